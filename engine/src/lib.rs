@@ -1,0 +1,1 @@
+//! Runs a Papilla model: ONNX and its card behind a small trait.

@@ -1,0 +1,1 @@
+//! Finite-element fingertip: scenes, solver, atlas, dataset.

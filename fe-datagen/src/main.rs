@@ -1,0 +1,2 @@
+//! `fe-datagen` command line.
+fn main() {}

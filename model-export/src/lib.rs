@@ -1,0 +1,1 @@
+//! Checks, evaluates and describes exported Papilla models.

@@ -1,0 +1,2 @@
+//! `model-export` command line.
+fn main() {}

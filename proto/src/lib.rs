@@ -1,0 +1,1 @@
+//! Wire contract of Papilla: frames, messages, maps, atlas.

@@ -1,0 +1,2 @@
+//! Papilla service.
+fn main() {}

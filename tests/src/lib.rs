@@ -1,0 +1,1 @@
+//! End-to-end tests and the load generator of Papilla.
