@@ -1,0 +1,190 @@
+//! The map: 224 x 224 samples, row-major, row 0 at the fingertip's far end.
+
+use crate::ErrorCode;
+
+/// Side of every map, pixels.
+pub const MAP_SIDE_PX: usize = 224;
+
+/// Number of samples of a map.
+pub const MAP_LEN: usize = MAP_SIDE_PX * MAP_SIDE_PX;
+
+/// Room above the greatest trained pressure, as a factor.
+///
+/// A map at the very maximum that went through f16, u8 or a PNG may come back
+/// a rounding step above it; such a map is not out of range.
+pub const PRESSURE_HEADROOM: f32 = 1.01;
+
+/// What is wrong with a pressure map. Rows and columns count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MapError {
+    /// Another number of samples than [`MAP_LEN`].
+    #[error("the map has {samples} samples, 224 x 224 = 50176 are needed")]
+    WrongLength {
+        /// Samples found.
+        samples: usize,
+    },
+    /// NaN or an infinity.
+    #[error("the sample at row {row}, column {column} is {value}; send finite pressures in Pa")]
+    NotFinite {
+        /// Row of the sample.
+        row: usize,
+        /// Column of the sample.
+        column: usize,
+        /// The sample, Pa.
+        value: f32,
+    },
+    /// Below zero.
+    #[error("the pressure at row {row}, column {column} is {value} Pa; it cannot be below zero")]
+    Negative {
+        /// Row of the sample.
+        row: usize,
+        /// Column of the sample.
+        column: usize,
+        /// The sample, Pa.
+        value: f32,
+    },
+    /// Above what the model was trained on.
+    #[error(
+        "the pressure at row {row}, column {column} is {value} Pa; the model knows up to {pressure_max_pa} Pa"
+    )]
+    OutOfRange {
+        /// Row of the sample.
+        row: usize,
+        /// Column of the sample.
+        column: usize,
+        /// The sample, Pa.
+        value: f32,
+        /// Greatest pressure the model was trained on, Pa.
+        pressure_max_pa: f32,
+    },
+}
+
+impl MapError {
+    /// The wire code of this error.
+    #[must_use]
+    pub const fn code(&self) -> ErrorCode {
+        match self {
+            Self::WrongLength { .. } => ErrorCode::WrongLength,
+            Self::NotFinite { .. } => ErrorCode::NotFinite,
+            Self::Negative { .. } => ErrorCode::NegativePressure,
+            Self::OutOfRange { .. } => ErrorCode::OutOfRange,
+        }
+    }
+}
+
+/// What [`check_pressure`] learns on its way through the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapSummary {
+    /// Greatest pressure in the map, Pa.
+    pub peak_pa: f32,
+}
+
+impl MapSummary {
+    /// Whether nothing touches the finger: every sample is zero.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        self.peak_pa <= 0.0
+    }
+}
+
+/// Checks a pressure map, Pa: length, finite, not negative, not above
+/// `pressure_max_pa` x [`PRESSURE_HEADROOM`].
+///
+/// # Errors
+/// The first sample at fault, in row-major order.
+pub fn check_pressure(map_pa: &[f32], pressure_max_pa: f32) -> Result<MapSummary, MapError> {
+    if map_pa.len() != MAP_LEN {
+        return Err(MapError::WrongLength { samples: map_pa.len() });
+    }
+    let limit_pa = pressure_max_pa * PRESSURE_HEADROOM;
+    // One branch-free pass decides; only a bad map is searched for the culprit.
+    // NaN fails both comparisons.
+    let good = map_pa.iter().fold(true, |good, &p| good & (p >= 0.0) & (p <= limit_pa));
+    if good {
+        let peak_pa = map_pa.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak });
+        return Ok(MapSummary { peak_pa });
+    }
+    for (index, &value) in map_pa.iter().enumerate() {
+        let (row, column) = (index / MAP_SIDE_PX, index % MAP_SIDE_PX);
+        if !value.is_finite() {
+            return Err(MapError::NotFinite { row, column, value });
+        }
+        if value < 0.0 {
+            return Err(MapError::Negative { row, column, value });
+        }
+        if value > limit_pa {
+            return Err(MapError::OutOfRange { row, column, value, pressure_max_pa });
+        }
+    }
+    // Reached only if the limit itself is not a number.
+    Err(MapError::OutOfRange { row: 0, column: 0, value: map_pa[0], pressure_max_pa })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn wrong_lengths_are_refused() {
+        for samples in [0, 1, MAP_LEN - 1, MAP_LEN + 1] {
+            let error = check_pressure(&vec![0.0; samples], 1.0).unwrap_err();
+            assert_eq!(error, MapError::WrongLength { samples });
+            assert_eq!(error.code(), ErrorCode::WrongLength);
+        }
+    }
+
+    #[test]
+    fn a_zero_map_is_zero_even_with_minus_zeros() {
+        let mut map = vec![0.0; MAP_LEN];
+        map[7] = -0.0;
+        assert!(check_pressure(&map, 1.0).unwrap().is_zero());
+        map[MAP_LEN - 1] = f32::MIN_POSITIVE;
+        assert!(!check_pressure(&map, 1.0).unwrap().is_zero());
+    }
+
+    #[test]
+    fn a_limit_that_is_no_number_lets_nothing_through() {
+        assert!(check_pressure(&vec![1.0; MAP_LEN], f32::NAN).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn the_sample_at_fault_is_named(
+            index in 0..MAP_LEN,
+            value in prop_oneof![
+                Just(f32::NAN), Just(f32::INFINITY), Just(f32::NEG_INFINITY),
+                -1e9f32..-1e-30, 102.0f32..1e30,
+            ],
+        ) {
+            let mut map = vec![50.0; MAP_LEN];
+            map[index] = value;
+            let expected = (index / MAP_SIDE_PX, index % MAP_SIDE_PX);
+            let (code, place) = match check_pressure(&map, 100.0).unwrap_err() {
+                e @ (MapError::NotFinite { row, column, .. }
+                | MapError::Negative { row, column, .. }
+                | MapError::OutOfRange { row, column, .. }) => (e.code(), (row, column)),
+                e @ MapError::WrongLength { .. } => (e.code(), (0, 0)),
+            };
+            prop_assert_eq!(place, expected);
+            let due = if !value.is_finite() {
+                ErrorCode::NotFinite
+            } else if value < 0.0 {
+                ErrorCode::NegativePressure
+            } else {
+                ErrorCode::OutOfRange
+            };
+            prop_assert_eq!(code, due);
+        }
+
+        #[test]
+        fn the_peak_is_the_greatest_sample(index in 0..MAP_LEN, value in 0.0f32..=100.0) {
+            let mut map = vec![0.0; MAP_LEN];
+            map[index] = value;
+            let summary = check_pressure(&map, 100.0).unwrap();
+            prop_assert_eq!(summary.peak_pa.to_bits(), value.to_bits());
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The JSON messages of a session: the client's hello, the server's ready and errors.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{ErrorCode, Problem, SampleType};
+
+/// What a client says in text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ClientMessage {
+    /// Opens the session; must be the first message.
+    Hello(Hello),
+}
+
+/// Opens a session: what the client wants and how it will send it.
+///
+/// Unknown members are refused, so that a misspelt wish is not silently dropped.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hello {
+    /// Version of the protocol the client speaks: [`PROTOCOL_VERSION`](crate::PROTOCOL_VERSION).
+    pub version: u32,
+    /// Effects the scene calls for, by name; the tier must render them all.
+    #[serde(default)]
+    pub effects: Vec<String>,
+    /// Time a frame may spend in the server, us; also the deadline of frames
+    /// that name none. None: no deadline.
+    #[serde(default)]
+    pub budget_us: Option<u32>,
+    /// Tier by name. None: the server takes the most accurate that meets the budget.
+    #[serde(default)]
+    pub tier: Option<String>,
+    /// Sample type of the pressure frames and of their answers.
+    #[serde(default)]
+    pub sample_type: SampleType,
+    /// Pa per unit of u16 and u8 frames whose header says scale 0.
+    #[serde(default)]
+    pub pressure_scale_pa: Option<f32>,
+    /// Hash of the atlas the client draws with; refused if the tier has another.
+    #[serde(default)]
+    pub atlas_hash: Option<String>,
+}
+
+impl Default for Hello {
+    fn default() -> Self {
+        Self {
+            version: u32::from(crate::PROTOCOL_VERSION),
+            effects: Vec::new(),
+            budget_us: None,
+            tier: None,
+            sample_type: SampleType::F32,
+            pressure_scale_pa: None,
+            atlas_hash: None,
+        }
+    }
+}
+
+/// What a server says in text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum ServerMessage {
+    /// The session is open; binary frames may follow.
+    Ready(Ready),
+    /// Something was refused.
+    Error(SessionError),
+}
+
+/// The session is open, and on these terms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ready {
+    /// Version of the protocol the server speaks.
+    pub version: u32,
+    /// Number of the session, for logs.
+    pub session: u64,
+    /// The tier that will render.
+    pub tier: String,
+    /// Effects the tier renders.
+    pub effects: Vec<String>,
+    /// Hash of the tier's atlas.
+    pub atlas_hash: String,
+    /// Time from receipt to answer that the server expects on an idle machine, us.
+    pub predicted_latency_us: u64,
+    /// Deadline of frames that name none, us; None: no deadline.
+    pub budget_us: Option<u32>,
+    /// Columns of every map.
+    pub width: u32,
+    /// Rows of every map.
+    pub height: u32,
+    /// Sample type of frames both ways.
+    pub sample_type: SampleType,
+    /// Greatest pressure the tier takes, Pa.
+    pub pressure_max_pa: f32,
+    /// J/m3 per unit of u16 and u8 answers, 1 for floats. A map that would
+    /// clip raises it: the header of each answer has the last word.
+    pub sed_scale_j_per_m3: f32,
+}
+
+/// Something was refused; says whether the session goes on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SessionError {
+    /// The code.
+    pub code: ErrorCode,
+    /// What went wrong, where, and what to do about it.
+    pub message: String,
+    /// Name of the member or header field at fault.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub field: Option<String>,
+    /// Sequence of the frame at fault, where it could be read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<u32>,
+    /// Whether the server closes the session after this message.
+    pub closes: bool,
+}
+
+impl SessionError {
+    /// The session error that says `problem`.
+    #[must_use]
+    pub fn new(problem: Problem, sequence: Option<u32>, closes: bool) -> Self {
+        let Problem { code, message, field } = problem;
+        Self { code, message, field, sequence, closes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn the_smallest_hello_is_enough() {
+        let hello: ClientMessage =
+            serde_json::from_value(json!({"type": "hello", "version": 1})).unwrap();
+        assert_eq!(hello, ClientMessage::Hello(Hello::default()));
+    }
+
+    #[test]
+    fn misspelt_and_mistyped_members_are_refused() {
+        for bad in [
+            json!({"type": "hello", "version": 1, "teir": "x"}),
+            json!({"type": "hello"}),
+            json!({"type": "helo", "version": 1}),
+            json!({"version": 1}),
+            json!({"type": "hello", "version": 1, "sample_type": "f64"}),
+            json!({"type": "hello", "version": 1, "budget_us": -1}),
+            json!({"type": "hello", "version": 1, "budget_us": 1.5}),
+            json!({"type": "hello", "version": "1"}),
+            json!([]),
+        ] {
+            assert!(serde_json::from_value::<ClientMessage>(bad.clone()).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn an_error_says_whether_the_session_goes_on() {
+        let problem = Problem::new(ErrorCode::WrongLength, "short").at("payload");
+        let message = ServerMessage::Error(SessionError::new(problem, Some(4), false));
+        assert_eq!(
+            serde_json::to_value(&message).unwrap(),
+            json!({"type": "error", "code": "wrong_length", "message": "short",
+                   "field": "payload", "sequence": 4, "closes": false})
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn hellos_come_back(
+            effects in prop::collection::vec("[a-z_]{1,12}", 0..4),
+            budget_us in any::<Option<u32>>(),
+            tier in prop::option::of(".{0,20}"),
+            kind in 0u8..4,
+            scale in prop::option::of(1e-6f32..1e6),
+        ) {
+            let hello = ClientMessage::Hello(Hello {
+                version: 1,
+                effects,
+                budget_us,
+                tier,
+                sample_type: SampleType::from_wire(kind).unwrap(),
+                pressure_scale_pa: scale,
+                atlas_hash: None,
+            });
+            let text = serde_json::to_string(&hello).unwrap();
+            prop_assert_eq!(serde_json::from_str::<ClientMessage>(&text).unwrap(), hello);
+        }
+
+        #[test]
+        fn text_of_any_kind_does_not_panic(text in ".{0,200}") {
+            let _ = serde_json::from_str::<ClientMessage>(&text);
+            let _ = serde_json::from_str::<ServerMessage>(&text);
+        }
+    }
+}
