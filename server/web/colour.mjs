@@ -1,0 +1,129 @@
+// Colour maps, value scales and their wording. Viridis (pressure) and inferno (SED) are perceptually
+// uniform maps of matplotlib, computed here from the published degree-6 polynomial fits (M. Zucker,
+// CC0). The diverging map for differences is a straight path through OKLab, uniform by construction.
+
+export const TABLE_LEN = 256;
+
+const VIRIDIS = [
+  [0.2777273272234177, 0.005407344544966578, 0.3340998053353061],
+  [0.1050930431085774, 1.404613529898575, 1.384590162594685],
+  [-0.3308618287255563, 0.214847559468213, 0.09509516302823659],
+  [-4.634230498983486, -5.799100973351585, -19.33244095627987],
+  [6.228269936347081, 14.17993336680509, 56.69055260068105],
+  [4.776384997670288, -13.74514537774601, -65.35303263337234],
+  [-5.435455855934631, 4.645852612178535, 26.3124352495832],
+];
+const INFERNO = [
+  [0.0002189403691192265, 0.001651004631001012, -0.01948089843709184],
+  [0.1065134194856116, 0.5639564367884091, 3.932712388889277],
+  [11.60249308247187, -3.972853965665698, -15.9423941062914],
+  [-41.70399613139459, 17.43639888205313, 44.35414519872813],
+  [77.162935699427, -33.40235894210092, -81.80730925738993],
+  [-71.31942824499214, 32.62606426397723, 73.20951985803202],
+  [25.13112622477341, -12.24266895238567, -23.07032500287172],
+];
+
+const byte = (x) => Math.round(255 * Math.min(1, Math.max(0, x)));
+
+function fromPolynomial(fit) {
+  const table = new Uint8ClampedArray(4 * TABLE_LEN);
+  for (let i = 0; i < TABLE_LEN; i++) {
+    const t = i / (TABLE_LEN - 1);
+    for (let channel = 0; channel < 3; channel++) {
+      let value = 0;
+      for (let k = fit.length - 1; k >= 0; k--) value = value * t + fit[k][channel];
+      table[4 * i + channel] = byte(value);
+    }
+    table[4 * i + 3] = 255;
+  }
+  return table;
+}
+
+/** sRGB bytes of an OKLab colour (B. Ottosson's matrices). */
+function okLab(lightness, a, b) {
+  const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;
+  const m = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3;
+  const s = (lightness - 0.0894841775 * a - 1.291485548 * b) ** 3;
+  const gamma = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+  return [
+    byte(gamma(4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s)),
+    byte(gamma(-1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s)),
+    byte(gamma(-0.0041960863 * l - 0.7034186147 * m + 1.707614701 * s)),
+  ];
+}
+
+/** Blue (negative) through grey to red (positive). */
+function diverging() {
+  const table = new Uint8ClampedArray(4 * TABLE_LEN);
+  const low = { a: -0.045, b: -0.15 };
+  const high = { a: 0.17, b: 0.095 };
+  for (let i = 0; i < TABLE_LEN; i++) {
+    const t = (2 * i) / (TABLE_LEN - 1) - 1;
+    const end = t < 0 ? low : high;
+    const strength = Math.abs(t);
+    const rgb = okLab(0.95 - 0.43 * strength, end.a * strength, end.b * strength);
+    table.set([...rgb, 255], 4 * i);
+  }
+  return table;
+}
+
+/** RGBA bytes, 256 entries each. */
+export const TABLES = {
+  viridis: fromPolynomial(VIRIDIS),
+  inferno: fromPolynomial(INFERNO),
+  diverging: diverging(),
+};
+
+/** The next 'round' number at or above `value`: 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten. */
+export function roundUp(value) {
+  if (!(value > 0)) return 1;
+  const power = 10 ** Math.floor(Math.log10(value));
+  for (const step of [1, 1.5, 2, 3, 4, 5, 6, 8]) {
+    if (step * power >= value * (1 - 1e-9)) return step * power;
+  }
+  return 10 * power;
+}
+
+/** Upper end of a colour scale: grows at once, shrinks only after the peak stayed low for a while. */
+export class AutoRange {
+  constructor(least, holdMs = 1200) {
+    this.least = least;
+    this.holdMs = holdMs;
+    this.max = least;
+    this.lowSinceMs = 0;
+  }
+
+  /** Takes a new peak; true when the scale changed. */
+  update(peak, nowMs) {
+    const wanted = Math.max(this.least, roundUp(peak));
+    if (wanted === this.max) {
+      this.lowSinceMs = nowMs;
+      return false;
+    }
+    if (wanted < this.max && nowMs - this.lowSinceMs < this.holdMs) return false;
+    this.max = wanted;
+    this.lowSinceMs = nowMs;
+    return true;
+  }
+}
+
+const PREFIXES = [[1e6, 'M'], [1e3, 'k'], [1, ''], [1e-3, 'm']];
+
+/** Divisor and prefix in which `value` reads best, e.g. 24 000 -> [1000, 'k']. */
+export function prefixFor(value) {
+  return PREFIXES.find(([size]) => Math.abs(value) >= size) ?? [1, ''];
+}
+
+/** Up to three significant digits, without exponent for the sizes met here. */
+export function digits(value) {
+  if (value === 0) return '0';
+  const decimals = Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value)) + 1e-9));
+  return value.toFixed(Math.min(decimals, 6));
+}
+
+/** Value with its unit, e.g. `quantity(24100, 'Pa')` = '24.1 kPa'; J/m3 keeps no prefix below 10^4. */
+export function quantity(value, unit) {
+  if (value === 0) return `0 ${unit}`;
+  const [size, prefix] = unit === 'Pa' || Math.abs(value) >= 1e4 ? prefixFor(value) : [1, ''];
+  return `${digits(value / size)} ${prefix}${unit}`;
+}

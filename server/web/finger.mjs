@@ -1,0 +1,272 @@
+// The 3-D finger: the atlas's skin patch, painted with the SED beneath it, flattened where the
+// indenter stands, and turned by dragging. Drawn only when something changed.
+
+import { MAP_LEN, SIDE_PX } from './protocol.mjs';
+import { TABLES, TABLE_LEN } from './colour.mjs';
+import { computeNormals } from './atlas.mjs';
+import { indenterMesh } from './indenter.mjs';
+import { GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
+
+const FIELD_OF_VIEW_RAD = 0.5;
+const PITCH_LIMIT_RAD = 1.5;
+// The glass stands this far off the skin: coplanar faces would flicker.
+const GLASS_OFFSET_MM = 0.06;
+const UNIT = { sed: 0, mask: 1, table: 2 };
+
+export class FingerView {
+  /** Throws where the browser has no WebGL2. */
+  constructor(canvas, atlas) {
+    this.canvas = canvas;
+    this.atlas = atlas;
+    this.gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
+    if (!this.gl) throw new Error('this browser offers no WebGL2');
+    this.positions = Float32Array.from(atlas.skin.positionsMm);
+    this.normals = Float32Array.from(atlas.normals);
+    this.sed = new Float32Array(MAP_LEN);
+    this.sedMax = 1;
+    this.decades = 0;
+    this.press = null;
+    this.yaw = 0.5;
+    this.pitch = 0.35;
+    this.zoom = 1;
+    this.view = new Float32Array(16);
+    this.projection = new Float32Array(16);
+    this.model = new Float32Array(16);
+    this.origin = new Float32Array(3);
+    this.direction = new Float32Array(3);
+    this.dirty = true;
+    this.#measure();
+    this.#build();
+    canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+    canvas.addEventListener('webglcontextrestored', () => this.#build());
+    new ResizeObserver(() => { this.dirty = true; }).observe(canvas);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#readTheme());
+  }
+
+  /** Shows this map (J/m3) on a scale that ends at `max`; `decades` > 0 makes it logarithmic. */
+  setSed(values, max, decades) {
+    const { gl } = this;
+    this.sed.set(values);
+    this.sedMax = max;
+    this.decades = decades;
+    gl.activeTexture(gl.TEXTURE0 + UNIT.sed);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed);
+    this.dirty = true;
+  }
+
+  /** Flattens the skin against the indenter of `press` and shows it; null takes it away. */
+  setPress(press) {
+    const { positions, atlas, gl } = this;
+    const rest = atlas.skin.positionsMm;
+    this.press = press;
+    positions.set(rest);
+    if (press) {
+      for (let i = 0; i < press.overlapMm.length; i++) {
+        const w = press.overlapMm[i];
+        if (w <= 0) continue;
+        for (let k = 0; k < 3; k++) positions[3 * i + k] = rest[3 * i + k] - w * press.normal[k];
+      }
+      this.#updateIndenter(press);
+    }
+    computeNormals(atlas.triangles, positions, this.normals);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.position);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, positions);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.normal);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.normals);
+    this.dirty = true;
+  }
+
+  orbit(yaw, pitch) {
+    this.yaw += yaw;
+    this.pitch = Math.max(-PITCH_LIMIT_RAD, Math.min(PITCH_LIMIT_RAD, this.pitch + pitch));
+    this.dirty = true;
+  }
+
+  zoomBy(factor) {
+    this.zoom = Math.max(0.6, Math.min(4, this.zoom * factor));
+    this.dirty = true;
+  }
+
+  /** The point of the skin under a pointer event, into `hit`; false where it misses the finger. */
+  pick(event, hit) {
+    const box = this.canvas.getBoundingClientRect();
+    const x = (2 * (event.clientX - box.left)) / box.width - 1;
+    const y = 1 - (2 * (event.clientY - box.top)) / box.height;
+    this.#aimCamera();
+    const m = this.view;
+    const dx = x / this.projection[0];
+    const dy = y / this.projection[5];
+    // The view matrix is a rotation R and a shift s: the eye is at -R^T s, a ray d comes from R^T d.
+    for (let k = 0; k < 3; k++) {
+      this.direction[k] = m[4 * k] * dx + m[4 * k + 1] * dy - m[4 * k + 2];
+      this.origin[k] = -(m[4 * k] * m[12] + m[4 * k + 1] * m[13] + m[4 * k + 2] * m[14]);
+    }
+    return this.atlas.intersect(this.origin, this.direction, hit);
+  }
+
+  /** Draws if anything changed since the last call. */
+  draw() {
+    if (!this.dirty || this.gl.isContextLost()) return;
+    const { gl, canvas } = this;
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    const width = Math.round(canvas.clientWidth * ratio);
+    const height = Math.round(canvas.clientHeight * ratio);
+    if (width === 0 || height === 0) return;
+    if (canvas.width !== width || canvas.height !== height) {
+      canvas.width = width;
+      canvas.height = height;
+    }
+    this.dirty = false;
+    this.#aimCamera();
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    this.#drawSkin();
+    if (this.press) this.#drawIndenter();
+  }
+
+  #drawSkin() {
+    const { gl, skin } = this;
+    gl.useProgram(skin.handle);
+    gl.uniformMatrix4fv(skin.uniforms.u_view, false, this.view);
+    gl.uniformMatrix4fv(skin.uniforms.u_projection, false, this.projection);
+    gl.uniform1f(skin.uniforms.u_max, this.sedMax);
+    gl.uniform1f(skin.uniforms.u_decades, this.decades);
+    gl.uniform3fv(skin.uniforms.u_clay, this.clay);
+    gl.bindVertexArray(this.skinArray);
+    gl.drawElements(gl.TRIANGLES, this.atlas.triangles.length, gl.UNSIGNED_INT, 0);
+  }
+
+  #drawIndenter() {
+    const { gl, glass, press, model } = this;
+    for (let k = 0; k < 3; k++) {
+      model[k] = press.tangent[k];
+      model[4 + k] = press.bitangent[k];
+      model[8 + k] = press.normal[k];
+      model[12 + k] = press.pointMm[k] + (press.heightMm + GLASS_OFFSET_MM) * press.normal[k];
+    }
+    model[15] = 1;
+    gl.useProgram(glass.handle);
+    gl.uniformMatrix4fv(glass.uniforms.u_view, false, this.view);
+    gl.uniformMatrix4fv(glass.uniforms.u_projection, false, this.projection);
+    gl.uniformMatrix4fv(glass.uniforms.u_model, false, model);
+    gl.uniform3fv(glass.uniforms.u_tint, this.glassTint);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    gl.bindVertexArray(this.glassArray);
+    gl.drawArrays(gl.TRIANGLES, 0, this.glassCount);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  #updateIndenter(press) {
+    const key = `${press.shape} ${press.radiusMm}`;
+    if (key === this.glassKey) return;
+    this.glassKey = key;
+    const mesh = indenterMesh(press.shape, press.radiusMm);
+    this.glassCount = mesh.length / 6;
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers.glass);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, mesh, this.gl.STATIC_DRAW);
+  }
+
+  /** Centre and radius of the patch, for the camera. */
+  #measure() {
+    const p = this.atlas.skin.positionsMm;
+    this.centre = [0, 0, 0];
+    for (let k = 0; k < 3; k++) {
+      let [low, high] = [Infinity, -Infinity];
+      for (let i = k; i < p.length; i += 3) {
+        low = Math.min(low, p[i]);
+        high = Math.max(high, p[i]);
+      }
+      this.centre[k] = (low + high) / 2;
+    }
+    this.radius = 0;
+    for (let i = 0; i < p.length; i += 3) {
+      const r = Math.hypot(p[i] - this.centre[0], p[i + 1] - this.centre[1], p[i + 2] - this.centre[2]);
+      this.radius = Math.max(this.radius, r);
+    }
+  }
+
+  /** Camera axes at rest: right = -y, up = -x (the tip), towards the eye = -z (the pad). */
+  #aimCamera() {
+    const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
+    const rows = [
+      [0, -cy, -sy],
+      [-cp, -sp * sy, sp * cy],
+      [-sp, cp * sy, -cp * cy],
+    ];
+    const { view, projection, centre } = this;
+    view.fill(0);
+    view[15] = 1;
+    for (let row = 0; row < 3; row++) {
+      for (let k = 0; k < 3; k++) {
+        view[4 * k + row] = rows[row][k];
+        view[12 + row] -= rows[row][k] * centre[k];
+      }
+    }
+    const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
+    const far = (1.08 * this.radius) / (Math.sin(FIELD_OF_VIEW_RAD / 2) * this.zoom * Math.min(1, aspect));
+    view[14] -= far;
+    const [near, back] = [Math.max(1, far - 4 * this.radius), far + 4 * this.radius];
+    projection.fill(0);
+    projection[5] = 1 / Math.tan(FIELD_OF_VIEW_RAD / 2);
+    projection[0] = projection[5] / aspect;
+    projection[10] = (back + near) / (near - back);
+    projection[11] = -1;
+    projection[14] = (2 * back * near) / (near - back);
+  }
+
+  #readTheme() {
+    const style = getComputedStyle(this.canvas);
+    const rgb = (name) => style.getPropertyValue(name).trim().split(/\s+/).map((x) => Number(x) / 255);
+    this.clay = rgb('--clay');
+    this.glassTint = rgb('--glass');
+    this.dirty = true;
+  }
+
+  #build() {
+    const { gl, atlas } = this;
+    this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT);
+    this.glass = program(gl, GLASS_VERTEX, GLASS_FRAGMENT);
+    this.buffers = {};
+    const buffer = (name, data, usage) => {
+      this.buffers[name] = gl.createBuffer();
+      gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[name]);
+      gl.bufferData(gl.ARRAY_BUFFER, data, usage);
+    };
+    const attribute = (location, size, stride = 0, offset = 0) => {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, stride, offset);
+    };
+    this.skinArray = gl.createVertexArray();
+    gl.bindVertexArray(this.skinArray);
+    buffer('position', this.positions, gl.DYNAMIC_DRAW);
+    attribute(0, 3);
+    buffer('normal', this.normals, gl.DYNAMIC_DRAW);
+    attribute(1, 3);
+    buffer('uv', atlas.interface.uvPx, gl.STATIC_DRAW);
+    attribute(2, 2);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, atlas.triangles, gl.STATIC_DRAW);
+    this.glassArray = gl.createVertexArray();
+    gl.bindVertexArray(this.glassArray);
+    buffer('glass', new Float32Array(6), gl.STATIC_DRAW);
+    attribute(0, 3, 24);
+    attribute(1, 3, 24, 12);
+    this.glassKey = '';
+    this.glassCount = 0;
+    gl.bindVertexArray(null);
+    const mask = atlas.interface.raster.mask.map((inside) => 255 * inside);
+    texture(gl, UNIT.mask, gl.R8, SIDE_PX, SIDE_PX, gl.RED, gl.UNSIGNED_BYTE, mask, gl.NEAREST);
+    texture(gl, UNIT.table, gl.RGBA, TABLE_LEN, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(TABLES.inferno.buffer), gl.LINEAR);
+    texture(gl, UNIT.sed, gl.R32F, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed, gl.NEAREST);
+    gl.useProgram(this.skin.handle);
+    gl.uniform1i(this.skin.uniforms.u_sed, UNIT.sed);
+    gl.uniform1i(this.skin.uniforms.u_mask, UNIT.mask);
+    gl.uniform1i(this.skin.uniforms.u_table, UNIT.table);
+    this.#readTheme();
+  }
+}

@@ -1,0 +1,134 @@
+// Shaders of the 3-D finger and the little WebGL2 that goes with them.
+
+/** Compiles and links; throws with the driver's own words. */
+export function program(gl, vertexSource, fragmentSource) {
+  const linked = gl.createProgram();
+  for (const [type, source] of [[gl.VERTEX_SHADER, vertexSource], [gl.FRAGMENT_SHADER, fragmentSource]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS) && !gl.isContextLost()) {
+      throw new Error(`shader: ${gl.getShaderInfoLog(shader)}`);
+    }
+    gl.attachShader(linked, shader);
+  }
+  gl.linkProgram(linked);
+  if (!gl.getProgramParameter(linked, gl.LINK_STATUS) && !gl.isContextLost()) {
+    throw new Error(`program: ${gl.getProgramInfoLog(linked)}`);
+  }
+  const uniforms = {};
+  const count = gl.getProgramParameter(linked, gl.ACTIVE_UNIFORMS) ?? 0;
+  for (let k = 0; k < count; k++) {
+    const { name } = gl.getActiveUniform(linked, k);
+    uniforms[name] = gl.getUniformLocation(linked, name);
+  }
+  return { handle: linked, uniforms };
+}
+
+/** A texture read texel by texel (no filter: float textures have none without an extension). */
+export function texture(gl, unit, internalFormat, width, height, format, type, data, filter) {
+  const made = gl.createTexture();
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(gl.TEXTURE_2D, made);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texImage2D(gl.TEXTURE_2D, 0, internalFormat, width, height, 0, format, type, data);
+  for (const which of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, which, filter);
+  for (const which of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, which, gl.CLAMP_TO_EDGE);
+  return made;
+}
+
+const CAMERA = `
+uniform mat4 u_view;
+uniform mat4 u_projection;
+`;
+
+export const SKIN_VERTEX = `#version 300 es
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in vec3 a_normal;
+layout(location = 2) in vec2 a_uv;
+${CAMERA}
+out vec3 v_view;
+out vec3 v_normal;
+out vec2 v_uv;
+void main() {
+  vec4 p = u_view * vec4(a_position, 1.0);
+  v_view = p.xyz;
+  v_normal = mat3(u_view) * a_normal;
+  v_uv = a_uv;
+  gl_Position = u_projection * p;
+}`;
+
+// The map is read bilinearly between the pixels inside the mask; outside it holds 0, which would
+// darken the rim. Skin without SED keeps the colour of clay, so that the shape stays visible.
+export const SKIN_FRAGMENT = `#version 300 es
+precision highp float;
+uniform highp sampler2D u_sed;
+uniform sampler2D u_mask;
+uniform sampler2D u_table;
+uniform float u_max;
+uniform float u_decades;
+uniform vec3 u_clay;
+in vec3 v_view;
+in vec3 v_normal;
+in vec2 v_uv;
+out vec4 colour;
+
+float sed() {
+  vec2 at = v_uv - 0.5;
+  ivec2 low = ivec2(floor(at));
+  vec2 f = at - floor(at);
+  float sum = 0.0;
+  float weight = 0.0;
+  for (int k = 0; k < 4; k++) {
+    ivec2 step = ivec2(k & 1, k >> 1);
+    ivec2 p = clamp(low + step, ivec2(0), ivec2(223));
+    float w = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y) * texelFetch(u_mask, p, 0).r;
+    sum += w * texelFetch(u_sed, p, 0).r;
+    weight += w;
+  }
+  return weight > 0.0 ? sum / weight : 0.0;
+}
+
+void main() {
+  float t = sed() / u_max;
+  if (u_decades > 0.0) t = t > 0.0 ? 1.0 + log2(t) / (3.321928 * u_decades) : 0.0;
+  t = clamp(t, 0.0, 1.0);
+  vec3 painted = texture(u_table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
+  vec3 base = mix(u_clay, painted, smoothstep(0.0, 0.1, t));
+  vec3 n = normalize(v_normal);
+  vec3 eye = normalize(-v_view);
+  bool inside = !gl_FrontFacing;
+  if (inside) n = -n;
+  float key = 0.5 + 0.5 * dot(n, normalize(vec3(-0.35, 0.55, 0.75)));
+  float light = 0.38 + 0.62 * key * key;
+  float gloss = 0.10 * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
+  float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
+  vec3 lit = base * light + gloss + rim * u_clay;
+  colour = vec4(inside ? u_clay * 0.32 * light : lit, 1.0);
+}`;
+
+export const GLASS_VERTEX = `#version 300 es
+layout(location = 0) in vec3 a_position;
+layout(location = 1) in vec3 a_normal;
+${CAMERA}
+uniform mat4 u_model;
+out vec3 v_view;
+out vec3 v_normal;
+void main() {
+  vec4 p = u_view * u_model * vec4(a_position, 1.0);
+  v_view = p.xyz;
+  v_normal = mat3(u_view) * mat3(u_model) * a_normal;
+  gl_Position = u_projection * p;
+}`;
+
+export const GLASS_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 u_tint;
+in vec3 v_view;
+in vec3 v_normal;
+out vec4 colour;
+void main() {
+  float across = 1.0 - abs(dot(normalize(v_normal), normalize(v_view)));
+  float alpha = 0.07 + 0.5 * across * across * across;
+  colour = vec4(u_tint * alpha, alpha);
+}`;

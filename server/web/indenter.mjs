@@ -1,0 +1,64 @@
+// Meshes of the indenters, in their own frame: x along the first tangent, y along the second, z out
+// of the finger; the lowest point at the origin; mm.
+
+const PLATE_MM = { half: 10, thick: 1.2 };
+const BAR_HALF_MM = 10;
+const ROUND = 48;
+
+/** Interleaved positions and normals (6 floats a vertex), plain triangles. */
+export function indenterMesh(shape, radiusMm) {
+  const vertices = [];
+  if (shape === 'plate') box(vertices);
+  else if (shape === 'sphere') sphere(vertices, radiusMm);
+  else bar(vertices, radiusMm);
+  return Float32Array.from(vertices);
+}
+
+function quad(out, corners, normals) {
+  for (const k of [0, 1, 2, 0, 2, 3]) out.push(...corners[k], ...normals[k]);
+}
+
+function box(out) {
+  const { half, thick } = PLATE_MM;
+  const point = (axis, side, a, b) => {
+    const p = [0, 0, 0];
+    p[axis] = side;
+    p[(axis + 1) % 3] = a;
+    p[(axis + 2) % 3] = b;
+    return [p[0] * half, p[1] * half, (p[2] + 1) * 0.5 * thick];
+  };
+  for (let axis = 0; axis < 3; axis++) {
+    for (const side of [-1, 1]) {
+      const normal = [0, 0, 0];
+      normal[axis] = side;
+      const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([a, b]) => point(axis, side, a, b));
+      quad(out, corners, [normal, normal, normal, normal]);
+    }
+  }
+}
+
+function sphere(out, radius) {
+  const point = (i, j) => {
+    const [polar, round] = [(i * Math.PI) / (ROUND / 2), (j * 2 * Math.PI) / ROUND];
+    const n = [Math.sin(polar) * Math.cos(round), Math.sin(polar) * Math.sin(round), -Math.cos(polar)];
+    return { n, p: [radius * n[0], radius * n[1], radius * (n[2] + 1)] };
+  };
+  for (let i = 0; i < ROUND / 2; i++) {
+    for (let j = 0; j < ROUND; j++) {
+      const corners = [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
+      quad(out, corners.map((c) => c.p), corners.map((c) => c.n));
+    }
+  }
+}
+
+function bar(out, radius) {
+  const point = (j, y) => {
+    const round = (j * 2 * Math.PI) / ROUND;
+    const n = [Math.sin(round), 0, -Math.cos(round)];
+    return { n, p: [radius * n[0], y, radius * (n[2] + 1)] };
+  };
+  for (let j = 0; j < ROUND; j++) {
+    const corners = [point(j, -BAR_HALF_MM), point(j + 1, -BAR_HALF_MM), point(j + 1, BAR_HALF_MM), point(j, BAR_HALF_MM)];
+    quad(out, corners.map((c) => c.p), corners.map((c) => c.n));
+  }
+}

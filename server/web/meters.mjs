@@ -1,0 +1,105 @@
+// The numbers beside the maps: latency, rate, counts, force, errors. Text changes four times a
+// second, so that it can be read and layout stays cheap.
+
+import { Stats, drawStrip } from './stats.mjs';
+
+const REFRESH_MS = 250;
+const LATE_TO_TELL = 5;
+
+const byId = (id) => document.getElementById(id);
+const put = (id, text) => {
+  const element = byId(id);
+  if (element.textContent !== text) element.textContent = text;
+};
+const ms = (value) => (Number.isNaN(value) ? '–' : value < 100 ? value.toFixed(1) : value.toFixed(0));
+const percent = (value) => {
+  if (Number.isNaN(value)) return '–';
+  const size = 100 * value;
+  return `${Math.abs(size) < 10 ? size.toFixed(2) : size.toFixed(1)} %`;
+};
+const signed = (value) => (value > 0 ? `+${percent(value)}` : percent(value).replace('-', '−'));
+
+export class Meters {
+  constructor() {
+    this.stats = new Stats();
+    this.pair = [NaN, NaN];
+    this.budgetMs = 0;
+    this.shownAtMs = 0;
+    this.errorsNow = null;
+    this.errorsShown = true;
+    this.pressNow = null;
+    this.tier = '–';
+    this.predictedMs = NaN;
+  }
+
+  /** A new tier or budget: a new measurement. */
+  restart(budgetMs) {
+    this.stats.clear();
+    this.budgetMs = budgetMs;
+    this.tier = '–';
+  }
+
+  ready(ready) {
+    this.tier = ready.tier;
+    this.predictedMs = ready.predicted_latency_us / 1000;
+  }
+
+  answer(answer, roundTripMs, nowMs) {
+    this.stats.answer(answer.status, roundTripMs, answer.serverUs, nowMs);
+  }
+
+  fault() {
+    this.stats.counts.error++;
+  }
+
+  skip() {
+    this.stats.counts.skipped++;
+  }
+
+  press(press) {
+    this.pressNow = press;
+  }
+
+  errors(figures) {
+    this.errorsNow = figures;
+    this.errorsShown = false;
+  }
+
+  /** Writes what changed; `sending` tells a pause from a stall. */
+  refresh(nowMs, sending) {
+    if (nowMs - this.shownAtMs < REFRESH_MS) return;
+    this.shownAtMs = nowMs;
+    const { stats, pair } = this;
+    put('tier-name', this.tier);
+    put('rate', sending ? `${stats.rate(nowMs)} frames/s` : 'idle');
+    for (const [name, ring] of [['trip', stats.roundTripMs], ['server', stats.serverMs]]) {
+      ring.percentiles(pair);
+      put(`${name}-p50`, ms(pair[0]));
+      put(`${name}-p99`, ms(pair[1]));
+      byId(`${name}-p99`).classList.toggle('bad', pair[1] > this.budgetMs);
+    }
+    for (const [name, count] of Object.entries(stats.counts)) put(`count-${name}`, String(count));
+    byId('count-late').classList.toggle('bad', stats.lateInARow >= LATE_TO_TELL);
+    drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
+    put('strip-top', `line: budget ${this.budgetMs} ms`);
+    this.#showPress();
+    this.#showErrors();
+  }
+
+  #showPress() {
+    if (!this.pressNow) return;
+    const { forceN, areaMm2 } = this.pressNow;
+    put('force', `≈ ${forceN.toFixed(2)} N`);
+    put('area', `≈ ${areaMm2.toFixed(0)} mm²`);
+  }
+
+  #showErrors() {
+    if (this.errorsShown || !this.errorsNow) return;
+    this.errorsShown = true;
+    const figures = this.errorsNow;
+    put('error-l2', percent(figures.relativeL2));
+    put('error-far', percent(figures.farFieldL2));
+    put('error-peak', signed(figures.peak));
+    put('error-energy', signed(figures.energy));
+  }
+}

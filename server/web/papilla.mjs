@@ -1,0 +1,276 @@
+// The page: wires atlas, press, session, maps and figures together. One loop, driven by the display.
+
+import { Atlas } from './atlas.mjs';
+import { PressControl } from './control.mjs';
+import { FingerView } from './finger.mjs';
+import { LOG_DECADES, MapView } from './map.mjs';
+import { Meters } from './meters.mjs';
+import { Press } from './press.mjs';
+import { MAP_LEN, Session } from './protocol.mjs';
+import { Replay, fetchJson } from './replay.mjs';
+
+const byId = (id) => document.getElementById(id);
+const SED_UNIT = 'J/m³';
+
+class Page {
+  constructor(atlas) {
+    this.atlas = atlas;
+    this.mode = 'press';
+    this.press = new Press(atlas);
+    this.pressureMaxPa = Infinity;
+    this.unsent = true;
+    this.log = false;
+    this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN) };
+    this.answered = { sequence: 0, pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
+    this.meters = new Meters();
+    this.replay = new Replay(atlas);
+    this.#makeViews();
+    this.control = new PressControl(atlas, this.press, this.views.pressure);
+    if (this.finger) this.control.attachFinger(this.finger);
+    this.session = this.#makeSession();
+    this.#listen();
+    this.tick = (nowMs) => this.#frame(nowMs);
+  }
+
+  #makeViews() {
+    const { atlas } = this;
+    const view = (id, options) => new MapView(byId(id), options);
+    this.views = {
+      pressure: view('pressure', { table: 'viridis', unit: 'Pa', least: 1000 }),
+      sed: view('sed', { table: 'inferno', unit: SED_UNIT, least: 1 }),
+      truth: view('truth', { table: 'inferno', unit: SED_UNIT, least: 1 }),
+      difference: view('difference', { table: 'diverging', unit: SED_UNIT, least: 1, signed: true }),
+    };
+    this.views.pressure.setPatch(atlas.skin.raster, atlas.mmPerPx);
+    for (const name of ['sed', 'truth', 'difference']) this.views[name].setPatch(atlas.interface.raster, atlas.mmPerPx);
+    try {
+      this.finger = new FingerView(byId('finger'), atlas);
+    } catch (error) {
+      this.finger = null;
+      byId('no-webgl').hidden = false;
+      byId('no-webgl').textContent = `The 3-D finger cannot be drawn: ${error.message}. The maps work without it.`;
+    }
+  }
+
+  #makeSession() {
+    const url = new URL('v1/session', document.baseURI);
+    url.protocol = url.protocol === 'https:' ? 'wss:' : 'ws:';
+    return new Session(url.href, {
+      onstate: (state, detail) => showState(state, detail),
+      onready: (ready) => this.#ready(ready),
+      onanswer: (answer, roundTripMs) => this.#answer(answer, roundTripMs),
+      onfault: (code, message) => {
+        this.meters.fault();
+        notify(code === 'atlas_mismatch' ? `${message} Reload the page to fetch the server's atlas.` : message);
+      },
+    });
+  }
+
+  start() {
+    this.#open();
+    requestAnimationFrame(this.tick);
+  }
+
+  #open() {
+    const budgetUs = Number(byId('budget').value);
+    this.meters.restart(budgetUs / 1000);
+    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash });
+  }
+
+  #ready(ready) {
+    this.pressureMaxPa = ready.pressure_max_pa > 0 ? ready.pressure_max_pa : Infinity;
+    this.control.changed = true;
+    this.unsent = true;
+    this.meters.ready(ready);
+    notify('');
+  }
+
+  #answer(answer, roundTripMs) {
+    const nowMs = performance.now();
+    this.meters.answer(answer, roundTripMs, nowMs);
+    if (answer.status !== 'ok') {
+      this.unsent = true;
+      return;
+    }
+    this.answered.sequence = answer.sequence;
+    this.answered.pressurePa.set(this.sent.pressurePa);
+    this.answered.sedJPerM3.set(answer.sedJPerM3);
+    this.#showSed(nowMs);
+    if (this.sent.mode === 'replay' && this.mode === 'replay') this.#showErrors(nowMs);
+  }
+
+  #showSed(nowMs) {
+    const { sed } = this.views;
+    sed.show(this.answered.sedJPerM3, nowMs);
+    this.finger?.setSed(this.answered.sedJPerM3, sed.range.max, this.log ? LOG_DECADES : 0);
+  }
+
+  #showErrors(nowMs) {
+    const { truth, difference, sed } = this.views;
+    this.meters.errors(this.replay.judge(this.answered.sedJPerM3));
+    truth.show(this.replay.truth, nowMs, sed.range);
+    difference.show(this.replay.difference, nowMs);
+  }
+
+  /** One display frame: newest press, its map, and the map on its way if no answer is due. */
+  #frame(nowMs) {
+    requestAnimationFrame(this.tick);
+    const map = this.session.frame.pressurePa;
+    const changed = this.mode === 'press' ? this.#stepPress(nowMs, map) : this.#stepReplay(nowMs, map);
+    if (changed) {
+      if (this.unsent && this.session.inFlight) this.meters.skip();
+      this.unsent = true;
+      this.views.pressure.show(map, nowMs);
+    }
+    const ready = this.mode === 'press' || this.replay.press;
+    if (ready && (this.unsent || byId('stream').checked)) this.#send(nowMs, map);
+    this.finger?.draw();
+    this.meters.refresh(nowMs, this.unsent || byId('stream').checked);
+  }
+
+  #send(nowMs, map) {
+    if (!this.session.send(nowMs)) return;
+    this.unsent = false;
+    this.sent.mode = this.mode;
+    this.sent.pressurePa.set(map);
+    if (this.mode === 'replay') this.replay.rememberTruth();
+  }
+
+  #stepPress(nowMs, map) {
+    if (!this.control.step(nowMs)) return false;
+    const { press, control } = this;
+    press.evaluate(control.depthMm, this.pressureMaxPa);
+    this.atlas.skin.raster.rasterise(press.pressurePa, map);
+    this.views.pressure.setMarker(press.uvPx);
+    this.finger?.setPress(press);
+    this.meters.press(press);
+    return true;
+  }
+
+  #stepReplay(nowMs, map) {
+    if (!this.replay.press || !this.replay.step(nowMs)) return false;
+    this.replay.pressureInto(map);
+    const depth = this.replay.press.depth_mm?.[this.replay.sample];
+    byId('replay-sample').value = String(this.replay.sample);
+    byId('replay-out').textContent = depth === undefined ? `${this.replay.sample + 1}` : `${depth.toFixed(2)} mm`;
+    return true;
+  }
+
+  #listen() {
+    for (const input of document.querySelectorAll('input[name=mode]')) {
+      input.addEventListener('change', () => this.#setMode(input.value));
+    }
+    byId('controls').addEventListener('submit', (event) => event.preventDefault());
+    byId('tier').addEventListener('change', () => this.#open());
+    byId('budget').addEventListener('change', () => this.#open());
+    byId('log').addEventListener('change', () => {
+      this.log = byId('log').checked;
+      for (const name of ['sed', 'truth']) this.views[name].setLogarithmic(this.log, performance.now());
+      this.#showSed(performance.now());
+    });
+    byId('replay-press').addEventListener('change', () => this.#loadPress());
+    byId('replay-sample').addEventListener('input', () => {
+      this.#play(false);
+      this.replay.choose(Number(byId('replay-sample').value));
+    });
+    byId('replay-play').addEventListener('click', () => this.#play(!this.replay.playing));
+  }
+
+  #setMode(mode) {
+    this.mode = mode;
+    document.body.dataset.mode = mode;
+    this.control.changed = true;
+    this.replay.changed = true;
+    if (mode === 'replay') {
+      this.views.pressure.setMarker(null);
+      this.finger?.setPress(null);
+      if (this.replay.presses.length === 0) this.#listPresses();
+    }
+  }
+
+  async #listPresses() {
+    try {
+      const presses = await this.replay.loadList();
+      byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(pressName(press), String(press.id ?? n))));
+      if (presses.length === 0) notify('This server ships no FE presses to replay.');
+      else await this.#loadPress();
+    } catch (error) {
+      notify(error.message);
+    }
+  }
+
+  async #loadPress() {
+    try {
+      if (!(await this.replay.load(byId('replay-press').value))) return;
+      byId('replay-sample').max = String(this.replay.sampleCount - 1);
+    } catch (error) {
+      notify(error.message);
+    }
+  }
+
+  #play(on) {
+    this.replay.playing = on;
+    byId('replay-play').setAttribute('aria-pressed', String(on));
+    byId('replay-play').textContent = on ? 'Pause' : 'Play';
+  }
+}
+
+function pressName(press) {
+  const angles = ['pitch', 'roll', 'yaw'].filter((name) => press[`${name}_deg`] !== undefined);
+  const words = angles.map((name) => `${name} ${press[`${name}_deg`].toFixed(0)}°`);
+  return [`#${press.id}`, ...words].join(' · ');
+}
+
+function showState(state, detail) {
+  const words = { connecting: 'connecting', ready: 'connected', waiting: 'disconnected', refused: 'refused' };
+  byId('state').dataset.state = state;
+  byId('state-text').textContent = detail ? `${words[state]}: ${detail}` : words[state];
+}
+
+function notify(message) {
+  byId('notice').textContent = message;
+  byId('notice').hidden = message === '';
+}
+
+async function listTiers() {
+  const { tiers } = await fetchJson('v1/tiers');
+  byId('tier').append(...tiers.map((tier) => {
+    const ms = tier.predicted_latency_us > 0 ? ` (${(tier.predicted_latency_us / 1000).toFixed(0)} ms)` : '';
+    return new Option(`${tier.name}${ms}`, tier.name);
+  }));
+}
+
+/** Says on the page whether this raster equals the server's own mask, pixel by pixel. */
+async function checkMasks(atlas) {
+  const words = [];
+  for (const patch of ['skin', 'interface']) {
+    const response = await fetch(`v1/atlas/mask.png?patch=${patch}`);
+    if (!response.ok) throw new Error(`v1/atlas/mask.png: HTTP ${response.status}`);
+    const image = await createImageBitmap(await response.blob(), { colorSpaceConversion: 'none' });
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const differing = atlas[patch].raster.countMaskDifferences(context.getImageData(0, 0, image.width, image.height).data);
+    if (differing > 0) words.push(`${differing} pixels of the ${patch} mask differ from the server's`);
+  }
+  byId('mask-check').textContent = words.length ? words.join(', ') : '(masks equal the server’s)';
+  byId('mask-check').classList.toggle('bad', words.length > 0);
+}
+
+document.body.dataset.mode = 'press';
+document.querySelector('input[name=mode][value=press]').checked = true;
+try {
+  const atlas = new Atlas(await fetchJson('v1/atlas'));
+  byId('atlas-hash').textContent = atlas.hash.slice(0, 12);
+  await listTiers();
+  const page = new Page(atlas);
+  page.start();
+  // For the console and the tests: the last answered pair of maps and what the page holds.
+  globalThis.papilla = page;
+  await checkMasks(atlas);
+} catch (error) {
+  showState('waiting', '');
+  byId('state').dataset.state = 'failed';
+  byId('state-text').textContent = 'not working';
+  notify(`${error.message}. Reload the page to try again.`);
+  throw error;
+}

@@ -1,0 +1,164 @@
+// The visitor's press: a rigid indenter on an elastic foundation. This is an ESTIMATE of the
+// pressure a finger would meet, good enough to play with; the FE presses are the reference.
+//
+// The indenter approaches along the inward skin normal at the chosen point. From its first touch it
+// goes `depthMm` further; a vertex that it overlaps by w carries p = STIFFNESS (SHARE depth - gap)+,
+// gap being how far the vertex lies behind the first touch. SHARE = 1/2 is Hertz's answer: of the
+// depth, half is taken by the skin beside the contact, which a plain (Winkler) foundation ignores.
+
+/** Foundation stiffness, Pa/mm, and the share of the depth felt under the indenter. */
+export const FOUNDATION = { stiffnessPaPerMm: 30000, share: 0.5 };
+
+/** Limits of the controls, mm; S1's campaign goes to 2.0 mm. */
+export const DEPTH_MAX_MM = 2;
+const PLATE_HALF_MM = 10;
+const PLATE_ROUNDING_MM = 1;
+/** An edge or a sphere wider than this beside its axis is not in the way. */
+const FACING = 0.05;
+
+/** Evaluates presses on one atlas without allocating. */
+export class Press {
+  constructor(atlas) {
+    this.atlas = atlas;
+    this.shape = 'plate';
+    this.radiusMm = 4;
+    this.angleRad = 0;
+    this.hit = { triangle: 0, weightB: 0, weightC: 0 };
+    this.pointMm = new Float32Array(3);
+    this.uvPx = new Float32Array(2);
+    /** Right-handed frame of the indenter: two tangents and the outward normal. */
+    this.tangent = new Float32Array(3);
+    this.bitangent = new Float32Array(3);
+    this.normal = new Float32Array(3);
+    this.pressurePa = new Float32Array(atlas.vertexCount);
+    /** Overlap of each vertex with the indenter, mm: what the drawing flattens. */
+    this.overlapMm = new Float32Array(atlas.vertexCount);
+    this.gapMm = new Float32Array(atlas.vertexCount);
+    this.forceN = 0;
+    this.areaMm2 = 0;
+    this.peakPa = 0;
+    /** Signed height of the indenter's lowest point over the chosen skin point, mm. */
+    this.heightMm = 0;
+    this.touchMm = 0;
+    this.#aim();
+  }
+
+  /** Moves to a pixel position of the skin map; false outside the patch. */
+  moveToPixel(u, v) {
+    if (!this.atlas.locate(u, v, this.hit)) return false;
+    this.#aim();
+    return true;
+  }
+
+  /** Moves to a point of the skin found by `Atlas.intersect`. */
+  moveToHit(hit) {
+    this.hit.triangle = hit.triangle;
+    this.hit.weightB = hit.weightB;
+    this.hit.weightC = hit.weightC;
+    this.#aim();
+  }
+
+  /** Changes shape ('plate' | 'sphere' | 'edge'), radius and the edge's direction. */
+  setShape(shape, radiusMm, angleRad) {
+    this.shape = shape;
+    this.radiusMm = radiusMm;
+    this.angleRad = angleRad;
+    this.#aim();
+  }
+
+  /** Pressure of every vertex at this depth; also force, area and peak. */
+  evaluate(depthMm, pressureMaxPa) {
+    const { pressurePa, overlapMm, gapMm } = this;
+    const { areasMm2 } = this.atlas;
+    const felt = FOUNDATION.share * depthMm;
+    this.forceN = 0;
+    this.areaMm2 = 0;
+    this.peakPa = 0;
+    this.heightMm = this.touchMm - depthMm;
+    for (let i = 0; i < pressurePa.length; i++) {
+      overlapMm[i] = Math.max(0, depthMm - gapMm[i]);
+      const p = Math.min(pressureMaxPa, FOUNDATION.stiffnessPaPerMm * Math.max(0, felt - gapMm[i]));
+      pressurePa[i] = p;
+      if (p > 0) {
+        this.forceN += 1e-6 * p * areasMm2[i];
+        this.areaMm2 += areasMm2[i];
+        if (p > this.peakPa) this.peakPa = p;
+      }
+    }
+  }
+
+  /** Frame and gaps for the present point and shape. */
+  #aim() {
+    const { atlas, normal, tangent, bitangent, pointMm } = this;
+    atlas.interpolate(atlas.skin.positionsMm, 3, this.hit, pointMm);
+    atlas.interpolate(atlas.skin.uvPx, 2, this.hit, this.uvPx);
+    atlas.interpolate(atlas.smoothNormals, 3, this.hit, normal);
+    const length = Math.hypot(normal[0], normal[1], normal[2]) || 1;
+    for (let k = 0; k < 3; k++) normal[k] /= length;
+    // The finger's own axis (x), made perpendicular to the normal; at the very tip take y.
+    const axis = Math.abs(normal[0]) < 0.95 ? 0 : 1;
+    let size = 0;
+    for (let k = 0; k < 3; k++) {
+      tangent[k] = (k === axis ? 1 : 0) - normal[axis] * normal[k];
+      size += tangent[k] ** 2;
+    }
+    for (let k = 0; k < 3; k++) tangent[k] /= Math.sqrt(size);
+    cross(normal, tangent, bitangent);
+    const cos = Math.cos(this.angleRad);
+    const sin = Math.sin(this.angleRad);
+    for (let k = 0; k < 3; k++) {
+      const t = tangent[k];
+      tangent[k] = cos * t + sin * bitangent[k];
+      bitangent[k] = cos * bitangent[k] - sin * t;
+    }
+    this.#measureGaps();
+  }
+
+  /** Gap of each vertex to the indenter when it first touches; Infinity beside or behind it. */
+  #measureGaps() {
+    const { gapMm, normal: n, tangent: t, bitangent: b, pointMm: o } = this;
+    const { positionsMm: p } = this.atlas.skin;
+    const { normals } = this.atlas;
+    let first = -Infinity;
+    for (let i = 0, k = 0; i < gapMm.length; i++, k += 3) {
+      const x = p[k] - o[0];
+      const y = p[k + 1] - o[1];
+      const z = p[k + 2] - o[2];
+      const facing = normals[k] * n[0] + normals[k + 1] * n[1] + normals[k + 2] * n[2];
+      const along = x * t[0] + y * t[1] + z * t[2];
+      const across = x * b[0] + y * b[1] + z * b[2];
+      const height = x * n[0] + y * n[1] + z * n[2];
+      const reach = facing > FACING ? height - this.#profile(along, across) : -Infinity;
+      gapMm[i] = reach;
+      if (reach > first) first = reach;
+    }
+    // A small indenter may fall between the vertices of a coarse mesh: it then touches nothing.
+    if (first === -Infinity) first = 0;
+    this.touchMm = first;
+    for (let i = 0; i < gapMm.length; i++) gapMm[i] = first - gapMm[i];
+  }
+
+  /** Height of the indenter's surface over its lowest point, mm. */
+  #profile(along, across) {
+    if (this.shape === 'plate') {
+      return roundedEdge(Math.abs(along)) + roundedEdge(Math.abs(across));
+    }
+    // The edge is a round bar along `bitangent`: at 0 degrees it lies across the finger.
+    const offset = this.shape === 'sphere' ? Math.hypot(along, across) : along;
+    const r = this.radiusMm;
+    if (Math.abs(offset) >= r || Math.abs(across) > PLATE_HALF_MM) return Infinity;
+    return r - Math.sqrt(r * r - offset * offset);
+  }
+}
+
+function roundedEdge(distanceMm) {
+  const over = distanceMm - (PLATE_HALF_MM - PLATE_ROUNDING_MM);
+  if (over <= 0) return 0;
+  return over >= PLATE_ROUNDING_MM ? Infinity : PLATE_ROUNDING_MM - Math.sqrt(PLATE_ROUNDING_MM ** 2 - over * over);
+}
+
+function cross(a, b, out) {
+  out[0] = a[1] * b[2] - a[2] * b[1];
+  out[1] = a[2] * b[0] - a[0] * b[2];
+  out[2] = a[0] * b[1] - a[1] * b[0];
+}

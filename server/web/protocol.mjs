@@ -1,0 +1,189 @@
+// Papilla's session protocol, client side: one WebSocket, a JSON hello, a JSON ready, then binary
+// frames of a 32-byte little-endian header and a row-major 224 x 224 payload (here always f32).
+
+export const SIDE_PX = 224;
+export const MAP_LEN = SIDE_PX * SIDE_PX;
+export const HEADER_BYTES = 32;
+export const STATUS = ['ok', 'superseded', 'late', 'error'];
+
+const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
+const VERSION = 1;
+const KIND = { pressure: 1, sed: 2 };
+const SAMPLE_F32 = 0;
+const TWO_POW_32 = 4294967296;
+const BACK_OFF_MS = { first: 250, last: 8000 };
+
+/** A request frame whose buffer is made once and refilled for every frame. */
+export class RequestFrame {
+  constructor() {
+    this.buffer = new ArrayBuffer(HEADER_BYTES + 4 * MAP_LEN);
+    this.header = new DataView(this.buffer, 0, HEADER_BYTES);
+    /** Pressure on the skin, Pa, row-major: write the map here. */
+    this.pressurePa = new Float32Array(this.buffer, HEADER_BYTES, MAP_LEN);
+    this.header.setUint32(0, MAGIC, true);
+    this.header.setUint8(4, VERSION);
+    this.header.setUint8(5, KIND.pressure);
+    this.header.setUint8(6, SAMPLE_F32);
+    this.header.setUint16(12, SIDE_PX, true);
+    this.header.setUint16(14, SIDE_PX, true);
+    this.header.setFloat32(28, 1, true);
+  }
+
+  /** Stamps the frame; the time is split by hand because a BigInt would be an allocation. */
+  stamp(sequence, timeUs) {
+    this.header.setUint32(8, sequence, true);
+    this.header.setUint32(16, timeUs % TWO_POW_32, true);
+    this.header.setUint32(20, timeUs / TWO_POW_32, true);
+  }
+}
+
+/** Reads an answer's header into `into`; throws an Error that says what is wrong with the frame. */
+export function readAnswer(data, into) {
+  if (data.byteLength < HEADER_BYTES) {
+    throw new Error(`answer of ${data.byteLength} bytes is shorter than its ${HEADER_BYTES}-byte header`);
+  }
+  const view = new DataView(data);
+  if (view.getUint32(0, true) !== MAGIC) throw new Error('answer does not start with PPL1');
+  if (view.getUint8(4) !== VERSION) throw new Error(`answer has protocol version ${view.getUint8(4)}`);
+  if (view.getUint8(5) !== KIND.sed) throw new Error(`answer is of kind ${view.getUint8(5)}, not SED`);
+  into.status = STATUS[view.getUint8(7)] ?? 'error';
+  into.sequence = view.getUint32(8, true);
+  into.serverUs = view.getUint32(24, true);
+  into.sedJPerM3 = null;
+  if (into.status === 'ok') {
+    const sampleType = view.getUint8(6);
+    if (sampleType !== SAMPLE_F32 || data.byteLength !== HEADER_BYTES + 4 * MAP_LEN) {
+      throw new Error(`answer of sample type ${sampleType} and ${data.byteLength} bytes is not an f32 map`);
+    }
+    into.sedJPerM3 = new Float32Array(data, HEADER_BYTES, MAP_LEN);
+  }
+  return into;
+}
+
+/**
+ * A session that keeps itself connected. At most one frame is in flight: `send` refuses while an
+ * answer is due, so the caller's newest map is always the next one sent.
+ *
+ * Callbacks: `onstate(state, detail)` with state connecting | ready | waiting | refused;
+ * `onready(ready)`; `onanswer(answer, roundTripMs)`; `onfault(code, message)`.
+ */
+export class Session {
+  constructor(url, callbacks) {
+    this.url = url;
+    this.callbacks = callbacks;
+    this.frame = new RequestFrame();
+    this.answer = { status: 'error', sequence: 0, serverUs: 0, sedJPerM3: null };
+    this.sequence = 0;
+    this.inFlight = false;
+    this.sentAtMs = 0;
+    this.patienceMs = 2000;
+    this.ready = null;
+    this.socket = null;
+    this.timer = 0;
+    this.delayMs = BACK_OFF_MS.first;
+    this.wish = { tier: null, budget_us: 50000 };
+    this.retryNow = () => this.#connect();
+  }
+
+  /** Opens a session of the wished tier (null: the server's choice) and budget; replaces the old one. */
+  open(wish) {
+    this.wish = { ...wish };
+    // An answer may never come on a slow tier; a lost one must not stop the page for ever.
+    this.patienceMs = Math.max(2000, wish.budget_us / 250);
+    this.delayMs = BACK_OFF_MS.first;
+    this.#connect();
+  }
+
+  /** Sends the map in `frame.pressurePa`; false while an answer is due or the session is not ready. */
+  send(nowMs) {
+    if (this.inFlight && nowMs - this.sentAtMs > this.patienceMs) {
+      this.inFlight = false;
+      this.callbacks.onfault('no_answer', `no answer to frame ${this.sequence} within ${this.patienceMs} ms`);
+    }
+    if (!this.ready || this.inFlight) return false;
+    this.sequence = (this.sequence + 1) >>> 0;
+    this.frame.stamp(this.sequence, Math.round((performance.timeOrigin + nowMs) * 1000));
+    this.sentAtMs = performance.now();
+    this.inFlight = true;
+    this.socket.send(this.frame.buffer);
+    return true;
+  }
+
+  #connect() {
+    clearTimeout(this.timer);
+    this.#drop();
+    this.callbacks.onstate('connecting', '');
+    const socket = new WebSocket(this.url);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    socket.onopen = () => {
+      socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
+    };
+    socket.onmessage = (event) => {
+      if (typeof event.data === 'string') this.#text(event.data);
+      else this.#binary(event.data);
+    };
+    socket.onclose = (event) => this.#closed(event);
+  }
+
+  #drop() {
+    const old = this.socket;
+    this.socket = null;
+    this.ready = null;
+    this.inFlight = false;
+    if (old) {
+      old.onopen = old.onmessage = old.onclose = null;
+      old.close();
+    }
+  }
+
+  #text(text) {
+    let message;
+    try {
+      message = JSON.parse(text);
+    } catch {
+      this.callbacks.onfault('bad_json', 'the server sent a text that is not JSON');
+      return;
+    }
+    if (message.type === 'ready') {
+      this.ready = message;
+      this.delayMs = BACK_OFF_MS.first;
+      this.callbacks.onready(message);
+      this.callbacks.onstate('ready', '');
+    } else if (message.type === 'error') {
+      if (message.sequence === undefined || message.sequence === null || message.sequence === this.sequence) {
+        this.inFlight = false;
+      }
+      this.callbacks.onfault(message.code, message.message);
+      // A refused hello would be refused again: wait for the visitor to choose otherwise.
+      if (!this.ready) {
+        this.#drop();
+        this.callbacks.onstate('refused', message.message);
+      }
+    }
+  }
+
+  #binary(data) {
+    const nowMs = performance.now();
+    try {
+      readAnswer(data, this.answer);
+    } catch (error) {
+      this.inFlight = false;
+      this.callbacks.onfault('bad_frame', error.message);
+      return;
+    }
+    // A stale sequence is the answer to a frame given up before: it says nothing about this one.
+    if (this.answer.sequence !== this.sequence || !this.inFlight) return;
+    this.inFlight = false;
+    this.callbacks.onanswer(this.answer, nowMs - this.sentAtMs);
+  }
+
+  #closed(event) {
+    this.#drop();
+    const jitter = 0.75 + 0.5 * Math.random();
+    const waitMs = this.delayMs * jitter;
+    this.delayMs = Math.min(2 * this.delayMs, BACK_OFF_MS.last);
+    this.callbacks.onstate('waiting', `${event.reason || 'connection lost'}; trying again in ${(waitMs / 1000).toFixed(1)} s`);
+    this.timer = setTimeout(this.retryNow, waitMs);
+  }
+}
