@@ -1,1 +1,12 @@
 //! Finite-element fingertip: scenes, solver, atlas, dataset.
+
+pub mod contact;
+pub mod element;
+pub mod geometry;
+pub mod indenter;
+pub mod linear;
+pub mod material;
+pub mod mesh;
+pub mod output;
+pub mod press;
+pub mod solve;
