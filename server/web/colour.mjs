@@ -74,11 +74,13 @@ export const TABLES = {
   diverging: diverging(),
 };
 
+const ROUND_STEPS = [1, 1.5, 2, 3, 4, 5, 6, 8];
+
 /** The next 'round' number at or above `value`: 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten. */
 export function roundUp(value) {
   if (!(value > 0)) return 1;
   const power = 10 ** Math.floor(Math.log10(value));
-  for (const step of [1, 1.5, 2, 3, 4, 5, 6, 8]) {
+  for (const step of ROUND_STEPS) {
     if (step * power >= value * (1 - 1e-9)) return step * power;
   }
   return 10 * power;
@@ -107,11 +109,12 @@ export class AutoRange {
   }
 }
 
-const PREFIXES = [[1e6, 'M'], [1e3, 'k'], [1, ''], [1e-3, 'm']];
+const PLAIN = [1, ''];
+const PREFIXES = [[1e6, 'M'], [1e3, 'k'], PLAIN, [1e-3, 'm']];
 
 /** Divisor and prefix in which `value` reads best, e.g. 24 000 -> [1000, 'k']. */
-export function prefixFor(value) {
-  return PREFIXES.find(([size]) => Math.abs(value) >= size) ?? [1, ''];
+function prefixFor(value) {
+  return PREFIXES.find(([size]) => Math.abs(value) >= size) ?? PLAIN;
 }
 
 /** Up to three significant digits, without exponent for the sizes met here. */
@@ -121,9 +124,7 @@ export function digits(value) {
   return value.toFixed(Math.min(decimals, 6));
 }
 
-/** Value with its unit, e.g. `quantity(24100, 'Pa')` = '24.1 kPa'; J/m3 keeps no prefix below 10^4. */
-export function quantity(value, unit) {
-  if (value === 0) return `0 ${unit}`;
-  const [size, prefix] = unit === 'Pa' || Math.abs(value) >= 1e4 ? prefixFor(value) : [1, ''];
-  return `${digits(value / size)} ${prefix}${unit}`;
+/** Divisor and prefix for a scale that ends at `max`: Pa are wanted as kPa, J/m3 only from 10^4 on as kJ/m3. */
+export function prefixOf(max, unit) {
+  return unit === 'Pa' || max >= 1e4 ? prefixFor(max) : PLAIN;
 }

@@ -192,25 +192,30 @@ export class FingerView {
 
   /** Camera axes at rest: right = -y, up = -x (the tip), towards the eye = -z (the pad). */
   #aimCamera() {
-    const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
-    const rows = [
-      [0, -cy, -sy],
-      [-cp, -sp * sy, sp * cy],
-      [-sp, cp * sy, -cp * cy],
-    ];
+    const cy = Math.cos(this.yaw);
+    const sy = Math.sin(this.yaw);
+    const cp = Math.cos(this.pitch);
+    const sp = Math.sin(this.pitch);
     const { view, projection, centre } = this;
-    view.fill(0);
+    // Column by column, as WebGL wants it.
+    view[0] = 0;
+    view[1] = -cp;
+    view[2] = -sp;
+    view[4] = -cy;
+    view[5] = -sp * sy;
+    view[6] = cp * sy;
+    view[8] = -sy;
+    view[9] = sp * cy;
+    view[10] = -cp * cy;
     view[15] = 1;
     for (let row = 0; row < 3; row++) {
-      for (let k = 0; k < 3; k++) {
-        view[4 * k + row] = rows[row][k];
-        view[12 + row] -= rows[row][k] * centre[k];
-      }
+      view[12 + row] = -(view[row] * centre[0] + view[4 + row] * centre[1] + view[8 + row] * centre[2]);
     }
     const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const far = (1.08 * this.radius) / (Math.sin(FIELD_OF_VIEW_RAD / 2) * this.zoom * Math.min(1, aspect));
     view[14] -= far;
-    const [near, back] = [Math.max(1, far - 4 * this.radius), far + 4 * this.radius];
+    const near = Math.max(1, far - 4 * this.radius);
+    const back = far + 4 * this.radius;
     projection.fill(0);
     projection[5] = 1 / Math.tan(FIELD_OF_VIEW_RAD / 2);
     projection[0] = projection[5] / aspect;

@@ -94,7 +94,7 @@ void main() {
   if (u_decades > 0.0) t = t > 0.0 ? 1.0 + log2(t) / (3.321928 * u_decades) : 0.0;
   t = clamp(t, 0.0, 1.0);
   vec3 painted = texture(u_table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-  vec3 base = mix(u_clay, painted, smoothstep(0.0, 0.1, t));
+  float paint = smoothstep(0.0, 0.1, t);
   vec3 n = normalize(v_normal);
   vec3 eye = normalize(-v_view);
   bool inside = !gl_FrontFacing;
@@ -103,7 +103,8 @@ void main() {
   float light = 0.38 + 0.62 * key * key;
   float gloss = 0.10 * pow(max(dot(n, normalize(eye + vec3(-0.35, 0.55, 0.75))), 0.0), 30.0);
   float rim = 0.14 * pow(1.0 - abs(dot(n, eye)), 3.0);
-  vec3 lit = base * light + gloss + rim * u_clay;
+  // Painted skin is shaded less: its colour is a value to be read off the scale.
+  vec3 lit = mix(u_clay * light, painted * (0.72 + 0.28 * light), paint) + gloss + rim * u_clay;
   colour = vec4(inside ? u_clay * 0.32 * light : lit, 1.0);
 }`;
 
@@ -129,6 +130,6 @@ in vec3 v_normal;
 out vec4 colour;
 void main() {
   float across = 1.0 - abs(dot(normalize(v_normal), normalize(v_view)));
-  float alpha = 0.07 + 0.5 * across * across * across;
+  float alpha = 0.04 + 0.5 * across * across * across;
   colour = vec4(u_tint * alpha, alpha);
 }`;

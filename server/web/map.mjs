@@ -2,15 +2,19 @@
 // canvas above it, a scale bar below, and the value under the pointer.
 
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
-import { AutoRange, TABLE_LEN, TABLES, digits, prefixFor, quantity } from './colour.mjs';
+import { AutoRange, TABLE_LEN, TABLES, digits, prefixOf } from './colour.mjs';
 
 /** Decades that the logarithmic scale spans. */
 export const LOG_DECADES = 3;
 const BAR_LENGTHS_MM = [10, 5, 2, 1];
+const TIP = 'tip \u2191';
 
 /** Picture of one quantity; `element` is the <figure> that holds its parts by data-part. */
 export class MapView {
-  /** `options`: table, unit, least (smallest scale end), signed (scale symmetric about 0). */
+  /**
+   * `options`: table, unit, least (smallest scale end), signed (scale symmetric about 0), like (a view
+   * whose unit prefix this one shares).
+   */
   constructor(element, options) {
     const part = (name) => element.querySelector(`[data-part=${name}]`);
     this.element = element;
@@ -21,6 +25,10 @@ export class MapView {
     this.ticks = part('ticks');
     this.peakText = part('peak');
     this.probeText = part('probe');
+    this.ruler = part('ruler');
+    this.unitText = part('unit');
+    this.overlayContext = this.overlay.getContext('2d');
+    this.theme = { outline: '', muted: '', panel: '' };
     this.context = this.canvas.getContext('2d', { willReadFrequently: true });
     this.image = this.context.createImageData(SIDE_PX, SIDE_PX);
     this.words = new Uint32Array(this.image.data.buffer);
@@ -37,7 +45,9 @@ export class MapView {
     this.marker = null;
     this.#drawBar();
     this.#listen();
-    new ResizeObserver(() => this.drawOverlay()).observe(this.overlay);
+    this.#readTheme();
+    new ResizeObserver(() => this.#fit()).observe(this.overlay);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#readTheme());
   }
 
   /** Binds the view to a patch: only its pixels are painted. */
@@ -46,7 +56,7 @@ export class MapView {
     this.outline = outlineOf(raster.mask);
     this.mmPerPx = mmPerPx;
     this.words.fill(0);
-    this.drawOverlay();
+    this.#fit();
   }
 
   setLogarithmic(on, nowMs) {
@@ -67,11 +77,21 @@ export class MapView {
       }
     } else if (this.range.update(this.peak, nowMs)) {
       this.#drawTicks();
+    } else if (this.prefixShown !== this.#prefix()[1]) {
+      this.#drawTicks();
     }
     this.#paint();
     this.context.putImageData(this.image, 0, 0);
     this.#showNumbers();
     return this.peak;
+  }
+
+  /** Lets the scale shrink after a peak has passed; true when it did. To be called while nothing new comes. */
+  settle(nowMs) {
+    if (!this.pixels || !this.range.update(this.peak, nowMs)) return false;
+    this.#drawTicks();
+    this.show(this.values, nowMs, this.range);
+    return true;
   }
 
   #paint() {
@@ -95,15 +115,25 @@ export class MapView {
   #showNumbers() {
     // Text is laid out afresh whenever it changes: only when the shown digits would differ.
     if (Math.abs(this.peak - this.peakShown) > 1e-3 * this.peak || (this.peak === 0 && this.peakShown !== 0)) {
-      this.peakText.textContent = quantity(this.peak, this.options.unit);
+      this.peakText.textContent = this.#quantity(this.peak);
       this.peakShown = this.peak;
     }
     this.#showProbe();
   }
 
   #showProbe() {
-    const text = this.probe < 0 ? '' : `here ${quantity(this.values[this.probe], this.options.unit)}`;
+    const text = this.probe < 0 ? '' : `here ${this.#quantity(this.values[this.probe])}`;
     if (this.probeText.textContent !== text) this.probeText.textContent = text;
+  }
+
+  /** Value in the unit of the scale. */
+  #quantity(value) {
+    const [size, prefix] = this.#prefix();
+    return `${digits(value / size)} ${prefix}${this.options.unit}`;
+  }
+
+  #prefix() {
+    return prefixOf((this.options.like ?? this).range.max, this.options.unit);
   }
 
   #listen() {
@@ -138,20 +168,21 @@ export class MapView {
   #drawTicks() {
     const { max } = this.range;
     const { signed, unit } = this.options;
+    this.peakShown = -1;
     const labels = [];
     if (this.logarithmic) {
       for (let k = 0; k <= LOG_DECADES; k++) labels.push(max * 10 ** (k - LOG_DECADES));
     } else {
       for (let k = 0; k <= 4; k++) labels.push(signed ? (max * (k - 2)) / 2 : (max * k) / 4);
     }
-    const [size, prefix] = unit === 'Pa' || max >= 1e4 ? prefixFor(max) : [1, ''];
+    const [size, prefix] = this.#prefix();
+    this.prefixShown = prefix;
     this.ticks.replaceChildren(...labels.map((value) => {
       const tick = document.createElement('span');
       tick.textContent = trim(value / size);
       return tick;
     }));
-    this.ticks.dataset.unit = `${prefix}${unit}`;
-    this.element.querySelector('[data-part=unit]').textContent = `${prefix}${unit}`;
+    this.unitText.textContent = `${prefix}${unit}`;
   }
 
   /** Marks the press: `marker` = [u, v] in pixels, or null. */
@@ -160,47 +191,50 @@ export class MapView {
     this.drawOverlay();
   }
 
+  #readTheme() {
+    const style = getComputedStyle(this.overlay);
+    for (const name of ['outline', 'muted', 'panel']) this.theme[name] = style.getPropertyValue(`--${name}`);
+    this.drawOverlay();
+  }
+
+  /** The picture changed its size: overlay and ruler follow. */
+  #fit() {
+    const lengthMm = BAR_LENGTHS_MM.find((mm) => mm / this.mmPerPx < SIDE_PX / 4) ?? 1;
+    const bar = document.createElement('i');
+    bar.style.width = `${(lengthMm / this.mmPerPx) * (this.overlay.clientWidth / SIDE_PX)}px`;
+    this.ruler.replaceChildren(bar, `${lengthMm} mm`);
+    this.drawOverlay();
+  }
+
   drawOverlay() {
-    if (!this.outline) return;
-    const { overlay } = this;
+    const { overlay, theme } = this;
     const size = Math.round(overlay.clientWidth * Math.min(2, window.devicePixelRatio || 1));
-    if (size === 0) return;
-    if (overlay.width !== size) {
+    if (!this.outline || size === 0) return;
+    if (overlay.width !== size || overlay.height !== size) {
       overlay.width = size;
       overlay.height = size;
     }
-    const context = overlay.getContext('2d');
-    const style = getComputedStyle(overlay);
+    const context = this.overlayContext;
     const scale = size / SIDE_PX;
-    const line = size / overlay.clientWidth;
+    // Size of a CSS pixel in map pixels.
+    const px = SIDE_PX / overlay.clientWidth;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, size, size);
     context.setTransform(scale, 0, 0, scale, 0, 0);
-    context.lineWidth = (1.25 * line) / scale;
-    context.strokeStyle = style.getPropertyValue('--outline');
+    context.lineWidth = 1.25 * px;
+    context.strokeStyle = theme.outline;
     context.stroke(this.outline);
-    this.#drawRuler(context, style, line / scale);
-    if (this.marker) drawMarker(context, this.marker, line / scale);
-  }
-
-  #drawRuler(context, style, px) {
-    const lengthMm = BAR_LENGTHS_MM.find((mm) => mm / this.mmPerPx < SIDE_PX / 4) ?? 1;
-    const length = lengthMm / this.mmPerPx;
-    const x = 6;
-    const y = SIDE_PX - 6;
-    context.strokeStyle = context.fillStyle = style.getPropertyValue('--muted');
-    context.lineWidth = 1.5 * px;
-    context.beginPath();
-    context.moveTo(x, y - 3 * px);
-    context.lineTo(x, y);
-    context.lineTo(x + length, y);
-    context.lineTo(x + length, y - 3 * px);
-    context.stroke();
     context.font = `${11 * px}px system-ui, sans-serif`;
-    context.textAlign = 'left';
-    context.fillText(`${lengthMm} mm`, x, y - 6 * px);
     context.textAlign = 'right';
-    context.fillText('tip \u2191', SIDE_PX - 6, 6 + 9 * px);
+    context.lineWidth = 3 * px;
+    context.strokeStyle = theme.panel;
+    context.strokeText(TIP, SIDE_PX - 2 * px, 11 * px);
+    context.fillStyle = theme.muted;
+    context.fillText(TIP, SIDE_PX - 2 * px, 11 * px);
+    if (this.marker) {
+      drawMarker(context, this.marker, px, 'rgb(0 0 0 / 0.55)', 3.5);
+      drawMarker(context, this.marker, px, 'rgb(255 255 255 / 0.95)', 1.5);
+    }
   }
 }
 
@@ -236,18 +270,22 @@ function outlineOf(mask) {
   return path;
 }
 
-/** A cross-hair that reads on any colour: dark below, light above. */
-function drawMarker(context, marker, px) {
-  for (const [colour, width] of [['rgb(0 0 0 / 0.55)', 3.5], ['rgb(255 255 255 / 0.95)', 1.5]]) {
-    context.strokeStyle = colour;
-    context.lineWidth = width * px;
-    context.beginPath();
-    context.arc(marker[0], marker[1], 5 * px, 0, 2 * Math.PI);
-    for (const [x, y] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
-      context.moveTo(marker[0] + 5 * px * x, marker[1] + 5 * px * y);
-      context.lineTo(marker[0] + 10 * px * x, marker[1] + 10 * px * y);
-    }
-    context.stroke();
-  }
+/** A cross-hair; drawn dark below and light above it reads on any colour. */
+function drawMarker(context, marker, px, colour, width) {
+  const [u, v] = marker;
+  const inner = 5 * px;
+  const outer = 10 * px;
+  context.strokeStyle = colour;
+  context.lineWidth = width * px;
+  context.beginPath();
+  context.arc(u, v, inner, 0, 2 * Math.PI);
+  context.moveTo(u + inner, v);
+  context.lineTo(u + outer, v);
+  context.moveTo(u - inner, v);
+  context.lineTo(u - outer, v);
+  context.moveTo(u, v + inner);
+  context.lineTo(u, v + outer);
+  context.moveTo(u, v - inner);
+  context.lineTo(u, v - outer);
+  context.stroke();
 }
-

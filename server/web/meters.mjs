@@ -28,8 +28,10 @@ export class Meters {
     this.errorsNow = null;
     this.errorsShown = true;
     this.pressNow = null;
+    this.pressErrors = [];
+    this.pressRows = [];
+    this.current = -1;
     this.tier = '–';
-    this.predictedMs = NaN;
   }
 
   /** A new tier or budget: a new measurement. */
@@ -39,9 +41,26 @@ export class Meters {
     this.tier = '–';
   }
 
-  ready(ready) {
+  ready(ready, medianL2) {
     this.tier = ready.tier;
-    this.predictedMs = ready.predicted_latency_us / 1000;
+    put('error-context', Number.isNaN(medianL2) ? '' : `median of this tier over all held-out presses: ${percent(medianL2)}`);
+  }
+
+  /** One row for each shipped press. */
+  listPresses(names) {
+    this.pressRows = names.map((name) => {
+      const row = document.createElement('tr');
+      const head = document.createElement('th');
+      head.scope = 'row';
+      head.textContent = name;
+      const bar = document.createElement('i');
+      const value = document.createElement('td');
+      const barCell = document.createElement('td');
+      barCell.append(bar);
+      row.append(head, barCell, value);
+      return { row, bar, value };
+    });
+    byId('press-errors').tBodies[0].replaceChildren(...this.pressRows.map(({ row }) => row));
   }
 
   answer(answer, roundTripMs, nowMs) {
@@ -60,8 +79,11 @@ export class Meters {
     this.pressNow = press;
   }
 
-  errors(figures) {
+  /** Errors of the press `current`, and the relative L2 of each press as far as it is known. */
+  errors(figures, pressErrors, current) {
     this.errorsNow = figures;
+    this.pressErrors = pressErrors;
+    this.current = current;
     this.errorsShown = false;
   }
 
@@ -101,5 +123,13 @@ export class Meters {
     put('error-far', percent(figures.farFieldL2));
     put('error-peak', signed(figures.peak));
     put('error-energy', signed(figures.energy));
+    let largest = 0;
+    for (const error of this.pressErrors) if (error > largest) largest = error;
+    this.pressRows.forEach(({ row, bar, value }, n) => {
+      const error = this.pressErrors[n];
+      row.setAttribute('aria-current', String(n === this.current));
+      bar.style.width = error > 0 ? `${(100 * error) / largest}%` : '0';
+      value.textContent = percent(error);
+    });
   }
 }

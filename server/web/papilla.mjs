@@ -13,12 +13,14 @@ const byId = (id) => document.getElementById(id);
 const SED_UNIT = 'J/m³';
 
 class Page {
-  constructor(atlas) {
+  constructor(atlas, tiers) {
     this.atlas = atlas;
+    this.tiers = tiers;
     this.mode = 'press';
     this.press = new Press(atlas);
     this.pressureMaxPa = Infinity;
     this.unsent = true;
+    this.stream = byId('stream');
     this.log = false;
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN) };
     this.answered = { sequence: 0, pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
@@ -41,6 +43,7 @@ class Page {
       truth: view('truth', { table: 'inferno', unit: SED_UNIT, least: 1 }),
       difference: view('difference', { table: 'diverging', unit: SED_UNIT, least: 1, signed: true }),
     };
+    this.views.difference.options.like = this.views.sed;
     this.views.pressure.setPatch(atlas.skin.raster, atlas.mmPerPx);
     for (const name of ['sed', 'truth', 'difference']) this.views[name].setPatch(atlas.interface.raster, atlas.mmPerPx);
     try {
@@ -78,10 +81,13 @@ class Page {
   }
 
   #ready(ready) {
-    this.pressureMaxPa = ready.pressure_max_pa > 0 ? ready.pressure_max_pa : Infinity;
+    // The server refuses what lies above; interpolation may round up by a digit.
+    this.pressureMaxPa = 0.9999 * ready.pressure_max_pa;
     this.control.changed = true;
     this.unsent = true;
-    this.meters.ready(ready);
+    this.replay.forget();
+    const tier = this.tiers.find((known) => known.name === ready.tier);
+    this.meters.ready(ready, tier?.relative_l2_median ?? NaN);
     notify('');
   }
 
@@ -100,14 +106,17 @@ class Page {
   }
 
   #showSed(nowMs) {
-    const { sed } = this.views;
-    sed.show(this.answered.sedJPerM3, nowMs);
-    this.finger?.setSed(this.answered.sedJPerM3, sed.range.max, this.log ? LOG_DECADES : 0);
+    this.views.sed.show(this.answered.sedJPerM3, nowMs);
+    this.#paintFinger();
+  }
+
+  #paintFinger() {
+    this.finger?.setSed(this.answered.sedJPerM3, this.views.sed.range.max, this.log ? LOG_DECADES : 0);
   }
 
   #showErrors(nowMs) {
     const { truth, difference, sed } = this.views;
-    this.meters.errors(this.replay.judge(this.answered.sedJPerM3));
+    this.meters.errors(this.replay.judge(this.answered.sedJPerM3), this.replay.errors, this.replay.sent);
     truth.show(this.replay.truth, nowMs, sed.range);
     difference.show(this.replay.difference, nowMs);
   }
@@ -121,11 +130,14 @@ class Page {
       if (this.unsent && this.session.inFlight) this.meters.skip();
       this.unsent = true;
       this.views.pressure.show(map, nowMs);
+    } else {
+      this.views.pressure.settle(nowMs);
     }
-    const ready = this.mode === 'press' || this.replay.press;
-    if (ready && (this.unsent || byId('stream').checked)) this.#send(nowMs, map);
+    if (this.views.sed.settle(nowMs)) this.#paintFinger();
+    const ready = this.mode === 'press' || this.replay.loaded;
+    if (ready && (this.unsent || this.stream.checked)) this.#send(nowMs, map);
     this.finger?.draw();
-    this.meters.refresh(nowMs, this.unsent || byId('stream').checked);
+    this.meters.refresh(nowMs, this.unsent || this.stream.checked);
   }
 
   #send(nowMs, map) {
@@ -148,11 +160,9 @@ class Page {
   }
 
   #stepReplay(nowMs, map) {
-    if (!this.replay.press || !this.replay.step(nowMs)) return false;
+    if (!this.replay.loaded || !this.replay.step(nowMs)) return false;
     this.replay.pressureInto(map);
-    const depth = this.replay.press.depth_mm?.[this.replay.sample];
-    byId('replay-sample').value = String(this.replay.sample);
-    byId('replay-out').textContent = depth === undefined ? `${this.replay.sample + 1}` : `${depth.toFixed(2)} mm`;
+    byId('replay-press').value = String(this.replay.chosen);
     return true;
   }
 
@@ -168,10 +178,9 @@ class Page {
       for (const name of ['sed', 'truth']) this.views[name].setLogarithmic(this.log, performance.now());
       this.#showSed(performance.now());
     });
-    byId('replay-press').addEventListener('change', () => this.#loadPress());
-    byId('replay-sample').addEventListener('input', () => {
+    byId('replay-press').addEventListener('change', () => {
       this.#play(false);
-      this.replay.choose(Number(byId('replay-sample').value));
+      this.replay.choose(Number(byId('replay-press').value));
     });
     byId('replay-play').addEventListener('click', () => this.#play(!this.replay.playing));
   }
@@ -184,25 +193,17 @@ class Page {
     if (mode === 'replay') {
       this.views.pressure.setMarker(null);
       this.finger?.setPress(null);
-      if (this.replay.presses.length === 0) this.#listPresses();
+      if (!this.replay.loaded) this.#loadPresses();
     }
   }
 
-  async #listPresses() {
+  async #loadPresses() {
     try {
-      const presses = await this.replay.loadList();
-      byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(pressName(press), String(press.id ?? n))));
+      await this.replay.load();
+      const { presses } = this.replay;
+      byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(pressName(press), String(n))));
+      this.meters.listPresses(presses.map(pressName));
       if (presses.length === 0) notify('This server ships no FE presses to replay.');
-      else await this.#loadPress();
-    } catch (error) {
-      notify(error.message);
-    }
-  }
-
-  async #loadPress() {
-    try {
-      if (!(await this.replay.load(byId('replay-press').value))) return;
-      byId('replay-sample').max = String(this.replay.sampleCount - 1);
     } catch (error) {
       notify(error.message);
     }
@@ -216,9 +217,7 @@ class Page {
 }
 
 function pressName(press) {
-  const angles = ['pitch', 'roll', 'yaw'].filter((name) => press[`${name}_deg`] !== undefined);
-  const words = angles.map((name) => `${name} ${press[`${name}_deg`].toFixed(0)}°`);
-  return [`#${press.id}`, ...words].join(' · ');
+  return `${press.name}, ${press.depth_mm.toFixed(2)} mm`;
 }
 
 function showState(state, detail) {
@@ -235,9 +234,11 @@ function notify(message) {
 async function listTiers() {
   const { tiers } = await fetchJson('v1/tiers');
   byId('tier').append(...tiers.map((tier) => {
-    const ms = tier.predicted_latency_us > 0 ? ` (${(tier.predicted_latency_us / 1000).toFixed(0)} ms)` : '';
-    return new Option(`${tier.name}${ms}`, tier.name);
+    const ms = `${(tier.predicted_latency_us / 1000).toPrecision(2)} ms`;
+    const error = tier.relative_l2_median > 0 ? `, error ${(100 * tier.relative_l2_median).toPrecision(2)} %` : '';
+    return new Option(`${tier.name} (${ms}${error})`, tier.name);
   }));
+  return tiers;
 }
 
 /** Says on the page whether this raster equals the server's own mask, pixel by pixel. */
@@ -261,8 +262,7 @@ document.querySelector('input[name=mode][value=press]').checked = true;
 try {
   const atlas = new Atlas(await fetchJson('v1/atlas'));
   byId('atlas-hash').textContent = atlas.hash.slice(0, 12);
-  await listTiers();
-  const page = new Page(atlas);
+  const page = new Page(atlas, await listTiers());
   page.start();
   // For the console and the tests: the last answered pair of maps and what the page holds.
   globalThis.papilla = page;

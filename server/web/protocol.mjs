@@ -11,6 +11,7 @@ const VERSION = 1;
 const KIND = { pressure: 1, sed: 2 };
 const SAMPLE_F32 = 0;
 const TWO_POW_32 = 4294967296;
+const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal']);
 const BACK_OFF_MS = { first: 250, last: 8000 };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
@@ -155,8 +156,9 @@ export class Session {
         this.inFlight = false;
       }
       this.callbacks.onfault(message.code, message.message);
-      // A refused hello would be refused again: wait for the visitor to choose otherwise.
-      if (!this.ready) {
+      // A refused hello would be refused again: wait for the visitor to choose otherwise. What passes
+      // by itself is left to the close that follows, and to the back-off.
+      if (!this.ready && !PASSING.has(message.code)) {
         this.#drop();
         this.callbacks.onstate('refused', message.message);
       }

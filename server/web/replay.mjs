@@ -39,75 +39,81 @@ export function errorFigures(network, truth, pixels, out) {
   return out;
 }
 
-/** The chosen press and sample; rasterises pressure and truth. */
+/** The shipped presses, one at a time; rasterises pressure and truth. */
 export class Replay {
   constructor(atlas) {
     this.atlas = atlas;
+    /** Each with name, pose, depth_mm, pressure_pa and sed_j_per_m3 at the atlas's vertices. */
     this.presses = [];
-    this.press = null;
-    this.sample = 0;
+    /** Relative L2 of each press as last answered; NaN before. */
+    this.errors = [];
+    this.chosen = 0;
+    /** The press whose truth `truth` holds: the one last sent. */
+    this.sent = -1;
     this.playing = false;
     this.changed = false;
     this.lastStepMs = 0;
-    this.loads = 0;
     /** FE truth of the frame last sent, J/m3. */
     this.truth = new Float32Array(MAP_LEN);
     this.difference = new Float32Array(MAP_LEN);
     this.figures = { relativeL2: NaN, farFieldL2: NaN, peak: NaN, energy: NaN };
   }
 
-  /** Fetches the list of shipped presses. */
-  async loadList() {
-    const list = await fetchJson('v1/presses');
-    this.presses = list.presses ?? list;
-    return this.presses;
+  get loaded() {
+    return this.presses.length > 0;
   }
 
-  /** Fetches press `id`; a later call overtakes an earlier one that is still loading. */
-  async load(id) {
-    const load = ++this.loads;
-    const press = await fetchJson(`v1/presses/${id}`);
-    if (load !== this.loads) return false;
-    this.press = press;
-    this.choose(this.sampleCount - 1);
-    return true;
+  /** Fetches all shipped presses; they are few. */
+  async load() {
+    const { presses } = await fetchJson('v1/presses');
+    const loaded = [];
+    for (let n = 0; n < presses.length; n++) loaded.push(await fetchJson(`v1/presses/${n}`));
+    this.presses = loaded;
+    this.forget();
+    this.choose(0);
   }
 
-  get sampleCount() {
-    return this.press ? this.press.pressure_pa.length : 0;
+  /** Another tier makes other errors. */
+  forget() {
+    this.errors = this.presses.map(() => NaN);
+    this.sent = -1;
   }
 
-  choose(sample) {
-    this.sample = sample;
+  choose(n) {
+    this.chosen = n;
     this.changed = true;
   }
 
-  /** Runs through the depths while playing; true when another sample is due to be shown. */
+  /** Runs through the presses while playing; true when another one is due to be shown. */
   step(nowMs) {
-    if (this.playing && this.sampleCount > 1 && nowMs - this.lastStepMs > PLAY_STEP_MS) {
+    if (this.playing && this.presses.length > 1 && nowMs - this.lastStepMs > PLAY_STEP_MS) {
       this.lastStepMs = nowMs;
-      this.choose((this.sample + 1) % this.sampleCount);
+      this.choose((this.chosen + 1) % this.presses.length);
     }
     const changed = this.changed;
     this.changed = false;
     return changed;
   }
 
-  /** Pressure map of the sample, Pa. */
+  /** Pressure map of the chosen press, Pa. */
   pressureInto(map) {
-    this.atlas.skin.raster.rasterise(this.press.pressure_pa[this.sample], map);
+    this.atlas.skin.raster.rasterise(this.presses[this.chosen].pressure_pa, map);
   }
 
-  /** Remembers the truth of the sample that is being sent. */
+  /** Remembers the truth of the press that is being sent. */
   rememberTruth() {
-    this.atlas.interface.raster.rasterise(this.press.sed_j_per_m3[this.sample], this.truth);
+    if (this.sent === this.chosen) return;
+    this.sent = this.chosen;
+    this.atlas.interface.raster.rasterise(this.presses[this.sent].sed_j_per_m3, this.truth);
   }
 
   /** Holds an answer against the truth; also fills the map of differences. */
   judge(network) {
     const { pixels } = this.atlas.interface.raster;
     for (let n = 0; n < pixels.length; n++) this.difference[pixels[n]] = network[pixels[n]] - this.truth[pixels[n]];
-    return errorFigures(network, this.truth, pixels, this.figures);
+    errorFigures(network, this.truth, pixels, this.figures);
+    this.errors[this.sent] = this.figures.relativeL2;
+    return this.figures;
   }
 }
 
