@@ -1,5 +1,6 @@
 //! Finite-element fingertip: scenes, solver, atlas, dataset.
 
+pub mod atlas;
 pub mod contact;
 pub mod element;
 pub mod geometry;

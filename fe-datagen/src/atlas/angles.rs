@@ -1,0 +1,58 @@
+//! Corner angles of triangles in space.
+
+use super::FlattenError;
+
+/// Smallest angle that still counts as a triangle, rad.
+const ANGLE_RAD_MIN: f64 = 1e-4;
+
+/// The three corner angles of each triangle, rad, in the order of its vertices.
+pub(super) fn corner_angles(
+    positions: &[[f64; 3]],
+    triangles: &[[usize; 3]],
+) -> Result<Vec<[f64; 3]>, FlattenError> {
+    let mut angles = Vec::with_capacity(triangles.len());
+    for (triangle, corners) in triangles.iter().enumerate() {
+        let p = corners.map(|vertex| positions[vertex]);
+        let corner = |k: usize| angle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
+        let three = [corner(0), corner(1), corner(2)];
+        let angle_rad = three.iter().copied().fold(f64::INFINITY, f64::min);
+        // Written so that a NaN (three equal points) is refused as well.
+        if !(angle_rad >= ANGLE_RAD_MIN) {
+            return Err(FlattenError::Degenerate { triangle, angle_rad });
+        }
+        angles.push(three);
+    }
+    Ok(angles)
+}
+
+fn angle(at: [f64; 3], to: [f64; 3], other: [f64; 3]) -> f64 {
+    let (a, b) = (difference(to, at), difference(other, at));
+    norm(cross(a, b)).atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+}
+
+/// Area of a triangle in space.
+pub(super) fn area(p: [[f64; 3]; 3]) -> f64 {
+    0.5 * norm(doubled_area_vector(p))
+}
+
+/// Normal of a triangle in space, as long as twice its area.
+pub(super) fn doubled_area_vector(p: [[f64; 3]; 3]) -> [f64; 3] {
+    cross(difference(p[1], p[0]), difference(p[2], p[0]))
+}
+
+/// Signed area of a triangle in the plane, positive counter-clockwise.
+pub(super) fn plane_area([a, b, c]: [[f64; 2]; 3]) -> f64 {
+    0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+}
+
+pub(super) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(super) fn norm(a: [f64; 3]) -> f64 {
+    (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt()
+}
