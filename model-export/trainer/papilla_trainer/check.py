@@ -1,0 +1,171 @@
+"""Checks that an exported model is legal, plain and the same function as the trained network."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+
+from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.dataset import SIDE_PX, Dataset
+from papilla_trainer.errors import CheckError
+from papilla_trainer.evaluation import chosen_epoch, predict, served_model, spread
+from papilla_trainer.export import INPUT, OPSET, OUTPUT
+from papilla_trainer.files import write_atomic
+from papilla_trainer.metrics import F32
+
+OPERATORS = frozenset(
+    {"Conv", "Relu", "MaxPool", "ConvTranspose", "Concat", "Mul", "Clip", "Constant"}
+)
+METADATA = (
+    "format",
+    "name",
+    "atlas_hash",
+    "effects",
+    "network",
+    "pressure_max_pa",
+    "sed_max_j_per_m3",
+    "dataset_sha256",
+    "training",
+    "metrics",
+)
+TOLERANCE = 1e-5
+
+
+@dataclass
+class CheckReport:
+    """What was found; ``failures`` is empty for a sound model."""
+
+    model: str
+    bytes: int
+    opset: int = 0
+    operators: dict[str, int] = field(default_factory=dict)
+    samples: int = 0
+    torch_difference_max: float | None = None
+    failures: list[str] = field(default_factory=list)
+    reference: str | None = None
+
+    def require(self, condition: bool, failure: str) -> None:
+        """Note a failure unless the condition holds."""
+        if not condition:
+            self.failures.append(failure)
+
+
+def check_model(
+    path: Path, dataset: Dataset, run_dir: Path | None, reference: Path | None, samples: int = 8
+) -> CheckReport:
+    """All checks; with ``run_dir`` also the comparison of ONNX Runtime with PyTorch."""
+    try:
+        data = path.read_bytes()
+        model = onnx.load_from_string(data)
+    except Exception as error:  # protobuf's own error type is not public
+        raise CheckError(f"{path}: not a readable ONNX file ({error})") from error
+    report = CheckReport(model=str(path), bytes=len(data))
+    _check_graph(model, report)
+    _check_metadata(model, dataset, report)
+    if report.failures:
+        return report
+    pressure, session = _held_out(dataset, samples), _session(data)
+    output = np.stack([session.run([OUTPUT], {INPUT: p[None, None]})[0][0, 0] for p in pressure])
+    report.samples = len(pressure)
+    _check_output(output, dataset, report)
+    if run_dir is not None:
+        _compare(run_dir, model, pressure, output, report)
+    if reference is not None and not report.failures:
+        write_reference(reference, pressure, output)
+        report.reference = str(reference)
+    return report
+
+
+def write_reference(path: Path, pressure_pa: F32, sed_j_per_m3: F32) -> None:
+    """Inputs and ONNX Runtime's outputs, ``[N, 224, 224]`` each, for other engines to meet."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, pressure_pa=pressure_pa, sed_j_per_m3=sed_j_per_m3)
+    write_atomic(path, buffer.getvalue())
+
+
+def _held_out(dataset: Dataset, count: int) -> F32:
+    ids = [dataset.test_ids[i] for i in spread(len(dataset.test_ids), count)]
+    maps = dataset.load(ids)
+    return maps.pressure_pa[spread(len(maps), count)]
+
+
+def _session(data: bytes) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+
+
+def _check_graph(model: onnx.ModelProto, report: CheckReport) -> None:
+    try:
+        onnx.checker.check_model(model, full_check=True)
+        onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True, data_prop=True)
+    except (onnx.checker.ValidationError, onnx.shape_inference.InferenceError) as error:
+        report.failures.append(f"not legal ONNX: {error}")
+        return
+    for node in model.graph.node:
+        report.operators[node.op_type] = report.operators.get(node.op_type, 0) + 1
+    foreign = sorted(set(report.operators) - OPERATORS)
+    report.require(not foreign, f"operators beyond the plain ones: {foreign}")
+    domains = {entry.domain or "ai.onnx": entry.version for entry in model.opset_import}
+    report.opset = domains.get("ai.onnx", 0)
+    report.require(domains == {"ai.onnx": OPSET}, f"operator sets {domains}, expected {OPSET}")
+    report.require(len(model.functions) == 0, "the model holds functions")
+    for values, name in ((model.graph.input, INPUT), (model.graph.output, OUTPUT)):
+        found = [(v.name, *_shape(v)) for v in values]
+        wanted = [(name, onnx.TensorProto.FLOAT, [1, 1, SIDE_PX, SIDE_PX])]
+        report.require(found == wanted, f"interface {found}, expected {wanted}")
+
+
+def _shape(value: onnx.ValueInfoProto) -> tuple[int, list[int]]:
+    tensor = value.type.tensor_type
+    return tensor.elem_type, [dimension.dim_value for dimension in tensor.shape.dim]
+
+
+def _check_metadata(model: onnx.ModelProto, dataset: Dataset, report: CheckReport) -> None:
+    found = {entry.key: entry.value for entry in model.metadata_props}
+    missing = [key for key in METADATA if not found.get(f"papilla.{key}")]
+    report.require(not missing, f"metadata missing: {missing}")
+    for key, wanted in (
+        ("atlas_hash", dataset.atlas_hash),
+        ("dataset_sha256", dataset.dataset_sha256),
+    ):
+        value = found.get(f"papilla.{key}")
+        report.require(value == wanted, f"{key} is {value}, the dataset's is {wanted}")
+
+
+def _check_output(output: F32, dataset: Dataset, report: CheckReport) -> None:
+    report.require(bool(np.isfinite(output).all()), "the output is not finite")
+    report.require(bool((output >= 0).all()), "the output is negative somewhere")
+    outside = output[:, dataset.interface.mask() == 0]
+    report.require(not outside.any(), "the output is not zero outside the interface patch")
+
+
+def _compare(
+    run_dir: Path, model: onnx.ModelProto, pressure: F32, output: F32, report: CheckReport
+) -> None:
+    checkpoint = Checkpoint.load(run_dir)
+    training = {entry.key: entry.value for entry in model.metadata_props}["papilla.training"]
+    exported = json.loads(training)["epoch_chosen"]
+    matching = [w for w in ("best", "last") if chosen_epoch(checkpoint, w) == exported]
+    if not matching:
+        report.failures.append(f"epoch {exported} was exported, {run_dir} no longer holds it")
+        return
+    expected = predict(served_model(checkpoint, matching[0]), pressure)
+    if expected.max() <= 0:
+        report.failures.append(
+            "the network answers zero for every held-out sample: train it longer"
+        )
+        return
+    difference = float(np.abs(output - expected).max() / expected.max())
+    report.torch_difference_max = difference
+    report.require(
+        difference <= TOLERANCE,
+        f"ONNX Runtime and PyTorch differ by {difference:.1e} of the maximum "
+        f"(allowed {TOLERANCE:.0e}): was the model exported from another run than {run_dir}?",
+    )

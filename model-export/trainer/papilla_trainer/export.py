@@ -1,0 +1,98 @@
+"""Checkpoint to ONNX: plain operators, fixed shape, metadata inside the file."""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import onnx
+import torch
+
+from papilla_trainer import __version__
+from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.config import TrainConfig
+from papilla_trainer.dataset import SIDE_PX
+from papilla_trainer.evaluation import chosen_epoch, read_metrics, served_model
+from papilla_trainer.files import write_atomic
+from papilla_trainer.network import ServedModel, parameter_count
+
+OPSET = 17
+INPUT = "pressure_pa"
+OUTPUT = "sed_j_per_m3"
+
+
+def export_run(run_dir: Path, out: Path, name: str | None = None, weights: str = "best") -> Path:
+    """Write the run's model with its metadata to ``out``; returns ``out``."""
+    checkpoint = Checkpoint.load(run_dir)
+    metrics = read_metrics(run_dir, checkpoint, weights)
+    model = to_onnx(served_model(checkpoint, weights))
+    properties = metadata(checkpoint, metrics, name or out.stem, weights)
+    onnx.helper.set_model_props(model, properties)
+    onnx.checker.check_model(model, full_check=True)
+    write_atomic(out, model.SerializeToString())
+    return out
+
+
+def to_onnx(model: ServedModel) -> onnx.ModelProto:
+    """Trace the served graph at batch 1, 224 x 224."""
+    example = torch.zeros(1, 1, SIDE_PX, SIDE_PX)
+    buffer = io.BytesIO()
+    model = model.to(memory_format=torch.contiguous_format)
+    with warnings.catch_warnings():
+        # The tracing exporter is marked as the older one; it is kept on purpose: it needs no
+        # further package and emits a plain graph without functions.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        torch.onnx.export(
+            model,
+            (example,),
+            buffer,
+            dynamo=False,
+            opset_version=OPSET,
+            input_names=[INPUT],
+            output_names=[OUTPUT],
+            do_constant_folding=True,
+        )
+    graph = onnx.load_from_string(buffer.getvalue())
+    graph.producer_name = "papilla_trainer"
+    graph.producer_version = __version__
+    return graph
+
+
+def metadata(
+    checkpoint: Checkpoint, metrics: dict[str, Any], name: str, weights: str
+) -> dict[str, str]:
+    """The ``metadata_props`` that engine and server read; every value is a string."""
+    served = checkpoint.served
+    config = TrainConfig(**checkpoint.config)
+    training = {
+        "seed": config.seed,
+        "epochs": checkpoint.epoch,
+        "epoch_chosen": chosen_epoch(checkpoint, weights),
+        "chosen_by": "validation_mse" if checkpoint.splits["validation"] else "last epoch",
+        "optimiser": "Adam",
+        "learning_rate": config.learning_rate,
+        "schedule": config.schedule,
+        "batch": config.batch,
+        "loss": "mse, max-normalised",
+        "precision": config.precision,
+        "presses": {split: len(ids) for split, ids in checkpoint.splits.items()},
+        "parameters": parameter_count(served_model(checkpoint)),
+        "seconds": round(checkpoint.seconds, 1),
+        "trainer": __version__,
+        **checkpoint.environment,
+    }
+    return {
+        "papilla.format": "1",
+        "papilla.name": name,
+        "papilla.atlas_hash": served.atlas_hash,
+        "papilla.effects": json.dumps(served.effects),
+        "papilla.network": json.dumps(config.spec.as_json()),
+        "papilla.pressure_max_pa": repr(served.pressure_max_pa),
+        "papilla.sed_max_j_per_m3": repr(served.sed_max_j_per_m3),
+        "papilla.dataset_sha256": served.dataset_sha256,
+        "papilla.training": json.dumps(training),
+        "papilla.metrics": json.dumps(metrics),
+    }

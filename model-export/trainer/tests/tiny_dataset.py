@@ -1,0 +1,115 @@
+"""A tiny dataset in the real format, for tests of the trainer's mechanics.
+
+Not finite elements: smooth made-up bumps on a grid of triangles. No figure from it means anything.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+SIDE = 224
+COLUMNS, ROWS = 9, 12
+
+
+def write_tiny_dataset(directory: Path, presses: int = 6, depths: int = 6, seed: int = 1) -> Path:
+    """Write manifest, rasters and shards; every fifth press (from the third) is a test press."""
+    (directory / "shards").mkdir(parents=True)
+    random = np.random.default_rng(seed)
+    skin, triangles = _grid(16.0, 208.0)
+    interface, _ = _grid(30.3, 193.1)
+    arrays: dict[str, np.ndarray] = {}
+    for name, uv in (("skin", skin), ("interface", interface)):
+        pixel, vertex, weight = _raster(uv, triangles)
+        arrays |= {f"{name}_pixel": pixel, f"{name}_vertex": vertex, f"{name}_weight": weight}
+    np.savez_compressed(directory / "raster.npz", **arrays)
+    entries, pressure_max, sed_max = [], 0.0, 0.0
+    for i in range(presses):
+        shard = _press(skin, random, depths)
+        pressure_max = max(pressure_max, float(shard["pressure_pa"].max()))
+        sed_max = max(sed_max, float(shard["sed_dermis_j_per_m3"].max()))
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, **shard)
+        file = f"shards/press-{i:05}.npz"
+        (directory / file).write_bytes(buffer.getvalue())
+        entries.append(
+            {
+                "id": i,
+                "file": file,
+                "sha256": hashlib.sha256(buffer.getvalue()).hexdigest(),
+                "split": "test" if i % 5 == 2 else "train",
+                "samples": depths,
+                "pitch_deg": float(i),
+                "roll_deg": 0.0,
+                "yaw_deg": 0.0,
+                "checks": {},
+            }
+        )
+    splits = {
+        split: [e["id"] for e in entries if e["split"] == split] for split in ("train", "test")
+    }
+    hashes = "".join(e["sha256"] for e in entries)
+    manifest = {
+        "format": 1,
+        "atlas_hash": hashlib.sha256(skin.tobytes()).hexdigest(),
+        "campaign": {},
+        "seed": seed,
+        "software": "tiny_dataset",
+        "units": {"pressure": "Pa", "sed": "J/m3", "depth": "mm", "force": "N"},
+        "effects": ["finite_strain", "layers"],
+        "vertex_count": len(skin),
+        "pressure_max_pa": pressure_max,
+        "sed_max_j_per_m3": sed_max,
+        "presses": entries,
+        "splits": splits,
+        "dataset_sha256": hashlib.sha256(hashes.encode()).hexdigest(),
+    }
+    (directory / "manifest.json").write_text(json.dumps(manifest))
+    return directory
+
+
+def _press(uv: np.ndarray, random: np.random.Generator, depths: int) -> dict[str, np.ndarray]:
+    centre = random.uniform(80, 144, size=2)
+    squared = ((uv - centre) ** 2).sum(axis=1)
+    depth = np.linspace(0.5, 2.0, depths, dtype=np.float32)
+    radius = 25.0 * np.sqrt(depth)[:, None]
+    pressure = 2e4 * depth[:, None] * np.clip(1 - squared / radius**2, 0, None)
+    sed = 3e3 * depth[:, None] ** 2 * np.exp(-squared / radius**2)
+    return {
+        "pressure_pa": pressure.astype(np.float32),
+        "sed_dermis_j_per_m3": sed.astype(np.float32),
+        "sed_epidermis_j_per_m3": (1.5 * sed).astype(np.float32),
+        "depth_mm": depth,
+        "force_n": np.zeros((depths, 3), dtype=np.float32),
+    }
+
+
+def _grid(low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    u, v = np.meshgrid(np.linspace(low, high, COLUMNS), np.linspace(low, high, ROWS))
+    uv = np.stack([u.ravel(), v.ravel()], axis=1)
+    corner = (np.arange(ROWS - 1)[:, None] * COLUMNS + np.arange(COLUMNS - 1)).ravel()
+    a, b, c, d = corner, corner + 1, corner + COLUMNS, corner + COLUMNS + 1
+    return uv, np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+
+
+def _raster(uv: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rows, columns = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    points = np.stack([columns + 0.5, rows + 0.5], axis=1)
+    owner = np.full(SIDE * SIDE, -1)
+    weights = np.zeros((SIDE * SIDE, 3))
+    for index, (a, b, c) in enumerate(uv[triangles]):
+        w = np.linalg.solve(np.stack([b - a, c - a], axis=1), (points - a).T).T
+        bary = np.stack([1 - w.sum(axis=1), w[:, 0], w[:, 1]], axis=1)
+        inside = (bary >= -1e-9).all(axis=1) & (owner < 0)
+        owner[inside] = index
+        weights[inside] = bary[inside]
+    pixel = np.flatnonzero(owner >= 0)
+    return (
+        pixel.astype(np.uint32),
+        triangles[owner[pixel]].astype(np.uint32),
+        weights[pixel].astype(np.float32),
+    )
