@@ -1,0 +1,175 @@
+// The page's modules without a browser: what they must agree on with the server and with theory.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+
+const web = new URL('../../server/web/', import.meta.url);
+const load = (name) => import(new URL(name, web));
+const { Raster } = await load('raster.mjs');
+const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol.mjs');
+const { AutoRange, TABLES, digits, roundUp } = await load('colour.mjs');
+const { Atlas } = await load('atlas.mjs');
+const { FOUNDATION, Press } = await load('press.mjs');
+const { errorFigures } = await load('replay.mjs');
+const { Ring } = await load('stats.mjs');
+
+test('a request frame has the documented bytes', () => {
+  const frame = new RequestFrame();
+  frame.stamp(0x04030201, 0x0102 * 2 ** 32 + 0x03040506);
+  const bytes = [...new Uint8Array(frame.buffer, 0, HEADER_BYTES)];
+  assert.deepEqual(bytes, [
+    0x50, 0x50, 0x4c, 0x31, 1, 1, 0, 0, 1, 2, 3, 4, 224, 0, 224, 0,
+    6, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f,
+  ]);
+  assert.equal(frame.buffer.byteLength, HEADER_BYTES + 4 * MAP_LEN);
+});
+
+function answerFrame(status, payload) {
+  const data = new ArrayBuffer(HEADER_BYTES + payload);
+  const view = new DataView(data);
+  [0x50, 0x50, 0x4c, 0x31, 1, 2, 0, status].forEach((byte, i) => view.setUint8(i, byte));
+  view.setUint32(8, 7, true);
+  view.setUint32(24, 1234, true);
+  return data;
+}
+
+test('answers are read, and damaged ones are named', () => {
+  const into = {};
+  const data = answerFrame(0, 4 * MAP_LEN);
+  new DataView(data).setFloat32(HEADER_BYTES + 4, 2.5, true);
+  assert.equal(readAnswer(data, into).sedJPerM3[1], 2.5);
+  assert.deepEqual([into.status, into.sequence, into.serverUs], ['ok', 7, 1234]);
+  assert.equal(readAnswer(answerFrame(1, 0), into).status, 'superseded');
+  assert.equal(readAnswer(answerFrame(2, 0), into).status, 'late');
+  assert.equal(into.sedJPerM3, null);
+  assert.throws(() => readAnswer(answerFrame(0, 0), into), /not an f32 map/);
+  assert.throws(() => readAnswer(new ArrayBuffer(31), into), /31 bytes/);
+  const other = answerFrame(0, 0);
+  new DataView(other).setUint8(0, 0);
+  assert.throws(() => readAnswer(other, into), /PPL1/);
+});
+
+test('the raster owns each pixel once, borders included, and is linear', () => {
+  // Two triangles share the diagonal of a square whose corners and diagonal pass through pixel centres.
+  const uv = [10.5, 10.5, 20.5, 10.5, 20.5, 20.5, 10.5, 20.5];
+  const raster = new Raster([0, 2, 1, 0, 3, 2], uv);
+  assert.equal(raster.pixels.length, 11 * 11);
+  const out = new Float32Array(MAP_LEN);
+  raster.rasterise([10.5, 20.5, 20.5, 10.5], out);
+  for (let row = 0; row < 224; row++) {
+    for (let column = 0; column < 224; column++) {
+      const inside = row >= 10 && row <= 20 && column >= 10 && column <= 20;
+      const due = inside ? column + 0.5 : 0;
+      assert.ok(Math.abs(out[row * 224 + column] - due) < 1e-5, `${row} ${column}`);
+    }
+  }
+});
+
+test('the raster decides exactly where rounding could not', () => {
+  // The pixel centre (5.5, 5.5) lies on this edge to the last bit, or a hair (2^-20 px) off it.
+  const centre = 5 * 224 + 5;
+  for (const [shift, inside] of [[0, 1], [2 ** -20, 0], [-(2 ** -20), 1]]) {
+    const raster = new Raster([0, 1, 2], [1.5 + shift, 1.5, 9.5 + shift, 9.5, 9.5 + shift, 1.5].map(Math.fround));
+    assert.equal(raster.mask[centre], inside, `shifted by ${shift}`);
+  }
+});
+
+test('colour tables begin and end where the published maps do', () => {
+  const near = (table, entry, rgb) => rgb.forEach((value, k) => {
+    assert.ok(Math.abs(TABLES[table][4 * entry + k] - value) <= 5, `${table}[${entry}] channel ${k}`);
+  });
+  near('viridis', 0, [68, 1, 84]);
+  near('viridis', 128, [33, 145, 140]);
+  near('viridis', 255, [253, 231, 37]);
+  near('inferno', 0, [0, 0, 4]);
+  near('inferno', 128, [188, 55, 84]);
+  near('inferno', 255, [252, 255, 164]);
+});
+
+test('scales are round, grow at once and shrink late', () => {
+  assert.deepEqual([0.7, 1, 1.01, 2400, 9e4].map(roundUp), [0.8, 1, 1.5, 3000, 1e5]);
+  const range = new AutoRange(1, 1000);
+  assert.equal(range.update(70, 0), true);
+  assert.equal(range.max, 80);
+  assert.equal(range.update(10, 500), false);
+  assert.equal(range.update(10, 1100), true);
+  assert.equal(range.max, 10);
+  assert.deepEqual([digits(0), digits(3.14159), digits(31.4), digits(0.001234)], ['0', '3.14', '31.4', '0.00123']);
+});
+
+test('percentiles are nearest ranks of the last 240 values', () => {
+  const ring = new Ring();
+  for (let i = 1000; i < 1100; i++) ring.push(i);
+  for (let i = 1; i <= 240; i++) ring.push(i);
+  assert.deepEqual(ring.percentiles([0, 0]), [120, 238]);
+  assert.equal(ring.recent(0), 240);
+});
+
+/** A sphere's lower cap as an atlas: polar angle laid out as radius, pad down, tip (x = 0) up. */
+function sphereAtlas(radiusMm) {
+  const rings = 60;
+  const spokes = 72;
+  const positions = [[12, 0, -radiusMm]];
+  const uv = [[112, 112]];
+  const triangles = [];
+  for (let i = 1; i <= rings; i++) {
+    for (let j = 0; j < spokes; j++) {
+      const polar = (0.9 * i) / rings;
+      const round = (2 * Math.PI * j) / spokes;
+      positions.push([12 + radiusMm * Math.sin(polar) * Math.cos(round), radiusMm * Math.sin(polar) * Math.sin(round), -radiusMm * Math.cos(polar)]);
+      uv.push([112 - (100 * i * Math.sin(round)) / rings, 112 + (100 * i * Math.cos(round)) / rings]);
+      const at = (ring, spoke) => (ring === 0 ? 0 : 1 + (ring - 1) * spokes + (spoke % spokes));
+      triangles.push([at(i - 1, j), at(i, j + 1), at(i, j)]);
+      if (i > 1) triangles.push([at(i - 1, j), at(i - 1, j + 1), at(i, j + 1)]);
+    }
+  }
+  const patch = { positions_mm: positions, uv_px: uv };
+  return new Atlas({ hash: 'sphere', mm_per_px: 0.1, triangles, skin: patch, interface: patch });
+}
+
+test('a plate on a sphere meets the foundation in closed form', () => {
+  const radiusMm = 8;
+  const depthMm = 0.8;
+  const atlas = sphereAtlas(radiusMm);
+  assert.ok(atlas.normals[2] < -0.99, 'the normals point out of the finger');
+  const press = new Press(atlas);
+  assert.ok(press.moveToPixel(112, 112.5));
+  press.evaluate(depthMm, Infinity);
+  // Gap r^2 / 2R: a paraboloid of pressure, peak k s d, force pi R k (s d)^2, over the area 2 pi R s d.
+  const felt = FOUNDATION.share * depthMm;
+  const near = (value, due, share, what) => assert.ok(Math.abs(value / due - 1) < share, `${what}: ${value}, due ${due}`);
+  near(press.peakPa, FOUNDATION.stiffnessPaPerMm * felt, 0.01, 'peak, Pa');
+  near(press.forceN, 1e-6 * Math.PI * radiusMm * FOUNDATION.stiffnessPaPerMm * felt ** 2, 0.05, 'force, N');
+  near(press.areaMm2, 2 * Math.PI * radiusMm * felt, 0.1, 'area, mm2');
+  press.evaluate(2 * depthMm, Infinity);
+  const limited = 0.5 * press.peakPa;
+  press.evaluate(2 * depthMm, limited);
+  assert.ok(press.peakPa <= limited, 'the pressure that the server takes is the limit');
+  press.evaluate(0, Infinity);
+  assert.equal(press.forceN, 0);
+});
+
+test('a ray and a pixel find the same point of the skin', () => {
+  const atlas = sphereAtlas(8);
+  const hit = { triangle: 0, weightB: 0, weightC: 0 };
+  assert.ok(atlas.locate(130, 120, hit));
+  const point = [...atlas.interpolate(atlas.skin.positionsMm, 3, hit, [0, 0, 0])];
+  const ray = { triangle: 0, weightB: 0, weightC: 0 };
+  assert.ok(atlas.intersect([point[0], point[1], -50], [0, 0, 1], ray));
+  const found = atlas.interpolate(atlas.skin.positionsMm, 3, ray, [0, 0, 0]);
+  assert.ok(Math.hypot(...found.map((x, k) => x - point[k])) < 1e-4);
+  assert.equal(atlas.intersect([point[0], point[1], 50], [0, 0, -1], ray), false, 'the inside is not hit');
+});
+
+test('error figures follow their definitions', () => {
+  const truth = new Float32Array(MAP_LEN);
+  const network = new Float32Array(MAP_LEN);
+  truth.set([10, 4, 0.5, 0]);
+  network.set([11, 4, 0, 0.5]);
+  const figures = errorFigures(network, truth, Uint32Array.of(0, 1, 2, 3), {});
+  const near = (value, due) => assert.ok(Math.abs(value - due) < 1e-9, `${value}, due ${due}`);
+  near(figures.relativeL2, Math.sqrt(1.5 / 116.25));
+  near(figures.farFieldL2, Math.sqrt(0.5 / 0.25));
+  near(figures.peak, 0.1);
+  near(figures.energy, 1 / 14.5);
+});

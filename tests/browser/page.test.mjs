@@ -1,0 +1,277 @@
+// The page in headless Chromium against the server at PAPILLA_URL. See README.md.
+
+import assert from 'node:assert/strict';
+import { after, before, test } from 'node:test';
+import { BASE, MAP_LEN, fetchMap, largest, launch, placeOfPeak, postPressure } from './browser.mjs';
+
+const PATIENCE_MS = 30000;
+let browser;
+let page;
+let shots;
+const complaints = [];
+
+before(async () => {
+  browser = await launch();
+  page = await browser.newPage({ viewport: { width: 1440, height: 900 }, colorScheme: 'light' });
+  page.setDefaultTimeout(PATIENCE_MS);
+  page.on('console', (message) => { if (['error', 'warning'].includes(message.type())) complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(String(error)));
+  page.on('requestfailed', (request) => complaints.push(`${request.url()}: ${request.failure()?.errorText}`));
+  await page.goto(BASE);
+  shots = process.env.PAPILLA_SHOTS;
+});
+
+after(async () => browser?.close());
+
+const text = (id) => page.locator(`#${id}`).textContent();
+const until = (condition, argument) => page.waitForFunction(condition, argument, { timeout: PATIENCE_MS });
+const chooseRadio = (name, value) => page.check(`input[name=${name}][value=${value}]`, { force: true });
+const keep = async (name) => { if (shots) await page.screenshot({ path: `${shots}/${name}.png`, fullPage: true }); };
+
+/** Waits until an answer to a frame sent after now has come. */
+async function nextAnswer() {
+  const sent = await page.evaluate(() => globalThis.papilla.session.sequence);
+  await until((after) => globalThis.papilla.answered.sequence > after, sent + 1);
+}
+
+/** Waits until the indenter has arrived at its depth and the map of that press is answered. */
+async function settled() {
+  await until(() => {
+    const { control, mode } = globalThis.papilla;
+    const goal = control.held || control.down ? Number(document.getElementById('depth').value) : 0;
+    return mode !== 'press' || control.depthMm === goal;
+  });
+  await nextAnswer();
+}
+
+/** The last pair of pressure sent and SED answered. */
+const answered = () => page.evaluate(() => {
+  const { pressurePa, sedJPerM3 } = globalThis.papilla.answered;
+  return { pressurePa: Array.from(pressurePa), sedJPerM3: Array.from(sedJPerM3) };
+});
+
+/** Colours on a map's canvas, one number a pixel. */
+const pixels = (id) => page.evaluate((figure) => {
+  const canvas = document.querySelector(`#${figure} [data-part=pixels]`);
+  const { data } = canvas.getContext('2d').getImageData(0, 0, 224, 224);
+  return Array.from(new Uint32Array(data.buffer));
+}, id);
+
+/** Colours of the WebGL canvas as it stands. */
+const fingerPixels = () => page.evaluate(() => {
+  const gl = document.getElementById('finger').getContext('webgl2');
+  const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
+  const bytes = new Uint8Array(4 * width * height);
+  gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+  return Array.from(new Uint32Array(bytes.buffer));
+});
+
+const differing = (a, b) => a.reduce((count, value, i) => count + (value !== b[i]), 0);
+
+/** Middle of map pixel (row, column) of the pad on the screen. */
+async function padPoint(row, column) {
+  const box = await page.locator('#pad').boundingBox();
+  return [box.x + ((column + 0.5) / 224) * box.width, box.y + ((row + 0.5) / 224) * box.height];
+}
+
+test('the page connects, shows an answered press and agrees with the server on the masks', async () => {
+  await until(() => document.getElementById('state').dataset.state === 'ready');
+  await settled();
+  await until(() => document.getElementById('mask-check').textContent !== '');
+  assert.match(await text('mask-check'), /masks equal the server/);
+  assert.match(await text('estimate'), /estimate/);
+  assert.ok(largest((await answered()).sedJPerM3) > 0);
+  assert.equal(await page.locator('#notice').isVisible(), false);
+  const atlas = await (await fetch(new URL('v1/atlas', BASE))).json();
+  assert.equal(await text('atlas-hash'), atlas.hash.slice(0, 12));
+  await keep('press-light');
+});
+
+test('a press with the mouse moves the pressure and the answered SED', async () => {
+  // A small sphere presses where it is put; a plate touches wherever the finger stands highest.
+  await chooseRadio('shape', 'sphere');
+  await settled();
+  const before = await pixels('sed');
+  const mark = await page.evaluate(() => Array.from(globalThis.papilla.press.uvPx));
+  const [row, column] = [Math.round(mark[1]) + 25, Math.round(mark[0]) + 12];
+  await page.mouse.move(...(await padPoint(row, column)));
+  await page.mouse.down();
+  await settled();
+  await page.mouse.up();
+  await settled();
+  assert.ok(differing(before, await pixels('sed')) > 100, 'the SED picture changed');
+  const { pressurePa, sedJPerM3 } = await answered();
+  const pressed = placeOfPeak(pressurePa);
+  assert.ok(Math.hypot(pressed.row - row, pressed.column - column) < 12, `pressure peaks at ${JSON.stringify(pressed)}`);
+  const felt = placeOfPeak(sedJPerM3);
+  assert.ok(Math.hypot(felt.row - row, felt.column - column) < 30, `SED peaks at ${JSON.stringify(felt)}`);
+});
+
+test('the session answers what POST /v1/sed answers', async () => {
+  const { pressurePa, sedJPerM3 } = await answered();
+  assert.equal(pressurePa.length, MAP_LEN);
+  assert.ok(largest(pressurePa) > 0);
+  const posted = await postPressure(pressurePa, await text('tier-name'));
+  const difference = largest(sedJPerM3.map((value, i) => value - posted[i]));
+  assert.ok(difference <= 1e-6 * largest(posted), `they differ by up to ${difference} J/m3`);
+});
+
+test('latency and rate are live', async () => {
+  await until(() => Number(document.getElementById('trip-p50').textContent) > 0);
+  const number = async (id) => Number(await text(id));
+  const [trip50, trip99, server50] = [await number('trip-p50'), await number('trip-p99'), await number('server-p50')];
+  assert.ok(trip50 <= trip99, `p50 ${trip50} <= p99 ${trip99}`);
+  assert.ok(server50 > 0 && server50 <= trip99, `in the server ${server50}, round trip ${trip99}`);
+  assert.match(await text('rate'), /^[1-9]\d* frames\/s$/);
+  const count = await number('count-ok');
+  await until((old) => Number(document.getElementById('count-ok').textContent) > old, count);
+});
+
+test('the 3-D finger is painted, pressed and turned', async () => {
+  const painted = await fingerPixels();
+  assert.ok(new Set(painted).size > 100, 'many colours');
+  const covered = painted.filter((pixel) => pixel !== 0).length / painted.length;
+  assert.ok(covered > 0.1 && covered < 0.95, `the finger covers ${covered} of its canvas`);
+  const box = await page.locator('#finger').boundingBox();
+  const before = await page.evaluate(() => Array.from(globalThis.papilla.press.pointMm));
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.55 * box.height);
+  await page.mouse.down();
+  await settled();
+  await page.mouse.up();
+  const after = await page.evaluate(() => Array.from(globalThis.papilla.press.pointMm));
+  assert.ok(Math.hypot(...after.map((x, k) => x - before[k])) > 0.5, 'the press went to the point under the mouse');
+  await settled();
+  const still = await fingerPixels();
+  await page.mouse.move(box.x + 0.03 * box.width, box.y + 0.9 * box.height);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.9 * box.height, { steps: 4 });
+  await page.mouse.up();
+  await nextAnswer();
+  assert.ok(differing(still, await fingerPixels()) > 1000, 'the finger turned');
+  const unmoved = await page.evaluate(() => Array.from(globalThis.papilla.press.pointMm));
+  assert.deepEqual(unmoved, after, 'turning does not press');
+});
+
+test('the keyboard moves, deepens and lifts the indenter', async () => {
+  await page.focus('#pad');
+  const before = await page.evaluate(() => globalThis.papilla.press.uvPx[0]);
+  await page.keyboard.press('ArrowLeft');
+  const moved = await page.evaluate(() => globalThis.papilla.press.uvPx[0]);
+  assert.ok(Math.abs(before - moved - 2) < 1e-3, `moved from ${before} to ${moved}`);
+  await page.keyboard.press('+');
+  await settled();
+  assert.match(await text('depth-out'), /^1\.10 mm$/);
+  await page.keyboard.press('Escape');
+  await settled();
+  const lifted = await answered();
+  assert.equal(largest(lifted.pressurePa), 0);
+  assert.equal(largest(lifted.sedJPerM3), 0, 'no pressure, no strain energy');
+  await page.keyboard.press(' ');
+  await settled();
+  assert.ok(largest((await answered()).sedJPerM3) > 0);
+});
+
+test('the indenter shapes press differently', async () => {
+  const areas = {};
+  for (const shape of ['sphere', 'edge', 'plate']) {
+    await chooseRadio('shape', shape);
+    await settled();
+    assert.equal(await page.locator('#radius').isVisible(), shape !== 'plate');
+    areas[shape] = await page.evaluate(() => globalThis.papilla.press.areaMm2);
+  }
+  assert.ok(areas.sphere > 0 && areas.sphere < areas.edge && areas.edge < areas.plate, JSON.stringify(areas));
+});
+
+test('replay shows the error against the FE truth', async () => {
+  await chooseRadio('mode', 'replay');
+  await until(() => document.getElementById('replay-press').options.length > 0);
+  const { presses } = await (await fetch(new URL('v1/presses', BASE))).json();
+  assert.ok(presses.length > 0, 'the server ships presses');
+  assert.equal(await page.locator('#replay-press option').count(), presses.length);
+  const last = presses.length - 1;
+  await page.selectOption('#replay-press', String(last));
+  await until((press) => globalThis.papilla.replay.sent === press && globalThis.papilla.replay.errors[press] > 0, last);
+  await nextAnswer();
+  await page.waitForTimeout(600);
+  // The same figure by another road: maps rasterised by the server, posted over HTTP.
+  const [pressure, truth] = await Promise.all([fetchMap(`v1/presses/${last}/pressure`), fetchMap(`v1/presses/${last}/sed`)]);
+  const network = await postPressure(pressure, await text('tier-name'));
+  let [error, size] = [0, 0];
+  for (let i = 0; i < MAP_LEN; i++) {
+    error += (network[i] - truth[i]) ** 2;
+    size += truth[i] ** 2;
+  }
+  const percent = 100 * Math.sqrt(error / size);
+  assert.ok(percent > 0);
+  const shown = Number((await text('error-l2')).replace(' %', ''));
+  assert.ok(Math.abs(shown - percent) <= (percent < 10 ? 0.006 : 0.06), `shown ${shown} %, recomputed ${percent} %`);
+  for (const figure of ['truth', 'difference']) {
+    assert.ok(new Set(await pixels(figure)).size > 10, `${figure} is painted`);
+  }
+  await keep('replay-light');
+  await page.click('#replay-play');
+  await until(() => globalThis.papilla.replay.errors.every((value) => value > 0));
+  await page.click('#replay-play');
+});
+
+test('the tier can be chosen', async () => {
+  const { tiers } = await (await fetch(new URL('v1/tiers', BASE))).json();
+  await page.selectOption('#budget', '500000');
+  const peaks = new Set();
+  for (const { name } of tiers) {
+    await page.selectOption('#tier', name);
+    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await nextAnswer();
+    peaks.add(largest((await answered()).sedJPerM3));
+  }
+  assert.equal(peaks.size, tiers.length, 'each tier answers in its own way');
+});
+
+test('a budget too small for the tier is shown as late frames, not as an old map', async (context) => {
+  const { tiers } = await (await fetch(new URL('v1/tiers', BASE))).json();
+  const slowest = tiers.reduce((a, b) => (a.predicted_latency_us > b.predicted_latency_us ? a : b));
+  if (slowest.predicted_latency_us < 12000) return context.skip(`${slowest.name} is fast enough for every budget`);
+  await page.selectOption('#tier', slowest.name);
+  await page.selectOption('#budget', '5500');
+  await until(() => Number(document.getElementById('count-late').textContent) > 5);
+  assert.match(await page.locator('#count-late').getAttribute('class') ?? '', /bad/);
+  await page.selectOption('#budget', '500000');
+  await nextAnswer();
+  return undefined;
+});
+
+test('a lost connection comes back by itself', async () => {
+  await page.evaluate(() => globalThis.papilla.session.socket.close());
+  await until(() => document.getElementById('state').dataset.state === 'waiting');
+  await until(() => document.getElementById('state').dataset.state === 'ready');
+  await nextAnswer();
+});
+
+test('the page fits a phone and follows the dark theme', async () => {
+  await page.emulateMedia({ colorScheme: 'dark' });
+  await page.setViewportSize({ width: 360, height: 740 });
+  await nextAnswer();
+  await keep('replay-dark-phone');
+  const wide = await page.evaluate(() => document.documentElement.scrollWidth - window.innerWidth);
+  assert.ok(wide <= 0, `the page is ${wide} px wider than the screen`);
+  await chooseRadio('mode', 'press');
+  await settled();
+  const background = await page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  assert.ok(background.match(/\d+/g).slice(0, 3).every((channel) => Number(channel) < 60), background);
+  const finger = await page.evaluate(() => {
+    const { width, height, clientWidth, clientHeight } = document.getElementById('finger');
+    return [width / clientWidth, height / clientHeight, clientWidth];
+  });
+  assert.ok(finger[0] >= 0.99 && Math.abs(finger[0] - finger[1]) < 0.02 && finger[2] <= 360, `finger canvas ${finger}`);
+  const [row, column] = [140, 112];
+  await page.locator('#pad').scrollIntoViewIfNeeded();
+  await page.mouse.click(...(await padPoint(row, column)));
+  await settled();
+  const mark = await page.evaluate(() => Array.from(globalThis.papilla.press.uvPx));
+  assert.ok(Math.hypot(mark[0] - column - 0.5, mark[1] - row - 0.5) < 3, `pressed at ${mark}`);
+  await keep('press-dark-phone');
+});
+
+test('nothing was complained about', () => {
+  assert.deepEqual(complaints, []);
+});
