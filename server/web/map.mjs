@@ -122,7 +122,7 @@ export class MapView {
   }
 
   #showProbe() {
-    const text = this.probe < 0 ? '' : `here ${this.#quantity(this.values[this.probe])}`;
+    const text = this.probe < 0 ? '' : this.#quantity(this.values[this.probe]);
     if (this.probeText.textContent !== text) this.probeText.textContent = text;
   }
 

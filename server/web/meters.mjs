@@ -102,8 +102,9 @@ export class Meters {
     }
     for (const [name, count] of Object.entries(stats.counts)) put(`count-${name}`, String(count));
     byId('count-late').classList.toggle('bad', stats.lateInARow >= LATE_TO_TELL);
-    drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
-    put('strip-top', `line: budget ${this.budgetMs} ms`);
+    const top = drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
+    const budget = `budget ${this.budgetMs} ms`;
+    put('strip-top', top >= this.budgetMs ? `line: ${budget}` : `top: ${ms(top)} ms, ${budget}`);
     this.#showPress();
     this.#showErrors();
   }

@@ -231,11 +231,13 @@ function notify(message) {
   byId('notice').hidden = message === '';
 }
 
+const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
+
 async function listTiers() {
   const { tiers } = await fetchJson('v1/tiers');
   byId('tier').append(...tiers.map((tier) => {
-    const ms = `${(tier.predicted_latency_us / 1000).toPrecision(2)} ms`;
-    const error = tier.relative_l2_median > 0 ? `, error ${(100 * tier.relative_l2_median).toPrecision(2)} %` : '';
+    const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
+    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
     return new Option(`${tier.name} (${ms}${error})`, tier.name);
   }));
   return tiers;

@@ -133,8 +133,10 @@ export class Session {
     this.ready = null;
     this.inFlight = false;
     if (old) {
-      old.onopen = old.onmessage = old.onclose = null;
-      old.close();
+      old.onmessage = old.onclose = null;
+      // Closing a socket that is still connecting makes the browser complain: let it connect first.
+      if (old.readyState === WebSocket.CONNECTING) old.onopen = () => old.close();
+      else old.close();
     }
   }
 

@@ -1,5 +1,7 @@
 // Live figures of the session: percentiles over the last frames, rates, counts and a strip chart.
 
+import { roundUp } from './colour.mjs';
+
 const WINDOW = 240;
 
 /** The last `WINDOW` numbers; percentiles are sorted out of a second array made once. */
@@ -75,12 +77,12 @@ export class Stats {
   }
 }
 
-/** Strip chart of the round trips, newest on the right, with the budget as a line. */
+/** Strip chart of the round trips, newest on the right, with the budget as a line; returns its top, ms. */
 export function drawStrip(canvas, ring, budgetMs) {
   const ratio = Math.min(2, window.devicePixelRatio || 1);
   const width = Math.round(canvas.clientWidth * ratio);
   const height = Math.round(canvas.clientHeight * ratio);
-  if (width === 0 || height === 0) return;
+  if (width === 0 || height === 0) return NaN;
   if (canvas.width !== width || canvas.height !== height) {
     canvas.width = width;
     canvas.height = height;
@@ -89,8 +91,10 @@ export function drawStrip(canvas, ring, budgetMs) {
   const style = getComputedStyle(canvas);
   const accent = style.getPropertyValue('--accent');
   const warn = style.getPropertyValue('--warn');
-  let top = 1.25 * budgetMs;
-  for (let k = 0; k < ring.count; k++) top = Math.max(top, Math.min(4 * budgetMs, ring.recent(k)));
+  let longest = 0;
+  for (let k = 0; k < ring.count; k++) longest = Math.max(longest, ring.recent(k));
+  // The budget stays in the picture unless it dwarfs the frames; one hiccup must not dwarf it either.
+  const top = Math.min(4 * budgetMs, budgetMs < 3 * longest ? Math.max(1.1 * budgetMs, longest) : roundUp(1.2 * longest));
   const y = (ms) => height - (Math.min(ms, top) / top) * height;
   context.clearRect(0, 0, width, height);
   const step = width / WINDOW;
@@ -100,5 +104,6 @@ export function drawStrip(canvas, ring, budgetMs) {
     context.fillRect(width - (k + 1) * step, y(ms), Math.max(1, step - 0.5), height);
   }
   context.fillStyle = style.getPropertyValue('--muted');
-  context.fillRect(0, Math.round(y(budgetMs)), width, ratio);
+  if (budgetMs <= top) context.fillRect(0, Math.round(y(budgetMs)), width, ratio);
+  return top;
 }

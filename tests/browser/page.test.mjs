@@ -122,7 +122,7 @@ test('latency and rate are live', async () => {
   const [trip50, trip99, server50] = [await number('trip-p50'), await number('trip-p99'), await number('server-p50')];
   assert.ok(trip50 <= trip99, `p50 ${trip50} <= p99 ${trip99}`);
   assert.ok(server50 > 0 && server50 <= trip99, `in the server ${server50}, round trip ${trip99}`);
-  assert.match(await text('rate'), /^[1-9]\d* frames\/s$/);
+  await until(() => /^[1-9]\d* frames\/s$/.test(document.getElementById('rate').textContent));
   const count = await number('count-ok');
   await until((old) => Number(document.getElementById('count-ok').textContent) > old, count);
 });
