@@ -87,8 +87,8 @@ export class Meters {
     this.errorsShown = false;
   }
 
-  /** Writes what changed; `sending` tells a pause from a stall. */
-  refresh(nowMs, sending) {
+  /** Writes what changed; `sending` tells a pause from a stall, `connected` whether answers can come. */
+  refresh(nowMs, sending, connected) {
     if (nowMs - this.shownAtMs < REFRESH_MS) return;
     this.shownAtMs = nowMs;
     const { stats, pair } = this;
@@ -101,7 +101,11 @@ export class Meters {
       byId(`${name}-p99`).classList.toggle('bad', pair[1] > this.budgetMs);
     }
     for (const [name, count] of Object.entries(stats.counts)) put(`count-${name}`, String(count));
-    byId('count-late').classList.toggle('bad', stats.lateInARow >= LATE_TO_TELL);
+    const late = stats.lateInARow >= LATE_TO_TELL;
+    byId('count-late').classList.toggle('bad', late);
+    // An old answer must not pass for the answer to this press.
+    byId('sed').classList.toggle('stale', late || !connected);
+    put('stale', connected ? `late: no answer within ${this.budgetMs} ms` : 'no connection');
     const top = drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
     const budget = `budget ${this.budgetMs} ms`;
     put('strip-top', top >= this.budgetMs ? `line: ${budget}` : `top: ${ms(top)} ms, ${budget}`);

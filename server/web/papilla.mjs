@@ -137,7 +137,7 @@ class Page {
     const ready = this.mode === 'press' || this.replay.loaded;
     if (ready && (this.unsent || this.stream.checked)) this.#send(nowMs, map);
     this.finger?.draw();
-    this.meters.refresh(nowMs, this.unsent || this.stream.checked);
+    this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null);
   }
 
   #send(nowMs, map) {

@@ -128,7 +128,8 @@ export class Press {
       const along = x * t[0] + y * t[1] + z * t[2];
       const across = x * b[0] + y * b[1] + z * b[2];
       const height = x * n[0] + y * n[1] + z * n[2];
-      const reach = facing > FACING ? height - this.#profile(along, across) : -Infinity;
+      // Rounded as it is stored, so that the first to touch has a gap of exactly 0.
+      const reach = facing > FACING ? Math.fround(height - this.#profile(along, across)) : -Infinity;
       gapMm[i] = reach;
       if (reach > first) first = reach;
     }

@@ -96,7 +96,9 @@ test('a press with the mouse moves the pressure and the answered SED', async () 
   const [row, column] = [Math.round(mark[1]) + 25, Math.round(mark[0]) + 12];
   await page.mouse.move(...(await padPoint(row, column)));
   await page.mouse.down();
+  await page.mouse.wheel(0, -250);
   await settled();
+  assert.match(await text('depth-out'), /^1\.20 mm$/, 'the wheel presses deeper while the button is down');
   await page.mouse.up();
   await settled();
   assert.ok(differing(before, await pixels('sed')) > 100, 'the SED picture changed');
@@ -105,6 +107,22 @@ test('a press with the mouse moves the pressure and the answered SED', async () 
   assert.ok(Math.hypot(pressed.row - row, pressed.column - column) < 12, `pressure peaks at ${JSON.stringify(pressed)}`);
   const felt = placeOfPeak(sedJPerM3);
   assert.ok(Math.hypot(felt.row - row, felt.column - column) < 30, `SED peaks at ${JSON.stringify(felt)}`);
+});
+
+test('an indenter that is not kept down lifts with the mouse button', async () => {
+  await page.uncheck('#keep');
+  await settled();
+  assert.equal(largest((await answered()).pressurePa), 0);
+  await page.mouse.move(...(await padPoint(120, 112)));
+  await page.mouse.down();
+  await settled();
+  assert.ok(largest((await answered()).pressurePa) > 0);
+  await page.mouse.up();
+  await settled();
+  assert.equal(largest((await answered()).pressurePa), 0);
+  await page.check('#keep');
+  await page.fill('#depth', '1');
+  await settled();
 });
 
 test('the session answers what POST /v1/sed answers', async () => {
@@ -235,6 +253,7 @@ test('a budget too small for the tier is shown as late frames, not as an old map
   await page.selectOption('#budget', '5500');
   await until(() => Number(document.getElementById('count-late').textContent) > 5);
   assert.match(await page.locator('#count-late').getAttribute('class') ?? '', /bad/);
+  assert.ok(await page.locator('#stale').isVisible(), 'the old map is marked');
   await page.selectOption('#budget', '500000');
   await nextAnswer();
   return undefined;
@@ -245,6 +264,7 @@ test('a lost connection comes back by itself', async () => {
   await until(() => document.getElementById('state').dataset.state === 'waiting');
   await until(() => document.getElementById('state').dataset.state === 'ready');
   await nextAnswer();
+  await until(() => !document.getElementById('sed').classList.contains('stale'));
 });
 
 test('the page fits a phone and follows the dark theme', async () => {
