@@ -9,11 +9,9 @@
 /** Foundation stiffness, Pa/mm, and the share of the depth felt under the indenter. */
 export const FOUNDATION = { stiffnessPaPerMm: 30000, share: 0.5 };
 
-/** Limits of the controls, mm; S1's campaign goes to 2.0 mm. */
-export const DEPTH_MAX_MM = 2;
 const PLATE_HALF_MM = 10;
 const PLATE_ROUNDING_MM = 1;
-/** An edge or a sphere wider than this beside its axis is not in the way. */
+/** Least cosine between the skin's normal and the indenter's axis: skin that looks away is not touched. */
 const FACING = 0.05;
 
 /** Evaluates presses on one atlas without allocating. */

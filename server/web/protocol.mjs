@@ -4,8 +4,8 @@
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
 export const HEADER_BYTES = 32;
-export const STATUS = ['ok', 'superseded', 'late', 'error'];
 
+const STATUS = ['ok', 'superseded', 'late', 'error'];
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
 const VERSION = 1;
 const KIND = { pressure: 1, sed: 2 };
