@@ -16,8 +16,7 @@ pub(super) fn corner_angles(
         let corner = |k: usize| angle(p[k], p[(k + 1) % 3], p[(k + 2) % 3]);
         let three = [corner(0), corner(1), corner(2)];
         let angle_rad = three.iter().copied().fold(f64::INFINITY, f64::min);
-        // Written so that a NaN (three equal points) is refused as well.
-        if !(angle_rad >= ANGLE_RAD_MIN) {
+        if angle_rad < ANGLE_RAD_MIN || three.iter().any(|angle| !angle.is_finite()) {
             return Err(FlattenError::Degenerate { triangle, angle_rad });
         }
         angles.push(three);
