@@ -106,6 +106,7 @@ class Dataset:
                 f"{directory / 'manifest.json'}: missing or malformed entry ({error!r}); "
                 "write the dataset again with `fe-datagen generate`"
             ) from error
+        self._check_identity()
         self._check_splits(labels)
         self.skin = self._read_raster("skin")
         self.interface = self._read_raster("interface")
@@ -127,6 +128,14 @@ class Dataset:
             depth[start:end] = shard["depth_mm"]
             start = end
         return Maps(pressure, sed, press_id, depth)
+
+    def _check_identity(self) -> None:
+        hashes = "".join(self.presses[i].sha256 for i in sorted(self.presses))
+        if hashlib.sha256(hashes.encode()).hexdigest() != self.dataset_sha256:
+            raise DatasetError(
+                f"{self.directory}: dataset_sha256 does not follow from the shards listed; the "
+                "manifest was edited or is damaged"
+            )
 
     def _check_splits(self, labels: dict[int, str]) -> None:
         train, test = set(self.train_ids), set(self.test_ids)

@@ -79,7 +79,7 @@ class Trainer:
             else None
         )
         self.network: S1UNet = build_network(config.spec, config.seed)
-        self.network.to(self.device, memory_format=torch.channels_last)
+        self.network.to(self.device).to(memory_format=torch.channels_last)
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=config.learning_rate, fused=True
         )

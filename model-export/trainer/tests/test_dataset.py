@@ -63,6 +63,14 @@ def test_a_label_that_contradicts_the_list_is_refused(tiny: Dataset, tmp_path: P
         Dataset(wrong)
 
 
+def test_a_manifest_that_does_not_match_its_shards_is_refused(
+    tiny: Dataset, tmp_path: Path
+) -> None:
+    cut = edited(tiny, tmp_path / "d", lambda m: m.update(presses=m["presses"][:-1]))
+    with pytest.raises(DatasetError, match="dataset_sha256"):
+        Dataset(cut)
+
+
 def test_another_format_is_refused(tiny: Dataset, tmp_path: Path) -> None:
     newer = edited(tiny, tmp_path / "d", lambda m: m.update(format=2))
     with pytest.raises(DatasetError, match="format 1"):
