@@ -1,7 +1,9 @@
 //! Finite-element fingertip: scenes, solver, atlas, dataset.
 
 pub mod atlas;
+pub mod campaign;
 pub mod contact;
+pub mod dataset;
 pub mod element;
 pub mod geometry;
 pub mod indenter;

@@ -1,0 +1,78 @@
+//! The manifest, assembled from the records of all presses.
+
+use super::sampling::split_of;
+use super::state::{Outcome, PressState, SOFTWARE};
+use super::{CampaignError, CampaignSpec, splits};
+use crate::dataset::{self, DroppedSample, FailedPress, Manifest, PressEntry, Splits};
+use crate::output::OutputError;
+use papilla_proto::atlas::Atlas;
+
+/// The manifest of all presses, which stand in order of their ids.
+pub(super) fn manifest(
+    spec: &CampaignSpec,
+    atlas: &Atlas,
+    states: &[PressState],
+) -> Result<Manifest, CampaignError> {
+    let all = splits(spec);
+    let (mut presses, mut failed, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut pressure_max, mut sed_max) = (0.0f64, 0.0f64);
+    for PressState { id, pose, outcome, .. } in states {
+        match outcome {
+            Outcome::Failed { error } => {
+                failed.push(FailedPress { id: *id, pose: *pose, error: error.clone() });
+            }
+            Outcome::Solved {
+                sha256,
+                samples,
+                checks,
+                pressure_max_pa,
+                sed_max_j_per_m3,
+                dropped: d,
+            } => {
+                pressure_max = pressure_max.max(*pressure_max_pa);
+                sed_max = sed_max.max(*sed_max_j_per_m3);
+                dropped.extend(d.iter().map(|(depth_mm, reason)| DroppedSample {
+                    press: *id,
+                    depth_mm: *depth_mm,
+                    reason: reason.clone(),
+                }));
+                presses.push(PressEntry {
+                    id: *id,
+                    file: dataset::shard_file(*id),
+                    sha256: sha256.clone(),
+                    split: split_of(&all, *id),
+                    samples: *samples,
+                    pose: *pose,
+                    checks: *checks,
+                });
+            }
+        }
+    }
+    if let (true, Some(first)) = (presses.is_empty(), failed.first()) {
+        let first = first.error.clone();
+        return Err(CampaignError::NothingSolved { presses: spec.presses, first });
+    }
+    let campaign = serde_json::to_value(spec)
+        .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
+    let present = |ids: &[usize]| -> Vec<usize> {
+        ids.iter().copied().filter(|id| presses.iter().any(|p| p.id == *id)).collect()
+    };
+    Ok(Manifest {
+        format: dataset::FORMAT,
+        atlas_hash: atlas.hash().to_string(),
+        campaign,
+        seed: spec.seed,
+        software: SOFTWARE.to_string(),
+        units: dataset::Units::default(),
+        effects: spec.effects.clone(),
+        vertex_count: atlas.vertex_count(),
+        pressure_max_pa: pressure_max,
+        sed_max_j_per_m3: sed_max,
+        check_columns: dataset::CHECK_COLUMNS.map(String::from).to_vec(),
+        splits: Splits { train: present(&all.train), test: present(&all.test) },
+        dataset_sha256: dataset::dataset_sha256(presses.iter().map(|p| p.sha256.as_str())),
+        presses,
+        failed,
+        dropped,
+    })
+}

@@ -1,0 +1,24 @@
+//! Campaigns: many presses of one finger, solved in parallel into a dataset.
+//!
+//! A campaign is a TOML file ([`CampaignSpec`]). [`run`] solves its presses,
+//! one per core, and writes the dataset that [`crate::dataset`] describes. It can be
+//! killed at any instant and started again: every press is one shard, written
+//! atomically, with a record in `DIR/progress` written after it. The dataset's
+//! bytes depend on the campaign alone, not on threads, kills or the clock.
+
+mod assemble;
+mod error;
+mod progress;
+mod report;
+mod run;
+mod sampling;
+mod spec;
+mod state;
+#[cfg(test)]
+mod tests;
+
+pub use error::{BoxError, CampaignError};
+pub use report::CampaignReport;
+pub use run::{PressSolver, RunOptions, run};
+pub use sampling::{poses, splits};
+pub use spec::{CampaignSpec, Density, PlateSpec, PoseRanges};

@@ -1,0 +1,306 @@
+//! The runner's mechanics: resume, threads, failures. The solver here is a
+//! formula of pose and depth; what it returns is of no matter to the runner.
+
+use super::*;
+use crate::dataset::testing::{atlas, posed_record};
+use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
+use crate::output::map_image::Bits;
+use crate::press::record::{IncrementRecord, Pose};
+use papilla_proto::atlas::Atlas;
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What goes wrong, in which press counted over all workers.
+#[derive(Clone, Copy, PartialEq)]
+enum Trouble {
+    None,
+    Abort(usize),
+    Fail(usize),
+    Panic(usize),
+    BadSample(usize),
+}
+
+struct Formula<'a> {
+    vertex_count: usize,
+    trouble: Trouble,
+    calls: &'a AtomicUsize,
+}
+
+impl PressSolver for Formula<'_> {
+    fn solve(&mut self, pose: Pose, depths_mm: &[f64]) -> Result<Vec<IncrementRecord>, BoxError> {
+        let call = self.calls.fetch_add(1, Ordering::SeqCst);
+        let record = |d: &f64| posed_record(pose, *d, self.vertex_count);
+        let mut records: Vec<_> = depths_mm.iter().map(record).collect();
+        match self.trouble {
+            // Not even a destructor runs: what kill -9 does.
+            Trouble::Abort(n) if n == call => std::process::abort(),
+            Trouble::Fail(n) if n == call => return Err("no convergence at 0.5 mm".into()),
+            Trouble::Panic(n) if n == call => panic!("index out of bounds"),
+            Trouble::BadSample(n) if n == call => records[0].checks.energy_vs_work = 0.02,
+            _ => {}
+        }
+        Ok(records)
+    }
+}
+
+fn spec() -> CampaignSpec {
+    CampaignSpec {
+        name: "test".into(),
+        seed: 3,
+        presses: 7,
+        depths_mm: vec![0.25, 0.5],
+        test_fraction: 0.3,
+        density: Density::Coarse,
+        effects: vec!["layers".into()],
+        plate: PlateSpec { size_mm: [20.0, 20.0], edge_radius_mm: 0.5 },
+        pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
+    }
+}
+
+fn go(folder: &Path, threads: usize, trouble: Trouble) -> Result<CampaignReport, CampaignError> {
+    let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
+    let vertex_count = atlas.vertex_count();
+    let options =
+        RunOptions { threads: NonZero::new(threads), progress: false, retry_failed: true };
+    let build = || Ok(Formula { vertex_count, trouble, calls: &calls });
+    run(&spec(), &atlas, build, folder, &options)
+}
+
+/// All files of the dataset; `progress` holds wall times and is not part of it.
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for part in ["", "shards"] {
+        for entry in std::fs::read_dir(folder.join(part)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                let name = path.strip_prefix(folder).unwrap().to_path_buf();
+                files.insert(name, std::fs::read(path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    for (threads, folder) in [1, 3].into_iter().zip(&folders) {
+        let report = go(folder.path(), threads, Trouble::None).unwrap();
+        assert!(report.is_complete());
+        assert_eq!((report.solved, report.samples), (7, 14));
+    }
+    let [one, three] = folders.map(|f| files(f.path()));
+    assert_eq!(one.len(), 3 + 7, "manifest, atlas, raster and 7 shards: {:?}", one.keys());
+    assert!(one == three);
+}
+
+/// Not a test of its own: the process that the next test starts and that dies.
+#[test]
+#[ignore = "started by a_killed_campaign_goes_on"]
+fn dies_in_the_fourth_press() {
+    if let Ok(folder) = std::env::var("PAPILLA_TEST_CAMPAIGN") {
+        let _ = go(Path::new(&folder), 1, Trouble::Abort(3));
+    }
+}
+
+#[test]
+fn a_killed_campaign_goes_on() {
+    let (killed, whole) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let output = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "--ignored", "campaign::tests::dies_in_the_fourth_press"])
+        .env("PAPILLA_TEST_CAMPAIGN", killed.path())
+        .output()
+        .unwrap();
+    assert!(!output.status.success(), "the child has to die");
+    assert!(!killed.path().join("manifest.json").exists(), "it died before the end");
+    // What a kill in the midst of a write leaves, and a shard without record.
+    std::fs::write(killed.path().join("shards/.partial-x7"), b"half").unwrap();
+    std::fs::write(killed.path().join("shards/press-00005.npz"), b"torn").unwrap();
+    let report = go(killed.path(), 2, Trouble::None).unwrap();
+    assert_eq!((report.reused, report.solved), (3, 4), "three presses were finished");
+    go(whole.path(), 1, Trouble::None).unwrap();
+    assert!(files(killed.path()) == files(whole.path()));
+    // A third run finds nothing left to do.
+    let again = go(killed.path(), 1, Trouble::Fail(0)).unwrap();
+    assert_eq!((again.reused, again.solved), (7, 0));
+    assert!(files(killed.path()) == files(whole.path()));
+}
+
+#[test]
+fn an_altered_shard_is_solved_again() {
+    let folder = tempfile::tempdir().unwrap();
+    go(folder.path(), 1, Trouble::None).unwrap();
+    let before = files(folder.path());
+    let shard = folder.path().join("shards/press-00002.npz");
+    let mut bytes = std::fs::read(&shard).unwrap();
+    bytes[200] ^= 1;
+    std::fs::write(&shard, bytes).unwrap();
+    assert!(verify(folder.path()).unwrap_err().to_string().contains("press-00002"));
+    let report = go(folder.path(), 1, Trouble::None).unwrap();
+    assert_eq!((report.reused, report.solved), (6, 1));
+    assert!(files(folder.path()) == before);
+}
+
+#[test]
+fn a_failed_press_is_reported_and_the_rest_is_kept() {
+    for (trouble, word) in
+        [(Trouble::Fail(4), "no convergence at 0.5 mm"), (Trouble::Panic(4), "index out of bounds")]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let report = go(folder.path(), 1, trouble).unwrap();
+        assert!(!report.is_complete());
+        assert_eq!((report.failed.len(), report.failed[0].id, report.samples), (1, 4, 12));
+        assert!(report.failed[0].error.contains(word), "{}", report.failed[0].error);
+        assert!(report.to_string().contains(word));
+        assert!(!folder.path().join("shards/press-00004.npz").exists());
+        let dataset = Dataset::open(folder.path()).unwrap();
+        let manifest = dataset.manifest();
+        assert_eq!(manifest.failed, report.failed);
+        assert!(manifest.presses.iter().all(|p| p.id != 4));
+        assert!([&manifest.splits.train, &manifest.splits.test].iter().all(|s| !s.contains(&4)));
+        verify(folder.path()).unwrap();
+        // The next run tries it again.
+        let next = go(folder.path(), 1, Trouble::None).unwrap();
+        assert_eq!((next.reused, next.solved, next.is_complete()), (6, 1, true));
+    }
+}
+
+#[test]
+fn a_sample_that_fails_its_checks_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = go(folder.path(), 1, Trouble::BadSample(2)).unwrap();
+    assert!(!report.is_complete());
+    assert_eq!((report.samples, report.dropped.len()), (13, 1));
+    assert_eq!((report.dropped[0].press, report.dropped[0].depth_mm), (2, Some(0.25)));
+    let dataset = Dataset::open(folder.path()).unwrap();
+    let press = &dataset.manifest().presses[2];
+    assert_eq!(dataset.shard(press).unwrap().depth_mm.to_vec(), [0.5]);
+}
+
+#[test]
+fn a_folder_serves_one_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    go(folder.path(), 1, Trouble::None).unwrap();
+    let options = RunOptions { progress: false, ..RunOptions::default() };
+    let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
+    let vertex_count = atlas.vertex_count();
+    let build = || Ok(Formula { vertex_count, trouble: Trouble::None, calls: &calls });
+    let other = CampaignSpec { seed: 4, ..spec() };
+    let error = run(&other, &atlas, build, folder.path(), &options).unwrap_err();
+    assert!(matches!(error, CampaignError::Occupied { .. }), "{error}");
+    // Nor do two processes write at once.
+    let lock = std::fs::File::open(folder.path().join("progress/lock")).unwrap();
+    lock.lock().unwrap();
+    let error = run(&spec(), &atlas, build, folder.path(), &options).unwrap_err();
+    assert!(matches!(error, CampaignError::Busy { .. }), "{error}");
+}
+
+#[test]
+fn a_solver_that_cannot_be_built_stops_the_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    let build = || -> Result<Formula<'static>, BoxError> { Err("mesh has no elements".into()) };
+    let options = RunOptions { progress: false, ..RunOptions::default() };
+    let error = run(&spec(), &atlas(6), build, folder.path(), &options).unwrap_err();
+    assert!(error.to_string().contains("mesh has no elements"), "{error}");
+    assert!(!folder.path().join("manifest.json").exists());
+}
+
+#[test]
+fn poses_fill_their_ranges_and_follow_the_seed() {
+    let wide = CampaignSpec { presses: 64, ..spec() };
+    let points = poses(&wide);
+    assert_eq!(points[..7], poses(&spec())[..], "the first poses do not depend on the number");
+    let cell = |p: &Pose| {
+        let index = |x: f64, low: f64, width: f64| ((x - low) / width * 8.0) as usize;
+        index(p.pitch_deg, 0.0, 45.0) * 8 + index(p.roll_deg, -30.0, 60.0)
+    };
+    // 64 Sobol points in 2-D: at most two of 8 x 8 cells' neighbours stay
+    // empty; of random points some 23 cells would.
+    let mut cells: Vec<usize> = points.iter().map(cell).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    assert!(cells.len() >= 60, "{} of 64 cells hit", cells.len());
+    assert!(points.iter().all(|p| (0.0..45.0).contains(&p.pitch_deg) && p.yaw_deg.abs() < 1e-12));
+    let other = poses(&CampaignSpec { seed: 4, ..wide });
+    assert!(points.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
+}
+
+#[test]
+fn the_split_is_by_press_and_follows_the_seed() {
+    let spec = CampaignSpec { presses: 125, test_fraction: 0.2, ..spec() };
+    let split = splits(&spec);
+    assert_eq!((split.train.len(), split.test.len()), (100, 25));
+    let mut all = [split.train.clone(), split.test.clone()].concat();
+    all.sort_unstable();
+    assert_eq!(all, (0..125).collect::<Vec<_>>());
+    assert_eq!(split, splits(&spec));
+    assert_ne!(split.test, splits(&CampaignSpec { seed: 9, ..spec.clone() }).test);
+    let two = splits(&CampaignSpec { presses: 2, test_fraction: 0.2, ..spec });
+    assert_eq!((two.train.len(), two.test.len()), (1, 1));
+}
+
+#[test]
+fn shipped_campaigns_are_readable() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../campaigns");
+    let s1 = CampaignSpec::read(&folder.join("s1.toml")).unwrap();
+    assert_eq!((s1.samples(), s1.test_fraction.to_bits()), (1000, 0.2f64.to_bits()));
+    assert_eq!(CampaignSpec::read(&folder.join("smoke.toml")).unwrap().density, Density::Coarse);
+}
+
+#[test]
+fn senseless_campaigns_are_refused_by_field() {
+    type Spoil = fn(&mut CampaignSpec);
+    let cases: [(Spoil, &str); 6] = [
+        (|s| s.presses = 0, "presses"),
+        (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
+        (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
+        (|s| s.test_fraction = 1.0, "test_fraction"),
+        (|s| s.plate.edge_radius_mm = 11.0, "edge_radius_mm"),
+        (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
+    ];
+    for (spoil, field) in cases {
+        let mut bad = spec();
+        spoil(&mut bad);
+        let text = bad.validate().unwrap_err().to_string();
+        assert!(text.contains(field), "{text}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("odd.toml");
+    std::fs::write(&path, "name = \"x\"\nspeed = 3\n").unwrap();
+    let text = CampaignSpec::read(&path).unwrap_err().to_string();
+    assert!(text.contains("odd.toml") && text.contains("speed"), "{text}");
+}
+
+#[test]
+fn stats_images_and_verify_read_what_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = go(folder.path(), 2, Trouble::None).unwrap();
+    let verified = verify(folder.path()).unwrap();
+    assert_eq!((verified.samples, &verified.dataset_sha256), (14, &report.dataset_sha256));
+    let sheet = folder.path().join("sheet.png");
+    let stats = stats(folder.path(), Some(&sheet)).unwrap();
+    assert!(sheet.exists());
+    assert_eq!(stats.depths.iter().map(|d| d.samples).collect::<Vec<_>>(), [7, 7]);
+    // The formula's force is the depth squared.
+    assert!((stats.depths[1].force_n.median - 0.25).abs() < 1e-6);
+    assert!(stats.to_string().contains("0.500"));
+    let out = folder.path().join("images");
+    let images = images(folder.path(), &out, &ImageOptions { bits: Bits::Sixteen }).unwrap();
+    assert_eq!(images.samples.len(), 14);
+    assert_eq!(std::fs::read_dir(&out).unwrap().count(), 2 * 14 + 1);
+    let held_out = images.samples.iter().filter(|s| s.split == Split::Test).count();
+    assert_eq!(held_out, stats.samples_test);
+}
+
+#[test]
+fn the_atlas_of_another_dataset_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    go(folder.path(), 1, Trouble::None).unwrap();
+    let other: Atlas = atlas(5);
+    std::fs::write(folder.path().join("atlas.json"), other.to_json().unwrap()).unwrap();
+    let text = Dataset::open(folder.path()).unwrap_err().to_string();
+    assert!(text.contains("do not mix"), "{text}");
+}
