@@ -1,0 +1,181 @@
+//! Model cards and the index of the shipped models.
+//!
+//! A card (`models/NAME.json`) is what `model-export evaluate` measured of
+//! `models/NAME.onnx` in this engine on presses that no training saw.
+
+use crate::{EngineError, MODEL_FORMAT, ModelInfo};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// The card of one model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Card {
+    /// Version of this layout.
+    pub format: u32,
+    /// Name of the model, such as `s1-base8`.
+    pub name: String,
+    /// SHA-256 of the `.onnx` file, 64 lower-case hexadecimal digits.
+    pub onnx_sha256: String,
+    /// Length of the `.onnx` file, bytes.
+    pub bytes: u64,
+    /// Hash of the atlas whose maps it takes and gives.
+    pub atlas_hash: String,
+    /// Effects its training data have.
+    pub effects: Vec<String>,
+    /// Kind and size of the network.
+    pub network: Value,
+    /// Least and greatest pressure of the training data, Pa.
+    pub pressure_range_pa: [f32; 2],
+    /// Greatest SED of the training data, J/m3.
+    pub sed_max_j_per_m3: f32,
+    /// SHA-256 of the dataset.
+    pub dataset_sha256: String,
+    /// How it was trained.
+    pub training: Value,
+    /// Accuracy on held-out presses.
+    pub metrics: Metrics,
+    /// How long one map takes.
+    pub latency_ms: Latency,
+    /// Greatest difference from ONNX Runtime over all samples, relative to the greatest
+    /// value of each sample; absent if it was not measured.
+    pub onnxruntime_difference_max: Option<f64>,
+}
+
+/// Accuracy over the samples of a split. All but SSIM are errors, relative, without unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// Which split of the dataset: `test` for presses that training never saw.
+    pub split: String,
+    /// Number of samples measured.
+    pub samples: usize,
+    /// `|p - t| / |t|` over the pixels of the interface.
+    pub relative_l2: Spread,
+    /// The same where the truth is below 10 % of its maximum; absent if no sample has such
+    /// pixels with anything in them.
+    pub far_field_relative_l2: Option<Spread>,
+    /// `|max p - max t| / max t`.
+    pub peak_error: Spread,
+    /// `|sum p - sum t| / sum t`.
+    pub total_energy_error: Spread,
+    /// Structural similarity of the maps over the truth's maximum; 1 is equal.
+    pub ssim: Similarity,
+}
+
+/// Median and 95th percentile of an error over samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Median.
+    pub median: f64,
+    /// 95th percentile: one sample in twenty is worse.
+    pub p95: f64,
+}
+
+/// Median and 5th percentile of a similarity over samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Similarity {
+    /// Median.
+    pub median: f64,
+    /// 5th percentile: one sample in twenty is worse.
+    pub p5: f64,
+}
+
+/// Time of one inference, ms.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Latency {
+    /// What ran it, with version.
+    pub backend: String,
+    /// Threads it ran on.
+    pub threads: usize,
+    /// Median, ms.
+    pub p50: f64,
+    /// 99th percentile, ms.
+    pub p99: f64,
+}
+
+impl Card {
+    /// Reads a card.
+    ///
+    /// # Errors
+    /// [`EngineError::BadCard`] if it is not JSON of this shape,
+    /// [`EngineError::UnsupportedFormat`] if its format is another.
+    pub fn from_json(text: &str) -> Result<Self, EngineError> {
+        let card: Self = serde_json::from_str(text)
+            .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
+        card.require_format()?;
+        Ok(card)
+    }
+
+    /// Text of a card, indented, with a final newline.
+    ///
+    /// # Errors
+    /// [`EngineError::BadCard`] if the serialiser fails (out of memory apart, it does not).
+    pub fn to_json(&self) -> Result<String, EngineError> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
+        Ok(text + "\n")
+    }
+
+    fn require_format(&self) -> Result<(), EngineError> {
+        if self.format == MODEL_FORMAT {
+            return Ok(());
+        }
+        Err(EngineError::UnsupportedFormat { file: "the card", found: self.format })
+    }
+
+    /// Refuses the card of another model.
+    ///
+    /// # Errors
+    /// [`EngineError::CardMismatch`] naming the first field that differs,
+    /// [`EngineError::UnsupportedFormat`].
+    pub fn require_model(&self, info: &ModelInfo) -> Result<(), EngineError> {
+        self.require_format()?;
+        let [scale, model_scale] =
+            [self.sed_max_j_per_m3, info.sed_max_j_per_m3].map(|scale| scale.to_string());
+        let [pressure, model_pressure] =
+            [self.pressure_range_pa[1], info.pressure_max_pa].map(|scale| scale.to_string());
+        for (field, card, model) in [
+            ("name", &self.name, &info.name),
+            ("onnx_sha256", &self.onnx_sha256, &info.onnx_sha256),
+            ("atlas_hash", &self.atlas_hash, &info.atlas_hash),
+            ("dataset_sha256", &self.dataset_sha256, &info.dataset_sha256),
+            ("sed_max_j_per_m3", &scale, &model_scale),
+            ("pressure_range_pa", &pressure, &model_pressure),
+        ] {
+            if card != model {
+                let (card, model) = (card.clone(), model.clone());
+                return Err(EngineError::CardMismatch { field, card, model });
+            }
+        }
+        if self.effects != info.effects {
+            let [card, model] = [&self.effects, &info.effects].map(|effects| effects.join(", "));
+            return Err(EngineError::CardMismatch { field: "effects", card, model });
+        }
+        Ok(())
+    }
+}
+
+/// `models/index.json`: which models there are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Index {
+    /// The model to take unasked; one of `models`.
+    pub default: String,
+    /// Names of all models; each has `NAME.onnx` and `NAME.json` beside the index.
+    pub models: Vec<String>,
+}
+
+impl Index {
+    /// Reads the index.
+    ///
+    /// # Errors
+    /// [`EngineError::BadCard`] if it is not JSON of this shape, lists nothing, or names a
+    /// default that is not in the list.
+    pub fn from_json(text: &str) -> Result<Self, EngineError> {
+        let index: Self = serde_json::from_str(text)
+            .map_err(|error| EngineError::BadCard { reason: format!("index.json: {error}") })?;
+        if index.models.contains(&index.default) {
+            return Ok(index);
+        }
+        let reason = format!("index.json: the default '{}' is not in 'models'", index.default);
+        Err(EngineError::BadCard { reason })
+    }
+}

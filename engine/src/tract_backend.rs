@@ -1,0 +1,127 @@
+//! tract, the backend that is always there.
+
+use crate::{
+    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_lengths,
+    check_output,
+};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use tract_onnx::pb::ModelProto;
+use tract_onnx::prelude::*;
+use tract_onnx::tract_core::model::TypedSimpleState;
+
+/// Backend and version, for cards and logs; a test holds it to `Cargo.lock`.
+pub(crate) const LABEL: &str = "tract 0.23.9";
+
+/// Most values in one intermediate tensor (1 GiB of f32): a garbled shape is refused
+/// before it asks the system for more memory than there is, which would abort.
+const TENSOR_LEN_MAX: i64 = 1 << 28;
+
+pub(crate) struct TractModel {
+    info: ModelInfo,
+    plan: Arc<TypedRunnableModel>,
+}
+
+impl TractModel {
+    pub(crate) fn load(proto: &ModelProto, info: ModelInfo) -> Result<Self, EngineError> {
+        let typed = guarded("read the model", || {
+            tract_onnx::onnx().model_for_proto_model(proto)?.into_typed()
+        })?;
+        check_sizes(&typed)?;
+        let plan = guarded("optimise the model", || typed.into_optimized()?.into_runnable())?;
+        Ok(Self { info, plan })
+    }
+}
+
+fn check_sizes(model: &TypedModel) -> Result<(), EngineError> {
+    for node in &model.nodes {
+        for outlet in &node.outputs {
+            let values = outlet.fact.shape.volume();
+            if !values.to_i64().is_ok_and(|values| (0..=TENSOR_LEN_MAX).contains(&values)) {
+                return Err(EngineError::TooLarge {
+                    node: node.name.clone(),
+                    values: values.to_string(),
+                    limit: TENSOR_LEN_MAX,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+impl Model for TractModel {
+    fn info(&self) -> &ModelInfo {
+        &self.info
+    }
+
+    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
+        let shape = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
+        let (state, input) = guarded("set up a session", || {
+            Ok((self.plan.spawn()?, Tensor::zero::<f32>(&shape)?.into_arc_tensor()))
+        })?;
+        Ok(Box::new(TractSession { plan: Arc::clone(&self.plan), state, input }))
+    }
+}
+
+struct TractSession {
+    plan: Arc<TypedRunnableModel>,
+    state: TypedSimpleState,
+    /// Filled anew for each map; tract lets go of it when a run ends.
+    input: Arc<Tensor>,
+}
+
+impl TractSession {
+    fn run(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> TractResult<()> {
+        // Allocates only if tract still holds the tensor, as after an error.
+        let input = Arc::make_mut(&mut self.input);
+        input.try_as_plain_ram_mut()?.as_slice_mut::<f32>()?.copy_from_slice(pressure_pa);
+        let outputs = self.state.run(tvec!(Arc::clone(&self.input).into_tvalue()))?;
+        let answer = outputs[0].try_as_plain_ram()?;
+        let answer = answer.as_slice::<f32>()?;
+        if answer.len() != MAP_LEN {
+            return Err(TractError::msg(format!("the answer has {} values", answer.len())));
+        }
+        sed_j_per_m3.copy_from_slice(answer);
+        Ok(())
+    }
+}
+
+impl Session for TractSession {
+    fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError> {
+        check_lengths(pressure_pa, sed_j_per_m3)?;
+        if let Err(error) = guarded("infer a map", || self.run(pressure_pa, sed_j_per_m3)) {
+            // What an interrupted run leaves behind is not known: start afresh.
+            self.state = guarded("set up a session", || self.plan.spawn())?;
+            return Err(error);
+        }
+        check_output(sed_j_per_m3)
+    }
+}
+
+/// Runs tract's code and turns its errors and panics into ours.
+///
+/// tract reports most bad models as errors but asserts here and there (shape
+/// arithmetic, indexing), and a service must not fall to a model file.
+pub(crate) fn guarded<T>(
+    action: &'static str,
+    work: impl FnOnce() -> TractResult<T>,
+) -> Result<T, EngineError> {
+    let backend = Backend::Tract;
+    // Whatever `work` was changing is dropped or rebuilt by the callers on failure.
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(error)) => Err(EngineError::Backend { backend, action, reason: format!("{error:#}") }),
+        Err(panic) => {
+            Err(EngineError::Panicked { backend, action, reason: panic_text(panic.as_ref()) })
+        }
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> String {
+    panic
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned())
+        .or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no message".to_owned())
+}
