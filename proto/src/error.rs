@@ -57,6 +57,8 @@ pub enum ErrorCode {
     NotFound,
     /// The resource does not take this HTTP method.
     MethodNotAllowed,
+    /// The resource speaks WebSocket; plain HTTP arrived.
+    UpgradeRequired,
     /// The client was too slow to send what was due.
     Timeout,
     /// The deadline passed; the work was dropped.
@@ -73,7 +75,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::WrongLength,
         Self::WrongType,
         Self::WrongShape,
@@ -97,6 +99,7 @@ impl ErrorCode {
         Self::NotAcceptable,
         Self::NotFound,
         Self::MethodNotAllowed,
+        Self::UpgradeRequired,
         Self::Timeout,
         Self::Late,
         Self::Superseded,
@@ -132,6 +135,7 @@ impl ErrorCode {
             Self::NotAcceptable => "not_acceptable",
             Self::NotFound => "not_found",
             Self::MethodNotAllowed => "method_not_allowed",
+            Self::UpgradeRequired => "upgrade_required",
             Self::Timeout => "timeout",
             Self::Late => "late",
             Self::Superseded => "superseded",
@@ -161,6 +165,7 @@ impl ErrorCode {
             Self::MethodNotAllowed => 405,
             Self::NotAcceptable => 406,
             Self::Timeout => 408,
+            Self::UpgradeRequired => 426,
             Self::TooLarge => 413,
             Self::WrongType => 415,
             Self::NotFinite

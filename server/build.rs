@@ -1,0 +1,46 @@
+//! Lists the files that go into the binary: the shipped models and the page.
+//!
+//! The lists are made here rather than written by hand, so that a model or a
+//! page module is added by putting its file into the folder.
+
+use std::{
+    env,
+    error::Error,
+    fs,
+    path::{Path, PathBuf},
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+    embed(&root.join("../models"), &["onnx", "json"], &out.join("models.rs"))?;
+    let page = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
+    embed(&root.join("web"), &page, &out.join("page.rs"))?;
+    Ok(())
+}
+
+/// Writes an expression of type `&[(&str, &[u8])]`: name and bytes of every
+/// file in `folder` with one of the `endings`, sorted by name.
+fn embed(folder: &Path, endings: &[&str], into: &Path) -> Result<(), Box<dyn Error>> {
+    println!("cargo:rerun-if-changed={}", folder.display());
+    let mut files = Vec::new();
+    if folder.is_dir() {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+            if path.is_file() && endings.contains(&ending) {
+                files.push(path.canonicalize()?);
+            }
+        }
+    }
+    files.sort();
+    let mut list = String::from("&[\n");
+    for path in files {
+        let name = path.file_name().and_then(|n| n.to_str()).ok_or("a file name is not UTF-8")?;
+        let path = path.to_str().ok_or("a path is not UTF-8")?;
+        list.push_str(&format!("    ({name:?}, include_bytes!({path:?}).as_slice()),\n"));
+    }
+    list.push_str("]\n");
+    fs::write(into, list)?;
+    Ok(())
+}

@@ -1,0 +1,42 @@
+//! The atlas: as it was shipped, as OBJ, and its mask.
+
+use axum::{
+    extract::State,
+    http::{HeaderMap, Uri, header},
+    response::Response,
+};
+use bytes::Bytes;
+use papilla_proto::{ErrorCode, Problem};
+
+use super::{Answer, Shared, refuse, tagged};
+use crate::{codec, problem};
+
+pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Response {
+    let asked = headers.get(header::IF_NONE_MATCH);
+    let (hash, body) = (app.catalogue.atlas.hash(), app.catalogue.atlas_json.clone());
+    tagged("application/json", hash, asked, body)
+}
+
+pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Response {
+    let asked = headers.get(header::IF_NONE_MATCH);
+    let atlas = &app.catalogue.atlas;
+    tagged("model/obj", atlas.hash(), asked, Bytes::from(atlas.to_obj()))
+}
+
+/// White where the patch is: the interface, or with `?patch=skin` the skin.
+pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    let catalogue = &app.catalogue;
+    let (patch, raster) = match uri.query() {
+        None | Some("" | "patch=interface") => ("interface", &catalogue.interface),
+        Some("patch=skin") => ("skin", &catalogue.skin),
+        Some(_) => {
+            let message = "the parameter is patch=interface or patch=skin";
+            return refuse(&app, Problem::new(ErrorCode::BadQuery, message).at("patch"));
+        }
+    };
+    let mut png = Vec::new();
+    codec::encode_mask(raster.mask(), &mut png)
+        .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
+    let tag = format!("{}-{patch}", catalogue.atlas.hash());
+    Ok(tagged("image/png", &tag, headers.get(header::IF_NONE_MATCH), Bytes::from(png)))
+}

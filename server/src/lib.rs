@@ -1,0 +1,166 @@
+//! The Papilla service: pressure maps in over HTTP or WebSocket, strain energy density
+//! maps out, inside a latency budget.
+//!
+//! ```text
+//! net ──► http ──┐                        ┌── worker (own sessions, own buffers)
+//!    └──► session ─► slot (latest wins) ─► queue ─┼── worker
+//!                                                 └── worker
+//! ```
+//!
+//! **Invariant:** tokio only moves bytes; decoding, inference and encoding run on the pool's
+//! own threads. **Invariant:** every queue is bounded and every wait is timed.
+//! **Invariant:** a frame that was accepted is answered exactly once.
+//!
+//! [`start`] runs the whole service inside a process; the binary does little more.
+
+mod app;
+mod assets;
+mod codec;
+mod config;
+mod error;
+mod http;
+mod metrics;
+mod models;
+mod negotiate;
+mod net;
+mod pool;
+mod problem;
+mod replay;
+mod session;
+
+use std::{net::SocketAddr, sync::Arc, time::Duration};
+
+pub use config::Config;
+pub use error::{DrainError, StartError};
+use tokio::{
+    net::TcpListener,
+    sync::watch,
+    task::{JoinHandle, spawn_blocking},
+    time::timeout,
+};
+
+use crate::{app::App, assets::Assets, metrics::Metrics, models::Catalogue, pool::Pool};
+
+/// A running service.
+///
+/// Dropping it without [`drain`](Self::drain) stops accepting and lets the threads finish.
+pub struct Server {
+    address: SocketAddr,
+    tiers: Vec<String>,
+    default_tier: String,
+    threads: usize,
+    drain: Arc<watch::Sender<bool>>,
+    drain_timeout: Duration,
+    accepting: JoinHandle<()>,
+    pool: Option<Pool>,
+}
+
+/// Starts the service: loads the models, warms every thread, binds, accepts.
+///
+/// Must be called within a tokio runtime. When it returns, the service is ready.
+///
+/// # Errors
+/// The models are missing or unusable, a thread cannot be started, or the address cannot be
+/// bound; each says what to do.
+pub async fn start(config: &Config) -> Result<Server, StartError> {
+    let loading = config.clone();
+    let (catalogue, metrics, pool) =
+        spawn_blocking(move || load(&loading)).await.map_err(|_| StartError::WorkerPanicked)??;
+    let bind = |source| StartError::Bind { address: config.bind, source };
+    let listener = TcpListener::bind(config.bind).await.map_err(bind)?;
+    let address = listener.local_addr().map_err(bind)?;
+    let drain = Arc::new(watch::Sender::new(false));
+    let entrance = pool.entrance(&metrics);
+    let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
+    let default_tier = catalogue.tiers[catalogue.default].name.clone();
+    let app = Arc::new(App::new(config, catalogue, metrics, entrance, Arc::clone(&drain)));
+    let router = http::router(Arc::clone(&app));
+    let accepting = tokio::spawn(net::serve(listener, router, app, config.max_connections.get()));
+    Ok(Server {
+        address,
+        tiers,
+        default_tier,
+        threads: config.thread_count(),
+        drain,
+        drain_timeout: config.drain_timeout(),
+        accepting,
+        pool: Some(pool),
+    })
+}
+
+type Loaded = (Arc<Catalogue>, Arc<Metrics>, Pool);
+
+fn load(config: &Config) -> Result<Loaded, StartError> {
+    let assets = match &config.models {
+        Some(folder) => Assets::from_folder(folder)
+            .map_err(|source| StartError::Folder { folder: folder.clone(), source })?,
+        None => Assets::embedded(),
+    };
+    let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref())?);
+    let metrics = Metrics::new(catalogue.tiers.iter().map(|tier| tier.name.as_str()));
+    // A slot is in the queue at most once, so this many places are always enough.
+    let places = config.max_sessions.get() + config.max_requests.get();
+    let pool = Pool::start(&catalogue, &metrics, config.thread_count(), places)?;
+    Ok((catalogue, metrics, pool))
+}
+
+impl Server {
+    /// The address it listens on, with the port the system chose.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Names of the tiers.
+    #[must_use]
+    pub fn tiers(&self) -> &[String] {
+        &self.tiers
+    }
+
+    /// Name of the tier taken for clients that name neither tier nor budget.
+    #[must_use]
+    pub fn default_tier(&self) -> &str {
+        &self.default_tier
+    }
+
+    /// Number of inference threads.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// Ends the service: takes nothing new, answers every accepted frame, tells
+    /// every session, and waits for all of them and for the threads.
+    ///
+    /// # Errors
+    /// Not done within the configured time; what was left is cut off.
+    pub async fn drain(mut self) -> Result<(), DrainError> {
+        self.drain.send_replace(true);
+        let accepting = &mut self.accepting;
+        let drain = &self.drain;
+        let all = async {
+            // Err: it panicked; nothing is accepted then either.
+            let _ = accepting.await;
+            // Connections and sessions each hold a receiver.
+            drain.closed().await;
+        };
+        let result = timeout(self.drain_timeout, all).await;
+        if let Some(mut pool) = self.pool.take() {
+            // Nobody waits for more than the job a thread has in hand.
+            let _ = spawn_blocking(move || pool.stop()).await;
+        }
+        result.map_err(|_| DrainError { seconds: self.drain_timeout.as_secs() })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.drain.send_replace(true);
+    }
+}
+
+/// Method (lower case) and path of every HTTP route, as the OpenAPI document writes them.
+#[must_use]
+pub fn routes() -> Vec<(String, String)> {
+    http::route_list()
+}

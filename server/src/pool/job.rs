@@ -1,0 +1,98 @@
+//! One map to render, and what became of it.
+
+use std::time::{Duration, Instant};
+
+use bytes::{Bytes, BytesMut};
+use papilla_proto::{FrameHeader, Problem};
+
+use crate::codec::{Input, Output};
+
+/// One pressure map on its way to a thread.
+#[derive(Debug)]
+pub(crate) struct Job {
+    /// Index of the tier in the catalogue.
+    pub(crate) tier: usize,
+    /// The undecoded map: the payload alone, without a frame header.
+    pub(crate) payload: Bytes,
+    /// How to decode it.
+    pub(crate) input: Input,
+    /// How to encode the answer.
+    pub(crate) output: Output,
+    /// The frame's header; None over HTTP.
+    pub(crate) header: Option<FrameHeader>,
+    /// When the server had read the map.
+    pub(crate) received: Instant,
+    /// When the answer is worthless.
+    pub(crate) deadline: Option<Instant>,
+}
+
+impl Job {
+    /// Whether the deadline has passed.
+    pub(crate) fn is_late(&self) -> bool {
+        is_past(self.deadline)
+    }
+}
+
+/// Whether `deadline` has passed.
+pub(crate) fn is_past(deadline: Option<Instant>) -> bool {
+    deadline.is_some_and(|deadline| Instant::now() >= deadline)
+}
+
+/// Where a deadline was found to have passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Stage {
+    /// Before the map entered the slot.
+    Admission,
+    /// When a thread took it from the slot.
+    Dequeue,
+    /// Decoded, but what is left of the time is less than any inference takes.
+    Inference,
+    /// Rendered, but not yet sent.
+    Sending,
+}
+
+/// Time spent in each stage.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Times {
+    /// Waiting for a thread.
+    pub(crate) queue: Duration,
+    /// Decoding and checking.
+    pub(crate) decode: Duration,
+    /// In the network; zero for a zero map.
+    pub(crate) infer: Duration,
+    /// Encoding the answer.
+    pub(crate) encode: Duration,
+}
+
+/// What became of a job.
+#[derive(Debug)]
+pub(crate) enum Outcome {
+    /// The map, encoded. Over a session 32 bytes are left free in front for the header.
+    Map {
+        /// The encoded answer.
+        bytes: BytesMut,
+        /// J/m3 per unit (u16, u8), J/m3 of full white (PNG), else 1.
+        scale: f32,
+    },
+    /// The deadline had passed.
+    Late(Stage),
+    /// Something was wrong with the map, or with us.
+    Failed(Problem),
+}
+
+/// A finished job.
+#[derive(Debug)]
+pub(crate) struct Done {
+    /// Index of the tier.
+    pub(crate) tier: usize,
+    /// The frame's header; None over HTTP.
+    pub(crate) header: Option<FrameHeader>,
+    /// When the server had read the map.
+    pub(crate) received: Instant,
+    /// When the answer is worthless.
+    pub(crate) deadline: Option<Instant>,
+    /// Time by stage.
+    pub(crate) times: Times,
+    /// What became of it.
+    pub(crate) outcome: Outcome,
+}

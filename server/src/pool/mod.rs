@@ -1,0 +1,128 @@
+//! The inference pool: N dedicated threads, each with its own session of every tier.
+//!
+//! tokio only moves bytes. A connection puts a [`Job`] into its [`Slot`] and the
+//! slot into the bounded [`Queue`](queue::Queue); a thread takes it from there, decodes,
+//! checks, infers, encodes, and hands the [`Done`] back through the slot's channel.
+
+mod buffer;
+mod job;
+mod queue;
+mod slot;
+mod work;
+
+use std::{
+    sync::Arc,
+    thread::{self, JoinHandle},
+    time::Duration,
+};
+
+pub(crate) use buffer::Recycler;
+pub(crate) use job::{Done, Job, Outcome, Stage, is_past};
+pub(crate) use slot::Slot;
+
+use self::{queue::Queue, work::Worker};
+use crate::{StartError, metrics::Metrics, models::Catalogue};
+use job::Times;
+use slot::Offer;
+
+/// The threads and the queue before them.
+pub(crate) struct Pool {
+    queue: Arc<Queue>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+/// The way into the pool.
+#[derive(Clone)]
+pub(crate) struct Entrance {
+    queue: Arc<Queue>,
+    metrics: Arc<Metrics>,
+}
+
+impl Pool {
+    /// Starts `threads` threads; returns once each has its sessions ready and warm.
+    ///
+    /// `places` bounds the queue: the greatest number of slots that may exist.
+    pub(crate) fn start(
+        catalogue: &Arc<Catalogue>,
+        metrics: &Arc<Metrics>,
+        threads: usize,
+        places: usize,
+    ) -> Result<Self, StartError> {
+        let queue = Arc::new(Queue::new(places));
+        let mut pool = Self { queue: Arc::clone(&queue), threads: Vec::with_capacity(threads) };
+        let (report, reports) = std::sync::mpsc::sync_channel(threads);
+        for number in 0..threads {
+            let (catalogue, metrics) = (Arc::clone(catalogue), Arc::clone(metrics));
+            let (queue, report) = (Arc::clone(&queue), report.clone());
+            let thread = thread::Builder::new()
+                .name(format!("infer-{number}"))
+                .spawn(move || match Worker::prepare(&catalogue, metrics) {
+                    Ok(mut worker) => {
+                        let _ = report.send(Ok(()));
+                        // The starter counts reports until all senders are gone.
+                        drop(report);
+                        worker.run(&queue);
+                    }
+                    Err(error) => {
+                        let _ = report.send(Err(error));
+                    }
+                })
+                .map_err(StartError::Thread)?;
+            pool.threads.push(thread);
+        }
+        drop(report);
+        let mut ready = 0;
+        while let Ok(result) = reports.recv() {
+            if let Err(error) = result {
+                pool.stop();
+                return Err(error);
+            }
+            ready += 1;
+        }
+        if ready == threads { Ok(pool) } else { Err(StartError::WorkerPanicked) }
+    }
+
+    pub(crate) fn entrance(&self, metrics: &Arc<Metrics>) -> Entrance {
+        Entrance { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
+    }
+
+    /// Ends the threads once the queue is empty, and waits for them.
+    pub(crate) fn stop(&mut self) {
+        self.queue.close();
+        for thread in self.threads.drain(..) {
+            if thread.join().is_err() {
+                tracing::error!("an inference thread panicked");
+            }
+        }
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.stop();
+    }
+}
+
+impl Entrance {
+    /// Puts `job` into `slot` and sees to it that a thread comes for it.
+    ///
+    /// Returns the job whose place it took, if that had not been started.
+    /// Err gives the job back: the pool is closed or, against the bounds set
+    /// at the start, full.
+    pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, Job> {
+        match slot.offer(job) {
+            Offer::Scheduled { replaced } => Ok(replaced),
+            Offer::Schedule => {
+                if self.queue.push(Arc::clone(slot)) {
+                    self.metrics.queue_length.set(self.queue.len());
+                    Ok(None)
+                } else {
+                    slot.retract().map_or(Ok(None), Err)
+                }
+            }
+        }
+    }
+}
+
+/// Longest wait of a thread for work before it looks around; every wait is timed.
+const LOOK_AROUND: Duration = Duration::from_millis(500);

@@ -1,0 +1,108 @@
+//! The one-frame slot of a session: the latest frame wins.
+
+use std::{
+    mem,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use tokio::sync::mpsc;
+
+use super::{Done, Job, buffer::Recycler};
+
+/// At most this many answers can wait for a connection: one of the job that
+/// runs, one of the job behind it, and room to be sure.
+const ANSWERS: usize = 4;
+
+/// What an offer came to.
+#[derive(Debug)]
+pub(crate) enum Offer {
+    /// The slot is on its way to a thread already. The unstarted job whose
+    /// place was taken, if there was one.
+    Scheduled {
+        /// The job that will not be run.
+        replaced: Option<Job>,
+    },
+    /// The slot was idle: put it into the queue.
+    Schedule,
+}
+
+/// The meeting point of one client and the pool.
+///
+/// A slot is in the queue or with a thread at most once, so a session never has
+/// two frames under way, answers keep the order of the frames, and the queue is
+/// bounded by the number of slots.
+#[derive(Debug)]
+pub(crate) struct Slot {
+    state: Mutex<State>,
+    answers: mpsc::Sender<Done>,
+}
+
+#[derive(Debug)]
+struct State {
+    waiting: Option<Job>,
+    /// In the queue or with a thread.
+    scheduled: bool,
+    recycler: Recycler,
+}
+
+impl Slot {
+    /// An empty slot and the end its answers come out of.
+    pub(crate) fn new() -> (Self, mpsc::Receiver<Done>) {
+        let (answers, receiver) = mpsc::channel(ANSWERS);
+        let state = State { waiting: None, scheduled: false, recycler: Recycler::default() };
+        (Self { state: Mutex::new(state), answers }, receiver)
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change below leaves the state whole, so a poisoned lock is usable.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts a job in; a job that waits is replaced.
+    pub(crate) fn offer(&self, job: Job) -> Offer {
+        let mut state = self.state();
+        let replaced = state.waiting.replace(job);
+        if mem::replace(&mut state.scheduled, true) {
+            Offer::Scheduled { replaced }
+        } else {
+            Offer::Schedule
+        }
+    }
+
+    /// Takes the job back out of a slot that could not be scheduled.
+    pub(crate) fn retract(&self) -> Option<Job> {
+        let mut state = self.state();
+        state.scheduled = false;
+        state.waiting.take()
+    }
+
+    /// A thread takes the job, and the buffers for its answer.
+    pub(super) fn take(&self) -> Option<(Job, Recycler)> {
+        let mut state = self.state();
+        match state.waiting.take() {
+            Some(job) => Some((job, mem::take(&mut state.recycler))),
+            None => {
+                state.scheduled = false;
+                None
+            }
+        }
+    }
+
+    /// The thread is done; true if another job has come meanwhile and the slot
+    /// must go into the queue again.
+    pub(super) fn finish(&self, done: Done, recycler: Recycler) -> bool {
+        // Err: the client is gone, or (never, see ANSWERS) does not fetch its answers.
+        if let Err(mpsc::error::TrySendError::Full(_)) = self.answers.try_send(done) {
+            tracing::error!("a client's answers are not fetched; one was dropped");
+        }
+        let mut state = self.state();
+        state.recycler = recycler;
+        state.scheduled = state.waiting.is_some();
+        state.scheduled
+    }
+
+    /// Whether nobody is there for the answer.
+    pub(super) fn is_abandoned(&self) -> bool {
+        self.answers.is_closed()
+    }
+}

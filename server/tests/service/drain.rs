@@ -1,0 +1,80 @@
+//! The end of the service: nothing that was accepted stays unanswered.
+
+use std::time::Duration;
+
+use papilla_proto::{FrameStatus, SampleType};
+use serde_json::json;
+use tokio::{net::TcpStream, time::sleep};
+
+use crate::support::{Service, bytes_of, frame, hello, ramp};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn accepted_work_is_answered_and_sessions_are_told() {
+    let service = Service::start().await;
+    let mut busy = service.socket().await;
+    busy.open(hello(json!({"tier": "slow"}))).await;
+    let mut idle = service.socket().await;
+    idle.open(hello(json!({}))).await;
+    let mut new = service.socket().await;
+    let post = service.post("/v1/sed?tier=slow", bytes_of(&ramp())).send();
+    let post = tokio::spawn(post);
+    busy.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    // Long enough to be accepted, not long enough to be done.
+    sleep(Duration::from_millis(30)).await;
+    busy.send(frame(2, 0, SampleType::F32, 1.0, &ramp())).await;
+    sleep(Duration::from_millis(30)).await;
+    let address = service.address;
+    let drain = tokio::spawn(service.server.drain());
+
+    idle.hear_end("shutting_down", 1001).await;
+    new.hear_end("shutting_down", 1001).await;
+    let mut answered = Vec::new();
+    for _ in 0..2 {
+        let (header, _) = busy.hear_frame().await;
+        assert!(matches!(header.status, FrameStatus::Ok | FrameStatus::Superseded), "{header:?}");
+        answered.push(header.sequence);
+    }
+    answered.sort_unstable();
+    assert_eq!(answered, [1, 2]);
+    busy.hear_end("shutting_down", 1001).await;
+    assert_eq!(post.await.unwrap().status, 200);
+    drain.await.unwrap().unwrap();
+    assert!(TcpStream::connect(address).await.is_err(), "the port is still open");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn frames_that_come_during_the_drain_are_refused_by_name() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    sleep(Duration::from_millis(30)).await;
+    let drain = tokio::spawn(service.server.drain());
+    sleep(Duration::from_millis(10)).await;
+    socket.send(frame(2, 0, SampleType::F32, 1.0, &ramp())).await;
+    let refused = socket.hear_refusal("shutting_down").await;
+    assert_eq!(refused["sequence"], 2);
+    let (header, _) = socket.hear_frame().await;
+    assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
+    socket.hear_end("shutting_down", 1001).await;
+    drain.await.unwrap().unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_kept_alive_does_not_hold_up_the_drain() {
+    let service = Service::start().await;
+    let _idle = TcpStream::connect(service.address).await.unwrap();
+    sleep(Duration::from_millis(20)).await;
+    service.server.drain().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_drain_that_takes_too_long_says_so() {
+    let service = Service::start_with(|config| config.drain_timeout_s = 0).await;
+    let mut socket = service.socket().await;
+    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    sleep(Duration::from_millis(30)).await;
+    let error = service.server.drain().await.unwrap_err();
+    assert!(error.to_string().contains("0 s"), "{error}");
+}

@@ -1,0 +1,185 @@
+//! Clients that are broken, slow or malicious.
+
+use std::time::{Duration, Instant};
+
+use papilla_proto::{MAP_LEN, SampleType};
+use serde_json::json;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+    time::{sleep, timeout},
+};
+use tokio_tungstenite::tungstenite::Message;
+
+use crate::support::{Answer, Service, bytes_of, frame, hello, ramp, raw_exchange};
+
+async fn impatient() -> Service {
+    Service::start_with(|config| {
+        config.io_timeout_s = 1;
+        config.idle_timeout_s = 3;
+    })
+    .await
+}
+
+/// The service is none the worse: it still renders.
+async fn assert_serves(service: &Service) {
+    assert_eq!(service.post("/v1/sed", bytes_of(&ramp())).send().await.status, 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn bodies_too_large_are_refused_and_the_client_gets_to_read_why() {
+    let service = Service::start().await;
+    for bytes in [(2 << 20) + 1, 7 << 20] {
+        let answer = service.post("/v1/sed", vec![0; bytes]).send().await;
+        answer.assert_refused(413, "too_large");
+    }
+    // Without a length, in chunks without end: cut off.
+    let mut endless =
+        b"POST /v1/sed HTTP/1.1\r\nhost: t\r\ntransfer-encoding: chunked\r\n\r\n".to_vec();
+    let chunk = [&b"10000\r\n"[..], &vec![0; 65_536], b"\r\n"].concat();
+    for _ in 0..400 {
+        endless.extend(&chunk);
+    }
+    raw_exchange(service.address, &endless).await;
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn slow_clients_are_dropped() {
+    let service = impatient().await;
+    // A head that never ends, and one that never begins.
+    for start in ["GET /healthz HTTP/1.1\r\nhost", ""] {
+        let since = Instant::now();
+        raw_exchange(service.address, start.as_bytes()).await;
+        assert!(since.elapsed() < Duration::from_secs(20));
+    }
+    // A body that never ends.
+    let head = "POST /v1/sed HTTP/1.1\r\nhost: t\r\nconnection: close\r\ncontent-length: 200704\r\n\r\n1234";
+    let answer = Answer::parse(&raw_exchange(service.address, head.as_bytes()).await);
+    answer.assert_refused(408, "timeout");
+    // A body that breaks off.
+    let mut stream = TcpStream::connect(service.address).await.unwrap();
+    stream.write_all(head.as_bytes()).await.unwrap();
+    drop(stream);
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_that_never_reads_is_dropped() {
+    let service = impatient().await;
+    // Pipelined posts whose answers, 200 kB each, go nowhere.
+    let mut stream = TcpStream::connect(service.address).await.unwrap();
+    let head = "POST /v1/sed HTTP/1.1\r\nhost: t\r\ncontent-length: 200704\r\n\r\n";
+    let post = [head.as_bytes(), &bytes_of(&ramp())].concat();
+    let flood = async { while stream.write_all(&post).await.is_ok() {} };
+    timeout(Duration::from_secs(60), flood).await.expect("the connection is still open");
+    // The same in a session.
+    let mut socket = service.socket().await;
+    socket.open(hello(json!({}))).await;
+    let flood = async {
+        while service.metric("papilla_sessions_open").await > 0.5 {
+            for sequence in 0..8 {
+                let frame = frame(sequence, 0, SampleType::F32, 1.0, &ramp());
+                let _ = timeout(Duration::from_millis(100), socket.try_send(frame)).await;
+            }
+        }
+    };
+    timeout(Duration::from_secs(60), flood).await.expect("the session is still open");
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn noise_is_no_http() {
+    let service = Service::start().await;
+    for noise in
+        [&b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03"[..], b"hello\r\n\r\n", &[0; 4096]]
+    {
+        raw_exchange(service.address, noise).await;
+    }
+    let long = format!("GET /{} HTTP/1.1\r\nhost: t\r\n\r\n", "x".repeat(100_000));
+    raw_exchange(service.address, long.as_bytes()).await;
+    for path in
+        ["/v1/presses/%ff", "/%00", "/../Cargo.toml", "/v1/../../etc/passwd", "//", "/v1/sed/"]
+    {
+        service.get(path).send().await.assert_refused(404, "not_found");
+    }
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_is_a_websocket() {
+    let service = Service::start().await;
+    service.get("/v1/session").send().await.assert_refused(426, "upgrade_required");
+    let half = service.get("/v1/session").header("upgrade", "websocket").send().await;
+    half.assert_refused(426, "upgrade_required");
+    service.post("/v1/session", "x").send().await.assert_refused(405, "method_not_allowed");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn silence_instead_of_a_hello_ends_the_session() {
+    let service = impatient().await;
+    let mut socket = service.socket().await;
+    socket.hear_end("timeout", 1008).await;
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_that_answers_pings_lives_on_and_one_that_does_not_ends() {
+    let service = impatient().await;
+    let mut live = service.socket().await;
+    live.open(hello(json!({}))).await;
+    let mut dead = service.socket().await;
+    dead.open(hello(json!({}))).await;
+    // Reading answers pings; `dead` does not read.
+    let _ = timeout(Duration::from_secs(5), live.hear()).await.expect_err("nothing is due");
+    live.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    live.hear_frame().await;
+    let wait = async {
+        while service.metric("papilla_sessions_open").await > 1.5 {
+            sleep(Duration::from_millis(50)).await;
+        }
+    };
+    timeout(Duration::from_secs(30), wait).await.expect("the dead session is still open");
+    dead.hear_end("timeout", 1008).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn messages_too_large_end_the_session_with_a_word() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello(json!({}))).await;
+    socket.try_send(vec![0_u8; (1 << 20) + 1]).await;
+    socket.hear_end("too_large", 1009).await;
+    assert_serves(&service).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn noise_in_a_session_harms_nobody_else() {
+    let service = Service::start().await;
+    let mut other = service.socket().await;
+    other.open(hello(json!({}))).await;
+    // Text that is not UTF-8, a reserved opcode, an unmasked frame.
+    for noise in
+        [&[0x81, 0x82, 0, 0, 0, 0, 0xff, 0xfe][..], &[0x83, 0x80, 0, 0, 0, 0], &[0x82, 0x01, 0x00]]
+    {
+        let mut stream = TcpStream::connect(service.address).await.unwrap();
+        let head = "GET /v1/session HTTP/1.1\r\nhost: t\r\nconnection: upgrade\r\nupgrade: websocket\r\n\
+            sec-websocket-version: 13\r\nsec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+        stream.write_all(head.as_bytes()).await.unwrap();
+        stream.write_all(noise).await.unwrap();
+        let mut answer = Vec::new();
+        let read = timeout(Duration::from_secs(30), stream.read_to_end(&mut answer));
+        let _ = read.await.expect("the connection is still open");
+        assert!(answer.starts_with(b"HTTP/1.1 101 "), "{:?}", String::from_utf8_lossy(&answer));
+    }
+    // A client that vanishes with a frame under way.
+    let mut gone = service.socket().await;
+    gone.open(hello(json!({"tier": "slow"}))).await;
+    gone.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    drop(gone);
+    other.send(frame(2, 0, SampleType::F32, 1.0, &vec![1.0; MAP_LEN])).await;
+    assert_eq!(other.hear_frame().await.0.sequence, 2);
+    other.send(Message::Ping(vec![1].into())).await;
+    other.send(frame(3, 0, SampleType::F32, 1.0, &ramp())).await;
+    assert_eq!(other.hear_frame().await.0.sequence, 3);
+}

@@ -1,0 +1,13 @@
+//! The whole service, from the outside: every route, every error path, real models.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+mod drain;
+mod hostile;
+mod information;
+mod page;
+mod rendering;
+mod session;
+mod start;
+mod support;

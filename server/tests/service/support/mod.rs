@@ -1,0 +1,173 @@
+//! A service with small models of its own, and clients that can misbehave.
+
+mod http;
+mod onnx;
+mod socket;
+
+use std::{fs, net::SocketAddr, path::Path};
+
+use papilla_proto::{
+    MAP_LEN,
+    atlas::{Atlas, PatchVertices},
+};
+use papilla_server::{Config, Server};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use tempfile::TempDir;
+
+pub(crate) use http::{Answer, Request, raw_exchange};
+pub(crate) use socket::{Heard, Socket, frame, hello};
+
+/// Greatest pressure the test models take, Pa.
+pub(crate) const PRESSURE_MAX_PA: f32 = 10_000.0;
+
+/// Greatest SED the cards of the test models name, J/m3.
+pub(crate) const SED_MAX: f32 = 5_000.0;
+
+/// What the test models multiply the pressure by.
+pub(crate) const GAIN: f32 = 0.5;
+
+/// A running service of two tiers: `quick` (the default; its card says it errs by 20 %) and
+/// `slow` (some hundred milliseconds; 5 %).
+pub(crate) struct Service {
+    pub(crate) server: Server,
+    pub(crate) address: SocketAddr,
+    pub(crate) models: TempDir,
+}
+
+impl Service {
+    /// With one inference thread, so that tests know what waits for what.
+    pub(crate) async fn start() -> Self {
+        Self::start_with(|_| ()).await
+    }
+
+    /// The same, with changes to the configuration.
+    pub(crate) async fn start_with(change: impl FnOnce(&mut Config)) -> Self {
+        let models = model_folder();
+        let mut config = Config {
+            models: Some(models.path().to_owned()),
+            threads: std::num::NonZeroUsize::new(1),
+            ..Config::default()
+        };
+        change(&mut config);
+        let server = papilla_server::start(&config).await.unwrap();
+        Self { address: server.address(), server, models }
+    }
+
+    pub(crate) fn get(&self, path: &str) -> Request {
+        Request::new(self.address, "GET", path)
+    }
+
+    pub(crate) fn post(&self, path: &str, body: impl Into<Vec<u8>>) -> Request {
+        Request::new(self.address, "POST", path).body(body)
+    }
+
+    pub(crate) async fn json(&self, path: &str) -> Value {
+        let answer = self.get(path).send().await;
+        assert_eq!(answer.status, 200, "{path}: {}", answer.text());
+        answer.json()
+    }
+
+    pub(crate) async fn socket(&self) -> Socket {
+        Socket::connect(self.address).await.unwrap()
+    }
+
+    /// The value of a metric, by its name and labels as they are printed.
+    pub(crate) async fn metric(&self, line: &str) -> f64 {
+        let text = self.get("/metrics").send().await.text();
+        let found = text.lines().find_map(|l| l.strip_prefix(line)?.trim().parse().ok());
+        found.unwrap_or_else(|| panic!("no metric {line} in\n{text}"))
+    }
+}
+
+/// A folder as the service expects it. Dropped, it is deleted.
+pub(crate) fn model_folder() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let atlas = atlas();
+    write(folder.path(), "atlas.json", atlas.to_json().unwrap().as_bytes());
+    add_model(folder.path(), "quick", atlas.hash(), 0, 0.2);
+    add_model(folder.path(), "slow", atlas.hash(), 8, 0.05);
+    let index = json!({"default": "quick", "models": ["quick", "slow"]});
+    write(folder.path(), "index.json", index.to_string().as_bytes());
+    let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| 100.0 * i as f32).collect();
+    let press = json!({"name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5,
+        "pressure_pa": values, "sed_j_per_m3": values});
+    write(folder.path(), "replay.json", json!({"presses": [press]}).to_string().as_bytes());
+    folder
+}
+
+pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) {
+    fs::write(folder.join(name), bytes).unwrap();
+}
+
+/// A square patch of four triangles around a middle vertex.
+pub(crate) fn atlas() -> Atlas {
+    let uv_px = vec![[20.0, 20.0], [200.0, 20.0], [200.0, 200.0], [20.0, 200.0], [110.5, 110.5]];
+    let patch = |z: f32| PatchVertices {
+        positions_mm: uv_px.iter().map(|&[u, v]: &[f32; 2]| [0.1 * v, -0.1 * u, z]).collect(),
+        uv_px: uv_px.clone(),
+    };
+    let triangles = vec![[0, 4, 1], [1, 4, 2], [2, 4, 3], [3, 4, 0]];
+    Atlas::new(0.1, triangles, patch(-1.0), patch(-0.5)).unwrap()
+}
+
+/// Writes a model and its card.
+pub(crate) fn add_model(folder: &Path, name: &str, atlas_hash: &str, work: usize, error: f64) {
+    let network = json!({"kind": "test", "base": work}).to_string();
+    let metadata = [
+        ("papilla.format", "1".to_owned()),
+        ("papilla.name", name.to_owned()),
+        ("papilla.atlas_hash", atlas_hash.to_owned()),
+        ("papilla.effects", json!(["finite_strain", "layers"]).to_string()),
+        ("papilla.network", network),
+        ("papilla.pressure_max_pa", PRESSURE_MAX_PA.to_string()),
+        ("papilla.sed_max_j_per_m3", SED_MAX.to_string()),
+        ("papilla.dataset_sha256", "0".repeat(64)),
+        ("papilla.training", json!({"seed": 0}).to_string()),
+        ("papilla.metrics", json!({}).to_string()),
+    ];
+    let onnx = onnx::model(GAIN, work, &metadata);
+    let spread = |median: f64| json!({"median": median, "p95": 2.0 * median});
+    let card = json!({
+        "format": 1, "name": name, "onnx_sha256": hex(&Sha256::digest(&onnx)), "bytes": onnx.len(),
+        "atlas_hash": atlas_hash, "effects": ["finite_strain", "layers"],
+        "network": {"kind": "test", "base": work},
+        "pressure_range_pa": [0.0, PRESSURE_MAX_PA], "sed_max_j_per_m3": SED_MAX,
+        "dataset_sha256": "0".repeat(64), "training": {"seed": 0},
+        "metrics": {"split": "test", "samples": 1, "relative_l2": spread(error),
+            "far_field_relative_l2": spread(error), "peak_error": spread(error),
+            "total_energy_error": spread(error), "ssim": {"median": 0.9, "p5": 0.8}},
+        "latency_ms": {"backend": "tract", "threads": 1, "p50": 1.0, "p99": 2.0},
+        "onnxruntime_difference_max": null
+    });
+    write(folder, &format!("{name}.onnx"), &onnx);
+    write(folder, &format!("{name}.json"), card.to_string().as_bytes());
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A map that differs in every sample, Pa.
+pub(crate) fn ramp() -> Vec<f32> {
+    (0..MAP_LEN).map(|i| PRESSURE_MAX_PA * i as f32 / (MAP_LEN - 1) as f32).collect()
+}
+
+pub(crate) fn bytes_of(map: &[f32]) -> Vec<u8> {
+    map.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+pub(crate) fn floats_of(bytes: &[u8]) -> Vec<f32> {
+    let (chunks, rest) = bytes.as_chunks::<4>();
+    assert!(rest.is_empty());
+    chunks.iter().map(|chunk| f32::from_le_bytes(*chunk)).collect()
+}
+
+/// Asserts that `sed` is what the test models make of `pressure`, within `error` of each sample.
+pub(crate) fn assert_rendered(pressure: &[f32], sed: &[f32], error: impl Fn(f32) -> f32) {
+    assert_eq!(sed.len(), pressure.len());
+    for (i, (p, e)) in pressure.iter().zip(sed).enumerate() {
+        let due = GAIN * p;
+        assert!((due - e).abs() <= error(due), "sample {i}: {due} became {e}");
+    }
+}

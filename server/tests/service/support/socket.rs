@@ -1,0 +1,137 @@
+//! A WebSocket client of a session.
+
+use std::{net::SocketAddr, time::Duration};
+
+use futures_util::{SinkExt, StreamExt};
+use papilla_proto::{FrameHeader, HEADER_LEN, SampleType};
+use serde_json::{Value, json};
+use tokio::{net::TcpStream, time::timeout};
+use tokio_tungstenite::{
+    WebSocketStream, client_async,
+    tungstenite::{Error, Message, protocol::CloseFrame},
+};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+pub(crate) struct Socket {
+    stream: WebSocketStream<TcpStream>,
+}
+
+/// What the server said.
+#[derive(Debug)]
+pub(crate) enum Heard {
+    Json(Value),
+    Frame(FrameHeader, Vec<u8>),
+    Closed(Option<u16>),
+}
+
+impl Socket {
+    /// Err: the status the server refused the handshake with, and its body.
+    pub(crate) async fn connect(address: SocketAddr) -> Result<Self, (u16, Value)> {
+        let stream = TcpStream::connect(address).await.unwrap();
+        stream.set_nodelay(true).unwrap();
+        match client_async(format!("ws://{address}/v1/session"), stream).await {
+            Ok((stream, _)) => Ok(Self { stream }),
+            Err(Error::Http(answer)) => {
+                let body = answer.body().as_deref().unwrap_or_default();
+                Err((answer.status().as_u16(), serde_json::from_slice(body).unwrap_or_default()))
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    pub(crate) async fn send(&mut self, message: impl Into<Message>) {
+        timeout(PATIENCE, self.stream.send(message.into())).await.unwrap().unwrap();
+    }
+
+    /// As `send`, but the server may close meanwhile.
+    pub(crate) async fn try_send(&mut self, message: impl Into<Message>) {
+        let _ = timeout(PATIENCE, self.stream.send(message.into())).await.unwrap();
+    }
+
+    pub(crate) async fn close(&mut self, frame: Option<CloseFrame>) {
+        let _ = self.stream.close(frame).await;
+    }
+
+    pub(crate) async fn hear(&mut self) -> Heard {
+        loop {
+            let message = timeout(PATIENCE, self.stream.next()).await.expect("no answer");
+            return match message {
+                Some(Ok(Message::Text(text))) => Heard::Json(serde_json::from_str(&text).unwrap()),
+                Some(Ok(Message::Binary(bytes))) => {
+                    let header = FrameHeader::decode(&bytes).unwrap();
+                    Heard::Frame(header, bytes[HEADER_LEN..].to_vec())
+                }
+                Some(Ok(Message::Close(frame))) => Heard::Closed(frame.map(|f| f.code.into())),
+                Some(Ok(_)) => continue,
+                Some(Err(_)) | None => Heard::Closed(None),
+            };
+        }
+    }
+
+    pub(crate) async fn hear_json(&mut self) -> Value {
+        match self.hear().await {
+            Heard::Json(value) => value,
+            other => panic!("text is due, not {other:?}"),
+        }
+    }
+
+    pub(crate) async fn hear_frame(&mut self) -> (FrameHeader, Vec<u8>) {
+        match self.hear().await {
+            Heard::Frame(header, payload) => (header, payload),
+            other => panic!("a frame is due, not {other:?}"),
+        }
+    }
+
+    /// Asserts that the next message is an error the session survives; returns it.
+    pub(crate) async fn hear_refusal(&mut self, code: &str) -> Value {
+        let error = self.hear_json().await;
+        assert_eq!(error["type"], "error", "{error}");
+        assert_eq!(error["code"], code, "{error}");
+        assert_eq!(error["closes"], false, "{error}");
+        error
+    }
+
+    /// Asserts that the server ends the session with this error.
+    pub(crate) async fn hear_end(&mut self, code: &str, close_code: u16) {
+        let error = self.hear_json().await;
+        assert_eq!((&error["code"], &error["closes"]), (&json!(code), &json!(true)), "{error}");
+        match self.hear().await {
+            Heard::Closed(found) => assert_eq!(found, Some(close_code)),
+            other => panic!("a close is due, not {other:?}"),
+        }
+    }
+
+    /// Says hello and asserts that the answer is ready; returns it.
+    pub(crate) async fn open(&mut self, hello: Value) -> Value {
+        self.send(hello.to_string()).await;
+        let ready = self.hear_json().await;
+        assert_eq!(ready["type"], "ready", "{ready}");
+        ready
+    }
+}
+
+/// A hello with these members beside type and version.
+pub(crate) fn hello(members: Value) -> Value {
+    let mut hello = json!({"type": "hello", "version": 1});
+    for (name, value) in members.as_object().unwrap() {
+        hello[name] = value.clone();
+    }
+    hello
+}
+
+/// A pressure frame.
+pub(crate) fn frame(
+    sequence: u32,
+    deadline_us: u32,
+    sample_type: SampleType,
+    scale: f32,
+    map: &[f32],
+) -> Vec<u8> {
+    let client_time_us = 1_000_000 + u64::from(sequence);
+    let header = FrameHeader::pressure(sequence, client_time_us, deadline_us, sample_type, scale);
+    let mut frame = header.encode().to_vec();
+    frame.resize(HEADER_LEN + map.len() * sample_type.bytes(), 0);
+    sample_type.encode(map, scale, &mut frame[HEADER_LEN..]).unwrap();
+    frame
+}
