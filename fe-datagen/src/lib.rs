@@ -2,6 +2,7 @@
 
 pub mod atlas;
 pub mod campaign;
+pub mod cli;
 pub mod contact;
 pub mod dataset;
 pub mod element;

@@ -21,4 +21,4 @@ pub use error::{BoxError, CampaignError};
 pub use report::CampaignReport;
 pub use run::{PressSolver, RunOptions, run};
 pub use sampling::{poses, splits};
-pub use spec::{CampaignSpec, Density, PlateSpec, PoseRanges};
+pub use spec::{CampaignSpec, EFFECTS, PoseRanges};

@@ -212,8 +212,10 @@ impl Queue<'_> {
     /// Each depth has to have its record, in order.
     fn complete(&self, records: Vec<IncrementRecord>) -> Result<Vec<IncrementRecord>, String> {
         let due = &self.spec.depths_mm;
-        let fits = records.len() == due.len()
-            && records.iter().zip(due).all(|(r, d)| !((r.depth_mm - d).abs() > 1e-9));
+        // A depth that is no number is left to the sample's own checks.
+        let fit =
+            |r: &IncrementRecord, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
+        let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
         let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
         let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");
         if fits { Ok(records) } else { Err(message()) }

@@ -1,31 +1,11 @@
 //! The campaign file.
 
 use super::CampaignError;
+use crate::mesh::fingertip::Density;
 use crate::output::OutputError;
+use crate::press::fingertip::PlateSpec;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-/// How fine the finger's mesh is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Density {
-    /// About 12 k unknowns.
-    Coarse,
-    /// About 60 k unknowns.
-    Medium,
-    /// About 200 k unknowns.
-    Fine,
-}
-
-/// The plate that presses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlateSpec {
-    /// Width and length, mm.
-    pub size_mm: [f64; 2],
-    /// Radius of the rounded edges, mm.
-    pub edge_radius_mm: f64,
-}
 
 /// Ranges \[lowest, highest\] of the plate's orientation, degrees.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,7 +35,7 @@ pub struct CampaignSpec {
     pub test_fraction: f64,
     /// Density of the mesh.
     pub density: Density,
-    /// Effects that the solver models.
+    /// Effects that the solver models; so far always [`EFFECTS`].
     #[serde(default = "default_effects")]
     pub effects: Vec<String>,
     /// The plate.
@@ -64,8 +44,12 @@ pub struct CampaignSpec {
     pub pose: PoseRanges,
 }
 
+/// The effects of every campaign's solver. Naming others is an error: a dataset
+/// must not claim what was not modelled.
+pub const EFFECTS: [&str; 2] = ["finite_strain", "layers"];
+
 fn default_effects() -> Vec<String> {
-    ["finite_strain", "layers"].map(String::from).to_vec()
+    EFFECTS.map(String::from).to_vec()
 }
 
 /// Points that the low-discrepancy sequence has.
@@ -118,6 +102,13 @@ impl CampaignSpec {
             (0.0..1.0).contains(&self.test_fraction),
             "test_fraction",
             format!("is {}, it has to be 0 or more and less than 1", self.test_fraction),
+        )?;
+        let mut effects: Vec<&str> = self.effects.iter().map(String::as_str).collect();
+        effects.sort_unstable();
+        require(
+            effects == EFFECTS,
+            "effects",
+            format!("is {:?}, the solver of campaigns models {EFFECTS:?}", self.effects),
         )?;
         let [a, b] = self.plate.size_mm;
         require(

@@ -4,7 +4,9 @@
 use super::*;
 use crate::dataset::testing::{atlas, posed_record};
 use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
+use crate::mesh::fingertip::Density;
 use crate::output::map_image::Bits;
+use crate::press::fingertip::PlateSpec;
 use crate::press::record::{IncrementRecord, Pose};
 use papilla_proto::atlas::Atlas;
 use std::collections::BTreeMap;
@@ -54,7 +56,7 @@ fn spec() -> CampaignSpec {
         depths_mm: vec![0.25, 0.5],
         test_fraction: 0.3,
         density: Density::Coarse,
-        effects: vec!["layers".into()],
+        effects: EFFECTS.map(String::from).to_vec(),
         plate: PlateSpec { size_mm: [20.0, 20.0], edge_radius_mm: 0.5 },
         pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
     }
@@ -253,7 +255,8 @@ fn shipped_campaigns_are_readable() {
 #[test]
 fn senseless_campaigns_are_refused_by_field() {
     type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 6] = [
+    let cases: [(Spoil, &str); 7] = [
+        (|s| s.effects.push("viscoelastic".into()), "effects"),
         (|s| s.presses = 0, "presses"),
         (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
         (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),

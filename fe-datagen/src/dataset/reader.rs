@@ -32,7 +32,7 @@ impl Dataset {
             return Err(DatasetError::Format { path, found, expected: FORMAT });
         }
         let manifest: Manifest =
-            serde_json::from_value(raw).map_err(|e| OutputError::malformed(&path, e))?;
+            serde_json::from_value(raw).map_err(|e| OutputError::malformed(&path, &e))?;
         if manifest.presses.is_empty() {
             return Err(DatasetError::Empty { path });
         }
@@ -64,7 +64,7 @@ impl Dataset {
         let path = self.folder.join(name);
         if !name.components().all(|c| matches!(c, Component::Normal(_))) {
             let message = format!("the manifest names a file outside the dataset: {}", press.file);
-            return Err(OutputError::malformed(&self.folder.join("manifest.json"), message).into());
+            return Err(OutputError::malformed(&self.folder.join("manifest.json"), &message).into());
         }
         let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
         expect(&path, "sha256", sha256_hex(&bytes), &press.sha256)?;
@@ -152,7 +152,7 @@ fn verify_values(path: &Path, manifest: &Manifest, shard: &Shard) -> Result<(), 
         let bad = values.iter().find(|v| !(**v >= 0.0 && f64::from(**v) <= max));
         if let Some(value) = bad {
             let message = format!("{name} holds {value}, outside 0 to {max}");
-            return Err(OutputError::malformed(path, message).into());
+            return Err(OutputError::malformed(path, &message).into());
         }
     }
     Ok(())

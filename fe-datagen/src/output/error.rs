@@ -63,7 +63,7 @@ impl OutputError {
     }
 
     /// Says that the file at `path` has the wrong content.
-    pub fn malformed(path: &Path, message: impl ToString) -> Self {
+    pub fn malformed(path: &Path, message: &dyn std::fmt::Display) -> Self {
         Self::Malformed { path: path.to_path_buf(), message: message.to_string() }
     }
 }

@@ -101,7 +101,7 @@ impl<'a> NpzArrays<'a> {
     /// [`OutputError::Malformed`] when the bytes are no zip archive.
     pub fn new(path: &'a Path, bytes: &'a [u8]) -> Result<Self, OutputError> {
         let reader =
-            NpzReader::new(Cursor::new(bytes)).map_err(|e| OutputError::malformed(path, e))?;
+            NpzReader::new(Cursor::new(bytes)).map_err(|e| OutputError::malformed(path, &e))?;
         Ok(Self { path, reader })
     }
 
@@ -116,7 +116,7 @@ impl<'a> NpzArrays<'a> {
     ) -> Result<Array<T, D>, OutputError> {
         self.reader
             .by_name(name)
-            .map_err(|e| OutputError::malformed(self.path, format!("array {name}: {e}")))
+            .map_err(|e| OutputError::malformed(self.path, &format!("array {name}: {e}")))
     }
 }
 

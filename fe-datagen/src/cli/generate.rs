@@ -1,0 +1,66 @@
+//! `generate`: a campaign of presses into a dataset.
+
+use super::{CHECKS_FAILED, print};
+use crate::atlas::build_atlas;
+use crate::campaign::{self, BoxError, CampaignSpec, PressSolver, RunOptions};
+use crate::geometry::fingertip::FingertipShape;
+use crate::mesh::fingertip::Order;
+use crate::press::fingertip::{Fingertip, PlateSpec, TissueConstants};
+use crate::press::record::{IncrementRecord, Pose};
+use crate::solve::{Options, Solver};
+use std::num::NonZero;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Run a campaign of presses, one per core, into a dataset.
+///
+/// Can be killed at any moment and started again: every press is one shard,
+/// written whole or not at all, and the bytes depend on the campaign alone.
+#[derive(clap::Args)]
+#[command(after_help = "Example: fe-datagen generate campaigns/s1.toml --out out/s1")]
+pub(super) struct Args {
+    /// Campaign file (see campaigns/ and docs/dataset.md).
+    campaign: PathBuf,
+    /// Folder of the dataset.
+    #[arg(long)]
+    out: PathBuf,
+    /// Presses solved at a time [default: one per core].
+    #[arg(long)]
+    threads: Option<NonZero<usize>>,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+struct PlateSolver<'a> {
+    finger: &'a Fingertip,
+    solver: Solver<'a>,
+    plate: PlateSpec,
+}
+
+impl PressSolver for PlateSolver<'_> {
+    fn solve(&mut self, pose: Pose, depths_mm: &[f64]) -> Result<Vec<IncrementRecord>, BoxError> {
+        let mut records = Vec::with_capacity(depths_mm.len());
+        self.finger.press(&mut self.solver, pose, self.plate, depths_mm, &mut |_, record, _| {
+            records.push(record.clone());
+        })?;
+        Ok(records)
+    }
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let spec = CampaignSpec::read(&args.campaign)?;
+    let shape = FingertipShape::default();
+    let finger =
+        Fingertip::new(&shape, &TissueConstants::default(), spec.density, Order::default())?;
+    let (skin, interface) = finger.patch_positions();
+    let (atlas, _) = build_atlas(&skin, &interface, &finger.patch.triangles)?;
+    let options = RunOptions { threads: args.threads, ..RunOptions::default() };
+    let solver = || -> Result<PlateSolver<'_>, BoxError> {
+        let solver = finger.solver(Options::default())?;
+        Ok(PlateSolver { finger: &finger, solver, plate: spec.plate })
+    };
+    let report = campaign::run(&spec, &atlas, solver, &args.out, &options)?;
+    print(&report, args.json, || report.to_string())?;
+    Ok(if report.is_complete() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}

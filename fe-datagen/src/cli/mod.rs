@@ -1,0 +1,57 @@
+//! The command line: one file a command.
+
+mod generate;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// A finite-element fingertip: solve presses, run campaigns, check the physics.
+#[derive(Parser)]
+#[command(
+    name = "fe-datagen",
+    version,
+    about,
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but something did not pass its own checks.\n\
+                  RUST_LOG=fe_datagen=debug tells the story of a solve."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Generate(generate::Args),
+}
+
+/// Runs the command line; the exit code is documented in `--help`.
+#[must_use]
+pub fn run() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Generate(args) => generate::run(&args),
+    };
+    match result {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Exit code of a run that finished but did not pass its own checks.
+const CHECKS_FAILED: u8 = 3;
+
+/// Prints a report as JSON or as people read it.
+fn print<T: serde::Serialize>(
+    report: &T,
+    json: bool,
+    human: impl FnOnce() -> String,
+) -> anyhow::Result<()> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(report)?);
+    } else {
+        println!("{}", human().trim_end());
+    }
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! The mean-dilatation element: energy, internal force and tangent.
+//!
+//! Three-field (Simo, Taylor & Pister 1985) with the dilatation `theta` and the
+//! pressure in one discontinuous basis `psi`, both condensed on the element. As
+//! the volumetric law is `K/2 (theta - 1)^2`, the condensed energy is
+//!
+//! `W = sum_q w U_iso(F) + K/2 b^T M^-1 b`,  `b_m = integral psi_m (J - 1) dV`,
+//!
+//! so `theta - 1 = psi . M^-1 b` is the projection of `J - 1` and force and
+//! tangent are plain derivatives: symmetric, and consistent by construction.
+
+use super::geometry::ElementGeometry;
+use crate::material::kinematics::cofactor_derivative;
+use crate::material::{Isochoric, Kinematics, Mat3, Material};
+
+/// Where an element turned inside out.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("J = {j:.3e} at quadrature point {point}")]
+pub struct Inverted {
+    /// Quadrature point in the element.
+    pub point: usize,
+    /// Volume ratio there.
+    pub j: f64,
+}
+
+/// What one evaluation of an element found.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementState {
+    /// Stored energy, mJ.
+    pub energy_mj: f64,
+    /// Smallest volume ratio `J` at a quadrature point.
+    pub j_min: f64,
+    /// Coefficients of `theta - 1` in the dilatation basis.
+    pub theta_minus_1: [f64; 4],
+}
+
+/// Displacement gradient at a point from nodal displacements.
+#[inline]
+pub fn displacement_gradient(u: &[[f64; 3]], gradients: &[[f64; 3]]) -> Mat3 {
+    let mut h = [[0.0; 3]; 3];
+    for (v, g) in u.iter().zip(gradients) {
+        for i in 0..3 {
+            for j in 0..3 {
+                h[i][j] += v[i] * g[j];
+            }
+        }
+    }
+    h
+}
+
+/// Largest `3 * nodes * dilatation functions`.
+const VOLUME_GRADIENTS_MAX: usize = 4 * 27;
+/// Largest number of quadrature points.
+const POINTS_MAX: usize = 27;
+
+/// Evaluates one element with nodal displacements `u` (mm).
+///
+/// Overwrites `force` (N, one per node) and, if given, the tangent `stiffness`
+/// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only).
+///
+/// # Errors
+/// [`Inverted`] where `J <= 0`; outputs are then meaningless.
+pub fn evaluate(
+    geometry: ElementGeometry<'_>,
+    material: &Material,
+    u: &[[f64; 3]],
+    force: &mut [[f64; 3]],
+    stiffness: Option<&mut [f64]>,
+) -> Result<ElementState, Inverted> {
+    let n = u.len();
+    let points = geometry.weights.len();
+    let m = geometry.inverse_gram.len().isqrt();
+    debug_assert!(points <= POINTS_MAX && m * n <= VOLUME_GRADIENTS_MAX);
+    let mut kinematics = [const { None::<Kinematics> }; POINTS_MAX];
+    let mut volume_gradient = [[0.0; 3]; VOLUME_GRADIENTS_MAX];
+    let mut b = [0.0; 4];
+    let mut j_min = f64::INFINITY;
+    for q in 0..points {
+        let gradients = &geometry.gradients[q * n..(q + 1) * n];
+        let k = Kinematics::new(displacement_gradient(u, gradients));
+        if !(k.j() > 0.0) {
+            return Err(Inverted { point: q, j: k.j() });
+        }
+        j_min = j_min.min(k.j());
+        for r in 0..m {
+            let weight = geometry.weights[q] * geometry.basis[q][r];
+            b[r] += weight * k.j_minus_1;
+            add_times(&mut volume_gradient[r * n..(r + 1) * n], weight, &k.cof, gradients);
+        }
+        kinematics[q] = Some(k);
+    }
+    let theta: [f64; 4] = std::array::from_fn(|r| {
+        if r < m { (0..m).map(|c| geometry.inverse_gram[r * m + c] * b[c]).sum() } else { 0.0 }
+    });
+    let bulk = material.bulk_mpa;
+    let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
+    for (a, f) in force.iter_mut().enumerate() {
+        *f = std::array::from_fn(|i| {
+            bulk * (0..m).map(|r| theta[r] * volume_gradient[r * n + a][i]).sum::<f64>()
+        });
+    }
+    let mut stiffness = stiffness;
+    if let Some(s) = stiffness.as_deref_mut() {
+        volumetric_stiffness(s, bulk, geometry.inverse_gram, &volume_gradient[..m * n], n, m);
+    }
+    for (q, k) in kinematics.iter().take(points).flatten().enumerate() {
+        let gradients = &geometry.gradients[q * n..(q + 1) * n];
+        let weight = geometry.weights[q];
+        energy += weight * material.isochoric.energy(k);
+        add_times(force, weight, &material.isochoric.first_piola(k), gradients);
+        if let Some(s) = stiffness.as_deref_mut() {
+            let pressure = bulk * (0..m).map(|r| theta[r] * geometry.basis[q][r]).sum::<f64>();
+            let mut a = material.isochoric.tangent(k);
+            let d = cofactor_derivative(&k.f);
+            for i in 0..3 {
+                for j in 0..3 {
+                    for kk in 0..3 {
+                        for l in 0..3 {
+                            a[i][j][kk][l] = weight * (a[i][j][kk][l] + pressure * d[i][j][kk][l]);
+                        }
+                    }
+                }
+            }
+            add_point_stiffness(s, &a, gradients);
+        }
+    }
+    Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta })
+}
+
+/// `force[a] += weight * p . gradients[a]`.
+#[inline]
+fn add_times(force: &mut [[f64; 3]], weight: f64, p: &Mat3, gradients: &[[f64; 3]]) {
+    for (f, g) in force.iter_mut().zip(gradients) {
+        for i in 0..3 {
+            f[i] += weight * (p[i][0] * g[0] + p[i][1] * g[1] + p[i][2] * g[2]);
+        }
+    }
+}
+
+/// Overwrites with `K sum_mn M^-1_mn g_m g_n^T`.
+fn volumetric_stiffness(
+    stiffness: &mut [f64],
+    bulk: f64,
+    inverse_gram: &[f64],
+    g: &[[f64; 3]],
+    n: usize,
+    m: usize,
+) {
+    let row = 3 * n;
+    for a in 0..n {
+        for i in 0..3 {
+            let mut left = [0.0; 4];
+            for c in 0..m {
+                left[c] =
+                    bulk * (0..m).map(|r| g[r * n + a][i] * inverse_gram[r * m + c]).sum::<f64>();
+            }
+            let line = &mut stiffness[(3 * a + i) * row..(3 * a + i + 1) * row];
+            for b in a..n {
+                for k in 0..3 {
+                    line[3 * b + k] = (0..m).map(|c| left[c] * g[c * n + b][k]).sum();
+                }
+            }
+        }
+    }
+}
+
+/// `K[a i][b k] += dN_a,j A_ijkl dN_b,l` for `a <= b`.
+#[inline]
+fn add_point_stiffness(
+    stiffness: &mut [f64],
+    a4: &crate::material::Tensor4,
+    gradients: &[[f64; 3]],
+) {
+    let n = gradients.len();
+    let row = 3 * n;
+    for b in 0..n {
+        let gb = gradients[b];
+        let mut t = [[[0.0; 3]; 3]; 3]; // [i][k][j]
+        for i in 0..3 {
+            for j in 0..3 {
+                for k in 0..3 {
+                    let v = &a4[i][j][k];
+                    t[i][k][j] = v[0] * gb[0] + v[1] * gb[1] + v[2] * gb[2];
+                }
+            }
+        }
+        for (a, ga) in gradients.iter().take(b + 1).enumerate() {
+            for i in 0..3 {
+                let base = (3 * a + i) * row + 3 * b;
+                for k in 0..3 {
+                    let v = &t[i][k];
+                    stiffness[base + k] += ga[0] * v[0] + ga[1] * v[1] + ga[2] * v[2];
+                }
+            }
+        }
+    }
+}

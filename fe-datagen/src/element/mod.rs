@@ -1,0 +1,9 @@
+//! Elements: reference shapes, undeformed geometry and the mean-dilatation kernel.
+
+pub mod geometry;
+pub mod kernel;
+pub mod reference;
+
+pub use geometry::{BlockGeometry, ShapeError};
+pub use kernel::{ElementState, Inverted};
+pub use reference::ElementKind;

@@ -1,0 +1,3 @@
+//! Shapes of the body, before any mesh.
+
+pub mod fingertip;

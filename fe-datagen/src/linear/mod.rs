@@ -1,0 +1,16 @@
+//! Sparse symmetric systems: pattern, ordering, factorization, iteration.
+//!
+//! The pattern of a mesh never changes (contact couples only degrees of freedom
+//! that an element couples already), so [`Structure`] is built once per mesh
+//! and shared by every press of a campaign.
+
+mod cg;
+mod factor;
+mod ordering;
+mod structure;
+
+pub(crate) use cg::dot;
+pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
+pub use factor::{Factor, FactorError, Factorizer};
+pub use ordering::OrderingError;
+pub use structure::{Equations, Structure, StructureError, SymmetricMatrix};

@@ -1,0 +1,94 @@
+//! Fill-reducing ordering by METIS nested dissection.
+//!
+//! On 3-D hexahedral meshes it needs less than half the factor entries of
+//! approximate minimum degree. The graph is that of the nodes, not of the
+//! degrees of freedom: a third of the size and supernodes for free.
+
+use std::collections::BTreeSet;
+
+/// METIS could not order a graph.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum OrderingError {
+    /// METIS counts in 32 bits.
+    #[error("the mesh graph has {0} entries, more than METIS' 32-bit index can count")]
+    TooLarge(usize),
+    /// METIS returned a status other than OK.
+    #[error("METIS nested dissection failed with status {0} (-2 input, -3 memory)")]
+    Metis(i32),
+}
+
+/// Order in which to eliminate the vertices: `order[k]` is the vertex that
+/// comes `k`-th. Deterministic: METIS' random seed is fixed.
+///
+/// # Errors
+/// [`OrderingError`] if METIS refuses the graph.
+pub(super) fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>, OrderingError> {
+    let entries: usize = neighbours.iter().map(BTreeSet::len).sum();
+    let too_large = |_| OrderingError::TooLarge(entries.max(neighbours.len()));
+    let mut n = i32::try_from(neighbours.len()).map_err(too_large)?;
+    i32::try_from(entries).map_err(too_large)?;
+    if n < 2 {
+        return Ok((0..neighbours.len() as u32).collect());
+    }
+    let mut start = Vec::with_capacity(neighbours.len() + 1);
+    let mut adjacent: Vec<i32> = Vec::with_capacity(entries);
+    start.push(0);
+    for list in neighbours {
+        adjacent.extend(list.iter().map(|&v| v as i32));
+        start.push(adjacent.len() as i32);
+    }
+    let mut permutation = vec![0; neighbours.len()];
+    let mut inverse = vec![0; neighbours.len()];
+    let status = call_metis(&mut n, &mut start, &mut adjacent, &mut permutation, &mut inverse);
+    if status == metis_sys::rstatus_et_METIS_OK {
+        Ok(permutation.into_iter().map(|v| v as u32).collect())
+    } else {
+        Err(OrderingError::Metis(status))
+    }
+}
+
+/// The one foreign call of this crate.
+#[allow(unsafe_code)]
+fn call_metis(
+    n: &mut i32,
+    start: &mut [i32],
+    adjacent: &mut [i32],
+    permutation: &mut [i32],
+    inverse: &mut [i32],
+) -> i32 {
+    let mut options = [0; metis_sys::METIS_NOPTIONS as usize];
+    // SAFETY: METIS reads `n + 1` entries of `start`, `start[n]` of `adjacent`
+    // (both built so by the caller) and METIS_NOPTIONS options, writes `n`
+    // entries of `permutation` and `inverse`, and keeps no pointer.
+    unsafe {
+        metis_sys::METIS_SetDefaultOptions(options.as_mut_ptr());
+        options[metis_sys::moptions_et_METIS_OPTION_SEED as usize] = 1;
+        metis_sys::METIS_NodeND(
+            n,
+            start.as_mut_ptr(),
+            adjacent.as_mut_ptr(),
+            std::ptr::null_mut(),
+            options.as_mut_ptr(),
+            permutation.as_mut_ptr(),
+            inverse.as_mut_ptr(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_ordered_by_a_permutation_that_repeats() {
+        let n = 200u32;
+        let graph: Vec<BTreeSet<u32>> = (0..n)
+            .map(|i| [i.wrapping_sub(1), i + 1].into_iter().filter(|&j| j < n).collect())
+            .collect();
+        let a = nested_dissection(&graph).unwrap();
+        let mut sorted = a.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..n).collect::<Vec<_>>());
+        assert_eq!(a, nested_dissection(&graph).unwrap());
+    }
+}

@@ -1,0 +1,289 @@
+//! Equation numbers, sparsity pattern and element scatter maps of a mesh.
+
+use super::ordering::{OrderingError, nested_dissection};
+use crate::mesh::Mesh;
+use faer::Side;
+use faer::perm::PermRef;
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use std::collections::BTreeSet;
+
+/// Which degrees of freedom are unknown.
+#[derive(Clone, Debug)]
+pub struct Equations {
+    /// Equation of each degree of freedom `3 node + component`; [`Self::FIXED`] if prescribed.
+    pub of_dof: Vec<u32>,
+    /// Number of unknowns.
+    pub count: usize,
+}
+
+impl Equations {
+    /// Mark of a prescribed degree of freedom.
+    pub const FIXED: u32 = u32::MAX;
+
+    /// Numbers the degrees of freedom for which `fixed` is false.
+    #[must_use]
+    pub fn new(fixed: &[bool]) -> Self {
+        let mut count = 0;
+        let of_dof = fixed
+            .iter()
+            .map(|&f| {
+                if f {
+                    Self::FIXED
+                } else {
+                    count += 1;
+                    count - 1
+                }
+            })
+            .collect();
+        Self { of_dof, count: count as usize }
+    }
+}
+
+/// Why a system's structure could not be built.
+#[derive(Debug, thiserror::Error)]
+pub enum StructureError {
+    /// Every degree of freedom is prescribed.
+    #[error("no unknowns: every degree of freedom is prescribed")]
+    NoUnknowns,
+    /// The ordering failed.
+    #[error(transparent)]
+    Ordering(#[from] OrderingError),
+    /// faer's symbolic factorization failed.
+    #[error("symbolic factorization failed: {0}")]
+    Symbolic(String),
+}
+
+/// Pattern (lower triangle, columns), scatter maps and symbolic factorization.
+pub struct Structure {
+    /// Unknowns.
+    pub equations: Equations,
+    /// First entry of each column; `n + 1` entries.
+    pub column_start: Vec<usize>,
+    /// Row of each entry, sorted in its column, starting with the diagonal.
+    pub row: Vec<usize>,
+    /// Per block: value index of every local pair `p <= q`, row-major upper
+    /// triangle, [`Equations::FIXED`] where a degree of freedom is prescribed.
+    scatter: Vec<Vec<u32>>,
+    pub(super) symbolic: SymbolicCholesky<usize>,
+}
+
+/// Values on a [`Structure`]'s pattern.
+#[derive(Clone, Debug)]
+pub struct SymmetricMatrix {
+    /// One value per entry of the lower triangle.
+    pub values: Vec<f64>,
+}
+
+impl Structure {
+    /// Structure of `mesh` with some degrees of freedom prescribed.
+    ///
+    /// # Errors
+    /// See [`StructureError`].
+    pub fn new(mesh: &Mesh, fixed: &[bool]) -> Result<Self, StructureError> {
+        let equations = Equations::new(fixed);
+        if equations.count == 0 {
+            return Err(StructureError::NoUnknowns);
+        }
+        let neighbours = node_graph(mesh);
+        let (column_start, row) = pattern(&neighbours, &equations);
+        let order = elimination_order(&neighbours, &equations)?;
+        let mut inverse = vec![0; order.len()];
+        for (k, &e) in order.iter().enumerate() {
+            inverse[e] = k;
+        }
+        let n = equations.count;
+        let a = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row);
+        let symbolic = factorize_symbolic_cholesky(
+            a,
+            Side::Lower,
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
+            CholeskySymbolicParams::default(),
+        )
+        .map_err(|e| StructureError::Symbolic(format!("{e:?}")))?;
+        let scatter = scatter_maps(mesh, &equations, &column_start, &row);
+        Ok(Self { equations, column_start, row, scatter, symbolic })
+    }
+
+    /// A matrix of zeros on this pattern.
+    #[must_use]
+    pub fn zeros(&self) -> SymmetricMatrix {
+        SymmetricMatrix { values: vec![0.0; self.row.len()] }
+    }
+
+    /// Entries of the numeric factor.
+    #[must_use]
+    pub fn factor_entries(&self) -> usize {
+        self.symbolic.len_val()
+    }
+
+    /// Adds an element's dense tangent (blocks `a <= b` of `3 n x 3 n`).
+    #[inline]
+    pub fn add_element(
+        &self,
+        matrix: &mut SymmetricMatrix,
+        block: usize,
+        element: usize,
+        dense: &[f64],
+    ) {
+        let size = dense.len().isqrt();
+        let pairs = size * (size + 1) / 2;
+        let map = &self.scatter[block][element * pairs..(element + 1) * pairs];
+        let mut at = 0;
+        for p in 0..size {
+            let line = &dense[p * size..(p + 1) * size];
+            for &v in &line[p..] {
+                let target = map[at];
+                at += 1;
+                if target != Equations::FIXED {
+                    matrix.values[target as usize] += v;
+                }
+            }
+        }
+    }
+
+    /// Adds a symmetric 3 x 3 block on a node's diagonal.
+    pub fn add_node(&self, matrix: &mut SymmetricMatrix, node: u32, block: &[[f64; 3]; 3]) {
+        for j in 0..3 {
+            let column = self.equations.of_dof[3 * node as usize + j];
+            if column == Equations::FIXED {
+                continue;
+            }
+            for i in j..3 {
+                let row = self.equations.of_dof[3 * node as usize + i];
+                if row != Equations::FIXED {
+                    let at = entry(&self.column_start, &self.row, row as usize, column as usize);
+                    matrix.values[at] += block[i][j];
+                }
+            }
+        }
+    }
+
+    /// `y = A x` over the unknowns.
+    pub fn multiply(&self, matrix: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for c in 0..self.equations.count {
+            let range = self.column_start[c]..self.column_start[c + 1];
+            let xc = x[c];
+            let mut sum = 0.0;
+            for (&r, &v) in self.row[range.clone()].iter().zip(&matrix.values[range]).skip(1) {
+                y[r] += v * xc;
+                sum += v * x[r];
+            }
+            y[c] += sum + matrix.values[self.column_start[c]] * xc;
+        }
+    }
+}
+
+/// Neighbours of every node through elements, itself left out.
+fn node_graph(mesh: &Mesh) -> Vec<BTreeSet<u32>> {
+    let mut graph = vec![BTreeSet::new(); mesh.nodes.len()];
+    for block in &mesh.blocks {
+        for e in 0..block.len() {
+            let nodes = block.element(e);
+            for &a in nodes {
+                graph[a as usize].extend(nodes.iter().copied().filter(|&b| b != a));
+            }
+        }
+    }
+    graph
+}
+
+/// Lower triangle of the pattern, by columns.
+fn pattern(neighbours: &[BTreeSet<u32>], equations: &Equations) -> (Vec<usize>, Vec<usize>) {
+    let mut start = vec![0];
+    let mut row = Vec::new();
+    for node in 0..neighbours.len() {
+        for i in 0..3 {
+            let column = equations.of_dof[3 * node + i];
+            if column == Equations::FIXED {
+                continue;
+            }
+            let first = row.len();
+            for &b in neighbours[node].iter().chain(std::iter::once(&(node as u32))) {
+                row.extend(
+                    equations.of_dof[3 * b as usize..3 * b as usize + 3]
+                        .iter()
+                        .filter(|&&r| r != Equations::FIXED && r >= column)
+                        .map(|&r| r as usize),
+                );
+            }
+            row[first..].sort_unstable();
+            start.push(row.len());
+        }
+    }
+    (start, row)
+}
+
+/// Nested dissection of the nodes with unknowns, expanded to equations.
+fn elimination_order(
+    neighbours: &[BTreeSet<u32>],
+    equations: &Equations,
+) -> Result<Vec<usize>, OrderingError> {
+    let unknowns = |node: usize| {
+        equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
+    };
+    let mut compact = vec![u32::MAX; neighbours.len()];
+    let mut kept = Vec::new();
+    for node in 0..neighbours.len() {
+        if unknowns(node).next().is_some() {
+            compact[node] = kept.len() as u32;
+            kept.push(node);
+        }
+    }
+    let graph: Vec<BTreeSet<u32>> = kept
+        .iter()
+        .map(|&node| {
+            neighbours[node]
+                .iter()
+                .map(|&b| compact[b as usize])
+                .filter(|&b| b != u32::MAX)
+                .collect()
+        })
+        .collect();
+    let order = nested_dissection(&graph)?;
+    Ok(order.iter().flat_map(|&v| unknowns(kept[v as usize]).map(|&e| e as usize)).collect())
+}
+
+fn entry(column_start: &[usize], row: &[usize], r: usize, c: usize) -> usize {
+    let (r, c) = (r.max(c), r.min(c));
+    let first = column_start[c];
+    let found = row[first..column_start[c + 1]].binary_search(&r);
+    debug_assert!(found.is_ok(), "entry ({r}, {c}) is not in the pattern");
+    first + found.unwrap_or(0)
+}
+
+fn scatter_maps(
+    mesh: &Mesh,
+    equations: &Equations,
+    column_start: &[usize],
+    row: &[usize],
+) -> Vec<Vec<u32>> {
+    mesh.blocks
+        .iter()
+        .map(|block| {
+            let size = 3 * block.kind.nodes();
+            let mut map = Vec::with_capacity(block.len() * size * (size + 1) / 2);
+            for e in 0..block.len() {
+                let of: Vec<u32> = block
+                    .element(e)
+                    .iter()
+                    .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
+                    .map(|d| equations.of_dof[d])
+                    .collect();
+                for p in 0..size {
+                    for q in p..size {
+                        map.push(if of[p] == Equations::FIXED || of[q] == Equations::FIXED {
+                            Equations::FIXED
+                        } else {
+                            entry(column_start, row, of[p] as usize, of[q] as usize) as u32
+                        });
+                    }
+                }
+            }
+            map
+        })
+        .collect()
+}

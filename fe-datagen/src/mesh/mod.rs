@@ -1,0 +1,107 @@
+//! Meshes: solid elements in blocks, named node sets and surfaces.
+
+pub mod block;
+pub mod fingertip;
+mod half_cube;
+pub mod recovery;
+pub mod surface;
+
+use crate::element::ElementKind;
+use std::collections::BTreeMap;
+pub use surface::{FaceKind, Surface};
+
+/// What an element is made of.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Tissue {
+    /// Outermost layer.
+    Epidermis,
+    /// Below the epidermis.
+    Dermis,
+    /// Fat between dermis and bone.
+    Subcutaneous,
+    /// Nail plate.
+    Nail,
+    /// Distal phalanx.
+    Bone,
+}
+
+impl Tissue {
+    /// Every tissue, from outside inward, nail and bone last.
+    pub const ALL: [Self; 5] =
+        [Self::Epidermis, Self::Dermis, Self::Subcutaneous, Self::Nail, Self::Bone];
+
+    /// Position in [`Tissue::ALL`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Name as scenes and mesh files spell it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Epidermis => "epidermis",
+            Self::Dermis => "dermis",
+            Self::Subcutaneous => "subcutaneous",
+            Self::Nail => "nail",
+            Self::Bone => "bone",
+        }
+    }
+}
+
+/// Solid elements of one kind.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Kind of every element.
+    pub kind: ElementKind,
+    /// `kind.nodes()` node indices per element.
+    pub connectivity: Vec<u32>,
+    /// Tissue of each element.
+    pub tissue: Vec<Tissue>,
+}
+
+impl Block {
+    /// Number of elements.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.tissue.len()
+    }
+
+    /// Whether the block has no element.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.tissue.is_empty()
+    }
+
+    /// Nodes of element `e`.
+    #[inline]
+    #[must_use]
+    pub fn element(&self, e: usize) -> &[u32] {
+        let n = self.kind.nodes();
+        &self.connectivity[e * n..(e + 1) * n]
+    }
+}
+
+/// A mesh of the undeformed body. Lengths in mm.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Node positions, mm.
+    pub nodes: Vec<[f64; 3]>,
+    /// Solid elements.
+    pub blocks: Vec<Block>,
+    /// Named groups of nodes, sorted.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// Named surfaces, faces seen counter-clockwise from outside.
+    pub surfaces: BTreeMap<String, Surface>,
+}
+
+impl Mesh {
+    /// Number of elements in all blocks.
+    #[must_use]
+    pub fn element_count(&self) -> usize {
+        self.blocks.iter().map(Block::len).sum()
+    }
+}

@@ -1,0 +1,5 @@
+//! One press: from a scene to stored equilibria.
+
+pub mod record;
+
+pub mod fingertip;

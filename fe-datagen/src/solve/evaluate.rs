@@ -1,0 +1,173 @@
+//! Energy, out-of-balance force and tangent of a whole body.
+
+use super::StepError;
+use super::problem::{Loading, Problem};
+use crate::contact::NodeContact;
+use crate::element::kernel::evaluate;
+use crate::linear::SymmetricMatrix;
+
+/// What an evaluation at one displacement found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Evaluation {
+    /// Elastic energy, mJ.
+    pub stored_mj: f64,
+    /// Potential that equilibrium minimises, mJ.
+    pub potential_mj: f64,
+    /// Internal + contact - external force at every degree of freedom, N.
+    pub residual_n: Vec<f64>,
+    /// Its norm over the unknowns.
+    pub residual_norm: f64,
+    /// Norm of contact, dead and support forces: what the residual is small against.
+    pub reference_norm: f64,
+    /// Nominal traction of each contact node, MPa.
+    pub traction_mpa: Vec<f64>,
+    /// Largest |gap| over nodes in contact, mm.
+    pub gap_error_mm: f64,
+    /// Smallest `J`.
+    pub j_min: f64,
+    /// Sum of contact forces on the body, N.
+    pub contact_force_n: [f64; 3],
+}
+
+/// State that an evaluation reads.
+pub(super) struct Trial<'a> {
+    pub u: &'a [[f64; 3]],
+    pub multipliers_mpa: &'a [f64],
+    pub penalty: f64,
+    pub load_fraction: f64,
+}
+
+/// Evaluates the body; fills `tangent` if given.
+pub(super) fn evaluate_body(
+    problem: &Problem,
+    loading: &Loading,
+    trial: &Trial<'_>,
+    mut tangent: Option<&mut SymmetricMatrix>,
+    out: &mut Evaluation,
+) -> Result<(), StepError> {
+    if let Some(t) = tangent.as_deref_mut() {
+        t.values.fill(0.0);
+    }
+    out.residual_n.clear();
+    out.residual_n.resize(3 * problem.mesh.nodes.len(), 0.0);
+    out.stored_mj = 0.0;
+    out.j_min = f64::INFINITY;
+    elements(problem, trial.u, tangent.as_deref_mut(), out)?;
+    out.potential_mj = out.stored_mj;
+    let mut reference = contact(problem, loading, trial, tangent, out);
+    for (node, f) in loading.dead_n.iter().enumerate() {
+        for i in 0..3 {
+            let force = trial.load_fraction * f[i];
+            out.residual_n[3 * node + i] -= force;
+            out.potential_mj -= force * trial.u[node][i];
+            reference += force * force;
+        }
+    }
+    let mut norm = 0.0;
+    for (r, &e) in out.residual_n.iter().zip(&problem.structure.equations.of_dof) {
+        if e == crate::linear::Equations::FIXED {
+            reference += r * r;
+        } else {
+            norm += r * r;
+        }
+    }
+    out.residual_norm = norm.sqrt();
+    out.reference_norm = reference.sqrt();
+    if out.residual_norm.is_finite() && out.potential_mj.is_finite() {
+        Ok(())
+    } else {
+        Err(StepError::NotFinite)
+    }
+}
+
+fn elements(
+    problem: &Problem,
+    u: &[[f64; 3]],
+    mut tangent: Option<&mut SymmetricMatrix>,
+    out: &mut Evaluation,
+) -> Result<(), StepError> {
+    let mut local = [[0.0; 3]; 27];
+    let mut force = [[0.0; 3]; 27];
+    let mut dense = Vec::new();
+    for (b, (block, geometry)) in problem.mesh.blocks.iter().zip(&problem.geometry).enumerate() {
+        let n = block.kind.nodes();
+        for e in 0..block.len() {
+            let nodes = block.element(e);
+            for (l, &node) in local.iter_mut().zip(nodes) {
+                *l = u[node as usize];
+            }
+            let stiffness = tangent.is_some().then(|| {
+                dense.clear();
+                dense.resize(9 * n * n, 0.0);
+                dense.as_mut_slice()
+            });
+            let material = &problem.materials[block.tissue[e].index()];
+            let state =
+                evaluate(geometry.element(e), material, &local[..n], &mut force[..n], stiffness)
+                    .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
+            out.stored_mj += state.energy_mj;
+            out.j_min = out.j_min.min(state.j_min);
+            for (f, &node) in force.iter().zip(nodes) {
+                for i in 0..3 {
+                    out.residual_n[3 * node as usize + i] += f[i];
+                }
+            }
+            if let Some(t) = tangent.as_deref_mut() {
+                problem.structure.add_element(t, b, e, &dense);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Adds contact; returns the square of its force norm.
+fn contact(
+    problem: &Problem,
+    loading: &Loading,
+    trial: &Trial<'_>,
+    mut tangent: Option<&mut SymmetricMatrix>,
+    out: &mut Evaluation,
+) -> f64 {
+    out.traction_mpa.clear();
+    out.gap_error_mm = 0.0;
+    out.contact_force_n = [0.0; 3];
+    let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
+    let placement = indenter.placement(trial.load_fraction);
+    let mut square = 0.0;
+    for ((&node, &area), &multiplier) in
+        surface.nodes.iter().zip(&surface.area_mm2).zip(trial.multipliers_mpa)
+    {
+        let n = node as usize;
+        let x = std::array::from_fn(|i| problem.mesh.nodes[n][i] + trial.u[n][i]);
+        let d = placement.distance(indenter.shape.as_ref(), x);
+        let Some(c) = NodeContact::new(&d, area, multiplier, trial.penalty) else {
+            out.traction_mpa.push(0.0);
+            continue;
+        };
+        out.traction_mpa.push(c.traction_mpa);
+        out.potential_mj += c.energy_mj;
+        if c.traction_mpa > 0.0 {
+            out.gap_error_mm = out.gap_error_mm.max(d.gap_mm.abs());
+        }
+        for i in 0..3 {
+            out.residual_n[3 * n + i] += c.force_n[i];
+            out.contact_force_n[i] -= c.force_n[i];
+            square += c.force_n[i] * c.force_n[i];
+        }
+        if let Some(t) = tangent.as_deref_mut() {
+            problem.structure.add_node(t, node, &c.stiffness);
+        }
+    }
+    square
+}
+
+/// Balances of an equilibrium: force by force and pressure by area.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Balance {
+    /// Force of the indenter on the body, N.
+    pub contact_force_n: [f64; 3],
+    /// Force of the supports on the body, N.
+    pub support_force_n: [f64; 3],
+    /// Integral of true pressure times inward normal over the deformed skin, N.
+    pub pressure_integral_n: [f64; 3],
+}

@@ -1,0 +1,129 @@
+//! Static equilibrium: Newton with line search, augmented contact, load steps.
+
+mod evaluate;
+mod newton;
+mod problem;
+mod stepping;
+
+pub use evaluate::Balance;
+pub use newton::Effort;
+pub use problem::{Loading, MovingIndenter, Problem, ProblemError};
+pub use stepping::{Solver, StepReport};
+
+use crate::linear::FactorError;
+
+/// Tolerances and limits; every loop is bounded by one of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Out-of-balance force over the norm of external and support forces.
+    pub residual_tolerance: f64,
+    /// Largest |gap| of a node in contact, mm.
+    pub gap_tolerance_mm: f64,
+    /// Contact penalty, MPa/mm; chosen from the material and mesh if `None`.
+    pub penalty_mpa_per_mm: Option<f64>,
+    /// Newton iterations per contact multiplier update.
+    pub newton_max: u32,
+    /// Updates of the contact multipliers per load step.
+    pub augmentations_max: u32,
+    /// Halvings of one load increment before the solve is given up.
+    pub cuts_max: u32,
+    /// Iterations of conjugate gradients after which the tangent is factorized afresh.
+    pub cg_max: u32,
+    /// A linear solve that needed more than this makes the next one refactorize.
+    pub refactor_after_cg: u32,
+    /// Backtracking steps of the line search.
+    pub line_search_max: u32,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            residual_tolerance: 1e-6,
+            gap_tolerance_mm: 1e-4,
+            penalty_mpa_per_mm: None,
+            newton_max: 40,
+            augmentations_max: 12,
+            cuts_max: 10,
+            cg_max: 60,
+            refactor_after_cg: 8,
+            line_search_max: 12,
+        }
+    }
+}
+
+/// Why one load step did not converge; the stepper cuts the step on it.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum StepError {
+    /// An element turns inside out already at the start of the iteration.
+    #[error("element {element} of block {block} turned inside out (J = {j:.3e})")]
+    Inverted {
+        /// Mesh block.
+        block: usize,
+        /// Element of the block.
+        element: usize,
+        /// Volume ratio.
+        j: f64,
+    },
+    /// Newton ran out of iterations.
+    #[error("Newton stopped after {iterations} iterations at relative residual {residual:.3e}")]
+    Newton {
+        /// Iterations done.
+        iterations: u32,
+        /// Relative residual reached.
+        residual: f64,
+    },
+    /// The line search found no acceptable step.
+    #[error("line search failed at relative residual {residual:.3e}")]
+    LineSearch {
+        /// Relative residual where it failed.
+        residual: f64,
+    },
+    /// Contact multipliers did not settle.
+    #[error("contact did not settle in {augmentations} augmentations: gap error {gap_mm:.3e} mm")]
+    Contact {
+        /// Augmentations done.
+        augmentations: u32,
+        /// Largest |gap| of a node in contact, mm.
+        gap_mm: f64,
+    },
+    /// Energy or force is not a finite number.
+    #[error("energy or force is not finite")]
+    NotFinite,
+}
+
+/// Why a solve was given up.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum SolveError {
+    /// The load step was cut as often as allowed.
+    #[error(
+        "no equilibrium beyond load fraction {reached:.6} after {cuts} cuts of the step: {cause}"
+    )]
+    CutsExhausted {
+        /// Last load fraction in equilibrium.
+        reached: f64,
+        /// Cuts done.
+        cuts: u32,
+        /// Error of the last try.
+        cause: StepError,
+    },
+    /// The factor does not fit in memory.
+    #[error(transparent)]
+    Factor(#[from] FactorErrorText),
+    /// A degree of freedom can move freely.
+    #[error(
+        "the body can move as a rigid whole: the tangent at rest is singular. Constrain it \
+         (fixed surfaces: bone, nail, base) or add contact that holds it"
+    )]
+    RigidBodyMode,
+}
+
+/// [`FactorError`] as a value that can be cloned and compared.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+#[error("{0}")]
+pub struct FactorErrorText(String);
+
+impl From<FactorError> for SolveError {
+    fn from(e: FactorError) -> Self {
+        Self::Factor(FactorErrorText(e.to_string()))
+    }
+}

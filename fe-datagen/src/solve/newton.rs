@@ -1,0 +1,313 @@
+//! Newton's method at one load fraction, with the linear solves it needs.
+//!
+//! A factorization costs as much as some thirty solves, so an older f32 factor
+//! preconditions conjugate gradients on the current tangent, and is renewed
+//! when that takes too many iterations.
+
+use super::evaluate::{Evaluation, Trial, evaluate_body};
+use super::problem::{Loading, Problem};
+use super::{Options, SolveError, StepError};
+use crate::linear::{
+    CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
+};
+use std::time::Instant;
+
+/// Work and wall time spent, summed over a solve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Effort {
+    /// Newton iterations.
+    pub newton_iterations: u32,
+    /// Numeric factorizations.
+    pub factorizations: u32,
+    /// Factorizations of an indefinite tangent among them.
+    pub indefinite_factorizations: u32,
+    /// Conjugate-gradient iterations.
+    pub cg_iterations: u32,
+    /// Multiplier updates.
+    pub augmentations: u32,
+    /// Halved load steps.
+    pub cuts: u32,
+    /// Elements and contact, s.
+    pub assemble_s: f64,
+    /// Numeric factorization, s.
+    pub factor_s: f64,
+    /// Conjugate gradients and direct solves, s.
+    pub solve_s: f64,
+}
+
+impl Effort {
+    /// The sum with another reading.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            newton_iterations: self.newton_iterations + other.newton_iterations,
+            factorizations: self.factorizations + other.factorizations,
+            indefinite_factorizations: self.indefinite_factorizations
+                + other.indefinite_factorizations,
+            cg_iterations: self.cg_iterations + other.cg_iterations,
+            augmentations: self.augmentations + other.augmentations,
+            cuts: self.cuts + other.cuts,
+            assemble_s: self.assemble_s + other.assemble_s,
+            factor_s: self.factor_s + other.factor_s,
+            solve_s: self.solve_s + other.solve_s,
+        }
+    }
+
+    /// The difference to an earlier reading.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            newton_iterations: self.newton_iterations - earlier.newton_iterations,
+            factorizations: self.factorizations - earlier.factorizations,
+            indefinite_factorizations: self.indefinite_factorizations
+                - earlier.indefinite_factorizations,
+            cg_iterations: self.cg_iterations - earlier.cg_iterations,
+            augmentations: self.augmentations - earlier.augmentations,
+            cuts: self.cuts - earlier.cuts,
+            assemble_s: self.assemble_s - earlier.assemble_s,
+            factor_s: self.factor_s - earlier.factor_s,
+            solve_s: self.solve_s - earlier.solve_s,
+        }
+    }
+}
+
+/// Memory and counters of the iteration.
+pub(super) struct Newton<'a> {
+    pub problem: &'a Problem,
+    pub options: Options,
+    pub penalty: f64,
+    pub effort: Effort,
+    factorizer: Factorizer,
+    tangent: SymmetricMatrix,
+    /// Renew the factor at the next linear solve.
+    stale: bool,
+    cg: CgWorkspace,
+    right: Vec<f64>,
+    step: Vec<f64>,
+    trial_u: Vec<[f64; 3]>,
+    pub current: Evaluation,
+    trial: Evaluation,
+}
+
+impl<'a> Newton<'a> {
+    pub(super) fn new(problem: &'a Problem, options: Options) -> Result<Self, SolveError> {
+        let n = problem.structure.equations.count;
+        Ok(Self {
+            problem,
+            options,
+            penalty: options.penalty_mpa_per_mm.unwrap_or_else(|| problem.penalty_mpa_per_mm()),
+            effort: Effort::default(),
+            factorizer: Factorizer::new(&problem.structure)?,
+            tangent: problem.structure.zeros(),
+            stale: true,
+            cg: CgWorkspace::default(),
+            right: vec![0.0; n],
+            step: vec![0.0; n],
+            trial_u: Vec::new(),
+            current: Evaluation::default(),
+            trial: Evaluation::default(),
+        })
+    }
+
+    /// Forgets the factor, so that a new press does not depend on the last one.
+    pub(super) fn forget(&mut self) {
+        self.stale = true;
+        self.effort = Effort::default();
+    }
+
+    /// Brings `u` to equilibrium at `load_fraction` with fixed multipliers, to a
+    /// residual of `tolerance` times the reference force.
+    pub(super) fn equilibrate(
+        &mut self,
+        tolerance: f64,
+        loading: &Loading,
+        load_fraction: f64,
+        multipliers: &[f64],
+        u: &mut [[f64; 3]],
+    ) -> Result<(), StepError> {
+        self.evaluate(loading, load_fraction, multipliers, u)?;
+        // Forces below this are rounding of a body at rest.
+        let floor = 1e-13 * self.force_scale_n();
+        let mut previous = f64::INFINITY;
+        for iteration in 0..=self.options.newton_max {
+            let (norm, reference) = (self.current.residual_norm, self.current.reference_norm);
+            tracing::trace!(iteration, load_fraction, residual = norm, reference, "newton");
+            if norm <= tolerance * reference || norm <= floor {
+                return Ok(());
+            }
+            if iteration == self.options.newton_max {
+                break;
+            }
+            self.assemble(loading, load_fraction, multipliers, u)?;
+            let forcing = Self::forcing(norm, previous, tolerance * reference);
+            previous = norm;
+            self.solve_step(forcing);
+            self.line_search(loading, load_fraction, multipliers, u)?;
+            self.effort.newton_iterations += 1;
+        }
+        Err(StepError::Newton {
+            iterations: self.options.newton_max,
+            residual: self.current.residual_norm / self.current.reference_norm,
+        })
+    }
+
+    /// How exactly to solve the linear system: no more than its model of the
+    /// body is worth (Eisenstat & Walker 1996, choice 2), nor than is asked of
+    /// the residual in the end.
+    fn forcing(norm: f64, previous: f64, target: f64) -> f64 {
+        let (first, gamma) = (1e-3, 0.1);
+        let ratio = norm / previous;
+        let wanted = if previous.is_finite() { gamma * ratio * ratio } else { first };
+        let enough = 0.3 * target / norm;
+        wanted.min(first).max(enough).min(0.3)
+    }
+
+    /// A force typical of the body: stiffest shear modulus times its extent squared.
+    fn force_scale_n(&self) -> f64 {
+        let mut low = [f64::INFINITY; 3];
+        let mut high = [f64::NEG_INFINITY; 3];
+        for p in &self.problem.mesh.nodes {
+            for i in 0..3 {
+                low[i] = low[i].min(p[i]);
+                high[i] = high[i].max(p[i]);
+            }
+        }
+        let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+        let mu = self.problem.materials.iter().map(|m| m.isochoric.mu_mpa).fold(0.0, f64::max);
+        mu * extent * extent
+    }
+
+    /// Evaluates at `u` into `current`, without a tangent.
+    pub(super) fn evaluate(
+        &mut self,
+        loading: &Loading,
+        load_fraction: f64,
+        multipliers: &[f64],
+        u: &[[f64; 3]],
+    ) -> Result<(), StepError> {
+        let clock = Instant::now();
+        let trial = Trial { u, multipliers_mpa: multipliers, penalty: self.penalty, load_fraction };
+        let result = evaluate_body(self.problem, loading, &trial, None, &mut self.current);
+        self.effort.assemble_s += clock.elapsed().as_secs_f64();
+        result
+    }
+
+    fn assemble(
+        &mut self,
+        loading: &Loading,
+        load_fraction: f64,
+        multipliers: &[f64],
+        u: &[[f64; 3]],
+    ) -> Result<(), StepError> {
+        let clock = Instant::now();
+        let trial = Trial { u, multipliers_mpa: multipliers, penalty: self.penalty, load_fraction };
+        let tangent = Some(&mut self.tangent);
+        let result = evaluate_body(self.problem, loading, &trial, tangent, &mut self.current);
+        self.effort.assemble_s += clock.elapsed().as_secs_f64();
+        for (dof, &e) in self.problem.structure.equations.of_dof.iter().enumerate() {
+            if e != Equations::FIXED {
+                self.right[e as usize] = -self.current.residual_n[dof];
+            }
+        }
+        result
+    }
+
+    /// Solves `tangent * step = right`.
+    fn solve_step(&mut self, tolerance: f64) {
+        if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
+            self.factorize();
+        }
+        for fresh in [false, true] {
+            if self.factorizer.held() == Some(Factor::Indefinite) {
+                let clock = Instant::now();
+                self.step.copy_from_slice(&self.right);
+                self.factorizer.solve(&self.problem.structure, &mut self.step);
+                self.effort.solve_s += clock.elapsed().as_secs_f64();
+                return;
+            }
+            let clock = Instant::now();
+            let found = conjugate_gradient(
+                &self.problem.structure,
+                &self.tangent,
+                &mut self.factorizer,
+                &self.right,
+                &mut self.step,
+                tolerance,
+                self.options.cg_max,
+                &mut self.cg,
+            );
+            self.effort.solve_s += clock.elapsed().as_secs_f64();
+            self.effort.cg_iterations += found.iterations;
+            self.stale = found.iterations > self.options.refactor_after_cg;
+            let usable = found.relative_residual <= tolerance
+                || (found.negative_curvature && found.iterations > 0);
+            if usable || fresh {
+                return;
+            }
+            self.factorize();
+        }
+    }
+
+    fn factorize(&mut self) {
+        let clock = Instant::now();
+        self.effort.factorizations += 1;
+        if self.factorizer.cholesky(&self.problem.structure, &self.tangent).is_err() {
+            tracing::debug!("tangent not positive definite: L B L^T");
+            self.effort.indefinite_factorizations += 1;
+            self.factorizer.indefinite(&self.problem.structure, &self.tangent);
+        }
+        self.stale = false;
+        self.effort.factor_s += clock.elapsed().as_secs_f64();
+    }
+
+    /// Backtracks along `step` until potential or residual falls.
+    fn line_search(
+        &mut self,
+        loading: &Loading,
+        load_fraction: f64,
+        multipliers: &[f64],
+        u: &mut [[f64; 3]],
+    ) -> Result<(), StepError> {
+        // Derivative of the potential along the step; an indefinite tangent
+        // can point uphill.
+        let mut slope: f64 = -crate::linear::dot(&self.right, &self.step);
+        if slope > 0.0 {
+            slope = -slope;
+            self.step.iter_mut().for_each(|s| *s = -*s);
+        }
+        let (energy, norm) = (self.current.potential_mj, self.current.residual_norm);
+        let mut length = 1.0;
+        for _ in 0..self.options.line_search_max {
+            self.trial_u.clear();
+            self.trial_u.extend_from_slice(u);
+            for (node, v) in self.trial_u.iter_mut().enumerate() {
+                for i in 0..3 {
+                    let e = self.problem.structure.equations.of_dof[3 * node + i];
+                    if e != Equations::FIXED {
+                        v[i] += length * self.step[e as usize];
+                    }
+                }
+            }
+            let clock = Instant::now();
+            let trial = Trial {
+                u: &self.trial_u,
+                multipliers_mpa: multipliers,
+                penalty: self.penalty,
+                load_fraction,
+            };
+            let found = evaluate_body(self.problem, loading, &trial, None, &mut self.trial);
+            self.effort.assemble_s += clock.elapsed().as_secs_f64();
+            if found.is_ok() {
+                let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
+                if falls || self.trial.residual_norm < 0.5 * norm {
+                    u.copy_from_slice(&self.trial_u);
+                    std::mem::swap(&mut self.current, &mut self.trial);
+                    return Ok(());
+                }
+            }
+            length *= 0.5;
+        }
+        // Energy differences drown in rounding close to the solution.
+        Err(StepError::LineSearch { residual: norm / self.current.reference_norm })
+    }
+}
