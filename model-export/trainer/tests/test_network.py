@@ -54,3 +54,13 @@ def test_same_seed_same_weights() -> None:
     a, b, c = (build_network(spec, seed).state_dict() for seed in (3, 3, 4))
     assert all(torch.equal(a[name], b[name]) for name in a)
     assert not all(torch.equal(a[name], c[name]) for name in a)
+
+
+def test_signal_neither_dies_nor_explodes_at_the_start() -> None:
+    """The reason for He's initialisation: what comes out still varies with what goes in."""
+    torch.manual_seed(0)
+    inputs = torch.rand(2, 1, 64, 64)
+    for seed in range(5):
+        with torch.no_grad():
+            outputs = build_network(parse_network("s1-base8"), seed)(inputs)
+        assert 0.1 < float(outputs.std() / inputs.std()) < 10
