@@ -80,13 +80,17 @@ pub enum EngineError {
         limit: i64,
     },
     /// The card cannot be read.
-    #[error("the model's card is unreadable: {reason}; write it again with `model-export evaluate`")]
+    #[error(
+        "the model's card is unreadable: {reason}; write it again with `model-export evaluate`"
+    )]
     BadCard {
         /// What the reader met.
         reason: String,
     },
     /// The card belongs to another model.
-    #[error("card and model disagree on {field}: card '{card}', model '{model}'; they are not of one export")]
+    #[error(
+        "card and model disagree on {field}: card '{card}', model '{model}'; they are not of one export"
+    )]
     CardMismatch {
         /// Which field.
         field: &'static str,
@@ -133,6 +137,16 @@ pub enum EngineError {
         /// Length needed.
         expected: usize,
     },
+    /// A pressure that is NaN or infinite.
+    #[error("the pressure at row {row}, column {column} is {value}")]
+    NonFiniteInput {
+        /// Row of the pixel.
+        row: usize,
+        /// Column of the pixel.
+        column: usize,
+        /// The value.
+        value: f32,
+    },
     /// The network answered NaN or infinity.
     #[error("the model answered {value} J/m3 at row {row}, column {column}; the map is void")]
     NonFiniteOutput {
@@ -144,7 +158,9 @@ pub enum EngineError {
         value: f32,
     },
     /// The network answered an energy density below zero.
-    #[error("the model answered {value} J/m3 at row {row}, column {column}; an energy density cannot be below zero")]
+    #[error(
+        "the model answered {value} J/m3 at row {row}, column {column}; an energy density cannot be below zero"
+    )]
     NegativeOutput {
         /// Row of the pixel.
         row: usize,

@@ -67,6 +67,7 @@ pub trait Session: Send {
     ///
     /// # Errors
     /// - [`EngineError::WrongLength`]: a map of another length.
+    /// - [`EngineError::NonFiniteInput`]: a pressure that is NaN or infinite.
     /// - [`EngineError::NonFiniteOutput`], [`EngineError::NegativeOutput`]: the network
     ///   answered with what is no energy density; the map is not to be used.
     /// - [`EngineError::Backend`], [`EngineError::Panicked`]: the backend failed.
@@ -166,14 +167,21 @@ fn infer_trial_map(model: &dyn Model) -> Result<(), EngineError> {
     model.session()?.infer(&pressure_pa, &mut sed_j_per_m3)
 }
 
-/// Refuses maps of another length than 224 x 224.
-fn check_lengths(pressure_pa: &[f32], sed_j_per_m3: &[f32]) -> Result<(), EngineError> {
+/// Refuses maps of another length than 224 x 224, and input that is not finite.
+fn check_maps(pressure_pa: &[f32], sed_j_per_m3: &[f32]) -> Result<(), EngineError> {
     for (map, found) in [(INPUT_NAME, pressure_pa.len()), (OUTPUT_NAME, sed_j_per_m3.len())] {
         if found != MAP_LEN {
             return Err(EngineError::WrongLength { map, found, expected: MAP_LEN });
         }
     }
-    Ok(())
+    // A ReLU turns NaN into zero: the answer would not betray it.
+    match pressure_pa.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => {
+            let (row, column) = (index / MAP_SIDE_PX, index % MAP_SIDE_PX);
+            Err(EngineError::NonFiniteInput { row, column, value: pressure_pa[index] })
+        }
+    }
 }
 
 /// Refuses what is no energy density.

@@ -2,8 +2,9 @@
 
 use crate::{Backend, EngineError, INPUT_NAME, MAP_SIDE_PX, OUTPUT_NAME};
 use tract_onnx::pb::{
-    AttributeProto, GraphProto, ModelProto, TensorProto, ValueInfoProto, tensor_proto::DataLocation,
-    tensor_proto::DataType, tensor_shape_proto::dimension::Value as Dimension, type_proto,
+    AttributeProto, GraphProto, ModelProto, TensorProto, ValueInfoProto,
+    tensor_proto::DataLocation, tensor_proto::DataType,
+    tensor_shape_proto::dimension::Value as Dimension, type_proto,
 };
 use tract_onnx::prelude::Framework;
 
@@ -132,8 +133,7 @@ fn check_attribute(
 }
 
 fn check_tensor(tensor: &TensorProto, name: &str) -> Result<(), EngineError> {
-    let broken =
-        |reason: String| EngineError::BrokenTensor { tensor: name.to_owned(), reason };
+    let broken = |reason: String| EngineError::BrokenTensor { tensor: name.to_owned(), reason };
     // A model must not make the program read other files.
     if !tensor.external_data.is_empty()
         || tensor.data_location == Some(DataLocation::External as i32)
@@ -163,7 +163,10 @@ fn check_tensor(tensor: &TensorProto, name: &str) -> Result<(), EngineError> {
     } else if tensor.raw_data.len().is_multiple_of(size) {
         tensor.raw_data.len() / size
     } else {
-        return Err(broken(format!("{} bytes are no whole number of values", tensor.raw_data.len())));
+        return Err(broken(format!(
+            "{} bytes are no whole number of values",
+            tensor.raw_data.len()
+        )));
     };
     if held != count {
         return Err(broken(format!("{held} values for shape {:?}", tensor.dims)));

@@ -1,8 +1,7 @@
 //! tract, the backend that is always there.
 
 use crate::{
-    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_lengths,
-    check_output,
+    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps, check_output,
 };
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -89,7 +88,7 @@ impl TractSession {
 
 impl Session for TractSession {
     fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError> {
-        check_lengths(pressure_pa, sed_j_per_m3)?;
+        check_maps(pressure_pa, sed_j_per_m3)?;
         if let Err(error) = guarded("infer a map", || self.run(pressure_pa, sed_j_per_m3)) {
             // What an interrupted run leaves behind is not known: start afresh.
             self.state = guarded("set up a session", || self.plan.spawn())?;
@@ -111,7 +110,9 @@ pub(crate) fn guarded<T>(
     // Whatever `work` was changing is dropped or rebuilt by the callers on failure.
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(error)) => Err(EngineError::Backend { backend, action, reason: format!("{error:#}") }),
+        Ok(Err(error)) => {
+            Err(EngineError::Backend { backend, action, reason: format!("{error:#}") })
+        }
         Err(panic) => {
             Err(EngineError::Panicked { backend, action, reason: panic_text(panic.as_ref()) })
         }

@@ -1,0 +1,107 @@
+//! ONNX Runtime, opened at run time as a shared library.
+
+use crate::{
+    Backend, EngineError, INPUT_NAME, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, OUTPUT_NAME, Session,
+    check_maps, check_output,
+};
+use ort::environment::Environment;
+use ort::session::{Session as OrtRun, builder::GraphOptimizationLevel};
+use ort::value::Tensor;
+use std::fmt::Display;
+use std::sync::{Arc, OnceLock};
+
+/// Names the library when `ORT_DYLIB_PATH` does not; the loader then searches for it.
+const LIBRARY: &str = if cfg!(target_os = "windows") {
+    "onnxruntime.dll"
+} else if cfg!(target_os = "macos") {
+    "libonnxruntime.dylib"
+} else {
+    "libonnxruntime.so"
+};
+
+pub(crate) struct OrtModel {
+    info: ModelInfo,
+    onnx: Arc<[u8]>,
+    environment: Environment,
+}
+
+impl OrtModel {
+    /// `onnx` has passed the checks of the contract.
+    pub(crate) fn load(onnx: &[u8], mut info: ModelInfo) -> Result<Self, EngineError> {
+        let environment = environment()?;
+        info.backend = format!("onnxruntime {}", version());
+        Ok(Self { info, onnx: onnx.into(), environment })
+    }
+}
+
+/// The one environment a process may have.
+fn environment() -> Result<Environment, EngineError> {
+    static ENVIRONMENT: OnceLock<Result<Environment, String>> = OnceLock::new();
+    let made = ENVIRONMENT.get_or_init(|| {
+        let path = std::env::var("ORT_DYLIB_PATH").ok().filter(|path| !path.is_empty());
+        let path = path.unwrap_or_else(|| LIBRARY.to_owned());
+        let builder = ort::init_from(&path).map_err(|error| {
+            format!("{error}; set ORT_DYLIB_PATH to the library of ONNX Runtime 1.17 or newer")
+        })?;
+        // Nobody is told what is rendered here.
+        builder.with_telemetry(false).build().map_err(|error| error.to_string())
+    });
+    made.clone().map_err(|reason| EngineError::BackendMissing { backend: Backend::Ort, reason })
+}
+
+/// Version of the opened library, from its build information
+/// (`ORT Build Info: git-branch=rel-1.31.1, ...`).
+fn version() -> &'static str {
+    let info = ort::info();
+    let branch = info.split("git-branch=").nth(1).and_then(|rest| rest.split(',').next());
+    branch.map_or("of unknown version", |branch| branch.trim_start_matches("rel-"))
+}
+
+fn failed<E: Display>(action: &'static str) -> impl Fn(E) -> EngineError {
+    move |error| EngineError::Backend { backend: Backend::Ort, action, reason: error.to_string() }
+}
+
+impl Model for OrtModel {
+    fn info(&self) -> &ModelInfo {
+        &self.info
+    }
+
+    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
+        let action = "set up a session";
+        let run = OrtRun::builder(&self.environment)
+            .map_err(failed(action))?
+            .with_optimization_level(GraphOptimizationLevel::All)
+            .map_err(failed(action))?
+            // The service runs one thread per session.
+            .with_intra_threads(1)
+            .map_err(failed(action))?
+            .commit_from_memory(&self.onnx)
+            .map_err(failed("read the model"))?;
+        let shape = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
+        let input = Tensor::from_array((shape, vec![0.0f32; MAP_LEN])).map_err(failed(action))?;
+        Ok(Box::new(OrtSession { run, input }))
+    }
+}
+
+struct OrtSession {
+    run: OrtRun,
+    /// Filled anew for each map.
+    input: Tensor<f32>,
+}
+
+impl Session for OrtSession {
+    fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError> {
+        check_maps(pressure_pa, sed_j_per_m3)?;
+        let action = "infer a map";
+        self.input.extract_tensor_mut().1.copy_from_slice(pressure_pa);
+        let outputs =
+            self.run.run(ort::inputs![INPUT_NAME => &self.input]).map_err(failed(action))?;
+        let (_, answer) =
+            outputs[OUTPUT_NAME].try_extract_tensor::<f32>().map_err(failed(action))?;
+        if answer.len() != MAP_LEN {
+            return Err(failed(action)(format!("the answer has {} values", answer.len())));
+        }
+        sed_j_per_m3.copy_from_slice(answer);
+        check_output(sed_j_per_m3)
+    }
+}

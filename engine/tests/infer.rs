@@ -1,0 +1,151 @@
+//! A real ONNX file through the engine, against ONNX Runtime's recorded answer.
+
+mod common;
+
+use common::{TINY, altered, expected, graph, press_pa};
+use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX, load, load_with};
+
+fn assert_equals_reference(sed_j_per_m3: &[f32]) {
+    let expected = expected();
+    // The project's bar for tract against ONNX Runtime: 1e-5 of the maximum.
+    let tolerance = 1e-5 * expected.max_j_per_m3;
+    for (i, row) in expected.every_7th_row_and_column.iter().enumerate() {
+        for (j, value) in row.iter().enumerate() {
+            let found = sed_j_per_m3[7 * i * MAP_SIDE_PX + 7 * j];
+            let difference = f64::from(found - value).abs();
+            assert!(difference <= tolerance, "row {i}, column {j}: {found}, not {value}");
+        }
+    }
+    let sum: f64 = sed_j_per_m3.iter().map(|&v| f64::from(v)).sum();
+    assert!((sum / expected.sum_j_per_m3 - 1.0).abs() < 1e-5, "sum {sum}");
+}
+
+#[test]
+fn tract_answers_as_onnx_runtime_does() {
+    let model = load(TINY, None).unwrap();
+    let mut session = model.session().unwrap();
+    let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    assert_equals_reference(&sed_j_per_m3);
+}
+
+#[test]
+fn sessions_run_in_threads_and_agree_bit_for_bit() {
+    let model = load(TINY, None).unwrap();
+    let mut first = vec![0.0; MAP_LEN];
+    model.session().unwrap().infer(&press_pa(), &mut first).unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                let mut session = model.session().unwrap();
+                let mut again = vec![0.0; MAP_LEN];
+                // Other maps between must leave no trace.
+                session.infer(&vec![1_000.0; MAP_LEN], &mut again).unwrap();
+                session.infer(&press_pa(), &mut again).unwrap();
+                assert_eq!(first, again);
+            });
+        }
+    });
+}
+
+#[test]
+fn says_what_the_model_is() {
+    let model = load(TINY, None).unwrap();
+    let info = model.info();
+    assert_eq!(info.name, "tiny");
+    assert_eq!(info.atlas_hash, "ab".repeat(32));
+    assert_eq!(info.effects, ["finite_strain", "layers"]);
+    assert_eq!(info.network["base"], 2);
+    assert_eq!((info.pressure_max_pa, info.sed_max_j_per_m3), (40_000.0, 2_500.0));
+    assert_eq!(info.bytes as usize, TINY.len());
+    assert!(info.backend.starts_with("tract "));
+    assert_eq!(info.onnx_sha256.len(), 64);
+}
+
+#[test]
+fn the_named_tract_version_is_the_locked_one() {
+    let lock = include_str!("../../Cargo.lock");
+    let at = lock.find("name = \"tract-onnx\"\nversion = \"").unwrap();
+    let version = lock[at..].split('"').nth(3).unwrap();
+    let model = load(TINY, None).unwrap();
+    assert_eq!(model.info().backend, format!("tract {version}"));
+}
+
+#[test]
+fn refuses_maps_of_another_length_and_goes_on() {
+    let model = load(TINY, None).unwrap();
+    let mut session = model.session().unwrap();
+    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+    for length in [0, MAP_LEN - 1, MAP_LEN + 1] {
+        let error = session.infer(&vec![0.0; length], &mut sed_j_per_m3).unwrap_err();
+        assert!(
+            matches!(error, EngineError::WrongLength { map: "pressure_pa", found, .. } if found == length)
+        );
+    }
+    let error = session.infer(&press_pa(), &mut sed_j_per_m3[1..]).unwrap_err();
+    assert!(matches!(error, EngineError::WrongLength { map: "sed_j_per_m3", .. }));
+    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    assert_equals_reference(&sed_j_per_m3);
+}
+
+#[test]
+fn an_infinite_answer_is_an_error_not_a_map() {
+    // Scaled so far up that a press beyond the trained range overflows.
+    let onnx = altered(|model| {
+        let scale = graph(model).initializer.iter_mut().find(|t| t.name == "scale_out").unwrap();
+        scale.raw_data = 1e36f32.to_le_bytes().to_vec();
+    });
+    let mut session = load(&onnx, None).unwrap().session().unwrap();
+    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+    let hard: Vec<f32> = press_pa().iter().map(|p| 1e4 * p).collect();
+    let error = session.infer(&hard, &mut sed_j_per_m3).unwrap_err();
+    assert!(matches!(error, EngineError::NonFiniteOutput { .. }), "{error}");
+    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+}
+
+#[test]
+fn input_that_is_not_finite_is_refused() {
+    let mut session = load(TINY, None).unwrap().session().unwrap();
+    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut pressure_pa = press_pa();
+        pressure_pa[3 * MAP_SIDE_PX + 5] = bad;
+        let error = session.infer(&pressure_pa, &mut sed_j_per_m3).unwrap_err();
+        assert!(matches!(error, EngineError::NonFiniteInput { row: 3, column: 5, .. }), "{error}");
+    }
+    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    assert_equals_reference(&sed_j_per_m3);
+}
+
+#[test]
+fn zero_in_leaves_only_the_biases() {
+    let model = load(TINY, None).unwrap();
+    let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+    model.session().unwrap().infer(&vec![0.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
+    let max = sed_j_per_m3.iter().copied().fold(0.0, f32::max);
+    assert!(f64::from(max) < 0.2 * expected().max_j_per_m3, "{max}");
+}
+
+#[cfg(not(feature = "ort"))]
+#[test]
+fn ort_is_refused_where_it_was_not_built() {
+    let Err(error) = load_with(Backend::Ort, TINY, None) else { panic!("loaded") };
+    assert!(matches!(error, EngineError::BackendMissing { backend: Backend::Ort, .. }));
+}
+
+/// Needs the shared library: `ORT_DYLIB_PATH=... cargo test --features ort`.
+#[cfg(feature = "ort")]
+#[test]
+fn onnx_runtime_answers_as_recorded() {
+    if std::env::var_os("ORT_DYLIB_PATH").is_none() {
+        eprintln!("skipped: ORT_DYLIB_PATH does not name the library of ONNX Runtime");
+        return;
+    }
+    let model = load_with(Backend::Ort, TINY, None).unwrap();
+    assert!(model.info().backend.starts_with("onnxruntime "), "{}", model.info().backend);
+    let mut session = model.session().unwrap();
+    let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+    session.infer(&vec![1_000.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
+    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    assert_equals_reference(&sed_j_per_m3);
+}
