@@ -63,18 +63,18 @@ pub struct Config {
     #[arg(long, default_value = "256", value_name = "N")]
     pub max_connections: NonZeroUsize,
 
-    /// A client that owes the server bytes (a request's rest, a hello, room for an answer) for
-    /// this long is dropped, seconds.
+    /// A client that owes the server bytes (a request, a hello, room for an answer) for this
+    /// long is dropped, seconds; so is a connection kept alive for nothing.
     #[arg(long, default_value = "10", value_name = "S")]
     pub io_timeout_s: u64,
 
-    /// A session or kept-alive connection silent for this long (pings are answered by any
-    /// WebSocket library and count) is closed, seconds.
+    /// A session silent for this long is closed, seconds. Pings count, and any WebSocket
+    /// library answers them.
     #[arg(long, default_value = "60", value_name = "S")]
     pub idle_timeout_s: u64,
 
-    /// Time for the drain, seconds.
-    #[arg(long, default_value = "10", value_name = "S")]
+    /// Time for the drain, seconds; longer than --io-timeout-s, or a slow client can outlast it.
+    #[arg(long, default_value = "15", value_name = "S")]
     pub drain_timeout_s: u64,
 }
 
@@ -96,7 +96,7 @@ impl Default for Config {
             max_connections: n(256),
             io_timeout_s: 10,
             idle_timeout_s: 60,
-            drain_timeout_s: 10,
+            drain_timeout_s: 15,
         }
     }
 }
@@ -106,7 +106,7 @@ impl Default for Config {
 pub(crate) struct Timeouts {
     /// For a client that owes bytes.
     pub(crate) io: Duration,
-    /// For a silent session or connection.
+    /// For a silent session.
     pub(crate) idle: Duration,
 }
 

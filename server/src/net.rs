@@ -26,8 +26,8 @@ use tokio::{
 
 use crate::app::{App, begun};
 
-/// Largest request head, bytes.
-const HEAD_MAX: usize = 32 * 1024;
+/// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
+const BUFFER_MAX: usize = 128 * 1024;
 
 /// Pause after a failed accept: the usual cause, no free file descriptors, passes.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
@@ -73,7 +73,7 @@ async fn connection(
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(app.timeouts.io)
-        .max_buf_size(HEAD_MAX)
+        .max_buf_size(BUFFER_MAX)
         .serve_connection(io, TowerToHyperService::new(router))
         .with_upgrades();
     tokio::pin!(connection);

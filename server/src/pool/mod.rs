@@ -126,3 +126,6 @@ impl Entrance {
 
 /// Longest wait of a thread for work before it looks around; every wait is timed.
 const LOOK_AROUND: Duration = Duration::from_millis(500);
+
+#[cfg(test)]
+mod tests;

@@ -12,9 +12,9 @@ use crate::support::{Service, bytes_of, frame, hello, ramp};
 async fn accepted_work_is_answered_and_sessions_are_told() {
     let service = Service::start().await;
     let mut busy = service.socket().await;
-    busy.open(hello(json!({"tier": "slow"}))).await;
+    busy.open(hello(&json!({"tier": "slow"}))).await;
     let mut idle = service.socket().await;
-    idle.open(hello(json!({}))).await;
+    idle.open(hello(&json!({}))).await;
     let mut new = service.socket().await;
     let post = service.post("/v1/sed?tier=slow", bytes_of(&ramp())).send();
     let post = tokio::spawn(post);
@@ -46,7 +46,7 @@ async fn accepted_work_is_answered_and_sessions_are_told() {
 async fn frames_that_come_during_the_drain_are_refused_by_name() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.open(hello(&json!({"tier": "slow"}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     sleep(Duration::from_millis(30)).await;
     let drain = tokio::spawn(service.server.drain());
@@ -72,7 +72,7 @@ async fn a_connection_kept_alive_does_not_hold_up_the_drain() {
 async fn a_drain_that_takes_too_long_says_so() {
     let service = Service::start_with(|config| config.drain_timeout_s = 0).await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.open(hello(&json!({"tier": "slow"}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     sleep(Duration::from_millis(30)).await;
     let error = service.server.drain().await.unwrap_err();

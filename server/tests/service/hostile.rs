@@ -75,7 +75,7 @@ async fn a_client_that_never_reads_is_dropped() {
     timeout(Duration::from_secs(60), flood).await.expect("the connection is still open");
     // The same in a session.
     let mut socket = service.socket().await;
-    socket.open(hello(json!({}))).await;
+    socket.open(hello(&json!({}))).await;
     let flood = async {
         while service.metric("papilla_sessions_open").await > 0.5 {
             for sequence in 0..8 {
@@ -127,9 +127,9 @@ async fn silence_instead_of_a_hello_ends_the_session() {
 async fn a_session_that_answers_pings_lives_on_and_one_that_does_not_ends() {
     let service = impatient().await;
     let mut live = service.socket().await;
-    live.open(hello(json!({}))).await;
+    live.open(hello(&json!({}))).await;
     let mut dead = service.socket().await;
-    dead.open(hello(json!({}))).await;
+    dead.open(hello(&json!({}))).await;
     // Reading answers pings; `dead` does not read.
     let _ = timeout(Duration::from_secs(5), live.hear()).await.expect_err("nothing is due");
     live.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
@@ -147,7 +147,7 @@ async fn a_session_that_answers_pings_lives_on_and_one_that_does_not_ends() {
 async fn messages_too_large_end_the_session_with_a_word() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({}))).await;
+    socket.open(hello(&json!({}))).await;
     socket.try_send(vec![0_u8; (1 << 20) + 1]).await;
     socket.hear_end("too_large", 1009).await;
     assert_serves(&service).await;
@@ -157,7 +157,7 @@ async fn messages_too_large_end_the_session_with_a_word() {
 async fn noise_in_a_session_harms_nobody_else() {
     let service = Service::start().await;
     let mut other = service.socket().await;
-    other.open(hello(json!({}))).await;
+    other.open(hello(&json!({}))).await;
     // Text that is not UTF-8, a reserved opcode, an unmasked frame.
     for noise in
         [&[0x81, 0x82, 0, 0, 0, 0, 0xff, 0xfe][..], &[0x83, 0x80, 0, 0, 0, 0], &[0x82, 0x01, 0x00]]
@@ -174,7 +174,7 @@ async fn noise_in_a_session_harms_nobody_else() {
     }
     // A client that vanishes with a frame under way.
     let mut gone = service.socket().await;
-    gone.open(hello(json!({"tier": "slow"}))).await;
+    gone.open(hello(&json!({"tier": "slow"}))).await;
     gone.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     drop(gone);
     other.send(frame(2, 0, SampleType::F32, 1.0, &vec![1.0; MAP_LEN])).await;

@@ -3,6 +3,7 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
+mod binary;
 mod drain;
 mod hostile;
 mod information;

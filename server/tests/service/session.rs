@@ -26,7 +26,7 @@ async fn every_sample_type_renders_within_its_error() {
         let scale =
             if sample_type.is_scaled() { PRESSURE_MAX_PA / sample_type.unit_max() } else { 1.0 };
         let mut socket = service.socket().await;
-        let ready = socket.open(hello(json!({"sample_type": name}))).await;
+        let ready = socket.open(hello(&json!({"sample_type": name}))).await;
         assert_eq!(ready["sample_type"], name);
         socket.send(frame(7, 0, sample_type, scale, &map)).await;
         let (header, payload) = socket.hear_frame().await;
@@ -56,7 +56,7 @@ async fn ready_says_what_was_agreed() {
     let mut socket = service.socket().await;
     let wish =
         json!({"effects": ["layers"], "budget_us": 60_000_000, "tier": null, "atlas_hash": hash});
-    let ready = socket.open(hello(wish)).await;
+    let ready = socket.open(hello(&wish)).await;
     assert_eq!(ready["version"], 1);
     assert_eq!(ready["tier"], "slow", "the most accurate tier that meets the budget");
     assert_eq!(ready["effects"], json!(["finite_strain", "layers"]));
@@ -67,7 +67,7 @@ async fn ready_says_what_was_agreed() {
     assert!(ready["session"].as_u64().unwrap() > 0);
     for (budget_us, tier) in [(Value::Null, "quick"), (json!(0), "quick"), (json!(1), "quick")] {
         let mut socket = service.socket().await;
-        let ready = socket.open(hello(json!({"budget_us": budget_us}))).await;
+        let ready = socket.open(hello(&json!({"budget_us": budget_us}))).await;
         assert_eq!(ready["tier"], tier, "{budget_us}");
     }
 }
@@ -78,18 +78,18 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
     let mut socket = service.socket().await;
     let atlas_hash = "0".repeat(64);
     for (bad, code, field) in [
-        (hello(json!({"version": 2})), "unknown_version", json!("version")),
-        (hello(json!({"tier": "nobody"})), "unknown_tier", json!("tier")),
-        (hello(json!({"effects": ["layers", "friction"]})), "unknown_effect", json!("effects")),
-        (hello(json!({"atlas_hash": atlas_hash})), "atlas_mismatch", json!("atlas_hash")),
-        (hello(json!({"pressure_scale_pa": 0})), "bad_scale", json!("pressure_scale_pa")),
-        (hello(json!({"colour": "red"})), "bad_json", Value::Null),
+        (hello(&json!({"version": 2})), "unknown_version", json!("version")),
+        (hello(&json!({"tier": "nobody"})), "unknown_tier", json!("tier")),
+        (hello(&json!({"effects": ["layers", "friction"]})), "unknown_effect", json!("effects")),
+        (hello(&json!({"atlas_hash": atlas_hash})), "atlas_mismatch", json!("atlas_hash")),
+        (hello(&json!({"pressure_scale_pa": 0})), "bad_scale", json!("pressure_scale_pa")),
+        (hello(&json!({"colour": "red"})), "bad_json", Value::Null),
     ] {
         socket.send(bad.to_string()).await;
         let error = socket.hear_refusal(code).await;
         assert_eq!(error["field"], field, "{error}");
     }
-    socket.open(hello(json!({}))).await;
+    socket.open(hello(&json!({}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Ok);
 }
@@ -122,7 +122,7 @@ async fn assert_survives(socket: &mut Socket, bad: Vec<u8>, code: &str, sequence
 async fn a_session_survives_wrong_frames_and_says_so() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({}))).await;
+    socket.open(hello(&json!({}))).await;
     let good = frame(5, 0, SampleType::F32, 1.0, &ramp());
     let with = |at: usize, bytes: &[u8]| {
         let mut bad = good.clone();
@@ -153,7 +153,7 @@ async fn a_session_survives_wrong_frames_and_says_so() {
     ] {
         assert_survives(&mut socket, bad, code, sequence).await;
     }
-    socket.send(hello(json!({})).to_string()).await;
+    socket.send(hello(&json!({})).to_string()).await;
     socket.hear_refusal("unexpected_text").await;
     socket.send(frame(6, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_eq!(socket.hear_frame().await.0.sequence, 6);
@@ -170,7 +170,7 @@ async fn scales_come_from_the_header_or_the_hello() {
         unscaled
     };
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"sample_type": "u8", "pressure_scale_pa": 2.0}))).await;
+    socket.open(hello(&json!({"sample_type": "u8", "pressure_scale_pa": 2.0}))).await;
     for frame in [unscaled.clone(), frame(1, 0, SampleType::U8, 2.0, &map)] {
         socket.send(frame).await;
         let (header, payload) = socket.hear_frame().await;
@@ -179,7 +179,7 @@ async fn scales_come_from_the_header_or_the_hello() {
         assert_rendered(&map, &sed, |e| SampleType::U8.error_max(e, header.scale) + 1e-3);
     }
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"sample_type": "u8"}))).await;
+    socket.open(hello(&json!({"sample_type": "u8"}))).await;
     socket.send(unscaled).await;
     assert_eq!(socket.hear_refusal("bad_scale").await["sequence"], 1);
 }
@@ -188,7 +188,7 @@ async fn scales_come_from_the_header_or_the_hello() {
 async fn a_map_beyond_the_scale_raises_it_instead_of_clipping() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    let ready = socket.open(hello(json!({"sample_type": "u16"}))).await;
+    let ready = socket.open(hello(&json!({"sample_type": "u16"}))).await;
     // The test models' card says 5000 J/m3; 1 % headroom in pressure goes beyond.
     let map = vec![1.005 * PRESSURE_MAX_PA; MAP_LEN];
     socket.send(frame(1, 0, SampleType::U16, 1.0, &map)).await;
@@ -218,7 +218,7 @@ async fn hear_all(socket: &mut Socket, count: usize) -> (BTreeMap<u32, FrameStat
 async fn the_latest_frame_wins() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.open(hello(&json!({"tier": "slow"}))).await;
     for sequence in 1..=5 {
         socket.send(frame(sequence, 0, SampleType::F32, 1.0, &ramp())).await;
     }
@@ -237,7 +237,7 @@ async fn the_latest_frame_wins() {
 async fn late_frames_are_dropped_answered_and_counted() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"tier": "slow"}))).await;
+    socket.open(hello(&json!({"tier": "slow"}))).await;
     // Over at once; less than any run takes.
     for (sequence, deadline_us) in [(1, 1), (2, 3000)] {
         socket.send(frame(sequence, deadline_us, SampleType::F32, 1.0, &ramp())).await;
@@ -250,7 +250,7 @@ async fn late_frames_are_dropped_answered_and_counted() {
     assert_eq!(service.metric(&outcome("late")).await as u64, 2);
     // The session's budget stands in where a frame names no deadline.
     let mut socket = service.socket().await;
-    socket.open(hello(json!({"tier": "slow", "budget_us": 3000}))).await;
+    socket.open(hello(&json!({"tier": "slow", "budget_us": 3000}))).await;
     socket.send(frame(3, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Late);
     socket.send(frame(4, 60_000_000, SampleType::F32, 1.0, &ramp())).await;
@@ -265,7 +265,7 @@ async fn sessions_beyond_the_bound_are_turned_away() {
     let one = std::num::NonZeroUsize::MIN;
     let service = Service::start_with(|config| config.max_sessions = one).await;
     let mut first = service.socket().await;
-    first.open(hello(json!({}))).await;
+    first.open(hello(&json!({}))).await;
     let (status, body) = Socket::connect(service.address).await.err().unwrap();
     assert_eq!((status, &body["error"]["code"]), (503, &json!("overloaded")));
     first.close(None).await;
@@ -277,7 +277,7 @@ async fn sessions_beyond_the_bound_are_turned_away() {
             Err((status, _)) => assert_eq!(status, 503),
         }
     };
-    second.open(hello(json!({}))).await;
+    second.open(hello(&json!({}))).await;
     assert_eq!(service.metric("papilla_sessions_open").await as i64, 1);
     assert_eq!(service.metric("papilla_sessions_total").await as i64, 2);
 }
@@ -290,7 +290,7 @@ async fn many_sessions_share_the_threads_and_keep_to_themselves() {
             let address = service.address;
             tokio::spawn(async move {
                 let mut socket = Socket::connect(address).await.unwrap();
-                socket.open(hello(json!({}))).await;
+                socket.open(hello(&json!({}))).await;
                 let map = vec![100.0 * client as f32; MAP_LEN];
                 for sequence in 0..30 {
                     socket.send(frame(sequence, 0, SampleType::F32, 1.0, &map)).await;
@@ -312,7 +312,7 @@ async fn many_sessions_share_the_threads_and_keep_to_themselves() {
 async fn the_header_is_the_documented_one() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(json!({}))).await;
+    socket.open(hello(&json!({}))).await;
     // Written out by hand, as a client in another language would.
     let mut bytes = b"PPL1".to_vec();
     bytes.extend([1, 1, 0, 0]);

@@ -32,7 +32,7 @@ pub(crate) const GAIN: f32 = 0.5;
 pub(crate) struct Service {
     pub(crate) server: Server,
     pub(crate) address: SocketAddr,
-    pub(crate) models: TempDir,
+    _models: TempDir,
 }
 
 impl Service {
@@ -51,7 +51,7 @@ impl Service {
         };
         change(&mut config);
         let server = papilla_server::start(&config).await.unwrap();
-        Self { address: server.address(), server, models }
+        Self { address: server.address(), server, _models: models }
     }
 
     pub(crate) fn get(&self, path: &str) -> Request {

@@ -112,7 +112,7 @@ impl Socket {
 }
 
 /// A hello with these members beside type and version.
-pub(crate) fn hello(members: Value) -> Value {
+pub(crate) fn hello(members: &Value) -> Value {
     let mut hello = json!({"type": "hello", "version": 1});
     for (name, value) in members.as_object().unwrap() {
         hello[name] = value.clone();
