@@ -1,6 +1,6 @@
 //! Maps as images: gray with a recorded scale for programs, colour for people.
 
-use super::canvas::{BLACK, Canvas, OUTSIDE, TEXT_HEIGHT_PX, TEXT_WIDTH_PX, viridis};
+use super::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX, TEXT_WIDTH_PX, viridis};
 use super::{OutputError, atomic};
 use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
 use serde::{Deserialize, Serialize};
@@ -240,7 +240,6 @@ impl MapView<'_> {
         let note = "fingertip up, seen from outside";
         let note_x = (x + side).saturating_sub(note.len() * TEXT_WIDTH_PX);
         canvas.text((note_x, y), note, [110; 3]);
-        canvas.fill((note_x.saturating_sub(18), y + 3), (10, 10), OUTSIDE);
     }
 
     /// Writes `stem.png` (16-bit gray), `stem-color.png` and `stem.json` (the
