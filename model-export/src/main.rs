@@ -1,2 +1,25 @@
-//! `model-export` command line.
-fn main() {}
+//! `model-export`: checks, evaluates and describes exported Papilla models.
+
+mod cli;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = cli::Arguments::parse();
+    match cli::run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let code = error
+                .downcast_ref::<model_export::ExportError>()
+                .map_or(1, model_export::ExportError::exit_code);
+            if arguments.json {
+                let report = serde_json::json!({"error": {"message": format!("{error:#}"), "exit_code": code}});
+                println!("{report}");
+            } else {
+                eprintln!("error: {error:#}");
+            }
+            ExitCode::from(code)
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The command line.
+
+mod check;
+mod evaluate;
+mod index;
+
+use clap::{Parser, Subcommand};
+use model_export::{ExportError, read, read_text, table};
+use papilla_engine::{Backend, Card, Model};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+const EXIT_CODES: &str = "\
+Exit status:
+  0  done
+  1  refused: the model, card, dataset or reference is not what it must be
+  2  wrong usage
+  3  a file could not be read or written";
+
+const ABOUT: &str = "\
+Checks, evaluates and describes exported Papilla models.
+
+A model maps the pressure on a fingertip (Pa) to the strain energy density (SED, J/m3) under
+its skin; the trainer writes it as ONNX. This program measures it in the engine that
+will serve it, on presses that no training saw, and writes its card.";
+
+const EXAMPLES: &str = "\
+A new model, from the trainer's file to the service:
+  model-export check    models/s1-base8.onnx --atlas models/atlas.json
+  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures
+  model-export index    models --default s1-base8
+  model-export table    models/*.json";
+
+/// Parsed command line.
+#[derive(Debug, Parser)]
+#[command(version, about = "Checks, evaluates and describes exported Papilla models", long_about = ABOUT, after_long_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one JSON document instead of text; errors too.
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Load a model, check it against the contract and say what it is.
+    ///
+    /// Checked: the file is whole; one input `pressure_pa` and one output `sed_j_per_m3`, float32
+    /// [1, 1, 224, 224]; every weight is finite and inside the file; metadata; a trial map is
+    /// answered with finite, non-negative values; with --atlas and --card, that they belong to it.
+    #[command(after_long_help = EXIT_CODES)]
+    Check(check::Options),
+    /// Measure a model on the held-out presses of a dataset and write its card.
+    ///
+    /// Every sample of the split is drawn from the shards, inferred in the serving engine on one
+    /// thread and compared with the finite-element truth over the interface's pixels: relative
+    /// L2, the same where the truth is below 10 % of its maximum (far field), peak, total
+    /// energy, SSIM; and the time of each inference.
+    #[command(after_long_help = EXIT_CODES)]
+    Evaluate(evaluate::Options),
+    /// Print a Markdown table of accuracy against time for several cards.
+    #[command(after_long_help = EXIT_CODES)]
+    Table {
+        /// Cards written by `evaluate`, in the order of the rows; other JSON files beside
+        /// them (index.json, atlas.json) are passed over.
+        #[arg(required = true, value_name = "CARD")]
+        cards: Vec<PathBuf>,
+    },
+    /// Write index.json for a folder of models: which there are, which one is the default.
+    ///
+    /// Every NAME.onnx there must have its card NAME.json and the atlas of atlas.json.
+    #[command(after_long_help = EXIT_CODES)]
+    Index(index::Options),
+}
+
+/// Does what the command line asks for.
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let json = arguments.json;
+    match &arguments.command {
+        Command::Check(options) => check::run(options, json),
+        Command::Evaluate(options) => evaluate::run(options, json),
+        Command::Table { cards } => print_table(cards, json),
+        Command::Index(options) => index::run(options, json),
+    }
+}
+
+fn print_table(paths: &[PathBuf], json: bool) -> anyhow::Result<()> {
+    let passed_over = |path: &&PathBuf| {
+        !path.file_name().is_some_and(|name| name == "index.json" || name == "atlas.json")
+    };
+    let cards = paths
+        .iter()
+        .filter(passed_over)
+        .map(|path| load_card(path))
+        .collect::<Result<Vec<_>, _>>()?;
+    if json {
+        return print_json(&cards);
+    }
+    print!("{}", table::markdown(&cards));
+    Ok(())
+}
+
+/// Reads a card.
+fn load_card(path: &Path) -> Result<Card, ExportError> {
+    let refused = |source| ExportError::Engine { path: path.to_owned(), source };
+    Card::from_json(&read_text(path)?).map_err(refused)
+}
+
+/// Loads a model, checked against its card if there is one.
+fn load_model(
+    path: &Path,
+    backend: Backend,
+    card: Option<&Card>,
+) -> Result<Arc<dyn Model>, ExportError> {
+    let refused = |source| ExportError::Engine { path: path.to_owned(), source };
+    papilla_engine::load_with(backend, &read(path)?, card).map_err(refused)
+}
+
+fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    println!("{}", serde_json::to_string_pretty(value)?);
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! `model-export index`.
+
+use super::check::load_atlas;
+use super::{load_card, load_model, print_json};
+use anyhow::{Context, bail};
+use model_export::evaluate::require_atlas;
+use model_export::{ExportError, write};
+use papilla_engine::{Backend, card::Index};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Folder with NAME.onnx, NAME.json and atlas.json.
+    folder: PathBuf,
+    /// The model to take unasked.
+    #[arg(long, value_name = "NAME")]
+    default: String,
+}
+
+pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let atlas = load_atlas(&options.folder.join("atlas.json"))?;
+    let mut models = names(&options.folder)?;
+    // From small to large: the order in which they are offered.
+    models.sort_by_key(|(bytes, name)| (*bytes, name.clone()));
+    let models: Vec<String> = models.into_iter().map(|(_, name)| name).collect();
+    if !models.contains(&options.default) {
+        bail!("there is no model '{}' in {}", options.default, options.folder.display());
+    }
+    for name in &models {
+        let card = load_card(&options.folder.join(format!("{name}.json")))?;
+        let path = options.folder.join(format!("{name}.onnx"));
+        let model = load_model(&path, Backend::Tract, Some(&card))?;
+        if model.info().name != *name {
+            bail!("{} calls itself '{}'", path.display(), model.info().name);
+        }
+        require_atlas("atlas.json", atlas.hash(), model.info())?;
+    }
+    let index = Index { default: options.default.clone(), models };
+    let text = serde_json::to_string_pretty(&index)? + "\n";
+    let path = options.folder.join("index.json");
+    write(&path, text.as_bytes())?;
+    if json {
+        return print_json(&index);
+    }
+    println!("{}: {} (default {})", path.display(), index.models.join(", "), index.default);
+    Ok(())
+}
+
+/// Length and name of every `.onnx` file.
+fn names(folder: &Path) -> anyhow::Result<Vec<(u64, String)>> {
+    let failed = |source| ExportError::Io { action: "read", path: folder.to_owned(), source };
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let path = entry.path();
+        if path.extension().is_some_and(|ending| ending == "onnx") {
+            let name = path.file_stem().and_then(|name| name.to_str());
+            let name = name.with_context(|| format!("{} is no UTF-8 name", path.display()))?;
+            names.push((entry.metadata().map_err(failed)?.len(), name.to_owned()));
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,230 @@
+//! Reads a dataset: `manifest.json`, `atlas.json` and one `.npz` shard per press.
+//!
+//! Shards hold values at the atlas's vertices; maps are rasterised from them here.
+
+use crate::{ExportError, read, read_text};
+use ndarray::{Array1, Array2, OwnedRepr};
+use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
+use papilla_proto::atlas::{Atlas, Patch, Raster};
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use std::io::Cursor;
+use std::path::{Component, Path, PathBuf};
+
+/// Version of the manifest that is read here.
+const FORMAT: u32 = 1;
+
+#[derive(Debug, Deserialize)]
+struct Manifest {
+    format: u32,
+    atlas_hash: String,
+    effects: Vec<String>,
+    vertex_count: usize,
+    presses: Vec<Press>,
+    splits: Splits,
+    dataset_sha256: String,
+}
+
+#[derive(Debug, Deserialize)]
+struct Splits {
+    train: Vec<usize>,
+    test: Vec<usize>,
+}
+
+/// One press of the manifest.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Press {
+    /// Number within the campaign.
+    pub id: usize,
+    /// Its shard, relative to the manifest.
+    pub file: String,
+    /// SHA-256 of the shard.
+    pub sha256: String,
+    /// Samples in the shard.
+    pub samples: usize,
+    /// Pitch of the plate, degrees.
+    pub pitch_deg: f64,
+    /// Roll of the plate, degrees.
+    pub roll_deg: f64,
+    /// Yaw of the plate, degrees.
+    pub yaw_deg: f64,
+}
+
+/// The samples of one press, values at the vertices.
+#[derive(Clone, Debug)]
+pub struct Shard {
+    /// Pressure on the skin, Pa; `[D, V]`.
+    pub pressure_pa: Array2<f32>,
+    /// SED on the dermis side of the interface, J/m3; `[D, V]`.
+    pub sed_j_per_m3: Array2<f32>,
+    /// Depth of each sample, mm; `[D]`.
+    pub depth_mm: Array1<f32>,
+}
+
+/// A dataset whose manifest and atlas have been read and agree.
+#[derive(Debug)]
+pub struct Dataset {
+    folder: PathBuf,
+    manifest: Manifest,
+    /// The atlas of all its maps.
+    pub atlas: Atlas,
+    /// Draws pressure.
+    pub skin: Raster,
+    /// Draws SED.
+    pub interface: Raster,
+}
+
+impl Dataset {
+    /// Opens the dataset in `folder`; shards are read by [`Dataset::load`].
+    ///
+    /// # Errors
+    /// [`ExportError::Io`], [`ExportError::Dataset`], [`ExportError::Atlas`].
+    pub fn open(folder: &Path) -> Result<Self, ExportError> {
+        let path = folder.join("manifest.json");
+        let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+        let manifest: Manifest = serde_json::from_str(&read_text(&path)?)
+            .map_err(|error| bad(format!("not a manifest: {error}")))?;
+        if manifest.format != FORMAT {
+            return Err(bad(format!(
+                "format {} is not supported, this program reads {FORMAT}",
+                manifest.format
+            )));
+        }
+        let atlas_path = folder.join("atlas.json");
+        let refused = |source| ExportError::Atlas { path: atlas_path.clone(), source };
+        let atlas = Atlas::from_json(&read_text(&atlas_path)?).map_err(refused)?;
+        atlas.require_hash(&manifest.atlas_hash).map_err(refused)?;
+        if atlas.vertex_count() != manifest.vertex_count {
+            return Err(bad(format!(
+                "{} vertices, the atlas has {}",
+                manifest.vertex_count,
+                atlas.vertex_count()
+            )));
+        }
+        manifest.check_identity().map_err(bad)?;
+        let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
+        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface })
+    }
+
+    /// SHA-256 that names the dataset.
+    #[must_use]
+    pub fn sha256(&self) -> &str {
+        &self.manifest.dataset_sha256
+    }
+
+    /// Effects that the solver modelled.
+    #[must_use]
+    pub fn effects(&self) -> &[String] {
+        &self.manifest.effects
+    }
+
+    /// The presses of a split (`train` or `test`), in the manifest's order.
+    ///
+    /// # Errors
+    /// [`ExportError::EmptySplit`] if there are none, [`ExportError::Dataset`] for another
+    /// name, or a press that is not in the manifest.
+    pub fn presses(&self, split: &str) -> Result<Vec<&Press>, ExportError> {
+        let path = self.folder.join("manifest.json");
+        let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+        let ids = match split {
+            "train" => &self.manifest.splits.train,
+            "test" => &self.manifest.splits.test,
+            _ => return Err(bad(format!("no split '{split}'; there are 'train' and 'test'"))),
+        };
+        let presses = ids
+            .iter()
+            .map(|id| {
+                let press = self.manifest.presses.iter().find(|press| press.id == *id);
+                press.ok_or_else(|| bad(format!("press {id} of the split is not listed")))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        if presses.iter().all(|press| press.samples == 0) {
+            return Err(ExportError::EmptySplit { path, split: split.to_owned() });
+        }
+        Ok(presses)
+    }
+
+    /// Path of the shard of a press.
+    #[must_use]
+    pub fn shard_path(&self, press: &Press) -> PathBuf {
+        self.folder.join(&press.file)
+    }
+
+    /// Reads the shard of a press and checks its hash, shapes and values.
+    ///
+    /// # Errors
+    /// [`ExportError::Io`], [`ExportError::Dataset`].
+    pub fn load(&self, press: &Press) -> Result<Shard, ExportError> {
+        let path = self.shard_path(press);
+        let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+        let bytes = read(&path)?;
+        if sha256_hex(&bytes) != press.sha256 {
+            return Err(bad(
+                "its hash is not the manifest's: it is damaged or of another run".into()
+            ));
+        }
+        let unreadable = |error: ReadNpzError| bad(format!("unreadable: {error}"));
+        let mut npz = NpzReader::new(Cursor::new(bytes)).map_err(unreadable)?;
+        let shard = Shard {
+            pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
+            sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
+            depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
+        };
+        let expected = (press.samples, self.manifest.vertex_count);
+        for (name, array) in
+            [("pressure_pa", &shard.pressure_pa), ("sed_dermis_j_per_m3", &shard.sed_j_per_m3)]
+        {
+            if array.dim() != expected {
+                return Err(bad(format!("{name} is {:?}, not {expected:?}", array.dim())));
+            }
+            if let Some(value) = array.iter().find(|value| !value.is_finite()) {
+                return Err(bad(format!("{name} holds {value}")));
+            }
+        }
+        if shard.depth_mm.len() != press.samples {
+            return Err(bad(format!("depth_mm has {} values", shard.depth_mm.len())));
+        }
+        Ok(shard)
+    }
+}
+
+type Npz = NpzReader<Cursor<Vec<u8>>>;
+
+pub(crate) fn read_array<T: ReadableElement, D: ndarray::Dimension>(
+    npz: &mut Npz,
+    name: &str,
+) -> Result<ndarray::ArrayBase<OwnedRepr<T>, D>, ReadNpzError> {
+    // numpy stores `name` as `name.npy`, other writers as `name`.
+    npz.by_name(&format!("{name}.npy")).or_else(|_| npz.by_name(name))
+}
+
+impl Manifest {
+    fn check_identity(&self) -> Result<(), String> {
+        for (i, press) in self.presses.iter().enumerate() {
+            // A manifest must not make the program read files elsewhere.
+            if Path::new(&press.file).components().any(|c| !matches!(c, Component::Normal(_))) {
+                return Err(format!(
+                    "press {}: '{}' is no path inside the dataset",
+                    press.id, press.file
+                ));
+            }
+            if self.presses[..i].iter().any(|other| other.id == press.id) {
+                return Err(format!("press {} is listed twice", press.id));
+            }
+        }
+        if let Some(id) = self.splits.test.iter().find(|id| self.splits.train.contains(id)) {
+            return Err(format!("press {id} is in both splits: the test would not be held out"));
+        }
+        let mut by_id: Vec<&Press> = self.presses.iter().collect();
+        by_id.sort_by_key(|press| press.id);
+        let hashes: String = by_id.iter().map(|press| press.sha256.as_str()).collect();
+        if sha256_hex(hashes.as_bytes()) != self.dataset_sha256 {
+            return Err("dataset_sha256 does not follow from the shards listed".to_owned());
+        }
+        Ok(())
+    }
+}
+
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,161 @@
+//! Pictures of a sample: pressure, truth, prediction and error side by side.
+
+mod canvas;
+mod colour;
+
+use crate::ExportError;
+use crate::dataset::Dataset;
+use crate::evaluate::{Maps, Sample};
+use canvas::Canvas;
+use colour::Scale;
+use image::RgbImage;
+use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use std::path::Path;
+
+/// Pixels of the picture for one pixel of a map.
+const ZOOM: usize = 2;
+const PANEL: usize = MAP_SIDE_PX * ZOOM;
+const GAP: usize = 16;
+/// Room above a panel: two lines of text.
+const HEAD: usize = 52;
+/// Room below a panel: the colour bar and its labels.
+const FOOT: usize = 56;
+const BAR: usize = 14;
+
+struct Panel<'a> {
+    title: String,
+    values: Vec<f32>,
+    mask: &'a [bool],
+    /// Values at the two ends of the colour bar.
+    ends: [f32; 2],
+    unit: &'static str,
+    scale: Scale,
+}
+
+/// Draws one sample. `heading` stands above, such as `worst of 200`.
+#[must_use]
+pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> RgbImage {
+    let kilo = |map: &[f32]| map.iter().map(|v| v / 1e3).collect::<Vec<_>>();
+    let [pressure, truth, predicted] =
+        [&maps.pressure_pa, &maps.truth_j_per_m3, &maps.predicted_j_per_m3].map(|m| kilo(m));
+    let error: Vec<f32> = (0..MAP_LEN).map(|i| predicted[i] - truth[i]).collect();
+    let greatest = |map: &[f32]| map.iter().fold(0.0f32, |m, v| m.max(v.abs()));
+    // Truth and prediction share a scale: equal colours are equal values.
+    let sed_max = greatest(&truth).max(greatest(&predicted));
+    let (pressure_max, error_max) = (greatest(&pressure), greatest(&error));
+    let inside = dataset.interface.mask();
+    let panel = |title: &str, values, mask, ends, unit, scale| Panel {
+        title: title.to_owned(),
+        values,
+        mask,
+        ends,
+        unit,
+        scale,
+    };
+    let panels = [
+        panel("pressure", pressure, dataset.skin.mask(), [0.0, pressure_max], "kPa", Scale::Rising),
+        panel("SED, finite elements", truth, inside, [0.0, sed_max], "kJ/m3", Scale::Rising),
+        panel("SED, model", predicted, inside, [0.0, sed_max], "kJ/m3", Scale::Rising),
+        panel(
+            "model - finite elements",
+            error,
+            inside,
+            [-error_max, error_max],
+            "kJ/m3",
+            Scale::Signed,
+        ),
+    ];
+    let width = panels.len() * PANEL + (panels.len() + 1) * GAP;
+    let mut canvas = Canvas::new(width, HEAD + PANEL + FOOT);
+    canvas.text(GAP, 8, &describe(heading, sample));
+    for (i, panel) in panels.iter().enumerate() {
+        draw_panel(&mut canvas, GAP + i * (PANEL + GAP), panel);
+    }
+    canvas.into_image()
+}
+
+/// Writes a picture as PNG.
+///
+/// # Errors
+/// [`ExportError::Picture`], [`ExportError::Io`].
+pub fn write_png(image: &RgbImage, path: &Path) -> Result<(), ExportError> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|source| ExportError::Picture { path: path.to_owned(), source })?;
+    crate::write(path, bytes.get_ref())
+}
+
+fn describe(heading: &str, sample: &Sample) -> String {
+    let m = &sample.metrics;
+    let far = m.far_field_relative_l2.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v));
+    format!(
+        "{heading}: press {}, depth {:.2} mm, pitch {:.1}, roll {:.1}, yaw {:.1} deg; relative L2 {:.1} %, \
+         far field {far}, peak {:.1} %, energy {:.1} %, SSIM {:.4}",
+        sample.press,
+        sample.depth_mm,
+        sample.pitch_deg,
+        sample.roll_deg,
+        sample.yaw_deg,
+        100.0 * m.relative_l2,
+        100.0 * m.peak_error,
+        100.0 * m.total_energy_error,
+        m.ssim,
+    )
+}
+
+fn draw_panel(canvas: &mut Canvas, left: usize, panel: &Panel<'_>) {
+    canvas.text(left, 32, &panel.title);
+    let [low, high] = panel.ends;
+    // A map of one value has the colour of the lower end.
+    let span = if high > low { high - low } else { 1.0 };
+    for row in 0..PANEL {
+        for column in 0..PANEL {
+            let i = row / ZOOM * MAP_SIDE_PX + column / ZOOM;
+            let colour = if panel.mask[i] {
+                panel.scale.colour((panel.values[i] - low) / span)
+            } else {
+                colour::OUTSIDE
+            };
+            canvas.set(left + column, HEAD + row, colour);
+        }
+    }
+    let top = HEAD + PANEL + 8;
+    for column in 0..PANEL {
+        let colour = panel.scale.colour(column as f32 / (PANEL - 1) as f32);
+        for row in 0..BAR {
+            canvas.set(left + column, top + row, colour);
+        }
+    }
+    let middle = 0.5 * (low + high);
+    for (place, value) in [(0.0, low), (0.5, middle), (1.0, high)] {
+        let label =
+            if place > 0.9 { format!("{} {}", number(value), panel.unit) } else { number(value) };
+        let free = PANEL - Canvas::text_width(&label);
+        canvas.text(left + (place * free as f32) as usize, top + BAR + 6, &label);
+    }
+}
+
+/// Three significant digits.
+fn number(value: f32) -> String {
+    let digits = if value.abs() < 1e-12 { 0 } else { 2 - value.abs().log10().floor() as i32 };
+    format!("{value:.*}", usize::try_from(digits.clamp(0, 6)).unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn labels_have_three_digits() {
+        for (value, label) in [
+            (0.0, "0"),
+            (23.456, "23.5"),
+            (0.001_234, "0.00123"),
+            (-1.5, "-1.50"),
+            (1234.0, "1234"),
+        ] {
+            assert_eq!(number(value), label);
+        }
+    }
+}
