@@ -47,6 +47,13 @@ impl Default for Speed {
 }
 
 impl Speed {
+    /// Takes note of one run of the warm-up: the fastest is what to expect. The others
+    /// met cold caches, and the other threads warming up beside them.
+    pub(crate) fn warm(&self, time: Duration) {
+        self.learn(time);
+        self.typical_us.store(self.fastest_us.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+
     /// Takes note of one run.
     pub(crate) fn learn(&self, time: Duration) {
         let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX).max(1);
