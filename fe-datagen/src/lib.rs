@@ -13,4 +13,5 @@ pub mod material;
 pub mod mesh;
 pub mod output;
 pub mod press;
+pub mod scene;
 pub mod solve;

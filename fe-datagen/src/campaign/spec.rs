@@ -3,7 +3,7 @@
 use super::CampaignError;
 use crate::mesh::fingertip::Density;
 use crate::output::OutputError;
-use crate::press::fingertip::PlateSpec;
+use crate::press::body::PlateSpec;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -6,7 +6,7 @@ use crate::dataset::testing::{atlas, posed_record};
 use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
 use crate::mesh::fingertip::Density;
 use crate::output::map_image::Bits;
-use crate::press::fingertip::PlateSpec;
+use crate::press::body::PlateSpec;
 use crate::press::record::{IncrementRecord, Pose};
 use papilla_proto::atlas::Atlas;
 use std::collections::BTreeMap;

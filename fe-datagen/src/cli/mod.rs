@@ -1,6 +1,9 @@
 //! The command line: one file a command.
 
+mod atlas;
+mod dataset;
 mod generate;
+mod solve;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -21,13 +24,19 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Solve(solve::Args),
     Generate(generate::Args),
+    Dataset(dataset::Args),
+    Atlas(atlas::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
 #[must_use]
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Solve(args) => solve::run(&args),
+        Command::Dataset(args) => dataset::run(&args),
+        Command::Atlas(args) => atlas::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match result {
@@ -54,4 +63,16 @@ fn print<T: serde::Serialize>(
         println!("{}", human().trim_end());
     }
     Ok(())
+}
+
+/// A bar on standard error with rate and time left.
+fn progress(what: &'static str, length: usize) -> indicatif::ProgressBar {
+    let style = indicatif::ProgressStyle::with_template(
+        "{msg} [{bar:30}] {pos}/{len} {per_sec} {eta} left",
+    );
+    let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
+    match style {
+        Ok(style) => bar.with_style(style.progress_chars("=> ")),
+        Err(_) => bar,
+    }
 }

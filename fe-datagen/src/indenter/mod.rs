@@ -4,8 +4,10 @@
 //! normal, which is the direction in which the indenter pushes the skin.
 
 mod plate;
+mod sphere;
 
 pub use plate::RoundedPlate;
+pub use sphere::Sphere;
 
 /// Signed distance with its first two derivatives at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]

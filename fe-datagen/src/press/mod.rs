@@ -2,4 +2,5 @@
 
 pub mod record;
 
-pub mod fingertip;
+pub mod body;
+pub mod fields;

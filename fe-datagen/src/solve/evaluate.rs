@@ -8,7 +8,7 @@ use crate::linear::SymmetricMatrix;
 
 /// What an evaluation at one displacement found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Evaluation {
+pub(crate) struct Evaluation {
     /// Elastic energy, mJ.
     pub stored_mj: f64,
     /// Potential that equilibrium minimises, mJ.
@@ -30,7 +30,7 @@ pub(super) struct Evaluation {
 }
 
 /// State that an evaluation reads.
-pub(super) struct Trial<'a> {
+pub(crate) struct Trial<'a> {
     pub u: &'a [[f64; 3]],
     pub multipliers_mpa: &'a [f64],
     pub penalty: f64,
@@ -38,7 +38,7 @@ pub(super) struct Trial<'a> {
 }
 
 /// Evaluates the body; fills `tangent` if given.
-pub(super) fn evaluate_body(
+pub(crate) fn evaluate_body(
     problem: &Problem,
     loading: &Loading,
     trial: &Trial<'_>,
@@ -161,13 +161,11 @@ fn contact(
     square
 }
 
-/// Balances of an equilibrium: force by force and pressure by area.
+/// Forces on the body at an equilibrium.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Balance {
     /// Force of the indenter on the body, N.
     pub contact_force_n: [f64; 3],
     /// Force of the supports on the body, N.
     pub support_force_n: [f64; 3],
-    /// Integral of true pressure times inward normal over the deformed skin, N.
-    pub pressure_integral_n: [f64; 3],
 }

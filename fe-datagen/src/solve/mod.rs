@@ -1,6 +1,6 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
-mod evaluate;
+pub(crate) mod evaluate;
 mod newton;
 mod problem;
 mod stepping;

@@ -252,22 +252,16 @@ impl<'a> Solver<'a> {
         pressure
     }
 
-    /// Integral of a nodal pressure (MPa) over the deformed surface, N, along
-    /// the inward normal: Gauss quadrature of the interpolated field.
+    /// Integral of a nodal pressure (MPa) over the deformed surface, N: Gauss
+    /// quadrature of the interpolated field.
     #[must_use]
-    pub fn integrate_pressure_n(
-        &self,
-        surface: &crate::mesh::Surface,
-        pressure: &[f64],
-    ) -> [f64; 3] {
+    pub fn integrate_pressure_n(&self, surface: &crate::mesh::Surface, pressure: &[f64]) -> f64 {
         let x = self.deformed();
-        let mut total = [0.0; 3];
+        let mut total = 0.0;
         let rule = surface.kind.quadrature();
         surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
             let p: f64 = face.iter().zip(value).map(|(&n, v)| v * pressure[n as usize]).sum();
-            for i in 0..3 {
-                total[i] -= p * normal[i];
-            }
+            total += p * crate::mesh::surface::norm(normal);
         });
         total
     }

@@ -1,17 +1,19 @@
-//! The fingertip pressed by a rigid plate: set-up, pose, and vertex values.
+//! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
 use super::record::{Checks, IncrementRecord, Pose};
+use crate::atlas::{AtlasReport, BuildAtlasError, build_atlas};
 use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::{Placement, RoundedPlate};
 use crate::material::{ElasticConstants, Material, MaterialError};
-use crate::mesh::fingertip::{Density, Order, Patch, build};
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
 use crate::solve::{
     Effort, Loading, MovingIndenter, Options, Problem, ProblemError, SolveError, Solver, StepReport,
 };
+use papilla_proto::atlas::Atlas;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -34,7 +36,22 @@ impl Default for TissueConstants {
     }
 }
 
-/// A plate and how far it goes.
+impl TissueConstants {
+    /// Material of each tissue, by [`Tissue::index`]. Nail and bone are rigid:
+    /// no element is made of them, their entry repeats the subcutaneous one.
+    fn materials(&self) -> Result<[Material; Tissue::ALL.len()], PressError> {
+        let material = |tissue: Tissue, c| {
+            Material::neo_hookean(c)
+                .map_err(|source| PressError::Material { tissue: tissue.name(), source })
+        };
+        let fat = material(Tissue::Subcutaneous, self.subcutaneous)?;
+        let epidermis = material(Tissue::Epidermis, self.epidermis)?;
+        let dermis = material(Tissue::Dermis, self.dermis)?;
+        Ok([epidermis, dermis, fat, fat, fat])
+    }
+}
+
+/// The rigid plate that presses.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlateSpec {
@@ -50,7 +67,7 @@ impl Default for PlateSpec {
     }
 }
 
-/// Why a fingertip could not be set up or pressed.
+/// Why a body could not be set up or pressed.
 #[derive(Debug, thiserror::Error)]
 pub enum PressError {
     /// The shape contradicts itself.
@@ -86,58 +103,87 @@ pub enum PressError {
     Depths(f64, f64),
 }
 
-/// A fingertip ready to be pressed, shared by every press of a campaign.
-pub struct Fingertip {
-    /// The body: bone, nail plate and the base's axial displacement held.
+/// A body ready to be pressed, shared by every press of a campaign.
+pub struct Body {
+    /// Mesh, materials, supports and contact surface.
     pub problem: Problem,
-    /// Patch that the atlas shows.
+    /// Name of the surface that the indenter may touch.
+    pub contact: String,
+    /// The fingertip's atlas patch; other bodies have none.
+    pub patch: Option<PressedPatch>,
+}
+
+/// What is read off a fingertip at each equilibrium.
+pub struct PressedPatch {
+    /// Vertices and triangles.
     pub patch: Patch,
     dermis: SedRecovery,
     epidermis: SedRecovery,
 }
 
-impl Fingertip {
-    /// Meshes and sets up a fingertip.
+impl Body {
+    /// Meshes a fingertip with its bone, its nail plate and the axial
+    /// displacement of its base held.
     ///
     /// # Errors
     /// See [`PressError`].
-    pub fn new(
+    pub fn fingertip(
         shape: &FingertipShape,
         constants: &TissueConstants,
         density: Density,
         order: Order,
     ) -> Result<Self, PressError> {
-        let finger = build(shape, density, order)?;
-        let mut fixed = vec![false; 3 * finger.mesh.nodes.len()];
-        for &n in finger.mesh.node_sets["bone"].iter().chain(&finger.mesh.node_sets["nail"]) {
+        let FingertipMesh { mesh, patch } = build(shape, density, order)?;
+        let mut fixed = vec![false; 3 * mesh.nodes.len()];
+        for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
-        for &n in &finger.mesh.node_sets["base"] {
+        for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
         }
-        let material = |tissue: Tissue, c: ElasticConstants| {
-            Material::neo_hookean(c)
-                .map_err(|source| PressError::Material { tissue: tissue.name(), source })
-        };
-        let epidermis = material(Tissue::Epidermis, constants.epidermis)?;
-        let dermis = material(Tissue::Dermis, constants.dermis)?;
-        let fat = material(Tissue::Subcutaneous, constants.subcutaneous)?;
-        // Nail and bone are rigid: no element is made of them.
-        let materials = [epidermis, dermis, fat, fat, fat];
-        let interface = &finger.patch.interface;
-        let dermis_side = SedRecovery::new(&finger.mesh, "interface", Tissue::Dermis, interface)?;
-        let epidermis_side =
-            SedRecovery::new(&finger.mesh, "interface", Tissue::Epidermis, interface)?;
-        let problem = Problem::new(finger.mesh, materials, fixed, Some("skin"))?;
-        Ok(Self { problem, patch: finger.patch, dermis: dermis_side, epidermis: epidermis_side })
+        let side = |tissue| SedRecovery::new(&mesh, "interface", tissue, &patch.interface);
+        let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
+        let problem = Problem::new(mesh, constants.materials()?, fixed, Some("skin"))?;
+        let patch = Some(PressedPatch { patch, dermis, epidermis });
+        Ok(Self { problem, contact: "skin".into(), patch })
     }
 
-    /// Undeformed positions of the patch's skin and interface vertices, mm.
-    #[must_use]
-    pub fn patch_positions(&self) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
-        let at =
-            |nodes: &[u32]| nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect();
-        (at(&self.patch.skin), at(&self.patch.interface))
+    /// Any mesh, held on the surfaces or node sets `held` and touched on the
+    /// surface `contact`.
+    ///
+    /// # Errors
+    /// [`PressError::Problem`] names a surface that the mesh lacks.
+    pub fn from_mesh(
+        mesh: Mesh,
+        constants: &TissueConstants,
+        held: &[String],
+        contact: &str,
+    ) -> Result<Self, PressError> {
+        let mut fixed = vec![false; 3 * mesh.nodes.len()];
+        for name in held {
+            let nodes = mesh.node_sets.get(name).ok_or_else(|| ProblemError::Missing {
+                kind: "node set",
+                name: name.clone(),
+                known: mesh.node_sets.keys().cloned().collect::<Vec<_>>().join(", "),
+            })?;
+            for &n in nodes {
+                fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+            }
+        }
+        let problem = Problem::new(mesh, constants.materials()?, fixed, Some(contact))?;
+        Ok(Self { problem, contact: contact.into(), patch: None })
+    }
+
+    /// The atlas of the body's patch; `None` for a body without one.
+    ///
+    /// # Errors
+    /// [`BuildAtlasError`] if the patch cannot be flattened.
+    pub fn atlas(&self) -> Option<Result<(Atlas, AtlasReport), BuildAtlasError>> {
+        let patch = &self.patch.as_ref()?.patch;
+        let at = |nodes: &[u32]| -> Vec<[f64; 3]> {
+            nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect()
+        };
+        Some(build_atlas(&at(&patch.skin), &at(&patch.interface), &patch.triangles))
     }
 
     /// The plate at first touch in `pose`, set to go `depth_mm` along its normal.
@@ -148,7 +194,7 @@ impl Fingertip {
         let rotation = rotation(pose);
         let normal = [rotation[0][2], rotation[1][2], rotation[2][2]];
         let along = |p: &[f64; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
-        let first = first_touch(&self.problem.mesh, along);
+        let first = first_touch(&self.problem.mesh, &self.contact, along);
         let half = [0.5 * plate.size_mm[0], 0.5 * plate.size_mm[1], 2.0 + plate.edge_radius_mm];
         MovingIndenter {
             shape: Arc::new(RoundedPlate { half_mm: half, edge_radius_mm: plate.edge_radius_mm }),
@@ -161,7 +207,9 @@ impl Fingertip {
     }
 
     /// Presses to each depth in turn and calls `visit` with the solver at each
-    /// equilibrium and its record.
+    /// equilibrium and its record. There are more equilibria than depths, for
+    /// the work integral; `refinement` 2 halves their distance, and so on. The
+    /// stored states do not depend on it.
     ///
     /// # Errors
     /// [`PressError::Solve`] names the depth that found no equilibrium; records
@@ -172,6 +220,7 @@ impl Fingertip {
         pose: Pose,
         plate: PlateSpec,
         depths_mm: &[f64],
+        refinement: u32,
         visit: &mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport),
     ) -> Result<(), PressError> {
         let mut last = 0.0;
@@ -183,21 +232,12 @@ impl Fingertip {
         }
         let indenter = self.plate(pose, plate, last);
         solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
-        // Small steps first: the work integral starts where force does, and
-        // force turns fast there.
-        let first = depths_mm.first().copied().unwrap_or(0.0);
-        let lead = [0.1, 0.25, 0.5, 0.75].map(|part| part * first / last);
         for (i, &depth_mm) in depths_mm.iter().enumerate() {
             let clock = Instant::now();
             let at = |source| PressError::Solve { depth_mm, source };
             let mut effort = Effort::default();
-            let between = match i {
-                0 => lead.to_vec(),
-                1 => vec![0.5 * (first + depth_mm) / last],
-                _ => Vec::new(),
-            };
-            for fraction in between {
-                effort = effort.plus(&solver.advance_to(fraction).map_err(at)?.effort);
+            for between in path_mm(depths_mm, i, refinement) {
+                effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
             }
             let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
             report.effort = report.effort.plus(&effort);
@@ -208,6 +248,26 @@ impl Fingertip {
         Ok(())
     }
 
+    /// Integral of the true pressure over the deformed skin, N (a scalar: on a
+    /// plate all of it acts along one normal). Taken as a reader of the maps
+    /// would: linear on the triangles of the atlas patch, so that contact outside
+    /// the patch shows; on the contact surface where there is no patch.
+    fn pressure_integral_n(&self, solver: &Solver<'_>, pressure_mpa: &[f64]) -> f64 {
+        let Some(PressedPatch { patch, .. }) = &self.patch else {
+            let surface = &self.problem.mesh.surfaces[&self.contact];
+            return solver.integrate_pressure_n(surface, pressure_mpa);
+        };
+        let x = solver.deformed();
+        let mut total = 0.0;
+        for t in &patch.triangles {
+            let n = t.map(|v| patch.skin[v as usize] as usize);
+            let edge = |k: usize| -> [f64; 3] { std::array::from_fn(|i| x[n[k]][i] - x[n[0]][i]) };
+            let area = 0.5 * norm(cross(edge(1), edge(2)));
+            total += area * n.iter().map(|&k| pressure_mpa[k]).sum::<f64>() / 3.0;
+        }
+        total
+    }
+
     /// Vertex values and checks of the solver's equilibrium.
     fn record(
         &self,
@@ -216,9 +276,9 @@ impl Fingertip {
         report: &StepReport,
     ) -> Result<IncrementRecord, PressError> {
         let Problem { mesh, geometry, materials, .. } = &self.problem;
-        let skin = &mesh.surfaces["skin"];
+        let skin = &mesh.surfaces[&self.contact];
         let pressure = solver.pressure_mpa(skin);
-        let integral = solver.integrate_pressure_n(skin, &pressure);
+        let integral = self.pressure_integral_n(solver, &pressure);
         let balance = solver.balance();
         let force = balance.contact_force_n;
         let size = norm(force).max(f64::MIN_POSITIVE);
@@ -226,15 +286,21 @@ impl Fingertip {
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
         let u = solver.displacement_mm();
+        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa) = Default::default();
+        if let Some(p) = &self.patch {
+            pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            sed_dermis_mpa = p.dermis.sed_mpa(mesh, geometry, materials, u)?;
+            sed_epidermis_mpa = p.epidermis.sed_mpa(mesh, geometry, materials, u)?;
+        }
         Ok(IncrementRecord {
             depth_mm,
             force_n: force,
-            pressure_mpa: self.patch.skin.iter().map(|&n| pressure[n as usize]).collect(),
-            sed_dermis_mpa: self.dermis.sed_mpa(mesh, geometry, materials, u)?,
-            sed_epidermis_mpa: self.epidermis.sed_mpa(mesh, geometry, materials, u)?,
+            pressure_mpa,
+            sed_dermis_mpa,
+            sed_epidermis_mpa,
             checks: Checks {
                 residual_relative: report.residual_relative,
-                contact_force_vs_pressure_integral: difference(integral, force),
+                contact_force_vs_pressure_integral: (integral - norm(force)).abs() / size,
                 plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
                 energy_vs_work: (report.stored_mj - work).abs() / work.abs().max(f64::MIN_POSITIVE),
                 j_min: report.j_min,
@@ -249,7 +315,7 @@ impl Fingertip {
         })
     }
 
-    /// A solver for this fingertip.
+    /// A solver for this body.
     ///
     /// # Errors
     /// [`PressError::Solve`] if the factor does not fit in memory.
@@ -257,6 +323,28 @@ impl Fingertip {
         Solver::new(&self.problem, options)
             .map_err(|source| PressError::Solve { depth_mm: 0.0, source })
     }
+}
+
+/// Depths between stored depth `i` and the one before it at which to find
+/// equilibrium too, mm. Force turns fast after first touch, and with it the
+/// work integral.
+fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
+    let to = depths_mm[i];
+    let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
+    let coarse: &[f64] = match i {
+        0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
+        1 => &[0.0, 0.5, 1.0],
+        _ => &[0.0, 1.0],
+    };
+    let at = |part: f64| from + part * (to - from);
+    let mut path = Vec::new();
+    for pair in coarse.windows(2) {
+        for k in 1..=refinement {
+            path.push(at(pair[0] + (pair[1] - pair[0]) * f64::from(k) / f64::from(refinement)));
+        }
+    }
+    path.pop();
+    path
 }
 
 /// Rotation of a plate: at rest its pressing face looks along +z into the pad;
@@ -273,6 +361,13 @@ pub fn rotation(pose: Pose) -> [[f64; 3]; 3] {
     product(&roll, &product(&pitch, &yaw))
 }
 
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
+}
+
 fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
@@ -280,8 +375,8 @@ fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
 /// Skin point with the smallest `along`; where several tie (a flat plate on a
 /// symmetric finger), their mean, so that a mirrored pose touches at the mirror
 /// image.
-fn first_touch(mesh: &Mesh, along: impl Fn(&[f64; 3]) -> f64) -> [f64; 3] {
-    let nodes = mesh.surfaces["skin"].nodes();
+fn first_touch(mesh: &Mesh, contact: &str, along: impl Fn(&[f64; 3]) -> f64) -> [f64; 3] {
+    let nodes = mesh.surfaces[contact].nodes();
     let points: Vec<_> = nodes.iter().map(|&n| mesh.nodes[n as usize]).collect();
     let least = points.iter().map(&along).fold(f64::INFINITY, f64::min);
     let scale = points.iter().map(|p| norm(*p)).fold(0.0, f64::max);

@@ -1,0 +1,77 @@
+//! `dataset`: look at, check and draw a dataset.
+
+use super::print;
+use crate::dataset::{self, ImageOptions};
+use crate::output::map_image::Bits;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Look at, check and draw a dataset.
+#[derive(clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Ranges, checks and forces by depth; a contact sheet of samples.
+    Stats {
+        /// The dataset's folder.
+        folder: PathBuf,
+        /// Write a contact sheet PNG here.
+        #[arg(long)]
+        sheet: Option<PathBuf>,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// 224 x 224 gray PNG pairs, normalised by the dataset's maximum.
+    Images {
+        /// The dataset's folder.
+        folder: PathBuf,
+        /// Folder for the images.
+        #[arg(long)]
+        out: PathBuf,
+        /// 8 bits a pixel, as S1 used, instead of 16.
+        #[arg(long)]
+        eight_bit: bool,
+        /// Print the index as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Check every hash, shape and value of a dataset.
+    Verify {
+        /// The dataset's folder.
+        folder: PathBuf,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    match &args.command {
+        Command::Stats { folder, sheet, json } => {
+            let report = dataset::stats(folder, sheet.as_deref())?;
+            print(&report, *json, || report.to_string())?;
+        }
+        Command::Images { folder, out, eight_bit, json } => {
+            let bits = if *eight_bit { Bits::Eight } else { Bits::Sixteen };
+            let report = dataset::images(folder, out, &ImageOptions { bits })?;
+            print(&report, *json, || {
+                format!("{} pairs written to {}", report.samples.len(), report.folder.display())
+            })?;
+        }
+        Command::Verify { folder, json } => {
+            let report = dataset::verify(folder)?;
+            print(&report, *json, || {
+                format!(
+                    "{} shards, {} samples: all hashes and values are good (sha256 {})",
+                    report.shards, report.samples, report.dataset_sha256
+                )
+            })?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,242 @@
+//! `solve`: one scene, with everything that can be looked at.
+
+use super::{CHECKS_FAILED, print};
+use crate::dataset::fault;
+use crate::element::ElementKind;
+use crate::mesh::block::{BlockLattice, build as build_block, even};
+use crate::mesh::fingertip::Order;
+use crate::output::map_image::{MapView, Quantity, white_of};
+use crate::output::npz::NpzBuilder;
+use crate::output::{atomic, vtu};
+use crate::press::body::Body;
+use crate::press::fields::{PA_PER_MPA, write_vtu};
+use crate::press::record::{Checks, IncrementRecord};
+use crate::scene::{Geometry, Layer, Scene};
+use crate::solve::{Effort, Options, Solver, StepReport};
+use anyhow::Context as _;
+use ndarray::Array2;
+use papilla_proto::atlas::{Atlas, Patch, Raster};
+use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Solve one scene and write everything that can be looked at.
+///
+/// Writes summary.json, a .vtu series for ParaView (series.pvd) and, for a
+/// fingertip, pressure.png and sed.png (16-bit gray, with -color twins) of the
+/// deepest state and maps.npz of all stored states.
+#[derive(clap::Args)]
+#[command(after_help = "Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press")]
+pub(super) struct Args {
+    /// Scene file (see scenes/ and docs/scenes.md).
+    scene: PathBuf,
+    /// Folder for the results.
+    #[arg(long)]
+    out: PathBuf,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// One stored equilibrium in `summary.json`.
+#[derive(Serialize)]
+struct Increment {
+    depth_mm: f64,
+    force_n: [f64; 3],
+    pressure_pa_max: f64,
+    sed_dermis_j_per_m3_max: f64,
+    sed_epidermis_j_per_m3_max: f64,
+    stored_energy_mj: f64,
+    checks: Checks,
+    effort: Effort,
+    seconds: f64,
+    /// Why this state would not enter a dataset; absent if it would.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault: Option<String>,
+}
+
+/// What `solve` says of a scene.
+#[derive(Serialize)]
+struct Summary {
+    scene: Scene,
+    unknowns: usize,
+    elements: usize,
+    factor_entries: usize,
+    atlas_hash: Option<String>,
+    setup_s: f64,
+    solve_s: f64,
+    effort: Effort,
+    increments: Vec<Increment>,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let scene = Scene::read(&args.scene)?;
+    let clock = Instant::now();
+    let body = body(&scene)?;
+    let atlas = body.atlas().transpose()?.map(|(atlas, _)| atlas);
+    let mut solver = body.solver(Options::default())?;
+    let setup_s = clock.elapsed().as_secs_f64();
+    atomic::create_folder(&args.out)?;
+    let clock = Instant::now();
+    let depths = scene.depths_mm();
+    let bar = super::progress("pressing", depths.len());
+    let (mut records, mut reports, mut series) = (Vec::new(), Vec::new(), Vec::new());
+    let mut written = Ok(());
+    let visit = &mut |s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
+        let name = format!("state-{:03}.vtu", records.len());
+        if written.is_ok() {
+            written = write_vtu(&args.out.join(&name), &body, s);
+        }
+        series.push((record.depth_mm, name));
+        records.push(record.clone());
+        reports.push(*report);
+        bar.inc(1);
+    };
+    let solved = body.press(&mut solver, scene.pose(), scene.plate, &depths, 1, visit);
+    bar.finish_and_clear();
+    written?;
+    vtu::write_pvd(&args.out.join("series.pvd"), &series)?;
+    if let Some(atlas) = &atlas {
+        write_maps(&args.out, atlas, &records)?;
+    }
+    let summary = Summary {
+        unknowns: body.problem.structure.equations.count,
+        elements: body.problem.mesh.element_count(),
+        factor_entries: body.problem.structure.factor_entries(),
+        atlas_hash: atlas.as_ref().map(|a| a.hash().to_owned()),
+        setup_s,
+        solve_s: clock.elapsed().as_secs_f64(),
+        effort: reports.iter().fold(Effort::default(), |sum, r| sum.plus(&r.effort)),
+        increments: records.iter().zip(&reports).map(|(r, s)| increment(r, s)).collect(),
+        scene,
+    };
+    atomic::write_json(&args.out.join("summary.json"), &summary)?;
+    solved?;
+    print(&summary, args.json, || human(&summary, &args.out))?;
+    let clean = summary.increments.iter().all(|i| i.fault.is_none());
+    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}
+
+fn body(scene: &Scene) -> anyhow::Result<Body> {
+    let constants = scene.constants();
+    Ok(match &scene.geometry {
+        Geometry::Fingertip { density, order, shape } => {
+            Body::fingertip(shape, &constants, *density, *order)?
+        }
+        Geometry::Block { size_mm, elements, layers, order } => {
+            let lattice = block_lattice(*size_mm, *elements, layers, *order);
+            let mesh = build_block(&lattice, |p| p);
+            Body::from_mesh(mesh, &constants, &["z_max".into()], "z_min")?
+        }
+    })
+}
+
+fn block_lattice(
+    size: [f64; 2],
+    elements: [usize; 2],
+    layers: &[Layer],
+    order: Order,
+) -> BlockLattice {
+    let (step, kind) = match order {
+        Order::Linear => (1, ElementKind::Hex8),
+        Order::Quadratic => (2, ElementKind::Hex27),
+    };
+    let mut z = vec![0.0];
+    let mut tissue = Vec::new();
+    for layer in layers {
+        let bottom = z.last().copied().unwrap_or(0.0);
+        let inside = even(layer.thickness_mm, layer.elements * step);
+        z.extend(inside[1..].iter().map(|t| bottom + t));
+        tissue.extend(std::iter::repeat_n(layer.tissue, layer.elements));
+    }
+    let [x, y] = std::array::from_fn(|i| even(size[i], elements[i] * step));
+    BlockLattice { axes: [x, y, z], layers: tissue, kind }
+}
+
+fn increment(record: &IncrementRecord, report: &StepReport) -> Increment {
+    let max = |v: &[f64]| PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
+    Increment {
+        depth_mm: record.depth_mm,
+        force_n: record.force_n,
+        pressure_pa_max: max(&record.pressure_mpa),
+        sed_dermis_j_per_m3_max: max(&record.sed_dermis_mpa),
+        sed_epidermis_j_per_m3_max: max(&record.sed_epidermis_mpa),
+        stored_energy_mj: report.stored_mj,
+        checks: record.checks,
+        effort: report.effort,
+        seconds: record.seconds,
+        fault: fault(record, record.pressure_mpa.len()),
+    }
+}
+
+/// Images of the deepest state and arrays of all.
+fn write_maps(folder: &Path, atlas: &Atlas, records: &[IncrementRecord]) -> anyhow::Result<()> {
+    let Some(deepest) = records.last() else { return Ok(()) };
+    let scaled = |v: &[f64]| -> Vec<f32> { v.iter().map(|x| (x * PA_PER_MPA) as f32).collect() };
+    let fields = [
+        (Quantity::Pressure, Patch::Skin, "pressure", &deepest.pressure_mpa),
+        (Quantity::Sed, Patch::Interface, "sed", &deepest.sed_dermis_mpa),
+    ];
+    let mut npz = NpzBuilder::new();
+    for (quantity, patch, stem, values) in fields {
+        let raster = Raster::new(atlas, patch);
+        let mut pixels = vec![0.0; MAP_LEN];
+        raster.rasterise(&scaled(values), &mut pixels)?;
+        let view = MapView {
+            quantity,
+            pixels: &pixels,
+            mask: raster.mask(),
+            mm_per_px: f64::from(atlas.mm_per_px()),
+            white: white_of(&pixels),
+        };
+        view.write(folder, stem)?;
+        npz.add_slice(&format!("{stem}_map"), &[MAP_SIDE_PX, MAP_SIDE_PX], &pixels)?;
+    }
+    let columns = deepest.pressure_mpa.len();
+    let all = |get: fn(&IncrementRecord) -> &Vec<f64>| {
+        let flat: Vec<f32> = records.iter().flat_map(|r| scaled(get(r))).collect();
+        Array2::from_shape_vec((records.len(), columns), flat).context("one value a vertex")
+    };
+    npz.add("pressure_pa", &all(|r| &r.pressure_mpa)?)?;
+    npz.add("sed_dermis_j_per_m3", &all(|r| &r.sed_dermis_mpa)?)?;
+    npz.add("sed_epidermis_j_per_m3", &all(|r| &r.sed_epidermis_mpa)?)?;
+    let depths: Vec<f32> = records.iter().map(|r| r.depth_mm as f32).collect();
+    npz.add_slice("depth_mm", &[depths.len()], &depths)?;
+    npz.write(&folder.join("maps.npz"))?;
+    atomic::write(&folder.join("atlas.json"), atlas.to_json()?.as_bytes())?;
+    Ok(())
+}
+
+fn human(s: &Summary, out: &Path) -> String {
+    let mut text = format!(
+        "{} unknowns, {} elements, {} factor entries; set-up {:.1} s, solve {:.1} s \
+         (assembly {:.1}, factorization {:.1}, linear solves {:.1})\n",
+        s.unknowns,
+        s.elements,
+        s.factor_entries,
+        s.setup_s,
+        s.solve_s,
+        s.effort.assemble_s,
+        s.effort.factor_s,
+        s.effort.solve_s,
+    );
+    text +=
+        "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   int p dA   energy\n";
+    for i in &s.increments {
+        let force = crate::mesh::surface::norm(i.force_n);
+        text += &format!(
+            "{:8.3} {:9.4} {:14.3} {:17.2} {:12} {:9.2} % {:6.2} %{}\n",
+            i.depth_mm,
+            force,
+            i.pressure_pa_max / 1e3,
+            i.sed_dermis_j_per_m3_max,
+            i.checks.newton_iterations,
+            100.0 * i.checks.contact_force_vs_pressure_integral,
+            100.0 * i.checks.energy_vs_work,
+            i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
+        );
+    }
+    text + &format!("written to {}", out.display())
+}

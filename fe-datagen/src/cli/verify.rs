@@ -1,0 +1,61 @@
+//! `verify`: the solver against closed forms, published values and itself.
+
+use super::{CHECKS_FAILED, print};
+use crate::verify::{self, CASES, Row};
+use anyhow::{Context, bail};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Check the solver: patch test, closed forms, benchmarks, balances, symmetry.
+///
+/// Prints one line a quantity: this code, the reference, where that comes
+/// from, how far apart they are and how far they may be.
+#[derive(clap::Args)]
+#[command(after_help = "Exit code 3 if any row is past its tolerance. docs/verification.md says what each row \
+                        shows.\nExample: fe-datagen verify --only hertz --only cook")]
+pub(super) struct Args {
+    /// Run only this case; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    only: Vec<String>,
+    /// Smaller meshes and presses, for a test run.
+    #[arg(long)]
+    quick: bool,
+    /// Also write the table as Markdown to this file.
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Print the rows as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    if let Some(unknown) = args.only.iter().find(|n| CASES.iter().all(|c| c.name != **n)) {
+        let known: Vec<_> = CASES.iter().map(|c| c.name).collect();
+        bail!("no case named '{unknown}'; there are: {}", known.join(", "));
+    }
+    let wanted = |c: &verify::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
+    let bar = indicatif::ProgressBar::new(CASES.iter().filter(|c| wanted(c)).count() as u64);
+    bar.set_style(indicatif::ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {elapsed}")?);
+    bar.enable_steady_tick(std::time::Duration::from_millis(250));
+    if !args.json {
+        println!("{}", Row::heading());
+    }
+    let report = verify::run(args.quick, &wanted, &mut |case, rows| match rows {
+        None => bar.set_message(case.name),
+        Some(rows) => {
+            bar.suspend(|| {
+                for row in rows.iter().filter(|_| !args.json) {
+                    println!("{}", row.line());
+                }
+            });
+            bar.inc(1);
+        }
+    });
+    bar.finish_and_clear();
+    if let Some(path) = &args.markdown {
+        std::fs::write(path, report.markdown())
+            .with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    print(&report, args.json, || report.summary())?;
+    Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}

@@ -1,0 +1,132 @@
+//! Checks of the whole solver against closed forms, published values and itself.
+//!
+//! One file a case; [`CASES`] is the registry. Every case solves real problems
+//! through the same [`crate::solve::Solver`] that presses fingers.
+
+mod bodies;
+mod check;
+mod cook;
+mod disc;
+mod finger;
+mod hertz;
+mod locking;
+mod manufactured;
+mod mirror;
+mod patch;
+mod report;
+mod tangent;
+mod uniaxial;
+
+pub use check::Check;
+pub use report::{Report, Row};
+
+use std::cell::OnceCell;
+use std::time::Instant;
+
+/// Any error that a case may end with; it fails the case.
+pub(crate) type CaseError = Box<dyn std::error::Error + Send + Sync>;
+
+/// How much to run, and what several cases share.
+pub(crate) struct Context {
+    /// Smaller meshes, fewer presses.
+    quick: bool,
+    /// One flat press, solved when first asked for.
+    flat: OnceCell<finger::FlatPress>,
+}
+
+/// One verification case: a problem and the rows that it yields.
+pub struct Case {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What its rows show, one sentence.
+    pub shows: &'static str,
+    run: fn(&Context) -> Result<Vec<Check>, CaseError>,
+}
+
+/// Every case, cheap and elementary ones first.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "patch",
+        shows: "Any element reproduces constant strain exactly on a distorted mesh, at small and \
+                at finite deformation.",
+        run: patch::run,
+    },
+    Case {
+        name: "uniaxial",
+        shows: "The material law and its stress: one element stretched and squeezed with free \
+                sides against the closed form.",
+        run: uniaxial::run,
+    },
+    Case {
+        name: "tangent",
+        shows: "The assembled tangent is the derivative of the assembled residual, contact with a \
+                curved indenter included, so Newton's method converges as it should.",
+        run: tangent::run,
+    },
+    Case {
+        name: "convergence",
+        shows: "Errors fall with mesh size at the order theory gives each element, on a curved \
+                finite-strain solution manufactured with its body force.",
+        run: manufactured::run,
+    },
+    Case {
+        name: "cook",
+        shows: "Cook's membrane: bending and shear of a skewed mesh at large deflection, \
+                compressible and nearly incompressible.",
+        run: cook::run,
+    },
+    Case {
+        name: "disc",
+        shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
+        run: disc::run,
+    },
+    Case {
+        name: "hertz",
+        shows: "Contact: a rigid sphere on a half-space at small load, force and contact radius.",
+        run: hertz::run,
+    },
+    Case {
+        name: "locking",
+        shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
+                against quadratic elements.",
+        run: locking::run,
+    },
+    Case {
+        name: "balances",
+        shows: "A fingertip press balances at every equilibrium: pressure integral, plate, \
+                supports, energy and work.",
+        run: finger::balances,
+    },
+    Case {
+        name: "finger",
+        shows: "The fingertip behaves as published fingertips do.",
+        run: finger::sanity,
+    },
+    Case {
+        name: "mirror",
+        shows: "A press rolled to the left is the mirror image of one rolled to the right.",
+        run: mirror::run,
+    },
+];
+
+/// Runs the cases that `wanted` accepts; `visit` is told of each before
+/// (`None`) and after (`Some(rows)`).
+pub fn run(
+    quick: bool,
+    wanted: &dyn Fn(&Case) -> bool,
+    visit: &mut dyn FnMut(&Case, Option<&[Row]>),
+) -> Report {
+    let context = Context { quick, flat: OnceCell::new() };
+    let mut report = Report { quick, ..Report::default() };
+    for case in CASES.iter().filter(|c| wanted(c)) {
+        visit(case, None);
+        let clock = Instant::now();
+        let checks = (case.run)(&context).unwrap_or_else(|e| vec![Check::failed(e.as_ref())]);
+        let seconds = clock.elapsed().as_secs_f64();
+        let rows: Vec<_> =
+            checks.into_iter().map(|check| Row { case: case.name, check, seconds }).collect();
+        visit(case, Some(&rows));
+        report.rows.extend(rows);
+    }
+    report
+}

@@ -1,0 +1,125 @@
+//! The table of all rows.
+
+use super::{CASES, Check};
+use serde::Serialize;
+use std::fmt::Write;
+
+/// A check with the case it belongs to.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Name of the case.
+    pub case: &'static str,
+    /// What was compared.
+    #[serde(flatten)]
+    pub check: Check,
+    /// Wall time of the whole case, s.
+    pub seconds: f64,
+}
+
+/// Every row of one run.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Whether the smaller problems were run.
+    pub quick: bool,
+    /// Rows in the order of the cases.
+    pub rows: Vec<Row>,
+}
+
+impl Row {
+    /// The row as a line of a terminal's table.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let c = &self.check;
+        let verdict = if c.pass { "ok" } else { "FAIL" };
+        format!(
+            "{verdict:<4} {:<12} {:<58} {:>12} {:>12} {:>9.2e} {:>9.1e}  {}",
+            self.case,
+            c.quantity,
+            number(c.value),
+            number(c.reference),
+            c.difference,
+            c.tolerance,
+            c.source
+        )
+    }
+
+    /// Heading of the lines.
+    #[must_use]
+    pub fn heading() -> String {
+        format!(
+            "{:<4} {:<12} {:<58} {:>12} {:>12} {:>9} {:>9}  {}",
+            "", "case", "quantity", "this code", "reference", "differs", "allowed", "source"
+        )
+    }
+}
+
+impl Report {
+    /// Whether there is at least one row and every one passed.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !self.rows.is_empty() && self.rows.iter().all(|r| r.check.pass)
+    }
+
+    /// Seconds of all cases together.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        let mut total = 0.0;
+        let mut last = "";
+        for row in &self.rows {
+            if row.case != last {
+                total += row.seconds;
+                last = row.case;
+            }
+        }
+        total
+    }
+
+    /// One line that sums the table up.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let failed = self.rows.iter().filter(|r| !r.check.pass).count();
+        let seconds = self.seconds();
+        format!("{} rows, {failed} past tolerance, {seconds:.0} s", self.rows.len())
+    }
+
+    /// The table for docs/verification.md, a section a case.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut out = String::new();
+        for case in CASES {
+            let rows: Vec<_> = self.rows.iter().filter(|r| r.case == case.name).collect();
+            let Some(first) = rows.first() else { continue };
+            let _ = writeln!(out, "## `{}`\n\n{} ({:.1} s)\n", case.name, case.shows, first.seconds);
+            out.push_str("| quantity | this code | reference | source | difference | tolerance | |\n");
+            out.push_str("|---|---|---|---|---|---|---|\n");
+            for Row { check: c, .. } in rows {
+                let _ = writeln!(
+                    out,
+                    "| {} | {} | {} | {} | {:.1e} | {:.1e} | {} |",
+                    c.quantity.replace('|', "\\|"),
+                    number(c.value),
+                    number(c.reference),
+                    c.source,
+                    c.difference,
+                    c.tolerance,
+                    if c.pass { "ok" } else { "**fails**" }
+                );
+            }
+            out.push('\n');
+        }
+        let _ = writeln!(out, "{}.", self.summary());
+        out
+    }
+}
+
+/// Six digits, without an exponent where none is needed.
+fn number(v: f64) -> String {
+    if v == 0.0 {
+        "0".into()
+    } else if v.abs() < 1e-3 || v.abs() >= 1e6 {
+        format!("{v:.2e}")
+    } else {
+        let digits = (5 - v.abs().log10().floor() as i32).clamp(0, 7) as usize;
+        format!("{v:.digits$}")
+    }
+}

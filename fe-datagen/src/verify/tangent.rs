@@ -1,0 +1,94 @@
+//! The assembled tangent against central differences of the assembled residual.
+
+use super::bodies::{cube, largest, noise, uniform};
+use super::{CaseError, Check, Context};
+use crate::element::ElementKind;
+use crate::indenter::{Placement, Sphere};
+use crate::linear::Equations;
+use crate::solve::evaluate::{Evaluation, Trial, evaluate_body};
+use crate::solve::{Loading, MovingIndenter, Problem, StepError};
+use std::sync::Arc;
+
+const SOURCE: &str = "central difference of the residual, step 1e-6 mm";
+const STEP_MM: f64 = 1e-6;
+
+pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
+    let kinds = [
+        (ElementKind::Hex8, "Hex8", 2),
+        (ElementKind::Hex27, "Hex27", 1),
+        (ElementKind::Tet10, "Tet10", 1),
+        (ElementKind::Tet4, "Tet4", 2),
+    ];
+    let mut rows = Vec::new();
+    for (kind, name, cells) in kinds {
+        let (error, touching) = error(kind, cells)?;
+        let quantity = format!("{name}, {touching} nodes in contact: largest relative error");
+        // Without contact the row would not show what it says.
+        let error = if touching == 0 { f64::NAN } else { error };
+        rows.push(Check::vanishes(quantity, error, 1e-7, SOURCE));
+    }
+    Ok(rows)
+}
+
+/// A sphere that dents the top of the cube near its middle.
+fn loading() -> Loading {
+    let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let start = Placement { rotation, origin_mm: [0.55, 0.45, 2.4] };
+    let shape = Arc::new(Sphere { radius_mm: 1.6 });
+    let indenter = MovingIndenter { shape, start, travel_mm: [0.0, 0.0, -0.1] };
+    Loading { indenter: Some(indenter), ..Loading::default() }
+}
+
+/// Largest error over the largest entry, and the number of nodes in contact.
+fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
+    let mesh = cube(kind, cells, |p| p);
+    let mut fixed = vec![false; 3 * mesh.nodes.len()];
+    for &n in &mesh.node_sets["z_min"] {
+        fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+    }
+    let problem = Problem::new(mesh, uniform(1.0, 0.4)?, fixed, Some("z_max"))?;
+    let contact = problem.contact.as_ref().map_or(0, |c| c.nodes.len());
+    let multipliers: Vec<f64> = (0..contact as u64).map(|i| 0.05 + 0.02 * noise(900 + i)).collect();
+    let size = 0.06 / cells as f64;
+    let mut u: Vec<[f64; 3]> = (0..problem.mesh.nodes.len() as u64)
+        .map(|n| std::array::from_fn(|i| size * noise(3 * n + i as u64)))
+        .collect();
+    let loading = loading();
+    let structure = &problem.structure;
+    let equations = &structure.equations;
+    let mut tangent = structure.zeros();
+    let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
+        let trial =
+            Trial { u, multipliers_mpa: &multipliers, penalty: 3.0, load_fraction: 1.0 };
+        let mut out = Evaluation::default();
+        evaluate_body(&problem, &loading, &trial, with_tangent.then_some(&mut tangent), &mut out)?;
+        Ok(out)
+    };
+    let touching = at(&u, true)?.traction_mpa.iter().filter(|t| **t > 0.0).count();
+    let dofs: Vec<usize> =
+        (0..3 * u.len()).filter(|&d| equations.of_dof[d] != Equations::FIXED).collect();
+    let mut difference = Vec::new();
+    for &dof in &dofs {
+        let (node, i) = (dof / 3, dof % 3);
+        let middle = u[node][i];
+        u[node][i] = middle + STEP_MM;
+        let plus = at(&u, false)?.residual_n;
+        u[node][i] = middle - STEP_MM;
+        let minus = at(&u, false)?.residual_n;
+        u[node][i] = middle;
+        difference.push(dofs.iter().map(|&d| (plus[d] - minus[d]) / (2.0 * STEP_MM)).collect::<Vec<_>>());
+    }
+    let (mut unit, mut column) = (vec![0.0; equations.count], vec![0.0; equations.count]);
+    let (mut worst, mut scale) = (0.0f64, 0.0f64);
+    for (&dof, expected) in dofs.iter().zip(&difference) {
+        let e = equations.of_dof[dof] as usize;
+        unit[e] = 1.0;
+        structure.multiply(&tangent, &unit, &mut column);
+        unit[e] = 0.0;
+        for (&d, expected) in dofs.iter().zip(expected) {
+            worst = worst.max((column[equations.of_dof[d] as usize] - expected).abs());
+        }
+        scale = scale.max(largest(&column));
+    }
+    Ok((worst / scale, touching))
+}
