@@ -19,6 +19,14 @@ const percent = (value) => {
 };
 const signed = (value) => (value > 0 ? `+${percent(value)}` : percent(value).replace('-', '−'));
 
+/** Scrolls the list, and only the list, to the row. */
+function showRow(row) {
+  const list = row.closest('.press-errors');
+  const top = row.offsetTop - list.offsetTop;
+  if (top < list.scrollTop) list.scrollTop = top;
+  else if (top + row.offsetHeight > list.scrollTop + list.clientHeight) list.scrollTop = top + row.offsetHeight - list.clientHeight;
+}
+
 export class Meters {
   constructor() {
     this.stats = new Stats();
@@ -133,6 +141,7 @@ export class Meters {
     this.pressRows.forEach(({ row, bar, value }, n) => {
       const error = this.pressErrors[n];
       row.setAttribute('aria-current', String(n === this.current));
+      if (n === this.current) showRow(row);
       bar.style.width = error > 0 ? `${(100 * error) / largest}%` : '0';
       value.textContent = percent(error);
     });

@@ -10,6 +10,8 @@ import { MAP_LEN, Session } from './protocol.mjs';
 import { Replay, fetchJson } from './replay.mjs';
 
 const byId = (id) => document.getElementById(id);
+/** A complaint stays at least this long, then until frames are answered again. */
+const NOTICE_MS = 6000;
 const SED_UNIT = 'J/m³';
 
 class Page {
@@ -98,11 +100,14 @@ class Page {
       this.unsent = true;
       return;
     }
+    if (nowMs - noticedAtMs > NOTICE_MS) notify('');
     this.answered.sequence = answer.sequence;
     this.answered.pressurePa.set(this.sent.pressurePa);
-    this.answered.sedJPerM3.set(answer.sedJPerM3);
-    this.#showSed(nowMs);
-    if (this.sent.mode === 'replay' && this.mode === 'replay') this.#showErrors(nowMs);
+    if (!equal(this.answered.sedJPerM3, answer.sedJPerM3)) {
+      this.answered.sedJPerM3.set(answer.sedJPerM3);
+      this.#showSed(nowMs);
+    }
+    if (this.sent.mode === 'replay' && this.mode === 'replay' && !this.replay.judged) this.#showErrors(nowMs);
   }
 
   #showSed(nowMs) {
@@ -133,7 +138,10 @@ class Page {
     } else {
       this.views.pressure.settle(nowMs);
     }
-    if (this.views.sed.settle(nowMs)) this.#paintFinger();
+    if (this.views.sed.settle(nowMs)) {
+      this.#paintFinger();
+      this.views.truth.show(this.replay.truth, nowMs, this.views.sed.range);
+    }
     const ready = this.mode === 'press' || this.replay.loaded;
     if (ready && (this.unsent || this.stream.checked)) this.#send(nowMs, map);
     this.finger?.draw();
@@ -190,6 +198,7 @@ class Page {
     document.body.dataset.mode = mode;
     this.control.changed = true;
     this.replay.changed = true;
+    this.replay.judged = false;
     if (mode === 'replay') {
       this.views.pressure.setMarker(null);
       this.finger?.setPress(null);
@@ -203,7 +212,7 @@ class Page {
       const { presses } = this.replay;
       byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(pressName(press), String(n))));
       this.meters.listPresses(presses.map(pressName));
-      if (presses.length === 0) notify('This server ships no FE presses to replay.');
+      if (presses.length === 0) throw new Error('this server ships no FE presses to replay');
     } catch (error) {
       notify(error.message);
     }
@@ -216,6 +225,12 @@ class Page {
   }
 }
 
+/** A press that does not move is answered alike again and again: no reason to draw it again. */
+function equal(a, b) {
+  for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
+  return true;
+}
+
 function pressName(press) {
   return `${press.name}, ${press.depth_mm.toFixed(2)} mm`;
 }
@@ -226,7 +241,10 @@ function showState(state, detail) {
   byId('state-text').textContent = detail ? `${words[state]}: ${detail}` : words[state];
 }
 
+let noticedAtMs = Infinity;
+
 function notify(message) {
+  noticedAtMs = message === '' ? Infinity : performance.now();
   byId('notice').textContent = message;
   byId('notice').hidden = message === '';
 }

@@ -50,6 +50,8 @@ export class Replay {
     this.chosen = 0;
     /** The press whose truth `truth` holds: the one last sent. */
     this.sent = -1;
+    /** Whether the answer to that press was held against its truth. */
+    this.judged = false;
     this.playing = false;
     this.changed = false;
     this.lastStepMs = 0;
@@ -77,6 +79,7 @@ export class Replay {
   forget() {
     this.errors = this.presses.map(() => NaN);
     this.sent = -1;
+    this.judged = false;
   }
 
   choose(n) {
@@ -104,11 +107,13 @@ export class Replay {
   rememberTruth() {
     if (this.sent === this.chosen) return;
     this.sent = this.chosen;
+    this.judged = false;
     this.atlas.interface.raster.rasterise(this.presses[this.sent].sed_j_per_m3, this.truth);
   }
 
   /** Holds an answer against the truth; also fills the map of differences. */
   judge(network) {
+    this.judged = true;
     const { pixels } = this.atlas.interface.raster;
     for (let n = 0; n < pixels.length; n++) this.difference[pixels[n]] = network[pixels[n]] - this.truth[pixels[n]];
     errorFigures(network, this.truth, pixels, this.figures);
