@@ -40,6 +40,20 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Held-out samples with their FE truth, for the service's page.
+    Replay {
+        /// The dataset's folder.
+        folder: PathBuf,
+        /// The file to write.
+        #[arg(long)]
+        out: PathBuf,
+        /// Number of samples.
+        #[arg(long, default_value_t = 6)]
+        count: usize,
+        /// Print the names as JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Check every hash, shape and value of a dataset.
     Verify {
         /// The dataset's folder.
@@ -62,6 +76,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             print(&report, *json, || {
                 format!("{} pairs written to {}", report.samples.len(), report.folder.display())
             })?;
+        }
+        Command::Replay { folder, out, count, json } => {
+            let names = dataset::replay(folder, *count, out)?;
+            print(&names, *json, || names.join("\n"))?;
         }
         Command::Verify { folder, json } => {
             let report = dataset::verify(folder)?;

@@ -14,6 +14,7 @@ mod images;
 mod limits;
 mod manifest;
 mod reader;
+mod replay;
 mod shard;
 mod sheet;
 mod stats;
@@ -31,6 +32,7 @@ pub use manifest::{
     sha256_hex,
 };
 pub use reader::{Dataset, VerifyReport, verify};
+pub use replay::replay;
 pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
 pub use sheet::contact_sheet;
 pub use stats::{DepthStats, Range, StatsReport, stats};
