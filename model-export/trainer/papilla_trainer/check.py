@@ -159,9 +159,7 @@ def _compare(
     expected = predict(served_model(checkpoint, matching[0]), pressure)
     peaks = expected.max(axis=(1, 2))
     if not (peaks > 0).any():
-        report.failures.append(
-            "the network answers zero for every held-out sample: train it longer"
-        )
+        report.failures.append("the network answers zero on all held-out samples: train longer")
         return
     # Each map relative to its own maximum, as `model-export evaluate` does; a map that is zero
     # for PyTorch has to be zero for ONNX Runtime too.

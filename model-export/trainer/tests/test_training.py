@@ -67,12 +67,14 @@ def test_killed_and_resumed_equals_straight_through(
         env={**os.environ, "PYTHONPATH": str(package)},
         stdout=subprocess.DEVNULL,
     )
-    deadline = time.monotonic() + 120
-    while not (out / "checkpoint.pt").exists() and process.poll() is None:
-        assert time.monotonic() < deadline, "no checkpoint within two minutes"
-        time.sleep(0.002)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
+    deadline = time.monotonic() + 600
+    try:
+        while not (out / "checkpoint.pt").exists() and process.poll() is None:
+            assert time.monotonic() < deadline, "no checkpoint within ten minutes"
+            time.sleep(0.01)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
     assert 1 <= Checkpoint.load(out).epoch <= config.epochs
     assert main(command) == 0
     assert_same(Checkpoint.load(out), finished)
