@@ -9,7 +9,7 @@ const { Raster } = await load('raster.mjs');
 const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol.mjs');
 const { AutoRange, TABLES, digits, roundUp } = await load('colour.mjs');
 const { Atlas } = await load('atlas.mjs');
-const { FOUNDATION, Press } = await load('press.mjs');
+const { HERTZ, Press } = await load('press.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
 
@@ -127,7 +127,7 @@ function sphereAtlas(radiusMm) {
   return new Atlas({ hash: 'sphere', mm_per_px: 0.1, triangles, skin: patch, interface: patch });
 }
 
-test('a plate on a sphere meets the foundation in closed form', () => {
+test('a plate on a sphere meets the contact law in closed form', () => {
   const radiusMm = 8;
   const depthMm = 0.8;
   const atlas = sphereAtlas(radiusMm);
@@ -135,18 +135,19 @@ test('a plate on a sphere meets the foundation in closed form', () => {
   const press = new Press(atlas);
   assert.ok(press.moveToPixel(112, 112.5));
   press.evaluate(depthMm, Infinity);
-  // Gap r^2 / 2R: a paraboloid of pressure, peak k s d, force pi R k (s d)^2, over the area 2 pi R s d.
-  const felt = FOUNDATION.share * depthMm;
+  // Gap r^2 / 2R: contact radius a^2 = 2 R share depth, Hertz's peak, force 2/3 pi a^2 p0.
+  const contactMm = Math.sqrt(2 * radiusMm * HERTZ.share * depthMm);
+  const peakPa = ((2 * HERTZ.modulusPa) / Math.PI) * Math.sqrt(depthMm / radiusMm) * (1 + (contactMm / HERTZ.layerMm) ** 3);
   const near = (value, due, share, what) => assert.ok(Math.abs(value / due - 1) < share, `${what}: ${value}, due ${due}`);
-  near(press.peakPa, FOUNDATION.stiffnessPaPerMm * felt, 0.01, 'peak, Pa');
-  near(press.forceN, 1e-6 * Math.PI * radiusMm * FOUNDATION.stiffnessPaPerMm * felt ** 2, 0.05, 'force, N');
-  near(press.areaMm2, 2 * Math.PI * radiusMm * felt, 0.1, 'area, mm2');
-  press.evaluate(2 * depthMm, Infinity);
+  near(press.peakPa, peakPa, 0.02, 'peak, Pa');
+  near(press.areaMm2, Math.PI * contactMm ** 2, 0.1, 'area, mm2');
+  near(press.forceN, (1e-6 * 2 * Math.PI * contactMm ** 2 * peakPa) / 3, 0.05, 'force, N');
   const limited = 0.5 * press.peakPa;
-  press.evaluate(2 * depthMm, limited);
+  press.evaluate(depthMm, limited);
   assert.ok(press.peakPa <= limited, 'the pressure that the server takes is the limit');
   press.evaluate(0, Infinity);
   assert.equal(press.forceN, 0);
+  assert.ok(press.pressurePa.every((p) => p === 0), 'no depth, no pressure, to the last bit');
 });
 
 test('a ray and a pixel find the same point of the skin', () => {
