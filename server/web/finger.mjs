@@ -4,6 +4,7 @@
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
 import { TABLES, TABLE_LEN } from './colour.mjs';
 import { computeNormals } from './atlas.mjs';
+import { fringeOf } from './raster.mjs';
 import { indenterMesh } from './indenter.mjs';
 import { GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
 
@@ -11,14 +12,18 @@ const FIELD_OF_VIEW_RAD = 0.5;
 const PITCH_LIMIT_RAD = 1.5;
 // The glass stands this far off the skin: coplanar faces would flicker.
 const GLASS_OFFSET_MM = 0.06;
-const UNIT = { sed: 0, mask: 1, table: 2 };
+const UNIT = { sed: 0, table: 1 };
+/** The texture holds 16-bit floats, which a filter can read everywhere; this is below their greatest. */
+const TEXTURE_MAX = 60000;
 
 export class FingerView {
   /** Throws where the browser has no WebGL2. */
   constructor(canvas, atlas) {
     this.canvas = canvas;
     this.atlas = atlas;
-    this.gl = canvas.getContext('webgl2', { antialias: true, alpha: true, preserveDrawingBuffer: true });
+    // Without a graphics processor smooth edges cost more than they are worth.
+    this.gl = canvas.getContext('webgl2', { antialias: true, preserveDrawingBuffer: true, failIfMajorPerformanceCaveat: true })
+      ?? canvas.getContext('webgl2', { antialias: false, preserveDrawingBuffer: true });
     if (!this.gl) throw new Error('this browser offers no WebGL2');
     this.positions = Float32Array.from(atlas.skin.positionsMm);
     this.normals = Float32Array.from(atlas.normals);
@@ -34,6 +39,7 @@ export class FingerView {
     this.model = new Float32Array(16);
     this.origin = new Float32Array(3);
     this.direction = new Float32Array(3);
+    this.fringe = fringeOf(atlas.interface.raster.mask);
     this.dirty = true;
     this.#measure();
     this.#build();
@@ -45,12 +51,14 @@ export class FingerView {
 
   /** Shows this map (J/m3) on a scale that ends at `max`; `decades` > 0 makes it logarithmic. */
   setSed(values, max, decades) {
-    const { gl } = this;
-    this.sed.set(values);
+    const { gl, sed, fringe } = this;
+    const { pixels } = this.atlas.interface.raster;
+    for (let n = 0; n < pixels.length; n++) sed[pixels[n]] = Math.min(TEXTURE_MAX, values[pixels[n]]);
+    for (let n = 0; n < fringe.length; n += 2) sed[fringe[n]] = sed[fringe[n + 1]];
     this.sedMax = max;
     this.decades = decades;
     gl.activeTexture(gl.TEXTURE0 + UNIT.sed);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, sed);
     this.dirty = true;
   }
 
@@ -264,13 +272,10 @@ export class FingerView {
     this.glassKey = '';
     this.glassCount = 0;
     gl.bindVertexArray(null);
-    const mask = atlas.interface.raster.mask.map((inside) => 255 * inside);
-    texture(gl, UNIT.mask, gl.R8, SIDE_PX, SIDE_PX, gl.RED, gl.UNSIGNED_BYTE, mask, gl.NEAREST);
     texture(gl, UNIT.table, gl.RGBA, TABLE_LEN, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(TABLES.inferno.buffer), gl.LINEAR);
-    texture(gl, UNIT.sed, gl.R32F, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed, gl.NEAREST);
+    texture(gl, UNIT.sed, gl.R16F, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed, gl.LINEAR);
     gl.useProgram(this.skin.handle);
     gl.uniform1i(this.skin.uniforms.u_sed, UNIT.sed);
-    gl.uniform1i(this.skin.uniforms.u_mask, UNIT.mask);
     gl.uniform1i(this.skin.uniforms.u_table, UNIT.table);
     this.#readTheme();
   }

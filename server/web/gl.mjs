@@ -25,7 +25,7 @@ export function program(gl, vertexSource, fragmentSource) {
   return { handle: linked, uniforms };
 }
 
-/** A texture read texel by texel (no filter: float textures have none without an extension). */
+/** A texture on its own unit, for good. */
 export function texture(gl, unit, internalFormat, width, height, format, type, data, filter) {
   const made = gl.createTexture();
   gl.activeTexture(gl.TEXTURE0 + unit);
@@ -58,12 +58,10 @@ void main() {
   gl_Position = u_projection * p;
 }`;
 
-// The map is read bilinearly between the pixels inside the mask; outside it holds 0, which would
-// darken the rim. Skin without SED keeps the colour of clay, so that the shape stays visible.
+// Skin without SED keeps the colour of clay, so that the shape stays visible.
 export const SKIN_FRAGMENT = `#version 300 es
 precision highp float;
 uniform highp sampler2D u_sed;
-uniform sampler2D u_mask;
 uniform sampler2D u_table;
 uniform float u_max;
 uniform float u_decades;
@@ -73,24 +71,8 @@ in vec3 v_normal;
 in vec2 v_uv;
 out vec4 colour;
 
-float sed() {
-  vec2 at = v_uv - 0.5;
-  ivec2 low = ivec2(floor(at));
-  vec2 f = at - floor(at);
-  float sum = 0.0;
-  float weight = 0.0;
-  for (int k = 0; k < 4; k++) {
-    ivec2 step = ivec2(k & 1, k >> 1);
-    ivec2 p = clamp(low + step, ivec2(0), ivec2(223));
-    float w = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y) * texelFetch(u_mask, p, 0).r;
-    sum += w * texelFetch(u_sed, p, 0).r;
-    weight += w;
-  }
-  return weight > 0.0 ? sum / weight : 0.0;
-}
-
 void main() {
-  float t = sed() / u_max;
+  float t = texture(u_sed, v_uv / 224.0).r / u_max;
   if (u_decades > 0.0) t = t > 0.0 ? 1.0 + log2(t) / (3.321928 * u_decades) : 0.0;
   t = clamp(t, 0.0, 1.0);
   vec3 painted = texture(u_table, vec2((t * 255.0 + 0.5) / 256.0, 0.5)).rgb;

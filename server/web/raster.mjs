@@ -96,3 +96,29 @@ function doubledArea(au, av, bu, bv, cu, cv) {
   const [au2, av2, bu2, bv2, cu2, cv2] = [au, av, bu, bv, cu, cv].map((px) => BigInt(Math.round(px * STEPS_PER_PX)));
   return Number((bv2 - av2) * (cu2 - au2) - (bu2 - au2) * (cv2 - av2)) / STEPS_PER_PX ** 2;
 }
+
+/**
+ * Pixels just outside the mask, each followed by a pixel inside beside it. A filter reads both at the
+ * rim, and a 0 from outside would darken it.
+ */
+export function fringeOf(mask) {
+  const pairs = [];
+  for (let row = 0; row < SIDE_PX; row++) {
+    for (let column = 0; column < SIDE_PX; column++) {
+      if (mask[row * SIDE_PX + column]) continue;
+      const inside = neighbourInside(mask, row, column);
+      if (inside >= 0) pairs.push(row * SIDE_PX + column, inside);
+    }
+  }
+  return Uint32Array.from(pairs);
+}
+
+/** A pixel of the mask beside (row, column), straight neighbours first; -1 if there is none. */
+function neighbourInside(mask, row, column) {
+  for (const [down, right] of [[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]]) {
+    const r = row + down;
+    const c = column + right;
+    if (r >= 0 && c >= 0 && r < SIDE_PX && c < SIDE_PX && mask[r * SIDE_PX + c]) return r * SIDE_PX + c;
+  }
+  return -1;
+}
