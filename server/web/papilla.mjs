@@ -210,8 +210,8 @@ class Page {
     try {
       await this.replay.load();
       const { presses } = this.replay;
-      byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(pressName(press), String(n))));
-      this.meters.listPresses(presses.map(pressName));
+      byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(press.name, String(n))));
+      this.meters.listPresses(presses.map((press) => press.name));
       if (presses.length === 0) throw new Error('this server ships no FE presses to replay');
     } catch (error) {
       notify(error.message);
@@ -229,10 +229,6 @@ class Page {
 function equal(a, b) {
   for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
   return true;
-}
-
-function pressName(press) {
-  return `${press.name}, ${press.depth_mm.toFixed(2)} mm`;
 }
 
 function showState(state, detail) {

@@ -99,7 +99,7 @@ test('a press with the mouse moves the pressure and the answered SED', async () 
   await page.mouse.down();
   await page.mouse.wheel(0, -250);
   await settled();
-  assert.match(await text('depth-out'), /^1\.20 mm$/, 'the wheel presses deeper while the button is down');
+  assert.match(await text('depth-out'), /^1\.70 mm$/, 'the wheel presses deeper while the button is down');
   await page.mouse.up();
   await settled();
   assert.ok(differing(before, await pixels('sed')) > 100, 'the SED picture changed');
