@@ -1,12 +1,12 @@
 //! What a model says of itself.
 
-use crate::{EngineError, MODEL_FORMAT};
+use crate::{EngineError, MAP_SIDE_PX, MODEL_FORMAT};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
-use tract_onnx::pb::ModelProto;
+use tract_onnx::pb::{ModelProto, tensor_proto::DataType};
 
 /// What a model is, from the `metadata_props` of its file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -17,7 +17,7 @@ pub struct ModelInfo {
     pub onnx_sha256: String,
     /// Length of the file, bytes.
     pub bytes: u64,
-    /// Number of trained values in the network.
+    /// Values in the network's tensors, scales included, masks left out.
     pub weights: u64,
     /// Hash of the atlas whose maps it takes and gives.
     pub atlas_hash: String,
@@ -82,12 +82,17 @@ impl ModelInfo {
     }
 }
 
-/// Initialisers that are floating-point numbers: the trained part of the graph.
+/// Floating-point initialisers but for maps (masks, coordinates): the trained part.
 fn weight_count(proto: &ModelProto) -> u64 {
+    const SIDE: i64 = MAP_SIDE_PX as i64;
     let Some(graph) = &proto.graph else { return 0 };
-    let floats = graph.initializer.iter().filter(|t| t.data_type == 1);
-    floats
-        .map(|t| t.dims.iter().fold(1u64, |n, &d| n.saturating_mul(d.max(0).unsigned_abs())))
+    let count =
+        |dims: &[i64]| dims.iter().fold(1u64, |n, &d| n.saturating_mul(d.max(0).unsigned_abs()));
+    graph
+        .initializer
+        .iter()
+        .filter(|t| t.data_type == DataType::Float as i32 && !t.dims.ends_with(&[SIDE, SIDE]))
+        .map(|t| count(&t.dims))
         .fold(0, u64::saturating_add)
 }
 

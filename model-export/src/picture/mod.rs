@@ -35,9 +35,8 @@ struct Panel<'a> {
 /// Draws one sample. `heading` stands above, such as `worst of 200`.
 #[must_use]
 pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> RgbImage {
-    let kilo = |map: &[f32]| map.iter().map(|v| v / 1e3).collect::<Vec<_>>();
-    let [pressure, truth, predicted] =
-        [&maps.pressure_pa, &maps.truth_j_per_m3, &maps.predicted_j_per_m3].map(|m| kilo(m));
+    let pressure = maps.pressure_pa.iter().map(|v| v / 1e3).collect::<Vec<_>>();
+    let (truth, predicted) = (maps.truth_j_per_m3.clone(), maps.predicted_j_per_m3.clone());
     let error: Vec<f32> = (0..MAP_LEN).map(|i| predicted[i] - truth[i]).collect();
     let greatest = |map: &[f32]| map.iter().fold(0.0f32, |m, v| m.max(v.abs()));
     // Truth and prediction share a scale: equal colours are equal values.
@@ -54,14 +53,14 @@ pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> R
     };
     let panels = [
         panel("pressure", pressure, dataset.skin.mask(), [0.0, pressure_max], "kPa", Scale::Rising),
-        panel("SED, finite elements", truth, inside, [0.0, sed_max], "kJ/m3", Scale::Rising),
-        panel("SED, model", predicted, inside, [0.0, sed_max], "kJ/m3", Scale::Rising),
+        panel("SED, finite elements", truth, inside, [0.0, sed_max], "J/m3", Scale::Rising),
+        panel("SED, model", predicted, inside, [0.0, sed_max], "J/m3", Scale::Rising),
         panel(
             "model - finite elements",
             error,
             inside,
             [-error_max, error_max],
-            "kJ/m3",
+            "J/m3",
             Scale::Signed,
         ),
     ];
