@@ -130,6 +130,10 @@ fn body(scene: &Scene) -> anyhow::Result<Body> {
             let mesh = build_block(&lattice, |p| p);
             Body::from_mesh(mesh, &constants, &["z_max".into()], "z_min")?
         }
+        Geometry::Mesh { file, fixed, contact } => {
+            let mesh = crate::mesh::gmsh::read_file(file)?;
+            Body::from_mesh(mesh, &constants, fixed, contact)?
+        }
     })
 }
 

@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod fingertip;
+pub mod gmsh;
 mod half_cube;
 pub mod recovery;
 pub mod surface;

@@ -57,6 +57,16 @@ pub enum Geometry {
         #[serde(default)]
         order: Order,
     },
+    /// A Gmsh 4.1 file with physical groups: volumes named by tissue, surfaces
+    /// by what they are for.
+    Mesh {
+        /// The `.msh` file, relative to the scene.
+        file: PathBuf,
+        /// Surfaces whose nodes are held.
+        fixed: Vec<String>,
+        /// Surface that the indenter may touch.
+        contact: String,
+    },
 }
 
 /// One layer of a block.
@@ -143,15 +153,18 @@ pub enum SceneError {
 }
 
 impl Scene {
-    /// Reads and checks a scene file.
+    /// Reads and checks a scene file; a mesh file's path is made relative to it.
     ///
     /// # Errors
     /// [`SceneError`] names the file and line, or the field and its rule.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.into(), source })?;
-        let scene: Self = toml::from_str(&text)
+        let mut scene: Self = toml::from_str(&text)
             .map_err(|e| SceneError::Parse { path: path.into(), message: e.to_string() })?;
+        if let (Geometry::Mesh { file, .. }, Some(folder)) = (&mut scene.geometry, path.parent()) {
+            *file = folder.join(&file);
+        }
         scene.validate()?;
         Ok(scene)
     }

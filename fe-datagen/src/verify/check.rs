@@ -75,7 +75,7 @@ impl Check {
     ) -> Self {
         let difference = if value.is_nan() { value } else { (low - value).max(value - high) };
         let reference = if value < low { low } else { high };
-        let quantity = format!("{} ({low} to {high})", quantity.into());
+        let quantity = format!("{} ({low:.3} to {high:.3})", quantity.into());
         let row = [value, reference, difference.max(0.0), 0.0];
         let mut check = Self::new(quantity, row, source);
         check.pass &= !value.is_nan();

@@ -3,7 +3,7 @@
 use super::{CaseError, Check, Context};
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
-use crate::press::fingertip::{Fingertip, PlateSpec, TissueConstants};
+use crate::press::body::{Body, PlateSpec, TissueConstants};
 use crate::press::record::{IncrementRecord, Pose};
 use crate::solve::Options;
 use std::collections::HashMap;
@@ -11,7 +11,7 @@ use std::collections::HashMap;
 const SOURCE: &str = "symmetry of the finger";
 
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
-    let finger = Fingertip::new(
+    let finger = Body::fingertip(
         &FingertipShape::default(),
         &TissueConstants::default(),
         Density::Coarse,
@@ -19,7 +19,9 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     )?;
     let [left, right] = [-15.0, 15.0].map(|roll_deg| press(&finger, roll_deg));
     let (left, right) = (left?, right?);
-    let (skin, _) = finger.patch_positions();
+    let patch = &finger.patch.as_ref().ok_or("the fingertip has no patch")?.patch;
+    let skin: Vec<_> =
+        patch.skin.iter().map(|&n| finger.problem.mesh.nodes[n as usize]).collect();
     // The mesh mirrors bit for bit; adding zero turns -0 into 0.
     let key = |p: &[f64; 3], sign: f64| [p[0], sign * p[1] + 0.0, p[2]].map(f64::to_bits);
     let at: HashMap<_, _> = skin.iter().enumerate().map(|(i, p)| (key(p, 1.0), i)).collect();
@@ -45,12 +47,12 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     ])
 }
 
-fn press(finger: &Fingertip, roll_deg: f64) -> Result<IncrementRecord, CaseError> {
+fn press(finger: &Body, roll_deg: f64) -> Result<IncrementRecord, CaseError> {
     let options = Options { residual_tolerance: 1e-10, gap_tolerance_mm: 1e-5, ..Options::default() };
     let mut solver = finger.solver(options)?;
     let pose = Pose { pitch_deg: 10.0, roll_deg, yaw_deg: 0.0 };
     let mut last = None;
-    finger.press(&mut solver, pose, PlateSpec::default(), &[0.5, 1.0], &mut |_, record, _| {
+    finger.press(&mut solver, pose, PlateSpec::default(), &[0.5, 1.0], 1, &mut |_, record, _| {
         last = Some(record.clone());
     })?;
     last.ok_or_else(|| "the press gave no record".into())

@@ -1,0 +1,262 @@
+//! From the file's records to a [`Mesh`], with every check that needs more than
+//! one line.
+
+use super::GmshError;
+use super::order::{self, corners, flipped, sides};
+use super::parse::{Raw, RawBlock};
+use crate::element::ElementKind;
+use crate::element::geometry::jacobian;
+use crate::element::reference::HEX27_LATTICE;
+use crate::mesh::{Block, Mesh, Surface, Tissue};
+use std::collections::HashMap;
+
+/// The mesh being built.
+struct Builder<'a> {
+    raw: &'a Raw,
+    mesh: Mesh,
+    /// New number of each node of the file; nodes of no solid element are left out.
+    number: HashMap<u32, u32>,
+    /// Middle node of the quadrilateral with these (sorted) corners.
+    middle: HashMap<Vec<u32>, u32>,
+    /// Solid elements of each side, by sorted corners: tissue and outward corners.
+    owners: HashMap<Vec<u32>, Vec<(Tissue, Vec<u32>)>>,
+}
+
+pub(super) fn build(raw: &Raw) -> Result<Mesh, GmshError> {
+    let mut b = Builder {
+        raw,
+        mesh: Mesh::default(),
+        number: HashMap::new(),
+        middle: HashMap::new(),
+        owners: HashMap::new(),
+    };
+    for block in raw.blocks.iter().filter(|b| b.entity.0 == 3) {
+        b.solids(block)?;
+    }
+    if b.mesh.blocks.is_empty() {
+        return Err(GmshError::NoSolid);
+    }
+    for block in raw.blocks.iter().filter(|b| b.entity.0 < 3) {
+        for name in b.group_names(block)? {
+            if block.entity.0 == 2 {
+                b.faces(block, &name)?;
+            } else {
+                b.nodes(block, &name)?;
+            }
+        }
+    }
+    for set in b.mesh.node_sets.values_mut() {
+        set.sort_unstable();
+        set.dedup();
+    }
+    Ok(b.mesh)
+}
+
+impl Builder<'_> {
+    /// Names of the physical groups of a block's entity.
+    fn group_names(&self, block: &RawBlock) -> Result<Vec<String>, GmshError> {
+        let (dimension, _) = block.entity;
+        let groups = self.raw.groups.get(&block.entity).map_or(&[][..], Vec::as_slice);
+        let name = |&tag: &i32| match self.raw.names.get(&(dimension, tag)) {
+            Some((name, _)) => Ok(name.clone()),
+            None => Err(GmshError::UnnamedGroup { line: block.line, dimension, tag }),
+        };
+        groups.iter().map(name).collect()
+    }
+
+    /// File indices of an element's nodes.
+    fn indices(
+        &self,
+        (line, element, tags): &(usize, u64, Vec<u64>),
+        expected: usize,
+    ) -> Result<Vec<u32>, GmshError> {
+        if tags.len() != expected {
+            return Err(GmshError::Syntax {
+                line: *line,
+                expected: "as many nodes as the element type has",
+                found: format!("{} nodes instead of {expected}", tags.len()),
+            });
+        }
+        let index = |tag: &u64| {
+            self.raw.node_of_tag.get(tag).copied().ok_or(GmshError::MissingNode {
+                line: *line,
+                element: *element,
+                tag: *tag,
+            })
+        };
+        tags.iter().map(index).collect()
+    }
+
+    /// Number of a node of the file in the mesh, new if not met before.
+    fn node(&mut self, index: u32) -> u32 {
+        let next = self.mesh.nodes.len() as u32;
+        let number = *self.number.entry(index).or_insert(next);
+        if number == next {
+            self.mesh.nodes.push(self.raw.positions[index as usize]);
+        }
+        number
+    }
+
+    fn tissue(&self, block: &RawBlock) -> Result<Tissue, GmshError> {
+        let (line, entity) = (block.line, block.entity.1);
+        let names = self.group_names(block)?;
+        let [name] = names.as_slice() else {
+            return Err(match names.len() {
+                0 => GmshError::NoPhysicalGroup { line, entity },
+                count => GmshError::SeveralTissues { line, entity, count },
+            });
+        };
+        let tissue = Tissue::ALL.into_iter().find(|t| t.name() == name);
+        tissue.ok_or_else(|| {
+            let named = self.raw.names.iter().find(|((d, _), (n, _))| *d == 3 && n == name);
+            GmshError::UnknownTissue { line: named.map_or(line, |(_, v)| v.1), name: name.clone() }
+        })
+    }
+
+    fn solids(&mut self, block: &RawBlock) -> Result<(), GmshError> {
+        let Some(solid) = order::solid(block.element_type) else {
+            let element_type = block.element_type;
+            return Err(GmshError::UnsupportedElement { line: block.line, element_type });
+        };
+        let tissue = self.tissue(block)?;
+        let at = match self.mesh.blocks.iter().position(|b| b.kind == solid.kind) {
+            Some(at) => at,
+            None => {
+                let empty =
+                    Block { kind: solid.kind, connectivity: Vec::new(), tissue: Vec::new() };
+                self.mesh.blocks.push(empty);
+                self.mesh.blocks.len() - 1
+            }
+        };
+        for element in &block.elements {
+            let file = self.indices(element, solid.nodes)?;
+            let mut nodes: Vec<u32> = solid.from_gmsh.iter().map(|&i| self.node(file[i])).collect();
+            if solid.nodes == 20 {
+                self.complete(&mut nodes);
+            }
+            self.check_shape(solid.kind, &nodes, element)?;
+            for side in sides(solid.kind) {
+                let corners: Vec<u32> = side.iter().map(|&c| nodes[c]).collect();
+                self.owners.entry(sorted(&corners)).or_default().push((tissue, corners));
+            }
+            self.mesh.blocks[at].connectivity.extend(nodes);
+            self.mesh.blocks[at].tissue.push(tissue);
+        }
+        Ok(())
+    }
+
+    /// Adds the middles of faces and body to a 20-node hexahedron, where its own
+    /// (serendipity) shape functions put them; neighbours share face nodes.
+    fn complete(&mut self, nodes: &mut Vec<u32>) {
+        for side in sides(ElementKind::Hex27) {
+            let corners: Vec<u32> = side.iter().map(|&c| nodes[c]).collect();
+            let mids = side.iter().zip(side.iter().cycle().skip(1)).map(|(&a, &b)| {
+                let middle: [i8; 3] =
+                    std::array::from_fn(|i| (HEX27_LATTICE[a][i] + HEX27_LATTICE[b][i]) / 2);
+                let edge = (8..20).find(|&e| HEX27_LATTICE[e] == middle);
+                nodes[edge.unwrap_or_default()]
+            });
+            let x = self.weighted(&[(&corners, -0.25), (&mids.collect::<Vec<_>>(), 0.5)]);
+            let key = sorted(&corners);
+            let next = self.mesh.nodes.len() as u32;
+            let id = *self.middle.entry(key).or_insert(next);
+            if id == next {
+                self.mesh.nodes.push(x);
+            }
+            nodes.push(id);
+        }
+        let x = self.weighted(&[(&nodes[..8], -0.25), (&nodes[8..20], 0.25)]);
+        nodes.push(self.mesh.nodes.len() as u32);
+        self.mesh.nodes.push(x);
+    }
+
+    fn weighted(&self, terms: &[(&[u32], f64)]) -> [f64; 3] {
+        let mut x = [0.0; 3];
+        for (nodes, weight) in terms {
+            for &n in *nodes {
+                for i in 0..3 {
+                    x[i] += weight * self.mesh.nodes[n as usize][i];
+                }
+            }
+        }
+        x
+    }
+
+    fn check_shape(
+        &self,
+        kind: ElementKind,
+        nodes: &[u32],
+        &(line, element, _): &(usize, u64, Vec<u64>),
+    ) -> Result<(), GmshError> {
+        let (mut value, mut gradient) = (vec![0.0; nodes.len()], vec![[0.0; 3]; nodes.len()]);
+        for q in kind.quadrature() {
+            kind.shape(q.xi, &mut value, &mut gradient);
+            let positions = nodes.iter().map(|&n| self.mesh.nodes[n as usize]);
+            let (_, determinant) = jacobian(positions, &gradient);
+            if !(determinant > 0.0) {
+                return Err(GmshError::InvertedElement { line, element, determinant });
+            }
+        }
+        Ok(())
+    }
+
+    /// Faces of a named surface, turned to look outward; on a surface between
+    /// two tissues outward is away from the deeper one.
+    fn faces(&mut self, block: &RawBlock, name: &str) -> Result<(), GmshError> {
+        let Some(face) = order::surface(block.element_type) else {
+            let element_type = block.element_type;
+            return Err(GmshError::UnsupportedElement { line: block.line, element_type });
+        };
+        for element in &block.elements {
+            let (line, tag) = (element.0, element.1);
+            let loose = || GmshError::LooseFace { line, element: tag, name: name.into() };
+            let file = self.indices(element, face.nodes)?;
+            let mut nodes = Vec::with_capacity(9);
+            for index in &file {
+                nodes.push(*self.number.get(index).ok_or_else(loose)?);
+            }
+            let key = sorted(&nodes[..corners(face.kind)]);
+            let owners = self.owners.get(&key).ok_or_else(loose)?;
+            let (_, outward) =
+                owners.iter().max_by_key(|(tissue, _)| tissue.index()).ok_or_else(loose)?;
+            if face.nodes == 8 {
+                nodes.push(*self.middle.get(&key).ok_or_else(loose)?);
+            }
+            if !turns_alike(&nodes, outward) {
+                nodes = flipped(face.kind).iter().map(|&i| nodes[i]).collect();
+            }
+            self.mesh.node_sets.entry(name.into()).or_default().extend(&nodes);
+            let empty = || Surface { kind: face.kind, connectivity: Vec::new() };
+            let surface = self.mesh.surfaces.entry(name.into()).or_insert_with(empty);
+            if surface.kind != face.kind {
+                return Err(GmshError::MixedSurface { line, name: name.into() });
+            }
+            surface.connectivity.extend(nodes);
+        }
+        Ok(())
+    }
+
+    /// Nodes of a named point or curve.
+    fn nodes(&mut self, block: &RawBlock, name: &str) -> Result<(), GmshError> {
+        for element in &block.elements {
+            for index in self.indices(element, element.2.len())? {
+                if let Some(&n) = self.number.get(&index) {
+                    self.mesh.node_sets.entry(name.into()).or_default().push(n);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn sorted(nodes: &[u32]) -> Vec<u32> {
+    let mut key = nodes.to_vec();
+    key.sort_unstable();
+    key
+}
+
+/// Whether the face's corners turn as `outward` does.
+fn turns_alike(face: &[u32], outward: &[u32]) -> bool {
+    let at = outward.iter().position(|n| *n == face[0]).unwrap_or(0);
+    outward[(at + 1) % outward.len()] == face[1]
+}

@@ -1,0 +1,172 @@
+//! Why a mesh file was refused.
+
+use std::path::PathBuf;
+
+/// Why a `.msh` file was refused; lines count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum GmshError {
+    /// The file cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Io {
+        /// File.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not the format that is read here.
+    #[error(
+        "line {line}: MSH version {found}; this reads 4.1. In Gmsh: File > Export, 'Version 4 ASCII', or \
+         gmsh -format msh41 -save"
+    )]
+    Version {
+        /// Line.
+        line: usize,
+        /// Version found.
+        found: String,
+    },
+    /// Binary file.
+    #[error(
+        "line {line}: binary MSH file; export it as ASCII (gmsh -bin 0 -save, or Mesh.Binary = 0)"
+    )]
+    Binary {
+        /// Line.
+        line: usize,
+    },
+    /// The text breaks the format's grammar.
+    #[error("line {line}: expected {expected}, found '{found}'")]
+    Syntax {
+        /// Line.
+        line: usize,
+        /// What should be there.
+        expected: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// The file ends too early.
+    #[error("the file ends inside ${section}; it is cut short")]
+    Truncated {
+        /// Section.
+        section: String,
+    },
+    /// A section that a mesh needs is not there.
+    #[error("the file has no ${section} section; {hint}")]
+    MissingSection {
+        /// Section.
+        section: &'static str,
+        /// What to do.
+        hint: &'static str,
+    },
+    /// A node tag occurs twice.
+    #[error("line {line}: node {tag} is defined twice")]
+    DuplicateNode {
+        /// Line of the second.
+        line: usize,
+        /// Tag.
+        tag: u64,
+    },
+    /// An element names a node that does not exist.
+    #[error("line {line}: element {element} uses node {tag}, which does not exist")]
+    MissingNode {
+        /// Line of the element.
+        line: usize,
+        /// Element tag.
+        element: u64,
+        /// Node tag.
+        tag: u64,
+    },
+    /// A solid or surface element of a type that is not supported.
+    #[error(
+        "line {line}: element type {element_type} is not supported; use hexahedra (8, 20 or 27 nodes) or \
+         tetrahedra (4 or 10), with quadrangles (4, 8 or 9) and triangles (3 or 6) for surfaces"
+    )]
+    UnsupportedElement {
+        /// Line of the element block.
+        line: usize,
+        /// Gmsh's number of the type.
+        element_type: u32,
+    },
+    /// Solid elements that nobody gave a tissue.
+    #[error(
+        "line {line}: the elements of volume {entity} belong to no physical group; put the volume in \
+         one named epidermis, dermis, subcutaneous, nail or bone"
+    )]
+    NoPhysicalGroup {
+        /// Line of the element block.
+        line: usize,
+        /// Volume tag.
+        entity: i32,
+    },
+    /// A volume in two groups would be of two tissues.
+    #[error(
+        "line {line}: volume {entity} belongs to {count} physical groups; it can have one tissue"
+    )]
+    SeveralTissues {
+        /// Line of the element block.
+        line: usize,
+        /// Volume tag.
+        entity: i32,
+        /// Groups.
+        count: usize,
+    },
+    /// A physical group without a name.
+    #[error(
+        "line {line}: physical group {tag} of dimension {dimension} has no name in $PhysicalNames"
+    )]
+    UnnamedGroup {
+        /// Line of the element block.
+        line: usize,
+        /// Dimension.
+        dimension: u8,
+        /// Group tag.
+        tag: i32,
+    },
+    /// A volume's group is not a tissue.
+    #[error(
+        "line {line}: '{name}' is no tissue; volumes are epidermis, dermis, subcutaneous, nail or bone"
+    )]
+    UnknownTissue {
+        /// Line of the name.
+        line: usize,
+        /// Name.
+        name: String,
+    },
+    /// An element folds.
+    #[error(
+        "line {line}: element {element} is inverted or flat (det dX/dxi = {determinant:.3e}); reorient \
+         the volume in Gmsh or untangle its high-order nodes"
+    )]
+    InvertedElement {
+        /// Line.
+        line: usize,
+        /// Element tag.
+        element: u64,
+        /// Smallest Jacobian determinant found.
+        determinant: f64,
+    },
+    /// A surface face on no solid element.
+    #[error("line {line}: face {element} of surface '{name}' is no side of a solid element")]
+    LooseFace {
+        /// Line.
+        line: usize,
+        /// Element tag of the face.
+        element: u64,
+        /// Surface name.
+        name: String,
+    },
+    /// A named surface of faces of two kinds.
+    #[error(
+        "line {line}: surface '{name}' mixes faces of different kinds; give each its own group"
+    )]
+    MixedSurface {
+        /// Line.
+        line: usize,
+        /// Surface name.
+        name: String,
+    },
+    /// No solid element at all.
+    #[error(
+        "the mesh has no solid element; mesh the volumes (gmsh -3) and save all of them or put them in \
+         physical groups"
+    )]
+    NoSolid,
+}

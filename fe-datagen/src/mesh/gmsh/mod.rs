@@ -1,0 +1,42 @@
+//! Meshes from Gmsh `.msh` files, ASCII format 4.1.
+//!
+//! Volumes belong to physical groups named `epidermis`, `dermis`,
+//! `subcutaneous`, `nail` or `bone`. Physical surfaces become surfaces and node
+//! sets of their name, physical curves and points node sets: `fixed` and
+//! `contact` are what a scene looks for. Lengths are taken as mm.
+//!
+//! Hexahedra with 8, 20 or 27 nodes (20 are completed to 27 by face and body
+//! nodes where their own shape functions put them) and tetrahedra with 4 or 10.
+
+mod build;
+mod error;
+mod order;
+mod parse;
+
+pub use error::GmshError;
+
+use super::Mesh;
+use std::path::Path;
+
+/// Reads a mesh from the text of a `.msh` file.
+///
+/// Nodes that no solid element uses are left out; the others keep the order in
+/// which elements first use them. Faces look outward (between two tissues: away
+/// from the deeper one).
+///
+/// # Errors
+/// [`GmshError`] names the line and what to do about it.
+pub fn read(text: &str) -> Result<Mesh, GmshError> {
+    build::build(&parse::parse(text)?)
+}
+
+/// Reads a mesh from a `.msh` file.
+///
+/// # Errors
+/// As [`read`], and if the file cannot be read.
+pub fn read_file(path: &Path) -> Result<Mesh, GmshError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| GmshError::Io { path: path.into(), source })?;
+    // A binary file is not UTF-8, but its first lines are, and they say so.
+    read(&String::from_utf8_lossy(&bytes))
+}
