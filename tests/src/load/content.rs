@@ -1,0 +1,150 @@
+//! What the frames hold: FE presses.
+
+use std::path::Path;
+
+use model_export::dataset::Dataset;
+use papilla_proto::{
+    MAP_LEN, SampleType,
+    atlas::{Atlas, Patch, Raster},
+};
+use serde::{Deserialize, de::DeserializeOwned};
+
+use super::LoadError;
+use crate::http::Request;
+
+/// Pressure maps of FE presses.
+#[derive(Clone, Debug)]
+pub struct Content {
+    /// Where they are from, for people.
+    pub source: String,
+    /// The atlas they are drawn with.
+    pub atlas_hash: String,
+    /// 224 x 224 samples each, row-major, Pa.
+    pub maps_pa: Vec<Vec<f32>>,
+}
+
+#[derive(Deserialize)]
+struct PressList {
+    presses: Vec<PressEntry>,
+}
+
+#[derive(Deserialize)]
+struct PressEntry {
+    id: usize,
+}
+
+#[derive(Deserialize)]
+struct Press {
+    pressure_pa: Vec<f32>,
+}
+
+impl Content {
+    /// The first `count` samples of a split of the dataset in `folder`.
+    ///
+    /// # Errors
+    /// [`LoadError::Dataset`] if the dataset is damaged.
+    pub fn from_dataset(folder: &Path, split: &str, count: usize) -> Result<Self, LoadError> {
+        let dataset = Dataset::open(folder)?;
+        let mut maps_pa = Vec::new();
+        for press in dataset.presses(split)? {
+            let shard = dataset.load(press)?;
+            for row in shard.pressure_pa.rows() {
+                if maps_pa.len() == count {
+                    break;
+                }
+                maps_pa.push(draw(&dataset.skin, &row.to_vec())?);
+            }
+        }
+        let source = format!("split {split} of {}", folder.display());
+        Ok(Self { source, atlas_hash: dataset.atlas.hash().to_owned(), maps_pa })
+    }
+
+    /// The first `count` presses that the service at `server` ships.
+    ///
+    /// # Errors
+    /// [`LoadError`]: the service does not answer, or ships none.
+    pub async fn from_server(server: &str, count: usize) -> Result<Self, LoadError> {
+        let atlas: Atlas = get(server, "/v1/atlas").await?;
+        let skin = Raster::new(&atlas, Patch::Skin);
+        let list: PressList = get(server, "/v1/presses").await?;
+        let mut maps_pa = Vec::new();
+        for entry in list.presses.iter().take(count) {
+            let press: Press = get(server, &format!("/v1/presses/{}", entry.id)).await?;
+            maps_pa.push(draw(&skin, &press.pressure_pa)?);
+        }
+        let source = format!("the presses of {server}");
+        if maps_pa.is_empty() {
+            return Err(LoadError::NoPresses(source));
+        }
+        Ok(Self { source, atlas_hash: atlas.hash().to_owned(), maps_pa })
+    }
+}
+
+fn draw(raster: &Raster, vertex_values: &[f32]) -> Result<Vec<f32>, LoadError> {
+    let mut map = vec![0.0; MAP_LEN];
+    raster.rasterise(vertex_values, &mut map)?;
+    Ok(map)
+}
+
+async fn get<T: DeserializeOwned>(server: &str, path: &str) -> Result<T, LoadError> {
+    let bad = |reason: String| LoadError::Service { path: path.to_owned(), reason };
+    let answer = Request::get(path).send(server).await?;
+    if answer.status != 200 {
+        return Err(bad(format!("status {}: {}", answer.status, answer.text())));
+    }
+    serde_json::from_slice(&answer.body).map_err(|error| bad(error.to_string()))
+}
+
+/// The maps as they go over the wire.
+#[derive(Clone, Debug)]
+pub(super) struct Encoded {
+    pub(super) sample_type: SampleType,
+    /// Pa per unit for u16 and u8, else 1.
+    pub(super) scale: f32,
+    pub(super) payloads: Vec<Vec<u8>>,
+}
+
+impl Encoded {
+    /// Encodes all maps with one scale, the finest that clips none.
+    pub(super) fn new(content: &Content, sample_type: SampleType) -> Result<Self, LoadError> {
+        let peak_pa = content.maps_pa.iter().flatten().copied().fold(0.0, f32::max);
+        let scale = if sample_type.is_scaled() && peak_pa > 0.0 {
+            peak_pa / sample_type.unit_max()
+        } else {
+            1.0
+        };
+        if sample_type == SampleType::F16 && peak_pa > sample_type.value_max(scale) {
+            return Err(LoadError::BeyondF16(peak_pa));
+        }
+        let encode = |map: &Vec<f32>| {
+            let mut payload = vec![0; map.len() * sample_type.bytes()];
+            sample_type.encode(map, scale, &mut payload).map(|()| payload)
+        };
+        let payloads = content.maps_pa.iter().map(encode).collect::<Result<_, _>>()?;
+        Ok(Self { sample_type, scale, payloads })
+    }
+
+    /// Which map `frame` of `session` holds: sessions start at different ones.
+    pub(super) fn index(&self, session: usize, frame: u32) -> usize {
+        (session * 7 + frame as usize) % self.payloads.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_scale_serves_all_maps() {
+        let maps_pa = vec![vec![0.0, 510.0], vec![1.0, 2.0]];
+        let content = Content { source: String::new(), atlas_hash: String::new(), maps_pa };
+        let encoded = Encoded::new(&content, SampleType::U8).unwrap();
+        assert_eq!(encoded.scale.to_bits(), 2.0_f32.to_bits());
+        assert_eq!(encoded.payloads, [vec![0, 255], vec![1, 1]]);
+        let sent: Vec<_> = (0..3).map(|frame| encoded.index(1, frame)).collect();
+        assert_eq!(sent, [1, 0, 1]);
+        let above = Content { maps_pa: vec![vec![7e4]], ..content };
+        assert!(matches!(Encoded::new(&above, SampleType::F16), Err(LoadError::BeyondF16(_))));
+        assert!(Encoded::new(&above, SampleType::F32).is_ok());
+    }
+}

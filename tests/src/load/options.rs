@@ -1,0 +1,164 @@
+//! What the load generator can be told.
+
+use std::{
+    num::{NonZeroU32, NonZeroUsize},
+    path::PathBuf,
+};
+
+use clap::Parser;
+use papilla_proto::SampleType;
+
+const HELP_TAIL: &str = "\
+Frames leave at their instants whether or not answers come (open loop), and times are
+counted from the instant a frame was meant to leave, so that no wait is hidden.
+A frame is missed if no map came back within the budget, counted from that instant:
+late, superseded, refused, lost, or ok but too slow.
+
+Examples:
+  papilla-load                                  one session, 90 Hz, 10 s
+  papilla-load --sessions 8 --rate-hz 30 --tier s1-base4
+  papilla-load --dataset data/s1 --sample-type u16 --verify
+  papilla-load --allow-miss-percent 1 --json    for a script
+
+Exit codes:
+  0  done
+  1  failed: no session, a wrong, lost, refused or disordered answer, a closed session
+  2  wrong usage
+  3  more misses than --allow-miss-percent";
+
+/// Loads a Papilla service with pressure frames and measures when maps come back.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "papilla-load", version, after_help = HELP_TAIL)]
+pub struct Options {
+    /// The service.
+    #[arg(
+        long,
+        env = "PAPILLA_SERVER",
+        default_value = "127.0.0.1:7224",
+        value_name = "HOST:PORT"
+    )]
+    pub server: String,
+
+    /// Sessions at a time, their frames evenly staggered.
+    #[arg(long, default_value = "1", value_name = "K")]
+    pub sessions: NonZeroUsize,
+
+    /// Frames a second and session.
+    #[arg(long, default_value = "90", value_name = "HZ", value_parser = positive)]
+    pub rate_hz: f64,
+
+    /// Time measured, seconds.
+    #[arg(long, default_value = "10", value_name = "S", value_parser = positive)]
+    pub duration_s: f64,
+
+    /// Time before that whose frames are sent but not counted, seconds.
+    #[arg(long, default_value = "1", value_name = "S", value_parser = not_negative)]
+    pub warmup_s: f64,
+
+    /// Samples on the wire: f32, f16, u16 or u8.
+    #[arg(long, default_value = "f32", value_name = "TYPE", value_parser = sample_type)]
+    pub sample_type: SampleType,
+
+    /// Budget of a frame, us; 0: none. 90 Hz leave 11111.
+    #[arg(long, default_value = "11000", value_name = "US")]
+    pub budget_us: u32,
+
+    /// Tier by name [default: the one the service chooses for the budget].
+    #[arg(long, value_name = "NAME")]
+    pub tier: Option<String>,
+
+    /// Folder of a dataset whose presses are sent [default: the service's own presses].
+    #[arg(long, value_name = "DIR")]
+    pub dataset: Option<PathBuf>,
+
+    /// Split of the dataset.
+    #[arg(long, default_value = "test", value_name = "SPLIT")]
+    pub split: String,
+
+    /// Most maps to take turns.
+    #[arg(long, default_value = "64", value_name = "N")]
+    pub maps: NonZeroUsize,
+
+    /// Compare every answer with what the engine answers here, to 1e-6 of the map's maximum
+    /// (and the error of the sample type).
+    #[arg(long)]
+    pub verify: bool,
+
+    /// Folder of the models that the service runs, for --verify.
+    #[arg(long, default_value = "models", value_name = "DIR")]
+    pub models: PathBuf,
+
+    /// How long to wait for answers after the last frame, seconds.
+    #[arg(long, default_value = "5", value_name = "S")]
+    pub drain_s: u64,
+
+    /// Exit with 3 if a greater share of the frames is missed, percent.
+    #[arg(long, value_name = "P", value_parser = not_negative)]
+    pub allow_miss_percent: Option<f64>,
+
+    /// Print the report as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Options {
+    /// Frames of one session that are sent but not counted, and those that are.
+    pub(super) fn frames(&self) -> (u32, u32) {
+        let frames = |seconds: f64| (seconds * self.rate_hz).round() as u32;
+        let counted = NonZeroU32::new(frames(self.duration_s)).unwrap_or(NonZeroU32::MIN);
+        (frames(self.warmup_s), counted.get())
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    // More than any clock or network keeps up with; and products stay within u32.
+    if value.abs() <= 30_000.0 { Ok(value) } else { Err("more than 30000".to_owned()) }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("has to be above 0".to_owned()) })
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|v| if v >= 0.0 { Ok(v) } else { Err("has to be 0 or more".to_owned()) })
+}
+
+fn sample_type(text: &str) -> Result<SampleType, String> {
+    let names = ["f32", "f16", "u16", "u8"];
+    let found = names.iter().position(|name| *name == text);
+    found.map(|i| SampleType::ALL[i]).ok_or_else(|| format!("there are {}", names.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(arguments: &[&str]) -> Result<Options, clap::Error> {
+        Options::try_parse_from([&["papilla-load"][..], arguments].concat())
+    }
+
+    #[test]
+    fn the_command_line_is_sound() {
+        use clap::CommandFactory;
+        Options::command().debug_assert();
+        for wrong in [
+            ["--sessions", "0"],
+            ["--rate-hz", "0"],
+            ["--rate-hz", "NaN"],
+            ["--duration-s", "-1"],
+            ["--sample-type", "f64"],
+            ["--allow-miss-percent", "-1"],
+        ] {
+            assert!(parse(&wrong).is_err(), "{wrong:?}");
+        }
+        assert_eq!(parse(&["--sample-type", "u8"]).unwrap().sample_type, SampleType::U8);
+    }
+
+    #[test]
+    fn frames_are_rate_times_time_and_at_least_one() {
+        let frames = |arguments: &[&str]| parse(arguments).unwrap().frames();
+        assert_eq!(frames(&[]), (90, 900));
+        assert_eq!(frames(&["--duration-s", "0.001", "--warmup-s", "0"]), (0, 1));
+    }
+}

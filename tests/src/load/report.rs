@@ -1,0 +1,227 @@
+//! The report, for people and for scripts.
+
+use std::{collections::BTreeMap, fmt};
+
+use papilla_proto::{Ready, SampleType};
+use serde::{Deserialize, Serialize};
+
+use super::{Content, Options, TOLERANCE, tally::Tally, tally::Times};
+
+/// Percentiles of a time, us.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Times measured.
+    pub count: u64,
+    /// Median.
+    pub p50: u64,
+    /// One in ten is longer.
+    pub p90: u64,
+    /// One in a hundred is longer.
+    pub p99: u64,
+    /// One in a thousand is longer.
+    pub p99_9: u64,
+    /// The longest.
+    pub max: u64,
+}
+
+impl Percentiles {
+    fn new(Times(histogram): &Times) -> Self {
+        let at = |quantile| histogram.value_at_quantile(quantile);
+        Self {
+            count: histogram.len(),
+            p50: at(0.5),
+            p90: at(0.9),
+            p99: at(0.99),
+            p99_9: at(0.999),
+            max: histogram.max(),
+        }
+    }
+}
+
+/// Answers held against the engine's own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verification {
+    /// Maps compared, those of the warm-up included.
+    pub maps: u64,
+    /// Maps that differ by more than `tolerance`.
+    pub wrong: u64,
+    /// Greatest difference, relative to the greatest value of the map, beyond the error of
+    /// the sample type.
+    pub difference_max: f64,
+    /// Greatest difference allowed, likewise.
+    pub tolerance: f64,
+}
+
+/// What a load run found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Host and port of the service.
+    pub server: String,
+    /// Sessions at a time.
+    pub sessions: usize,
+    /// Frames a second and session.
+    pub rate_hz: f64,
+    /// Time measured, s.
+    pub duration_s: f64,
+    /// Samples on the wire.
+    pub sample_type: SampleType,
+    /// Budget of a frame, us; 0: none.
+    pub budget_us: u32,
+    /// The tier that rendered.
+    pub tier: String,
+    /// Latency that the server expected on an idle machine, us.
+    pub predicted_latency_us: u64,
+    /// Where the presses are from.
+    pub source: String,
+    /// Maps that took turns.
+    pub maps: usize,
+    /// Frames counted.
+    pub frames: u64,
+    /// Answered with a map.
+    pub ok: u64,
+    /// Answered: a newer frame took its place.
+    pub superseded: u64,
+    /// Answered: too late.
+    pub late: u64,
+    /// Refusals by code.
+    pub errors: BTreeMap<String, u64>,
+    /// Never answered.
+    pub lost: u64,
+    /// Maps that came after the map of a later frame.
+    pub out_of_order: u64,
+    /// Answers to no frame, or second answers.
+    pub unexpected: u64,
+    /// Frames without a map within the budget, from the intended instant.
+    pub missed: u64,
+    /// The same, percent of the frames.
+    pub missed_percent: f64,
+    /// From the intended instant to the map, us.
+    pub round_trip_us: Percentiles,
+    /// In the server, from receipt to sending, us.
+    pub server_us: Percentiles,
+    /// From the intended instant to the sending, us: the generator's own part.
+    pub send_delay_us: Percentiles,
+    /// Comparison with the engine's own answers, if asked for.
+    pub verification: Option<Verification>,
+    /// Why sessions ended before their time.
+    pub ended: Vec<String>,
+    /// Greatest share of misses allowed, percent.
+    pub allow_miss_percent: Option<f64>,
+}
+
+impl Report {
+    pub(super) fn new(options: &Options, content: &Content, ready: &Ready, t: &Tally) -> Self {
+        let verification = options.verify.then_some(Verification {
+            maps: t.verified,
+            wrong: t.wrong,
+            difference_max: t.difference_max,
+            tolerance: TOLERANCE,
+        });
+        Self {
+            server: options.server.clone(),
+            sessions: options.sessions.get(),
+            rate_hz: options.rate_hz,
+            duration_s: options.duration_s,
+            sample_type: options.sample_type,
+            budget_us: options.budget_us,
+            tier: ready.tier.clone(),
+            predicted_latency_us: ready.predicted_latency_us,
+            source: content.source.clone(),
+            maps: content.maps_pa.len(),
+            frames: t.frames,
+            ok: t.ok,
+            superseded: t.superseded,
+            late: t.late,
+            errors: t.errors.clone(),
+            lost: t.lost,
+            out_of_order: t.out_of_order,
+            unexpected: t.unexpected,
+            missed: t.missed(),
+            missed_percent: 100.0 * t.missed() as f64 / t.frames.max(1) as f64,
+            round_trip_us: Percentiles::new(&t.round_trip),
+            server_us: Percentiles::new(&t.server),
+            send_delay_us: Percentiles::new(&t.send_delay),
+            verification,
+            ended: t.ended.clone(),
+            allow_miss_percent: options.allow_miss_percent,
+        }
+    }
+
+    /// What the service did that it must not do; misses are not among it.
+    #[must_use]
+    pub fn faults(&self) -> Vec<String> {
+        let mut faults = self.ended.clone();
+        let errors = self.errors.values().sum();
+        for (count, what) in [
+            (errors, "refused"),
+            (self.lost, "never answered"),
+            (self.out_of_order, "out of order"),
+            (self.unexpected, "not asked for"),
+        ] {
+            if count > 0 {
+                faults.push(format!("{count} {what}"));
+            }
+        }
+        match self.verification {
+            Some(v) if v.wrong > 0 => faults.push(format!("{} maps are not the engine's", v.wrong)),
+            Some(v) if v.maps == 0 => faults.push("no map to verify".to_owned()),
+            _ => {}
+        }
+        faults
+    }
+
+    /// Exit code of the program: 0, 1 with a fault, 3 with more misses than allowed.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        if !self.faults().is_empty() {
+            return 1;
+        }
+        let allowed = self.allow_miss_percent.unwrap_or(f64::INFINITY);
+        if self.missed_percent > allowed { 3 } else { 0 }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.sessions == 1 { "" } else { "s" };
+        writeln!(
+            f,
+            "{} session{plural} at {} Hz for {} s, {:?} samples, {} maps from {}",
+            self.sessions, self.rate_hz, self.duration_s, self.sample_type, self.maps, self.source
+        )?;
+        writeln!(f, "tier {}, expected {} us", self.tier, self.predicted_latency_us)?;
+        let errors: u64 = self.errors.values().sum();
+        writeln!(
+            f,
+            "{} frames: {} ok, {} superseded, {} late, {errors} refused, {} lost; {} out of order",
+            self.frames, self.ok, self.superseded, self.late, self.lost, self.out_of_order
+        )?;
+        for (code, count) in &self.errors {
+            writeln!(f, "  refused: {count} {code}")?;
+        }
+        let within = match self.budget_us {
+            0 => String::new(),
+            us => format!(" within {us} us of the instant they were meant to leave"),
+        };
+        writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
+        writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
+        for (name, p) in [
+            ("round trip", &self.round_trip_us),
+            ("  of it in the server", &self.server_us),
+            ("sent late by", &self.send_delay_us),
+        ] {
+            writeln!(f, "{name:24}{:>9}{:>9}{:>9}{:>9}{:>9}", p.p50, p.p90, p.p99, p.p99_9, p.max)?;
+        }
+        if let Some(v) = &self.verification {
+            writeln!(
+                f,
+                "{} maps held against the engine's own: {} wrong, greatest difference {:.1e} of the maximum",
+                v.maps, v.wrong, v.difference_max
+            )?;
+        }
+        for fault in self.faults() {
+            writeln!(f, "FAULT: {fault}")?;
+        }
+        Ok(())
+    }
+}

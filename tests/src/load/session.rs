@@ -1,0 +1,195 @@
+//! One session under load: a task that sends, a task that hears.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use papilla_proto::{FrameHeader, FrameStatus};
+use tokio::{sync::mpsc::UnboundedReceiver, time::timeout_at};
+
+use super::{
+    TOLERANCE, content::Encoded, pacer::Plan, tally::Tally, tally::Times, verify::Reference,
+};
+use crate::socket::{Heard, Receiver, Sender, SocketError, frame};
+
+/// What all sessions share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) plan: Plan,
+    pub(super) encoded: Encoded,
+    pub(super) reference: Option<Reference>,
+    /// How long a map may take to be in time; none: any time will do.
+    pub(super) deadline: Option<Duration>,
+    /// How long to wait after the last frame.
+    pub(super) drain: Duration,
+}
+
+/// Runs one session to its end.
+pub(super) async fn run(
+    shared: Arc<Shared>,
+    session: usize,
+    sender: Sender,
+    receiver: Receiver,
+    beat: UnboundedReceiver<u32>,
+) -> Tally {
+    let sending = tokio::spawn(send(Arc::clone(&shared), session, sender, beat));
+    let mut ear = Ear::new(&shared, session);
+    ear.listen(receiver).await;
+    let mut tally = ear.tally();
+    match sending.await {
+        Ok((mut sender, send_delay)) => {
+            tally.send_delay = send_delay;
+            sender.close().await;
+        }
+        Err(error) => tally.ended.push(format!("session {session}: {error}")),
+    }
+    tally
+}
+
+/// Sends each frame when its time has come.
+async fn send(
+    shared: Arc<Shared>,
+    session: usize,
+    mut sender: Sender,
+    mut beat: UnboundedReceiver<u32>,
+) -> (Sender, Times) {
+    let Shared { plan, encoded, .. } = shared.as_ref();
+    let mut delay = Times::default();
+    let start = plan.intended(session, 0);
+    while let Some(number) = beat.recv().await {
+        let intended = plan.intended(session, number);
+        let time_us = (intended - start).as_micros() as u64;
+        let header = FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
+        let payload = &encoded.payloads[encoded.index(session, number)];
+        let message = frame(&header, payload);
+        if number >= plan.warmup {
+            delay.record(intended.elapsed());
+        }
+        // Err: the listener hears of it too, and says why.
+        if sender.send(message).await.is_err() {
+            break;
+        }
+    }
+    (sender, delay)
+}
+
+/// Hears the answers of one session.
+struct Ear<'a> {
+    shared: &'a Shared,
+    session: usize,
+    tally: Tally,
+    answered: Vec<bool>,
+    outstanding: u32,
+    last_map: Option<u32>,
+    scratch: Vec<f32>,
+}
+
+impl<'a> Ear<'a> {
+    fn new(shared: &'a Shared, session: usize) -> Self {
+        let frames = shared.plan.frames;
+        Self {
+            shared,
+            session,
+            tally: Tally { frames: u64::from(frames - shared.plan.warmup), ..Tally::default() },
+            answered: vec![false; frames as usize],
+            outstanding: frames,
+            last_map: None,
+            scratch: Vec::new(),
+        }
+    }
+
+    /// Until every frame is answered, the session ends, or nothing comes any more.
+    async fn listen(&mut self, mut receiver: Receiver) {
+        let Shared { plan, drain, .. } = self.shared;
+        let last = plan.intended(self.session, plan.frames - 1) + *drain;
+        while self.outstanding > 0 {
+            match timeout_at(last.into(), receiver.hear()).await {
+                Ok(Ok(heard)) => self.take(Instant::now(), &heard),
+                Ok(Err(error)) => return self.end(&error),
+                // What is outstanding is lost.
+                Err(_) => return,
+            }
+        }
+    }
+
+    fn end(&mut self, error: &SocketError) {
+        self.tally.ended.push(format!("session {}: {error}", self.session));
+    }
+
+    fn take(&mut self, now: Instant, heard: &Heard) {
+        match heard {
+            Heard::Frame(header, payload) => self.frame(now, header, payload),
+            Heard::Error(error) => {
+                if error.sequence.is_none_or(|number| self.settle(number)) {
+                    *self.tally.errors.entry(error.code.to_string()).or_default() += 1;
+                }
+                if error.closes {
+                    self.tally.ended.push(format!("session {}: {}", self.session, error.message));
+                }
+            }
+        }
+    }
+
+    fn frame(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
+        let number = header.sequence;
+        let counts = self.settle(number);
+        if header.status == FrameStatus::Ok {
+            self.order(number);
+            self.verify(header, payload);
+        }
+        if !counts {
+            return;
+        }
+        match header.status {
+            FrameStatus::Ok => {
+                let intended = self.shared.plan.intended(self.session, number);
+                let time = now.saturating_duration_since(intended);
+                self.tally.ok += 1;
+                self.tally.in_time += u64::from(self.shared.deadline.is_none_or(|d| time <= d));
+                self.tally.round_trip.record(time);
+                self.tally.server.record(Duration::from_micros(header.time_us.into()));
+            }
+            FrameStatus::Superseded => self.tally.superseded += 1,
+            FrameStatus::Late => self.tally.late += 1,
+            FrameStatus::Error => {
+                *self.tally.errors.entry("status error".to_owned()).or_default() += 1;
+            }
+        }
+    }
+
+    /// Takes note that a frame is answered; false if its answer is not to be counted.
+    fn settle(&mut self, number: u32) -> bool {
+        match self.answered.get_mut(number as usize) {
+            Some(answered) if !*answered => {
+                *answered = true;
+                self.outstanding -= 1;
+                number >= self.shared.plan.warmup
+            }
+            _ => {
+                self.tally.unexpected += 1;
+                false
+            }
+        }
+    }
+
+    fn order(&mut self, number: u32) {
+        if self.last_map.is_some_and(|last| number < last) {
+            self.tally.out_of_order += 1;
+        }
+        self.last_map = self.last_map.max(Some(number));
+    }
+
+    fn verify(&mut self, header: &FrameHeader, payload: &[u8]) {
+        let Some(reference) = &self.shared.reference else { return };
+        let index = self.shared.encoded.index(self.session, header.sequence);
+        let difference = reference.difference(index, header, payload, &mut self.scratch);
+        self.tally.compare(difference, TOLERANCE);
+    }
+
+    fn tally(mut self) -> Tally {
+        let counted = self.answered.iter().skip(self.shared.plan.warmup as usize);
+        self.tally.lost = counted.filter(|answered| !**answered).count() as u64;
+        self.tally
+    }
+}

@@ -1,0 +1,108 @@
+//! The load generator against a real service.
+
+use std::{path::Path, process::Command};
+
+use clap::Parser;
+use papilla_tests::load::{self, LoadError, Options, Report};
+use tempfile::TempDir;
+
+use crate::{
+    scene::PRESSED,
+    service::{Service, model_folder, replaced, tiny_models},
+};
+
+fn models() -> TempDir {
+    tiny_models(&PRESSED.atlas, &PRESSED.samples()[1])
+}
+
+async fn run(service: &Service, arguments: &[&str]) -> Result<Report, LoadError> {
+    let short = ["papilla-load", "--server", &service.address, "--rate-hz", "20"];
+    let shorter = ["--duration-s", "1", "--warmup-s", "0.2", "--drain-s", "60"];
+    let options = Options::try_parse_from([&short[..], &shorter, arguments].concat()).unwrap();
+    load::run(&options).await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
+    let models = models();
+    let folder = models.path().to_str().unwrap();
+    let service = Service::on(models.path()).await;
+    for sample_type in ["f32", "f16", "u16", "u8"] {
+        let arguments = ["--sessions", "2", "--budget-us", "0", "--verify", "--models", folder];
+        let arguments = [&arguments[..], &["--sample-type", sample_type]].concat();
+        let report = run(&service, &arguments).await.unwrap();
+        assert_eq!(report.faults(), Vec::<String>::new(), "{report}");
+        assert_eq!(report.frames, 40);
+        assert_eq!(report.ok + report.superseded, 40, "{report}");
+        assert_eq!(report.missed, 40 - report.ok, "without a deadline any map is in time");
+        assert!(report.ok > 0 && report.tier == "tiny", "{report}");
+        let times = report.round_trip_us;
+        assert_eq!(times.count, report.ok);
+        assert!(times.p50 <= times.p99 && times.p99 <= times.max);
+        assert!(times.max >= report.server_us.p50, "the server's time is part of the trip");
+        let verification = report.verification.unwrap();
+        assert!(verification.maps >= report.ok && verification.wrong == 0, "{report}");
+        assert_eq!(report.exit_code(), 0);
+        let again: Report = serde_json::from_str(&serde_json::to_string(&report).unwrap()).unwrap();
+        assert_eq!(again.round_trip_us, report.round_trip_us);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn misses_are_counted_and_judged() {
+    let models = models();
+    let service = Service::on(models.path()).await;
+    // Nothing is done within a microsecond.
+    let report = run(&service, &["--budget-us", "1"]).await.unwrap();
+    assert_eq!((report.frames, report.late, report.missed), (20, 20, 20), "{report}");
+    assert_eq!(report.exit_code(), 0, "nobody said how many are too many");
+    let report = run(&service, &["--budget-us", "1", "--allow-miss-percent", "99"]).await.unwrap();
+    assert_eq!(report.exit_code(), 3);
+    let report = run(&service, &["--budget-us", "1", "--allow-miss-percent", "100"]).await.unwrap();
+    assert_eq!(report.exit_code(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn maps_of_another_model_are_found_out() {
+    let models = models();
+    let service = Service::on(models.path()).await;
+    // The same network, its output greater by a hundred-thousandth.
+    let onnx = std::fs::read(models.path().join("tiny.onnx")).unwrap();
+    let other = replaced(&onnx, &2_500.0_f32.to_le_bytes(), &2_500.025_f32.to_le_bytes());
+    let other = model_folder(&PRESSED.atlas, &PRESSED.samples()[1], &other);
+    let folder = other.path().to_str().unwrap();
+    let report =
+        run(&service, &["--budget-us", "0", "--verify", "--models", folder]).await.unwrap();
+    let verification = report.verification.unwrap();
+    assert_eq!(verification.wrong, verification.maps, "{report}");
+    assert!((0.9e-5..1.1e-5).contains(&verification.difference_max), "{report}");
+    assert_eq!(report.exit_code(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_run_says_why() {
+    let models = models();
+    let service = Service::on(models.path()).await;
+    let error = run(&service, &["--tier", "nobody"]).await.unwrap_err();
+    assert!(error.to_string().contains("unknown_tier"), "{error}");
+    let error = run(&service, &["--dataset", "/nowhere"]).await.unwrap_err();
+    assert!(error.to_string().contains("/nowhere"), "{error}");
+    let error = run(&service, &["--verify", "--models", "/nowhere"]).await.unwrap_err();
+    assert!(matches!(&error, LoadError::Model { path, .. } if path.starts_with("/nowhere")));
+}
+
+#[test]
+fn exit_codes_are_the_documented_ones() {
+    let program = Path::new(env!("CARGO_BIN_EXE_papilla-load"));
+    let run = |arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).output().unwrap();
+        let said = [output.stdout, output.stderr].concat();
+        (output.status.code(), String::from_utf8(said).unwrap())
+    };
+    let (code, help) = run(&["--help"]);
+    assert!(code == Some(0) && help.contains("Exit codes"), "{help}");
+    assert_eq!(run(&["--sessions", "none"]).0, Some(2));
+    // Port 1 of the loopback: nobody listens there.
+    let (code, said) = run(&["--server", "127.0.0.1:1"]);
+    assert!(code == Some(1) && said.contains("is the service running"), "{said}");
+}

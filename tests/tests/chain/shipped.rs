@@ -1,0 +1,130 @@
+//! What ships: the models answer the presses they come with, and the presses can be solved
+//! again.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use fe_datagen::{
+    dataset::{Dataset, PressEntry, Shard, Split},
+    scene::Scene,
+};
+use papilla_proto::{
+    MAP_LEN,
+    atlas::{Atlas, Patch, Raster},
+};
+
+use crate::{
+    assert_close, client,
+    scene::{Pressed, map_integral},
+    service::{Sample, Service},
+};
+
+/// A folder of the repository; it must be there.
+pub(crate) fn folder(name: &str) -> PathBuf {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(name);
+    let there = fs::read_dir(&path).is_ok_and(|mut entries| entries.next().is_some());
+    assert!(
+        there,
+        "{name}/ is missing or empty in the repository: models/ and data/s1/ ship with it; \
+         docs/dataset.md and docs/training.md say how they are made"
+    );
+    path
+}
+
+/// A text file that ships; it must be there.
+pub(crate) fn text(path: &Path) -> String {
+    fs::read_to_string(path)
+        .unwrap_or_else(|error| panic!("{}: {error}; it ships with the repository", path.display()))
+}
+
+fn dataset() -> Dataset {
+    Dataset::open(&folder("data/s1")).unwrap()
+}
+
+fn held_out(dataset: &Dataset) -> Vec<&PressEntry> {
+    let presses = dataset.manifest().presses.iter();
+    presses.filter(|press| press.split == Split::Test).collect()
+}
+
+fn samples(shard: &Shard) -> Vec<Sample> {
+    let sample = |i: usize| Sample {
+        pressure_pa: shard.pressure_pa.row(i).to_vec(),
+        sed_j_per_m3: shard.sed_dermis_j_per_m3.row(i).to_vec(),
+        depth_mm: shard.depth_mm[i],
+    };
+    (0..shard.len()).map(sample).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_shipped_models_answer_every_client() {
+    let service = Service::shipped().await;
+    let dataset = dataset();
+    assert_eq!(service.atlas.hash(), dataset.atlas().hash());
+    for card in &service.cards {
+        assert_eq!(card.dataset_sha256, dataset.manifest().dataset_sha256, "{}", card.name);
+    }
+    let press = samples(&dataset.shard(held_out(&dataset)[0]).unwrap());
+    let deepest = press.last().unwrap();
+    client::http_answers_are_the_librarys(&service, deepest).await;
+    client::nothing_in_nothing_out(&service).await;
+    client::http_mistakes_are_named(&service, deepest).await;
+    client::session_answers_are_the_librarys(&service, &press).await;
+    client::sessions_survive_mistakes(&service, deepest).await;
+}
+
+/// The figure on the card is what a client of the service finds.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_card_tells_the_truth() {
+    let service = Service::shipped().await;
+    let dataset = dataset();
+    let shards = held_out(&dataset).into_iter().map(|press| dataset.shard(press).unwrap());
+    let all: Vec<Sample> = shards.flat_map(|shard| samples(&shard)).collect();
+    let card = &service.cards[0].metrics;
+    assert_eq!((card.split.as_str(), card.samples), ("test", all.len()));
+    let found = client::median_error(&service, &all).await;
+    let due = card.relative_l2.median;
+    assert!((found / due - 1.0).abs() < 1e-3, "median relative L2 {found}, the card says {due}");
+}
+
+/// The map knows the undeformed area, the force the deformed one: they agree to some percent.
+#[test]
+fn maps_of_the_dataset_carry_the_force_of_the_plate() {
+    let dataset = dataset();
+    let skin = Raster::new(dataset.atlas(), Patch::Skin);
+    let mut map = vec![0.0; MAP_LEN];
+    for press in held_out(&dataset) {
+        let shard = dataset.shard(press).unwrap();
+        for (sample, force_n) in samples(&shard).iter().zip(shard.force_n.rows()) {
+            skin.rasterise(&sample.pressure_pa, &mut map).unwrap();
+            let force_n = force_n.iter().map(|f| f64::from(f * f)).sum::<f64>().sqrt();
+            let share = map_integral(dataset.atlas(), &skin, &map) / force_n;
+            let what = format!("press {}, {} mm", press.id, sample.depth_mm);
+            assert!((share - 1.0).abs() < 0.1, "{what}: {share} of the force");
+        }
+    }
+}
+
+/// The solver of today finds what the dataset holds, on the atlas that the models carry.
+#[test]
+fn a_shipped_press_can_be_solved_again() {
+    let dataset = dataset();
+    let press = held_out(&dataset)[0];
+    let shard = dataset.shard(press).unwrap();
+    // The campaign's mesh and plate are those of this scene; the pose is the press's.
+    let mut scene = Scene::read(&folder("scenes").join("flat-press.toml")).unwrap();
+    scene.motion.pitch_deg = press.pose.pitch_deg;
+    scene.motion.roll_deg = press.pose.roll_deg;
+    scene.motion.yaw_deg = press.pose.yaw_deg;
+    scene.motion.depth_mm = f64::from(shard.depth_mm[0]);
+    scene.motion.increments = 1;
+    scene.validate().unwrap();
+    let pressed = Pressed::solve(&scene);
+    let shipped = Atlas::from_json(&text(&folder("models").join("atlas.json")));
+    assert_eq!(pressed.atlas.hash(), shipped.unwrap().hash(), "the atlas of the models");
+    let found = &pressed.samples()[0];
+    let due = &samples(&shard)[0];
+    assert_close("pressure", &found.pressure_pa, &due.pressure_pa, 1e-3);
+    assert_close("SED", &found.sed_j_per_m3, &due.sed_j_per_m3, 1e-3);
+}
