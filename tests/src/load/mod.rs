@@ -97,7 +97,7 @@ pub async fn run(options: &Options) -> Result<Report, LoadError> {
     let encoded = Encoded::new(&content, options.sample_type)?;
     // The first session learns the tier; all others ask for that one, so that all load the same.
     let mut hello = Hello {
-        budget_us: (options.budget_us > 0).then_some(options.budget_us),
+        budget_us: options.budget(),
         tier: options.tier.clone(),
         sample_type: options.sample_type,
         atlas_hash: Some(content.atlas_hash.clone()),
@@ -131,7 +131,7 @@ async fn load(
         plan: Plan::new(options, Instant::now() + RUN_UP),
         encoded,
         reference,
-        deadline: hello.budget_us.map(|us| Duration::from_micros(us.into())),
+        deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
         drain: Duration::from_secs(options.drain_s),
     });
     let (mut beats, mut tasks) = (Vec::new(), Vec::new());

@@ -11,12 +11,14 @@ use papilla_proto::SampleType;
 const HELP_TAIL: &str = "\
 Frames leave at their instants whether or not answers come (open loop), and times are
 counted from the instant a frame was meant to leave, so that no wait is hidden.
-A frame is missed if no map came back within the budget, counted from that instant:
-late, superseded, refused, lost, or ok but too slow.
+A frame is missed if no map came back within --deadline-us of that instant: late,
+superseded, refused, lost, or ok but too slow.
 
 Examples:
   papilla-load                                  one session, 90 Hz, 10 s
   papilla-load --sessions 8 --rate-hz 30 --tier s1-base4
+  papilla-load --budget-us 0 --deadline-us 11111
+                                                drop nothing, count what a 90 Hz frame misses
   papilla-load --dataset data/s1 --sample-type u16 --verify
   papilla-load --allow-miss-percent 1 --json    for a script
 
@@ -59,9 +61,14 @@ pub struct Options {
     #[arg(long, default_value = "f32", value_name = "TYPE", value_parser = sample_type)]
     pub sample_type: SampleType,
 
-    /// Budget of a frame, us; 0: none. 90 Hz leave 11111.
-    #[arg(long, default_value = "11000", value_name = "US")]
+    /// Budget of a frame, us, after which the service drops it; 0: none. Touch may lag 50 ms
+    /// behind sight unnoticed.
+    #[arg(long, default_value = "50000", value_name = "US")]
     pub budget_us: u32,
+
+    /// Time after which a map counts as missed, us [default: the budget].
+    #[arg(long, value_name = "US")]
+    pub deadline_us: Option<NonZeroU32>,
 
     /// Tier by name [default: the one the service chooses for the budget].
     #[arg(long, value_name = "NAME")]
@@ -102,6 +109,16 @@ pub struct Options {
 }
 
 impl Options {
+    /// The budget as the protocol has it.
+    pub(super) fn budget(&self) -> Option<u32> {
+        (self.budget_us > 0).then_some(self.budget_us)
+    }
+
+    /// Time after which a map counts as missed, us; none: never.
+    pub(super) fn deadline(&self) -> Option<u32> {
+        self.deadline_us.map(NonZeroU32::get).or_else(|| self.budget())
+    }
+
     /// Frames of one session that are sent but not counted, and those that are.
     pub(super) fn frames(&self) -> (u32, u32) {
         let frames = |seconds: f64| (seconds * self.rate_hz).round() as u32;
@@ -153,6 +170,14 @@ mod tests {
             assert!(parse(&wrong).is_err(), "{wrong:?}");
         }
         assert_eq!(parse(&["--sample-type", "u8"]).unwrap().sample_type, SampleType::U8);
+    }
+
+    #[test]
+    fn the_deadline_is_the_budget_unless_told() {
+        let deadline = |arguments: &[&str]| parse(arguments).unwrap().deadline();
+        assert_eq!(deadline(&["--budget-us", "7000"]), Some(7000));
+        assert_eq!(deadline(&["--budget-us", "0"]), None);
+        assert_eq!(deadline(&["--budget-us", "0", "--deadline-us", "5"]), Some(5));
     }
 
     #[test]

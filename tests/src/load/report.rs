@@ -25,16 +25,17 @@ pub struct Percentiles {
 }
 
 impl Percentiles {
-    fn new(Times(histogram): &Times) -> Self {
+    /// None without a time.
+    fn new(Times(histogram): &Times) -> Option<Self> {
         let at = |quantile| histogram.value_at_quantile(quantile);
-        Self {
+        (!histogram.is_empty()).then(|| Self {
             count: histogram.len(),
             p50: at(0.5),
             p90: at(0.9),
             p99: at(0.99),
             p99_9: at(0.999),
             max: histogram.max(),
-        }
+        })
     }
 }
 
@@ -65,8 +66,10 @@ pub struct Report {
     pub duration_s: f64,
     /// Samples on the wire.
     pub sample_type: SampleType,
-    /// Budget of a frame, us; 0: none.
-    pub budget_us: u32,
+    /// Budget of a frame, us; none: nothing is dropped.
+    pub budget_us: Option<u32>,
+    /// Time after which a map counts as missed, us; none: never.
+    pub deadline_us: Option<u32>,
     /// The tier that rendered.
     pub tier: String,
     /// Latency that the server expected on an idle machine, us.
@@ -91,16 +94,16 @@ pub struct Report {
     pub out_of_order: u64,
     /// Answers to no frame, or second answers.
     pub unexpected: u64,
-    /// Frames without a map within the budget, from the intended instant.
+    /// Frames without a map within the deadline, from the intended instant.
     pub missed: u64,
     /// The same, percent of the frames.
     pub missed_percent: f64,
-    /// From the intended instant to the map, us.
-    pub round_trip_us: Percentiles,
+    /// From the intended instant to the map, us; none if no map came.
+    pub round_trip_us: Option<Percentiles>,
     /// In the server, from receipt to sending, us.
-    pub server_us: Percentiles,
+    pub server_us: Option<Percentiles>,
     /// From the intended instant to the sending, us: the generator's own part.
-    pub send_delay_us: Percentiles,
+    pub send_delay_us: Option<Percentiles>,
     /// Comparison with the engine's own answers, if asked for.
     pub verification: Option<Verification>,
     /// Why sessions ended before their time.
@@ -123,7 +126,8 @@ impl Report {
             rate_hz: options.rate_hz,
             duration_s: options.duration_s,
             sample_type: options.sample_type,
-            budget_us: options.budget_us,
+            budget_us: options.budget(),
+            deadline_us: options.deadline(),
             tier: ready.tier.clone(),
             predicted_latency_us: ready.predicted_latency_us,
             source: content.source.clone(),
@@ -189,7 +193,12 @@ impl fmt::Display for Report {
             "{} session{plural} at {} Hz for {} s, {:?} samples, {} maps from {}",
             self.sessions, self.rate_hz, self.duration_s, self.sample_type, self.maps, self.source
         )?;
-        writeln!(f, "tier {}, expected {} us", self.tier, self.predicted_latency_us)?;
+        write!(f, "tier {}, expected {} us", self.tier, self.predicted_latency_us)?;
+        writeln!(
+            f,
+            "; {}",
+            self.budget_us.map_or("no budget".to_owned(), |us| format!("budget {us} us"))
+        )?;
         let errors: u64 = self.errors.values().sum();
         writeln!(
             f,
@@ -199,18 +208,22 @@ impl fmt::Display for Report {
         for (code, count) in &self.errors {
             writeln!(f, "  refused: {count} {code}")?;
         }
-        let within = match self.budget_us {
-            0 => String::new(),
-            us => format!(" within {us} us of the instant they were meant to leave"),
-        };
+        let within = self.deadline_us.map_or_else(String::new, |us| {
+            format!(" within {us} us of the instant they were meant to leave")
+        });
         writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
         writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
-        for (name, p) in [
-            ("round trip", &self.round_trip_us),
-            ("  of it in the server", &self.server_us),
-            ("sent late by", &self.send_delay_us),
+        for (name, times) in [
+            ("round trip", self.round_trip_us),
+            ("  of it in the server", self.server_us),
+            ("sent late by", self.send_delay_us),
         ] {
-            writeln!(f, "{name:24}{:>9}{:>9}{:>9}{:>9}{:>9}", p.p50, p.p90, p.p99, p.p99_9, p.max)?;
+            write!(f, "{name:24}")?;
+            let columns = times.map(|p| [p.p50, p.p90, p.p99, p.p99_9, p.max]);
+            for column in columns.map_or([None; 5], |times| times.map(Some)) {
+                write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
+            }
+            writeln!(f)?;
         }
         if let Some(v) = &self.verification {
             writeln!(

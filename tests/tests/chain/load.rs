@@ -36,10 +36,13 @@ async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
         assert_eq!(report.ok + report.superseded, 40, "{report}");
         assert_eq!(report.missed, 40 - report.ok, "without a deadline any map is in time");
         assert!(report.ok > 0 && report.tier == "tiny", "{report}");
-        let times = report.round_trip_us;
+        let times = report.round_trip_us.unwrap();
         assert_eq!(times.count, report.ok);
         assert!(times.p50 <= times.p99 && times.p99 <= times.max);
-        assert!(times.max >= report.server_us.p50, "the server's time is part of the trip");
+        assert!(
+            times.max >= report.server_us.unwrap().p50,
+            "the server's time is part of the trip"
+        );
         let verification = report.verification.unwrap();
         assert!(verification.maps >= report.ok && verification.wrong == 0, "{report}");
         assert_eq!(report.exit_code(), 0);
@@ -56,10 +59,15 @@ async fn misses_are_counted_and_judged() {
     let report = run(&service, &["--budget-us", "1"]).await.unwrap();
     assert_eq!((report.frames, report.late, report.missed), (20, 20, 20), "{report}");
     assert_eq!(report.exit_code(), 0, "nobody said how many are too many");
+    assert!(report.round_trip_us.is_none(), "no map, no time");
     let report = run(&service, &["--budget-us", "1", "--allow-miss-percent", "99"]).await.unwrap();
     assert_eq!(report.exit_code(), 3);
     let report = run(&service, &["--budget-us", "1", "--allow-miss-percent", "100"]).await.unwrap();
     assert_eq!(report.exit_code(), 0);
+    // The service need not drop what the client thinks too slow.
+    let report = run(&service, &["--budget-us", "0", "--deadline-us", "1"]).await.unwrap();
+    assert!(report.ok > 0 && report.late == 0, "{report}");
+    assert_eq!((report.missed, report.exit_code()), (20, 0));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -10,6 +10,9 @@
 //! | `client` | what every client must find, over HTTP and in a session |
 //! | `load` | the load generator against the service |
 
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
 mod client;
 mod load;
 mod scene;
