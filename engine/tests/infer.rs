@@ -1,5 +1,8 @@
 //! A real ONNX file through the engine, against ONNX Runtime's recorded answer.
 
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{TINY, altered, expected, graph, press_pa};

@@ -1,5 +1,8 @@
 //! Files that are no Papilla model: each is refused with an error that names the fault.
 
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{TINY, altered, graph, node, set_metadata};

@@ -1,6 +1,9 @@
 //! The whole way on the command line: a dataset whose truth is the model's own answer times
 //! 0.8, so that every figure is known in closed form.
 
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
 use ndarray::{Array1, Array2, Array3, Axis};
 use ndarray_npy::NpzWriter;
 use papilla_engine::{Card, MAP_LEN, MAP_SIDE_PX, card::Index, load};

@@ -10,7 +10,8 @@ use super::{Map, Quantity};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PressureMap {
-    pressure_pa: Vec<f32>,
+    /// In 64 bits: what overflows 32 is then infinite, and refused with its place.
+    pressure_pa: Vec<f64>,
 }
 
 /// Only what a reader needs: a pressure map reads back as it is.
@@ -32,7 +33,9 @@ pub(super) fn decode(bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Proble
         let message = format!("the map has {samples} samples, 224 x 224 = {MAP_LEN} are needed");
         return Err(Problem::new(ErrorCode::WrongLength, message).at("pressure_pa"));
     }
-    pressure_pa.copy_from_slice(&map.pressure_pa);
+    for (sample, value) in pressure_pa.iter_mut().zip(map.pressure_pa) {
+        *sample = value as f32;
+    }
     Ok(())
 }
 

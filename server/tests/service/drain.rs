@@ -48,9 +48,11 @@ async fn frames_that_come_during_the_drain_are_refused_by_name() {
     let mut socket = service.socket().await;
     socket.open(hello(&json!({"tier": "slow"}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
-    sleep(Duration::from_millis(30)).await;
+    // The answer to what comes after a frame says that the frame was taken.
+    socket.send("?").await;
+    socket.hear_refusal("unexpected_text").await;
     let drain = tokio::spawn(service.server.drain());
-    sleep(Duration::from_millis(10)).await;
+    sleep(Duration::from_millis(50)).await;
     socket.send(frame(2, 0, SampleType::F32, 1.0, &ramp())).await;
     let refused = socket.hear_refusal("shutting_down").await;
     assert_eq!(refused["sequence"], 2);
