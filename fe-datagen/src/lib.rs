@@ -15,3 +15,4 @@ pub mod output;
 pub mod press;
 pub mod scene;
 pub mod solve;
+pub mod verify;

@@ -4,6 +4,7 @@ mod atlas;
 mod dataset;
 mod generate;
 mod solve;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -28,6 +29,7 @@ enum Command {
     Generate(generate::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
+    Verify(verify::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -37,6 +39,7 @@ pub fn run() -> ExitCode {
         Command::Solve(args) => solve::run(&args),
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match result {

@@ -11,8 +11,10 @@ use std::process::ExitCode;
 /// Prints one line a quantity: this code, the reference, where that comes
 /// from, how far apart they are and how far they may be.
 #[derive(clap::Args)]
-#[command(after_help = "Exit code 3 if any row is past its tolerance. docs/verification.md says what each row \
-                        shows.\nExample: fe-datagen verify --only hertz --only cook")]
+#[command(
+    after_help = "Exit code 3 if any row is past its tolerance. docs/verification.md says what each row \
+                        shows.\nExample: fe-datagen verify --only hertz --only cook"
+)]
 pub(super) struct Args {
     /// Run only this case; may be given several times.
     #[arg(long, value_name = "NAME")]
@@ -35,7 +37,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let wanted = |c: &verify::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
     let bar = indicatif::ProgressBar::new(CASES.iter().filter(|c| wanted(c)).count() as u64);
-    bar.set_style(indicatif::ProgressStyle::with_template("{wide_bar} {pos}/{len} {msg} {elapsed}")?);
+    bar.set_style(indicatif::ProgressStyle::with_template(
+        "{wide_bar} {pos}/{len} {msg} {elapsed}",
+    )?);
     bar.enable_steady_tick(std::time::Duration::from_millis(250));
     if !args.json {
         println!("{}", Row::heading());

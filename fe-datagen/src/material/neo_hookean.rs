@@ -18,9 +18,9 @@ impl Isochoric for NeoHookean {
 
     /// `P = mu J^(-2/3) (F - I1/3 F^-T)`.
     ///
-    /// The bracket is `(J F - I1/3 cof F) / J`; with `cof F = I + tr(H) I - H^T
-    /// + cof H` the unit matrices cancel symbolically and small strain keeps
-    /// all digits.
+    /// The bracket is `(J F - I1/3 cof F) / J`. In
+    /// `cof F = I + tr(H) I - H^T + cof H` the unit matrices cancel symbolically
+    /// and small strain keeps all digits.
     #[inline]
     fn first_piola(&self, k: &Kinematics) -> Mat3 {
         let j = k.j_minus_1;

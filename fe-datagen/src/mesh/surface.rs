@@ -90,6 +90,9 @@ impl FaceKind {
     }
 }
 
+/// Receives face nodes, shape values and area vector (mm2) of one point.
+pub type FaceVisitor<'a> = &'a mut dyn FnMut(&[u32], &[f64], [f64; 3]);
+
 /// Faces of one kind.
 #[derive(Clone, Debug)]
 pub struct Surface {
@@ -121,7 +124,7 @@ impl Surface {
         &self,
         rule: &[([f64; 2], f64)],
         x: &dyn Fn(u32) -> [f64; 3],
-        visit: &mut dyn FnMut(&[u32], &[f64], [f64; 3]),
+        visit: FaceVisitor<'_>,
     ) {
         let n = self.kind.nodes();
         let (mut value, mut gradient) = ([0.0; 9], [[0.0; 2]; 9]);

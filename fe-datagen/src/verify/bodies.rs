@@ -46,11 +46,7 @@ pub(super) fn lattice(
 }
 
 /// A unit cube of `cells^3` elements (tetrahedra: six a cell).
-pub(super) fn cube(
-    kind: ElementKind,
-    cells: usize,
-    map: impl Fn([f64; 3]) -> [f64; 3],
-) -> Mesh {
+pub(super) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
     let n = if kind == ElementKind::Hex27 { 2 * cells } else { cells };
     lattice(kind, [even(1.0, n), even(1.0, n), even(1.0, n)], map)
 }
@@ -96,7 +92,8 @@ fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
         }
     }
     for set in mesh.node_sets.values_mut() {
-        let both = |(a, b): &(u32, u32)| set.binary_search(a).is_ok() && set.binary_search(b).is_ok();
+        let both =
+            |(a, b): &(u32, u32)| set.binary_search(a).is_ok() && set.binary_search(b).is_ok();
         let new: Vec<_> = middle.iter().filter(|(k, _)| both(k)).map(|(_, &m)| m).collect();
         set.extend(new);
         set.sort_unstable();
@@ -182,7 +179,14 @@ pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
     let all = [true; 3];
     hold(
         mesh,
-        &[("x_min", all), ("x_max", all), ("y_min", all), ("y_max", all), ("z_min", all), ("z_max", all)],
+        &[
+            ("x_min", all),
+            ("x_max", all),
+            ("y_min", all),
+            ("y_max", all),
+            ("z_min", all),
+            ("z_max", all),
+        ],
     )
 }
 

@@ -57,19 +57,31 @@ impl FlatPress {
         let depths: Vec<f64> = (1..=steps).map(|i| step_mm * f64::from(i)).collect();
         let skin = &finger.problem.mesh.surfaces["skin"];
         let mut equilibria = Vec::new();
-        finger.press(&mut solver, pose, PlateSpec::default(), &depths, REFINEMENT, &mut |solver, record, _| {
-            let pressure = solver.pressure_mpa(skin);
-            let x = solver.deformed();
-            let mut area = vec![0.0; x.len()];
-            skin.add_nodal_areas(&|n| x[n as usize], &mut area);
-            equilibria.push(Equilibrium {
-                depth_mm: record.depth_mm,
-                force_n: norm(record.force_n),
-                area_mm2: area.iter().zip(&pressure).filter(|(_, p)| **p > 0.0).map(|(a, _)| a).sum(),
-                peak_mpa: pressure.iter().copied().fold(0.0, f64::max),
-                checks: record.checks,
-            });
-        })?;
+        finger.press(
+            &mut solver,
+            pose,
+            PlateSpec::default(),
+            &depths,
+            REFINEMENT,
+            &mut |solver, record, _| {
+                let pressure = solver.pressure_mpa(skin);
+                let x = solver.deformed();
+                let mut area = vec![0.0; x.len()];
+                skin.add_nodal_areas(&|n| x[n as usize], &mut area);
+                equilibria.push(Equilibrium {
+                    depth_mm: record.depth_mm,
+                    force_n: norm(record.force_n),
+                    area_mm2: area
+                        .iter()
+                        .zip(&pressure)
+                        .filter(|(_, p)| **p > 0.0)
+                        .map(|(a, _)| a)
+                        .sum(),
+                    peak_mpa: pressure.iter().copied().fold(0.0, f64::max),
+                    checks: record.checks,
+                });
+            },
+        )?;
         Ok(Self { density, equilibria })
     }
 
@@ -82,7 +94,15 @@ impl FlatPress {
 pub(super) fn balances(context: &Context) -> Result<Vec<Check>, CaseError> {
     let press = context.flat_press()?;
     let judged = || press.equilibria.iter().filter(|e| e.depth_mm >= DEPTH_MIN_MM);
-    for e in &press.equilibria { eprintln!("DBG {:.2} {:.4} {:.2e} {:.2e}", e.depth_mm, e.force_n, e.checks.contact_force_vs_pressure_integral, e.checks.energy_vs_work); }
+    for e in &press.equilibria {
+        eprintln!(
+            "DBG {:.2} {:.4} {:.2e} {:.2e}",
+            e.depth_mm,
+            e.force_n,
+            e.checks.contact_force_vs_pressure_integral,
+            e.checks.energy_vs_work
+        );
+    }
     let worst = |of: fn(&Checks) -> f64| judged().map(|e| of(&e.checks)).fold(0.0, f64::max);
     let first = judged().next().map_or(0.0, |e| e.depth_mm);
     let deepest = press.equilibria.last().map_or(0.0, |e| e.depth_mm);
@@ -110,8 +130,7 @@ pub(super) fn sanity(context: &Context) -> Result<Vec<Check>, CaseError> {
         .windows(2)
         .map(|w| (w[1].force_n - w[0].force_n) / (w[1].depth_mm - w[0].depth_mm))
         .collect();
-    let least_rise =
-        stiffness.windows(2).map(|w| w[1] / w[0]).fold(f64::INFINITY, f64::min);
+    let least_rise = stiffness.windows(2).map(|w| w[1] / w[0]).fold(f64::INFINITY, f64::min);
     let ratio = one.peak_mpa * one.area_mm2 / one.force_n;
     let bound = "Hertz without bone 0.25 N; bone stiffens it a few times";
     let paraboloid = "inverted paraboloid: 2 (Hertz: 1.5)";
@@ -138,8 +157,7 @@ fn slope(points: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
     let n = points.clone().count() as f64;
     let (sx, sy) = points.clone().fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
     let (mx, my) = (sx / n, sy / n);
-    let (xy, xx) = points.fold((0.0, 0.0), |s, p| {
-        (s.0 + (p.0 - mx) * (p.1 - my), s.1 + (p.0 - mx).powi(2))
-    });
+    let (xy, xx) =
+        points.fold((0.0, 0.0), |s, p| (s.0 + (p.0 - mx) * (p.1 - my), s.1 + (p.0 - mx).powi(2)));
     xy / xx
 }

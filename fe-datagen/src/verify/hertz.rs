@@ -45,11 +45,8 @@ fn press(kind: ElementKind, h: f64, nu: f64, depth: f64) -> Result<[f64; 3], Cas
         travel_mm: [0.0, 0.0, -depth],
     };
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
-    let options = Options {
-        residual_tolerance: 1e-6,
-        gap_tolerance_mm: 1e-4 * depth,
-        ..Options::default()
-    };
+    let options =
+        Options { residual_tolerance: 1e-6, gap_tolerance_mm: 1e-4 * depth, ..Options::default() };
     let (solver, _) = solve(&problem, loading, options, 2)?;
     let force = 4.0 * norm(problem_force(&solver));
     // For Hertz' pressure the mean of r^2 over the load is 2/5 a^2.

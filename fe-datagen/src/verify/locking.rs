@@ -28,11 +28,7 @@ fn force_n(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
     let mesh = lattice(kind, [even(5.0, n), even(5.0, n), even(5.0, n)], |p| p);
     let fixed = hold(
         &mesh,
-        &[
-            ("x_min", [true, false, false]),
-            ("y_min", [false, true, false]),
-            ("z_min", [true; 3]),
-        ],
+        &[("x_min", [true, false, false]), ("y_min", [false, true, false]), ("z_min", [true; 3])],
     );
     let problem = Problem::new(mesh, uniform(0.1, nu)?, fixed, Some("z_max"))?;
     // Upside down: the plate presses with its local +z face.

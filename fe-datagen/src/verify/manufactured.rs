@@ -73,9 +73,9 @@ fn integrate(mesh: &Mesh, visit: &mut dyn FnMut(&Place<'_>)) {
     let block = &mesh.blocks[0];
     let n = block.kind.nodes();
     let (mut value, mut reference) = (vec![0.0; n], vec![[0.0; 3]; n]);
-    let rule = GAUSS_3.iter().flat_map(|&a| {
-        GAUSS_3.iter().flat_map(move |&b| GAUSS_3.iter().map(move |&c| [a, b, c]))
-    });
+    let rule = GAUSS_3
+        .iter()
+        .flat_map(|&a| GAUSS_3.iter().flat_map(move |&b| GAUSS_3.iter().map(move |&c| [a, b, c])));
     for point in rule {
         let xi = point.map(|p| p.0);
         let weight: f64 = point.iter().map(|p| p.1).product();

@@ -20,8 +20,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let [left, right] = [-15.0, 15.0].map(|roll_deg| press(&finger, roll_deg));
     let (left, right) = (left?, right?);
     let patch = &finger.patch.as_ref().ok_or("the fingertip has no patch")?.patch;
-    let skin: Vec<_> =
-        patch.skin.iter().map(|&n| finger.problem.mesh.nodes[n as usize]).collect();
+    let skin: Vec<_> = patch.skin.iter().map(|&n| finger.problem.mesh.nodes[n as usize]).collect();
     // The mesh mirrors bit for bit; adding zero turns -0 into 0.
     let key = |p: &[f64; 3], sign: f64| [p[0], sign * p[1] + 0.0, p[2]].map(f64::to_bits);
     let at: HashMap<_, _> = skin.iter().enumerate().map(|(i, p)| (key(p, 1.0), i)).collect();
@@ -48,12 +47,20 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
 }
 
 fn press(finger: &Body, roll_deg: f64) -> Result<IncrementRecord, CaseError> {
-    let options = Options { residual_tolerance: 1e-10, gap_tolerance_mm: 1e-5, ..Options::default() };
+    let options =
+        Options { residual_tolerance: 1e-10, gap_tolerance_mm: 1e-5, ..Options::default() };
     let mut solver = finger.solver(options)?;
     let pose = Pose { pitch_deg: 10.0, roll_deg, yaw_deg: 0.0 };
     let mut last = None;
-    finger.press(&mut solver, pose, PlateSpec::default(), &[0.5, 1.0], 1, &mut |_, record, _| {
-        last = Some(record.clone());
-    })?;
+    finger.press(
+        &mut solver,
+        pose,
+        PlateSpec::default(),
+        &[0.5, 1.0],
+        1,
+        &mut |_, record, _| {
+            last = Some(record.clone());
+        },
+    )?;
     last.ok_or_else(|| "the press gave no record".into())
 }

@@ -5,8 +5,8 @@ use super::bodies::{
 };
 use super::{CaseError, Check, Context};
 use crate::element::ElementKind;
-use crate::material::kinematics::Mat3;
 use crate::material::Kinematics;
+use crate::material::kinematics::Mat3;
 use crate::solve::{Loading, Problem};
 
 const SOURCE: &str = "exact (Irons & Razzaque 1972)";

@@ -105,8 +105,11 @@ impl Report {
         for case in CASES {
             let rows: Vec<_> = self.rows.iter().filter(|r| r.case == case.name).collect();
             let Some(first) = rows.first() else { continue };
-            let _ = writeln!(out, "## `{}`\n\n{} ({:.1} s)\n", case.name, case.shows, first.seconds);
-            out.push_str("| quantity | this code | reference | source | difference | tolerance | |\n");
+            let _ =
+                writeln!(out, "## `{}`\n\n{} ({:.1} s)\n", case.name, case.shows, first.seconds);
+            out.push_str(
+                "| quantity | this code | reference | source | difference | tolerance | |\n",
+            );
             out.push_str("|---|---|---|---|---|---|---|\n");
             for Row { check: c, .. } in rows {
                 let _ = writeln!(

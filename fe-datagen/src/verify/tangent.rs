@@ -58,8 +58,7 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
     let equations = &structure.equations;
     let mut tangent = structure.zeros();
     let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
-        let trial =
-            Trial { u, multipliers_mpa: &multipliers, penalty: 3.0, load_fraction: 1.0 };
+        let trial = Trial { u, multipliers_mpa: &multipliers, penalty: 3.0, load_fraction: 1.0 };
         let mut out = Evaluation::default();
         evaluate_body(&problem, &loading, &trial, with_tangent.then_some(&mut tangent), &mut out)?;
         Ok(out)
@@ -76,7 +75,8 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
         u[node][i] = middle - STEP_MM;
         let minus = at(&u, false)?.residual_n;
         u[node][i] = middle;
-        difference.push(dofs.iter().map(|&d| (plus[d] - minus[d]) / (2.0 * STEP_MM)).collect::<Vec<_>>());
+        difference
+            .push(dofs.iter().map(|&d| (plus[d] - minus[d]) / (2.0 * STEP_MM)).collect::<Vec<_>>());
     }
     let (mut unit, mut column) = (vec![0.0; equations.count], vec![0.0; equations.count]);
     let (mut worst, mut scale) = (0.0f64, 0.0f64);

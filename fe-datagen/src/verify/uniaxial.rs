@@ -22,8 +22,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
                     ("z_min", [false, false, true]),
                 ],
             );
-            let prescribed_mm =
-                prescribe(&mesh, &fixed, |x| [(stretch - 1.0) * x[0], 0.0, 0.0]);
+            let prescribed_mm = prescribe(&mesh, &fixed, |x| [(stretch - 1.0) * x[0], 0.0, 0.0]);
             let problem = Problem::new(mesh, uniform(0.08, 0.45)?, fixed, None)?;
             let loading = Loading { prescribed_mm, ..Loading::default() };
             let (solver, _) = solve(&problem, loading, tight(), 4)?;
@@ -57,7 +56,6 @@ fn closed_form(material: &Material, a: f64) -> (f64, f64) {
     }
     let j = a * l * l;
     let i1 = a * a + 2.0 * l * l;
-    let nominal =
-        mu * j.powf(-2.0 / 3.0) * (a - i1 / (3.0 * a)) + bulk * (j - 1.0) * j / a;
+    let nominal = mu * j.powf(-2.0 / 3.0) * (a - i1 / (3.0 * a)) + bulk * (j - 1.0) * j / a;
     (l, nominal)
 }
