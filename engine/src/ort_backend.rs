@@ -49,12 +49,18 @@ fn environment() -> Result<Environment, EngineError> {
     made.clone().map_err(|reason| EngineError::BackendMissing { backend: Backend::Ort, reason })
 }
 
-/// Version of the opened library, from its build information
-/// (`ORT Build Info: git-branch=rel-1.31.1, ...`).
-fn version() -> &'static str {
+/// Which library was opened: the branch or else the commit of its build information
+/// (`ORT Build Info: git-branch=rel-1.19.0, git-commit-id=26250ae, ...`; wheels print
+/// `git-branch=HEAD`).
+fn version() -> String {
     let info = ort::info();
-    let branch = info.split("git-branch=").nth(1).and_then(|rest| rest.split(',').next());
-    branch.map_or("of unknown version", |branch| branch.trim_start_matches("rel-"))
+    let entry = |key: &str| {
+        info.split(key).nth(1).and_then(|rest| rest.split([',', ' ']).next()).unwrap_or("unknown")
+    };
+    match entry("git-branch=").strip_prefix("rel-") {
+        Some(release) => release.to_owned(),
+        None => format!("commit {}", entry("git-commit-id=")),
+    }
 }
 
 fn failed<E: Display>(action: &'static str) -> impl Fn(E) -> EngineError {

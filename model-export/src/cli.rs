@@ -28,7 +28,7 @@ will serve it, on presses that no training saw, and writes its card.";
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
   model-export check    models/s1-base8.onnx --atlas models/atlas.json
-  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures
+  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures/s1-base8
   model-export index    models --default s1-base8
   model-export table    models/*.json";
 
@@ -64,7 +64,7 @@ enum Command {
     #[command(after_long_help = EXIT_CODES)]
     Table {
         /// Cards written by `evaluate`, in the order of the rows; other JSON files beside
-        /// them (index.json, atlas.json) are passed over.
+        /// them (atlas.json, index.json, replay.json) are passed over.
         #[arg(required = true, value_name = "CARD")]
         cards: Vec<PathBuf>,
     },
@@ -88,7 +88,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 fn print_table(paths: &[PathBuf], json: bool) -> anyhow::Result<()> {
     let passed_over = |path: &&PathBuf| {
-        !path.file_name().is_some_and(|name| name == "index.json" || name == "atlas.json")
+        let others = ["atlas.json", "index.json", "replay.json"];
+        !path.file_name().is_some_and(|name| others.iter().any(|other| name == *other))
     };
     let cards = paths
         .iter()

@@ -14,10 +14,11 @@ fn main() -> ExitCode {
                 .downcast_ref::<model_export::ExportError>()
                 .map_or(1, model_export::ExportError::exit_code);
             if arguments.json {
-                let report = serde_json::json!({"error": {"message": format!("{error:#}"), "exit_code": code}});
+                let report =
+                    serde_json::json!({"error": {"message": error.to_string(), "exit_code": code}});
                 println!("{report}");
             } else {
-                eprintln!("error: {error:#}");
+                eprintln!("error: {error}");
             }
             ExitCode::from(code)
         }
