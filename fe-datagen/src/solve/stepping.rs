@@ -252,16 +252,33 @@ impl<'a> Solver<'a> {
         pressure
     }
 
-    /// Integral of a nodal pressure (MPa) over the deformed surface, N: Gauss
-    /// quadrature of the interpolated field.
+    /// Force that a nodal pressure (MPa) exerts on the deformed surface, N: Gauss
+    /// quadrature of the interpolated field, which acts along the indenter's normal.
     #[must_use]
-    pub fn integrate_pressure_n(&self, surface: &crate::mesh::Surface, pressure: &[f64]) -> f64 {
+    pub fn force_of_pressure_n(
+        &self,
+        surface: &crate::mesh::Surface,
+        pressure: &[f64],
+    ) -> [f64; 3] {
+        let Some(indenter) = &self.loading.indenter else { return [0.0; 3] };
         let x = self.deformed();
-        let mut total = 0.0;
+        let mut traction = vec![[0.0; 3]; x.len()];
+        for n in surface.nodes() {
+            let n = n as usize;
+            if pressure[n] > 0.0 {
+                let normal = indenter.distance(self.state.fraction, x[n]).normal;
+                traction[n] = normal.map(|v| v * pressure[n]);
+            }
+        }
+        let mut total = [0.0; 3];
         let rule = surface.kind.quadrature();
         surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
-            let p: f64 = face.iter().zip(value).map(|(&n, v)| v * pressure[n as usize]).sum();
-            total += p * crate::mesh::surface::norm(normal);
+            let area = crate::mesh::surface::norm(normal);
+            for (&n, v) in face.iter().zip(value) {
+                for i in 0..3 {
+                    total[i] += v * area * traction[n as usize][i];
+                }
+            }
         });
         total
     }
