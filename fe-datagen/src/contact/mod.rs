@@ -1,4 +1,4 @@
-//! Frictionless contact of the skin with a rigid indenter.
+//! Contact of the skin with a rigid indenter; friction is in [`friction`].
 //!
 //! Augmented Lagrangian at the nodes of the contact surface with their share
 //! of the area, `integral N_a dA`, as weight: one multiplier a node is what the
@@ -9,6 +9,10 @@
 //!
 //! has the traction `t` along the indenter's normal as its derivative and a
 //! symmetric tangent on the node's own diagonal block.
+
+pub mod friction;
+
+pub use friction::{FrictionNode, FrictionTrial, NodeFriction};
 
 use crate::indenter::Distance;
 use crate::mesh::Surface;

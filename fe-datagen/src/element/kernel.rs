@@ -8,10 +8,12 @@
 //!
 //! so `theta - 1 = psi . M^-1 b` is the projection of `J - 1` and force and
 //! tangent are plain derivatives: symmetric, and consistent by construction.
+//! With a law of small strain `J - 1` is `tr H` and its second derivative vanishes.
 
 use super::geometry::ElementGeometry;
-use crate::material::kinematics::cofactor_derivative;
-use crate::material::{Isochoric, Kinematics, Mat3, Material};
+use super::solid::Points;
+use crate::material::kinematics::{cofactor_derivative, trace};
+use crate::material::{Isochoric, Kinematics, Mat3};
 
 /// Where an element turned inside out.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -53,16 +55,18 @@ const VOLUME_GRADIENTS_MAX: usize = 4 * 27;
 /// Largest number of quadrature points.
 const POINTS_MAX: usize = 27;
 
-/// Evaluates one element with nodal displacements `u` (mm).
+/// Evaluates one element with nodal displacements `u` (mm) and the bulk modulus
+/// `bulk_mpa`; `points` gives the isochoric law of each quadrature point.
 ///
 /// Overwrites `force` (N, one per node) and, if given, the tangent `stiffness`
 /// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only).
 ///
 /// # Errors
 /// [`Inverted`] where `J <= 0`; outputs are then meaningless.
-pub fn evaluate(
+pub fn evaluate<P: Points>(
     geometry: ElementGeometry<'_>,
-    material: &Material,
+    law: &P,
+    bulk_mpa: f64,
     u: &[[f64; 3]],
     force: &mut [[f64; 3]],
     stiffness: Option<&mut [f64]>,
@@ -78,21 +82,24 @@ pub fn evaluate(
     for q in 0..points {
         let gradients = &geometry.gradients[q * n..(q + 1) * n];
         let k = Kinematics::new(displacement_gradient(u, gradients));
-        if !(k.j() > 0.0) {
+        // NaN fails the test too.
+        if !(k.j() > 0.0) && (P::At::FINITE || k.j().is_nan()) {
             return Err(Inverted { point: q, j: k.j() });
         }
         j_min = j_min.min(k.j());
+        let (growth, by_h) =
+            if P::At::FINITE { (k.j_minus_1, k.cof) } else { (trace(&k.h), UNIT) };
         for r in 0..m {
             let weight = geometry.weights[q] * geometry.basis[q][r];
-            b[r] += weight * k.j_minus_1;
-            add_times(&mut volume_gradient[r * n..(r + 1) * n], weight, &k.cof, gradients);
+            b[r] += weight * growth;
+            add_times(&mut volume_gradient[r * n..(r + 1) * n], weight, &by_h, gradients);
         }
         kinematics[q] = Some(k);
     }
     let theta: [f64; 4] = std::array::from_fn(|r| {
         if r < m { (0..m).map(|c| geometry.inverse_gram[r * m + c] * b[c]).sum() } else { 0.0 }
     });
-    let bulk = material.bulk_mpa;
+    let bulk = bulk_mpa;
     let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
     for (a, f) in force.iter_mut().enumerate() {
         *f = std::array::from_fn(|i| {
@@ -106,25 +113,39 @@ pub fn evaluate(
     for (q, k) in kinematics.iter().take(points).flatten().enumerate() {
         let gradients = &geometry.gradients[q * n..(q + 1) * n];
         let weight = geometry.weights[q];
-        energy += weight * material.isochoric.energy(k);
-        add_times(force, weight, &material.isochoric.first_piola(k), gradients);
+        let law = law.at(q);
+        energy += weight * law.energy(k);
+        add_times(force, weight, &law.first_piola(k), gradients);
         if let Some(s) = stiffness.as_deref_mut() {
             let pressure = bulk * (0..m).map(|r| theta[r] * geometry.basis[q][r]).sum::<f64>();
-            let mut a = material.isochoric.tangent(k);
-            let d = cofactor_derivative(&k.f);
-            for i in 0..3 {
-                for j in 0..3 {
-                    for kk in 0..3 {
-                        for l in 0..3 {
-                            a[i][j][kk][l] = weight * (a[i][j][kk][l] + pressure * d[i][j][kk][l]);
-                        }
-                    }
-                }
-            }
-            add_point_stiffness(s, &a, gradients);
+            add_point_stiffness(s, &point_tangent(&law, k, pressure, weight), gradients);
         }
     }
     Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta })
+}
+
+const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// `weight (A + pressure d cof / dF)`.
+#[inline]
+fn point_tangent<L: Isochoric>(
+    law: &L,
+    k: &Kinematics,
+    pressure: f64,
+    weight: f64,
+) -> crate::material::Tensor4 {
+    let mut a = law.tangent(k);
+    let d = if L::FINITE { cofactor_derivative(&k.f) } else { [[[[0.0; 3]; 3]; 3]; 3] };
+    for i in 0..3 {
+        for j in 0..3 {
+            for kk in 0..3 {
+                for l in 0..3 {
+                    a[i][j][kk][l] = weight * (a[i][j][kk][l] + pressure * d[i][j][kk][l]);
+                }
+            }
+        }
+    }
+    a
 }
 
 /// `force[a] += weight * p . gradients[a]`.

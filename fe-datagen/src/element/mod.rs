@@ -1,9 +1,12 @@
 //! Elements: reference shapes, undeformed geometry and the mean-dilatation kernel.
 
+pub mod extrapolate;
 pub mod geometry;
 pub mod kernel;
 pub mod reference;
+pub mod solid;
 
 pub use geometry::{BlockGeometry, ShapeError};
 pub use kernel::{ElementState, Inverted};
 pub use reference::ElementKind;
+pub use solid::{Elastic, Memory, Solid, Viscoelastic};

@@ -11,6 +11,8 @@ pub struct NeoHookean {
 }
 
 impl Isochoric for NeoHookean {
+    const FINITE: bool = true;
+
     #[inline]
     fn energy(&self, k: &Kinematics) -> f64 {
         0.5 * self.mu_mpa * k.i1_bar_minus_3()
@@ -60,5 +62,10 @@ impl Isochoric for NeoHookean {
             }
         }
         t
+    }
+
+    #[inline]
+    fn shear_modulus_mpa(&self) -> f64 {
+        self.mu_mpa
     }
 }

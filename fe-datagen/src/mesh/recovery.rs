@@ -8,10 +8,26 @@
 
 use super::{FaceKind, Mesh, Tissue};
 use crate::element::geometry::{BlockGeometry, jacobian};
-use crate::element::kernel::{displacement_gradient, evaluate};
-use crate::element::{ElementKind, Inverted};
-use crate::material::{Kinematics, Material};
+use crate::element::kernel::displacement_gradient;
+use crate::element::{ElementKind, Inverted, Memory, Solid, extrapolate};
+use crate::material::Kinematics;
 use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A deformed body, as far as recovery needs it.
+pub struct Deformed<'a> {
+    /// Undeformed mesh.
+    pub mesh: &'a Mesh,
+    /// Undeformed element geometry, one a block.
+    pub geometry: &'a [BlockGeometry],
+    /// What each tissue is made of.
+    pub materials: &'a [Arc<dyn Solid>],
+    /// Displacement, mm, one a mesh node.
+    pub u: &'a [[f64; 3]],
+    /// History of an element's quadrature points `(block, element)`; empty for
+    /// materials without memory.
+    pub history: &'a dyn Fn(usize, usize) -> &'a [f64],
+}
 
 /// One evaluation point that contributes to an interface node.
 #[derive(Clone, Debug)]
@@ -22,6 +38,8 @@ struct Sample {
     gradients: Vec<[f64; 3]>,
     /// Dilatation basis at the point.
     basis: [f64; 4],
+    /// Weights of the element's quadrature points.
+    from_points: Vec<f64>,
 }
 
 /// Evaluates SED at chosen nodes of a surface from the elements of one tissue.
@@ -100,32 +118,44 @@ impl SedRecovery {
         Ok(Self { samples, terms })
     }
 
-    /// SED in MPa (= mJ/mm3) at the nodes, from the displacement `u` (mm, one a
-    /// mesh node). Evaluated from the strain, not summed over increments.
+    /// SED in MPa (= mJ/mm3) at the nodes. Evaluated from the strain (and, with
+    /// memory, from what the branches hold: the energy that can be got back),
+    /// not summed over increments.
     ///
     /// # Errors
     /// [`Inverted`] if an element that is sampled has turned inside out.
-    pub fn sed_mpa(
-        &self,
-        mesh: &Mesh,
-        geometry: &[BlockGeometry],
-        materials: &[Material],
-        u: &[[f64; 3]],
-    ) -> Result<Vec<f64>, Inverted> {
+    pub fn sed_mpa(&self, body: &Deformed<'_>) -> Result<Vec<f64>, Inverted> {
         let mut values = Vec::with_capacity(self.samples.len());
         for s in &self.samples {
-            let block = &mesh.blocks[s.block];
-            let material = &materials[block.tissue[s.element].index()];
-            let local: Vec<_> = block.element(s.element).iter().map(|&n| u[n as usize]).collect();
+            let block = &body.mesh.blocks[s.block];
+            let material = &body.materials[block.tissue[s.element].index()];
+            let local: Vec<_> =
+                block.element(s.element).iter().map(|&n| body.u[n as usize]).collect();
             let mut force = vec![[0.0; 3]; local.len()];
-            let state =
-                evaluate(geometry[s.block].element(s.element), material, &local, &mut force, None)?;
+            let history = (body.history)(s.block, s.element);
+            let memory = Memory { history, dt_s: 0.0 };
+            let shape = body.geometry[s.block].element(s.element);
+            let state = material.evaluate(shape, &local, memory, &mut force, None)?;
             let theta: f64 = s.basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t).sum();
             let k = Kinematics::new(displacement_gradient(&local, &s.gradients));
-            values.push(material.energy(&k, theta));
+            let own = interpolate(history, &s.from_points, material.history_len());
+            values.push(material.stored_mpa(&k, theta, &own));
         }
         Ok(self.terms.iter().map(|t| t.iter().map(|&(s, w)| w * values[s]).sum()).collect())
     }
+}
+
+/// History of a point from that of the quadrature points.
+fn interpolate(history: &[f64], weights: &[f64], len: usize) -> Vec<f64> {
+    let mut own = vec![0.0; len];
+    if len > 0 {
+        for (point, w) in history.chunks_exact(len).zip(weights) {
+            for (o, h) in own.iter_mut().zip(point) {
+                *o += w * h;
+            }
+        }
+    }
+    own
 }
 
 fn sample(mesh: &Mesh, block: usize, element: usize, xi: [f64; 3]) -> Sample {
@@ -139,7 +169,8 @@ fn sample(mesh: &Mesh, block: usize, element: usize, xi: [f64; 3]) -> Sample {
         .iter()
         .map(|d| std::array::from_fn(|i| (0..3).map(|k| d[k] * inverse[k][i]).sum()))
         .collect();
-    Sample { block, element, gradients, basis: b.kind.dilatation_basis(xi) }
+    let from_points = extrapolate::weights(b.kind, xi);
+    Sample { block, element, gradients, basis: b.kind.dilatation_basis(xi), from_points }
 }
 
 /// Sorted corners: the identity of a quadrilateral face.

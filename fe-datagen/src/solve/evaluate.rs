@@ -1,15 +1,16 @@
 //! Energy, out-of-balance force and tangent of a whole body.
 
 use super::StepError;
-use super::problem::{Loading, Problem};
-use crate::contact::NodeContact;
-use crate::element::kernel::evaluate;
+use super::loading::Loading;
+use super::problem::Problem;
+use crate::contact::{FrictionTrial, NodeContact, NodeFriction};
+use crate::element::Memory;
 use crate::linear::SymmetricMatrix;
 
 /// What an evaluation at one displacement found.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Evaluation {
-    /// Elastic energy, mJ.
+    /// Elastic energy, mJ; of a body with memory the potential of the step.
     pub stored_mj: f64,
     /// Potential that equilibrium minimises, mJ.
     pub potential_mj: f64,
@@ -21,6 +22,9 @@ pub(crate) struct Evaluation {
     pub reference_norm: f64,
     /// Nominal traction of each contact node, MPa.
     pub traction_mpa: Vec<f64>,
+    /// Tangential traction of each contact node on the indenter, MPa; empty
+    /// without friction.
+    pub friction: Vec<[f64; 3]>,
     /// Largest |gap| over nodes in contact, mm.
     pub gap_error_mm: f64,
     /// Smallest `J`.
@@ -35,6 +39,10 @@ pub(crate) struct Trial<'a> {
     pub multipliers_mpa: &'a [f64],
     pub penalty: f64,
     pub load_fraction: f64,
+    /// History of materials with memory at the start of the step, and its length, s.
+    pub memory: Memory<'a>,
+    /// Tangential contact; `None` without friction.
+    pub friction: Option<&'a FrictionTrial>,
 }
 
 /// Evaluates the body; fills `tangent` if given.
@@ -52,7 +60,7 @@ pub(crate) fn evaluate_body(
     out.residual_n.resize(3 * problem.mesh.nodes.len(), 0.0);
     out.stored_mj = 0.0;
     out.j_min = f64::INFINITY;
-    elements(problem, trial.u, tangent.as_deref_mut(), out)?;
+    elements(problem, trial, tangent.as_deref_mut(), out)?;
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent, out);
     for (node, f) in loading.dead_n.iter().enumerate() {
@@ -82,7 +90,7 @@ pub(crate) fn evaluate_body(
 
 fn elements(
     problem: &Problem,
-    u: &[[f64; 3]],
+    trial: &Trial<'_>,
     mut tangent: Option<&mut SymmetricMatrix>,
     out: &mut Evaluation,
 ) -> Result<(), StepError> {
@@ -94,7 +102,7 @@ fn elements(
         for e in 0..block.len() {
             let nodes = block.element(e);
             for (l, &node) in local.iter_mut().zip(nodes) {
-                *l = u[node as usize];
+                *l = trial.u[node as usize];
             }
             let stiffness = tangent.is_some().then(|| {
                 dense.clear();
@@ -102,9 +110,12 @@ fn elements(
                 dense.as_mut_slice()
             });
             let material = &problem.materials[block.tissue[e].index()];
-            let state =
-                evaluate(geometry.element(e), material, &local[..n], &mut force[..n], stiffness)
-                    .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
+            let memory = problem.memory.as_ref().map_or(Memory::default(), |layout| {
+                layout.of(trial.memory.history, trial.memory.dt_s, b, e)
+            });
+            let state = material
+                .evaluate(geometry.element(e), &local[..n], memory, &mut force[..n], stiffness)
+                .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
             out.stored_mj += state.energy_mj;
             out.j_min = out.j_min.min(state.j_min);
             for (f, &node) in force.iter().zip(nodes) {
@@ -129,6 +140,7 @@ fn contact(
     out: &mut Evaluation,
 ) -> f64 {
     out.traction_mpa.clear();
+    out.friction.clear();
     out.gap_error_mm = 0.0;
     out.contact_force_n = [0.0; 3];
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
@@ -149,16 +161,58 @@ fn contact(
         if c.traction_mpa > 0.0 {
             out.gap_error_mm = out.gap_error_mm.max(d.gap_mm.abs());
         }
-        for i in 0..3 {
-            out.residual_n[3 * n + i] += c.force_n[i];
-            out.contact_force_n[i] -= c.force_n[i];
-            square += c.force_n[i] * c.force_n[i];
-        }
+        square += out.add_contact_force(n, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
             problem.structure.add_node(t, node, &c.stiffness);
         }
     }
+    if let Some(friction) = trial.friction {
+        let offset = indenter.offset_mm(trial.load_fraction);
+        square += add_friction(problem, trial, friction, offset, tangent, out);
+    }
     square
+}
+
+/// Adds friction; returns the square of its force norm.
+fn add_friction(
+    problem: &Problem,
+    trial: &Trial<'_>,
+    friction: &FrictionTrial,
+    offset: [f64; 3],
+    mut tangent: Option<&mut SymmetricMatrix>,
+    out: &mut Evaluation,
+) -> f64 {
+    let Some(surface) = &problem.contact else { return 0.0 };
+    let mut square = 0.0;
+    for ((&node, &area), state) in
+        surface.nodes.iter().zip(&surface.area_mm2).zip(&friction.nodes)
+    {
+        let n = node as usize;
+        let relative =
+            std::array::from_fn(|i| problem.mesh.nodes[n][i] + trial.u[n][i] - offset[i]);
+        let found = NodeFriction::new(state, relative, area, trial.penalty);
+        out.friction.push(found.map_or([0.0; 3], |f| f.traction_mpa));
+        let Some(f) = found else { continue };
+        out.potential_mj += f.energy_mj;
+        square += out.add_contact_force(n, f.force_n);
+        if let Some(t) = tangent.as_deref_mut() {
+            problem.structure.add_node(t, node, &f.stiffness);
+        }
+    }
+    square
+}
+
+impl Evaluation {
+    /// Adds the derivative of a contact potential at a node; returns its square.
+    fn add_contact_force(&mut self, node: usize, force_n: [f64; 3]) -> f64 {
+        let mut square = 0.0;
+        for i in 0..3 {
+            self.residual_n[3 * node + i] += force_n[i];
+            self.contact_force_n[i] -= force_n[i];
+            square += force_n[i] * force_n[i];
+        }
+        square
+    }
 }
 
 /// Forces on the body at an equilibrium.

@@ -1,14 +1,20 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
 pub(crate) mod evaluate;
+mod loading;
+mod memory;
 mod newton;
 mod problem;
+mod rubbing;
 mod stepping;
+mod work;
 
 pub use evaluate::Balance;
+pub use loading::{Loading, MovingIndenter};
+pub use memory::{EnergySplit, MemoryLayout};
 pub use newton::Effort;
-pub use problem::{Loading, MovingIndenter, Problem, ProblemError};
-pub use stepping::{Solver, StepReport};
+pub use problem::{Materials, Problem, ProblemError};
+pub use stepping::{Mark, Solver, StepReport};
 
 use crate::linear::FactorError;
 
@@ -33,6 +39,14 @@ pub struct Options {
     pub refactor_after_cg: u32,
     /// Backtracking steps of the line search.
     pub line_search_max: u32,
+    /// Updates of normal and tangential multipliers per load step with friction.
+    pub friction_updates_max: u32,
+    /// Change of tangential traction between two updates over the largest bound,
+    /// below which friction has settled.
+    pub friction_tolerance: f64,
+    /// How far linear extrapolation over a time step may miss, over the largest
+    /// displacement; bodies with memory only.
+    pub time_error: f64,
 }
 
 impl Default for Options {
@@ -47,6 +61,9 @@ impl Default for Options {
             cg_max: 60,
             refactor_after_cg: 8,
             line_search_max: 12,
+            friction_updates_max: 40,
+            friction_tolerance: 1e-3,
+            time_error: 2e-3,
         }
     }
 }

@@ -5,8 +5,11 @@
 //! when that takes too many iterations.
 
 use super::evaluate::{Evaluation, Trial, evaluate_body};
-use super::problem::{Loading, Problem};
+use super::loading::Loading;
+use super::problem::Problem;
 use super::{Options, SolveError, StepError};
+use crate::contact::FrictionTrial;
+use crate::element::Memory;
 use crate::linear::{
     CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
 };
@@ -71,6 +74,29 @@ impl Effort {
     }
 }
 
+/// What stays fixed while an equilibrium is sought.
+#[derive(Clone, Copy)]
+pub(super) struct Fixed<'a> {
+    pub loading: &'a Loading,
+    pub load_fraction: f64,
+    pub multipliers: &'a [f64],
+    pub memory: Memory<'a>,
+    pub friction: Option<&'a FrictionTrial>,
+}
+
+impl<'a> Fixed<'a> {
+    fn trial(&self, u: &'a [[f64; 3]], penalty: f64) -> Trial<'a> {
+        Trial {
+            u,
+            multipliers_mpa: self.multipliers,
+            penalty,
+            load_fraction: self.load_fraction,
+            memory: self.memory,
+            friction: self.friction,
+        }
+    }
+}
+
 /// Memory and counters of the iteration.
 pub(super) struct Newton<'a> {
     pub problem: &'a Problem,
@@ -115,22 +141,21 @@ impl<'a> Newton<'a> {
         self.effort = Effort::default();
     }
 
-    /// Brings `u` to equilibrium at `load_fraction` with fixed multipliers, to a
-    /// residual of `tolerance` times the reference force.
+    /// Brings `u` to equilibrium with everything else `fixed`, to a residual of
+    /// `tolerance` times the reference force.
     pub(super) fn equilibrate(
         &mut self,
         tolerance: f64,
-        loading: &Loading,
-        load_fraction: f64,
-        multipliers: &[f64],
+        fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
     ) -> Result<(), StepError> {
-        self.evaluate(loading, load_fraction, multipliers, u)?;
+        self.evaluate(fixed, u)?;
         // Forces below this are rounding of a body at rest.
         let floor = 1e-13 * self.force_scale_n();
         let mut previous = f64::INFINITY;
         for iteration in 0..=self.options.newton_max {
             let (norm, reference) = (self.current.residual_norm, self.current.reference_norm);
+            let load_fraction = fixed.load_fraction;
             tracing::trace!(iteration, load_fraction, residual = norm, reference, "newton");
             if norm <= tolerance * reference || norm <= floor {
                 return Ok(());
@@ -138,11 +163,11 @@ impl<'a> Newton<'a> {
             if iteration == self.options.newton_max {
                 break;
             }
-            self.assemble(loading, load_fraction, multipliers, u)?;
+            self.assemble(fixed, u)?;
             let forcing = Self::forcing(norm, previous, tolerance * reference);
             previous = norm;
             self.solve_step(forcing);
-            self.line_search(loading, load_fraction, multipliers, u)?;
+            self.line_search(fixed, u)?;
             self.effort.newton_iterations += 1;
         }
         Err(StepError::Newton {
@@ -173,36 +198,32 @@ impl<'a> Newton<'a> {
             }
         }
         let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        let mu = self.problem.materials.iter().map(|m| m.isochoric.mu_mpa).fold(0.0, f64::max);
+        let mu = self.problem.materials.iter().map(|m| m.shear_modulus_mpa()).fold(0.0, f64::max);
         mu * extent * extent
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
     pub(super) fn evaluate(
         &mut self,
-        loading: &Loading,
-        load_fraction: f64,
-        multipliers: &[f64],
+        fixed: Fixed<'_>,
         u: &[[f64; 3]],
     ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = Trial { u, multipliers_mpa: multipliers, penalty: self.penalty, load_fraction };
-        let result = evaluate_body(self.problem, loading, &trial, None, &mut self.current);
+        let trial = fixed.trial(u, self.penalty);
+        let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
         result
     }
 
     fn assemble(
         &mut self,
-        loading: &Loading,
-        load_fraction: f64,
-        multipliers: &[f64],
+        fixed: Fixed<'_>,
         u: &[[f64; 3]],
     ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = Trial { u, multipliers_mpa: multipliers, penalty: self.penalty, load_fraction };
+        let trial = fixed.trial(u, self.penalty);
         let tangent = Some(&mut self.tangent);
-        let result = evaluate_body(self.problem, loading, &trial, tangent, &mut self.current);
+        let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
         for (dof, &e) in self.problem.structure.equations.of_dof.iter().enumerate() {
             if e != Equations::FIXED {
@@ -263,9 +284,7 @@ impl<'a> Newton<'a> {
     /// Backtracks along `step` until potential or residual falls.
     fn line_search(
         &mut self,
-        loading: &Loading,
-        load_fraction: f64,
-        multipliers: &[f64],
+        fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
     ) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
@@ -289,13 +308,8 @@ impl<'a> Newton<'a> {
                 }
             }
             let clock = Instant::now();
-            let trial = Trial {
-                u: &self.trial_u,
-                multipliers_mpa: multipliers,
-                penalty: self.penalty,
-                load_fraction,
-            };
-            let found = evaluate_body(self.problem, loading, &trial, None, &mut self.trial);
+            let trial = fixed.trial(&self.trial_u, self.penalty);
+            let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
             self.effort.assemble_s += clock.elapsed().as_secs_f64();
             if found.is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;

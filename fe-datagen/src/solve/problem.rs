@@ -1,12 +1,14 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
 use crate::contact::ContactSurface;
-use crate::element::{BlockGeometry, ShapeError};
-use crate::indenter::{Distance, Placement, SignedDistance};
+use super::memory::MemoryLayout;
+use crate::element::{BlockGeometry, ShapeError, Solid};
 use crate::linear::{Structure, StructureError};
-use crate::material::Material;
 use crate::mesh::{Mesh, Tissue};
 use std::sync::Arc;
+
+/// What each tissue is made of, by [`Tissue::index`].
+pub type Materials = [Arc<dyn Solid>; Tissue::ALL.len()];
 
 /// A body ready to be loaded. Shared by every press of a campaign.
 pub struct Problem {
@@ -14,8 +16,10 @@ pub struct Problem {
     pub mesh: Mesh,
     /// Undeformed element geometry, one a block.
     pub geometry: Vec<BlockGeometry>,
-    /// Material of each tissue, by [`Tissue::index`].
-    pub materials: Vec<Material>,
+    /// What each tissue is made of, by [`Tissue::index`].
+    pub materials: Materials,
+    /// Where each element's memory is; `None` if no material has any.
+    pub memory: Option<MemoryLayout>,
     /// Prescribed degrees of freedom, `3 node + component`.
     pub fixed: Vec<bool>,
     /// Sparsity pattern, ordering and symbolic factor.
@@ -58,7 +62,7 @@ impl Problem {
     /// See [`ProblemError`].
     pub fn new(
         mesh: Mesh,
-        materials: [Material; Tissue::ALL.len()],
+        materials: Materials,
         fixed: Vec<bool>,
         contact_surface: Option<&str>,
     ) -> Result<Self, ProblemError> {
@@ -83,7 +87,8 @@ impl Problem {
                 Some(ContactSurface::new(surface, &mesh.nodes, &fixed))
             }
         };
-        Ok(Self { mesh, geometry, materials: materials.to_vec(), fixed, structure, contact })
+        let memory = MemoryLayout::new(&mesh, &geometry, &materials);
+        Ok(Self { mesh, geometry, materials, memory, fixed, structure, contact })
     }
 
     /// Contact penalty from material and mesh, MPa/mm: a few hundred times the
@@ -99,49 +104,8 @@ impl Problem {
         let mu = Tissue::ALL
             .iter()
             .filter(|t| used(t))
-            .map(|t| self.materials[t.index()].isochoric.mu_mpa)
+            .map(|t| self.materials[t.index()].shear_modulus_mpa())
             .fold(0.0, f64::max);
         FACTOR * mu / mean_area.sqrt()
     }
-}
-
-/// An indenter that moves along a straight line.
-#[derive(Clone)]
-pub struct MovingIndenter {
-    /// Its shape.
-    pub shape: Arc<dyn SignedDistance>,
-    /// Where it is at load fraction 0.
-    pub start: Placement,
-    /// Displacement at load fraction 1, mm.
-    pub travel_mm: [f64; 3],
-}
-
-impl MovingIndenter {
-    /// Placement at load fraction `t`.
-    #[must_use]
-    pub fn placement(&self, t: f64) -> Placement {
-        let mut p = self.start;
-        for i in 0..3 {
-            p.origin_mm[i] += t * self.travel_mm[i];
-        }
-        p
-    }
-
-    /// Distance of `x` at load fraction `t`.
-    #[must_use]
-    pub fn distance(&self, t: f64, x: [f64; 3]) -> Distance {
-        self.placement(t).distance(self.shape.as_ref(), x)
-    }
-}
-
-/// Loads, all proportional to the load fraction in `[0, 1]`.
-#[derive(Clone, Default)]
-pub struct Loading {
-    /// Dead nodal forces at fraction 1, N; empty if there are none.
-    pub dead_n: Vec<[f64; 3]>,
-    /// Prescribed displacements at fraction 1: `(degree of freedom, mm)`; the
-    /// other prescribed degrees of freedom stay 0.
-    pub prescribed_mm: Vec<(usize, f64)>,
-    /// Indenter.
-    pub indenter: Option<MovingIndenter>,
 }

@@ -1,9 +1,15 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
 use super::evaluate::Balance;
-use super::newton::{Effort, Newton};
-use super::problem::{Loading, Problem};
+use super::loading::Loading;
+use super::memory::{self, EnergySplit};
+use super::newton::{Effort, Fixed, Newton};
+use super::problem::Problem;
+use super::rubbing;
+use super::work::Work;
 use super::{Options, SolveError, StepError};
+use crate::contact::{FrictionNode, FrictionTrial};
+use crate::element::Memory;
 use crate::linear::Equations;
 
 /// Solves one loading of a [`Problem`]; re-usable for the next.
@@ -13,15 +19,29 @@ pub struct Solver<'a> {
     state: State,
     /// Equilibrium before the last, for extrapolation.
     before: Option<State>,
-    /// Contact force (N) along the travel at every equilibrium: `(fraction, force)`.
-    history: Vec<(f64, f64)>,
+    work: Work,
+    /// Load fraction that a time step may take; `None` for bodies without memory.
+    pace: Option<f64>,
 }
 
+/// An equilibrium, or the start of the search for one.
 #[derive(Clone, Debug, Default)]
-struct State {
+pub struct State {
     fraction: f64,
     u: Vec<[f64; 3]>,
     multipliers: Vec<f64>,
+    /// History of materials with memory; empty if there are none.
+    memory: Vec<f64>,
+    /// Tangential contact; no nodes without friction.
+    friction: FrictionTrial,
+}
+
+/// A place to go back to, see [`Solver::mark`].
+#[derive(Clone)]
+pub struct Mark {
+    state: State,
+    before: Option<State>,
+    work: Work,
 }
 
 /// One equilibrium.
@@ -33,8 +53,10 @@ pub struct StepReport {
     pub residual_relative: f64,
     /// Largest |gap| of a node in contact, mm.
     pub gap_error_mm: f64,
-    /// Elastic energy, mJ.
+    /// Energy that can be got back, mJ.
     pub stored_mj: f64,
+    /// Energy that materials with memory have turned into heat, mJ.
+    pub dissipated_mj: f64,
     /// Smallest `J`.
     pub j_min: f64,
     /// Work since the last report.
@@ -52,7 +74,8 @@ impl<'a> Solver<'a> {
             loading: Loading::default(),
             state: State::default(),
             before: None,
-            history: Vec::new(),
+            work: Work::default(),
+            pace: None,
         };
         solver.start(Loading::default());
         Ok(solver)
@@ -67,9 +90,20 @@ impl<'a> Solver<'a> {
             fraction: 0.0,
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
             multipliers: vec![0.0; contact_nodes],
+            memory: vec![0.0; problem.memory.as_ref().map_or(0, |m| m.len)],
+            friction: FrictionTrial::default(),
         };
+        if self.loading.friction > 0.0 {
+            self.state.friction = FrictionTrial {
+                coefficient: self.loading.friction,
+                nodes: vec![FrictionNode::default(); contact_nodes],
+            };
+            let State { u, friction, .. } = &mut self.state;
+            rubbing::anchor(problem, &self.loading, 0.0, u, friction);
+        }
         self.before = None;
-        self.history = vec![(0.0, 0.0)];
+        self.work = Work::default();
+        self.pace = self.first_pace();
         self.newton.forget();
     }
 
@@ -91,6 +125,25 @@ impl<'a> Solver<'a> {
         &self.newton.current.traction_mpa
     }
 
+    /// Load fraction reached.
+    #[must_use]
+    pub fn fraction(&self) -> f64 {
+        self.state.fraction
+    }
+
+    /// The present equilibrium, to come back to with [`Self::restore`].
+    #[must_use]
+    pub fn mark(&self) -> Mark {
+        Mark { state: self.state.clone(), before: self.before.clone(), work: self.work.clone() }
+    }
+
+    /// Goes back to an earlier equilibrium of the same loading.
+    pub fn restore(&mut self, mark: &Mark) {
+        self.state = mark.state.clone();
+        self.before = mark.before.clone();
+        self.work = mark.work.clone();
+    }
+
     /// Goes on to `target` (in `[0, 1]`, above the fraction reached) through as
     /// many equilibria as it takes.
     ///
@@ -98,7 +151,7 @@ impl<'a> Solver<'a> {
     /// [`SolveError::CutsExhausted`]; the state is then the last equilibrium.
     pub fn advance_to(&mut self, target: f64) -> Result<StepReport, SolveError> {
         let first = self.newton.effort;
-        let mut step = target - self.state.fraction;
+        let mut step = self.paced(target - self.state.fraction);
         let mut cuts = 0;
         while self.state.fraction < target {
             let next = if self.state.fraction + 1.000_001 * step >= target {
@@ -107,7 +160,7 @@ impl<'a> Solver<'a> {
                 self.state.fraction + step
             };
             match self.try_step(next) {
-                Ok(()) => step *= 1.5,
+                Ok(()) => step = self.paced(1.5 * step),
                 Err(cause) => {
                     cuts += 1;
                     self.newton.effort.cuts += 1;
@@ -123,15 +176,26 @@ impl<'a> Solver<'a> {
                 }
             }
         }
+        Ok(self.report(&first))
+    }
+
+    fn report(&self, since: &Effort) -> StepReport {
         let e = &self.newton.current;
-        Ok(StepReport {
+        // The potential of a body without memory is its stored energy.
+        let energy = if self.newton.problem.memory.is_some() {
+            memory::energies(self.newton.problem, &self.state.memory, &self.state.u)
+        } else {
+            EnergySplit { stored_mj: e.stored_mj, dissipated_mj: 0.0 }
+        };
+        StepReport {
             load_fraction: self.state.fraction,
             residual_relative: e.residual_norm / e.reference_norm.max(f64::MIN_POSITIVE),
             gap_error_mm: e.gap_error_mm,
-            stored_mj: e.stored_mj,
+            stored_mj: energy.stored_mj,
+            dissipated_mj: energy.dissipated_mj,
             j_min: e.j_min,
-            effort: self.newton.effort.since(&first),
-        })
+            effort: self.newton.effort.since(since),
+        }
     }
 
     /// One equilibrium at `next`, or the state as it was.
@@ -147,15 +211,56 @@ impl<'a> Solver<'a> {
             }
             Err(e) => return Err(e),
         }
+        self.set_pace(next, &trial.u);
+        let problem = self.newton.problem;
+        let dt_s = self.seconds(next);
         trial.fraction = next;
+        if let Some(layout) = &problem.memory {
+            memory::advance(problem, layout, &trial.u, dt_s, &mut trial.memory);
+        }
+        rubbing::update(&mut trial.friction, &self.newton.current);
+        rubbing::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
         self.before = Some(std::mem::replace(&mut self.state, trial));
-        let force = self.newton.current.contact_force_n;
-        let along = self.loading.indenter.as_ref().map_or(0.0, |m| {
-            let length = crate::mesh::surface::norm(m.travel_mm);
-            (0..3).map(|i| force[i] * m.travel_mm[i] / length).sum()
-        });
-        self.history.push((next, along));
+        if let Some(indenter) = &self.loading.indenter {
+            self.work.add(indenter, next, self.newton.current.contact_force_n);
+        }
         Ok(())
+    }
+
+    /// Half the shortest relaxation time, as a load fraction.
+    fn first_pace(&self) -> Option<f64> {
+        let problem = self.newton.problem;
+        problem.memory.as_ref()?;
+        let shortest = problem.materials.iter().filter_map(|m| m.shortest_time_s());
+        Some(0.5 * shortest.fold(f64::INFINITY, f64::min) / self.loading.duration_s)
+    }
+
+    /// `step`, no longer than time integration allows.
+    fn paced(&self, step: f64) -> f64 {
+        self.pace.map_or(step, |p| step.min(p))
+    }
+
+    /// Sets the next time step by how far linear extrapolation missed this one:
+    /// the recursion of a Prony series is exact for what changes linearly.
+    fn set_pace(&mut self, next: f64, u: &[[f64; 3]]) {
+        let (Some(pace), Some(before)) = (&mut self.pace, &self.before) else { return };
+        let step = next - self.state.fraction;
+        let ratio = step / (self.state.fraction - before.fraction);
+        let (mut miss, mut size) = (0.0f64, 0.0f64);
+        for ((new, last), old) in u.iter().zip(&self.state.u).zip(&before.u) {
+            for i in 0..3 {
+                let predicted = last[i] + ratio * (last[i] - old[i]);
+                miss = miss.max((new[i] - predicted).abs());
+                size = size.max(new[i].abs());
+            }
+        }
+        let wanted = (self.newton.options.time_error * size / miss.max(f64::MIN_POSITIVE)).sqrt();
+        *pace = step * wanted.clamp(0.3, 2.0);
+    }
+
+    /// Time from the last equilibrium to `next`, s.
+    fn seconds(&self, next: f64) -> f64 {
+        (next - self.state.fraction) * self.loading.duration_s
     }
 
     /// Extrapolates the last two equilibria.
@@ -182,41 +287,73 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// Equilibrium with contact multipliers updated until gaps close.
+    /// Equilibrium with contact multipliers updated until gaps close and, with
+    /// friction, tangential tractions settle.
     fn augmented(&mut self, fraction: f64, trial: &mut State) -> Result<(), StepError> {
         let options = self.newton.options;
+        let dt_s = self.seconds(fraction);
+        let rubs = !trial.friction.nodes.is_empty();
+        let problem = self.newton.problem;
+        let bound = |trial: &mut State| {
+            let State { u, multipliers, friction, .. } = trial;
+            rubbing::bound(problem, &self.loading, fraction, u, multipliers, friction);
+        };
+        bound(trial);
+        let updates =
+            if rubs { options.friction_updates_max } else { options.augmentations_max };
         // The first equilibrium only serves to update the multipliers.
         let mut tolerance = 1e-3f64.max(options.residual_tolerance);
-        for update in 0..=options.augmentations_max {
+        for update in 0..=updates {
             let (multipliers, u) = (&trial.multipliers, &mut trial.u);
-            self.newton.equilibrate(tolerance, &self.loading, fraction, multipliers, u)?;
+            let fixed = Fixed {
+                loading: &self.loading,
+                load_fraction: fraction,
+                multipliers,
+                memory: Memory { history: &trial.memory, dt_s },
+                friction: rubs.then_some(&trial.friction),
+            };
+            self.newton.equilibrate(tolerance, fixed, u)?;
             if self.newton.current.gap_error_mm <= options.gap_tolerance_mm {
-                let tight = options.residual_tolerance;
-                self.newton.equilibrate(tight, &self.loading, fraction, multipliers, u)?;
+                self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
             }
-            let e = &self.newton.current;
-            if e.gap_error_mm <= options.gap_tolerance_mm {
+            let closed = self.newton.current.gap_error_mm <= options.gap_tolerance_mm;
+            let settled = rubbing::change(&trial.friction, &self.newton.current)
+                <= options.friction_tolerance;
+            if closed && settled {
                 return Ok(());
             }
-            tolerance = options.residual_tolerance;
-            if update < options.augmentations_max {
+            if update < updates {
+                tolerance = options.residual_tolerance;
+                let e = &self.newton.current;
                 trial.multipliers.copy_from_slice(&e.traction_mpa);
+                rubbing::update(&mut trial.friction, e);
+                bound(trial);
                 self.newton.effort.augmentations += 1;
             }
         }
         Err(StepError::Contact {
-            augmentations: options.augmentations_max,
+            augmentations: updates,
             gap_mm: self.newton.current.gap_error_mm,
         })
     }
 
-    /// Work of the indenter so far, mJ: the force history integrated by a power
-    /// law between equilibria, which is exact for Hertz-like contact.
+    /// Work of the indenter so far, mJ.
     #[must_use]
     pub fn indenter_work_mj(&self) -> f64 {
-        let Some(m) = &self.loading.indenter else { return 0.0 };
-        let travel = crate::mesh::surface::norm(m.travel_mm);
-        power_law_integral(&self.history) * travel
+        self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
+    }
+
+    /// History of materials with memory at the equilibrium; empty without.
+    #[must_use]
+    pub fn memory(&self) -> &[f64] {
+        &self.state.memory
+    }
+
+    /// Tangential traction of the indenter on each contact node, MPa per
+    /// undeformed area; empty without friction.
+    #[must_use]
+    pub fn shear_traction_mpa(&self) -> Vec<[f64; 3]> {
+        self.newton.current.friction.iter().map(|t| t.map(|v| -v)).collect()
     }
 
     /// Forces of indenter and supports, and the integral of true pressure.
@@ -288,40 +425,5 @@ impl<'a> Solver<'a> {
     pub fn deformed(&self) -> Vec<[f64; 3]> {
         let nodes = &self.newton.problem.mesh.nodes;
         nodes.iter().zip(&self.state.u).map(|(x, u)| std::array::from_fn(|i| x[i] + u[i])).collect()
-    }
-}
-
-/// Integral of `(x, f)` points with `f = c x^m` on each interval; on the first,
-/// from `x = 0`, with the exponent of the second.
-fn power_law_integral(points: &[(f64, f64)]) -> f64 {
-    let exponent = |a: (f64, f64), b: (f64, f64)| {
-        if a.0 > 0.0 && a.1 > 0.0 && b.1 > 0.0 {
-            Some((b.1 / a.1).ln() / (b.0 / a.0).ln())
-        } else {
-            None
-        }
-    };
-    let mut total = 0.0;
-    for (i, w) in points.windows(2).enumerate() {
-        let (a, b) = (w[0], w[1]);
-        let m = exponent(a, b).or_else(|| points.get(i + 2).and_then(|&c| exponent(b, c)));
-        total += match m {
-            Some(m) if (m + 1.0).abs() > 1e-6 && b.0 > 0.0 => (b.0 * b.1 - a.0 * a.1) / (m + 1.0),
-            _ => 0.5 * (b.0 - a.0) * (a.1 + b.1),
-        };
-    }
-    total
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_work_of_a_power_law_is_exact() {
-        let points: Vec<_> =
-            (0..6).map(|i| f64::from(i) * 0.3).map(|x| (x, 2.0 * x.powf(1.7))).collect();
-        let exact = 2.0 * 1.5f64.powf(2.7) / 2.7;
-        assert!((power_law_integral(&points) - exact).abs() < 1e-12 * exact);
     }
 }

@@ -1,0 +1,68 @@
+//! Friction over a step: bounds, planes and multipliers between equilibria.
+
+use super::evaluate::Evaluation;
+use super::loading::Loading;
+use super::problem::Problem;
+use crate::contact::FrictionTrial;
+use crate::mesh::surface::norm;
+
+/// Sets bound and tangent plane of every node from its normal multiplier and its
+/// place at `u`.
+pub(super) fn bound(
+    problem: &Problem,
+    loading: &Loading,
+    fraction: f64,
+    u: &[[f64; 3]],
+    multipliers_mpa: &[f64],
+    friction: &mut FrictionTrial,
+) {
+    let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
+    let coefficient = friction.coefficient;
+    for ((node, &n), &pressure) in
+        friction.nodes.iter_mut().zip(&surface.nodes).zip(multipliers_mpa)
+    {
+        let n = n as usize;
+        let x = std::array::from_fn(|k| problem.mesh.nodes[n][k] + u[n][k]);
+        node.bound_mpa = coefficient * pressure;
+        node.normal = indenter.distance(fraction, x).normal;
+    }
+}
+
+/// Takes the tractions of an equilibrium as multipliers.
+pub(super) fn update(friction: &mut FrictionTrial, found: &Evaluation) {
+    for (node, &t) in friction.nodes.iter_mut().zip(&found.friction) {
+        node.traction_mpa = t;
+    }
+}
+
+/// How far multipliers and bounds are from those that the equilibrium found,
+/// over the largest bound.
+pub(super) fn change(friction: &FrictionTrial, found: &Evaluation) -> f64 {
+    let (mut worst, mut scale) = (0.0f64, 0.0f64);
+    for ((node, t), pressure) in
+        friction.nodes.iter().zip(&found.friction).zip(&found.traction_mpa)
+    {
+        let bound = friction.coefficient * pressure;
+        let moved = norm(std::array::from_fn(|i| t[i] - node.traction_mpa[i]));
+        worst = worst.max(moved).max((bound - node.bound_mpa).abs());
+        scale = scale.max(bound);
+    }
+    if worst == 0.0 { 0.0 } else { worst / scale }
+}
+
+/// Sets every node's place relative to the indenter, from which slip of the next
+/// step counts.
+pub(super) fn anchor(
+    problem: &Problem,
+    loading: &Loading,
+    fraction: f64,
+    u: &[[f64; 3]],
+    friction: &mut FrictionTrial,
+) {
+    let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
+    let offset = indenter.offset_mm(fraction);
+    for (node, &n) in friction.nodes.iter_mut().zip(&surface.nodes) {
+        let (x, u) = (problem.mesh.nodes[n as usize], u[n as usize]);
+        node.anchor_mm = std::array::from_fn(|i| x[i] + u[i] - offset[i]);
+    }
+}
