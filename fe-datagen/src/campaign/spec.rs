@@ -3,7 +3,7 @@
 use super::CampaignError;
 use crate::mesh::fingertip::Density;
 use crate::output::OutputError;
-use crate::press::body::PlateSpec;
+use crate::indenter::IndenterSpec;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -38,8 +38,8 @@ pub struct CampaignSpec {
     /// Effects that the solver models; so far always [`EFFECTS`].
     #[serde(default = "default_effects")]
     pub effects: Vec<String>,
-    /// The plate.
-    pub plate: PlateSpec,
+    /// The indenter.
+    pub indenter: IndenterSpec,
     /// Ranges of its orientation.
     pub pose: PoseRanges,
 }
@@ -110,17 +110,9 @@ impl CampaignSpec {
             "effects",
             format!("is {:?}, the solver of campaigns models {EFFECTS:?}", self.effects),
         )?;
-        let [a, b] = self.plate.size_mm;
-        require(
-            a.is_finite() && b.is_finite() && a > 0.0 && b > 0.0,
-            "plate.size_mm",
-            format!("is {:?}, both have to be above 0", self.plate.size_mm),
-        )?;
-        require(
-            (0.0..=a.min(b) / 2.0).contains(&self.plate.edge_radius_mm),
-            "plate.edge_radius_mm",
-            format!("is {}, it has to be 0 to half a side", self.plate.edge_radius_mm),
-        )?;
+        if let Err(e) = self.indenter.validate() {
+            require(false, "indenter", e.to_string())?;
+        }
         let ranges = [
             ("pose.pitch_deg", self.pose.pitch_deg, 90.0),
             ("pose.roll_deg", self.pose.roll_deg, 180.0),

@@ -6,7 +6,7 @@ use crate::dataset::testing::{atlas, posed_record};
 use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
 use crate::mesh::fingertip::Density;
 use crate::output::map_image::Bits;
-use crate::press::body::PlateSpec;
+use crate::indenter::IndenterSpec;
 use crate::press::record::{IncrementRecord, Pose};
 use papilla_proto::atlas::Atlas;
 use std::collections::BTreeMap;
@@ -57,7 +57,7 @@ fn spec() -> CampaignSpec {
         test_fraction: 0.3,
         density: Density::Coarse,
         effects: EFFECTS.map(String::from).to_vec(),
-        plate: PlateSpec { size_mm: [20.0, 20.0], edge_radius_mm: 0.5 },
+        indenter: IndenterSpec::Plate { size_mm: [20.0, 20.0], edge_radius_mm: 0.5 },
         pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
     }
 }

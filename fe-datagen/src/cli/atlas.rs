@@ -1,10 +1,9 @@
 //! `atlas`: flatten the fingertip's patches and say how well it went.
 
 use super::print;
-use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, Order};
+use crate::mesh::fingertip::Density;
 use crate::output::atomic;
-use crate::press::body::{Body, TissueConstants};
+use crate::press::body::Body;
 use anyhow::Context as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -35,9 +34,7 @@ fn density(name: &str) -> Result<Density, String> {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let shape = FingertipShape::default();
-    let body =
-        Body::fingertip(&shape, &TissueConstants::default(), args.density, Order::default())?;
+    let body = Body::usual(args.density)?;
     let (atlas, report) = body.atlas().context("a fingertip has an atlas patch")??;
     if let Some(path) = &args.out {
         atomic::write(path, atlas.to_json()?.as_bytes())?;

@@ -3,9 +3,8 @@
 use super::{CHECKS_FAILED, print};
 use crate::campaign::{self, BoxError, CampaignSpec, PressSolver, RunOptions};
 use crate::dataset::BALANCE_RELATIVE_MAX;
-use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::Order;
-use crate::press::body::{Body, PlateSpec, TissueConstants};
+use crate::press::body::Body;
+use crate::press::drive::{Approach, Drive};
 use crate::press::record::{IncrementRecord, Pose};
 use crate::solve::{Options, Solver, StepReport};
 use anyhow::Context as _;
@@ -36,7 +35,7 @@ pub(super) struct Args {
 struct PlateSolver<'a> {
     finger: &'a Body,
     solver: Solver<'a>,
-    plate: PlateSpec,
+    plate: Approach,
 }
 
 impl PressSolver for PlateSolver<'_> {
@@ -48,14 +47,9 @@ impl PressSolver for PlateSolver<'_> {
             records.clear();
             let mut keep =
                 |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| records.push(r.clone());
-            self.finger.press(
-                &mut self.solver,
-                pose,
-                self.plate,
-                depths_mm,
-                refinement,
-                &mut keep,
-            )?;
+            let approach = Approach { pose, ..self.plate.clone() };
+            let drive = Drive::Depths(depths_mm.to_vec());
+            self.finger.press(&mut self.solver, &approach, &drive, refinement, &mut keep)?;
             if records.iter().all(|r| r.checks.energy_vs_work <= BALANCE_RELATIVE_MAX) {
                 break;
             }
@@ -66,14 +60,18 @@ impl PressSolver for PlateSolver<'_> {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let spec = CampaignSpec::read(&args.campaign)?;
-    let shape = FingertipShape::default();
-    let finger =
-        Body::fingertip(&shape, &TissueConstants::default(), spec.density, Order::default())?;
+    let finger = Body::usual(spec.density)?;
     let (atlas, _) = finger.atlas().context("a fingertip has an atlas patch")??;
     let options = RunOptions { threads: args.threads, ..RunOptions::default() };
+    let folder = args.campaign.parent().unwrap_or(std::path::Path::new(""));
+    let plate = Approach {
+        shape: spec.indenter.build(folder)?,
+        top_mm: spec.indenter.top_mm(),
+        ..Approach::plate(Pose::default())
+    };
     let solver = || -> Result<PlateSolver<'_>, BoxError> {
         let solver = finger.solver(Options::default())?;
-        Ok(PlateSolver { finger: &finger, solver, plate: spec.plate })
+        Ok(PlateSolver { finger: &finger, solver, plate: plate.clone() })
     };
     let report = campaign::run(&spec, &atlas, solver, &args.out, &options)?;
     print(&report, args.json, || report.to_string())?;

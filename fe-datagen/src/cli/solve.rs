@@ -2,16 +2,13 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::dataset::fault;
-use crate::element::ElementKind;
-use crate::mesh::block::{BlockLattice, build as build_block, even};
-use crate::mesh::fingertip::Order;
 use crate::output::map_image::{MapView, Quantity, white_of};
 use crate::output::npz::NpzBuilder;
 use crate::output::{atomic, vtu};
-use crate::press::body::Body;
 use crate::press::fields::{PA_PER_MPA, write_vtu};
 use crate::press::record::{Checks, IncrementRecord};
-use crate::scene::{Geometry, Layer, Scene};
+use crate::press::setup::Setup;
+use crate::scene::{Plan, Scene};
 use crate::solve::{Effort, Options, Solver, StepReport};
 use anyhow::Context as _;
 use ndarray::Array2;
@@ -61,6 +58,7 @@ struct Increment {
 #[derive(Serialize)]
 struct Summary {
     scene: Scene,
+    plan: Plan,
     unknowns: usize,
     elements: usize,
     factor_entries: usize,
@@ -74,27 +72,28 @@ struct Summary {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
-    let body = body(&scene)?;
+    let setup = Setup::new(&scene)?;
+    let body = &setup.body;
     let atlas = body.atlas().transpose()?.map(|(atlas, _)| atlas);
     let mut solver = body.solver(Options::default())?;
     let setup_s = clock.elapsed().as_secs_f64();
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
-    let depths = scene.depths_mm();
-    let bar = super::progress("pressing", depths.len());
+    let bar = super::progress("pressing", setup.drive.len());
     let (mut records, mut reports, mut series) = (Vec::new(), Vec::new(), Vec::new());
     let mut written = Ok(());
     let visit = &mut |s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
         let name = format!("state-{:03}.vtu", records.len());
         if written.is_ok() {
-            written = write_vtu(&args.out.join(&name), &body, s);
+            written = write_vtu(&args.out.join(&name), body, s);
         }
-        series.push((record.depth_mm, name));
+        let timed = setup.drive.is_timed();
+        series.push((if timed { record.time_s } else { record.depth_mm }, name));
         records.push(record.clone());
         reports.push(*report);
         bar.inc(1);
     };
-    let solved = body.press(&mut solver, scene.pose(), scene.plate, &depths, 1, visit);
+    let solved = body.press(&mut solver, &setup.approach, &setup.drive, 1, visit);
     bar.finish_and_clear();
     written?;
     vtu::write_pvd(&args.out.join("series.pvd"), &series)?;
@@ -102,6 +101,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         write_maps(&args.out, atlas, &records)?;
     }
     let summary = Summary {
+        plan: setup.plan,
         unknowns: body.problem.structure.equations.count,
         elements: body.problem.mesh.element_count(),
         factor_entries: body.problem.structure.factor_entries(),
@@ -117,46 +117,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     print(&summary, args.json, || human(&summary, &args.out))?;
     let clean = summary.increments.iter().all(|i| i.fault.is_none());
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
-}
-
-fn body(scene: &Scene) -> anyhow::Result<Body> {
-    let constants = scene.constants();
-    Ok(match &scene.geometry {
-        Geometry::Fingertip { density, order, shape } => {
-            Body::fingertip(shape, &constants, *density, *order)?
-        }
-        Geometry::Block { size_mm, elements, layers, order } => {
-            let lattice = block_lattice(*size_mm, *elements, layers, *order);
-            let mesh = build_block(&lattice, |p| p);
-            Body::from_mesh(mesh, &constants, &["z_max".into()], "z_min")?
-        }
-        Geometry::Mesh { file, fixed, contact } => {
-            let mesh = crate::mesh::gmsh::read_file(file)?;
-            Body::from_mesh(mesh, &constants, fixed, contact)?
-        }
-    })
-}
-
-fn block_lattice(
-    size: [f64; 2],
-    elements: [usize; 2],
-    layers: &[Layer],
-    order: Order,
-) -> BlockLattice {
-    let (step, kind) = match order {
-        Order::Linear => (1, ElementKind::Hex8),
-        Order::Quadratic => (2, ElementKind::Hex27),
-    };
-    let mut z = vec![0.0];
-    let mut tissue = Vec::new();
-    for layer in layers {
-        let bottom = z.last().copied().unwrap_or(0.0);
-        let inside = even(layer.thickness_mm, layer.elements * step);
-        z.extend(inside[1..].iter().map(|t| bottom + t));
-        tissue.extend(std::iter::repeat_n(layer.tissue, layer.elements));
-    }
-    let [x, y] = std::array::from_fn(|i| even(size[i], elements[i] * step));
-    BlockLattice { axes: [x, y, z], layers: tissue, kind }
 }
 
 fn increment(record: &IncrementRecord, report: &StepReport) -> Increment {

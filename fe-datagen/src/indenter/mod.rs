@@ -4,9 +4,11 @@
 //! normal, which is the direction in which the indenter pushes the skin.
 
 mod plate;
+mod spec;
 mod sphere;
 
 pub use plate::RoundedPlate;
+pub use spec::{IndenterError, IndenterSpec, first_touch_travel};
 pub use sphere::Sphere;
 
 /// Signed distance with its first two derivatives at a point.

@@ -34,6 +34,15 @@ pub enum Order {
     Quadratic,
 }
 
+/// x
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Parts {
+    /// x
+    pub bone: bool,
+    /// x
+    pub nail: bool,
+}
+
 /// Lattice sizes of a density: surface grid and intervals through each layer.
 struct Resolution {
     grid: GridSize,
@@ -113,6 +122,7 @@ pub fn build(
     shape: &FingertipShape,
     density: Density,
     order: Order,
+    _parts: Parts,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
     let resolution = density.resolution(order);
@@ -250,7 +260,7 @@ mod tests {
         let shape = FingertipShape::default();
         for density in [Density::Coarse, Density::Medium, Density::Fine] {
             for order in [Order::Linear, Order::Quadratic] {
-                let finger = build(&shape, density, order).unwrap();
+                let finger = build(&shape, density, order, Parts::default()).unwrap();
                 let block = &finger.mesh.blocks[0];
                 let geometry =
                     BlockGeometry::new(block.kind, &finger.mesh.nodes, &block.connectivity);
@@ -261,7 +271,7 @@ mod tests {
 
     #[test]
     fn skin_faces_look_outward() {
-        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear).unwrap();
+        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear, Parts::default()).unwrap();
         let skin = &finger.mesh.surfaces["skin"];
         let centre = [15.0, 0.0, 0.0];
         let position = |n: u32| finger.mesh.nodes[n as usize];
@@ -276,7 +286,7 @@ mod tests {
 
     #[test]
     fn the_mesh_mirrors_left_to_right_exactly() {
-        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear).unwrap();
+        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear, Parts::default()).unwrap();
         let key = |p: [f64; 3]| p.map(f64::to_bits);
         let set: std::collections::HashSet<_> =
             finger.mesh.nodes.iter().map(|&p| key([p[0], p[1] + 0.0, p[2]])).collect();
@@ -287,7 +297,7 @@ mod tests {
 
     #[test]
     fn the_patch_is_a_disc() {
-        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear).unwrap();
+        let finger = build(&FingertipShape::default(), Density::Coarse, Order::Linear, Parts::default()).unwrap();
         let p = &finger.patch;
         let mut edges = std::collections::HashSet::new();
         for t in &p.triangles {

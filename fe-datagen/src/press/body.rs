@@ -4,68 +4,16 @@ use super::record::{Checks, IncrementRecord, Pose};
 use crate::atlas::{AtlasReport, BuildAtlasError, build_atlas};
 use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
-use crate::indenter::{Placement, RoundedPlate};
-use crate::material::{ElasticConstants, Material, MaterialError};
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Patch, build};
-use crate::mesh::recovery::{NoElement, SedRecovery};
+use crate::indenter::IndenterError;
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
+use crate::mesh::recovery::{Deformed, NoElement, SedRecovery};
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
+use crate::scene::{SceneError, TissueError};
 use crate::solve::{
-    Effort, Loading, MovingIndenter, Options, Problem, ProblemError, SolveError, Solver, StepReport,
+    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
 };
 use papilla_proto::atlas::Atlas;
-use std::sync::Arc;
-use std::time::Instant;
-
-/// Elastic constants of the soft tissues.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TissueConstants {
-    /// Epidermis (Chen, Shuai & Zhu).
-    pub epidermis: ElasticConstants,
-    /// Dermis (Maeno 1998).
-    pub dermis: ElasticConstants,
-    /// Subcutaneous tissue (Maeno 1998).
-    pub subcutaneous: ElasticConstants,
-}
-
-impl Default for TissueConstants {
-    fn default() -> Self {
-        let c = |youngs_modulus_mpa| ElasticConstants { youngs_modulus_mpa, poissons_ratio: 0.48 };
-        Self { epidermis: c(0.136), dermis: c(0.080), subcutaneous: c(0.034) }
-    }
-}
-
-impl TissueConstants {
-    /// Material of each tissue, by [`Tissue::index`]. Nail and bone are rigid:
-    /// no element is made of them, their entry repeats the subcutaneous one.
-    fn materials(&self) -> Result<[Material; Tissue::ALL.len()], PressError> {
-        let material = |tissue: Tissue, c| {
-            Material::neo_hookean(c)
-                .map_err(|source| PressError::Material { tissue: tissue.name(), source })
-        };
-        let fat = material(Tissue::Subcutaneous, self.subcutaneous)?;
-        let epidermis = material(Tissue::Epidermis, self.epidermis)?;
-        let dermis = material(Tissue::Dermis, self.dermis)?;
-        Ok([epidermis, dermis, fat, fat, fat])
-    }
-}
-
-/// The rigid plate that presses.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PlateSpec {
-    /// Side lengths, mm.
-    pub size_mm: [f64; 2],
-    /// Radius of its edges, mm.
-    pub edge_radius_mm: f64,
-}
-
-impl Default for PlateSpec {
-    fn default() -> Self {
-        Self { size_mm: [20.0, 20.0], edge_radius_mm: 1.0 }
-    }
-}
 
 /// Why a body could not be set up or pressed.
 #[derive(Debug, thiserror::Error)]
@@ -73,20 +21,21 @@ pub enum PressError {
     /// The shape contradicts itself.
     #[error(transparent)]
     Shape(#[from] FingertipShapeError),
-    /// A material is out of range.
-    #[error("materials.{tissue}: {source}")]
-    Material {
-        /// Tissue.
-        tissue: &'static str,
-        /// What is wrong.
-        source: MaterialError,
-    },
     /// The problem could not be set up.
     #[error(transparent)]
     Problem(#[from] ProblemError),
     /// The interface has no elements on one side.
     #[error(transparent)]
     Recovery(#[from] NoElement),
+    /// The scene contradicts itself.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A material is out of range.
+    #[error(transparent)]
+    Material(#[from] TissueError),
+    /// The mesh file is bad.
+    #[error(transparent)]
+    Mesh(#[from] crate::mesh::gmsh::GmshError),
     /// No equilibrium.
     #[error("at depth {depth_mm} mm: {source}")]
     Solve {
@@ -98,9 +47,20 @@ pub enum PressError {
     /// An element is inside out where SED is wanted.
     #[error(transparent)]
     Inverted(#[from] Inverted),
-    /// Depths must be positive and increasing.
-    #[error("depths_mm must be positive, finite and increasing; found {0} after {1}")]
-    Depths(f64, f64),
+    /// Depths, forces and times must be positive and rising.
+    #[error("depths, forces and times must be positive, finite and rising; found {0} after {1}")]
+    Rising(f64, f64),
+    /// A prescribed force was not reached.
+    #[error("the force of {wanted_n} N was not reached: {reached_n:.4} N after 6 mm or 60 tries")]
+    Force {
+        /// Force asked for, N.
+        wanted_n: f64,
+        /// Largest force below it, N.
+        reached_n: f64,
+    },
+    /// The indenter does not meet the body.
+    #[error(transparent)]
+    Indenter(#[from] IndenterError),
 }
 
 /// A body ready to be pressed, shared by every press of a campaign.
@@ -111,6 +71,8 @@ pub struct Body {
     pub contact: String,
     /// The fingertip's atlas patch; other bodies have none.
     pub patch: Option<PressedPatch>,
+    /// Whether the body is a plane section in x and y.
+    pub plane: bool,
 }
 
 /// What is read off a fingertip at each equilibrium.
@@ -129,11 +91,12 @@ impl Body {
     /// See [`PressError`].
     pub fn fingertip(
         shape: &FingertipShape,
-        constants: &TissueConstants,
+        materials: Materials,
         density: Density,
         order: Order,
+        parts: Parts,
     ) -> Result<Self, PressError> {
-        let FingertipMesh { mesh, patch } = build(shape, density, order)?;
+        let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
@@ -143,9 +106,9 @@ impl Body {
         }
         let side = |tissue| SedRecovery::new(&mesh, "interface", tissue, &patch.interface);
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
-        let problem = Problem::new(mesh, constants.materials()?, fixed, Some("skin"))?;
+        let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
         let patch = Some(PressedPatch { patch, dermis, epidermis });
-        Ok(Self { problem, contact: "skin".into(), patch })
+        Ok(Self { problem, contact: "skin".into(), patch, plane: false })
     }
 
     /// Any mesh, held on the surfaces or node sets `held` and touched on the
@@ -155,7 +118,7 @@ impl Body {
     /// [`PressError::Problem`] names a surface that the mesh lacks.
     pub fn from_mesh(
         mesh: Mesh,
-        constants: &TissueConstants,
+        materials: Materials,
         held: &[String],
         contact: &str,
     ) -> Result<Self, PressError> {
@@ -170,8 +133,8 @@ impl Body {
                 fixed[3 * n as usize..3 * n as usize + 3].fill(true);
             }
         }
-        let problem = Problem::new(mesh, constants.materials()?, fixed, Some(contact))?;
-        Ok(Self { problem, contact: contact.into(), patch: None })
+        let problem = Problem::new(mesh, materials, fixed, Some(contact))?;
+        Ok(Self { problem, contact: contact.into(), patch: None, plane: false })
     }
 
     /// The atlas of the body's patch; `None` for a body without one.
@@ -186,66 +149,15 @@ impl Body {
         Some(build_atlas(&at(&patch.skin), &at(&patch.interface), &patch.triangles))
     }
 
-    /// The plate at first touch in `pose`, set to go `depth_mm` along its normal.
-    ///
-    /// The plate's centre starts at the skin point that it touches first.
+    /// Orientation of an indenter in `pose`: its own z axis is the direction in
+    /// which it presses. A plane section is pressed in its plane, towards +y.
     #[must_use]
-    pub fn plate(&self, pose: Pose, plate: PlateSpec, depth_mm: f64) -> MovingIndenter {
-        let rotation = rotation(pose);
-        let normal = [rotation[0][2], rotation[1][2], rotation[2][2]];
-        let along = |p: &[f64; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
-        let first = first_touch(&self.problem.mesh, &self.contact, along);
-        let half = [0.5 * plate.size_mm[0], 0.5 * plate.size_mm[1], 2.0 + plate.edge_radius_mm];
-        MovingIndenter {
-            shape: Arc::new(RoundedPlate { half_mm: half, edge_radius_mm: plate.edge_radius_mm }),
-            start: Placement {
-                rotation,
-                origin_mm: std::array::from_fn(|i| first[i] - half[2] * normal[i]),
-            },
-            travel_mm: normal.map(|v| v * depth_mm),
+    pub fn rotation(&self, pose: Pose) -> [[f64; 3]; 3] {
+        if self.plane {
+            product(&[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], &rotation(pose))
+        } else {
+            rotation(pose)
         }
-    }
-
-    /// Presses to each depth in turn and calls `visit` with the solver at each
-    /// equilibrium and its record. There are more equilibria than depths, for
-    /// the work integral; `refinement` 2 halves their distance, and so on. The
-    /// stored states do not depend on it.
-    ///
-    /// # Errors
-    /// [`PressError::Solve`] names the depth that found no equilibrium; records
-    /// up to it have been visited.
-    pub fn press(
-        &self,
-        solver: &mut Solver<'_>,
-        pose: Pose,
-        plate: PlateSpec,
-        depths_mm: &[f64],
-        refinement: u32,
-        visit: &mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport),
-    ) -> Result<(), PressError> {
-        let mut last = 0.0;
-        for &d in depths_mm {
-            if !(d.is_finite() && d > last) {
-                return Err(PressError::Depths(d, last));
-            }
-            last = d;
-        }
-        let indenter = self.plate(pose, plate, last);
-        solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
-        for (i, &depth_mm) in depths_mm.iter().enumerate() {
-            let clock = Instant::now();
-            let at = |source| PressError::Solve { depth_mm, source };
-            let mut effort = Effort::default();
-            for between in path_mm(depths_mm, i, refinement) {
-                effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
-            }
-            let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
-            report.effort = report.effort.plus(&effort);
-            let mut record = self.record(solver, depth_mm, &report)?;
-            record.seconds = clock.elapsed().as_secs_f64();
-            visit(solver, &record, &report);
-        }
-        Ok(())
     }
 
     /// Force of the pressure that is recorded, N: what the atlas patch does not
@@ -263,14 +175,13 @@ impl Body {
     }
 
     /// Vertex values and checks of the solver's equilibrium.
-    fn record(
+    pub(super) fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,
         report: &StepReport,
     ) -> Result<IncrementRecord, PressError> {
-        let Problem { mesh, geometry, materials, .. } = &self.problem;
-        let skin = &mesh.surfaces[&self.contact];
+        let skin = &self.problem.mesh.surfaces[&self.contact];
         let pressure = solver.pressure_mpa(skin);
         let integral = self.force_of_pressure_n(solver, &pressure);
         let balance = solver.balance();
@@ -279,15 +190,23 @@ impl Body {
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
-        let u = solver.displacement_mm();
         let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa) = Default::default();
         if let Some(p) = &self.patch {
             pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
-            sed_dermis_mpa = p.dermis.sed_mpa(mesh, geometry, materials, u)?;
-            sed_epidermis_mpa = p.epidermis.sed_mpa(mesh, geometry, materials, u)?;
+            let history = |block, element| solver.history_of(block, element);
+            let body = Deformed {
+                mesh: &self.problem.mesh,
+                geometry: &self.problem.geometry,
+                materials: &self.problem.materials,
+                u: solver.displacement_mm(),
+                history: &history,
+            };
+            sed_dermis_mpa = p.dermis.sed_mpa(&body)?;
+            sed_epidermis_mpa = p.epidermis.sed_mpa(&body)?;
         }
         Ok(IncrementRecord {
             depth_mm,
+            time_s: 0.0,
             force_n: force,
             pressure_mpa,
             sed_dermis_mpa,
@@ -296,7 +215,8 @@ impl Body {
                 residual_relative: report.residual_relative,
                 contact_force_vs_pressure_integral: difference(integral, force),
                 plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
-                energy_vs_work: (report.stored_mj - work).abs() / work.abs().max(f64::MIN_POSITIVE),
+                energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
+                    / work.abs().max(f64::MIN_POSITIVE),
                 j_min: report.j_min,
                 penetration_mm_max: report.gap_error_mm,
                 newton_iterations: report.effort.newton_iterations,
@@ -319,29 +239,7 @@ impl Body {
     }
 }
 
-/// Depths between stored depth `i` and the one before it at which to find
-/// equilibrium too, mm. Force turns fast after first touch, and with it the
-/// work integral.
-fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
-    let to = depths_mm[i];
-    let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
-    let coarse: &[f64] = match i {
-        0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
-        1 => &[0.0, 0.5, 1.0],
-        _ => &[0.0, 1.0],
-    };
-    let at = |part: f64| from + part * (to - from);
-    let mut path = Vec::new();
-    for pair in coarse.windows(2) {
-        for k in 1..=refinement {
-            path.push(at(pair[0] + (pair[1] - pair[0]) * f64::from(k) / f64::from(refinement)));
-        }
-    }
-    path.pop();
-    path
-}
-
-/// Rotation of a plate: at rest its pressing face looks along +z into the pad;
+/// Rotation of an indenter: at rest its pressing side looks along +z into the pad;
 /// yaw about its normal, then pitch about y (tip first is positive), then roll
 /// about x.
 #[must_use]
@@ -357,17 +255,4 @@ pub fn rotation(pose: Pose) -> [[f64; 3]; 3] {
 
 fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
-}
-
-/// Skin point with the smallest `along`; where several tie (a flat plate on a
-/// symmetric finger), their mean, so that a mirrored pose touches at the mirror
-/// image.
-fn first_touch(mesh: &Mesh, contact: &str, along: impl Fn(&[f64; 3]) -> f64) -> [f64; 3] {
-    let nodes = mesh.surfaces[contact].nodes();
-    let points: Vec<_> = nodes.iter().map(|&n| mesh.nodes[n as usize]).collect();
-    let least = points.iter().map(&along).fold(f64::INFINITY, f64::min);
-    let scale = points.iter().map(|p| norm(*p)).fold(0.0, f64::max);
-    let touching: Vec<_> = points.iter().filter(|p| along(p) <= least + 1e-12 * scale).collect();
-    let count = touching.len() as f64;
-    std::array::from_fn(|i| touching.iter().map(|p| p[i]).sum::<f64>() / count)
 }

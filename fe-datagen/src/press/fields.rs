@@ -1,7 +1,9 @@
 //! Fields of a whole body at one equilibrium, for looking at.
 
 use super::body::Body;
-use crate::element::kernel::evaluate;
+use crate::element::Memory;
+use crate::element::kernel::displacement_gradient;
+use crate::material::Kinematics;
 use crate::output::vtu::{self, Field, VtuMesh};
 use crate::output::{OutputError, vtu::Values};
 use crate::solve::Solver;
@@ -18,23 +20,36 @@ struct ElementFields {
 }
 
 impl ElementFields {
-    fn new(body: &Body, u: &[[f64; 3]]) -> Self {
+    fn new(body: &Body, solver: &Solver<'_>) -> Self {
         let mut fields =
             Self { sed_j_per_m3: Vec::new(), volume_ratio: Vec::new(), layer: Vec::new() };
-        let problem = &body.problem;
-        for (block, geometry) in problem.mesh.blocks.iter().zip(&problem.geometry) {
-            let mut force = vec![[0.0; 3]; block.kind.nodes()];
+        let (problem, u) = (&body.problem, solver.displacement_mm());
+        for (b, (block, geometry)) in problem.mesh.blocks.iter().zip(&problem.geometry).enumerate() {
+            let n = block.kind.nodes();
+            let mut force = vec![[0.0; 3]; n];
             for e in 0..block.len() {
                 let local: Vec<_> = block.element(e).iter().map(|&n| u[n as usize]).collect();
-                let material = &problem.materials[block.tissue[e].index()];
+                let solid = &problem.materials[block.tissue[e].index()];
                 let shape = geometry.element(e);
-                let volume: f64 = shape.weights.iter().sum();
+                let history = solver.history_of(b, e);
+                let memory = Memory { history, dt_s: 0.0 };
                 // An equilibrium has no inverted element; NaN would show one.
-                let state = evaluate(shape, material, &local, &mut force, None).ok();
-                let (energy, theta) =
-                    state.map_or((f64::NAN, f64::NAN), |s| (s.energy_mj, s.theta_minus_1[0]));
+                let theta = solid
+                    .evaluate(shape, &local, memory, &mut force, None)
+                    .map_or([f64::NAN; 4], |s| s.theta_minus_1);
+                let (mut energy, mut volume, mut growth) = (0.0, 0.0, 0.0);
+                let len = solid.history_len();
+                for (q, gradients) in shape.gradients.chunks_exact(n).enumerate() {
+                    let k = Kinematics::new(displacement_gradient(&local, gradients));
+                    let t: f64 = shape.basis[q].iter().zip(theta).map(|(b, t)| b * t).sum();
+                    let own = &history[q * len..(q + 1) * len];
+                    let weight = shape.weights[q];
+                    energy += weight * solid.stored_mpa(&k, t, own);
+                    volume += weight;
+                    growth += weight * t;
+                }
                 fields.sed_j_per_m3.push(energy / volume * PA_PER_MPA);
-                fields.volume_ratio.push(1.0 + theta);
+                fields.volume_ratio.push(1.0 + growth / volume);
                 fields.layer.push(block.tissue[e].index() as i32);
             }
         }
@@ -60,7 +75,7 @@ pub fn write_vtu(path: &Path, body: &Body, solver: &Solver<'_>) -> Result<(), Ou
         }
     }
     let u = solver.displacement_mm();
-    let fields = ElementFields::new(body, u);
+    let fields = ElementFields::new(body, solver);
     let pressure: Vec<f64> = solver
         .pressure_mpa(&mesh.surfaces[&body.contact])
         .into_iter()

@@ -1,6 +1,8 @@
-//! One press: from a scene to stored equilibria.
-
-pub mod record;
+//! One press: a body, an indenter on its way, and what is recorded.
 
 pub mod body;
+pub mod drive;
 pub mod fields;
+pub mod laws;
+pub mod record;
+pub mod setup;

@@ -36,6 +36,8 @@ pub struct Checks {
 pub struct IncrementRecord {
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,
+    /// Time since first touch, s; 0 where time plays no part.
+    pub time_s: f64,
     /// Force of the plate on the finger in the finger's frame, N.
     pub force_n: [f64; 3],
     /// True contact pressure at the skin patch's vertices, MPa; length V.
@@ -51,7 +53,7 @@ pub struct IncrementRecord {
 }
 
 /// Orientation of the plate relative to the finger.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Pitch about y (lateral), degrees; tip first is positive.
     pub pitch_deg: f64,

@@ -125,6 +125,21 @@ impl<'a> Solver<'a> {
         &self.newton.current.traction_mpa
     }
 
+    /// Forgets how the last equilibria followed each other, because the load is
+    /// about to turn.
+    pub fn turn(&mut self) {
+        self.before = None;
+        self.pace = self.first_pace();
+    }
+
+    /// Contact force along a straight path, N.
+    #[must_use]
+    pub fn force_along_path_n(&self) -> f64 {
+        let force = self.newton.current.contact_force_n;
+        let travel = self.loading.indenter.as_ref().and_then(|m| m.straight_travel());
+        travel.map_or(0.0, |(_, direction)| (0..3).map(|i| force[i] * direction[i]).sum())
+    }
+
     /// Load fraction reached.
     #[must_use]
     pub fn fraction(&self) -> f64 {
@@ -343,10 +358,12 @@ impl<'a> Solver<'a> {
         self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
     }
 
-    /// History of materials with memory at the equilibrium; empty without.
+    /// History of an element's quadrature points at the equilibrium; empty for
+    /// materials without memory.
     #[must_use]
-    pub fn memory(&self) -> &[f64] {
-        &self.state.memory
+    pub fn history_of(&self, block: usize, element: usize) -> &[f64] {
+        let layout = self.newton.problem.memory.as_ref();
+        layout.map_or(&[], |m| &self.state.memory[m.range(block, element)])
     }
 
     /// Tangential traction of the indenter on each contact node, MPa per

@@ -1,22 +1,23 @@
 //! Meshes, materials, loads and fields that the cases share.
 
 use super::CaseError;
-use crate::element::kernel::{displacement_gradient, evaluate};
+use crate::element::kernel::displacement_gradient;
 use crate::element::reference::{HEX27_LATTICE, TET10_EDGES};
-use crate::element::{ElementKind, Inverted};
+use crate::element::{Elastic, ElementKind, Inverted, Memory};
 use crate::material::kinematics::Mat3;
-use crate::material::{ElasticConstants, Isochoric, Kinematics, Material, MaterialError};
+use crate::material::{ElasticConstants, Kinematics, MaterialError, NeoHookean};
 use crate::mesh::block::{BlockLattice, build, even};
 use crate::mesh::{Block, Mesh, Surface, Tissue};
 use crate::solve::evaluate::{Evaluation, Trial, evaluate_body};
-use crate::solve::{Loading, Options, Problem, Solver, StepError, StepReport};
+use crate::solve::{Loading, Materials, Options, Problem, Solver, StepError, StepReport};
 use std::collections::HashMap;
 
 /// The same material for every tissue.
-pub(super) fn uniform(e_mpa: f64, nu: f64) -> Result<[Material; 5], MaterialError> {
-    let m =
-        Material::neo_hookean(ElasticConstants { youngs_modulus_mpa: e_mpa, poissons_ratio: nu })?;
-    Ok([m; 5])
+pub(super) fn uniform(e_mpa: f64, nu: f64) -> Result<Materials, MaterialError> {
+    let constants = ElasticConstants { youngs_modulus_mpa: e_mpa, poissons_ratio: nu };
+    let [mu_mpa, bulk_mpa] = constants.moduli_mpa()?;
+    let solid = Elastic::shared(NeoHookean { mu_mpa }, bulk_mpa);
+    Ok(std::array::from_fn(|_| solid.clone()))
 }
 
 /// Options that drive the residual to rounding.
@@ -218,7 +219,14 @@ pub(super) fn solve<'a>(
 
 /// Internal forces, N, one a degree of freedom.
 pub(super) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
-    let trial = Trial { u, multipliers_mpa: &[], penalty: 1.0, load_fraction: 0.0 };
+    let trial = Trial {
+        u,
+        multipliers_mpa: &[],
+        penalty: 1.0,
+        load_fraction: 0.0,
+        memory: Memory::default(),
+        friction: None,
+    };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, None, &mut out)?;
     Ok(out.residual_n)
@@ -243,23 +251,15 @@ pub(super) fn points(
             let g = geometry.element(e);
             let material = &problem.materials[block.tissue[e].index()];
             let local: Vec<_> = block.element(e).iter().map(|&a| u[a as usize]).collect();
-            let state = evaluate(g, material, &local, &mut force, None)?;
+            let state = material.evaluate(g, &local, Memory::default(), &mut force, None)?;
             for (gradients, basis) in g.gradients.chunks_exact(n).zip(g.basis) {
                 let theta: f64 = basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t).sum();
                 let k = Kinematics::new(displacement_gradient(&local, gradients));
-                visit(Point { stress: first_piola(material, &k, theta) });
+                visit(Point { stress: material.first_piola_mpa(&k, theta, Memory::default()) });
             }
         }
     }
     Ok(())
-}
-
-/// First Piola-Kirchhoff stress, volumetric part included, MPa.
-pub(super) fn first_piola(material: &Material, k: &Kinematics, theta_minus_1: f64) -> Mat3 {
-    let p = material.isochoric.first_piola(k);
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| p[i][j] + material.bulk_mpa * theta_minus_1 * k.cof[i][j])
-    })
 }
 
 /// Largest entry by magnitude.

@@ -1,9 +1,10 @@
 //! A flat plate on the fingertip: balances, and what published fingertips do.
 
 use super::{CaseError, Check, Context};
-use crate::mesh::fingertip::{Density, Order};
+use crate::mesh::fingertip::Density;
 use crate::mesh::surface::norm;
-use crate::press::body::{Body, PlateSpec, TissueConstants};
+use crate::press::body::Body;
+use crate::press::drive::{Approach, Drive};
 use crate::press::record::{Checks, Pose};
 use crate::solve::Options;
 
@@ -45,22 +46,15 @@ impl Context {
 impl FlatPress {
     /// Presses in steps of `step_mm`.
     fn solve(density: Density, step_mm: f64, steps: u32) -> Result<Self, CaseError> {
-        let finger = Body::fingertip(
-            &crate::geometry::fingertip::FingertipShape::default(),
-            &TissueConstants::default(),
-            density,
-            Order::Linear,
-        )?;
+        let finger = Body::usual(density)?;
         let mut solver = finger.solver(Options::default())?;
-        let pose = Pose { pitch_deg: 0.0, roll_deg: 0.0, yaw_deg: 0.0 };
         let depths: Vec<f64> = (1..=steps).map(|i| step_mm * f64::from(i)).collect();
         let skin = &finger.problem.mesh.surfaces["skin"];
         let mut equilibria = Vec::new();
         finger.press(
             &mut solver,
-            pose,
-            PlateSpec::default(),
-            &depths,
+            &Approach::plate(Pose::default()),
+            &Drive::Depths(depths),
             REFINEMENT,
             &mut |solver, record, _| {
                 let pressure = solver.pressure_mpa(skin);

@@ -39,11 +39,9 @@ fn press(kind: ElementKind, h: f64, nu: f64, depth: f64) -> Result<[f64; 3], Cas
     let (mesh, fixed) = quarter_space(kind, h, 4.0 / 3.0 * RADIUS_MM, far, RADIUS_MM);
     let problem = Problem::new(mesh, uniform(E_MPA, nu)?, fixed, Some("touch"))?;
     let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let indenter = MovingIndenter {
-        shape: Arc::new(Sphere { radius_mm: SPHERE_MM }),
-        start: Placement { rotation, origin_mm: [0.0, 0.0, SPHERE_MM] },
-        travel_mm: [0.0, 0.0, -depth],
-    };
+    let start = Placement { rotation, origin_mm: [0.0, 0.0, SPHERE_MM] };
+    let sphere = Arc::new(Sphere { radius_mm: SPHERE_MM });
+    let indenter = MovingIndenter::straight(sphere, start, [0.0, 0.0, -depth]);
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
     let options =
         Options { residual_tolerance: 1e-6, gap_tolerance_mm: 1e-4 * depth, ..Options::default() };

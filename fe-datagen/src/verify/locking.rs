@@ -33,11 +33,9 @@ fn force_n(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
     let problem = Problem::new(mesh, uniform(0.1, nu)?, fixed, Some("z_max"))?;
     // Upside down: the plate presses with its local +z face.
     let rotation = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
-    let indenter = MovingIndenter {
-        shape: Arc::new(RoundedPlate { half_mm: [20.0, 20.0, 2.0], edge_radius_mm: 0.5 }),
-        start: Placement { rotation, origin_mm: [0.0, 0.0, 7.0] },
-        travel_mm: [0.0, 0.0, -0.75],
-    };
+    let plate = Arc::new(RoundedPlate { half_mm: [20.0, 20.0, 2.0], edge_radius_mm: 0.5 });
+    let start = Placement { rotation, origin_mm: [0.0, 0.0, 7.0] };
+    let indenter = MovingIndenter::straight(plate, start, [0.0, 0.0, -0.75]);
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
     let (solver, _) = solve(&problem, loading, Options::default(), 3)?;
     Ok(solver.balance().contact_force_n[2].abs())

@@ -1,9 +1,9 @@
 //! Presses rolled to either side are mirror images.
 
 use super::{CaseError, Check, Context};
-use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, Order};
-use crate::press::body::{Body, PlateSpec, TissueConstants};
+use crate::mesh::fingertip::Density;
+use crate::press::body::Body;
+use crate::press::drive::{Approach, Drive};
 use crate::press::record::{IncrementRecord, Pose};
 use crate::solve::Options;
 use std::collections::HashMap;
@@ -11,12 +11,7 @@ use std::collections::HashMap;
 const SOURCE: &str = "symmetry of the finger";
 
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
-    let finger = Body::fingertip(
-        &FingertipShape::default(),
-        &TissueConstants::default(),
-        Density::Coarse,
-        Order::Linear,
-    )?;
+    let finger = Body::usual(Density::Coarse)?;
     let [left, right] = [-15.0, 15.0].map(|roll_deg| press(&finger, roll_deg));
     let (left, right) = (left?, right?);
     let patch = &finger.patch.as_ref().ok_or("the fingertip has no patch")?.patch;
@@ -54,9 +49,8 @@ fn press(finger: &Body, roll_deg: f64) -> Result<IncrementRecord, CaseError> {
     let mut last = None;
     finger.press(
         &mut solver,
-        pose,
-        PlateSpec::default(),
-        &[0.5, 1.0],
+        &Approach::plate(pose),
+        &Drive::Depths(vec![0.5, 1.0]),
         1,
         &mut |_, record, _| {
             last = Some(record.clone());

@@ -1,10 +1,10 @@
 //! Patch test: constant strain on a distorted mesh.
 
 use super::bodies::{
-    cube, first_piola, hold_boundary, largest, noise, points, prescribe, solve, tight, uniform,
+    cube, hold_boundary, largest, noise, points, prescribe, solve, tight, uniform,
 };
 use super::{CaseError, Check, Context};
-use crate::element::ElementKind;
+use crate::element::{ElementKind, Memory};
 use crate::material::Kinematics;
 use crate::material::kinematics::Mat3;
 use crate::solve::{Loading, Problem};
@@ -62,7 +62,7 @@ fn errors(kind: ElementKind, cells: usize, h: Mat3) -> Result<[f64; 2], CaseErro
     let difference: Vec<f64> =
         u.as_flattened().iter().zip(exact.as_flattened()).map(|(a, b)| a - b).collect();
     let k = Kinematics::new(h);
-    let stress = first_piola(&problem.materials[0], &k, k.j_minus_1);
+    let stress = problem.materials[0].first_piola_mpa(&k, k.j_minus_1, Memory::default());
     let stress_scale = largest(stress.as_flattened());
     let mut worst = 0.0f64;
     points(&problem, u, &mut |p| {

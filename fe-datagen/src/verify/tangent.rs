@@ -2,7 +2,7 @@
 
 use super::bodies::{cube, largest, noise, uniform};
 use super::{CaseError, Check, Context};
-use crate::element::ElementKind;
+use crate::element::{ElementKind, Memory};
 use crate::indenter::{Placement, Sphere};
 use crate::linear::Equations;
 use crate::solve::evaluate::{Evaluation, Trial, evaluate_body};
@@ -35,7 +35,7 @@ fn loading() -> Loading {
     let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let start = Placement { rotation, origin_mm: [0.55, 0.45, 2.4] };
     let shape = Arc::new(Sphere { radius_mm: 1.6 });
-    let indenter = MovingIndenter { shape, start, travel_mm: [0.0, 0.0, -0.1] };
+    let indenter = MovingIndenter::straight(shape, start, [0.0, 0.0, -0.1]);
     Loading { indenter: Some(indenter), ..Loading::default() }
 }
 
@@ -58,7 +58,14 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
     let equations = &structure.equations;
     let mut tangent = structure.zeros();
     let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
-        let trial = Trial { u, multipliers_mpa: &multipliers, penalty: 3.0, load_fraction: 1.0 };
+        let trial = Trial {
+            u,
+            multipliers_mpa: &multipliers,
+            penalty: 3.0,
+            load_fraction: 1.0,
+            memory: Memory::default(),
+            friction: None,
+        };
         let mut out = Evaluation::default();
         evaluate_body(&problem, &loading, &trial, with_tangent.then_some(&mut tangent), &mut out)?;
         Ok(out)

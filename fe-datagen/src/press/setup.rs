@@ -1,0 +1,116 @@
+//! From a scene to a body and an indenter.
+
+use super::body::{Body, PressError};
+use super::drive::{Approach, Drive, DrivePoint};
+use super::laws::solids;
+use crate::element::ElementKind;
+use crate::geometry::fingertip::FingertipShape;
+use crate::mesh::block::{BlockLattice, build as build_block, even};
+use crate::mesh::fingertip::{Density, Order};
+use crate::scene::{Geometry, Layer, Motion, Plan, Scene, TissueTable};
+
+/// Everything that a scene is solved with.
+pub struct Setup {
+    /// What is going to be simulated.
+    pub plan: Plan,
+    /// The body.
+    pub body: Body,
+    /// The indenter.
+    pub approach: Approach,
+    /// What is stored.
+    pub drive: Drive,
+}
+
+impl Setup {
+    /// Meshes and sets up what a scene describes.
+    ///
+    /// # Errors
+    /// [`PressError`] names what cannot be built.
+    pub fn new(scene: &Scene) -> Result<Self, PressError> {
+        let plan = scene.plan()?;
+        let approach = Approach {
+            shape: scene.indenter.build(&scene.folder)?,
+            top_mm: scene.indenter.top_mm(),
+            pose: scene.motion.pose(),
+            offset_mm: scene.motion.offset_mm,
+            friction: plan.friction,
+        };
+        let body = body(scene, &plan)?;
+        Ok(Self { plan, body, approach, drive: drive(&scene.motion) })
+    }
+}
+
+fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
+    let materials = solids(&scene.materials, plan)?;
+    match &scene.geometry {
+        Geometry::Fingertip { density, order, shape } => {
+            Body::fingertip(shape, materials, *density, *order, plan.parts)
+        }
+        Geometry::Block { size_mm, elements, layers, order } => {
+            let lattice = block_lattice(*size_mm, *elements, layers, *order);
+            let mesh = build_block(&lattice, |p| p);
+            Body::from_mesh(mesh, materials, &["z_max".into()], "z_min")
+        }
+        Geometry::Mesh { file, fixed, contact } => {
+            let mesh = crate::mesh::gmsh::read_file(&scene.folder.join(file))?;
+            Body::from_mesh(mesh, materials, fixed, contact)
+        }
+    }
+}
+
+impl Body {
+    /// The default finger with S1's analysis: neo-Hookean layers, rigid bone and
+    /// nail.
+    ///
+    /// # Errors
+    /// [`PressError`] if it cannot be set up.
+    pub fn usual(density: Density) -> Result<Self, PressError> {
+        let plan = Plan::usual();
+        let materials = solids(&TissueTable::default(), &plan)?;
+        let shape = FingertipShape::default();
+        Self::fingertip(&shape, materials, density, Order::default(), plan.parts)
+    }
+}
+
+fn block_lattice(
+    size: [f64; 2],
+    elements: [usize; 2],
+    layers: &[Layer],
+    order: Order,
+) -> BlockLattice {
+    let (step, kind) = match order {
+        Order::Linear => (1, ElementKind::Hex8),
+        Order::Quadratic => (2, ElementKind::Hex27),
+    };
+    let mut z = vec![0.0];
+    let mut tissue = Vec::new();
+    for layer in layers {
+        let bottom = z.last().copied().unwrap_or(0.0);
+        let inside = even(layer.thickness_mm, layer.elements * step);
+        z.extend(inside[1..].iter().map(|t| bottom + t));
+        tissue.extend(std::iter::repeat_n(layer.tissue, layer.elements));
+    }
+    let [x, y] = std::array::from_fn(|i| even(size[i], elements[i] * step));
+    BlockLattice { axes: [x, y, z], layers: tissue, kind }
+}
+
+/// States that a motion stores.
+fn drive(motion: &Motion) -> Drive {
+    let n = motion.increments;
+    let steps = |last: f64| (1..=n).map(|i| last * i as f64 / n as f64).collect();
+    if let Some(path) = &motion.path {
+        let mut points = Vec::new();
+        let mut from = DrivePoint::default();
+        for p in path {
+            let to = DrivePoint { time_s: p.time_s, depth_mm: p.depth_mm, shift_mm: p.shift_mm };
+            points.extend((1..n).map(|i| from.towards(&to, i, n)));
+            points.push(to);
+            from = to;
+        }
+        return Drive::Path(points);
+    }
+    match (motion.depth_mm, motion.force_n) {
+        (Some(depth), _) => Drive::Depths(steps(depth)),
+        (None, force) => Drive::Forces(steps(force.unwrap_or(0.0))),
+    }
+}

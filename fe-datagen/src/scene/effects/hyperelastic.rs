@@ -1,0 +1,16 @@
+//! Ogden's law where a tissue has one.
+
+use super::{Effect, Law};
+use crate::mesh::Tissue;
+
+pub(super) const EFFECT: Effect = Effect {
+    name: "hyperelastic",
+    adds: "Ogden's law for every tissue that has a table [materials.TISSUE.ogden]",
+    without: "neo-Hookean law from Young's modulus and Poisson's ratio",
+    needs: &["finite_strain"],
+    fits: |scene| {
+        let any = Tissue::ALL.iter().any(|&t| scene.materials.of(t).ogden.is_some());
+        if any { Ok(()) } else { Err("no tissue has a table [materials.TISSUE.ogden]") }
+    },
+    switch_on: |_, plan| plan.law = Law::Ogden,
+};
