@@ -19,6 +19,8 @@ pub struct FrictionTrial {
     pub coefficient: f64,
     /// One entry a contact node.
     pub nodes: Vec<FrictionNode>,
+    /// Energy turned into heat so far, mJ.
+    pub heat_mj: f64,
 }
 
 /// Tangential state of one contact node.

@@ -12,7 +12,7 @@ use super::eigen;
 use super::{Isochoric, Kinematics, Mat3, Tensor4};
 
 /// Most terms of a law.
-pub const TERMS_MAX: usize = 6;
+pub(super) const TERMS_MAX: usize = 6;
 
 /// One term of an Ogden law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

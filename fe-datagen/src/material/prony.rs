@@ -17,7 +17,7 @@ use super::linear::deviatoric_strain;
 use super::{Isochoric, Kinematics, Mat3, Tensor4};
 
 /// Most terms of a series.
-pub const TERMS_MAX: usize = 6;
+pub(super) const TERMS_MAX: usize = 6;
 
 /// One relaxing share.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -213,7 +213,7 @@ impl Body {
             sed_epidermis_mpa,
             checks: Checks {
                 residual_relative: report.residual_relative,
-                contact_force_vs_pressure_integral: difference(integral, force),
+                contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),
                 plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
                 energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
                     / work.abs().max(f64::MIN_POSITIVE),

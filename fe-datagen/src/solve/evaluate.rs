@@ -31,6 +31,8 @@ pub(crate) struct Evaluation {
     pub j_min: f64,
     /// Sum of contact forces on the body, N.
     pub contact_force_n: [f64; 3],
+    /// What of it is normal, N.
+    pub normal_force_n: [f64; 3],
 }
 
 /// State that an evaluation reads.
@@ -143,6 +145,7 @@ fn contact(
     out.friction.clear();
     out.gap_error_mm = 0.0;
     out.contact_force_n = [0.0; 3];
+    out.normal_force_n = [0.0; 3];
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
     let placement = indenter.placement(trial.load_fraction);
     let mut square = 0.0;
@@ -166,6 +169,7 @@ fn contact(
             problem.structure.add_node(t, node, &c.stiffness);
         }
     }
+    out.normal_force_n = out.contact_force_n;
     if let Some(friction) = trial.friction {
         let offset = indenter.offset_mm(trial.load_fraction);
         square += add_friction(problem, trial, friction, offset, tangent, out);
@@ -220,6 +224,8 @@ impl Evaluation {
 pub struct Balance {
     /// Force of the indenter on the body, N.
     pub contact_force_n: [f64; 3],
+    /// Part of it that acts along the indenter's normals, N.
+    pub normal_force_n: [f64; 3],
     /// Force of the supports on the body, N.
     pub support_force_n: [f64; 3],
 }

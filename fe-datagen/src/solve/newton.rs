@@ -198,8 +198,7 @@ impl<'a> Newton<'a> {
             }
         }
         let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        let mu = self.problem.materials.iter().map(|m| m.shear_modulus_mpa()).fold(0.0, f64::max);
-        mu * extent * extent
+        self.problem.stiffest_mpa(|_| true) * extent * extent
     }
 
     /// Evaluates at `u` into `current`, without a tangent.

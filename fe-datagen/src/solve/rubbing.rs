@@ -50,8 +50,8 @@ pub(super) fn change(friction: &FrictionTrial, found: &Evaluation) -> f64 {
     if worst == 0.0 { 0.0 } else { worst / scale }
 }
 
-/// Sets every node's place relative to the indenter, from which slip of the next
-/// step counts.
+/// Adds the heat of the step, traction times slip, and sets every node's place
+/// relative to the indenter, from which slip of the next step counts.
 pub(super) fn anchor(
     problem: &Problem,
     loading: &Loading,
@@ -61,8 +61,12 @@ pub(super) fn anchor(
 ) {
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
     let offset = indenter.offset_mm(fraction);
-    for (node, &n) in friction.nodes.iter_mut().zip(&surface.nodes) {
+    let FrictionTrial { nodes, heat_mj, .. } = friction;
+    for ((node, &n), area) in nodes.iter_mut().zip(&surface.nodes).zip(&surface.area_mm2) {
         let (x, u) = (problem.mesh.nodes[n as usize], u[n as usize]);
-        node.anchor_mm = std::array::from_fn(|i| x[i] + u[i] - offset[i]);
+        let place: [f64; 3] = std::array::from_fn(|i| x[i] + u[i] - offset[i]);
+        let t = node.traction_mpa;
+        *heat_mj += area * (0..3).map(|i| t[i] * (place[i] - node.anchor_mm[i])).sum::<f64>();
+        node.anchor_mm = place;
     }
 }

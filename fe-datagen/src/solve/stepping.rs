@@ -26,7 +26,7 @@ pub struct Solver<'a> {
 
 /// An equilibrium, or the start of the search for one.
 #[derive(Clone, Debug, Default)]
-pub struct State {
+pub(super) struct State {
     fraction: f64,
     u: Vec<[f64; 3]>,
     multipliers: Vec<f64>,
@@ -55,7 +55,7 @@ pub struct StepReport {
     pub gap_error_mm: f64,
     /// Energy that can be got back, mJ.
     pub stored_mj: f64,
-    /// Energy that materials with memory have turned into heat, mJ.
+    /// Energy that materials with memory and friction have turned into heat, mJ.
     pub dissipated_mj: f64,
     /// Smallest `J`.
     pub j_min: f64,
@@ -97,6 +97,7 @@ impl<'a> Solver<'a> {
             self.state.friction = FrictionTrial {
                 coefficient: self.loading.friction,
                 nodes: vec![FrictionNode::default(); contact_nodes],
+                heat_mj: 0.0,
             };
             let State { u, friction, .. } = &mut self.state;
             rubbing::anchor(problem, &self.loading, 0.0, u, friction);
@@ -207,7 +208,7 @@ impl<'a> Solver<'a> {
             residual_relative: e.residual_norm / e.reference_norm.max(f64::MIN_POSITIVE),
             gap_error_mm: e.gap_error_mm,
             stored_mj: energy.stored_mj,
-            dissipated_mj: energy.dissipated_mj,
+            dissipated_mj: energy.dissipated_mj + self.state.friction.heat_mj,
             j_min: e.j_min,
             effort: self.newton.effort.since(since),
         }
@@ -378,7 +379,11 @@ impl<'a> Solver<'a> {
     pub fn balance(&self) -> Balance {
         let problem = self.newton.problem;
         let e = &self.newton.current;
-        let mut balance = Balance { contact_force_n: e.contact_force_n, ..Balance::default() };
+        let mut balance = Balance {
+            contact_force_n: e.contact_force_n,
+            normal_force_n: e.normal_force_n,
+            ..Balance::default()
+        };
         for (dof, &eq) in problem.structure.equations.of_dof.iter().enumerate() {
             if eq == Equations::FIXED {
                 balance.support_force_n[dof % 3] += e.residual_n[dof];
