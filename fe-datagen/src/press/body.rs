@@ -6,7 +6,7 @@ use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::{Placement, RoundedPlate};
 use crate::material::{ElasticConstants, Material, MaterialError};
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Patch, build};
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
@@ -133,7 +133,7 @@ impl Body {
         density: Density,
         order: Order,
     ) -> Result<Self, PressError> {
-        let FingertipMesh { mesh, patch } = build(shape, density, order)?;
+        let FingertipMesh { mesh, patch } = build(shape, density, order, Parts::default())?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
