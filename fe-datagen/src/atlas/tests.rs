@@ -1,7 +1,7 @@
 use super::shapes::{Shape, cylinder_sector, octahedron, spherical_cap, tongue};
 use super::*;
 use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, Order, build};
+use crate::mesh::fingertip::{Density, Order, Parts, build};
 use papilla_proto::MAP_SIDE_PX;
 use papilla_proto::atlas::{Atlas, Patch, Raster};
 use proptest::prelude::*;
@@ -323,7 +323,7 @@ fn the_report_compares_all_methods() {
 #[test]
 fn the_fingertip_flattens_at_every_density() {
     for density in [Density::Coarse, Density::Medium, Density::Fine] {
-        let finger = build(&FingertipShape::default(), density, Order::Linear).unwrap();
+        let finger = build(&FingertipShape::default(), density, Order::Linear, Parts::default()).unwrap();
         let at = |nodes: &[u32]| nodes.iter().map(|&n| finger.mesh.nodes[n as usize]).collect();
         let (skin, interface): (Vec<_>, Vec<_>) =
             (at(&finger.patch.skin), at(&finger.patch.interface));

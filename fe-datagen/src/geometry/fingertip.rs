@@ -50,6 +50,11 @@ pub struct FingertipShape {
     pub nail_mm: [f64; 2],
     /// Nail plate: distance of its free edge from the tip.
     pub nail_tip_mm: f64,
+    /// Nail plate: its thickness. Only an elastic nail has one.
+    pub nail_thickness_mm: f64,
+    /// Bone: thickness of its cortex, around an empty marrow cavity. Only an
+    /// elastic bone has one.
+    pub bone_cortex_mm: f64,
 }
 
 impl Default for FingertipShape {
@@ -72,6 +77,8 @@ impl Default for FingertipShape {
             bone_waist_at: 0.55,
             nail_mm: [11.0, 12.0],
             nail_tip_mm: 2.0,
+            nail_thickness_mm: 0.5,
+            bone_cortex_mm: 0.75,
         }
     }
 }
@@ -102,6 +109,23 @@ pub enum FingertipShapeError {
         /// Skin point.
         z_mm: f64,
     },
+    /// A solid bone's cortex fills the bone.
+    #[error(
+        "geometry.bone_cortex_mm = {cortex_mm} leaves no marrow cavity: an elastic bone's cortex may take \
+         {most_mm:.3} mm of this bone at most; make the cortex thinner, the bone thicker or rigid"
+    )]
+    CortexTooThick {
+        /// Thickness asked for.
+        cortex_mm: f64,
+        /// Most that the bone's sizes allow.
+        most_mm: f64,
+    },
+    /// A solid nail has no element.
+    #[error(
+        "geometry.nail_mm: the nail plate covers no whole face of the skin; make it larger, the mesh \
+         denser or the nail rigid"
+    )]
+    NailTooSmall,
     /// Lengths contradict each other.
     #[error("geometry: {0}")]
     Inconsistent(&'static str),
@@ -121,6 +145,9 @@ pub enum SurfaceParameter {
 const SKIN_SHARE_MAX: f64 = 0.75;
 /// Least gap between skin and bone, mm.
 const GAP_MIN_MM: f64 = 0.3;
+/// Share of the bone's least half size that its cortex may take: what is left
+/// keeps the cavity's elements from degenerating.
+const CORTEX_SHARE_MAX: f64 = 0.8;
 
 impl FingertipShape {
     /// Checks every length.
@@ -147,6 +174,8 @@ impl FingertipShape {
             ("nail_mm[0]", self.nail_mm[0]),
             ("nail_mm[1]", self.nail_mm[1]),
             ("nail_tip_mm", self.nail_tip_mm),
+            ("nail_thickness_mm", self.nail_thickness_mm),
+            ("bone_cortex_mm", self.bone_cortex_mm),
         ];
         for (field, value) in positive {
             if !(value.is_finite() && value > 0.0) {
@@ -167,6 +196,22 @@ impl FingertipShape {
             ));
         }
         Ok(())
+    }
+
+    /// Checks that a solid bone's cortex leaves a marrow cavity. Not part of
+    /// [`FingertipShape::validate`]: a rigid bone may be as thin as it likes.
+    ///
+    /// # Errors
+    /// [`FingertipShapeError::CortexTooThick`] says how thick it may be.
+    pub fn validate_cortex(&self) -> Result<(), FingertipShapeError> {
+        let sizes = [self.bone_tuft_mm, self.bone_waist_mm, self.bone_base_mm];
+        let least = sizes.as_flattened().iter().map(|v| 0.5 * v).fold(self.bone_cap_mm, f64::min);
+        let (cortex_mm, most_mm) = (self.bone_cortex_mm, CORTEX_SHARE_MAX * least);
+        if cortex_mm <= most_mm {
+            Ok(())
+        } else {
+            Err(FingertipShapeError::CortexTooThick { cortex_mm, most_mm })
+        }
     }
 
     /// Skin point of a parameter, mm.
@@ -228,16 +273,27 @@ impl FingertipShape {
     /// Bone point of a parameter, mm.
     #[must_use]
     pub fn bone(&self, s: SurfaceParameter) -> [f64; 3] {
+        self.bone_inset(s, 0.0)
+    }
+
+    /// Point of the marrow cavity's wall below a bone point, mm: every half size
+    /// of the bone less its cortex.
+    #[must_use]
+    pub fn marrow(&self, s: SurfaceParameter) -> [f64; 3] {
+        self.bone_inset(s, self.bone_cortex_mm)
+    }
+
+    fn bone_inset(&self, s: SurfaceParameter, inset_mm: f64) -> [f64; 3] {
         let neck = self.bone_tip_mm + self.bone_cap_mm;
         match s {
             SurfaceParameter::Cap(d) => [
-                neck + self.bone_cap_mm * d[0],
-                0.5 * self.bone_tuft_mm[0] * d[1],
-                self.bone_offset_mm + 0.5 * self.bone_tuft_mm[1] * d[2],
+                neck + (self.bone_cap_mm - inset_mm) * d[0],
+                (0.5 * self.bone_tuft_mm[0] - inset_mm) * d[1],
+                self.bone_offset_mm + (0.5 * self.bone_tuft_mm[1] - inset_mm) * d[2],
             ],
             SurfaceParameter::Body(d, t) => {
                 let x = neck + t * (self.length_mm - neck);
-                let half = |i: usize| 0.5 * self.bone_size(x, i);
+                let half = |i: usize| 0.5 * self.bone_size(x, i) - inset_mm;
                 [x, half(0) * d[0], self.bone_offset_mm + half(1) * d[1]]
             }
         }
@@ -338,6 +394,29 @@ mod tests {
             let n = shape.skin_normal(p);
             assert!(n[0].abs() < 1e-5 && n[1] * p[1] + n[2] * p[2] > 0.0);
         }
+    }
+
+    #[test]
+    fn the_cortex_has_its_thickness_where_the_bone_is_round() {
+        let shape = FingertipShape::default();
+        let flat = [
+            SurfaceParameter::Cap([-1.0, 0.0, 0.0]),
+            SurfaceParameter::Body([0.0, -1.0], 0.4),
+            SurfaceParameter::Body([1.0, 0.0], 1.0),
+        ];
+        for s in flat {
+            let (bone, marrow) = (shape.bone(s), shape.marrow(s));
+            let gap: [f64; 3] = std::array::from_fn(|i| bone[i] - marrow[i]);
+            assert!((crate::mesh::surface::norm(gap) - 0.75).abs() < 1e-12, "{s:?}");
+        }
+    }
+
+    #[test]
+    fn a_cortex_without_a_cavity_is_refused() {
+        let shape = FingertipShape { bone_tuft_mm: [7.5, 1.5], ..Default::default() };
+        assert!(shape.validate().is_ok(), "a rigid bone may be thin");
+        let e = shape.validate_cortex().unwrap_err();
+        assert!(e.to_string().contains("bone_cortex_mm = 0.75") && e.to_string().contains("0.600"));
     }
 
     #[test]

@@ -1,9 +1,13 @@
 //! Meshes: solid elements in blocks, named node sets and surfaces.
 
 pub mod block;
+mod extrude;
 pub mod fingertip;
 pub mod gmsh;
 mod half_cube;
+mod nail;
+#[cfg(test)]
+mod quality;
 pub mod recovery;
 pub mod surface;
 
