@@ -1,12 +1,27 @@
 //! Rigid sphere.
 
+use super::rules::{BadValue, length};
 use super::{Distance, SignedDistance};
+use serde::{Deserialize, Serialize};
 
-/// A sphere centred at the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A sphere centred at the origin; its top is at `z = radius_mm`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct Sphere {
     /// Radius, mm.
     pub radius_mm: f64,
+}
+
+impl Default for Sphere {
+    fn default() -> Self {
+        Self { radius_mm: 5.0 }
+    }
+}
+
+impl Sphere {
+    pub(super) fn validate(&self) -> Result<(), BadValue> {
+        length("radius_mm", self.radius_mm)
+    }
 }
 
 impl SignedDistance for Sphere {
@@ -29,37 +44,19 @@ impl SignedDistance for Sphere {
         });
         Distance { gap_mm: length - self.radius_mm, normal, hessian }
     }
+
+    fn reach_mm(&self, _direction: [f64; 3]) -> f64 {
+        self.radius_mm
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
+    use crate::indenter::testing::{Exactness, distance_tests};
 
-    proptest! {
-        /// Normal and Hessian are derivatives of the distance, inside and out.
-        #[test]
-        fn derivatives_match_differences(
-            x in -9.0f64..9.0, y in -9.0f64..9.0, z in 0.5f64..9.0,
-        ) {
-            let sphere = Sphere { radius_mm: 4.0 };
-            let p = [x, y, z];
-            let d = sphere.distance(p);
-            let h = 1e-5;
-            let at = |i: usize, s: f64| {
-                let mut q = p;
-                q[i] += s * h;
-                sphere.distance(q)
-            };
-            for i in 0..3 {
-                let (a, b) = (at(i, 1.0), at(i, -1.0));
-                prop_assert!(((a.gap_mm - b.gap_mm) / (2.0 * h) - d.normal[i]).abs() < 1e-8);
-                for j in 0..3 {
-                    let difference = (a.normal[j] - b.normal[j]) / (2.0 * h);
-                    prop_assert!((difference - d.hessian[i][j]).abs() < 1e-7, "{i}{j}");
-                }
-            }
-        }
+    distance_tests! {
+        sphere: Sphere { radius_mm: 4.0 } => Exactness::Exact, detail_mm 4.0, mirrors [0, 1, 2]
     }
 
     #[test]
