@@ -132,6 +132,7 @@ fn body(scene: &Scene) -> anyhow::Result<Body> {
         }
         Geometry::Mesh { file, fixed, contact } => {
             let mesh = crate::mesh::gmsh::read_file(file)?;
+            let mesh = crate::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, &constants, fixed, contact)?
         }
     })

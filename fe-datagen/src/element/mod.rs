@@ -3,6 +3,7 @@
 pub mod geometry;
 pub mod kernel;
 pub mod reference;
+pub(crate) mod shape;
 
 pub use geometry::{BlockGeometry, ShapeError};
 pub use kernel::{ElementState, Inverted};
