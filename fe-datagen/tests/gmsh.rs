@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 use fe_datagen::element::{BlockGeometry, ElementKind};
+use fe_datagen::mesh::complete::for_contact;
 use fe_datagen::mesh::gmsh::{GmshError, read, read_file};
 use fe_datagen::mesh::{FaceKind, Mesh, Tissue};
 use std::path::PathBuf;
@@ -92,9 +93,12 @@ fn nodes_of_a_straight_hex27_are_in_our_order() {
 fn a_curved_sector_keeps_its_volume_and_area() {
     // Four quadratic elements over 90 degrees between radii 1 and 2, 0.5 high.
     let pi = std::f64::consts::PI;
-    for name in ["sector_hex27.msh", "sector_hex20.msh"] {
+    for (name, kind, face) in [
+        ("sector_hex27.msh", ElementKind::Hex27, FaceKind::Quad9),
+        ("sector_hex20.msh", ElementKind::Hex20, FaceKind::Quad8),
+    ] {
         let m = mesh(name);
-        assert_eq!(m.blocks[0].kind, ElementKind::Hex27, "{name}");
+        assert_eq!((m.blocks[0].kind, m.surfaces["contact"].kind), (kind, face), "{name}");
         let exact = 0.25 * pi * (4.0 - 1.0) * 0.5;
         assert!((volume(&m) / exact - 1.0).abs() < 1e-3, "{name}: {} {exact}", volume(&m));
         let (a, _) = area_vector(&m, "contact");
@@ -103,6 +107,73 @@ fn a_curved_sector_keeps_its_volume_and_area() {
         let (a, _) = area_vector(&m, "fixed");
         assert!(a[2] < -2.3, "{name}: {a:?}");
     }
+}
+
+/// 20-node hexahedra completed for contact are those that Gmsh writes with 27.
+#[test]
+fn completed_hexahedra_have_the_nodes_of_whole_ones() {
+    let m = for_contact(mesh("sector_hex20.msh"), "contact");
+    let twin = mesh("sector_hex27.msh");
+    assert_eq!(m.blocks[0].kind, ElementKind::Hex27);
+    assert_eq!(m.surfaces["contact"].kind, FaceKind::Quad9);
+    assert_eq!(m.nodes.len(), twin.nodes.len());
+    assert!((volume(&m) / volume(&twin) - 1.0).abs() < 1e-3);
+    for (name, set) in &twin.node_sets {
+        assert_eq!(m.node_sets[name].len(), set.len(), "{name}");
+    }
+}
+
+/// A quarter ring of two tissues without volumes is plane strain; its outer half
+/// is numbered clockwise in the file.
+#[test]
+fn a_planar_ring_has_its_tissues_and_edges_that_look_outward() {
+    let pi = std::f64::consts::PI;
+    for (name, kind, face) in [
+        ("ring_quad4.msh", ElementKind::Quad4, FaceKind::Line2),
+        ("ring_quad8.msh", ElementKind::Quad8, FaceKind::Line3),
+        ("ring_quad9.msh", ElementKind::Quad9, FaceKind::Line3),
+    ] {
+        let m = mesh(name);
+        assert!(m.is_planar());
+        let b = &m.blocks[0];
+        assert_eq!((b.kind, b.len()), (kind, 6), "{name}");
+        let dermis = b.tissue.iter().filter(|t| **t == Tissue::Dermis).count();
+        assert_eq!(dermis, 3, "{name}");
+        // Three straight chords a quarter circle, or three parabolas.
+        let sector: f64 = 0.5 * (pi / 6.0).sin();
+        let exact = if kind == ElementKind::Quad4 { 9.0 * sector } else { 0.25 * pi * 3.0 };
+        assert!((volume(&m) / exact - 1.0).abs() < 1e-3, "{name}: {}", volume(&m));
+        for (surface, radius) in [("fixed", -1.0), ("contact", 2.0), ("interface", 1.5)] {
+            assert_eq!(m.surfaces[surface].kind, face, "{name}");
+            let (a, _) = area_vector(&m, surface);
+            // A chord of the whole arc, turned: outward from the ring, on the
+            // interface away from the dermis.
+            let good = (a[0] - radius).abs() + (a[1] - radius).abs() < 1e-9 && a[2] == 0.0;
+            assert!(good, "{name} {surface} {a:?}");
+            assert_eq!(m.node_sets[surface], m.surfaces[surface].nodes(), "{name}");
+        }
+        let [corner] = m.node_sets["corner"][..] else { panic!("{name}: one corner") };
+        assert_eq!(m.nodes[corner as usize], [2.0, 0.0, 0.0]);
+    }
+}
+
+#[test]
+fn what_is_not_plane_strain_is_refused() {
+    use GmshError as E;
+    let good = text("ring_quad4.msh");
+    let bent = good.replacen("\n2 0 0\n", "\n2 0 0.01\n", 1);
+    assert_ne!(bent, good);
+    assert!(matches!(read(&bent), Err(E::NotFlat { z_mm, .. }) if z_mm == 0.01));
+    let rounded = good.replacen("\n2 0 0\n", "\n2 0 1e-17\n", 1);
+    assert!(read(&rounded).unwrap().nodes.iter().all(|x| x[2] == 0.0));
+    // The surface elements of a body whose volumes were not meshed.
+    let ball = text("ball_tet4.msh").replace("3 1 \"subcutaneous\"", "2 1 \"dermis\"");
+    let start = ball.find("$Elements").unwrap();
+    let triangle = format!("{}$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n", &ball[..start]);
+    assert!(matches!(
+        read(&triangle),
+        Err(E::UnsupportedPlanarElement { element_type: 2, .. })
+    ));
 }
 
 #[test]

@@ -39,10 +39,10 @@ mod tests {
 
     #[test]
     fn linear_fields_come_out_exact_and_points_keep_their_value() {
-        for kind in [ElementKind::Hex8, ElementKind::Hex27, ElementKind::Tet10] {
+        for kind in ElementKind::ALL.into_iter().filter(|k| *k != ElementKind::Tet4) {
             let points = kind.quadrature();
             let field = |x: [f64; 3]| 1.0 + 2.0 * x[0] - 0.5 * x[1] + 3.0 * x[2];
-            let xi = [0.3, 0.2, 0.1];
+            let xi = if kind.is_planar() { [0.3, 0.2, 0.0] } else { [0.3, 0.2, 0.1] };
             let found: f64 =
                 weights(kind, xi).iter().zip(&points).map(|(w, p)| w * field(p.xi)).sum();
             assert!((found - field(xi)).abs() < 1e-13, "{kind:?} {found}");

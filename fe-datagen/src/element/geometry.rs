@@ -18,6 +18,17 @@ pub enum ShapeError {
         /// Jacobian determinant, mm3.
         determinant: f64,
     },
+    /// A node of a plane-strain element lies off the plane.
+    #[error(
+        "element {element} is planar but one of its nodes has z = {z_mm} mm; plane-strain meshes lie in \
+         the plane z = 0"
+    )]
+    OffPlane {
+        /// Element index in its block.
+        element: usize,
+        /// Offending coordinate, mm.
+        z_mm: f64,
+    },
 }
 
 /// Gradients and weights at the quadrature points of every element of a block.
@@ -27,9 +38,11 @@ pub struct BlockGeometry {
     pub kind: ElementKind,
     /// Quadrature points per element.
     pub points: usize,
-    /// `dN_a/dX`, `[element][point][node][3]`, 1/mm.
+    /// `dN_a/dX`, `[element][point][node][3]`, 1/mm; planar elements have no
+    /// third component.
     gradients: Vec<[f64; 3]>,
-    /// Weight times reference volume, `[element][point]`, mm3.
+    /// Weight times reference volume, `[element][point]`, mm3; of planar
+    /// elements area times 1 mm of thickness.
     weights: Vec<f64>,
     /// Inverse of `integral psi_m psi_n dV`, `[element][m * M + n]`, 1/mm3.
     inverse_gram: Vec<f64>,
@@ -56,7 +69,7 @@ impl BlockGeometry {
     /// `connectivity` holds `kind.nodes()` indices per element into `nodes`, mm.
     ///
     /// # Errors
-    /// [`ShapeError::Inverted`] names the first element that folds.
+    /// [`ShapeError`] names the first element that folds or leaves its plane.
     pub fn new(
         kind: ElementKind,
         nodes: &[[f64; 3]],
@@ -84,6 +97,10 @@ impl BlockGeometry {
         };
         for e in 0..elements {
             let conn = &connectivity[e * n..(e + 1) * n];
+            let z = |&a: &u32| nodes[a as usize][2];
+            if let Some(z_mm) = conn.iter().map(z).find(|z| kind.is_planar() && *z != 0.0) {
+                return Err(ShapeError::OffPlane { element: e, z_mm });
+            }
             let mut gram = [[0.0; 4]; 4];
             for (p, q) in quadrature.iter().enumerate() {
                 let (inverse, determinant) =
@@ -125,6 +142,10 @@ impl BlockGeometry {
 }
 
 /// Inverse and determinant of `dX/dxi`; the inverse is `[xi][X]`.
+///
+/// Functions that do not depend on the third reference coordinate are those of a
+/// planar element: that coordinate then runs through its 1 mm of thickness, and
+/// the determinant is the one of the plane.
 pub fn jacobian(
     nodes: impl Iterator<Item = [f64; 3]>,
     reference_gradients: &[[f64; 3]],
@@ -136,6 +157,9 @@ pub fn jacobian(
                 j[i][k] += x[i] * d[k];
             }
         }
+    }
+    if reference_gradients.iter().all(|d| d[2] == 0.0) {
+        j[2][2] = 1.0;
     }
     let c = crate::material::kinematics::cofactor(&j);
     let determinant = j[0][0] * c[0][0] + j[0][1] * c[0][1] + j[0][2] * c[0][2];
@@ -168,5 +192,47 @@ fn push_inverse(gram: &[[f64; 4]; 4], m: usize, out: &mut Vec<f64>) {
     }
     for row in inverse.iter().take(m) {
         out.extend_from_slice(&row[..m]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sheared square with one bent side: area in closed form.
+    #[test]
+    fn planar_weights_are_area_and_gradients_stay_in_the_plane() {
+        for kind in [ElementKind::Quad4, ElementKind::Quad8, ElementKind::Quad9] {
+            let bend = if kind.order() == 2 { 0.3 } else { 0.0 };
+            let nodes: Vec<[f64; 3]> = (0..kind.nodes())
+                .map(|a| {
+                    let [x, y, _] = kind.node_xi(a);
+                    // The side y = -1 sinks by a parabola.
+                    [2.0 * x + 0.5 * y, 1.5 * y - 0.5 * bend * (1.0 - x * x) * (1.0 - y), 0.0]
+                })
+                .collect();
+            let connectivity: Vec<u32> = (0..kind.nodes() as u32).collect();
+            let g = BlockGeometry::new(kind, &nodes, &connectivity).unwrap();
+            let area: f64 = g.element(0).weights.iter().sum();
+            // Parallelogram 4 x 3 and a parabolic segment, 2/3 of 4 x bend; the
+            // serendipity functions hold x^2 y, the others hold it too.
+            assert!((area - (12.0 + 2.0 / 3.0 * 4.0 * bend)).abs() < 1e-13, "{kind:?} {area}");
+            assert!(g.element(0).gradients.iter().all(|d| d[2] == 0.0));
+        }
+    }
+
+    #[test]
+    fn folds_and_nodes_off_the_plane_are_refused() {
+        let mut nodes = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let new = |nodes: &[[f64; 3]], c: &[u32]| BlockGeometry::new(ElementKind::Quad4, nodes, c);
+        assert!(matches!(
+            new(&nodes, &[0, 3, 2, 1]).unwrap_err(),
+            ShapeError::Inverted { element: 0, point: 0, .. }
+        ));
+        nodes[2][2] = 0.1;
+        assert_eq!(
+            new(&nodes, &[0, 1, 2, 3]).unwrap_err(),
+            ShapeError::OffPlane { element: 0, z_mm: 0.1 }
+        );
     }
 }

@@ -4,6 +4,7 @@ pub mod extrapolate;
 pub mod geometry;
 pub mod kernel;
 pub mod reference;
+pub(crate) mod shape;
 pub mod solid;
 
 pub use geometry::{BlockGeometry, ShapeError};

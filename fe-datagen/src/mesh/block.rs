@@ -1,19 +1,20 @@
-//! A rectangular block of hexahedra, optionally mapped and in layers.
+//! A block of hexahedra, or a rectangle of quadrilaterals, on a lattice of
+//! nodes, optionally mapped and in layers.
 
+use super::surface::side_nodes;
 use super::{Block, FaceKind, Mesh, Surface, Tissue};
 use crate::element::ElementKind;
-use crate::element::reference::HEX27_LATTICE;
 
-/// Lattice of a block: node coordinates along each axis, and the tissue of each
-/// interval along `z`.
+/// Node coordinates along each axis, and the tissue of each layer.
 #[derive(Clone, Debug)]
 pub struct BlockLattice {
     /// Increasing node coordinates along x, y, z, mm. Quadratic elements take
-    /// them in pairs of intervals.
+    /// them in pairs of intervals; planar ones have `[0.0]` along z.
     pub axes: [Vec<f64>; 3],
-    /// Tissue of each element layer along `z`, from the bottom.
+    /// Tissue of each layer of elements from the bottom: along z, in the plane
+    /// along y.
     pub layers: Vec<Tissue>,
-    /// `Hex8` or `Hex27`.
+    /// Hexahedra or quadrilaterals.
     pub kind: ElementKind,
 }
 
@@ -25,100 +26,121 @@ pub fn even(length: f64, n: usize) -> Vec<f64> {
 
 /// Meshes the lattice, its nodes moved by `map`.
 ///
-/// Node sets `x_min`, `x_max`, … and surfaces of the same names.
+/// Node sets `x_min`, `x_max`, … and surfaces of the same names; in the plane
+/// those of x and y.
 ///
 /// # Panics
 /// If the lattice does not fit the element: a programming error.
 #[must_use]
 pub fn build(lattice: &BlockLattice, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
-    let step = if lattice.kind == ElementKind::Hex27 { 2 } else { 1 };
+    let (kind, step) = (lattice.kind, lattice.kind.order());
+    let dimension = kind.dimension();
     let count: [usize; 3] = std::array::from_fn(|i| lattice.axes[i].len());
+    let fits = |c: usize| c > step && (c - 1).is_multiple_of(step);
+    let flat = dimension == 3 || count[2] == 1;
     assert!(
-        count.iter().all(|c| *c > step && (c - 1) % step == 0),
+        !kind.lattice().is_empty() && flat && count[..dimension].iter().all(|&c| fits(c)),
         "lattice does not fit the element"
     );
-    assert_eq!(lattice.layers.len(), (count[2] - 1) / step, "one tissue a layer");
-    let id = |i: usize, j: usize, k: usize| (i + count[0] * (j + count[1] * k)) as u32;
+    let cells: [usize; 3] =
+        std::array::from_fn(|i| if i < dimension { (count[i] - 1) / step } else { 1 });
+    assert_eq!(lattice.layers.len(), cells[dimension - 1], "one tissue a layer");
     let mut mesh = Mesh::default();
     for &z in &lattice.axes[2] {
         for &y in &lattice.axes[1] {
             mesh.nodes.extend(lattice.axes[0].iter().map(|&x| map([x, y, z])));
         }
     }
-    let mut block = Block { kind: lattice.kind, connectivity: Vec::new(), tissue: Vec::new() };
-    for k in (0..count[2] - 1).step_by(step) {
-        for j in (0..count[1] - 1).step_by(step) {
-            for i in (0..count[0] - 1).step_by(step) {
-                for at in &HEX27_LATTICE[..lattice.kind.nodes()] {
-                    let to = |c: i8| ((i64::from(c) + 1) * step as i64 / 2) as usize;
-                    block.connectivity.push(id(i + to(at[0]), j + to(at[1]), k + to(at[2])));
+    let mut block = Block { kind, connectivity: Vec::new(), tissue: Vec::new() };
+    let mut sides = Sides::default();
+    for k in 0..cells[2] {
+        for j in 0..cells[1] {
+            for i in 0..cells[0] {
+                let cell = [i, j, k];
+                let first = block.connectivity.len();
+                for at in kind.lattice() {
+                    let to = |axis: usize| {
+                        let offset = (i64::from(at[axis]) + 1) as usize * step / 2;
+                        if axis < dimension { cell[axis] * step + offset } else { 0 }
+                    };
+                    let id = to(0) + count[0] * (to(1) + count[1] * to(2));
+                    block.connectivity.push(id as u32);
                 }
-                block.tissue.push(lattice.layers[k / step]);
+                block.tissue.push(lattice.layers[cell[dimension - 1]]);
+                sides.add(kind, &block.connectivity[first..], cell, cells);
             }
         }
     }
     mesh.blocks.push(block);
-    for axis in 0..3 {
-        for (end, name) in [(0, "min"), (count[axis] - 1, "max")] {
-            let name = format!("{}_{name}", ["x", "y", "z"][axis]);
-            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-            let node = |a: usize, b: usize| {
-                let mut at = [0; 3];
-                at[axis] = end;
-                at[u] = a;
-                at[v] = b;
-                id(at[0], at[1], at[2])
-            };
-            let surface = side(count[u], count[v], step, end > 0, &node);
-            mesh.node_sets.insert(name.clone(), surface.nodes());
-            mesh.surfaces.insert(name, surface);
-        }
+    for (name, surface) in sides.surfaces(kind) {
+        mesh.node_sets.insert(name.clone(), surface.nodes());
+        mesh.surfaces.insert(name, surface);
     }
+    mesh.drop_unused_nodes();
     mesh
 }
 
-/// Faces of a side; `outward` if `u x v` is the outward normal.
-fn side(
-    nu: usize,
-    nv: usize,
-    step: usize,
-    outward: bool,
-    node: &dyn Fn(usize, usize) -> u32,
-) -> Surface {
-    const ORDER: [[usize; 2]; 9] =
-        [[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1], [1, 1]];
-    let kind = if step == 1 { FaceKind::Quad4 } else { FaceKind::Quad9 };
-    let mut connectivity = Vec::new();
-    for b in (0..nv - 1).step_by(step) {
-        for a in (0..nu - 1).step_by(step) {
-            for p in &ORDER[..kind.nodes()] {
-                let [mut du, mut dv] = p.map(|c| c * step / 2);
-                if !outward {
-                    std::mem::swap(&mut du, &mut dv);
-                }
-                connectivity.push(node(a + du, b + dv));
+/// Faces on the outer sides: `-x, +x, -y, …`.
+#[derive(Default)]
+struct Sides([Vec<u32>; 6]);
+
+impl Sides {
+    /// Adds the sides of a cell that lie on the outside of the block.
+    fn add(&mut self, kind: ElementKind, nodes: &[u32], cell: [usize; 3], cells: [usize; 3]) {
+        for side in 0..kind.sides().len() {
+            let (axis, up) = side_axis(kind, side);
+            let outside = cell[axis] == if up { cells[axis] - 1 } else { 0 };
+            if outside {
+                let face = side_nodes(kind, side).into_iter().map(|a| nodes[a]);
+                self.0[2 * axis + usize::from(up)].extend(face);
             }
         }
     }
-    Surface { kind, connectivity }
+
+    fn surfaces(self, kind: ElementKind) -> impl Iterator<Item = (String, Surface)> {
+        self.0.into_iter().enumerate().filter(|(_, c)| !c.is_empty()).map(move |(i, c)| {
+            let name = format!("{}_{}", ["x", "y", "z"][i / 2], ["min", "max"][i % 2]);
+            (name, Surface { kind: FaceKind::of(kind), connectivity: c })
+        })
+    }
+}
+
+/// Axis that a side is normal to, and whether it is at the upper end.
+fn side_axis(kind: ElementKind, side: usize) -> (usize, bool) {
+    let corners = kind.sides()[side];
+    let at = |c: usize, axis: usize| kind.lattice()[c][axis];
+    let normal = |axis: &usize| corners.iter().all(|&c| at(c, *axis) == at(corners[0], *axis));
+    let axis = (0..kind.dimension()).find(normal).unwrap_or_default();
+    (axis, at(corners[0], axis) > 0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::element::BlockGeometry;
+
+    const KINDS: [ElementKind; 6] = [
+        ElementKind::Hex8,
+        ElementKind::Hex20,
+        ElementKind::Hex27,
+        ElementKind::Quad4,
+        ElementKind::Quad8,
+        ElementKind::Quad9,
+    ];
+
+    /// 1 x 2 x 3 mm in 2 x 2 x 4 node intervals; in the plane 1 x 2 mm.
+    fn mesh(kind: ElementKind) -> Mesh {
+        let last = if kind.is_planar() { vec![0.0] } else { even(3.0, 4) };
+        let axes = [even(1.0, 2), even(2.0, 2), last];
+        let layers = (axes[kind.dimension() - 1].len() - 1) / kind.order();
+        build(&BlockLattice { axes, layers: vec![Tissue::Dermis; layers], kind }, |p| p)
+    }
 
     #[test]
     fn sides_look_outward_and_have_the_right_area() {
-        for kind in [ElementKind::Hex8, ElementKind::Hex27] {
-            let step = if kind == ElementKind::Hex27 { 2 } else { 1 };
-            let mesh = build(
-                &BlockLattice {
-                    axes: [even(1.0, 2), even(2.0, 2), even(3.0, 4)],
-                    layers: vec![Tissue::Dermis; 4 / step],
-                    kind,
-                },
-                |p| p,
-            );
+        for kind in KINDS {
+            let mesh = mesh(kind);
+            assert_eq!(mesh.surfaces.len(), 2 * kind.dimension());
             for (name, s) in &mesh.surfaces {
                 let mut total = [0.0; 3];
                 s.integrate(&s.kind.quadrature(), &|n| mesh.nodes[n as usize], &mut |_, _, n| {
@@ -127,10 +149,31 @@ mod tests {
                     }
                 });
                 let axis = ["x", "y", "z"].iter().position(|a| name.starts_with(a)).unwrap();
-                let area = 6.0 / (axis + 1) as f64;
+                let volume = if kind.is_planar() { 2.0 } else { 6.0 };
+                let area = volume / (axis + 1) as f64;
                 let sign = if name.ends_with("max") { 1.0 } else { -1.0 };
                 assert!((total[axis] - sign * area).abs() < 1e-13, "{kind:?} {name} {total:?}");
+                let set = &mesh.node_sets[name];
+                let at = if name.ends_with("max") { (axis + 1) as f64 } else { 0.0 };
+                assert!(set.iter().all(|&n| (mesh.nodes[n as usize][axis] - at).abs() < 1e-15));
             }
+        }
+    }
+
+    #[test]
+    fn elements_fill_the_block_and_use_every_node() {
+        for kind in KINDS {
+            let mesh = mesh(kind);
+            let block = &mesh.blocks[0];
+            let geometry = BlockGeometry::new(kind, &mesh.nodes, &block.connectivity).unwrap();
+            let volume: f64 =
+                (0..block.len()).map(|e| geometry.element(e).weights.iter().sum::<f64>()).sum();
+            let expected = if kind.is_planar() { 2.0 } else { 6.0 };
+            assert!((volume - expected).abs() < 1e-13, "{kind:?} {volume}");
+            let mut used = block.connectivity.clone();
+            used.sort_unstable();
+            used.dedup();
+            assert_eq!(used.len(), mesh.nodes.len(), "{kind:?}");
         }
     }
 }

@@ -1,14 +1,18 @@
 //! Meshes: solid elements in blocks, named node sets and surfaces.
 
 pub mod block;
+pub mod complete;
 mod extrude;
 pub mod fingertip;
 pub mod gmsh;
 mod half_cube;
 mod nail;
+pub mod probe;
 #[cfg(test)]
 mod quality;
 pub mod recovery;
+pub mod sample;
+pub mod section;
 pub mod surface;
 
 use crate::element::ElementKind;
@@ -99,7 +103,8 @@ pub struct Mesh {
     pub blocks: Vec<Block>,
     /// Named groups of nodes, sorted.
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// Named surfaces, faces seen counter-clockwise from outside.
+    /// Named surfaces, faces seen counter-clockwise from outside (edges of planar
+    /// elements: body on the left).
     pub surfaces: BTreeMap<String, Surface>,
 }
 
@@ -108,5 +113,53 @@ impl Mesh {
     #[must_use]
     pub fn element_count(&self) -> usize {
         self.blocks.iter().map(Block::len).sum()
+    }
+
+    /// Whether every element is a plane-strain one, in the plane z = 0.
+    #[must_use]
+    pub fn is_planar(&self) -> bool {
+        !self.blocks.is_empty() && self.blocks.iter().all(|b| b.kind.is_planar())
+    }
+
+    /// Holds what plane strain holds: displacement along z of every node of a
+    /// planar element. `fixed` has one entry a degree of freedom.
+    pub fn hold_out_of_plane(&self, fixed: &mut [bool]) {
+        for block in self.blocks.iter().filter(|b| b.kind.is_planar()) {
+            for &n in &block.connectivity {
+                fixed[3 * n as usize + 2] = true;
+            }
+        }
+    }
+
+    /// Drops the nodes that no element uses and numbers the others in their old
+    /// order.
+    pub(crate) fn drop_unused_nodes(&mut self) {
+        let mut number = vec![u32::MAX; self.nodes.len()];
+        for n in self.blocks.iter().flat_map(|b| &b.connectivity) {
+            number[*n as usize] = 0;
+        }
+        let mut next = 0;
+        for n in &mut number {
+            if *n == 0 {
+                *n = next;
+                next += 1;
+            }
+        }
+        let mut at = 0;
+        self.nodes.retain(|_| {
+            at += 1;
+            number[at - 1] != u32::MAX
+        });
+        let blocks = self.blocks.iter_mut().flat_map(|b| &mut b.connectivity);
+        let faces = self.surfaces.values_mut().flat_map(|s| &mut s.connectivity);
+        for n in blocks.chain(faces) {
+            *n = number[*n as usize];
+        }
+        for set in self.node_sets.values_mut() {
+            set.retain(|n| number[*n as usize] != u32::MAX);
+            for n in set {
+                *n = number[*n as usize];
+            }
+        }
     }
 }

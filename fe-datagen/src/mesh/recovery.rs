@@ -1,46 +1,16 @@
 //! Strain energy density at the nodes of an interface, one side at a time.
 //!
 //! SED jumps across layers, so each side averages only elements of its own. A
-//! trilinear element's in-plane strain is best at the face's middle, so Hex8
-//! samples there and a vertex takes its faces' values weighted by one over
-//! their area (exact for a linear field on a graded tensor grid); Hex27 is
-//! sampled at the vertex itself.
+//! linear element's in-plane strain is best at the face's middle, so `Hex8`,
+//! `Quad4` and `Tet4` sample there and a vertex takes its faces' values weighted
+//! by one over their area (exact for a linear field on a graded tensor grid);
+//! quadratic elements are sampled at the vertex itself. In the plane a face is an
+//! edge and its area the length.
 
-use super::{FaceKind, Mesh, Tissue};
-use crate::element::geometry::{BlockGeometry, jacobian};
-use crate::element::kernel::displacement_gradient;
-use crate::element::{ElementKind, Inverted, Memory, Solid, extrapolate};
-use crate::material::Kinematics;
+use super::sample::{Deformed, Sample};
+use super::{Mesh, Surface, Tissue};
+use crate::element::Inverted;
 use std::collections::HashMap;
-use std::sync::Arc;
-
-/// A deformed body, as far as recovery needs it.
-pub struct Deformed<'a> {
-    /// Undeformed mesh.
-    pub mesh: &'a Mesh,
-    /// Undeformed element geometry, one a block.
-    pub geometry: &'a [BlockGeometry],
-    /// What each tissue is made of.
-    pub materials: &'a [Arc<dyn Solid>],
-    /// Displacement, mm, one a mesh node.
-    pub u: &'a [[f64; 3]],
-    /// History of an element's quadrature points `(block, element)`; empty for
-    /// materials without memory.
-    pub history: &'a dyn Fn(usize, usize) -> &'a [f64],
-}
-
-/// One evaluation point that contributes to an interface node.
-#[derive(Clone, Debug)]
-struct Sample {
-    block: usize,
-    element: usize,
-    /// `dN/dX` at the point, one per node, 1/mm.
-    gradients: Vec<[f64; 3]>,
-    /// Dilatation basis at the point.
-    basis: [f64; 4],
-    /// Weights of the element's quadrature points.
-    from_points: Vec<f64>,
-}
 
 /// Evaluates SED at chosen nodes of a surface from the elements of one tissue.
 #[derive(Clone, Debug)]
@@ -62,17 +32,6 @@ pub struct NoElement {
     pub tissue: &'static str,
 }
 
-/// Corner nodes of the six faces of a hexahedron and the reference coordinates
-/// of their centres.
-const HEX_FACES: [([usize; 4], [f64; 3]); 6] = [
-    ([0, 3, 7, 4], [-1.0, 0.0, 0.0]),
-    ([1, 2, 6, 5], [1.0, 0.0, 0.0]),
-    ([0, 1, 5, 4], [0.0, -1.0, 0.0]),
-    ([3, 2, 6, 7], [0.0, 1.0, 0.0]),
-    ([0, 1, 2, 3], [0.0, 0.0, -1.0]),
-    ([4, 5, 6, 7], [0.0, 0.0, 1.0]),
-];
-
 impl SedRecovery {
     /// Recovery at `nodes` of the surface named `surface`, from `tissue`'s side.
     ///
@@ -84,15 +43,16 @@ impl SedRecovery {
         tissue: Tissue,
         nodes: &[u32],
     ) -> Result<Self, NoElement> {
-        let owner = element_on_face(mesh, tissue);
+        let owner = element_on_side(mesh, tissue);
         let mut by_node: HashMap<u32, Vec<(usize, f64)>> = HashMap::new();
         let mut samples = Vec::new();
-        let faces = mesh.surfaces.get(surface);
-        for (face, area) in faces.map(|s| face_areas(mesh, s)).unwrap_or_default() {
-            let Some(&(block, element, centre)) = owner.get(&corner_key(&face)) else { continue };
+        for (face, corners, area) in mesh.surfaces.get(surface).into_iter().flat_map(|s| faces(mesh, s)) {
+            let Some(&(block, element, side)) = owner.get(&sorted(&face[..corners])) else {
+                continue;
+            };
             let b = &mesh.blocks[block];
-            if b.kind == ElementKind::Hex8 {
-                samples.push(sample(mesh, block, element, centre));
+            if b.kind.order() == 1 {
+                samples.push(Sample::new(mesh, block, element, b.kind.side_centre(side)));
                 for &n in &face {
                     by_node.entry(n).or_default().push((samples.len() - 1, 1.0 / area));
                 }
@@ -101,7 +61,7 @@ impl SedRecovery {
                     let Some(local) = b.element(element).iter().position(|&m| m == n) else {
                         continue;
                     };
-                    samples.push(sample(mesh, block, element, b.kind.node_xi(local)));
+                    samples.push(Sample::new(mesh, block, element, b.kind.node_xi(local)));
                     by_node.entry(n).or_default().push((samples.len() - 1, 1.0 / area));
                 }
             }
@@ -118,95 +78,190 @@ impl SedRecovery {
         Ok(Self { samples, terms })
     }
 
-    /// SED in MPa (= mJ/mm3) at the nodes. Evaluated from the strain (and, with
-    /// memory, from what the branches hold: the energy that can be got back),
-    /// not summed over increments.
+    /// Where SED is sampled, before it is averaged to the nodes.
+    #[must_use]
+    pub fn samples(&self) -> &[Sample] {
+        &self.samples
+    }
+
+    /// Nodal means of values at [`Self::samples`].
+    #[must_use]
+    pub fn average(&self, values: &[f64]) -> Vec<f64> {
+        self.terms.iter().map(|t| t.iter().map(|&(s, w)| w * values[s]).sum()).collect()
+    }
+
+    /// SED in MPa (= mJ/mm3) at the nodes.
     ///
     /// # Errors
     /// [`Inverted`] if an element that is sampled has turned inside out.
     pub fn sed_mpa(&self, body: &Deformed<'_>) -> Result<Vec<f64>, Inverted> {
-        let mut values = Vec::with_capacity(self.samples.len());
-        for s in &self.samples {
-            let block = &body.mesh.blocks[s.block];
-            let material = &body.materials[block.tissue[s.element].index()];
-            let local: Vec<_> =
-                block.element(s.element).iter().map(|&n| body.u[n as usize]).collect();
-            let mut force = vec![[0.0; 3]; local.len()];
-            let history = (body.history)(s.block, s.element);
-            let memory = Memory { history, dt_s: 0.0 };
-            let shape = body.geometry[s.block].element(s.element);
-            let state = material.evaluate(shape, &local, memory, &mut force, None)?;
-            let theta: f64 = s.basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t).sum();
-            let k = Kinematics::new(displacement_gradient(&local, &s.gradients));
-            let own = interpolate(history, &s.from_points, material.history_len());
-            values.push(material.stored_mpa(&k, theta, &own));
-        }
-        Ok(self.terms.iter().map(|t| t.iter().map(|&(s, w)| w * values[s]).sum()).collect())
+        let values =
+            self.samples.iter().map(|s| s.sed_mpa(body)).collect::<Result<Vec<_>, _>>()?;
+        Ok(self.average(&values))
     }
 }
 
-/// History of a point from that of the quadrature points.
-fn interpolate(history: &[f64], weights: &[f64], len: usize) -> Vec<f64> {
-    let mut own = vec![0.0; len];
-    if len > 0 {
-        for (point, w) in history.chunks_exact(len).zip(weights) {
-            for (o, h) in own.iter_mut().zip(point) {
-                *o += w * h;
-            }
-        }
-    }
-    own
-}
-
-fn sample(mesh: &Mesh, block: usize, element: usize, xi: [f64; 3]) -> Sample {
-    let b = &mesh.blocks[block];
-    let n = b.kind.nodes();
-    let (mut value, mut reference) = (vec![0.0; n], vec![[0.0; 3]; n]);
-    b.kind.shape(xi, &mut value, &mut reference);
-    let conn = b.element(element);
-    let (inverse, _) = jacobian(conn.iter().map(|&a| mesh.nodes[a as usize]), &reference);
-    let gradients = reference
-        .iter()
-        .map(|d| std::array::from_fn(|i| (0..3).map(|k| d[k] * inverse[k][i]).sum()))
-        .collect();
-    let from_points = extrapolate::weights(b.kind, xi);
-    Sample { block, element, gradients, basis: b.kind.dilatation_basis(xi), from_points }
-}
-
-/// Sorted corners: the identity of a quadrilateral face.
-fn corner_key(face: &[u32]) -> [u32; 4] {
-    let mut key = [face[0], face[1], face[2], face[3]];
+/// The identity of a face: its corners, sorted.
+fn sorted(corners: &[u32]) -> Vec<u32> {
+    let mut key = corners.to_vec();
     key.sort_unstable();
     key
 }
 
-/// Element of `tissue`, with the face's centre, for every face of such elements.
-fn element_on_face(mesh: &Mesh, tissue: Tissue) -> HashMap<[u32; 4], (usize, usize, [f64; 3])> {
+/// Block, element and side of every face of a tissue's elements.
+fn element_on_side(mesh: &Mesh, tissue: Tissue) -> HashMap<Vec<u32>, (usize, usize, usize)> {
     let mut owner = HashMap::new();
     for (block, b) in mesh.blocks.iter().enumerate() {
-        if !matches!(b.kind, ElementKind::Hex8 | ElementKind::Hex27) {
-            continue;
-        }
         for e in (0..b.len()).filter(|&e| b.tissue[e] == tissue) {
             let conn = b.element(e);
-            for (corners, centre) in &HEX_FACES {
-                owner.insert(corner_key(&corners.map(|c| conn[c])), (block, e, *centre));
+            for (side, corners) in b.kind.sides().iter().enumerate() {
+                let corners: Vec<u32> = corners.iter().map(|&c| conn[c]).collect();
+                owner.insert(sorted(&corners), (block, e, side));
             }
         }
     }
     owner
 }
 
-fn face_areas(mesh: &Mesh, surface: &super::Surface) -> Vec<(Vec<u32>, f64)> {
-    if !matches!(surface.kind, FaceKind::Quad4 | FaceKind::Quad9) {
-        return Vec::new();
-    }
+/// Nodes, number of corners and area of every face.
+fn faces(mesh: &Mesh, surface: &Surface) -> Vec<(Vec<u32>, usize, f64)> {
     let rule = surface.kind.quadrature();
-    let mut areas: Vec<(Vec<u32>, f64)> = surface.faces().map(|f| (f.to_vec(), 0.0)).collect();
+    let corners = surface.kind.corners();
+    let mut faces: Vec<_> = surface.faces().map(|f| (f.to_vec(), corners, 0.0)).collect();
     let mut visit = 0;
     surface.integrate(&rule, &|n| mesh.nodes[n as usize], &mut |_, _, normal| {
-        areas[visit / rule.len()].1 += super::surface::norm(normal);
+        faces[visit / rule.len()].2 += super::surface::norm(normal);
         visit += 1;
     });
-    areas
+    faces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::ElementKind;
+    use crate::element::{BlockGeometry, Elastic, Solid};
+    use crate::material::{Kinematics, NeoHookean};
+    use crate::mesh::FaceKind;
+    use crate::mesh::block::{BlockLattice, build, even};
+    use std::sync::Arc;
+
+    const KINDS: [ElementKind; 6] = [
+        ElementKind::Hex8,
+        ElementKind::Hex20,
+        ElementKind::Hex27,
+        ElementKind::Quad4,
+        ElementKind::Quad8,
+        ElementKind::Quad9,
+    ];
+
+    fn material(mu_mpa: f64) -> Arc<dyn Solid> {
+        Elastic::shared(NeoHookean { mu_mpa }, 10.0 * mu_mpa)
+    }
+
+    /// A unit cube or square of two layers, the interface half way, edges curved.
+    fn layered(kind: ElementKind, elements: usize) -> Mesh {
+        let axis = || even(1.0, elements * kind.order());
+        let third = if kind.is_planar() { vec![0.0] } else { axis() };
+        let layers = (0..elements)
+            .map(|l| if 2 * l < elements { Tissue::Dermis } else { Tissue::Epidermis })
+            .collect();
+        let up = kind.dimension() - 1;
+        let mut mesh =
+            build(&BlockLattice { axes: [axis(), axis(), third], layers, kind }, |mut p| {
+                p[up] *= 1.0 + 0.1 * (2.0 * p[0]).sin();
+                p
+            });
+        // The upper sides of the lower layer's top elements.
+        let b = &mesh.blocks[0];
+        let top = if kind.is_planar() { 2 } else { 5 };
+        let per_layer = b.len() / elements;
+        let connectivity = (0..per_layer)
+            .flat_map(|e| {
+                let nodes = b.element(per_layer * (elements / 2 - 1) + e);
+                crate::mesh::surface::side_nodes(kind, top).into_iter().map(|a| nodes[a])
+            })
+            .collect();
+        let surface = Surface { kind: FaceKind::of(kind), connectivity };
+        mesh.surfaces.insert("interface".into(), surface);
+        mesh
+    }
+
+    fn recover(mesh: &Mesh, tissue: Tissue, u: &[[f64; 3]]) -> (Vec<u32>, Vec<f64>) {
+        let b = &mesh.blocks[0];
+        let geometry = [BlockGeometry::new(b.kind, &mesh.nodes, &b.connectivity).unwrap()];
+        let materials = [2.0, 1.0, 1.0, 1.0, 1.0].map(material);
+        let nodes = mesh.surfaces["interface"].nodes();
+        let recovery = SedRecovery::new(mesh, "interface", tissue, &nodes).unwrap();
+        let sed = recovery
+            .sed_mpa(&Deformed {
+                mesh,
+                geometry: &geometry,
+                materials: &materials,
+                u,
+                history: &|_, _| &[],
+            })
+            .unwrap();
+        (nodes, sed)
+    }
+
+    /// Even strain: both sides exact, with the jump of the moduli between them.
+    #[test]
+    fn sed_of_an_even_strain_is_exact_on_both_sides() {
+        let h = [[0.1, 0.05, 0.0], [-0.02, -0.08, 0.0], [0.0; 3]];
+        let exact = |e| {
+            let k = Kinematics::new(h);
+            material(e).stored_mpa(&k, k.j_minus_1, &[])
+        };
+        for kind in KINDS {
+            let mesh = layered(kind, 4);
+            let u: Vec<[f64; 3]> = mesh
+                .nodes
+                .iter()
+                .map(|x| std::array::from_fn(|i| (0..3).map(|j| h[i][j] * x[j]).sum()))
+                .collect();
+            for (tissue, e) in [(Tissue::Dermis, 1.0), (Tissue::Epidermis, 2.0)] {
+                for sed in recover(&mesh, tissue, &u).1 {
+                    assert!((sed / exact(e) - 1.0).abs() < 1e-12, "{kind:?} {tissue:?}");
+                }
+            }
+        }
+    }
+
+    /// On a smooth displacement errors fall with the mesh: `Hex27` and `Quad9` by
+    /// the square of its size; the others at least in proportion to it.
+    #[test]
+    fn sed_converges_at_the_interface() {
+        let field = |x: [f64; 3]| [0.1 * (1.7 * x[1]).sin(), 0.1 * (1.3 * x[0] + x[1]).cos(), 0.0];
+        let gradient = |x: [f64; 3]| {
+            let s = -0.1 * (1.3 * x[0] + x[1]).sin();
+            [[0.0, 0.17 * (1.7 * x[1]).cos(), 0.0], [1.3 * s, s, 0.0], [0.0; 3]]
+        };
+        for kind in KINDS {
+            let error = |elements: usize| {
+                let mesh = layered(kind, elements);
+                let u: Vec<_> = mesh.nodes.iter().map(|&x| field(x)).collect();
+                let (nodes, sed) = recover(&mesh, Tissue::Dermis, &u);
+                let mut worst = 0.0f64;
+                for (&n, found) in nodes.iter().zip(sed) {
+                    let k = Kinematics::new(gradient(mesh.nodes[n as usize]));
+                    let exact = material(1.0).stored_mpa(&k, k.j_minus_1, &[]);
+                    worst = worst.max((found - exact).abs());
+                }
+                worst
+            };
+            let (coarse, fine) = (error(4), error(8));
+            let order = (coarse / fine).log2();
+            let least = if kind.dilatation_functions() > 1 { 1.7 } else { 0.8 };
+            assert!(order > least, "{kind:?}: order {order}, error {fine}");
+        }
+    }
+
+    #[test]
+    fn a_layer_that_does_not_reach_the_surface_is_an_error() {
+        let mesh = layered(ElementKind::Quad4, 4);
+        let nodes = mesh.surfaces["interface"].nodes();
+        let error = SedRecovery::new(&mesh, "interface", Tissue::Bone, &nodes).unwrap_err();
+        assert_eq!(error.tissue, "bone");
+    }
 }

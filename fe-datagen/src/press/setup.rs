@@ -53,6 +53,7 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
         }
         Geometry::Mesh { file, fixed, contact } => {
             let mesh = crate::mesh::gmsh::read_file(&scene.folder.join(file))?;
+            let mesh = crate::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
         }
     }

@@ -42,6 +42,16 @@ pub enum ProblemError {
     /// The system has no structure.
     #[error(transparent)]
     Structure(#[from] StructureError),
+    /// The faces of the contact surface cannot carry contact at their nodes.
+    #[error(
+        "surface '{name}' has 8-node faces, whose corners would have to be pulled under an even \
+         pressure: contact there gives wrong forces. Complete the mesh to 27-node hexahedra \
+         (mesh::complete), or mesh with 8 or 27 nodes"
+    )]
+    ContactFaces {
+        /// Surface.
+        name: String,
+    },
     /// A surface or node set is missing.
     #[error("the mesh has no {kind} named '{name}'; it has: {known}")]
     Missing {
@@ -56,16 +66,17 @@ pub enum ProblemError {
 
 impl Problem {
     /// Sets up a body with prescribed degrees of freedom `fixed` and contact
-    /// on the named surface.
+    /// on the named surface. Plane-strain elements hold displacement along z.
     ///
     /// # Errors
     /// See [`ProblemError`].
     pub fn new(
         mesh: Mesh,
         materials: Materials,
-        fixed: Vec<bool>,
+        mut fixed: Vec<bool>,
         contact_surface: Option<&str>,
     ) -> Result<Self, ProblemError> {
+        mesh.hold_out_of_plane(&mut fixed);
         let geometry = mesh
             .blocks
             .iter()
@@ -84,6 +95,9 @@ impl Problem {
                     name: name.into(),
                     known: mesh.surfaces.keys().cloned().collect::<Vec<_>>().join(", "),
                 })?;
+                if !surface.kind.carries_contact() {
+                    return Err(ProblemError::ContactFaces { name: name.into() });
+                }
                 Some(ContactSurface::new(surface, &mesh.nodes, &fixed))
             }
         };

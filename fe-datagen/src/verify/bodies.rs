@@ -33,23 +33,34 @@ pub(super) fn noise(seed: u64) -> f64 {
     (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// Meshes `axes` with elements of `kind`, all of one tissue, nodes moved by `map`.
+/// Meshes `axes` with elements of `kind`, all of one tissue, nodes moved by
+/// `map`. Planar elements take the first two axes.
 pub(super) fn lattice(
     kind: ElementKind,
-    axes: [Vec<f64>; 3],
+    mut axes: [Vec<f64>; 3],
     map: impl Fn([f64; 3]) -> [f64; 3],
 ) -> Mesh {
-    let step = if kind == ElementKind::Hex27 { 2 } else { 1 };
-    let layers = vec![Tissue::Dermis; (axes[2].len() - 1) / step];
-    let hexes = if step == 2 { ElementKind::Hex27 } else { ElementKind::Hex8 };
-    let mesh = build(&BlockLattice { axes, layers, kind: hexes }, map);
-    if hexes == kind { mesh } else { tetrahedra(mesh, kind) }
+    if kind.is_planar() {
+        axes[2] = vec![0.0];
+    }
+    let tetrahedral = kind.lattice().is_empty();
+    let cells = if tetrahedral { ElementKind::Hex8 } else { kind };
+    let layers = vec![Tissue::Dermis; (axes[kind.dimension() - 1].len() - 1) / cells.order()];
+    let mesh = build(&BlockLattice { axes, layers, kind: cells }, map);
+    if tetrahedral { tetrahedra(mesh, kind) } else { mesh }
 }
 
-/// A unit cube of `cells^3` elements (tetrahedra: six a cell).
+/// Node intervals of a lattice along an edge of an element (tetrahedra get
+/// their mid-edge nodes later).
+pub(super) fn intervals(kind: ElementKind) -> usize {
+    if kind.lattice().is_empty() { 1 } else { kind.order() }
+}
+
+/// A unit cube of `cells^3` elements (tetrahedra: six a cell), or a unit square
+/// of `cells^2` planar ones.
 pub(super) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
-    let n = if kind == ElementKind::Hex27 { 2 * cells } else { cells };
-    lattice(kind, [even(1.0, n), even(1.0, n), even(1.0, n)], map)
+    let axis = even(1.0, intervals(kind) * cells);
+    lattice(kind, [axis.clone(), axis.clone(), axis], map)
 }
 
 /// Cuts every hexahedron into six tetrahedra along its main diagonal. Mid-edge
@@ -175,7 +186,7 @@ fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
     a
 }
 
-/// All degrees of freedom of the six sides of a lattice.
+/// All degrees of freedom of the sides of a lattice.
 pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
     let all = [true; 3];
     hold(

@@ -1,6 +1,7 @@
-//! Cook's membrane, plane strain, finite strain.
+//! Cook's membrane, plane strain, finite strain: planar elements, and a slab of
+//! hexahedra that cannot move through its thickness.
 
-use super::bodies::{hold, lattice, solve, uniform};
+use super::bodies::{hold, intervals, lattice, solve, uniform};
 use super::{CaseError, Check, Context};
 use crate::element::ElementKind;
 use crate::mesh::block::even;
@@ -38,18 +39,53 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
         let quantity = row("Hex8", cells, 0.4999);
         rows.push(Check::relative(quantity, rise, reference, tolerance, QUADRATIC));
     }
+    rows.extend(planar(context)?);
+    Ok(rows)
+}
+
+/// Planar elements against the published value, and against the slab, whose
+/// plane solution they have to repeat digit for digit.
+fn planar(context: &Context) -> Result<Vec<Check>, CaseError> {
+    let (linear, quadratic, slab) = if context.quick { (32, 16, 8) } else { (64, 32, 16) };
+    let mut rows = Vec::new();
+    let kinds = [
+        (ElementKind::Quad4, "Quad4", linear),
+        (ElementKind::Quad8, "Quad8", quadratic),
+        (ElementKind::Quad9, "Quad9", quadratic),
+    ];
+    let reference = rise_mm(ElementKind::Quad9, 2 * quadratic, 0.4999)?;
+    for (kind, name, cells) in kinds {
+        let rise = rise_mm(kind, cells, 0.3)?;
+        let quantity = format!("{name}, {cells} x {cells}, nu 0.3: rise of the end, mm");
+        rows.push(Check::relative(quantity, rise, PUBLISHED_MM, 0.005, PUBLISHED));
+        let rise = rise_mm(kind, cells, 0.4999)?;
+        let quantity = format!("{name}, {cells} x {cells}, nu 0.4999: rise of the end, mm");
+        let source = "this code, Quad9, twice as fine";
+        rows.push(Check::relative(quantity, rise, reference, 0.01, source));
+    }
+    let twins = [
+        (ElementKind::Quad4, ElementKind::Hex8, "Quad4", "a slab of Hex8 on the same mesh"),
+        (ElementKind::Quad9, ElementKind::Hex27, "Quad9", "a slab of Hex27 on the same mesh"),
+    ];
+    for (flat, solid, name, source) in twins {
+        for nu in [0.3, 0.4999] {
+            let [rise, slab_mm] = [rise_mm(flat, slab, nu)?, rise_mm(solid, slab, nu)?];
+            let quantity = format!("{name}, {slab} x {slab}, nu {nu}: rise of the end, mm");
+            rows.push(Check::relative(quantity, rise, slab_mm, 1e-7, source));
+        }
+    }
     Ok(rows)
 }
 
 /// Rise of the middle of the loaded end under 1 N per mm of thickness.
 fn rise_mm(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
-    let step = if kind == ElementKind::Hex27 { 2 } else { 1 };
+    let step = intervals(kind);
     let n = step * cells;
     let mesh = lattice(kind, [even(1.0, n), even(1.0, n), even(1.0, step)], |[s, t, z]| {
         [48.0 * s, 44.0 * s + t * (44.0 + s * (16.0 - 44.0)), z]
     });
     let mut fixed = hold(&mesh, &[("x_min", [true; 3])]);
-    // Plane strain: nothing moves through the thickness.
+    // Plane strain of the slab: nothing moves through the thickness.
     for n in 0..mesh.nodes.len() {
         fixed[3 * n + 2] = true;
     }
@@ -64,6 +100,7 @@ fn rise_mm(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
     let tip = mesh.nodes.iter().position(middle).ok_or("no node in the middle of the end")?;
     let problem = Problem::new(mesh, uniform(2.0 * MU_MPA * (1.0 + nu), nu)?, fixed, None)?;
     let loading = Loading { dead_n, ..Loading::default() };
-    let (solver, _) = solve(&problem, loading, Options::default(), 4)?;
+    let options = Options { residual_tolerance: 1e-9, ..Options::default() };
+    let (solver, _) = solve(&problem, loading, options, 4)?;
     Ok(solver.displacement_mm()[tip][1])
 }

@@ -11,35 +11,45 @@ use crate::material::Kinematics;
 use crate::mesh::Mesh;
 use crate::solve::{Loading, Problem};
 
-const SOURCE: &str = "theory: order of interpolation";
+const SOURCE: &str = "theory: order of interpolation, of the dilatation if that is lower";
 
-/// `u_i = 0.07 sin(a_i . X + b_i)` mm on a unit cube: strains up to 0.3.
+/// `u_i = 0.07 sin(a_i . X + b_i)` mm on a unit cube or square: strains up to 0.3.
 const AMPLITUDE_MM: f64 = 0.07;
 const WAVES: [[f64; 3]; 3] = [[2.4, 1.3, -0.9], [-1.1, 2.2, 1.5], [0.8, -1.6, 2.7]];
 const PHASES: [f64; 3] = [0.3, 1.1, -0.6];
 
-fn phase(x: [f64; 3], i: usize) -> f64 {
-    (0..3).map(|j| WAVES[i][j] * x[j]).sum::<f64>() + PHASES[i]
-}
+/// The solution in so many dimensions: plane strain leaves z out.
+#[derive(Clone, Copy)]
+struct Solution(usize);
 
-fn displacement(x: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| AMPLITUDE_MM * phase(x, i).sin())
-}
+impl Solution {
+    fn phase(self, x: [f64; 3], i: usize) -> f64 {
+        (0..self.0).map(|j| WAVES[i][j] * x[j]).sum::<f64>() + PHASES[i]
+    }
 
-fn gradient(x: [f64; 3]) -> Mat3 {
-    std::array::from_fn(|i| {
-        let c = AMPLITUDE_MM * phase(x, i).cos();
-        WAVES[i].map(|a| c * a)
-    })
+    fn displacement(self, x: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| if i < self.0 { AMPLITUDE_MM * self.phase(x, i).sin() } else { 0.0 })
+    }
+
+    fn gradient(self, x: [f64; 3]) -> Mat3 {
+        let mut h = [[0.0; 3]; 3];
+        for i in 0..self.0 {
+            let c = AMPLITUDE_MM * self.phase(x, i).cos();
+            for j in 0..self.0 {
+                h[i][j] = c * WAVES[i][j];
+            }
+        }
+        h
+    }
 }
 
 /// Body force `-Div P` per undeformed volume, N/mm3: sixth-order differences
 /// of the material's own stress, whose error is below 1e-9 of the force.
-fn body_force(material: &dyn Solid, x: [f64; 3]) -> [f64; 3] {
+fn body_force(material: &dyn Solid, solution: Solution, x: [f64; 3]) -> [f64; 3] {
     const H: f64 = 4e-3;
     const WEIGHTS: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
     let stress = |x: [f64; 3]| {
-        let k = Kinematics::new(gradient(x));
+        let k = Kinematics::new(solution.gradient(x));
         material.first_piola_mpa(&k, k.j_minus_1, Memory::default())
     };
     let mut force = [0.0; 3];
@@ -68,14 +78,15 @@ struct Place<'a> {
     volume: f64,
 }
 
-/// Visits a 3 x 3 x 3 Gauss rule in every element.
+/// Visits a three-point Gauss rule along each axis of every element.
 fn integrate(mesh: &Mesh, visit: &mut dyn FnMut(&Place<'_>)) {
     let block = &mesh.blocks[0];
     let n = block.kind.nodes();
     let (mut value, mut reference) = (vec![0.0; n], vec![[0.0; 3]; n]);
+    let through: &[(f64, f64)] = if block.kind.is_planar() { &[(0.0, 1.0)] } else { &GAUSS_3 };
     let rule = GAUSS_3
         .iter()
-        .flat_map(|&a| GAUSS_3.iter().flat_map(move |&b| GAUSS_3.iter().map(move |&c| [a, b, c])));
+        .flat_map(|&a| GAUSS_3.iter().flat_map(move |&b| through.iter().map(move |&c| [a, b, c])));
     for point in rule {
         let xi = point.map(|p| p.0);
         let weight: f64 = point.iter().map(|p| p.1).product();
@@ -103,9 +114,16 @@ fn integrate(mesh: &Mesh, visit: &mut dyn FnMut(&Place<'_>)) {
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
     let (hex8, hex27) = if context.quick { ([4, 8], [2, 4]) } else { ([8, 16], [4, 8]) };
-    for (kind, name, cells, order) in
-        [(ElementKind::Hex8, "Hex8", hex8, 2.0), (ElementKind::Hex27, "Hex27", hex27, 3.0)]
-    {
+    let (quad4, quad9) = if context.quick { ([8, 16], [4, 8]) } else { ([16, 32], [8, 16]) };
+    let kinds = [
+        (ElementKind::Hex8, "Hex8", hex8, 2.0),
+        (ElementKind::Hex20, "Hex20", hex27, 2.0),
+        (ElementKind::Hex27, "Hex27", hex27, 3.0),
+        (ElementKind::Quad4, "Quad4", quad4, 2.0),
+        (ElementKind::Quad8, "Quad8", quad9, 2.0),
+        (ElementKind::Quad9, "Quad9", quad9, 3.0),
+    ];
+    for (kind, name, cells, order) in kinds {
         let coarse = errors(kind, cells[0])?;
         let fine = errors(kind, cells[1])?;
         let halvings = (cells[1] as f64 / cells[0] as f64).log2();
@@ -120,17 +138,21 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     Ok(rows)
 }
 
-/// L2 errors of displacement and of its gradient on a smoothly distorted cube.
+/// L2 errors of displacement and of its gradient on a smoothly distorted cube
+/// or square.
 fn errors(kind: ElementKind, cells: usize) -> Result<[f64; 2], CaseError> {
     let pi = std::f64::consts::PI;
+    let d = kind.dimension();
+    let solution = Solution(d);
     let mesh = cube(kind, cells, |p| {
-        let bump: f64 = p.iter().map(|v| (pi * v).sin()).product();
-        std::array::from_fn(|i| p[i] + 0.05 * [1.0, -0.8, 0.6][i] * bump)
+        let bump: f64 = p[..d].iter().map(|v| (pi * v).sin()).product();
+        let shift = |i: usize| 0.05 * [1.0, -0.8, 0.6][i] * bump;
+        std::array::from_fn(|i| if i < d { p[i] + shift(i) } else { p[i] })
     });
     let materials = uniform(1.0, 0.3)?;
     let mut dead_n = vec![[0.0; 3]; mesh.nodes.len()];
     integrate(&mesh, &mut |p| {
-        let force = body_force(materials[0].as_ref(), p.x);
+        let force = body_force(materials[0].as_ref(), solution, p.x);
         for (&node, v) in p.nodes.iter().zip(p.value) {
             for i in 0..3 {
                 dead_n[node as usize][i] += v * force[i] * p.volume;
@@ -138,7 +160,7 @@ fn errors(kind: ElementKind, cells: usize) -> Result<[f64; 2], CaseError> {
         }
     });
     let fixed = hold_boundary(&mesh);
-    let prescribed_mm = prescribe(&mesh, &fixed, displacement);
+    let prescribed_mm = prescribe(&mesh, &fixed, |x| solution.displacement(x));
     let problem = Problem::new(mesh, materials, fixed, None)?;
     let loading = Loading { dead_n, prescribed_mm, ..Loading::default() };
     let (solver, _) = solve(&problem, loading, tight(), 2)?;
@@ -146,7 +168,7 @@ fn errors(kind: ElementKind, cells: usize) -> Result<[f64; 2], CaseError> {
     let mut squares = [0.0; 2];
     integrate(&problem.mesh, &mut |p| {
         let local: Vec<_> = p.nodes.iter().map(|&n| u[n as usize]).collect();
-        let (exact, exact_gradient) = (displacement(p.x), gradient(p.x));
+        let (exact, exact_gradient) = (solution.displacement(p.x), solution.gradient(p.x));
         let found_gradient = displacement_gradient(&local, p.gradients);
         for i in 0..3 {
             let found: f64 = local.iter().zip(p.value).map(|(l, v)| v * l[i]).sum();

@@ -1,7 +1,7 @@
 //! Patch test: constant strain on a distorted mesh.
 
 use super::bodies::{
-    cube, hold_boundary, largest, noise, points, prescribe, solve, tight, uniform,
+    cube, hold_boundary, intervals, largest, noise, points, prescribe, solve, tight, uniform,
 };
 use super::{CaseError, Check, Context};
 use crate::element::{ElementKind, Memory};
@@ -11,22 +11,31 @@ use crate::solve::{Loading, Problem};
 
 const SOURCE: &str = "exact (Irons & Razzaque 1972)";
 
-/// A displacement gradient without symmetry; `times` scales it.
-fn gradient(times: f64) -> Mat3 {
-    [[0.9, 0.5, -0.3], [0.2, -0.6, 0.4], [-0.5, 0.3, 0.7]].map(|r| r.map(|v| times * v))
+/// A displacement gradient without symmetry, in the plane for planar elements;
+/// `times` scales it.
+fn gradient(kind: ElementKind, times: f64) -> Mat3 {
+    let h = [[0.9, 0.5, -0.3], [0.2, -0.6, 0.4], [-0.5, 0.3, 0.7]];
+    let d = kind.dimension();
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| if i < d && j < d { times * h[i][j] } else { 0.0 })
+    })
 }
 
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
     let kinds = [
         (ElementKind::Hex8, "Hex8", 3),
+        (ElementKind::Hex20, "Hex20", 2),
         (ElementKind::Hex27, "Hex27", 2),
         (ElementKind::Tet10, "Tet10", 2),
         (ElementKind::Tet4, "Tet4", 3),
+        (ElementKind::Quad4, "Quad4", 3),
+        (ElementKind::Quad8, "Quad8", 2),
+        (ElementKind::Quad9, "Quad9", 2),
     ];
     for (kind, name, cells) in kinds {
         for (size, strain) in [("small", 1e-3), ("finite", 0.25)] {
-            let [u, stress] = errors(kind, cells, gradient(strain))?;
+            let [u, stress] = errors(kind, cells, gradient(kind, strain))?;
             let row = |what, value| {
                 let quantity = format!("{name}, {size} strain: relative error of {what}");
                 Check::vanishes(quantity, value, 1e-10, SOURCE)
@@ -39,15 +48,17 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
 
 /// Largest relative errors of displacement and stress for `u = H X` on the boundary.
 fn errors(kind: ElementKind, cells: usize, h: Mat3) -> Result<[f64; 2], CaseError> {
-    // Interior nodes move by up to a seventh of a cell (of a half cell: Hex27,
-    // whose edges and faces then curve).
-    let steps = if kind == ElementKind::Hex27 { 2 * cells } else { cells } as f64;
+    // Interior nodes move by up to a seventh of a cell (of a half cell: quadratic
+    // elements, whose edges and faces then curve).
+    let steps = (intervals(kind) * cells) as f64;
+    let d = kind.dimension();
     let mesh = cube(kind, cells, |p| {
-        if p.iter().any(|v| *v < 1e-12 || *v > 1.0 - 1e-12) {
+        if p[..d].iter().any(|v| *v < 1e-12 || *v > 1.0 - 1e-12) {
             return p;
         }
         let key = p.iter().fold(7u64, |k, v| 31 * k + (v * steps).round() as u64);
-        std::array::from_fn(|i| p[i] + noise(3 * key + i as u64) / (7.0 * steps))
+        let shift = |i: usize| noise(3 * key + i as u64) / (7.0 * steps);
+        std::array::from_fn(|i| if i < d { p[i] + shift(i) } else { p[i] })
     });
     let field =
         |x: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| (0..3).map(|j| h[i][j] * x[j]).sum()) };

@@ -5,6 +5,7 @@ use super::{CaseError, Check, Context};
 use crate::element::{ElementKind, Memory};
 use crate::indenter::{Placement, Sphere};
 use crate::linear::Equations;
+use crate::mesh::FaceKind;
 use crate::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use crate::solve::{Loading, MovingIndenter, Problem, StepError};
 use std::sync::Arc;
@@ -15,25 +16,36 @@ const STEP_MM: f64 = 1e-6;
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let kinds = [
         (ElementKind::Hex8, "Hex8", 2),
+        (ElementKind::Hex20, "Hex20", 1),
         (ElementKind::Hex27, "Hex27", 1),
         (ElementKind::Tet10, "Tet10", 1),
         (ElementKind::Tet4, "Tet4", 2),
+        (ElementKind::Quad4, "Quad4", 3),
+        (ElementKind::Quad8, "Quad8", 2),
+        (ElementKind::Quad9, "Quad9", 2),
     ];
     let mut rows = Vec::new();
     for (kind, name, cells) in kinds {
         let (error, touching) = error(kind, cells)?;
         let quantity = format!("{name}, {touching} nodes in contact: largest relative error");
-        // Without contact the row would not show what it says.
-        let error = if touching == 0 { f64::NAN } else { error };
+        // Without contact the row would not show what it says, but where it is refused.
+        let carries = FaceKind::of(kind).carries_contact();
+        let error = if carries && touching == 0 { f64::NAN } else { error };
         rows.push(Check::vanishes(quantity, error, 1e-7, SOURCE));
     }
     Ok(rows)
 }
 
-/// A sphere that dents the top of the cube near its middle.
-fn loading() -> Loading {
+/// A sphere that dents the top of the cube near its middle; the top of a
+/// square, where it is a disc of the same radius.
+fn loading(kind: ElementKind) -> Loading {
     let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let start = Placement { rotation, origin_mm: [0.55, 0.45, 2.4] };
+    let (origin_mm, travel_mm) = if kind.is_planar() {
+        ([0.55, 2.4, 0.0], [0.0, -0.1, 0.0])
+    } else {
+        ([0.55, 0.45, 2.4], [0.0, 0.0, -0.1])
+    };
+    let start = Placement { rotation, origin_mm };
     let shape = Arc::new(Sphere { radius_mm: 1.6 });
     let indenter = MovingIndenter::straight(shape, start, [0.0, 0.0, -0.1]);
     Loading { indenter: Some(indenter), ..Loading::default() }
@@ -43,17 +55,22 @@ fn loading() -> Loading {
 fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
     let mesh = cube(kind, cells, |p| p);
     let mut fixed = vec![false; 3 * mesh.nodes.len()];
-    for &n in &mesh.node_sets["z_min"] {
+    let (bottom, top) = if kind.is_planar() { ("y_min", "y_max") } else { ("z_min", "z_max") };
+    for &n in &mesh.node_sets[bottom] {
         fixed[3 * n as usize..3 * n as usize + 3].fill(true);
     }
-    let problem = Problem::new(mesh, uniform(1.0, 0.4)?, fixed, Some("z_max"))?;
+    let touched = FaceKind::of(kind).carries_contact().then_some(top);
+    let problem = Problem::new(mesh, uniform(1.0, 0.4)?, fixed, touched)?;
     let contact = problem.contact.as_ref().map_or(0, |c| c.nodes.len());
     let multipliers: Vec<f64> = (0..contact as u64).map(|i| 0.05 + 0.02 * noise(900 + i)).collect();
     let size = 0.06 / cells as f64;
     let mut u: Vec<[f64; 3]> = (0..problem.mesh.nodes.len() as u64)
-        .map(|n| std::array::from_fn(|i| size * noise(3 * n + i as u64)))
+        .map(|n| {
+            let moves = |i: usize| if i < kind.dimension() { size } else { 0.0 };
+            std::array::from_fn(|i| moves(i) * noise(3 * n + i as u64))
+        })
         .collect();
-    let loading = loading();
+    let loading = loading(kind);
     let structure = &problem.structure;
     let equations = &structure.equations;
     let mut tangent = structure.zeros();

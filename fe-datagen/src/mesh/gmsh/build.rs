@@ -2,22 +2,21 @@
 //! one line.
 
 use super::GmshError;
-use super::order::{self, corners, flipped, sides};
+use super::order::{self, flipped};
 use super::parse::{Raw, RawBlock};
 use crate::element::ElementKind;
 use crate::element::geometry::jacobian;
-use crate::element::reference::HEX27_LATTICE;
 use crate::mesh::{Block, Mesh, Surface, Tissue};
 use std::collections::HashMap;
 
 /// The mesh being built.
 struct Builder<'a> {
     raw: &'a Raw,
+    /// Whether the mesh is plane strain: no volumes, quadrangles instead.
+    planar: bool,
     mesh: Mesh,
     /// New number of each node of the file; nodes of no solid element are left out.
     number: HashMap<u32, u32>,
-    /// Middle node of the quadrilateral with these (sorted) corners.
-    middle: HashMap<Vec<u32>, u32>,
     /// Solid elements of each side, by sorted corners: tissue and outward corners.
     owners: HashMap<Vec<u32>, Vec<(Tissue, Vec<u32>)>>,
 }
@@ -25,20 +24,21 @@ struct Builder<'a> {
 pub(super) fn build(raw: &Raw) -> Result<Mesh, GmshError> {
     let mut b = Builder {
         raw,
+        planar: !raw.blocks.iter().any(|b| b.entity.0 == 3),
         mesh: Mesh::default(),
         number: HashMap::new(),
-        middle: HashMap::new(),
         owners: HashMap::new(),
     };
-    for block in raw.blocks.iter().filter(|b| b.entity.0 == 3) {
+    let dimension = if b.planar { 2 } else { 3 };
+    for block in raw.blocks.iter().filter(|b| b.entity.0 == dimension) {
         b.solids(block)?;
     }
     if b.mesh.blocks.is_empty() {
         return Err(GmshError::NoSolid);
     }
-    for block in raw.blocks.iter().filter(|b| b.entity.0 < 3) {
+    for block in raw.blocks.iter().filter(|b| b.entity.0 < dimension) {
         for name in b.group_names(block)? {
-            if block.entity.0 == 2 {
+            if block.entity.0 == dimension - 1 {
                 b.faces(block, &name)?;
             } else {
                 b.nodes(block, &name)?;
@@ -92,7 +92,11 @@ impl Builder<'_> {
         let next = self.mesh.nodes.len() as u32;
         let number = *self.number.entry(index).or_insert(next);
         if number == next {
-            self.mesh.nodes.push(self.raw.positions[index as usize]);
+            let mut x = self.raw.positions[index as usize];
+            if self.planar {
+                x[2] = 0.0;
+            }
+            self.mesh.nodes.push(x);
         }
         number
     }
@@ -108,15 +112,16 @@ impl Builder<'_> {
         };
         let tissue = Tissue::ALL.into_iter().find(|t| t.name() == name);
         tissue.ok_or_else(|| {
-            let named = self.raw.names.iter().find(|((d, _), (n, _))| *d == 3 && n == name);
+            let dimension = block.entity.0;
+            let mut names = self.raw.names.iter();
+            let named = names.find(|((d, _), (n, _))| *d == dimension && n == name);
             GmshError::UnknownTissue { line: named.map_or(line, |(_, v)| v.1), name: name.clone() }
         })
     }
 
     fn solids(&mut self, block: &RawBlock) -> Result<(), GmshError> {
-        let Some(solid) = order::solid(block.element_type) else {
-            let element_type = block.element_type;
-            return Err(GmshError::UnsupportedElement { line: block.line, element_type });
+        let Some(solid) = order::solid(block.element_type, self.planar) else {
+            return Err(self.unsupported(block));
         };
         let tissue = self.tissue(block)?;
         let at = match self.mesh.blocks.iter().position(|b| b.kind == solid.kind) {
@@ -129,13 +134,17 @@ impl Builder<'_> {
             }
         };
         for element in &block.elements {
-            let file = self.indices(element, solid.nodes)?;
+            let file = self.indices(element, solid.kind.nodes())?;
+            if self.planar {
+                self.check_flat(&file, element)?;
+            }
             let mut nodes: Vec<u32> = solid.from_gmsh.iter().map(|&i| self.node(file[i])).collect();
-            if solid.nodes == 20 {
-                self.complete(&mut nodes);
+            if self.planar && self.turns_clockwise(&nodes[..4]) {
+                let turned = &order::QUAD_TURNED[..nodes.len()];
+                nodes = turned.iter().map(|&i| nodes[i]).collect();
             }
             self.check_shape(solid.kind, &nodes, element)?;
-            for side in sides(solid.kind) {
+            for side in solid.kind.sides() {
                 let corners: Vec<u32> = side.iter().map(|&c| nodes[c]).collect();
                 self.owners.entry(sorted(&corners)).or_default().push((tissue, corners));
             }
@@ -145,41 +154,35 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Adds the middles of faces and body to a 20-node hexahedron, where its own
-    /// (serendipity) shape functions put them; neighbours share face nodes.
-    fn complete(&mut self, nodes: &mut Vec<u32>) {
-        for side in sides(ElementKind::Hex27) {
-            let corners: Vec<u32> = side.iter().map(|&c| nodes[c]).collect();
-            let mids = side.iter().zip(side.iter().cycle().skip(1)).map(|(&a, &b)| {
-                let middle: [i8; 3] =
-                    std::array::from_fn(|i| (HEX27_LATTICE[a][i] + HEX27_LATTICE[b][i]) / 2);
-                let edge = (8..20).find(|&e| HEX27_LATTICE[e] == middle);
-                nodes[edge.unwrap_or_default()]
-            });
-            let x = self.weighted(&[(&corners, -0.25), (&mids.collect::<Vec<_>>(), 0.5)]);
-            let key = sorted(&corners);
-            let next = self.mesh.nodes.len() as u32;
-            let id = *self.middle.entry(key).or_insert(next);
-            if id == next {
-                self.mesh.nodes.push(x);
-            }
-            nodes.push(id);
+    fn unsupported(&self, block: &RawBlock) -> GmshError {
+        let (line, element_type) = (block.line, block.element_type);
+        if self.planar {
+            GmshError::UnsupportedPlanarElement { line, element_type }
+        } else {
+            GmshError::UnsupportedElement { line, element_type }
         }
-        let x = self.weighted(&[(&nodes[..8], -0.25), (&nodes[8..20], 0.25)]);
-        nodes.push(self.mesh.nodes.len() as u32);
-        self.mesh.nodes.push(x);
     }
 
-    fn weighted(&self, terms: &[(&[u32], f64)]) -> [f64; 3] {
-        let mut x = [0.0; 3];
-        for (nodes, weight) in terms {
-            for &n in *nodes {
-                for i in 0..3 {
-                    x[i] += weight * self.mesh.nodes[n as usize][i];
-                }
-            }
+    /// A planar mesh lies in z = 0, up to the rounding of the file's numbers.
+    fn check_flat(
+        &self,
+        file: &[u32],
+        &(line, element, _): &(usize, u64, Vec<u64>),
+    ) -> Result<(), GmshError> {
+        let at = |n: &u32| self.raw.positions[*n as usize];
+        let size = file.iter().map(at).flat_map(|x| [x[0].abs(), x[1].abs()]).fold(0.0, f64::max);
+        match file.iter().map(|n| at(n)[2]).find(|z| z.abs() > 1e-12 * size) {
+            Some(z_mm) => Err(GmshError::NotFlat { line, element, z_mm }),
+            None => Ok(()),
         }
-        x
+    }
+
+    /// Whether the quadrangle with these corners has negative area: an element
+    /// of the plane has no inside, so its numbering is simply turned.
+    fn turns_clockwise(&self, corners: &[u32]) -> bool {
+        let x = |i: usize| self.mesh.nodes[corners[i] as usize];
+        let [p, q]: [[f64; 2]; 2] = [(0, 2), (1, 3)].map(|(a, b)| [0, 1].map(|i| x(b)[i] - x(a)[i]));
+        p[0] * q[1] - p[1] * q[0] < 0.0
     }
 
     fn check_shape(
@@ -203,32 +206,28 @@ impl Builder<'_> {
     /// Faces of a named surface, turned to look outward; on a surface between
     /// two tissues outward is away from the deeper one.
     fn faces(&mut self, block: &RawBlock, name: &str) -> Result<(), GmshError> {
-        let Some(face) = order::surface(block.element_type) else {
-            let element_type = block.element_type;
-            return Err(GmshError::UnsupportedElement { line: block.line, element_type });
+        let Some(kind) = order::surface(block.element_type, self.planar) else {
+            return Err(self.unsupported(block));
         };
         for element in &block.elements {
             let (line, tag) = (element.0, element.1);
             let loose = || GmshError::LooseFace { line, element: tag, name: name.into() };
-            let file = self.indices(element, face.nodes)?;
-            let mut nodes = Vec::with_capacity(9);
+            let file = self.indices(element, kind.nodes())?;
+            let mut nodes = Vec::with_capacity(kind.nodes());
             for index in &file {
                 nodes.push(*self.number.get(index).ok_or_else(loose)?);
             }
-            let key = sorted(&nodes[..corners(face.kind)]);
+            let key = sorted(&nodes[..kind.corners()]);
             let owners = self.owners.get(&key).ok_or_else(loose)?;
             let (_, outward) =
                 owners.iter().max_by_key(|(tissue, _)| tissue.index()).ok_or_else(loose)?;
-            if face.nodes == 8 {
-                nodes.push(*self.middle.get(&key).ok_or_else(loose)?);
-            }
             if !turns_alike(&nodes, outward) {
-                nodes = flipped(face.kind).iter().map(|&i| nodes[i]).collect();
+                nodes = flipped(kind).iter().map(|&i| nodes[i]).collect();
             }
             self.mesh.node_sets.entry(name.into()).or_default().extend(&nodes);
-            let empty = || Surface { kind: face.kind, connectivity: Vec::new() };
+            let empty = || Surface { kind, connectivity: Vec::new() };
             let surface = self.mesh.surfaces.entry(name.into()).or_insert_with(empty);
-            if surface.kind != face.kind {
+            if surface.kind != kind {
                 return Err(GmshError::MixedSurface { line, name: name.into() });
             }
             surface.connectivity.extend(nodes);
@@ -255,8 +254,11 @@ fn sorted(nodes: &[u32]) -> Vec<u32> {
     key
 }
 
-/// Whether the face's corners turn as `outward` does.
+/// Whether the face's corners turn as `outward` does; an edge's: run as it does.
 fn turns_alike(face: &[u32], outward: &[u32]) -> bool {
+    if outward.len() == 2 {
+        return face[0] == outward[0];
+    }
     let at = outward.iter().position(|n| *n == face[0]).unwrap_or(0);
     outward[(at + 1) % outward.len()] == face[1]
 }

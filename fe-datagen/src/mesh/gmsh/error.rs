@@ -85,25 +85,50 @@ pub enum GmshError {
         /// Gmsh's number of the type.
         element_type: u32,
     },
+    /// An element of a mesh without volumes that is not of the plane.
+    #[error(
+        "line {line}: the mesh has no volumes, so it is taken as plane strain, and element type \
+         {element_type} is not supported there; use quadrangles (4, 8 or 9 nodes; Recombine Surface in \
+         Gmsh) with lines (2 or 3) for surfaces, or mesh the volumes (gmsh -3)"
+    )]
+    UnsupportedPlanarElement {
+        /// Line of the element block.
+        line: usize,
+        /// Gmsh's number of the type.
+        element_type: u32,
+    },
+    /// A mesh without volumes that is not in the plane z = 0.
+    #[error(
+        "line {line}: the mesh has no volumes, so it is taken as plane strain, but element {element} \
+         has a node at z = {z_mm} mm; put it in the plane z = 0 or mesh the volumes (gmsh -3)"
+    )]
+    NotFlat {
+        /// Line of the element.
+        line: usize,
+        /// Element tag.
+        element: u64,
+        /// Offending coordinate, mm.
+        z_mm: f64,
+    },
     /// Solid elements that nobody gave a tissue.
     #[error(
-        "line {line}: the elements of volume {entity} belong to no physical group; put the volume in \
-         one named epidermis, dermis, subcutaneous, nail or bone"
+        "line {line}: the elements of volume (in the plane: surface) {entity} belong to no physical \
+         group; put it in one named epidermis, dermis, subcutaneous, nail or bone"
     )]
     NoPhysicalGroup {
         /// Line of the element block.
         line: usize,
-        /// Volume tag.
+        /// Volume tag, in the plane surface tag.
         entity: i32,
     },
     /// A volume in two groups would be of two tissues.
     #[error(
-        "line {line}: volume {entity} belongs to {count} physical groups; it can have one tissue"
+        "line {line}: volume (in the plane: surface) {entity} belongs to {count} physical groups; it can have one tissue"
     )]
     SeveralTissues {
         /// Line of the element block.
         line: usize,
-        /// Volume tag.
+        /// Volume tag, in the plane surface tag.
         entity: i32,
         /// Groups.
         count: usize,
@@ -122,7 +147,7 @@ pub enum GmshError {
     },
     /// A volume's group is not a tissue.
     #[error(
-        "line {line}: '{name}' is no tissue; volumes are epidermis, dermis, subcutaneous, nail or bone"
+        "line {line}: '{name}' is no tissue; volumes (in the plane surfaces) are epidermis, dermis, subcutaneous, nail or bone"
     )]
     UnknownTissue {
         /// Line of the name.
@@ -165,8 +190,8 @@ pub enum GmshError {
     },
     /// No solid element at all.
     #[error(
-        "the mesh has no solid element; mesh the volumes (gmsh -3) and save all of them or put them in \
-         physical groups"
+        "the mesh has no solid element; mesh the volumes (gmsh -3; for plane strain the surfaces, gmsh -2, \
+         recombined to quadrangles) and save all of them or put them in physical groups"
     )]
     NoSolid,
 }

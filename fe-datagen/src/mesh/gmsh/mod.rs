@@ -5,8 +5,12 @@
 //! sets of their name, physical curves and points node sets: `fixed` and
 //! `contact` are what a scene looks for. Lengths are taken as mm.
 //!
-//! Hexahedra with 8, 20 or 27 nodes (20 are completed to 27 by face and body
-//! nodes where their own shape functions put them) and tetrahedra with 4 or 10.
+//! Hexahedra with 8, 20 or 27 nodes and tetrahedra with 4 or 10. The faces of
+//! 20-node hexahedra carry no contact until [`super::complete`] has been there.
+//!
+//! A file without volumes is a plane-strain mesh in the plane z = 0: surfaces
+//! of quadrangles with 4, 8 or 9 nodes name tissues, curves become surfaces and
+//! node sets, points node sets. Quadrangles may be numbered either way round.
 
 mod build;
 mod error;
