@@ -119,7 +119,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
 }
 
-fn body(scene: &Scene) -> anyhow::Result<Body> {
+pub(super) fn body(scene: &Scene) -> anyhow::Result<Body> {
     let constants = scene.constants();
     Ok(match &scene.geometry {
         Geometry::Fingertip { density, order, shape } => {

@@ -46,14 +46,14 @@ pub(super) fn lattice(
 }
 
 /// A unit cube of `cells^3` elements (tetrahedra: six a cell).
-pub(super) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
+pub(crate) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
     let n = if kind == ElementKind::Hex27 { 2 * cells } else { cells };
     lattice(kind, [even(1.0, n), even(1.0, n), even(1.0, n)], map)
 }
 
 /// Cuts every hexahedron into six tetrahedra along its main diagonal. Mid-edge
 /// nodes join the node sets that hold both ends.
-fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
+pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
     const PATHS: [[usize; 3]; 6] =
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let hexes = mesh.blocks.remove(0);
@@ -155,7 +155,7 @@ fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
 }
 
 /// Prescribed degrees of freedom: components of the nodes of sets.
-pub(super) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
+pub(crate) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
     let mut fixed = vec![false; 3 * mesh.nodes.len()];
     for (name, components) in sets {
         for &n in mesh.node_sets.get(*name).into_iter().flatten() {
@@ -175,7 +175,7 @@ fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
 }
 
 /// All degrees of freedom of the six sides of a lattice.
-pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
+pub(crate) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
     let all = [true; 3];
     hold(
         mesh,
@@ -191,7 +191,7 @@ pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
 }
 
 /// Prescribed values of the held degrees of freedom from a displacement field.
-pub(super) fn prescribe(
+pub(crate) fn prescribe(
     mesh: &Mesh,
     fixed: &[bool],
     u: impl Fn([f64; 3]) -> [f64; 3],
@@ -217,7 +217,7 @@ pub(super) fn solve<'a>(
 }
 
 /// Internal forces, N, one a degree of freedom.
-pub(super) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
+pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
     let trial = Trial { u, multipliers_mpa: &[], penalty: 1.0, load_fraction: 0.0 };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, None, &mut out)?;
