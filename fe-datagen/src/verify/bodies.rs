@@ -52,20 +52,20 @@ pub(super) fn lattice(
 
 /// Node intervals of a lattice along an edge of an element (tetrahedra get
 /// their mid-edge nodes later).
-pub(super) fn intervals(kind: ElementKind) -> usize {
+pub(crate) fn intervals(kind: ElementKind) -> usize {
     if kind.lattice().is_empty() { 1 } else { kind.order() }
 }
 
 /// A unit cube of `cells^3` elements (tetrahedra: six a cell), or a unit square
 /// of `cells^2` planar ones.
-pub(super) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
+pub(crate) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
     let axis = even(1.0, intervals(kind) * cells);
     lattice(kind, [axis.clone(), axis.clone(), axis], map)
 }
 
 /// Cuts every hexahedron into six tetrahedra along its main diagonal. Mid-edge
 /// nodes join the node sets that hold both ends.
-fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
+pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
     const PATHS: [[usize; 3]; 6] =
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let hexes = mesh.blocks.remove(0);
@@ -167,7 +167,7 @@ fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
 }
 
 /// Prescribed degrees of freedom: components of the nodes of sets.
-pub(super) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
+pub(crate) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
     let mut fixed = vec![false; 3 * mesh.nodes.len()];
     for (name, components) in sets {
         for &n in mesh.node_sets.get(*name).into_iter().flatten() {
@@ -187,7 +187,7 @@ fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
 }
 
 /// All degrees of freedom of the sides of a lattice.
-pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
+pub(crate) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
     let all = [true; 3];
     hold(
         mesh,
@@ -203,7 +203,7 @@ pub(super) fn hold_boundary(mesh: &Mesh) -> Vec<bool> {
 }
 
 /// Prescribed values of the held degrees of freedom from a displacement field.
-pub(super) fn prescribe(
+pub(crate) fn prescribe(
     mesh: &Mesh,
     fixed: &[bool],
     u: impl Fn([f64; 3]) -> [f64; 3],
@@ -229,7 +229,7 @@ pub(super) fn solve<'a>(
 }
 
 /// Internal forces, N, one a degree of freedom.
-pub(super) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
+pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
     let trial = Trial {
         u,
         multipliers_mpa: &[],

@@ -33,7 +33,7 @@ impl Check {
     }
 
     /// `|value - reference| / |reference|` within `tolerance`.
-    pub(super) fn relative(
+    pub(crate) fn relative(
         quantity: impl Into<String>,
         value: f64,
         reference: f64,
@@ -45,7 +45,7 @@ impl Check {
     }
 
     /// `|value - reference|` within `tolerance`.
-    pub(super) fn absolute(
+    pub(crate) fn absolute(
         quantity: impl Into<String>,
         value: f64,
         reference: f64,
@@ -57,7 +57,7 @@ impl Check {
     }
 
     /// An error measure that should be zero, up to `tolerance`.
-    pub(super) fn vanishes(
+    pub(crate) fn vanishes(
         quantity: impl Into<String>,
         value: f64,
         tolerance: f64,
@@ -67,7 +67,7 @@ impl Check {
     }
 
     /// A value accepted anywhere from `low` to `high`.
-    pub(super) fn within(
+    pub(crate) fn within(
         quantity: impl Into<String>,
         value: f64,
         [low, high]: [f64; 2],
@@ -83,7 +83,7 @@ impl Check {
     }
 
     /// A case that ended with an error.
-    pub(super) fn failed(error: &(dyn std::error::Error + Send + Sync)) -> Self {
+    pub(crate) fn failed(error: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::new(format!("failed: {error}"), [f64::NAN, f64::NAN, f64::NAN, 0.0], "")
     }
 }

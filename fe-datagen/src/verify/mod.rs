@@ -3,7 +3,7 @@
 //! One file a case; [`CASES`] is the registry. Every case solves real problems
 //! through the same [`crate::solve::Solver`] that presses fingers.
 
-mod bodies;
+pub(crate) mod bodies;
 mod check;
 mod cook;
 mod disc;

@@ -1,0 +1,71 @@
+//! Cases that both codes solve on equal meshes.
+
+mod one_element;
+mod ours;
+mod sphere;
+
+use super::Ccx;
+use crate::verify::{CaseError, Check, Report, Row};
+use std::path::Path;
+use std::time::Instant;
+
+/// Where the references come from.
+const SOURCE: &str = "CalculiX";
+
+/// What the cases share.
+struct Context<'a> {
+    ccx: &'a Ccx,
+    /// Folder for decks and results.
+    folder: &'a Path,
+    /// Smaller meshes.
+    quick: bool,
+}
+
+/// One problem that both codes solve.
+pub struct Case {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What its rows show, one sentence.
+    pub shows: &'static str,
+    run: fn(&Context<'_>) -> Result<Vec<Check>, CaseError>,
+}
+
+/// Every case, cheap ones first.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "one-element",
+        shows: "One element of each material and kind, stretched and sheared: the laws and their \
+                constants mean the same in both codes.",
+        run: one_element::run,
+    },
+    Case {
+        name: "sphere",
+        shows: "A block of two layers under a rigid sphere: contact, force, displacement, and SED \
+                where the layers meet.",
+        run: sphere::run,
+    },
+];
+
+/// Runs the cases that `wanted` accepts, with decks and results in `folder`;
+/// `visit` is told of each before (`None`) and after (`Some(rows)`).
+pub fn run(
+    ccx: &Ccx,
+    folder: &Path,
+    quick: bool,
+    wanted: &dyn Fn(&Case) -> bool,
+    visit: &mut dyn FnMut(&Case, Option<&[Row]>),
+) -> Report {
+    let context = Context { ccx, folder, quick };
+    let mut report = Report { quick, ..Report::default() };
+    for case in CASES.iter().filter(|c| wanted(c)) {
+        visit(case, None);
+        let clock = Instant::now();
+        let checks = (case.run)(&context).unwrap_or_else(|e| vec![Check::failed(e.as_ref())]);
+        let seconds = clock.elapsed().as_secs_f64();
+        let rows: Vec<_> =
+            checks.into_iter().map(|check| Row { case: case.name, check, seconds }).collect();
+        visit(case, Some(&rows));
+        report.rows.extend(rows);
+    }
+    report
+}

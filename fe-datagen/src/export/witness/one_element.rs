@@ -1,0 +1,194 @@
+//! One element of each material, stretched and sheared by prescribed displacements.
+
+use super::ours::{law, laws, sed_mpa};
+use super::{Check, Context, SOURCE};
+use crate::element::ElementKind;
+use crate::export::Quantity;
+use crate::export::deck::{ELEMENTS, HELD};
+use crate::export::{Deck, ElementTypes, MaterialCard, StepControl};
+use crate::mesh::{Mesh, Tissue};
+use crate::solve::{Loading, Options, Problem, Solver};
+use crate::verify::CaseError;
+use crate::verify::bodies::{cube, hold, hold_boundary, internal_force, prescribe};
+
+/// How the unit cube is deformed.
+#[derive(Clone, Copy)]
+enum Motion {
+    /// Stretched along x to this length, sides free.
+    Uniaxial(f64),
+    /// `u_x = g y` everywhere.
+    Shear(f64),
+}
+
+/// Force (N) on the moved face and energy density (MPa).
+type Answer = [f64; 2];
+
+pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
+    let mut rows = Vec::new();
+    for (material, card) in materials() {
+        let motions = if card.is_hyperelastic() {
+            [Motion::Uniaxial(0.75), Motion::Uniaxial(1.4), Motion::Shear(0.5)]
+        } else {
+            [Motion::Uniaxial(0.99), Motion::Uniaxial(1.01), Motion::Shear(0.02)]
+        };
+        let hexes = [(ElementKind::Hex8, "Hex8 = C3D8"), (ElementKind::Hex27, "Hex27 = C3D20R")];
+        let tets = [(ElementKind::Tet4, "Tet4 = C3D4"), (ElementKind::Tet10, "Tet10 = C3D10")];
+        for motion in motions {
+            for (kind, name) in hexes.into_iter().chain(tets) {
+                let job = format!("one-{}", rows.len());
+                let theirs = calculix(context, &job, &card, kind, motion)?;
+                let (who, ours) = match law(&card) {
+                    Some(_) => (name, solver(&card, kind, motion)?),
+                    None => (name, closed_form(&card, motion)),
+                };
+                let how = match motion {
+                    Motion::Uniaxial(stretch) => format!("stretch {stretch}"),
+                    Motion::Shear(g) => format!("shear {g}"),
+                };
+                for (i, what) in ["force, N", "SED, MPa"].into_iter().enumerate() {
+                    let quantity = format!("{material}, {who}, {how}: {what}");
+                    rows.push(Check::relative(quantity, ours[i], theirs[i], 1e-5, SOURCE));
+                }
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn materials() -> [(&'static str, MaterialCard); 3] {
+    let bulk_mpa = 0.080 / (3.0 * (1.0 - 2.0 * 0.48));
+    let (mu_mpa, alpha) =
+        (vec![2.3583e-2, 4.5408e-5, 4.0878e-2], vec![-2.0623, 25.0, -3.4784]);
+    [
+        ("neo-Hookean", MaterialCard::NeoHookean { mu_mpa: 0.080 / 2.96, bulk_mpa }),
+        ("Ogden", MaterialCard::Ogden { mu_mpa, alpha, bulk_mpa: 1.6 }),
+        ("linear", MaterialCard::Linear { youngs_modulus_mpa: 0.080, poissons_ratio: 0.48 }),
+    ]
+}
+
+/// A unit cube and what is held and moved of it.
+fn body(kind: ElementKind, motion: Motion) -> (Mesh, Vec<bool>, Vec<(usize, f64)>) {
+    let mesh = cube(kind, 1, |p| p);
+    let (fixed, values) = match motion {
+        Motion::Uniaxial(stretch) => {
+            let (x, y, z) = ([true, false, false], [false, true, false], [false, false, true]);
+            let sides = [("x_min", x), ("x_max", x), ("y_min", y), ("z_min", z)];
+            let fixed = hold(&mesh, &sides);
+            let values = prescribe(&mesh, &fixed, |p| [(stretch - 1.0) * p[0], 0.0, 0.0]);
+            (fixed, values)
+        }
+        Motion::Shear(g) => {
+            let fixed = hold_boundary(&mesh);
+            let values = prescribe(&mesh, &fixed, |p| [g * p[1], 0.0, 0.0]);
+            (fixed, values)
+        }
+    };
+    (mesh, fixed, values)
+}
+
+/// The moved face's name: x_max pulls, y_max shears; its force is along x.
+fn moved(motion: Motion) -> &'static str {
+    match motion {
+        Motion::Uniaxial(_) => "x_max",
+        Motion::Shear(_) => "y_max",
+    }
+}
+
+/// CalculiX' force and energy density.
+fn calculix(
+    context: &Context<'_>,
+    job: &str,
+    card: &MaterialCard,
+    kind: ElementKind,
+    motion: Motion,
+) -> Result<Answer, CaseError> {
+    let (mesh, fixed, values) = body(kind, motion);
+    let mut materials = [const { None }; Tissue::ALL.len()];
+    materials[Tissue::Dermis.index()] = Some(card.clone());
+    let deck = Deck {
+        title: job,
+        mesh: &mesh,
+        materials: &materials,
+        fixed: &fixed,
+        prescribed_mm: &values,
+        press: None,
+        types: ElementTypes::default(),
+        step: StepControl { residual_tolerance: 1e-9, ..StepControl::default() },
+    };
+    let run = context.ccx.run(context.folder, job, &deck.to_text()?)?;
+    let end = &mesh.node_sets[moved(motion)];
+    let reactions = &run.dat.table(Quantity::Force, HELD, 1.0)?.rows;
+    let at_end = |id: usize| end.binary_search(&(id as u32 - 1)).is_ok();
+    let force = reactions.iter().filter(|r| at_end(r.id)).map(|r| r.values[0]).sum();
+    let strain = &run.dat.table(Quantity::Strain, ELEMENTS, 1.0)?.rows;
+    let sed = strain.iter().map(|r| card.energy_mpa(&r.values)).sum::<f64>();
+    Ok([force, sed / strain.len() as f64])
+}
+
+/// The same of our solver.
+fn solver(card: &MaterialCard, kind: ElementKind, motion: Motion) -> Result<Answer, CaseError> {
+    let (mesh, fixed, prescribed_mm) = body(kind, motion);
+    let mut cards = [const { None }; Tissue::ALL.len()];
+    cards[Tissue::Dermis.index()] = Some(card.clone());
+    let laws = laws(&cards).ok_or("our solver has no such law")?;
+    let problem = Problem::new(mesh, laws, fixed, None)?;
+    let options = Options { residual_tolerance: 1e-12, ..Options::default() };
+    let mut solver = Solver::new(&problem, options)?;
+    solver.start(Loading { prescribed_mm, ..Loading::default() });
+    for quarter in 1..=4 {
+        solver.advance_to(f64::from(quarter) / 4.0)?;
+    }
+    let u = solver.displacement_mm();
+    let internal = internal_force(&problem, u)?;
+    let end = &problem.mesh.node_sets[moved(motion)];
+    let force = end.iter().map(|&n| internal[3 * n as usize]).sum();
+    let sed: Vec<f64> =
+        sed_mpa(&problem, ElementTypes::default(), u)?.into_iter().flatten().collect();
+    Ok([force, sed.iter().sum::<f64>() / sed.len() as f64])
+}
+
+/// The same from the law alone: strain is uniform.
+fn closed_form(card: &MaterialCard, motion: Motion) -> Answer {
+    if !card.is_hyperelastic() {
+        let (mu, bulk) = (card.shear_modulus_mpa(), card.bulk_modulus_mpa());
+        let modulus = 9.0 * bulk * mu / (3.0 * bulk + mu);
+        return match motion {
+            Motion::Uniaxial(a) => [modulus * (a - 1.0), 0.5 * modulus * (a - 1.0).powi(2)],
+            Motion::Shear(g) => [mu * g, 0.5 * mu * g * g],
+        };
+    }
+    let stretch = match motion {
+        Motion::Uniaxial(a) => {
+            let lateral = bisect(0.2, 5.0, |l| card.nominal_mpa([a, l, l])[1]);
+            [a, lateral, lateral]
+        }
+        Motion::Shear(g) => {
+            let first = 0.5 * g + (1.0 + 0.25 * g * g).sqrt();
+            [first, 1.0 / first, 1.0]
+        }
+    };
+    let stress = card.nominal_mpa(stretch);
+    let force = match motion {
+        Motion::Uniaxial(_) => stress[0],
+        // dU/dg along l1 - 1/l1 = g, l2 = 1/l1.
+        Motion::Shear(_) => {
+            let square = stretch[0] * stretch[0];
+            (stress[0] - stress[1] / square) * square / (1.0 + square)
+        }
+    };
+    let green = stretch.map(|l| 0.5 * (l * l - 1.0));
+    [force, card.energy_mpa(&[green[0], green[1], green[2], 0.0, 0.0, 0.0])]
+}
+
+/// Root of an increasing function between `low` and `high`.
+fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if f(middle) > 0.0 {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    0.5 * (low + high)
+}
