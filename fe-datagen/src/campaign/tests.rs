@@ -261,7 +261,12 @@ fn senseless_campaigns_are_refused_by_field() {
         (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
         (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
         (|s| s.test_fraction = 1.0, "test_fraction"),
-        (|s| s.plate.edge_radius_mm = 11.0, "edge_radius_mm"),
+        (
+            |s| {
+                s.indenter = IndenterSpec::Plate { size_mm: [20.0, 20.0], edge_radius_mm: 11.0 };
+            },
+            "edge_radius_mm",
+        ),
         (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
     ];
     for (spoil, field) in cases {

@@ -17,6 +17,7 @@ pub(crate) fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> In
     };
     IncrementRecord {
         depth_mm,
+        time_s: 0.0,
         force_n: [0.0, 0.0, depth_mm * depth_mm],
         pressure_mpa: field(0.01),
         sed_dermis_mpa: field(0.002),

@@ -47,7 +47,7 @@ fn loading(kind: ElementKind) -> Loading {
     };
     let start = Placement { rotation, origin_mm };
     let shape = Arc::new(Sphere { radius_mm: 1.6 });
-    let indenter = MovingIndenter::straight(shape, start, [0.0, 0.0, -0.1]);
+    let indenter = MovingIndenter::straight(shape, start, travel_mm);
     Loading { indenter: Some(indenter), ..Loading::default() }
 }
 
