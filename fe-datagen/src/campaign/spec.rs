@@ -1,9 +1,9 @@
 //! The campaign file.
 
 use super::CampaignError;
+use crate::indenter::IndenterSpec;
 use crate::mesh::fingertip::Density;
 use crate::output::OutputError;
-use crate::indenter::IndenterSpec;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -4,9 +4,9 @@
 use super::*;
 use crate::dataset::testing::{atlas, posed_record};
 use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
+use crate::indenter::IndenterSpec;
 use crate::mesh::fingertip::Density;
 use crate::output::map_image::Bits;
-use crate::indenter::IndenterSpec;
 use crate::press::record::{IncrementRecord, Pose};
 use papilla_proto::atlas::Atlas;
 use std::collections::BTreeMap;

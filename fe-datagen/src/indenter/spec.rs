@@ -1,5 +1,5 @@
 //! placeholder until h1
-use super::{RoundedPlate, SignedDistance, Sphere, Placement};
+use super::{Placement, RoundedPlate, SignedDistance, Sphere};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
@@ -22,10 +22,16 @@ pub enum IndenterSpec {
         radius_mm: f64,
     },
 }
-fn size() -> [f64; 2] { [20.0, 20.0] }
-fn radius() -> f64 { 1.0 }
+fn size() -> [f64; 2] {
+    [20.0, 20.0]
+}
+fn radius() -> f64 {
+    1.0
+}
 impl Default for IndenterSpec {
-    fn default() -> Self { Self::Plate { size_mm: size(), edge_radius_mm: radius() } }
+    fn default() -> Self {
+        Self::Plate { size_mm: size(), edge_radius_mm: radius() }
+    }
 }
 /// x
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,16 +39,33 @@ impl Default for IndenterSpec {
 pub struct IndenterError(pub String);
 impl IndenterSpec {
     /// x
-    pub fn validate(&self) -> Result<(), IndenterError> { Ok(()) }
+    pub fn validate(&self) -> Result<(), IndenterError> {
+        Ok(())
+    }
     /// x
-    pub fn top_mm(&self) -> f64 { match self { Self::Plate{edge_radius_mm,..} => 2.0 + edge_radius_mm, Self::Sphere{radius_mm} => *radius_mm } }
+    pub fn top_mm(&self) -> f64 {
+        match self {
+            Self::Plate { edge_radius_mm, .. } => 2.0 + edge_radius_mm,
+            Self::Sphere { radius_mm } => *radius_mm,
+        }
+    }
     /// x
     pub fn build(&self, _folder: &Path) -> Result<Arc<dyn SignedDistance>, IndenterError> {
         Ok(match *self {
-            Self::Plate { size_mm, edge_radius_mm } => Arc::new(RoundedPlate { half_mm: [0.5 * size_mm[0], 0.5 * size_mm[1], 2.0 + edge_radius_mm], edge_radius_mm }),
+            Self::Plate { size_mm, edge_radius_mm } => Arc::new(RoundedPlate {
+                half_mm: [0.5 * size_mm[0], 0.5 * size_mm[1], 2.0 + edge_radius_mm],
+                edge_radius_mm,
+            }),
             Self::Sphere { radius_mm } => Arc::new(Sphere { radius_mm }),
         })
     }
 }
 /// x
-pub fn first_touch_travel(_: &dyn SignedDistance, _: &Placement, _: [f64; 3], _: &[[f64; 3]]) -> Result<f64, IndenterError> { Ok(0.0) }
+pub fn first_touch_travel(
+    _: &dyn SignedDistance,
+    _: &Placement,
+    _: [f64; 3],
+    _: &[[f64; 3]],
+) -> Result<f64, IndenterError> {
+    Ok(0.0)
+}

@@ -11,9 +11,7 @@ use crate::mesh::sample::Deformed;
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
 use crate::scene::{SceneError, TissueError};
-use crate::solve::{
-    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
-};
+use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
 use papilla_proto::atlas::Atlas;
 
 /// Why a body could not be set up or pressed.
@@ -176,7 +174,7 @@ impl Body {
     }
 
     /// Vertex values and checks of the solver's equilibrium.
-    pub(super) fn record(
+    pub(crate) fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,

@@ -202,11 +202,7 @@ impl<'a> Newton<'a> {
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
-    pub(super) fn evaluate(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &[[f64; 3]],
-    ) -> Result<(), StepError> {
+    pub(super) fn evaluate(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
         let clock = Instant::now();
         let trial = fixed.trial(u, self.penalty);
         let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
@@ -214,11 +210,7 @@ impl<'a> Newton<'a> {
         result
     }
 
-    fn assemble(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &[[f64; 3]],
-    ) -> Result<(), StepError> {
+    fn assemble(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
         let clock = Instant::now();
         let trial = fixed.trial(u, self.penalty);
         let tangent = Some(&mut self.tangent);
@@ -281,11 +273,7 @@ impl<'a> Newton<'a> {
     }
 
     /// Backtracks along `step` until potential or residual falls.
-    fn line_search(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &mut [[f64; 3]],
-    ) -> Result<(), StepError> {
+    fn line_search(&mut self, fixed: Fixed<'_>, u: &mut [[f64; 3]]) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
         // can point uphill.
         let mut slope: f64 = -crate::linear::dot(&self.right, &self.step);

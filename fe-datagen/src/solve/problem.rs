@@ -1,7 +1,7 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
-use crate::contact::ContactSurface;
 use super::memory::MemoryLayout;
+use crate::contact::ContactSurface;
 use crate::element::{BlockGeometry, ShapeError, Solid};
 use crate::linear::{Structure, StructureError};
 use crate::mesh::{Mesh, Tissue};
