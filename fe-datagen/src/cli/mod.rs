@@ -2,6 +2,7 @@
 
 mod atlas;
 mod dataset;
+mod effects;
 mod generate;
 mod solve;
 mod verify;
@@ -30,6 +31,7 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    Effects(effects::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -40,6 +42,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match result {

@@ -49,6 +49,9 @@ pub enum PressError {
     /// Depths, forces and times must be positive and rising.
     #[error("depths, forces and times must be positive, finite and rising; found {0} after {1}")]
     Rising(f64, f64),
+    /// Nothing was stored.
+    #[error("the motion has no state to store")]
+    Empty,
     /// A prescribed force was not reached.
     #[error("the force of {wanted_n} N was not reached: {reached_n:.4} N after 6 mm or 60 tries")]
     Force {

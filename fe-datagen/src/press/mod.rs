@@ -6,3 +6,4 @@ pub mod fields;
 pub mod laws;
 pub mod record;
 pub mod setup;
+pub mod study;
