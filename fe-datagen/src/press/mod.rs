@@ -7,3 +7,6 @@ pub mod laws;
 pub mod record;
 pub mod setup;
 pub mod study;
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,7 @@ mod ogden;
 mod patch;
 mod relaxation;
 mod report;
+mod solid_parts;
 mod tangent;
 mod uniaxial;
 
@@ -128,6 +129,12 @@ pub const CASES: &[Case] = &[
         name: "increments",
         shows: "Pressure and SED of an elastic press do not depend on the number of increments.",
         run: increments::run,
+    },
+    Case {
+        name: "solid-parts",
+        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and bone \
+                carries as a rigid one does.",
+        run: solid_parts::run,
     },
     Case {
         name: "mirror",
