@@ -6,4 +6,5 @@ pub mod fields;
 pub mod laws;
 pub mod record;
 pub mod setup;
+mod skin;
 pub mod study;
