@@ -17,7 +17,9 @@ mod viscoelastic;
 use super::{Scene, SceneError};
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::Parts;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// An effect.
 pub struct Effect {
@@ -134,6 +136,17 @@ impl EffectName {
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         EFFECTS.iter().position(|e| e.name == name).map(Self)
+    }
+}
+
+impl JsonSchema for EffectName {
+    fn schema_name() -> Cow<'static, str> {
+        "Effect".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let one = |e: &Effect| json_schema!({ "const": e.name, "description": e.adds });
+        json_schema!({ "oneOf": EFFECTS.map(one) })
     }
 }
 
