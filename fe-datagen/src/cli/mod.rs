@@ -3,6 +3,7 @@
 mod atlas;
 mod dataset;
 mod effects;
+mod explain;
 mod generate;
 mod schema;
 mod solve;
@@ -28,6 +29,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Solve(solve::Args),
+    Explain(explain::Args),
     Schema(schema::Args),
     Generate(generate::Args),
     Dataset(dataset::Args),
@@ -41,6 +43,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Solve(args) => solve::run(&args),
+        Command::Explain(args) => explain::run(&args),
         Command::Schema(args) => schema::run(&args),
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),

@@ -15,6 +15,7 @@ mod plane_strain;
 mod viscoelastic;
 
 use super::{Scene, SceneError};
+use crate::forecast::Census;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::Parts;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
@@ -33,6 +34,10 @@ pub struct Effect {
     pub needs: &'static [&'static str],
     /// Says why a scene cannot have it.
     pub fits: fn(&Scene) -> Result<(), &'static str>,
+    /// What it makes the solver assemble or store; 0 in every scene without it.
+    pub state: fn(&Census) -> usize,
+    /// What `state` counts.
+    pub state_is: &'static str,
     /// Puts it into a plan.
     pub switch_on: fn(&Scene, &mut Plan),
 }
