@@ -3,7 +3,9 @@
 mod atlas;
 mod dataset;
 mod effects;
+mod explain;
 mod generate;
+mod schema;
 mod solve;
 mod verify;
 
@@ -27,6 +29,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Solve(solve::Args),
+    Explain(explain::Args),
+    Schema(schema::Args),
     Generate(generate::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
@@ -39,6 +43,8 @@ enum Command {
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Solve(args) => solve::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::Schema(args) => schema::run(&args),
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),

@@ -12,5 +12,7 @@ pub(super) const EFFECT: Effect = Effect {
         Geometry::Mesh { .. } => Ok(()),
         _ => Err("this geometry is a solid; geometry.kind = \"section\" is plane"),
     },
+    state: |c| c.plane_elements,
+    state_is: "plane elements",
     switch_on: |_, plan| plan.plane_strain = true,
 };

@@ -1,0 +1,74 @@
+//! What it takes to evaluate a body's elements, probed on some of them.
+
+use super::machine::fastest_s;
+use crate::element::Memory;
+use crate::mesh::{Block, Tissue};
+use crate::solve::Problem;
+use std::hint::black_box;
+
+/// Time to evaluate every element once, s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pass {
+    /// Forces alone.
+    pub forces_s: f64,
+    /// Forces and tangent, added up in the system.
+    pub tangent_s: f64,
+}
+
+/// Elements of a tissue that are probed.
+const SAMPLE: usize = 48;
+/// Runs of a probe.
+const RUNS: usize = 5;
+
+impl Pass {
+    /// Evaluates some elements of each tissue in a small deformation with three
+    /// different principal stretches.
+    pub(super) fn probe(problem: &Problem) -> Self {
+        let mut pass = Self::default();
+        let mut tangent = problem.structure.zeros();
+        for (b, block) in problem.mesh.blocks.iter().enumerate() {
+            for tissue in Tissue::ALL {
+                let of: Vec<usize> =
+                    (0..block.len()).filter(|&e| block.tissue[e] == tissue).collect();
+                if of.is_empty() {
+                    continue;
+                }
+                let step = of.len().div_ceil(SAMPLE);
+                let sample: Vec<usize> = of.iter().copied().step_by(step).collect();
+                let share = of.len() as f64 / sample.len() as f64;
+                pass.forces_s += share * fastest_s(RUNS, || {
+                    sample.iter().for_each(|&e| evaluate(problem, b, block, e, None));
+                });
+                pass.tangent_s += share * fastest_s(RUNS, || {
+                    for &e in &sample {
+                        let n = block.kind.nodes();
+                        let mut dense = vec![0.0; 9 * n * n];
+                        evaluate(problem, b, block, e, Some(dense.as_mut_slice()));
+                        problem.structure.add_element(&mut tangent, b, e, &dense);
+                    }
+                });
+            }
+        }
+        pass
+    }
+}
+
+fn evaluate(problem: &Problem, b: usize, block: &Block, e: usize, tangent: Option<&mut [f64]>) {
+    let mut u = [[0.0; 3]; 27];
+    let mut force = [[0.0; 3]; 27];
+    let nodes = block.element(e);
+    for (u, &node) in u.iter_mut().zip(nodes) {
+        let x = problem.mesh.nodes[node as usize];
+        *u = [1e-3 * x[0] + 2e-4 * x[1], -2e-3 * x[1], 3e-3 * x[2]];
+        if block.kind.is_planar() {
+            u[2] = 0.0;
+        }
+    }
+    let solid = &problem.materials[block.tissue[e].index()];
+    let history = vec![0.0; problem.geometry[b].points * solid.history_len()];
+    let memory = Memory { history: &history, dt_s: 0.1 };
+    let (u, force) = (&u[..nodes.len()], &mut force[..nodes.len()]);
+    // The deformation is far from turning an element inside out.
+    let _ = black_box(solid.evaluate(problem.geometry[b].element(e), u, memory, force, tangent));
+    black_box(force);
+}
