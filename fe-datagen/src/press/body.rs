@@ -86,8 +86,15 @@ pub struct PressedPatch {
 }
 
 impl Body {
-    /// Meshes a fingertip with its bone, its nail plate and the axial
-    /// displacement of its base held.
+    /// Meshes a fingertip and holds what carries it.
+    ///
+    /// Always the axial displacement of the soft tissue's base, which goes on as
+    /// the rest of the finger. A rigid bone is held as a whole. An elastic one is
+    /// clamped where the base plane cuts it, because there the joint carries it; its
+    /// marrow cavity is free: marrow and cancellous bone are softer than the cortex
+    /// by a factor of ten and more, and to hold the cavity's wall would leave but
+    /// 0.75 mm of cortex to deform on a rigid core. The skin under a rigid nail is
+    /// held; an elastic nail is carried by that skin alone.
     ///
     /// # Errors
     /// See [`PressError`].
@@ -100,11 +107,13 @@ impl Body {
     ) -> Result<Self, PressError> {
         let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
-        for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
-            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
-        }
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
+        }
+        let bone = if parts.bone { "bone_base" } else { "bone" };
+        let nail = (!parts.nail).then_some("nail");
+        for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
+            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
         let side = |tissue| SedRecovery::new(&mesh, "interface", tissue, &patch.interface);
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);

@@ -8,3 +8,6 @@ pub mod record;
 pub mod setup;
 mod skin;
 pub mod study;
+
+#[cfg(test)]
+mod tests;

@@ -187,7 +187,8 @@ impl<'a> Newton<'a> {
         wanted.min(first).max(enough).min(0.3)
     }
 
-    /// A force typical of the body: stiffest shear modulus times its extent squared.
+    /// A force typical of the body: its soft tissue's shear modulus times its extent
+    /// squared.
     fn force_scale_n(&self) -> f64 {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -198,7 +199,7 @@ impl<'a> Newton<'a> {
             }
         }
         let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        self.problem.stiffest_mpa(|_| true) * extent * extent
+        self.problem.soft_mpa() * extent * extent
     }
 
     /// Evaluates at `u` into `current`, without a tangent.

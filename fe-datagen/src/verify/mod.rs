@@ -20,6 +20,7 @@ mod patch;
 mod punch;
 mod relaxation;
 mod report;
+mod solid_parts;
 mod tangent;
 mod uniaxial;
 
@@ -147,6 +148,12 @@ pub const CASES: &[Case] = &[
         name: "increments",
         shows: "Pressure and SED of an elastic press do not depend on the number of increments.",
         run: increments::run,
+    },
+    Case {
+        name: "solid-parts",
+        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and bone \
+                carries as a rigid one does.",
+        run: solid_parts::run,
     },
     Case {
         name: "mirror",
