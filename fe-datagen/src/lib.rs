@@ -6,6 +6,7 @@ pub mod cli;
 pub mod contact;
 pub mod dataset;
 pub mod element;
+pub mod export;
 pub mod geometry;
 pub mod indenter;
 pub mod linear;

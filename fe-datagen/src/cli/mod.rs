@@ -2,9 +2,11 @@
 
 mod atlas;
 mod dataset;
+mod export;
 mod generate;
 mod solve;
 mod verify;
+mod witness;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -30,6 +32,8 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    Export(export::Args),
+    Witness(witness::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -40,6 +44,8 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Witness(args) => witness::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match result {

@@ -89,6 +89,7 @@ impl Deck<'_> {
             self.indenter(rigid, &mut out);
             self.contact(press, &mut out)?;
         }
+        self.amplitudes(&mut out);
         self.step(&mut out);
         Ok(out)
     }
@@ -152,6 +153,10 @@ impl Deck<'_> {
             let material = name.to_uppercase();
             let _ = write!(out, "*MATERIAL, NAME={material}\n{}", card.cards());
             let _ = writeln!(out, "*SOLID SECTION, ELSET={}, MATERIAL={material}", set_of(tissue));
+            if self.mesh.is_planar() {
+                // Thickness, mm: forces are per mm of length, as ours.
+                out.push_str("1.\n");
+            }
         }
         Ok(())
     }
@@ -159,8 +164,10 @@ impl Deck<'_> {
     fn supports(&self, out: &mut String) {
         let mut held = Vec::new();
         let mut boundary = String::new();
+        // Plane strain holds the third one itself.
+        let components = if self.mesh.is_planar() { 2 } else { 3 };
         for n in self.nodes() {
-            let dofs = &self.fixed[3 * n as usize..3 * n as usize + 3];
+            let dofs = &self.fixed[3 * n as usize..3 * n as usize + components];
             for (i, _) in dofs.iter().enumerate().filter(|(_, fixed)| **fixed) {
                 let _ = writeln!(boundary, "{},{},{}", n + 1, i + 1, i + 1);
             }
@@ -231,6 +238,17 @@ impl Deck<'_> {
         cards.map(MaterialCard::shear_modulus_mpa).fold(0.0, f64::max)
     }
 
+    /// Displacement over load fraction of an indenter whose path has corners.
+    fn amplitudes(&self, out: &mut String) {
+        let Some(press) = self.press.as_ref().filter(|p| p.indenter.path.len() > 1) else { return };
+        for i in 0..3 {
+            let _ = writeln!(out, "*AMPLITUDE, NAME=ALONG{}\n0.,0.", i + 1);
+            for (t, offset) in &press.indenter.path {
+                let _ = writeln!(out, "{},{}", number(*t), number(offset[i]));
+            }
+        }
+    }
+
     fn step(&self, out: &mut String) {
         let StepControl { first, largest, outputs, residual_tolerance } = &self.step;
         let when = if outputs.is_empty() {
@@ -272,9 +290,14 @@ impl Deck<'_> {
         for &(dof, value) in self.prescribed_mm {
             let _ = writeln!(out, "{},{2},{2},{1}", dof / 3 + 1, number(value), dof % 3 + 1);
         }
-        if let Some(press) = &self.press {
-            for (i, &t) in press.indenter.travel_mm.iter().enumerate() {
+        let Some(press) = &self.press else { return };
+        if let [(_, travel)] = press.indenter.path[..] {
+            for (i, t) in travel.into_iter().enumerate() {
                 let _ = writeln!(out, "{INDENTER},{0},{0},{1}", i + 1, number(t));
+            }
+        } else {
+            for i in 1..=3 {
+                let _ = writeln!(out, "*BOUNDARY, AMPLITUDE=ALONG{i}\n{INDENTER},{i},{i},1.");
             }
         }
     }
