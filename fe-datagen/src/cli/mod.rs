@@ -2,6 +2,7 @@
 
 mod atlas;
 mod dataset;
+mod effects;
 mod export;
 mod generate;
 mod solve;
@@ -34,6 +35,7 @@ enum Command {
     Verify(verify::Args),
     Export(export::Args),
     Witness(witness::Args),
+    Effects(effects::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -46,6 +48,7 @@ pub fn run() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Witness(args) => witness::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
     match result {

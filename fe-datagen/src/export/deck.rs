@@ -45,9 +45,9 @@ pub struct Press<'a> {
     pub contact: &'a str,
     /// What touches it.
     pub indenter: RigidIndenter,
-    /// Pressure per overlap, MPa/mm. `None`: 1000 times the stiffest shear
-    /// modulus over the mean edge of a contact face, which leaves an overlap of
-    /// some 1e-4 of that edge.
+    /// Pressure per overlap, MPa/mm. `None`: 10 000 times (face-to-face contact,
+    /// which does not settle with more: 1000 times) the stiffest shear modulus
+    /// over the mean edge of a contact face.
     pub stiffness_mpa_per_mm: Option<f64>,
 }
 
@@ -211,15 +211,19 @@ impl Deck<'_> {
             let _ = writeln!(out, "{element},S{face}");
         }
         let mu = self.shear_modulus_mpa();
+        let node_contact = takes_node_contact(surface.kind);
         let stiffness = press.stiffness_mpa_per_mm.unwrap_or_else(|| {
             let mut area = 0.0;
             let rule = surface.kind.quadrature();
             surface.integrate(&rule, &|n| self.mesh.nodes[n as usize], &mut |_, _, normal| {
                 area += crate::mesh::surface::norm(normal);
             });
-            1e3 * mu / (area / faces.len().max(1) as f64).sqrt()
+            let mean = area / faces.len().max(1) as f64;
+            // The area of an edge is its length.
+            let size = if surface.kind.corners() == 2 { mean } else { mean.sqrt() };
+            if node_contact { 1e4 * mu / size } else { 1e3 * mu / size }
         });
-        let kind = if takes_node_contact(surface.kind) { "NODE" } else { "SURFACE" };
+        let kind = if node_contact { "NODE" } else { "SURFACE" };
         // The second number is the pull on nodes just out of contact (node-to-face only).
         let _ = write!(
             out,

@@ -98,10 +98,12 @@ impl CcxElement {
     }
 }
 
-/// Whether CalculiX' node-to-face contact suits a surface; it takes wrong nodal
-/// weights on quadratic faces, which need face-to-face contact.
+/// Whether CalculiX' node-to-face contact suits a surface. It takes wrong nodal
+/// weights on quadratic faces, which need face-to-face contact. Edges are faces
+/// of bricks with their layers tied to each other, where a node's share is that of
+/// the edge; face-to-face contact there does not find out what touches.
 pub(super) const fn takes_node_contact(kind: FaceKind) -> bool {
-    matches!(kind, FaceKind::Quad4 | FaceKind::Tri3)
+    matches!(kind, FaceKind::Line2 | FaceKind::Line3 | FaceKind::Quad4 | FaceKind::Tri3)
 }
 
 /// `(element number, face number)` of every face of a surface, both from 1;

@@ -45,7 +45,16 @@ pub enum ExportError {
     #[error("no deck for the indenter '{shape}': plates, spheres and cylinders can be exported")]
     Indenter {
         /// Shape as scenes name it.
-        shape: String,
+        shape: &'static str,
+    },
+    /// A cylinder's ends are not in a deck.
+    #[error(
+        "skin lies {beyond_mm:.2} mm beyond an end of the cylinder, and a deck leaves its ends \
+         open: make indenter.length_mm larger"
+    )]
+    Ends {
+        /// How far the contact surface goes beyond the straight part, mm.
+        beyond_mm: f64,
     },
     /// A material would be misread.
     #[error("material of {tissue}: {why}")]

@@ -59,10 +59,8 @@ pub(super) struct RigidMesh {
     pub bricks: Vec<[u32; 20]>,
 }
 
-/// Arc of one quadratic facet, degrees: it leaves the circle by 1e-6 of the radius.
-const FACET_DEG: f64 = 7.5;
-/// Facets across a flat side.
-const FLAT_FACETS: usize = 4;
+/// Arc of one quadratic facet, degrees: it leaves the circle by 1e-5 of the radius.
+const FACET_DEG: f64 = 12.5;
 /// Steepest part of an edge, ball or cylinder that is meshed, degrees.
 const ANGLE_MAX_DEG: f64 = 75.0;
 
@@ -135,6 +133,20 @@ impl RigidIndenter {
         Ok(rolled)
     }
 
+    /// Refuses a cylinder that does not reach past the body on both sides.
+    pub(super) fn refuse_ends(
+        &self,
+        points: impl Iterator<Item = [f64; 3]>,
+    ) -> Result<(), ExportError> {
+        let RigidShape::Cylinder { half_length_mm, .. } = self.shape else { return Ok(()) };
+        let axis = self.start.rotation.map(|row| row[1]);
+        let along = |p: [f64; 3]| -> f64 {
+            (0..3).map(|i| (p[i] - self.start.origin_mm[i]) * axis[i]).sum()
+        };
+        let beyond_mm = points.map(|p| along(p).abs()).fold(0.0, f64::max) - half_length_mm;
+        if beyond_mm > 0.0 { Err(ExportError::Ends { beyond_mm }) } else { Ok(()) }
+    }
+
     /// Half angle of a round shape that a body without hollows can touch, with
     /// some room.
     fn reach_deg(&self, radius_mm: f64) -> f64 {
@@ -174,10 +186,10 @@ struct Station {
     angle: f64,
 }
 
-/// Stations along one axis, two intervals a facet.
+/// Stations along one axis, two intervals a facet; a flat side is one.
 fn stations(half_mm: f64, angle_deg: f64) -> Vec<Station> {
     let arcs = 2 * (angle_deg / FACET_DEG).ceil() as usize;
-    let flats = if half_mm > 0.0 { 2 * FLAT_FACETS } else { 0 };
+    let flats = if half_mm > 0.0 { 2 } else { 0 };
     let mut all = Vec::with_capacity(2 * arcs + flats + 1);
     let arc = |i: usize| angle_deg.to_radians() * i as f64 / arcs as f64;
     all.extend((1..=arcs).rev().map(|i| Station { offset_mm: -half_mm, angle: -arc(i) }));
@@ -256,6 +268,17 @@ mod tests {
             let geometry = BlockGeometry::new(ElementKind::Hex8, &m.nodes, &corners);
             assert!(geometry.is_ok(), "{shape:?}: {:?}", geometry.err());
         }
+    }
+
+    #[test]
+    fn a_cylinder_shorter_than_the_body_is_refused() {
+        let shape = RigidShape::Cylinder { radius_mm: 2.0, half_length_mm: 5.0 };
+        let indenter = RigidIndenter { shape, start: TURNED, path: Vec::new() };
+        // Its axis is the world's z; it is centred at z = 5.
+        let at = |z: f64| indenter.refuse_ends([[1.0, 0.0, 5.0], [0.0, 2.0, z]].into_iter());
+        assert_eq!(at(9.9), Ok(()));
+        let refused = at(-1.0).unwrap_err();
+        assert!(matches!(refused, ExportError::Ends { beyond_mm } if (beyond_mm - 1.0).abs() < 1e-12));
     }
 
     #[test]

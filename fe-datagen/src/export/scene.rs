@@ -4,7 +4,7 @@ use super::{
     Deck, ElementTypes, ExportError, MaterialCard, Press, RigidIndenter, RigidShape, StepControl,
     refuse_inexpressible,
 };
-use crate::indenter::IndenterSpec;
+use crate::indenter::{IndenterSpec, RoundedPlate};
 use crate::mesh::Tissue;
 use crate::press::body::PressError;
 use crate::press::drive::Drive;
@@ -67,6 +67,9 @@ impl SceneDeck {
         }
         let moving = setup.body.indenter(&setup.approach, &setup.drive)?;
         let indenter = RigidIndenter { shape, start: moving.start, path: moving.path };
+        let problem = &setup.body.problem;
+        let nodes = problem.mesh.surfaces[&setup.body.contact].nodes();
+        indenter.refuse_ends(nodes.iter().map(|&n| problem.mesh.nodes[n as usize]))?;
         Ok(Self { setup, cards, indenter, outputs })
     }
 
@@ -97,12 +100,17 @@ impl RigidShape {
     /// # Errors
     /// [`ExportError::Indenter`] names a shape that is none of these.
     pub fn of(spec: &IndenterSpec) -> Result<Self, ExportError> {
-        match *spec {
-            IndenterSpec::Plate { size_mm, edge_radius_mm } => Ok(Self::Plate {
-                half_mm: [0.5 * size_mm[0], 0.5 * size_mm[1], 2.0 + edge_radius_mm],
-                edge_radius_mm,
+        match spec {
+            IndenterSpec::Plate(plate) => {
+                let RoundedPlate { half_mm, edge_radius_mm } = plate.into();
+                Ok(Self::Plate { half_mm, edge_radius_mm })
+            }
+            IndenterSpec::Sphere(sphere) => Ok(Self::Sphere { radius_mm: sphere.radius_mm }),
+            IndenterSpec::Cylinder(c) => Ok(Self::Cylinder {
+                radius_mm: c.radius_mm,
+                half_length_mm: 0.5 * c.length_mm - c.end_radius_mm,
             }),
-            IndenterSpec::Sphere { radius_mm } => Ok(Self::Sphere { radius_mm }),
+            other => Err(ExportError::Indenter { shape: other.name() }),
         }
     }
 }

@@ -211,8 +211,7 @@ struct Grid {
 }
 
 /// Tissue of each layer of rows.
-const LAYERS: [Tissue; 4] =
-    [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous, Tissue::Bone];
+const LAYERS: [Tissue; 4] = [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous, Tissue::Bone];
 
 impl Grid {
     fn new(
@@ -266,9 +265,11 @@ impl Grid {
             nodes.push([skin[0], skin[1], 0.0]);
             for (l, fractions) in self.fractions.iter().enumerate() {
                 let (p, q) = (bounds[l], bounds[l + 1]);
-                nodes.extend(fractions[1..].iter().map(|t| {
-                    [(1.0 - t) * p[0] + t * q[0], (1.0 - t) * p[1] + t * q[1], 0.0]
-                }));
+                nodes.extend(
+                    fractions[1..]
+                        .iter()
+                        .map(|t| [(1.0 - t) * p[0] + t * q[0], (1.0 - t) * p[1] + t * q[1], 0.0]),
+                );
             }
         }
         nodes

@@ -11,9 +11,7 @@ use crate::mesh::sample::Deformed;
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
 use crate::scene::{SceneError, TissueError};
-use crate::solve::{
-    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
-};
+use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
 use papilla_proto::atlas::Atlas;
 
 /// Why a body could not be set up or pressed.
@@ -51,6 +49,9 @@ pub enum PressError {
     /// Depths, forces and times must be positive and rising.
     #[error("depths, forces and times must be positive, finite and rising; found {0} after {1}")]
     Rising(f64, f64),
+    /// Nothing was stored.
+    #[error("the motion has no state to store")]
+    Empty,
     /// A prescribed force was not reached.
     #[error("the force of {wanted_n} N was not reached: {reached_n:.4} N after 6 mm or 60 tries")]
     Force {
@@ -85,8 +86,15 @@ pub struct PressedPatch {
 }
 
 impl Body {
-    /// Meshes a fingertip with its bone, its nail plate and the axial
-    /// displacement of its base held.
+    /// Meshes a fingertip and holds what carries it.
+    ///
+    /// Always the axial displacement of the soft tissue's base, which goes on as
+    /// the rest of the finger. A rigid bone is held as a whole. An elastic one is
+    /// clamped where the base plane cuts it, because there the joint carries it; its
+    /// marrow cavity is free: marrow and cancellous bone are softer than the cortex
+    /// by a factor of ten and more, and to hold the cavity's wall would leave but
+    /// 0.75 mm of cortex to deform on a rigid core. The skin under a rigid nail is
+    /// held; an elastic nail is carried by that skin alone.
     ///
     /// # Errors
     /// See [`PressError`].
@@ -99,11 +107,13 @@ impl Body {
     ) -> Result<Self, PressError> {
         let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
-        for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
-            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
-        }
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
+        }
+        let bone = if parts.bone { "bone_base" } else { "bone" };
+        let nail = (!parts.nail).then_some("nail");
+        for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
+            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
         let side = |tissue| SedRecovery::new(&mesh, "interface", tissue, &patch.interface);
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
@@ -176,7 +186,7 @@ impl Body {
     }
 
     /// Vertex values and checks of the solver's equilibrium.
-    pub(super) fn record(
+    pub(crate) fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,
@@ -191,9 +201,11 @@ impl Body {
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
-        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa) = Default::default();
+        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
+            Default::default();
         if let Some(p) = &self.patch {
             pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            shear_mpa = self.shear_mpa(solver, &p.patch.skin);
             let history = |block, element| solver.history_of(block, element);
             let body = Deformed {
                 mesh: &self.problem.mesh,
@@ -212,6 +224,8 @@ impl Body {
             pressure_mpa,
             sed_dermis_mpa,
             sed_epidermis_mpa,
+            shear_mpa,
+            outside_calibration: self.outside_calibration(solver),
             checks: Checks {
                 residual_relative: report.residual_relative,
                 contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),

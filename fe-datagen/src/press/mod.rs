@@ -6,3 +6,8 @@ pub mod fields;
 pub mod laws;
 pub mod record;
 pub mod setup;
+mod skin;
+pub mod study;
+
+#[cfg(test)]
+mod tests;

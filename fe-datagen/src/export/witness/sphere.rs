@@ -19,13 +19,13 @@ const LAYERS_MM: [f64; 2] = [1.0, 2.0];
 const RADIUS_MM: f64 = 4.0;
 const DEPTH_MM: f64 = 0.5;
 
-/// Element of ours and of theirs, Poisson's ratio, elements a mm on small and on
-/// full meshes.
+/// Element of ours and of theirs, Poisson's ratio, elements a mm on small (`None`:
+/// not run) and on full meshes.
 struct Pair {
     kind: ElementKind,
     linear: LinearHex,
     nu: f64,
-    per_mm: [f64; 2],
+    per_mm: [Option<f64>; 2],
     name: &'static str,
     job: &'static str,
     tolerance: Tolerance,
@@ -40,7 +40,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             kind: ElementKind::Tet4,
             linear: LinearHex::C3d8,
             nu: 0.48,
-            per_mm: [1.0, 2.0],
+            per_mm: [Some(1.0), Some(3.0)],
             name: "Tet4 = C3D4",
             job: "sphere-tet4",
             tolerance: EQUAL,
@@ -49,7 +49,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             kind: ElementKind::Hex27,
             linear: LinearHex::C3d8,
             nu: 0.48,
-            per_mm: [1.0, 2.0],
+            per_mm: [Some(1.0), Some(2.0)],
             name: "Hex27, C3D20R",
             job: "sphere-hex27",
             tolerance: EXPECTED,
@@ -58,7 +58,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             kind: ElementKind::Hex8,
             linear: LinearHex::C3d8,
             nu: 0.3,
-            per_mm: [2.0, 4.0],
+            per_mm: [Some(2.0), Some(3.0)],
             name: "Hex8, C3D8, nu 0.3",
             job: "sphere-hex8-soft",
             tolerance: EXPECTED,
@@ -67,7 +67,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             kind: ElementKind::Hex8,
             linear: LinearHex::C3d8,
             nu: 0.48,
-            per_mm: [2.0, 4.0],
+            per_mm: [None, Some(3.0)],
             name: "Hex8, C3D8",
             job: "sphere-hex8",
             tolerance: EXPECTED,
@@ -76,7 +76,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             kind: ElementKind::Hex8,
             linear: LinearHex::C3d8i,
             nu: 0.48,
-            per_mm: [2.0, 4.0],
+            per_mm: [None, Some(3.0)],
             name: "Hex8, C3D8I",
             job: "sphere-hex8-modes",
             tolerance: EXPECTED,
@@ -84,13 +84,15 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     ];
     let mut rows = Vec::new();
     for pair in pairs {
-        rows.extend(pressing(context, &pair).compare(context)?);
+        if let Some(per_mm) = pair.per_mm[usize::from(!context.quick)] {
+            rows.extend(pressing(&pair, per_mm).compare(context)?);
+        }
     }
     Ok(rows)
 }
 
-fn pressing<'a>(context: &Context<'_>, pair: &Pair) -> Pressing<'a> {
-    let (mesh, fixed) = block(pair.kind, pair.per_mm[usize::from(!context.quick)]);
+fn pressing<'a>(pair: &Pair, per_mm: f64) -> Pressing<'a> {
+    let (mesh, fixed) = block(pair.kind, per_mm);
     // Its own +z presses down.
     let start = Placement {
         rotation: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
