@@ -7,6 +7,7 @@ pub mod contact;
 pub mod dataset;
 pub mod element;
 pub mod forecast;
+pub mod export;
 pub mod geometry;
 pub mod indenter;
 pub mod linear;

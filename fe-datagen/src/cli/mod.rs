@@ -4,10 +4,12 @@ mod atlas;
 mod dataset;
 mod effects;
 mod explain;
+mod export;
 mod generate;
 mod schema;
 mod solve;
 mod verify;
+mod witness;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,6 +37,8 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    Export(export::Args),
+    Witness(witness::Args),
     Effects(effects::Args),
 }
 
@@ -48,6 +52,8 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
     };
