@@ -3,6 +3,8 @@
 mod atlas;
 mod dataset;
 mod generate;
+mod lines;
+mod s2;
 mod solve;
 mod verify;
 
@@ -30,6 +32,7 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    S2(s2::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -41,6 +44,7 @@ pub fn run() -> ExitCode {
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::S2(args) => s2::run(&args),
     };
     match result {
         Ok(code) => code,

@@ -51,6 +51,9 @@ pub enum SceneError {
     /// A material out of range.
     #[error(transparent)]
     Material(#[from] TissueError),
+    /// A section that contradicts itself.
+    #[error(transparent)]
+    Section(#[from] crate::geometry::section::SectionShapeError),
     /// An indenter out of range.
     #[error(transparent)]
     Indenter(#[from] crate::indenter::IndenterError),

@@ -2,8 +2,10 @@
 
 use super::error::{SceneError, is_length, require};
 use crate::geometry::fingertip::FingertipShape;
+use crate::geometry::section::SectionShape;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::{Density, Order};
+use crate::mesh::section::Extent;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -21,6 +23,21 @@ pub enum Geometry {
         /// Dimensions that differ from the default.
         #[serde(default)]
         shape: FingertipShape,
+    },
+    /// The fingertip's cross-section, for the effect `plane_strain`. Forces and
+    /// energies are per mm of length.
+    Section {
+        /// Mesh density.
+        density: Density,
+        /// Element order: `Quad4` or `Quad9`.
+        #[serde(default = "quadratic")]
+        order: Order,
+        /// Half of it, for symmetric presses, or the whole.
+        #[serde(default)]
+        extent: Extent,
+        /// Dimensions that differ from the default.
+        #[serde(default)]
+        shape: SectionShape,
     },
     /// A block in layers, pressed from below (`z_min`) and held on top (`z_max`).
     Block {
@@ -46,6 +63,10 @@ pub enum Geometry {
     },
 }
 
+fn quadratic() -> Order {
+    Order::Quadratic
+}
+
 /// One layer of a block.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -63,6 +84,9 @@ const ELEMENTS_MAX: usize = 1000;
 
 impl Geometry {
     pub(super) fn validate(&self) -> Result<(), SceneError> {
+        if let Self::Section { shape, .. } = self {
+            shape.validate()?;
+        }
         let Self::Block { size_mm, elements, layers, .. } = self else { return Ok(()) };
         require(
             size_mm.iter().all(|&v| is_length(v)),

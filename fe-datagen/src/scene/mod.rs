@@ -90,6 +90,12 @@ impl Scene {
             let twice = self.effects[..i].contains(e);
             require(!twice, "effects", &e.as_str(), "is named twice")?;
         }
+        if matches!(self.geometry, Geometry::Section { .. }) && !self.has("plane_strain") {
+            return Err(SceneError::Fields {
+                field: "effects",
+                rule: "geometry.kind = \"section\" is plane: name the effect \"plane_strain\"",
+            });
+        }
         self.materials.validate()?;
         self.plan().map(drop)
     }
@@ -134,6 +140,8 @@ mod tests {
     #[test]
     fn bad_scenes_name_the_field_and_the_cure() {
         let with = |effects: &str| format!("effects = {effects}\n{FINGER}");
+        let section =
+            |e: &str| with(&format!("[\"layers\", \"{e}\"]")).replace("fingertip", "section");
         let cases = [
             (FINGER.replace("depth_mm = 1.0", "depth_mm = -1.0"), "motion.depth_mm"),
             (FINGER.replace("depth_mm = 1.0", ""), "exactly one of depth_mm"),
@@ -144,6 +152,13 @@ mod tests {
             (with("[\"hyperelastic\"]"), "needs 'finite_strain'"),
             (with("[\"viscoelastic\"]"), "motion.path"),
             (with("[\"plane_strain\"]"), "section"),
+            (section("finite_strain"), "name the effect"),
+            (section("plane_strain\", \"nail") + "pitch_deg = 3.0\n", "extent = \"whole\""),
+            (section("plane_strain") + "yaw_deg = 3.0\n", "motion.roll_deg, yaw_deg"),
+            (
+                section("plane_strain") + "[geometry.shape]\ndermis_mm = -1.0\n",
+                "geometry.shape.dermis_mm = -1 mm",
+            ),
             (with("[\"friction\"]"), "friction.coefficient"),
             (with("[\"layers\", \"layers\"]"), "twice"),
             (
