@@ -15,6 +15,7 @@ pub mod material;
 pub mod mesh;
 pub mod output;
 pub mod press;
+pub mod s2;
 pub mod scene;
 pub mod solve;
 pub mod verify;

@@ -169,6 +169,7 @@ impl CampaignSpec {
             friction: self.friction,
             effects: self.effects.clone(),
             folder: self.folder.clone(),
+            origin: Origin::default(),
         }
     }
 

@@ -8,7 +8,8 @@ use crate::export::{ElementTypes, MaterialCard, RigidIndenter, RigidShape};
 use crate::geometry::section::SectionShape;
 use crate::indenter::{Placement, RoundedPlate};
 use crate::mesh::fingertip::Density;
-use crate::mesh::section::{SectionParts, build};
+use crate::mesh::fingertip::Parts;
+use crate::mesh::section::{Extent, build};
 use crate::mesh::Tissue;
 use crate::scene::TissueTable;
 use crate::scene::effects::{Law, Plan};
@@ -42,7 +43,7 @@ fn pressing<'a>(
 ) -> Result<Pressing<'a>, CaseError> {
     let density = if context.quick { Density::Coarse } else { Density::Medium };
     let shape = SectionShape::default();
-    let section = build(&shape, SectionParts::default(), density, kind)?;
+    let section = build(&shape, Parts::default(), density, kind, Extent::Half)?;
     let fixed = section.fixed();
     // Its own +z presses towards +y, from the pad's lowest point.
     let start = Placement {
