@@ -34,10 +34,10 @@ fn a_scene_becomes_a_whole_deck() {
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let deck = std::fs::read_to_string(&out).unwrap();
     assert_eq!(data(&deck, "*NODE, NSET=NBODY").len(), 25 * 25 * 10);
-    let elements: usize =
-        ["EEPIDERMIS", "EDERMIS", "ESUBCUTANEOUS"].iter().map(|set| {
-            data(&deck, &format!("*ELEMENT, TYPE=C3D8, ELSET={set}")).len()
-        }).sum();
+    let elements: usize = ["EEPIDERMIS", "EDERMIS", "ESUBCUTANEOUS"]
+        .iter()
+        .map(|set| data(&deck, &format!("*ELEMENT, TYPE=C3D8, ELSET={set}")).len())
+        .sum();
     assert_eq!(elements, 24 * 24 * 9);
     assert_eq!(data(&deck, "*SURFACE, NAME=TOUCHED").len(), 24 * 24);
     assert!(data(&deck, "*SURFACE, NAME=TOUCHED")[0].ends_with(",S1"), "bricks' lower faces");

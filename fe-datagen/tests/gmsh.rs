@@ -169,11 +169,9 @@ fn what_is_not_plane_strain_is_refused() {
     // The surface elements of a body whose volumes were not meshed.
     let ball = text("ball_tet4.msh").replace("3 1 \"subcutaneous\"", "2 1 \"dermis\"");
     let start = ball.find("$Elements").unwrap();
-    let triangle = format!("{}$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n", &ball[..start]);
-    assert!(matches!(
-        read(&triangle),
-        Err(E::UnsupportedPlanarElement { element_type: 2, .. })
-    ));
+    let triangle =
+        format!("{}$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n", &ball[..start]);
+    assert!(matches!(read(&triangle), Err(E::UnsupportedPlanarElement { element_type: 2, .. })));
 }
 
 #[test]

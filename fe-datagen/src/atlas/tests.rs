@@ -323,7 +323,8 @@ fn the_report_compares_all_methods() {
 #[test]
 fn the_fingertip_flattens_at_every_density() {
     for density in [Density::Coarse, Density::Medium, Density::Fine] {
-        let finger = build(&FingertipShape::default(), density, Order::Linear, Parts::default()).unwrap();
+        let finger =
+            build(&FingertipShape::default(), density, Order::Linear, Parts::default()).unwrap();
         let at = |nodes: &[u32]| nodes.iter().map(|&n| finger.mesh.nodes[n as usize]).collect();
         let (skin, interface): (Vec<_>, Vec<_>) =
             (at(&finger.patch.skin), at(&finger.patch.interface));

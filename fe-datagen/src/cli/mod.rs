@@ -2,6 +2,7 @@
 
 mod atlas;
 mod dataset;
+mod effects;
 mod generate;
 mod lines;
 mod s2;
@@ -33,6 +34,7 @@ enum Command {
     Atlas(atlas::Args),
     Verify(verify::Args),
     S2(s2::Args),
+    Effects(effects::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -43,6 +45,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::S2(args) => s2::run(&args),
     };

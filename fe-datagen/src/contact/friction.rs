@@ -55,7 +55,12 @@ impl NodeFriction {
     /// Friction of a node at `relative_mm` (position less the indenter's
     /// displacement); `None` where nothing presses.
     #[must_use]
-    pub fn new(node: &FrictionNode, relative_mm: [f64; 3], area: f64, penalty: f64) -> Option<Self> {
+    pub fn new(
+        node: &FrictionNode,
+        relative_mm: [f64; 3],
+        area: f64,
+        penalty: f64,
+    ) -> Option<Self> {
         let s = node.bound_mpa;
         if !(s > 0.0) {
             return None;

@@ -87,8 +87,7 @@ pub fn evaluate<P: Points>(
             return Err(Inverted { point: q, j: k.j() });
         }
         j_min = j_min.min(k.j());
-        let (growth, by_h) =
-            if P::At::FINITE { (k.j_minus_1, k.cof) } else { (trace(&k.h), UNIT) };
+        let (growth, by_h) = if P::At::FINITE { (k.j_minus_1, k.cof) } else { (trace(&k.h), UNIT) };
         for r in 0..m {
             let weight = geometry.weights[q] * geometry.basis[q][r];
             b[r] += weight * growth;

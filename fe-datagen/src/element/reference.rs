@@ -335,7 +335,8 @@ mod tests {
             let xi = [0.13, 0.21, 0.32];
             kind.shape(xi, &mut v, &mut g);
             for i in 0..3 {
-                let at = |s: f64| std::array::from_fn(|k| if k == i { xi[k] + s * h } else { xi[k] });
+                let at =
+                    |s: f64| std::array::from_fn(|k| if k == i { xi[k] + s * h } else { xi[k] });
                 kind.shape(at(1.0), &mut plus, &mut unused);
                 kind.shape(at(-1.0), &mut minus, &mut unused);
                 for a in 0..n {
@@ -359,7 +360,8 @@ mod tests {
                 if kind.order() == 1 {
                     linear
                 } else {
-                    linear + x[0] * x[0] - x[1] * x[1] + 2.0 * x[2] * x[2] + x[0] * x[1] - x[1] * x[2]
+                    linear + x[0] * x[0] - x[1] * x[1] + 2.0 * x[2] * x[2] + x[0] * x[1]
+                        - x[1] * x[2]
                 }
             };
             let found: f64 = (0..n).map(|a| v[a] * field(kind.node_xi(a))).sum();

@@ -52,8 +52,7 @@ pub(super) fn serendipity(
         let corner = at[..d].iter().all(|c| *c != 0);
         let mut factor = [(1.0, 0.0); 3];
         for i in 0..d {
-            factor[i] =
-                if at[i] == 0 { quadratic_1d(0, xi[i]) } else { linear_1d(at[i], xi[i]) };
+            factor[i] = if at[i] == 0 { quadratic_1d(0, xi[i]) } else { linear_1d(at[i], xi[i]) };
         }
         let product = factor[0].0 * factor[1].0 * factor[2].0;
         let slope: [f64; 3] = std::array::from_fn(|i| {

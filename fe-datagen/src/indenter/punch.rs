@@ -40,8 +40,7 @@ impl Punch {
 impl SignedDistance for Punch {
     fn distance(&self, p: [f64; 3]) -> Distance {
         let half = 0.5 * self.height_mm;
-        let section =
-            Rectangle { half_mm: [self.radius_mm, half], radius_mm: self.rim_radius_mm };
+        let section = Rectangle { half_mm: [self.radius_mm, half], radius_mm: self.rim_radius_mm };
         revolve(p, 2, |[r, z]| section.distance([r, z + half]))
     }
 

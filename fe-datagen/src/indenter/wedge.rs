@@ -90,8 +90,7 @@ impl Inner {
         let out = nx * (x - a[0]) + nz * up;
         let along = nz * (x - a[0]) - nx * up;
         let length = nz * (b[0] - a[0]) - nx * (b[1] - a[1]);
-        let flat =
-            |gap_mm, normal| Flat { gap_mm, normal, curvature_per_mm: 0.0 };
+        let flat = |gap_mm, normal| Flat { gap_mm, normal, curvature_per_mm: 0.0 };
         if up <= 0.0 && down <= 0.0 && out <= 0.0 {
             return if up >= out && up >= down {
                 flat(up, [0.0, 1.0])
@@ -134,12 +133,10 @@ impl SignedDistance for Wedge {
         let end = [0.0, side(p[1]), 0.0];
         if d > 0.0 && q > 0.0 {
             let length = d.hypot(q);
-            let normal: [f64; 3] =
-                std::array::from_fn(|i| (d * section[i] + q * end[i]) / length);
+            let normal: [f64; 3] = std::array::from_fn(|i| (d * section[i] + q * end[i]) / length);
             let hessian = std::array::from_fn(|i| {
                 std::array::from_fn(|j| {
-                    let dyads = section[i] * section[j] + end[i] * end[j]
-                        - normal[i] * normal[j]
+                    let dyads = section[i] * section[j] + end[i] * end[j] - normal[i] * normal[j]
                         + d * bend * tangent[i] * tangent[j];
                     dyads / length
                 })

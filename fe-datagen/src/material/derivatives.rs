@@ -19,12 +19,8 @@ fn check<M: Isochoric>(m: &M, h: Mat3) {
     let d = 1e-5 * k0.j().min(1.0);
     let p = m.first_piola(&k0);
     let a = m.tangent(&k0);
-    let scale = a
-        .as_flattened()
-        .as_flattened()
-        .as_flattened()
-        .iter()
-        .fold(0.0f64, |s, x| s.max(x.abs()));
+    let scale =
+        a.as_flattened().as_flattened().as_flattened().iter().fold(0.0f64, |s, x| s.max(x.abs()));
     for k in 0..3 {
         for l in 0..3 {
             let (plus, minus) = (perturbed(&h, k, l, d), perturbed(&h, k, l, -d));
@@ -61,10 +57,8 @@ fn fat() -> Ogden {
 }
 
 fn relaxing<L: Isochoric>(law: L) -> Relaxing<L> {
-    let series = Prony::new(&[
-        PronyTerm { share: 0.3, time_s: 0.5 },
-        PronyTerm { share: 0.2, time_s: 5.0 },
-    ]);
+    let series =
+        Prony::new(&[PronyTerm { share: 0.3, time_s: 0.5 }, PronyTerm { share: 0.2, time_s: 5.0 }]);
     let mut history = vec![0.0; series.history_len()];
     let before = Kinematics::new([[0.1, 0.05, 0.0], [-0.02, -0.1, 0.03], [0.0, 0.1, 0.05]]);
     prony::advance(&law, &series, &before, 0.2, &mut history);

@@ -159,9 +159,7 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
             }
             b
         };
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| self.scale * elastic[i][j] + memory[i][j])
-        })
+        std::array::from_fn(|i| std::array::from_fn(|j| self.scale * elastic[i][j] + memory[i][j]))
     }
 
     fn tangent(&self, k: &Kinematics) -> Tensor4 {
@@ -254,17 +252,15 @@ fn branch_energies<L: Isochoric>(
     k: &Kinematics,
     history: &[f64],
 ) -> [f64; TERMS_MAX] {
-    let metric = if L::FINITE { isochoric_cauchy_green(k) } else { full(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) };
+    let metric =
+        if L::FINITE { isochoric_cauchy_green(k) } else { full(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) };
     let square = |s: &Mat3| {
         let m = product(s, &metric);
         double_dot(&m, &std::array::from_fn(|i| std::array::from_fn(|j| m[j][i])))
     };
     let stress = square(&instantaneous(law, k));
-    let compliance = if stress > 0.0 {
-        law.energy(k) / stress
-    } else {
-        0.25 / law.shear_modulus_mpa()
-    };
+    let compliance =
+        if stress > 0.0 { law.energy(k) / stress } else { 0.25 / law.shear_modulus_mpa() };
     let mut energy = [0.0; TERMS_MAX];
     for ((e, t), q) in energy.iter_mut().zip(prony.terms()).zip(history[6..].chunks_exact(6)) {
         if t.share > 0.0 {
@@ -298,10 +294,7 @@ mod tests {
     const LAW: NeoHookean = NeoHookean { mu_mpa: 0.02 };
 
     fn series() -> Prony {
-        Prony::new(&[
-            PronyTerm { share: 0.3, time_s: 0.4 },
-            PronyTerm { share: 0.2, time_s: 5.0 },
-        ])
+        Prony::new(&[PronyTerm { share: 0.3, time_s: 0.4 }, PronyTerm { share: 0.2, time_s: 5.0 }])
     }
 
     fn shear(g: f64) -> Kinematics {
@@ -319,11 +312,15 @@ mod tests {
         for dt in [1e-6, 0.1, 0.3, 2.0, 7.0, 1e6] {
             let stress = Relaxing::new(LAW, &prony, &history, dt).first_piola(&k)[0][1];
             time += dt;
-            let expected = first * (0.5 + 0.3 * (-time / 0.4f64).exp() + 0.2 * (-time / 5.0f64).exp());
+            let expected =
+                first * (0.5 + 0.3 * (-time / 0.4f64).exp() + 0.2 * (-time / 5.0f64).exp());
             assert!((stress - expected).abs() < 1e-13 * first, "t = {time}");
             advance(&LAW, &prony, &k, dt, &mut history);
         }
-        assert!((stored(&LAW, &prony, &k, &history) - 0.5 * LAW.energy(&k)).abs() < 1e-12 * LAW.energy(&k));
+        assert!(
+            (stored(&LAW, &prony, &k, &history) - 0.5 * LAW.energy(&k)).abs()
+                < 1e-12 * LAW.energy(&k)
+        );
     }
 
     #[test]

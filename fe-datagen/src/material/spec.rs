@@ -149,7 +149,11 @@ impl PronySpec {
     /// Chen, Shuai & Zhu, Table 2, second set.
     #[must_use]
     pub fn skin() -> Self {
-        Self { share: vec![0.2566, 0.2225], time_s: vec![0.3834, 4.6731], moduli: Moduli::default() }
+        Self {
+            share: vec![0.2566, 0.2225],
+            time_s: vec![0.3834, 4.6731],
+            moduli: Moduli::default(),
+        }
     }
 
     /// Chen, Shuai & Zhu, Table 2, first set. `tau_1 = .2136` repeats `g_2` digit for

@@ -14,7 +14,7 @@ use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use serde::{Deserialize, Serialize};
 
 /// Named mesh densities.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Density {
     /// About 10 thousand unknowns: for tests and a first look.

@@ -49,10 +49,9 @@ pub(super) fn attach(
         }
     }
     // Layer INTERVALS is the skin itself.
-    let node =
-        |layer: usize, s: u32| {
-            if layer == INTERVALS { s } else { first + layer as u32 * n + local[&s] }
-        };
+    let node = |layer: usize, s: u32| {
+        if layer == INTERVALS { s } else { first + layer as u32 * n + local[&s] }
+    };
     let plate = Cells { cells: &covered, step };
     let mut outside = Cells { cells: &bare, step }.faces(|s| s);
     outside.connectivity.extend(plate.faces(|s| node(0, s)).connectivity);

@@ -166,12 +166,7 @@ fn boxes(mesh: &Mesh) -> Vec<Box3> {
 
 /// Reference coordinates of `p` in an element, by Newton's method from its
 /// middle; `None` if the element does not hold it.
-fn inverse_map(
-    mesh: &Mesh,
-    kind: ElementKind,
-    nodes: &[u32],
-    p: [f64; 3],
-) -> Option<[f64; 3]> {
+fn inverse_map(mesh: &Mesh, kind: ElementKind, nodes: &[u32], p: [f64; 3]) -> Option<[f64; 3]> {
     let n = kind.nodes();
     let (mut value, mut gradient) = (vec![0.0; n], vec![[0.0; 3]; n]);
     let simplex = kind.lattice().is_empty();
@@ -232,7 +227,9 @@ mod tests {
         let layers =
             [Tissue::Subcutaneous, Tissue::Subcutaneous, Tissue::Dermis, Tissue::Epidermis];
         let lattice = BlockLattice { axes: [axis(), axis(), third], layers: layers.into(), kind };
-        build(&lattice, |[x, y, z]| [x + 0.15 * (3.0 * y).sin(), y + 0.1 * x * x, z + 0.1 * x * y * z])
+        build(&lattice, |[x, y, z]| {
+            [x + 0.15 * (3.0 * y).sin(), y + 0.1 * x * x, z + 0.1 * x * y * z]
+        })
     }
 
     proptest! {

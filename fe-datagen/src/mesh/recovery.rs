@@ -46,7 +46,9 @@ impl SedRecovery {
         let owner = element_on_side(mesh, tissue);
         let mut by_node: HashMap<u32, Vec<(usize, f64)>> = HashMap::new();
         let mut samples = Vec::new();
-        for (face, corners, area) in mesh.surfaces.get(surface).into_iter().flat_map(|s| faces(mesh, s)) {
+        for (face, corners, area) in
+            mesh.surfaces.get(surface).into_iter().flat_map(|s| faces(mesh, s))
+        {
             let Some(&(block, element, side)) = owner.get(&sorted(&face[..corners])) else {
                 continue;
             };
@@ -95,8 +97,7 @@ impl SedRecovery {
     /// # Errors
     /// [`Inverted`] if an element that is sampled has turned inside out.
     pub fn sed_mpa(&self, body: &Deformed<'_>) -> Result<Vec<f64>, Inverted> {
-        let values =
-            self.samples.iter().map(|s| s.sed_mpa(body)).collect::<Result<Vec<_>, _>>()?;
+        let values = self.samples.iter().map(|s| s.sed_mpa(body)).collect::<Result<Vec<_>, _>>()?;
         Ok(self.average(&values))
     }
 }
@@ -155,8 +156,9 @@ mod tests {
         ElementKind::Quad9,
     ];
 
-    fn material(mu_mpa: f64) -> Arc<dyn Solid> {
-        Elastic::shared(NeoHookean { mu_mpa }, 10.0 * mu_mpa)
+    /// Poisson's ratio 0.45.
+    fn material(e_mpa: f64) -> Arc<dyn Solid> {
+        Elastic::shared(NeoHookean { mu_mpa: e_mpa / 2.9 }, e_mpa / 0.3)
     }
 
     /// A unit cube or square of two layers, the interface half way, edges curved.

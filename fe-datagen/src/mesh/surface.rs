@@ -165,8 +165,7 @@ pub fn side_nodes(element: ElementKind, side: usize) -> Vec<usize> {
     // Middles are the nodes of the element at the mean of some corners.
     let mut push = |of: &[usize]| {
         let n = of.len() as f64;
-        let mean: [f64; 3] =
-            std::array::from_fn(|i| of.iter().map(|&c| at(c)[i]).sum::<f64>() / n);
+        let mean: [f64; 3] = std::array::from_fn(|i| of.iter().map(|&c| at(c)[i]).sum::<f64>() / n);
         let is_there = |&a: &usize| (0..3).all(|i| (at(a)[i] - mean[i]).abs() < 1e-9);
         nodes.extend((0..element.nodes()).find(is_there));
     };

@@ -8,6 +8,7 @@ pub mod canvas;
 mod error;
 pub mod map_image;
 pub mod npz;
+pub mod plot;
 pub mod vtu;
 
 pub use error::OutputError;

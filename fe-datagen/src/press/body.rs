@@ -2,20 +2,17 @@
 
 use super::record::{Checks, IncrementRecord, Pose};
 use crate::atlas::{AtlasReport, BuildAtlasError, build_atlas};
-use crate::element::{ElementKind, Inverted};
+use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
-use crate::geometry::section::SectionShape;
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::sample::Deformed;
-use crate::mesh::section::{Extent, SectionMeshError};
+use crate::mesh::section::SectionMeshError;
 use crate::mesh::surface::norm;
-use crate::mesh::{self, Mesh, Tissue};
+use crate::mesh::{Mesh, Tissue};
 use crate::scene::{SceneError, TissueError};
-use crate::solve::{
-    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
-};
+use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
 use papilla_proto::atlas::Atlas;
 use std::path::PathBuf;
 
@@ -69,6 +66,9 @@ pub enum PressError {
     /// Depths, forces and times must be positive and rising.
     #[error("depths, forces and times must be positive, finite and rising; found {0} after {1}")]
     Rising(f64, f64),
+    /// Nothing was stored.
+    #[error("the motion has no state to store")]
+    Empty,
     /// A prescribed force was not reached.
     #[error("the force of {wanted_n} N was not reached: {reached_n:.4} N after 6 mm or 60 tries")]
     Force {
@@ -103,22 +103,16 @@ pub struct PressedPatch {
     epidermis: SedRecovery,
 }
 
-/// A cross-section and how it is meshed.
-#[derive(Clone, Copy, Debug)]
-pub struct SectionSpec<'a> {
-    /// Dimensions.
-    pub shape: &'a SectionShape,
-    /// Mesh density.
-    pub density: Density,
-    /// Element order.
-    pub order: Order,
-    /// Half or whole.
-    pub extent: Extent,
-}
-
 impl Body {
-    /// Meshes a fingertip with its bone, its nail plate and the axial
-    /// displacement of its base held.
+    /// Meshes a fingertip and holds what carries it.
+    ///
+    /// Always the axial displacement of the soft tissue's base, which goes on as
+    /// the rest of the finger. A rigid bone is held as a whole. An elastic one is
+    /// clamped where the base plane cuts it, because there the joint carries it; its
+    /// marrow cavity is free: marrow and cancellous bone are softer than the cortex
+    /// by a factor of ten and more, and to hold the cavity's wall would leave but
+    /// 0.75 mm of cortex to deform on a rigid core. The skin under a rigid nail is
+    /// held; an elastic nail is carried by that skin alone.
     ///
     /// # Errors
     /// See [`PressError`].
@@ -131,37 +125,19 @@ impl Body {
     ) -> Result<Self, PressError> {
         let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
-        for &n in mesh.node_sets["bone"].iter().chain(&mesh.node_sets["nail"]) {
-            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
-        }
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
+        }
+        let bone = if parts.bone { "bone_base" } else { "bone" };
+        let nail = (!parts.nail).then_some("nail");
+        for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
+            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
         Self::with_patch(mesh, materials, fixed, patch, false)
     }
 
-    /// Meshes a cross-section of the fingertip, with its supports.
-    ///
-    /// # Errors
-    /// See [`PressError`].
-    pub fn section(
-        spec: &SectionSpec<'_>,
-        materials: Materials,
-        parts: Parts,
-    ) -> Result<Self, PressError> {
-        let kind = match spec.order {
-            Order::Linear => ElementKind::Quad4,
-            Order::Quadratic => ElementKind::Quad9,
-        };
-        let section = mesh::section::build(spec.shape, parts, spec.density, kind, spec.extent)?;
-        let (fixed, mesh) = (section.fixed(), section.mesh);
-        let [skin, interface] = ["skin", "interface"].map(|name| mesh.surfaces[name].walk());
-        let patch = Patch { skin, interface, triangles: Vec::new() };
-        Self::with_patch(mesh, materials, fixed, patch, true)
-    }
-
     /// A body with layers, of which pressure and SED are read at vertices.
-    fn with_patch(
+    pub(super) fn with_patch(
         mesh: Mesh,
         materials: Materials,
         fixed: Vec<bool>,
@@ -257,7 +233,7 @@ impl Body {
     }
 
     /// Vertex values and checks of the solver's equilibrium.
-    pub(super) fn record(
+    pub(crate) fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,
@@ -272,9 +248,11 @@ impl Body {
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
-        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa) = Default::default();
+        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
+            Default::default();
         if let Some(p) = &self.patch {
             pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            shear_mpa = self.shear_mpa(solver, &p.patch.skin);
             let history = |block, element| solver.history_of(block, element);
             let body = self.deformed(solver, &history);
             sed_dermis_mpa = p.dermis.sed_mpa(&body)?;
@@ -287,6 +265,8 @@ impl Body {
             pressure_mpa,
             sed_dermis_mpa,
             sed_epidermis_mpa,
+            shear_mpa,
+            outside_calibration: self.outside_calibration(solver),
             checks: Checks {
                 residual_relative: report.residual_relative,
                 contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),

@@ -86,7 +86,11 @@ impl Body {
     ///
     /// # Errors
     /// [`PressError::Indenter`] if it never touches.
-    pub fn indenter(&self, approach: &Approach, drive: &Drive) -> Result<MovingIndenter, PressError> {
+    pub fn indenter(
+        &self,
+        approach: &Approach,
+        drive: &Drive,
+    ) -> Result<MovingIndenter, PressError> {
         let rotation = self.rotation(approach.pose);
         let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
         let (x, y, normal) = (axis(0), axis(1), axis(2));
@@ -240,7 +244,8 @@ impl Body {
                     solver.restore(&mark);
                     high = Some((next, force));
                 } else {
-                    step = (next - low.0) * ((wanted - force) / (force - low.1).max(1e-300)).clamp(0.2, 1.5);
+                    step = (next - low.0)
+                        * ((wanted - force) / (force - low.1).max(1e-300)).clamp(0.2, 1.5);
                     low = (next, force);
                     if next >= 1.0 {
                         break;

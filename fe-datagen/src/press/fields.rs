@@ -24,7 +24,8 @@ impl ElementFields {
         let mut fields =
             Self { sed_j_per_m3: Vec::new(), volume_ratio: Vec::new(), layer: Vec::new() };
         let (problem, u) = (&body.problem, solver.displacement_mm());
-        for (b, (block, geometry)) in problem.mesh.blocks.iter().zip(&problem.geometry).enumerate() {
+        for (b, (block, geometry)) in problem.mesh.blocks.iter().zip(&problem.geometry).enumerate()
+        {
             let n = block.kind.nodes();
             let mut force = vec![[0.0; 3]; n];
             for e in 0..block.len() {

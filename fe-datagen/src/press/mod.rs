@@ -5,4 +5,10 @@ pub mod drive;
 pub mod fields;
 pub mod laws;
 pub mod record;
+pub mod section;
 pub mod setup;
+mod skin;
+pub mod study;
+
+#[cfg(test)]
+mod tests;

@@ -162,11 +162,15 @@ mod tests {
             (with("[\"friction\"]"), "friction.coefficient"),
             (with("[\"layers\", \"layers\"]"), "twice"),
             (
-                format!("{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"),
+                format!(
+                    "{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"
+                ),
                 "materials.dermis: Poisson's ratio 0.5",
             ),
             (
-                format!("{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 8e7\npoissons_ratio = 0.4\n"),
+                format!(
+                    "{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 8e7\npoissons_ratio = 0.4\n"
+                ),
                 "was Pa meant",
             ),
         ];

@@ -188,8 +188,7 @@ fn add_friction(
 ) -> f64 {
     let Some(surface) = &problem.contact else { return 0.0 };
     let mut square = 0.0;
-    for ((&node, &area), state) in
-        surface.nodes.iter().zip(&surface.area_mm2).zip(&friction.nodes)
+    for ((&node, &area), state) in surface.nodes.iter().zip(&surface.area_mm2).zip(&friction.nodes)
     {
         let n = node as usize;
         let relative =

@@ -19,11 +19,7 @@ pub struct MovingIndenter {
 impl MovingIndenter {
     /// An indenter that moves straight by `travel_mm` over the whole load.
     #[must_use]
-    pub fn straight(
-        shape: Arc<dyn SignedDistance>,
-        start: Placement,
-        travel_mm: [f64; 3],
-    ) -> Self {
+    pub fn straight(shape: Arc<dyn SignedDistance>, start: Placement, travel_mm: [f64; 3]) -> Self {
         Self { shape, start, path: vec![(1.0, travel_mm)] }
     }
 

@@ -187,7 +187,8 @@ impl<'a> Newton<'a> {
         wanted.min(first).max(enough).min(0.3)
     }
 
-    /// A force typical of the body: stiffest shear modulus times its extent squared.
+    /// A force typical of the body: its soft tissue's shear modulus times its extent
+    /// squared.
     fn force_scale_n(&self) -> f64 {
         let mut low = [f64::INFINITY; 3];
         let mut high = [f64::NEG_INFINITY; 3];
@@ -198,15 +199,11 @@ impl<'a> Newton<'a> {
             }
         }
         let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        self.problem.stiffest_mpa(|_| true) * extent * extent
+        self.problem.soft_mpa() * extent * extent
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
-    pub(super) fn evaluate(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &[[f64; 3]],
-    ) -> Result<(), StepError> {
+    pub(super) fn evaluate(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
         let clock = Instant::now();
         let trial = fixed.trial(u, self.penalty);
         let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
@@ -214,11 +211,7 @@ impl<'a> Newton<'a> {
         result
     }
 
-    fn assemble(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &[[f64; 3]],
-    ) -> Result<(), StepError> {
+    fn assemble(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
         let clock = Instant::now();
         let trial = fixed.trial(u, self.penalty);
         let tangent = Some(&mut self.tangent);
@@ -281,11 +274,7 @@ impl<'a> Newton<'a> {
     }
 
     /// Backtracks along `step` until potential or residual falls.
-    fn line_search(
-        &mut self,
-        fixed: Fixed<'_>,
-        u: &mut [[f64; 3]],
-    ) -> Result<(), StepError> {
+    fn line_search(&mut self, fixed: Fixed<'_>, u: &mut [[f64; 3]]) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
         // can point uphill.
         let mut slope: f64 = -crate::linear::dot(&self.right, &self.step);

@@ -1,7 +1,7 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
-use crate::contact::ContactSurface;
 use super::memory::MemoryLayout;
+use crate::contact::ContactSurface;
 use crate::element::{BlockGeometry, ShapeError, Solid};
 use crate::linear::{Structure, StructureError};
 use crate::mesh::{Mesh, Tissue};
@@ -114,17 +114,24 @@ impl Problem {
         const FACTOR: f64 = 200.0;
         let Some(contact) = &self.contact else { return 1.0 };
         let mean_area = contact.area_mm2.iter().sum::<f64>() / contact.area_mm2.len().max(1) as f64;
-        let mu = self.stiffest_mpa(|t| t != Tissue::Nail && t != Tissue::Bone);
-        FACTOR * mu / mean_area.sqrt()
+        FACTOR * self.soft_mpa() / mean_area.sqrt()
     }
 
-    /// Largest shear modulus of the tissues that the mesh has and `wanted` names, MPa.
-    pub(super) fn stiffest_mpa(&self, wanted: impl Fn(Tissue) -> bool) -> f64 {
-        let used = |t: Tissue| self.mesh.blocks.iter().any(|b| b.tissue.contains(&t));
-        Tissue::ALL
+    /// Largest shear modulus of the mesh's soft tissues, MPa; of its bone and nail
+    /// if it has nothing else. What an indenter meets is measured by it: beside
+    /// soft tissue, bone is 5e5 times stiffer and as good as held.
+    pub(super) fn soft_mpa(&self) -> f64 {
+        let used = |t: &Tissue| self.mesh.blocks.iter().any(|b| b.tissue.contains(t));
+        let (hard, soft): (Vec<_>, Vec<_>) = Tissue::ALL
             .into_iter()
-            .filter(|&t| wanted(t) && used(t))
-            .map(|t| self.materials[t.index()].shear_modulus_mpa())
-            .fold(0.0, f64::max)
+            .filter(used)
+            .partition(|&t| t == Tissue::Nail || t == Tissue::Bone);
+        let of = |tissues: &[Tissue]| {
+            tissues
+                .iter()
+                .map(|t| self.materials[t.index()].shear_modulus_mpa())
+                .fold(0.0, f64::max)
+        };
+        if soft.is_empty() { of(&hard) } else { of(&soft) }
     }
 }

@@ -39,8 +39,7 @@ pub(super) fn update(friction: &mut FrictionTrial, found: &Evaluation) {
 /// over the largest bound.
 pub(super) fn change(friction: &FrictionTrial, found: &Evaluation) -> f64 {
     let (mut worst, mut scale) = (0.0f64, 0.0f64);
-    for ((node, t), pressure) in
-        friction.nodes.iter().zip(&found.friction).zip(&found.traction_mpa)
+    for ((node, t), pressure) in friction.nodes.iter().zip(&found.friction).zip(&found.traction_mpa)
     {
         let bound = friction.coefficient * pressure;
         let moved = norm(std::array::from_fn(|i| t[i] - node.traction_mpa[i]));

@@ -315,8 +315,7 @@ impl<'a> Solver<'a> {
             rubbing::bound(problem, &self.loading, fraction, u, multipliers, friction);
         };
         bound(trial);
-        let updates =
-            if rubs { options.friction_updates_max } else { options.augmentations_max };
+        let updates = if rubs { options.friction_updates_max } else { options.augmentations_max };
         // The first equilibrium only serves to update the multipliers.
         let mut tolerance = 1e-3f64.max(options.residual_tolerance);
         for update in 0..=updates {
@@ -347,10 +346,7 @@ impl<'a> Solver<'a> {
                 self.newton.effort.augmentations += 1;
             }
         }
-        Err(StepError::Contact {
-            augmentations: updates,
-            gap_mm: self.newton.current.gap_error_mm,
-        })
+        Err(StepError::Contact { augmentations: updates, gap_mm: self.newton.current.gap_error_mm })
     }
 
     /// Work of the indenter so far, mJ.

@@ -2,12 +2,12 @@
 
 use super::bodies::{cube, hold_boundary, prescribe, solve, tight, uniform};
 use super::{CaseError, Check, Context};
-use crate::element::{ElementKind, Memory, Solid};
 use crate::element::geometry::jacobian;
 use crate::element::kernel::displacement_gradient;
 use crate::element::reference::GAUSS_3;
-use crate::material::kinematics::Mat3;
+use crate::element::{ElementKind, Memory, Solid};
 use crate::material::Kinematics;
+use crate::material::kinematics::Mat3;
 use crate::mesh::Mesh;
 use crate::solve::{Loading, Problem};
 
@@ -28,7 +28,9 @@ impl Solution {
     }
 
     fn displacement(self, x: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| if i < self.0 { AMPLITUDE_MM * self.phase(x, i).sin() } else { 0.0 })
+        std::array::from_fn(
+            |i| if i < self.0 { AMPLITUDE_MM * self.phase(x, i).sin() } else { 0.0 },
+        )
     }
 
     fn gradient(self, x: [f64; 3]) -> Mat3 {

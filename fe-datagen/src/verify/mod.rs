@@ -6,14 +6,19 @@
 pub(crate) mod bodies;
 mod check;
 mod cook;
+mod coulomb;
 mod disc;
 mod finger;
 mod hertz;
+mod increments;
 mod locking;
 mod manufactured;
 mod mirror;
+mod ogden;
 mod patch;
+mod relaxation;
 mod report;
+mod solid_parts;
 mod tangent;
 mod uniaxial;
 
@@ -58,6 +63,18 @@ pub const CASES: &[Case] = &[
         run: uniaxial::run,
     },
     Case {
+        name: "ogden",
+        shows: "Both published Ogden laws: one element uniaxially, planar and equibiaxially \
+                strained against the closed form.",
+        run: ogden::run,
+    },
+    Case {
+        name: "relaxation",
+        shows: "Prony series: a confined column relaxes under a held plate and creeps under a \
+                rising load as the closed forms say; energy is stored or dissipated, not lost.",
+        run: relaxation::run,
+    },
+    Case {
         name: "tangent",
         shows: "The assembled tangent is the derivative of the assembled residual, contact with a \
                 curved indenter included, so Newton's method converges as it should.",
@@ -86,6 +103,12 @@ pub const CASES: &[Case] = &[
         run: hertz::run,
     },
     Case {
+        name: "coulomb",
+        shows: "Friction: a block that is dragged slips with Coulomb's force and sticks as if \
+                glued.",
+        run: coulomb::run,
+    },
+    Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
                 against quadratic elements.",
@@ -101,6 +124,17 @@ pub const CASES: &[Case] = &[
         name: "finger",
         shows: "The fingertip behaves as published fingertips do.",
         run: finger::sanity,
+    },
+    Case {
+        name: "increments",
+        shows: "Pressure and SED of an elastic press do not depend on the number of increments.",
+        run: increments::run,
+    },
+    Case {
+        name: "solid-parts",
+        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and bone \
+                carries as a rigid one does.",
+        run: solid_parts::run,
     },
     Case {
         name: "mirror",

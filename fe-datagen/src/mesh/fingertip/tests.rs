@@ -95,12 +95,36 @@ fn hash(finger: &FingertipMesh) -> String {
 fn the_rigid_mesh_is_the_one_that_datasets_were_made_on() {
     // Computed before bone and nail could be solid. A change here orphans every dataset.
     let known = [
-        (Density::Coarse, Order::Linear, "fd9eb3cfc3ca2a94ea2f6f3e683a308cfc497c02f24288ae45734403b6788567"),
-        (Density::Coarse, Order::Quadratic, "15cad6802c422c58227fce2f495c4b4a6ceea0eb2edc22853b482034848e3d7e"),
-        (Density::Medium, Order::Linear, "6fca914ed4ec919491b33c38350219e7d3245822e126ceb71df57227d671a979"),
-        (Density::Medium, Order::Quadratic, "a14a3aede2549f90a9c7cb5435a7eb17259fed38cd58b36b21d331d994294bf9"),
-        (Density::Fine, Order::Linear, "1227071539e245d520371d4a25240730c1080b69f1843bd76015a851ab39eea5"),
-        (Density::Fine, Order::Quadratic, "650522359e56d9db02ed3c1175c7b2669488663918563c32e6bdc2bb92933ffd"),
+        (
+            Density::Coarse,
+            Order::Linear,
+            "fd9eb3cfc3ca2a94ea2f6f3e683a308cfc497c02f24288ae45734403b6788567",
+        ),
+        (
+            Density::Coarse,
+            Order::Quadratic,
+            "15cad6802c422c58227fce2f495c4b4a6ceea0eb2edc22853b482034848e3d7e",
+        ),
+        (
+            Density::Medium,
+            Order::Linear,
+            "6fca914ed4ec919491b33c38350219e7d3245822e126ceb71df57227d671a979",
+        ),
+        (
+            Density::Medium,
+            Order::Quadratic,
+            "a14a3aede2549f90a9c7cb5435a7eb17259fed38cd58b36b21d331d994294bf9",
+        ),
+        (
+            Density::Fine,
+            Order::Linear,
+            "1227071539e245d520371d4a25240730c1080b69f1843bd76015a851ab39eea5",
+        ),
+        (
+            Density::Fine,
+            Order::Quadratic,
+            "650522359e56d9db02ed3c1175c7b2669488663918563c32e6bdc2bb92933ffd",
+        ),
     ];
     for (density, order, due) in known {
         assert_eq!(hash(&finger(density, order, RIGID)), due, "{density:?} {order:?}");
@@ -134,14 +158,8 @@ fn solid_parts_leave_the_soft_tissue_as_it_is() {
 /// Outward faces of the whole solid: those of one element alone, corners
 /// counter-clockwise from outside, turned to start at the least.
 fn boundary(mesh: &Mesh) -> HashSet<[u32; 4]> {
-    const OUTWARD: [[usize; 4]; 6] = [
-        [0, 4, 7, 3],
-        [1, 2, 6, 5],
-        [0, 1, 5, 4],
-        [3, 7, 6, 2],
-        [0, 3, 2, 1],
-        [4, 5, 6, 7],
-    ];
+    const OUTWARD: [[usize; 4]; 6] =
+        [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]];
     let mut faces: HashMap<[u32; 4], Vec<[u32; 4]>> = HashMap::new();
     for block in &mesh.blocks {
         for e in 0..block.len() {
@@ -274,9 +292,8 @@ fn skin_faces_look_outward() {
     let centre = [15.0, 0.0, 0.0];
     let position = |n: u32| finger.mesh.nodes[n as usize];
     skin.integrate(&skin.kind.quadrature(), &position, &mut |face, value, normal| {
-        let x: [f64; 3] = std::array::from_fn(|i| {
-            face.iter().zip(value).map(|(&n, v)| v * position(n)[i]).sum()
-        });
+        let x: [f64; 3] =
+            std::array::from_fn(|i| face.iter().zip(value).map(|(&n, v)| v * position(n)[i]).sum());
         let outward: f64 = (0..3).map(|i| normal[i] * (x[i] - centre[i])).sum();
         assert!(outward > 0.0, "{x:?} {normal:?}");
     });

@@ -181,7 +181,8 @@ impl Builder<'_> {
     /// of the plane has no inside, so its numbering is simply turned.
     fn turns_clockwise(&self, corners: &[u32]) -> bool {
         let x = |i: usize| self.mesh.nodes[corners[i] as usize];
-        let [p, q]: [[f64; 2]; 2] = [(0, 2), (1, 3)].map(|(a, b)| [0, 1].map(|i| x(b)[i] - x(a)[i]));
+        let [p, q]: [[f64; 2]; 2] =
+            [(0, 2), (1, 3)].map(|(a, b)| [0, 1].map(|i| x(b)[i] - x(a)[i]));
         p[0] * q[1] - p[1] * q[0] < 0.0
     }
 

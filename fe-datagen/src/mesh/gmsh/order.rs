@@ -60,9 +60,7 @@ pub(super) const fn flipped(kind: FaceKind) -> &'static [usize] {
     match kind {
         FaceKind::Line2 => &[1, 0],
         FaceKind::Line3 => &[1, 0, 2],
-        FaceKind::Quad4 | FaceKind::Quad8 | FaceKind::Quad9 => {
-            QUAD_TURNED.split_at(kind.nodes()).0
-        }
+        FaceKind::Quad4 | FaceKind::Quad8 | FaceKind::Quad9 => QUAD_TURNED.split_at(kind.nodes()).0,
         FaceKind::Tri3 => &[0, 2, 1],
         FaceKind::Tri6 => &[0, 2, 1, 5, 4, 3],
     }

@@ -129,13 +129,19 @@ impl EffectName {
     pub const fn as_str(&self) -> &'static str {
         EFFECTS[self.0].name
     }
+
+    /// The effect of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        EFFECTS.iter().position(|e| e.name == name).map(Self)
+    }
 }
 
 impl TryFrom<String> for EffectName {
     type Error = String;
 
     fn try_from(name: String) -> Result<Self, String> {
-        EFFECTS.iter().position(|e| e.name == name).map(Self).ok_or_else(|| {
+        Self::named(&name).ok_or_else(|| {
             let known: Vec<_> = EFFECTS.iter().map(|e| e.name).collect();
             format!("unknown effect '{name}'; there are: {}", known.join(", "))
         })

@@ -1,0 +1,132 @@
+//! `effects`: what each effect of a scene changes and costs.
+
+use super::print;
+use crate::output::atomic;
+use crate::output::plot::{Axis, Chart, Mark, Series, write_svg};
+use crate::press::study::{self, Change, Outcome, Study, Switched};
+use crate::scene::{EffectName, Scene};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Solve a scene with each effect switched off (or on) in turn.
+///
+/// Prints what the effect changes at the last stored state (relative L2 and peak of
+/// SED and pressure, force) and what it costs (seconds, iterations, unknowns). With
+/// --out also writes effects.json, effects.md and the plot effects.svg.
+#[derive(clap::Args)]
+#[command(after_help = "Solves the scene once for every effect: try a coarse mesh first.\n\
+                        Example: fe-datagen effects scenes/flat-press.toml --out out/effects")]
+pub(super) struct Args {
+    /// Scene file (see scenes/ and docs/scenes.md).
+    scene: PathBuf,
+    /// Folder for table and plot.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Print the study as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let scene = Scene::read(&args.scene)?;
+    let bar = super::progress("solving", crate::scene::effects::EFFECTS.len() + 1);
+    let mut begun = false;
+    let study = study::run(&scene, &mut |what| {
+        bar.set_message(what.to_owned());
+        if std::mem::replace(&mut begun, true) {
+            bar.inc(1);
+        }
+    })?;
+    bar.finish_and_clear();
+    let table = markdown(&study);
+    if let Some(out) = &args.out {
+        atomic::create_folder(out)?;
+        atomic::write_json(&out.join("effects.json"), &study)?;
+        atomic::write(&out.join("effects.md"), table.as_bytes())?;
+        write_svg(&out.join("effects.svg"), &chart(&study))?;
+    }
+    print(&study, args.json, || table)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn markdown(study: &Study) -> String {
+    let base = &study.base;
+    let names: Vec<_> = study.effects.iter().map(EffectName::as_str).collect();
+    let mut text = format!(
+        "As it stands ({}): {:.4} N, peak pressure {:.0} Pa, peak SED {:.1} J/m3; {} unknowns, \
+         {:.1} s, {} Newton iterations.\n\n",
+        if names.is_empty() { "no effect".into() } else { names.join(", ") },
+        base.force_n,
+        base.pressure_pa_max,
+        base.sed_j_per_m3_max,
+        base.unknowns,
+        base.solve_s,
+        base.effort.newton_iterations,
+    );
+    text.push_str(
+        "| switched | SED, L2 | SED, peak | pressure, L2 | pressure, peak | force | seconds | Newton | unknowns |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for s in &study.switched {
+        let _ = writeln!(text, "| {} | {} |", label(s), row(&s.outcome));
+    }
+    text
+}
+
+fn label(s: &Switched) -> String {
+    let way = if s.named { "off" } else { "on" };
+    if s.along.is_empty() {
+        format!("`{}` {way}", s.effect)
+    } else {
+        format!("`{}` {way}, with `{}`", s.effect, s.along.join("`, `"))
+    }
+}
+
+fn row(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Solved { state, change } => {
+            let percent = |of: fn(&Change) -> f64| {
+                change.as_ref().map_or("-".into(), |c| format!("{:.2} %", 100.0 * of(c)))
+            };
+            format!(
+                "{} | {} | {} | {} | {} | {:.1} | {} | {}",
+                percent(|c| c.sed_l2),
+                percent(|c| c.sed_peak),
+                percent(|c| c.pressure_l2),
+                percent(|c| c.pressure_peak),
+                percent(|c| c.force),
+                state.solve_s,
+                state.effort.newton_iterations,
+                state.unknowns
+            )
+        }
+        Outcome::Refused(why) => format!("not for this scene: {why} | | | | | | |"),
+        Outcome::Failed(why) => format!("no equilibrium: {why} | | | | | | |"),
+    }
+}
+
+/// Cost against benefit, one dot an effect.
+fn chart(study: &Study) -> Chart {
+    let series = study.switched.iter().filter_map(|s| match &s.outcome {
+        Outcome::Solved { state, change: Some(change) } => {
+            let (with, without) = if s.named {
+                (study.base.solve_s, state.solve_s)
+            } else {
+                (state.solve_s, study.base.solve_s)
+            };
+            Some(Series {
+                name: label(s).replace('`', ""),
+                points: vec![(with / without, 100.0 * change.sed_l2.max(1e-6))],
+                mark: Mark::Dots,
+            })
+        }
+        _ => None,
+    });
+    Chart {
+        title: "What an effect changes and costs".into(),
+        x: Axis::log("time with the effect over time without"),
+        y: Axis::log("change of SED at the interface, relative L2, %"),
+        series: series.collect(),
+    }
+}

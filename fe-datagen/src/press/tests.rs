@@ -1,0 +1,99 @@
+//! Presses of the coarse fingertip with bone and nail as solids.
+
+use super::body::{Body, PressError};
+use super::drive::{Approach, Drive};
+use super::laws::solids;
+use super::record::{IncrementRecord, Pose};
+use crate::geometry::fingertip::FingertipShape;
+use crate::mesh::fingertip::{Density, Order, Parts};
+use crate::mesh::surface::norm;
+use crate::scene::{Plan, TissueTable};
+use crate::solve::Options;
+
+const BONE: Parts = Parts { bone: true, nail: false };
+const NAIL: Parts = Parts { bone: false, nail: true };
+const BOTH: Parts = Parts { bone: true, nail: true };
+
+/// A coarse finger pressed 1 mm by a level plate.
+fn press(parts: Parts, table: &TissueTable, shape: &FingertipShape) -> Vec<IncrementRecord> {
+    let solve = || -> Result<_, PressError> {
+        let plan = Plan { parts, ..Plan::usual() };
+        let materials = solids(table, &plan)?;
+        let body = Body::fingertip(shape, materials, Density::Coarse, Order::Linear, parts)?;
+        let mut solver = body.solver(Options::default())?;
+        let mut records = Vec::new();
+        let drive = Drive::Depths(vec![0.25, 0.5, 1.0]);
+        let approach = Approach::plate(Pose::default());
+        body.press(&mut solver, &approach, &drive, 2, &mut |_, r, _| records.push(r.clone()))?;
+        Ok(records)
+    };
+    solve().unwrap()
+}
+
+fn force_n(records: &[IncrementRecord]) -> f64 {
+    norm(records.last().unwrap().force_n)
+}
+
+/// The default table with a bone of another Young's modulus.
+fn with_bone(youngs_modulus_mpa: f64) -> TissueTable {
+    let mut table = TissueTable::default();
+    table.bone.youngs_modulus_mpa = youngs_modulus_mpa;
+    table
+}
+
+#[test]
+fn solid_parts_converge_and_balance_beside_tissue_half_a_million_times_softer() {
+    let (table, shape) = (TissueTable::default(), FingertipShape::default());
+    let ratio = table.bone.youngs_modulus_mpa / table.subcutaneous.youngs_modulus_mpa;
+    assert!(ratio.round() >= 5e5, "{ratio}");
+    let rigid = force_n(&press(Parts::default(), &table, &shape));
+    for parts in [BONE, NAIL, BOTH] {
+        let records = press(parts, &table, &shape);
+        for r in &records {
+            let c = &r.checks;
+            println!("{parts:?} {} mm, {:.6} N: {c:?}", r.depth_mm, norm(r.force_n));
+            assert!(c.residual_relative <= 1e-6, "{parts:?}");
+            assert!(c.plate_vs_support_reaction <= 1e-5, "{parts:?}");
+            assert!(c.contact_force_vs_pressure_integral <= 5e-3, "{parts:?}");
+            assert!(c.energy_vs_work <= 5e-3, "{parts:?}");
+            assert!(c.penetration_mm_max <= 1e-4 && c.j_min > 0.0, "{parts:?}");
+            assert_eq!(c.step_cuts, 0, "{parts:?}");
+        }
+        // What gives way carries less; the finger is still held by its bone.
+        let force = force_n(&records);
+        assert!(force < rigid && force > 0.8 * rigid, "{parts:?}: {force} N, rigid {rigid} N");
+    }
+}
+
+#[test]
+fn a_stiffer_bone_tends_to_the_rigid_one() {
+    let shape = FingertipShape::default();
+    let rigid = press(Parts::default(), &TissueTable::default(), &shape);
+    let missing: Vec<f64> = [1.7, 17.0, 170.0, 1_700.0, 17_000.0]
+        .iter()
+        .map(|&e| 1.0 - force_n(&press(BONE, &with_bone(e), &shape)) / force_n(&rigid))
+        .collect();
+    println!("force missing to the rigid bone's: {missing:?}");
+    assert!(missing.windows(2).all(|m| m[1] < m[0] && m[1] > 0.0), "{missing:?}");
+    // In the end deflection goes with 1 / E.
+    let order = (missing[3] / missing[4]).log10();
+    assert!((order - 1.0).abs() < 0.1, "{order}");
+}
+
+#[test]
+fn rigid_parts_have_no_constants() {
+    let (mut table, mut shape) = (TissueTable::default(), FingertipShape::default());
+    let plain = press(Parts::default(), &table, &shape);
+    table.bone.youngs_modulus_mpa = 1.0;
+    table.nail.poissons_ratio = 0.1;
+    shape.nail_thickness_mm = 1.2;
+    shape.bone_cortex_mm = 0.3;
+    let other = press(Parts::default(), &table, &shape);
+    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    for (a, b) in plain.iter().zip(&other) {
+        assert_eq!(bits(&a.force_n), bits(&b.force_n));
+        assert_eq!(bits(&a.pressure_mpa), bits(&b.pressure_mpa));
+        assert_eq!(bits(&a.sed_dermis_mpa), bits(&b.sed_dermis_mpa));
+        assert_eq!(bits(&a.sed_epidermis_mpa), bits(&b.sed_epidermis_mpa));
+    }
+}

@@ -1,0 +1,43 @@
+//! An elastic press ends in the same state however many steps led there.
+
+use super::{CaseError, Check, Context};
+use crate::mesh::fingertip::Density;
+use crate::press::body::Body;
+use crate::press::drive::{Approach, Drive};
+use crate::press::record::{IncrementRecord, Pose};
+use crate::solve::{Loading, Options, StepReport};
+
+const SOURCE: &str = "elastic: no memory of the way";
+const DEPTH_MM: f64 = 1.0;
+
+pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
+    let finger = Body::usual(Density::Coarse)?;
+    let many = if context.quick { 20 } else { 100 };
+    let (once, often) = (press(&finger, 1)?, press(&finger, many)?);
+    let row = |what: &str, a: &[f64], b: &[f64]| {
+        let square = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+        let error =
+            square(&mut a.iter().zip(b).map(|(x, y)| x - y)) / square(&mut b.iter().copied());
+        let quantity = format!("1 against {many} steps to 1 mm: {what}, relative L2");
+        Check::vanishes(quantity, error, 1e-5, SOURCE)
+    };
+    Ok(vec![
+        row("pressure", &once.pressure_mpa, &often.pressure_mpa),
+        row("SED of the dermis", &once.sed_dermis_mpa, &often.sed_dermis_mpa),
+        row("SED of the epidermis", &once.sed_epidermis_mpa, &often.sed_epidermis_mpa),
+    ])
+}
+
+fn press(finger: &Body, steps: u32) -> Result<IncrementRecord, CaseError> {
+    let options =
+        Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-6, ..Options::default() };
+    let mut solver = finger.solver(options)?;
+    let approach = Approach::plate(Pose { pitch_deg: 15.0, roll_deg: 0.0, yaw_deg: 0.0 });
+    let indenter = finger.indenter(&approach, &Drive::Depths(vec![DEPTH_MM]))?;
+    solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
+    let mut report = StepReport::default();
+    for s in 1..=steps {
+        report = solver.advance_to(f64::from(s) / f64::from(steps))?;
+    }
+    Ok(finger.record(&solver, DEPTH_MM, &report)?)
+}
