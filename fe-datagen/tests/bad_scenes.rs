@@ -84,9 +84,8 @@ fn a_negative_thickness() {
 
 #[test]
 fn an_incompressible_tissue() {
-    let text = format!(
-        "{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"
-    );
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n");
     assert_refused(&text, 12, &["materials.dermis: Poisson's ratio 0.5", "0.49 to 0.4999"]);
 }
 
@@ -113,9 +112,8 @@ fn missing_and_absurd_units() {
     assert_refused(&of_motion("depth_mm = \"1 mm\""), 8, &["motion.depth_mm", "bare number"]);
     assert_refused(&of_motion("depth_mm = 1000.0"), 8, &["motion.depth_mm", "at most 100 mm"]);
     assert_refused(&of_motion("force_n = 1e6"), 8, &["motion.force_n", "at most 1000 N"]);
-    let text = format!(
-        "{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.48\n"
-    );
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.48\n");
     assert_refused(&text, 11, &["materials.dermis", "80000 MPa", "was Pa meant?"]);
     let text = format!("{FINGER}\n[geometry.shape]\nepidermis_mm = 200.0\n");
     assert_refused(&text, 11, &["geometry.shape.epidermis_mm = 200 mm", "at most 100"]);

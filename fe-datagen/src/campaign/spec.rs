@@ -7,7 +7,7 @@ use crate::mesh::fingertip::{Density, Order};
 use crate::output::OutputError;
 use crate::press::record::Pose;
 use crate::scene::effects::usual;
-use crate::scene::{EffectName, Friction, Geometry, Motion, Scene, TissueTable};
+use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Scene, TissueTable};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -36,17 +36,19 @@ impl Pass {
                 let step = of.len().div_ceil(SAMPLE);
                 let sample: Vec<usize> = of.iter().copied().step_by(step).collect();
                 let share = of.len() as f64 / sample.len() as f64;
-                pass.forces_s += share * fastest_s(RUNS, || {
-                    sample.iter().for_each(|&e| evaluate(problem, b, block, e, None));
-                });
-                pass.tangent_s += share * fastest_s(RUNS, || {
-                    for &e in &sample {
-                        let n = block.kind.nodes();
-                        let mut dense = vec![0.0; 9 * n * n];
-                        evaluate(problem, b, block, e, Some(dense.as_mut_slice()));
-                        problem.structure.add_element(&mut tangent, b, e, &dense);
-                    }
-                });
+                pass.forces_s += share
+                    * fastest_s(RUNS, || {
+                        sample.iter().for_each(|&e| evaluate(problem, b, block, e, None));
+                    });
+                pass.tangent_s += share
+                    * fastest_s(RUNS, || {
+                        for &e in &sample {
+                            let n = block.kind.nodes();
+                            let mut dense = vec![0.0; 9 * n * n];
+                            evaluate(problem, b, block, e, Some(dense.as_mut_slice()));
+                            problem.structure.add_element(&mut tangent, b, e, &dense);
+                        }
+                    });
             }
         }
         pass

@@ -70,8 +70,7 @@ impl Forecast {
     pub fn new(scene: &Scene, setup: &Setup) -> Self {
         let problem = &setup.body.problem;
         let structure = &problem.structure;
-        let (machine, pass, work) =
-            (Machine::probe(), Pass::probe(problem), Work::new(setup));
+        let (machine, pass, work) = (Machine::probe(), Pass::probe(problem), Work::new(setup));
         let (entries, flops) = (structure.factor_entries(), structure.factor_flops());
         // Forward and backward through the f32 factor, once through tangent and pattern.
         let cg_bytes = (8 * entries + 16 * structure.row.len()) as f64;

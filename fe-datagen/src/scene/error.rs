@@ -123,7 +123,8 @@ fn cure(message: &str) -> String {
         return format!(": add it (docs/scenes.md has `{missing}` with its unit)");
     }
     if message.starts_with("unknown field") {
-        let meant = |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
+        let meant =
+            |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
         return quoted.iter().skip(1).find(meant).map_or_else(String::new, |meant| {
             format!("; did you mean `{meant}`? Units stand in the names of fields")
         });
