@@ -33,7 +33,6 @@ use std::{net::SocketAddr, sync::Arc, time::Duration};
 pub use config::Config;
 pub use error::{DrainError, StartError};
 use tokio::{
-    net::TcpListener,
     sync::watch,
     task::{JoinHandle, spawn_blocking},
     time::timeout,
@@ -67,7 +66,7 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
     let (catalogue, metrics, pool) =
         spawn_blocking(move || load(&loading)).await.map_err(|_| StartError::WorkerPanicked)??;
     let bind = |source| StartError::Bind { address: config.bind, source };
-    let listener = TcpListener::bind(config.bind).await.map_err(bind)?;
+    let listener = net::listen(config.bind).map_err(bind)?;
     let address = listener.local_addr().map_err(bind)?;
     let drain = Arc::new(watch::Sender::new(false));
     let entrance = pool.entrance(&metrics);

@@ -2,7 +2,7 @@
 
 use super::sampling::split_of;
 use super::state::{Outcome, PressState, SOFTWARE};
-use super::{CampaignError, CampaignSpec, splits};
+use super::{CampaignError, CampaignSpec, Press, splits};
 use crate::dataset::{self, DroppedSample, FailedPress, Manifest, PressEntry, Splits};
 use crate::output::OutputError;
 use papilla_proto::atlas::Atlas;
@@ -16,10 +16,18 @@ pub(super) fn manifest(
     let all = splits(spec);
     let (mut presses, mut failed, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
     let (mut pressure_max, mut sed_max) = (0.0f64, 0.0f64);
-    for PressState { id, pose, outcome, .. } in states {
+    for PressState { press, outcome, .. } in states {
+        let Press { id, indenter, shape, pose, offset_mm, .. } = press.clone();
         match outcome {
             Outcome::Failed { error } => {
-                failed.push(FailedPress { id: *id, pose: *pose, error: error.clone() });
+                failed.push(FailedPress {
+                    id,
+                    indenter,
+                    shape,
+                    pose,
+                    offset_mm,
+                    error: error.clone(),
+                });
             }
             Outcome::Solved {
                 sha256,
@@ -32,17 +40,20 @@ pub(super) fn manifest(
                 pressure_max = pressure_max.max(*pressure_max_pa);
                 sed_max = sed_max.max(*sed_max_j_per_m3);
                 dropped.extend(d.iter().map(|(depth_mm, reason)| DroppedSample {
-                    press: *id,
+                    press: id,
                     depth_mm: *depth_mm,
                     reason: reason.clone(),
                 }));
                 presses.push(PressEntry {
-                    id: *id,
-                    file: dataset::shard_file(*id),
+                    id,
+                    file: dataset::shard_file(id),
                     sha256: sha256.clone(),
-                    split: split_of(&all, *id),
+                    split: split_of(&all, id),
                     samples: *samples,
-                    pose: *pose,
+                    indenter,
+                    shape,
+                    pose,
+                    offset_mm,
                     checks: *checks,
                 });
             }
@@ -64,7 +75,7 @@ pub(super) fn manifest(
         seed: spec.seed,
         software: SOFTWARE.to_string(),
         units: dataset::Units::default(),
-        effects: spec.effects.clone(),
+        effects: spec.effects.iter().map(|e| e.as_str().into()).collect(),
         vertex_count: atlas.vertex_count(),
         pressure_max_pa: pressure_max,
         sed_max_j_per_m3: sed_max,

@@ -2,6 +2,7 @@
 
 use crate::dataset::DatasetError;
 use crate::output::OutputError;
+use crate::scene::SceneError;
 use std::path::PathBuf;
 
 /// Any error of a solver; its text goes into the manifest.
@@ -25,9 +26,19 @@ pub enum CampaignError {
         /// Name of the campaign.
         campaign: String,
         /// The field.
-        field: &'static str,
+        field: String,
         /// What is wrong and what is allowed.
         message: String,
+    },
+    /// A value that a scene could not have either.
+    #[error("campaign {campaign}, indenter '{indenter}': {source}")]
+    Scene {
+        /// Name of the campaign.
+        campaign: String,
+        /// Name of the indenter.
+        indenter: String,
+        /// What is wrong.
+        source: Box<SceneError>,
     },
     /// The folder belongs to something else.
     #[error("{folder} holds {what}: choose another --out, or remove the folder to start over")]

@@ -20,5 +20,5 @@ mod tests;
 pub use error::{BoxError, CampaignError};
 pub use report::CampaignReport;
 pub use run::{PressSolver, RunOptions, run};
-pub use sampling::{poses, splits};
-pub use spec::{CampaignSpec, EFFECTS, PoseRanges};
+pub use sampling::{Press, presses, splits};
+pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};

@@ -75,8 +75,8 @@ impl fmt::Display for CampaignReport {
             let p = &press.pose;
             writeln!(
                 f,
-                "  FAILED press {} (pitch {:.2}, roll {:.2}, yaw {:.2} deg): {}",
-                press.id, p.pitch_deg, p.roll_deg, p.yaw_deg, press.error
+                "  FAILED press {} ({}; pitch {:.2}, roll {:.2}, yaw {:.2} deg): {}",
+                press.id, press.indenter, p.pitch_deg, p.roll_deg, p.yaw_deg, press.error
             )?;
         }
         for sample in &self.dropped {

@@ -2,10 +2,10 @@
 
 use super::assemble::manifest;
 use super::state::{Outcome, PressState, Workspace};
-use super::{BoxError, CampaignError, CampaignReport, CampaignSpec, poses, progress};
+use super::{BoxError, CampaignError, CampaignReport, CampaignSpec, Press, presses, progress};
 use crate::dataset;
 use crate::output::atomic;
-use crate::press::record::{IncrementRecord, Pose};
+use crate::press::record::IncrementRecord;
 use indicatif::ProgressBar;
 use papilla_proto::atlas::Atlas;
 use std::any::Any;
@@ -18,14 +18,13 @@ use std::time::Instant;
 
 /// Solves one press after another; each worker thread has its own.
 pub trait PressSolver {
-    /// Presses the plate in the given pose to each of the depths (mm, rising)
-    /// and returns one equilibrium per depth, with values at the vertices of
-    /// the campaign's atlas. Equal arguments have to give equal records
-    /// (`seconds` apart), whatever was solved before.
+    /// Presses to each of the depths and returns one equilibrium per depth, with
+    /// values at the vertices of the campaign's atlas. Equal presses have to give
+    /// equal records (`seconds` apart), whatever was solved before.
     ///
     /// # Errors
     /// What did not converge and where; it is recorded in the manifest.
-    fn solve(&mut self, pose: Pose, depths_mm: &[f64]) -> Result<Vec<IncrementRecord>, BoxError>;
+    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError>;
 }
 
 /// How to run, as opposed to what.
@@ -65,10 +64,10 @@ pub fn run<S: PressSolver>(
     let workspace = Workspace::open(folder, spec, atlas)?;
     dataset::write_atlas(folder, atlas)?;
     let (mut done, mut todo) = (Vec::new(), Vec::new());
-    for (id, pose) in poses(spec).into_iter().enumerate() {
-        match workspace.load(id, pose) {
+    for press in presses(spec) {
+        match workspace.load(&press) {
             Some(state) if !(options.retry_failed && is_failed(&state)) => done.push(state),
-            _ => todo.push((id, pose)),
+            _ => todo.push(press),
         }
     }
     let reused = done.len();
@@ -76,7 +75,6 @@ pub fn run<S: PressSolver>(
     let threads = cores.map_or(1, NonZero::get).min(todo.len().max(1));
     let bar = progress::bar(spec.presses, reused, options.progress);
     let queue = Queue {
-        spec,
         vertex_count: atlas.vertex_count(),
         workspace: &workspace,
         todo: &todo,
@@ -99,14 +97,15 @@ pub fn run<S: PressSolver>(
     for result in queue.results.into_inner().unwrap_or_else(|poison| poison.into_inner()) {
         done.push(result?);
     }
-    done.sort_by_key(|state| state.id);
+    done.sort_by_key(|state| state.press.id);
     let manifest = manifest(spec, atlas, &done)?;
     atomic::write_json(&workspace.folder().join("manifest.json"), &manifest)?;
     Ok(CampaignReport {
         name: spec.name.clone(),
         folder: folder.to_path_buf(),
         presses: spec.presses,
-        solved: todo.len() - done.iter().filter(|s| is_failed(s) && is_in(&todo, s.id)).count(),
+        solved: todo.len()
+            - done.iter().filter(|s| is_failed(s) && is_in(&todo, s.press.id)).count(),
         reused,
         samples: manifest.presses.iter().map(|p| p.samples).sum(),
         samples_due: spec.samples(),
@@ -125,16 +124,15 @@ fn is_failed(state: &PressState) -> bool {
     matches!(state.outcome, Outcome::Failed { .. })
 }
 
-fn is_in(todo: &[(usize, Pose)], id: usize) -> bool {
-    todo.binary_search_by_key(&id, |(id, _)| *id).is_ok()
+fn is_in(todo: &[Press], id: usize) -> bool {
+    todo.binary_search_by_key(&id, |press| press.id).is_ok()
 }
 
 /// The presses still to be solved, shared by the workers.
 struct Queue<'a> {
-    spec: &'a CampaignSpec,
     vertex_count: usize,
     workspace: &'a Workspace,
-    todo: &'a [(usize, Pose)],
+    todo: &'a [Press],
     next: AtomicUsize,
     stop: AtomicBool,
     bar: &'a ProgressBar,
@@ -147,10 +145,10 @@ impl Queue<'_> {
     fn work<S: PressSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
         let mut solver = None;
         while !self.stop.load(Ordering::Relaxed) {
-            let Some(&(id, pose)) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else {
+            let Some(press) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else {
                 return;
             };
-            match self.press(id, pose, &mut solver, build) {
+            match self.press(press, &mut solver, build) {
                 Ok(state) => self.push(Ok(state)),
                 Err(error) => self.fail(error),
             }
@@ -170,8 +168,7 @@ impl Queue<'_> {
 
     fn press<S: PressSolver>(
         &self,
-        id: usize,
-        pose: Pose,
+        press: &Press,
         solver: &mut Option<S>,
         build: &(impl Fn() -> Result<S, BoxError> + Sync),
     ) -> Result<PressState, CampaignError> {
@@ -180,10 +177,10 @@ impl Queue<'_> {
             None => build().map_err(CampaignError::Setup)?,
         };
         let start = Instant::now();
-        let depths_mm = &self.spec.depths_mm;
+        let id = press.id;
         // One bad press must not cost the others; a solver that panicked may be
         // in any state and is not used again.
-        let solved = match catch_unwind(AssertUnwindSafe(|| ready.solve(pose, depths_mm))) {
+        let solved = match catch_unwind(AssertUnwindSafe(|| ready.solve(press))) {
             Ok(solved) => {
                 *solver = Some(ready);
                 solved.map_err(|e| chain(e.as_ref()))
@@ -191,7 +188,7 @@ impl Queue<'_> {
             Err(panic) => Err(format!("the solver panicked: {}", panic_text(panic.as_ref()))),
         };
         let seconds = start.elapsed().as_secs_f64();
-        let (outcome, shard) = match solved.and_then(|records| self.complete(records)) {
+        let (outcome, shard) = match solved.and_then(|records| complete(press, records)) {
             Ok(records) => self.encode(&records)?,
             Err(error) => (Outcome::Failed { error }, None),
         };
@@ -204,21 +201,9 @@ impl Queue<'_> {
                 tracing::info!(press = id, seconds, samples, "press solved");
             }
         }
-        let state = PressState { id, pose, seconds, outcome };
+        let state = PressState { press: press.clone(), seconds, outcome };
         self.workspace.store(&state, shard.as_deref())?;
         Ok(state)
-    }
-
-    /// Each depth has to have its record, in order.
-    fn complete(&self, records: Vec<IncrementRecord>) -> Result<Vec<IncrementRecord>, String> {
-        let due = &self.spec.depths_mm;
-        // A depth that is no number is left to the sample's own checks.
-        let fit =
-            |r: &IncrementRecord, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
-        let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
-        let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
-        let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");
-        if fits { Ok(records) } else { Err(message()) }
     }
 
     fn encode(
@@ -246,6 +231,17 @@ impl Queue<'_> {
             }
         })
     }
+}
+
+/// Each depth has to have its record, in order.
+fn complete(press: &Press, records: Vec<IncrementRecord>) -> Result<Vec<IncrementRecord>, String> {
+    let due = &press.depths_mm;
+    // A depth that is no number is left to the sample's own checks.
+    let fit = |r: &IncrementRecord, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
+    let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
+    let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
+    let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");
+    if fits { Ok(records) } else { Err(message()) }
 }
 
 /// An error's text with those of its causes.

@@ -1,9 +1,9 @@
 //! What a campaign remembers between runs, in `DIR/progress`.
 
-use super::{CampaignError, CampaignSpec};
+use super::{CampaignError, CampaignSpec, Press};
 use crate::dataset::{FORMAT, sha256_hex, shard_file};
 use crate::output::{OutputError, atomic};
-use crate::press::record::{Checks, Pose};
+use crate::press::record::Checks;
 use papilla_proto::atlas::Atlas;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -21,8 +21,7 @@ struct Owner {
 /// What became of one press; written after its shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct PressState {
-    pub id: usize,
-    pub pose: Pose,
+    pub press: Press,
     /// Wall time, s. Not part of the dataset: it is never the same twice.
     pub seconds: f64,
     pub outcome: Outcome,
@@ -98,13 +97,13 @@ impl Workspace {
 
     /// What an earlier run left of a press: only what can be trusted, that is a
     /// readable record whose shard is there and has the recorded hash.
-    pub(super) fn load(&self, id: usize, pose: Pose) -> Option<PressState> {
-        let state: PressState = atomic::read_json(&self.record_path(id)).ok()?;
-        if state.id != id || state.pose != pose {
+    pub(super) fn load(&self, press: &Press) -> Option<PressState> {
+        let state: PressState = atomic::read_json(&self.record_path(press.id)).ok()?;
+        if state.press != *press {
             return None;
         }
         if let Outcome::Solved { sha256, .. } = &state.outcome {
-            let bytes = std::fs::read(self.folder.join(shard_file(id))).ok()?;
+            let bytes = std::fs::read(self.folder.join(shard_file(press.id))).ok()?;
             if sha256_hex(&bytes) != *sha256 {
                 return None;
             }
@@ -118,7 +117,7 @@ impl Workspace {
         state: &PressState,
         shard: Option<&[u8]>,
     ) -> Result<(), OutputError> {
-        let path = self.folder.join(shard_file(state.id));
+        let path = self.folder.join(shard_file(state.press.id));
         match shard {
             Some(bytes) => atomic::write(&path, bytes)?,
             // A press that failed this time must not keep the shard of another time.
@@ -127,7 +126,7 @@ impl Workspace {
             }
             None => {}
         }
-        atomic::write_json(&self.record_path(state.id), state)
+        atomic::write_json(&self.record_path(state.press.id), state)
     }
 
     /// The output folder.
@@ -138,7 +137,15 @@ impl Workspace {
 
 /// Names everything that shards depend on, so that two campaigns never mix.
 fn fingerprint(spec: &CampaignSpec, atlas: &Atlas) -> Result<String, OutputError> {
-    let text = serde_json::to_string(&(spec, atlas.hash(), FORMAT, SOFTWARE))
+    let mut pictures = Vec::new();
+    for candidate in spec.candidates() {
+        for picture in candidate.indenter.pictures() {
+            let path = spec.folder.join(picture);
+            let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
+            pictures.push(sha256_hex(&bytes));
+        }
+    }
+    let text = serde_json::to_string(&(spec, pictures, atlas.hash(), FORMAT, SOFTWARE))
         .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
     Ok(sha256_hex(text.as_bytes()))
 }

@@ -4,12 +4,14 @@
 use super::*;
 use crate::dataset::testing::{atlas, posed_record};
 use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
-use crate::indenter::IndenterSpec;
+use crate::indenter::{IndenterSpec, Plate, Sphere};
 use crate::mesh::fingertip::Density;
 use crate::output::map_image::Bits;
 use crate::press::record::{IncrementRecord, Pose};
+use crate::scene::effects::usual;
+use crate::scene::{Friction, TissueTable};
 use papilla_proto::atlas::Atlas;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,10 +34,10 @@ struct Formula<'a> {
 }
 
 impl PressSolver for Formula<'_> {
-    fn solve(&mut self, pose: Pose, depths_mm: &[f64]) -> Result<Vec<IncrementRecord>, BoxError> {
+    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError> {
         let call = self.calls.fetch_add(1, Ordering::SeqCst);
-        let record = |d: &f64| posed_record(pose, *d, self.vertex_count);
-        let mut records: Vec<_> = depths_mm.iter().map(record).collect();
+        let record = |d: &f64| posed_record(press.pose, *d, self.vertex_count);
+        let mut records: Vec<_> = press.depths_mm.iter().map(record).collect();
         match self.trouble {
             // Not even a destructor runs: what kill -9 does.
             Trouble::Abort(n) if n == call => std::process::abort(),
@@ -54,12 +56,37 @@ fn spec() -> CampaignSpec {
         seed: 3,
         presses: 7,
         depths_mm: vec![0.25, 0.5],
+        depths: None,
         test_fraction: 0.3,
         density: Density::Coarse,
-        effects: EFFECTS.map(String::from).to_vec(),
-        indenter: IndenterSpec::Plate { size_mm: [20.0, 20.0], edge_radius_mm: 0.5 },
+        effects: usual(),
+        materials: TissueTable::default(),
+        friction: Friction::default(),
+        indenter: Some(IndenterSpec::default()),
+        indenters: Vec::new(),
         pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
+        offset_mm: [[0.0; 2]; 2],
+        folder: PathBuf::new(),
     }
+}
+
+fn candidate(name: &str, share: u32, indenter: IndenterSpec) -> Candidate {
+    let name = name.into();
+    Candidate { name, share, indenter, pose: None, offset_mm: None, depths: None }
+}
+
+/// Three indenters, one with a turn, an offset and depths of its own.
+fn several() -> CampaignSpec {
+    let ball = Candidate {
+        pose: Some(PoseRanges { pitch_deg: [10.0, 20.0], roll_deg: [0.0; 2], yaw_deg: [5.0; 2] }),
+        offset_mm: Some([[-2.0, 2.0], [1.0, 1.0]]),
+        depths: Some(DepthRange { deepest_mm: [1.0, 1.5], states: 3 }),
+        ..candidate("ball", 2, IndenterSpec::Sphere(Sphere::default()))
+    };
+    let plate = candidate("plate", 1, IndenterSpec::default());
+    let small = Plate { size_mm: [6.0, 6.0], edge_radius_mm: 0.5 };
+    let small = candidate("small plate", 1, IndenterSpec::Plate(small));
+    CampaignSpec { presses: 64, indenter: None, indenters: vec![plate, ball, small], ..spec() }
 }
 
 fn go(folder: &Path, threads: usize, trouble: Trouble) -> Result<CampaignReport, CampaignError> {
@@ -213,6 +240,8 @@ fn a_solver_that_cannot_be_built_stops_the_campaign() {
 #[test]
 fn poses_fill_their_ranges_and_follow_the_seed() {
     let wide = CampaignSpec { presses: 64, ..spec() };
+    let poses =
+        |spec: &CampaignSpec| -> Vec<Pose> { presses(spec).iter().map(|p| p.pose).collect() };
     let points = poses(&wide);
     assert_eq!(points[..7], poses(&spec())[..], "the first poses do not depend on the number");
     let cell = |p: &Pose| {
@@ -228,6 +257,77 @@ fn poses_fill_their_ranges_and_follow_the_seed() {
     assert!(points.iter().all(|p| (0.0..45.0).contains(&p.pitch_deg) && p.yaw_deg.abs() < 1e-12));
     let other = poses(&CampaignSpec { seed: 4, ..wide });
     assert!(points.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
+}
+
+/// The shipped dataset's poses: its seed has to give them for ever.
+#[test]
+fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let s1 = CampaignSpec::read(&root.join("campaigns/s1.toml")).unwrap();
+    let shipped = Dataset::open(&root.join("data/s1")).unwrap();
+    let planned = presses(&s1);
+    for entry in &shipped.manifest().presses {
+        let press = &planned[entry.id];
+        assert_eq!((press.pose, press.offset_mm), (entry.pose, entry.offset_mm));
+        assert_eq!((&press.indenter, &press.shape), (&entry.indenter, &entry.shape));
+    }
+    let campaign = serde_json::to_value(&s1).unwrap();
+    assert_eq!(shipped.manifest().campaign, campaign, "as this program would write it");
+}
+
+#[test]
+fn indenters_take_turns_by_their_shares() {
+    let all = presses(&several());
+    let count = |name: &str, n: usize| all[..n].iter().filter(|p| p.indenter == name).count();
+    for n in 1..=64 {
+        for (name, share) in [("plate", 0.25), ("ball", 0.5), ("small plate", 0.25)] {
+            let lag = share * n as f64 - count(name, n) as f64;
+            assert!(lag.abs() < 1.0, "{name}: {lag} behind after {n}");
+        }
+    }
+    assert_eq!(all[..9], presses(&CampaignSpec { presses: 9, ..several() })[..]);
+    assert_ne!(all, presses(&CampaignSpec { seed: 4, ..several() }));
+}
+
+#[test]
+fn an_indenter_has_its_own_ranges() {
+    let all = presses(&several());
+    for ball in all.iter().filter(|p| p.indenter == "ball") {
+        assert_eq!((ball.shape.as_str(), ball.depths_mm.len()), ("sphere", 3));
+        assert!((10.0..20.0).contains(&ball.pose.pitch_deg));
+        assert!((-2.0..2.0).contains(&ball.offset_mm[0]));
+        let deepest = ball.depths_mm[2];
+        assert!((1.0..1.5).contains(&deepest) && (ball.depths_mm[0] - deepest / 3.0).abs() < 1e-15);
+    }
+    let plates: Vec<_> = all.iter().filter(|p| p.shape == "plate").collect();
+    assert!(plates.iter().all(|p| p.depths_mm == [0.25, 0.5] && p.offset_mm == [0.0, 0.0]));
+    // Each indenter has a sequence of its own: no two share a pose.
+    let first = |name: &str| plates.iter().find(|p| p.indenter == name).unwrap().pose;
+    assert_ne!(first("plate"), first("small plate"));
+}
+
+#[test]
+fn the_manifest_names_the_indenter_of_every_press() {
+    let folder = tempfile::tempdir().unwrap();
+    let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
+    let vertex_count = atlas.vertex_count();
+    let options = RunOptions { progress: false, ..RunOptions::default() };
+    let build = || Ok(Formula { vertex_count, trouble: Trouble::Fail(1), calls: &calls });
+    let spec = CampaignSpec { presses: 8, ..several() };
+    let report = run(&spec, &atlas, build, folder.path(), &options).unwrap();
+    // Four presses of two depths, four of three, one of them failed.
+    assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
+    assert_eq!((report.samples_due, report.failed.len()), (20, 1));
+    let manifest = Dataset::open(folder.path()).unwrap().manifest().clone();
+    let planned = presses(&spec);
+    for entry in &manifest.presses {
+        assert_eq!(entry.indenter, planned[entry.id].indenter);
+        assert_eq!(entry.offset_mm, planned[entry.id].offset_mm);
+    }
+    assert_eq!(manifest.failed[0].indenter, planned[manifest.failed[0].id].indenter);
+    let stats = stats(folder.path(), None).unwrap();
+    assert_eq!(stats.indenters.values().sum::<usize>(), 7);
+    assert!(stats.to_string().contains("ball"));
 }
 
 #[test]
@@ -250,22 +350,56 @@ fn shipped_campaigns_are_readable() {
     let s1 = CampaignSpec::read(&folder.join("s1.toml")).unwrap();
     assert_eq!((s1.samples(), s1.test_fraction.to_bits()), (1000, 0.2f64.to_bits()));
     assert_eq!(CampaignSpec::read(&folder.join("smoke.toml")).unwrap().density, Density::Coarse);
+    let broad = CampaignSpec::read(&folder.join("broad.toml")).unwrap();
+    let held_out = CampaignSpec::read(&folder.join("heldout.toml")).unwrap();
+    let shapes = |spec: &CampaignSpec| -> BTreeSet<String> {
+        presses(spec).into_iter().map(|p| p.shape).collect()
+    };
+    for shape in ["plate", "sphere", "cylinder", "punch", "grating"] {
+        assert!(shapes(&broad).contains(shape), "{shape}");
+    }
+    for shape in ["wedge", "ring", "dots"] {
+        assert!(shapes(&held_out).contains(shape), "{shape}");
+    }
+    assert!(shapes(&broad).is_disjoint(&shapes(&held_out)), "no held-out shape is seen");
+}
+
+fn several_with(change: fn(&mut Candidate)) -> CampaignSpec {
+    let mut spec = several();
+    change(&mut spec.indenters[1]);
+    spec
+}
+
+fn bad_depths() -> Option<DepthRange> {
+    Some(DepthRange { deepest_mm: [0.0, 1.0], states: 2 })
 }
 
 #[test]
 fn senseless_campaigns_are_refused_by_field() {
     type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 7] = [
-        (|s| s.effects.push("viscoelastic".into()), "effects"),
+    let cases: [(Spoil, &str); 15] = [
+        (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
+        (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
+        (|s| s.indenter = None, "indenter"),
+        (|s| s.depths = Some(DepthRange { deepest_mm: [1.0, 2.0], states: 2 }), "depths"),
+        (|s| s.offset_mm[1] = [2.0, -2.0], "offset_mm"),
+        (
+            |s| *s = CampaignSpec { indenter: Some(IndenterSpec::default()), ..several() },
+            "indenters",
+        ),
+        (|s| *s = several_with(|c| c.share = 0), "indenters[1].share"),
+        (|s| *s = several_with(|c| c.name = "plate".into()), "indenters[1].name"),
+        (|s| *s = several_with(|c| c.depths = bad_depths()), "indenters[1].depths.deepest_mm"),
         (|s| s.presses = 0, "presses"),
         (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
         (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
         (|s| s.test_fraction = 1.0, "test_fraction"),
         (
             |s| {
-                s.indenter = IndenterSpec::Plate { size_mm: [20.0, 20.0], edge_radius_mm: 11.0 };
+                let plate = Plate { edge_radius_mm: 11.0, ..Plate::default() };
+                s.indenter = Some(IndenterSpec::Plate(plate));
             },
-            "edge_radius_mm",
+            "indenter.edge_radius_mm",
         ),
         (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
     ];

@@ -1,11 +1,12 @@
 //! `generate`: a campaign of presses into a dataset.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign::{self, BoxError, CampaignSpec, PressSolver, RunOptions};
+use crate::campaign::{self, BoxError, CampaignSpec, Press, PressSolver, RunOptions};
 use crate::dataset::BALANCE_RELATIVE_MAX;
 use crate::press::body::Body;
 use crate::press::drive::{Approach, Drive};
-use crate::press::record::{IncrementRecord, Pose};
+use crate::press::record::IncrementRecord;
+use crate::press::setup::Setup;
 use crate::solve::{Options, Solver, StepReport};
 use anyhow::Context as _;
 use std::num::NonZero;
@@ -32,24 +33,28 @@ pub(super) struct Args {
     json: bool,
 }
 
-struct PlateSolver<'a> {
-    finger: &'a Body,
+struct BodySolver<'a> {
+    body: &'a Body,
     solver: Solver<'a>,
-    plate: Approach,
+    approaches: &'a [Approach],
 }
 
-impl PressSolver for PlateSolver<'_> {
-    fn solve(&mut self, pose: Pose, depths_mm: &[f64]) -> Result<Vec<IncrementRecord>, BoxError> {
-        let mut records = Vec::with_capacity(depths_mm.len());
+impl PressSolver for BodySolver<'_> {
+    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError> {
+        let approach = Approach {
+            pose: press.pose,
+            offset_mm: press.offset_mm,
+            ..self.approaches[press.candidate].clone()
+        };
+        let drive = Drive::Depths(press.depths_mm.clone());
+        let mut records = Vec::with_capacity(press.depths_mm.len());
         // The states are the same on a finer path; the work integral, which is
         // one of their checks, is better.
         for refinement in [1, 2, 4] {
             records.clear();
             let mut keep =
                 |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| records.push(r.clone());
-            let approach = Approach { pose, ..self.plate.clone() };
-            let drive = Drive::Depths(depths_mm.to_vec());
-            self.finger.press(&mut self.solver, &approach, &drive, refinement, &mut keep)?;
+            self.body.press(&mut self.solver, &approach, &drive, refinement, &mut keep)?;
             if records.iter().all(|r| r.checks.energy_vs_work <= BALANCE_RELATIVE_MAX) {
                 break;
             }
@@ -60,18 +65,22 @@ impl PressSolver for PlateSolver<'_> {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let spec = CampaignSpec::read(&args.campaign)?;
-    let finger = Body::usual(spec.density)?;
-    let (atlas, _) = finger.atlas().context("a fingertip has an atlas patch")??;
+    let candidates = spec.candidates();
+    let first = candidates.first().context("a campaign has an indenter")?;
+    let Setup { body, approach, .. } = Setup::new(&spec.scene(first))?;
+    let (atlas, _) = body.atlas().context("a fingertip has an atlas patch")??;
     let options = RunOptions { threads: args.threads, ..RunOptions::default() };
-    let folder = args.campaign.parent().unwrap_or(std::path::Path::new(""));
-    let plate = Approach {
-        shape: spec.indenter.build(folder)?,
-        top_mm: spec.indenter.top_mm(),
-        ..Approach::plate(Pose::default())
-    };
-    let solver = || -> Result<PlateSolver<'_>, BoxError> {
-        let solver = finger.solver(Options::default())?;
-        Ok(PlateSolver { finger: &finger, solver, plate: plate.clone() })
+    let mut approaches = Vec::new();
+    for candidate in &candidates {
+        approaches.push(Approach {
+            shape: candidate.indenter.build(&spec.folder)?,
+            top_mm: candidate.indenter.top_mm(),
+            ..approach.clone()
+        });
+    }
+    let solver = || -> Result<BodySolver<'_>, BoxError> {
+        let solver = body.solver(Options::default())?;
+        Ok(BodySolver { body: &body, solver, approaches: &approaches })
     };
     let report = campaign::run(&spec, &atlas, solver, &args.out, &options)?;
     print(&report, args.json, || report.to_string())?;

@@ -46,6 +46,8 @@ struct Increment {
     sed_dermis_j_per_m3_max: f64,
     sed_epidermis_j_per_m3_max: f64,
     stored_energy_mj: f64,
+    /// Share of the volume beyond the calibrated stretches of its law.
+    outside_calibration: f64,
     checks: Checks,
     effort: Effort,
     seconds: f64,
@@ -128,6 +130,7 @@ fn increment(record: &IncrementRecord, report: &StepReport) -> Increment {
         sed_dermis_j_per_m3_max: max(&record.sed_dermis_mpa),
         sed_epidermis_j_per_m3_max: max(&record.sed_epidermis_mpa),
         stored_energy_mj: report.stored_mj,
+        outside_calibration: record.outside_calibration,
         checks: record.checks,
         effort: report.effort,
         seconds: record.seconds,
@@ -166,10 +169,35 @@ fn write_maps(folder: &Path, atlas: &Atlas, records: &[IncrementRecord]) -> anyh
     npz.add("pressure_pa", &all(|r| &r.pressure_mpa)?)?;
     npz.add("sed_dermis_j_per_m3", &all(|r| &r.sed_dermis_mpa)?)?;
     npz.add("sed_epidermis_j_per_m3", &all(|r| &r.sed_epidermis_mpa)?)?;
+    if !deepest.shear_mpa.is_empty() {
+        write_shear(&mut npz, atlas, records)?;
+    }
     let depths: Vec<f32> = records.iter().map(|r| r.depth_mm as f32).collect();
     npz.add_slice("depth_mm", &[depths.len()], &depths)?;
     npz.write(&folder.join("maps.npz"))?;
     atomic::write(&folder.join("atlas.json"), atlas.to_json()?.as_bytes())?;
+    Ok(())
+}
+
+/// Shear traction of all states at the vertices, and of the deepest as three maps.
+fn write_shear(
+    npz: &mut NpzBuilder,
+    atlas: &Atlas,
+    records: &[IncrementRecord],
+) -> anyhow::Result<()> {
+    let pa = |v: &f64| (v * PA_PER_MPA) as f32;
+    let shear =
+        |r: &IncrementRecord| -> Vec<f32> { r.shear_mpa.as_flattened().iter().map(pa).collect() };
+    let all: Vec<f32> = records.iter().flat_map(shear).collect();
+    npz.add_slice("shear_pa", &[records.len(), atlas.vertex_count(), 3], &all)?;
+    let raster = Raster::new(atlas, Patch::Skin);
+    let mut maps = vec![0.0; 3 * MAP_LEN];
+    let deepest = records.last().map(shear).unwrap_or_default();
+    for (i, map) in maps.chunks_exact_mut(MAP_LEN).enumerate() {
+        let component: Vec<f32> = deepest.iter().skip(i).step_by(3).copied().collect();
+        raster.rasterise(&component, map)?;
+    }
+    npz.add_slice("shear_map", &[3, MAP_SIDE_PX, MAP_SIDE_PX], &maps)?;
     Ok(())
 }
 
@@ -201,6 +229,10 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
+        if i.outside_calibration > 0.0 {
+            let percent = 100.0 * i.outside_calibration;
+            text += &format!("         {percent:.2} % of the volume beyond calibrated stretches\n");
+        }
     }
     text + &format!("written to {}", out.display())
 }

@@ -57,6 +57,14 @@ pub fn fault(record: &IncrementRecord, vertex_count: usize) -> Option<String> {
             ));
         }
     }
+    let shear = record.shear_mpa.as_flattened();
+    if !shear.is_empty() && shear.len() != 3 * vertex_count {
+        let found = record.shear_mpa.len();
+        return Some(format!("shear_mpa has {found} values, not {vertex_count}"));
+    }
+    if let Some(vertex) = shear.iter().position(|v| !v.is_finite()) {
+        return Some(format!("shear_mpa is {} at vertex {}", shear[vertex], vertex / 3));
+    }
     None
 }
 
@@ -92,7 +100,7 @@ mod tests {
     fn each_limit_bites() {
         assert_eq!(fault(&record(1.0, 4), 4), None);
         type Spoil = fn(&mut IncrementRecord);
-        let cases: [(Spoil, &str); 9] = [
+        let cases: [(Spoil, &str); 11] = [
             (|r| r.checks.residual_relative = 1e-3, "residual_relative"),
             (|r| r.checks.contact_force_vs_pressure_integral = 6e-3, "pressure_integral"),
             (|r| r.checks.plate_vs_support_reaction = f64::NAN, "support_reaction"),
@@ -102,6 +110,8 @@ mod tests {
             (|r| r.pressure_mpa[2] = -1e-9, "vertex 2"),
             (|r| r.sed_dermis_mpa[0] = f64::INFINITY, "sed_dermis"),
             (|r| r.sed_epidermis_mpa.push(0.0), "has 5 values"),
+            (|r| r.shear_mpa = vec![[0.0; 3]; 3], "shear_mpa has 3 values"),
+            (|r| r.shear_mpa = vec![[0.0, f64::NAN, 0.0]; 4], "shear_mpa is NaN at vertex 0"),
         ];
         for (spoil, word) in cases {
             let mut bad = record(1.0, 4);

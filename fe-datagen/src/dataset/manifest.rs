@@ -97,9 +97,16 @@ pub struct PressEntry {
     pub split: Split,
     /// Samples D in the shard.
     pub samples: usize,
-    /// Orientation of the plate.
+    /// Name of the indenter in the campaign.
+    pub indenter: String,
+    /// Name of its shape.
+    pub shape: String,
+    /// Orientation of the indenter.
     #[serde(flatten)]
     pub pose: Pose,
+    /// Where the indenter's axis met the skin, mm along its own x and y from the
+    /// skin point that a flat plate would have touched first.
+    pub offset_mm: [f64; 2],
     /// The worst of each check over the samples.
     pub checks: Checks,
 }
@@ -109,9 +116,15 @@ pub struct PressEntry {
 pub struct FailedPress {
     /// Number within the campaign.
     pub id: usize,
-    /// Orientation of the plate.
+    /// Name of the indenter in the campaign.
+    pub indenter: String,
+    /// Name of its shape.
+    pub shape: String,
+    /// Orientation of the indenter.
     #[serde(flatten)]
     pub pose: Pose,
+    /// Where the indenter's axis meets the skin, mm, as in [`PressEntry`].
+    pub offset_mm: [f64; 2],
     /// The solver's own words.
     pub error: String,
 }

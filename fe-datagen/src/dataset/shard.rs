@@ -4,7 +4,7 @@ use super::{DatasetError, fault, worst_checks};
 use crate::output::atomic;
 use crate::output::npz::{NpzArrays, NpzBuilder};
 use crate::press::record::{Checks, IncrementRecord};
-use ndarray::{Array1, Array2, Ix1, Ix2};
+use ndarray::{Array1, Array2, Array3, Ix1, Ix2, Ix3};
 use papilla_proto::atlas::{Atlas, Patch, Raster};
 use std::path::Path;
 
@@ -57,6 +57,12 @@ pub struct Shard {
     pub force_n: Array2<f32>,
     /// Self-checks \[D, 11\], see [`CHECK_COLUMNS`].
     pub checks: Array2<f64>,
+    /// Shear traction of the indenter on the skin in the finger's frame, Pa
+    /// \[D, V, 3\]; only with friction.
+    pub shear_pa: Option<Array3<f32>>,
+    /// Share of the volume beyond the calibrated stretches of its law \[D\]; only if
+    /// a sample has any.
+    pub outside_calibration: Option<Array1<f32>>,
 }
 
 /// A shard ready to be written, and what the manifest says of it.
@@ -112,6 +118,13 @@ pub fn encode(
     npz.add_slice("depth_mm", &[d], &depth)?;
     npz.add_slice("force_n", &[d, 3], &force)?;
     npz.add_slice("checks", &[d, CHECK_COLUMNS.len()], &check_rows)?;
+    if kept.iter().any(|r| !r.shear_mpa.is_empty()) {
+        npz.add_slice("shear_pa", &[d, v, 3], &field(|r| r.shear_mpa.as_flattened()))?;
+    }
+    if kept.iter().any(|r| r.outside_calibration > 0.0) {
+        let share: Vec<f32> = kept.iter().map(|r| r.outside_calibration as f32).collect();
+        npz.add_slice("outside_calibration", &[d], &share)?;
+    }
     Ok(Ok(Encoded {
         bytes: npz.finish()?,
         samples: d,
@@ -130,6 +143,7 @@ impl Shard {
     /// [`DatasetError::Mismatch`] when the shapes do not fit together.
     pub fn decode(path: &Path, bytes: &[u8], vertex_count: usize) -> Result<Self, DatasetError> {
         let mut npz = NpzArrays::new(path, bytes)?;
+        let (rubs, flagged) = (npz.has("shear_pa")?, npz.has("outside_calibration")?);
         let shard = Self {
             pressure_pa: npz.get::<f32, Ix2>("pressure_pa")?,
             sed_dermis_j_per_m3: npz.get::<f32, Ix2>("sed_dermis_j_per_m3")?,
@@ -137,8 +151,14 @@ impl Shard {
             depth_mm: npz.get::<f32, Ix1>("depth_mm")?,
             force_n: npz.get::<f32, Ix2>("force_n")?,
             checks: npz.get::<f64, Ix2>("checks")?,
+            shear_pa: rubs.then(|| npz.get::<f32, Ix3>("shear_pa")).transpose()?,
+            outside_calibration: flagged
+                .then(|| npz.get::<f32, Ix1>("outside_calibration"))
+                .transpose()?,
         };
         let d = shard.depth_mm.len();
+        let by_sample = |a: &Array1<f32>| (a.len(), 1);
+        let by_vertex = |a: &Array3<f32>| (a.dim().0, a.len() / d.max(1));
         let shapes = [
             ("shape of pressure_pa", shard.pressure_pa.dim(), (d, vertex_count)),
             ("shape of sed_dermis_j_per_m3", shard.sed_dermis_j_per_m3.dim(), (d, vertex_count)),
@@ -149,6 +169,16 @@ impl Shard {
             ),
             ("shape of force_n", shard.force_n.dim(), (d, 3)),
             ("shape of checks", shard.checks.dim(), (d, CHECK_COLUMNS.len())),
+            (
+                "shape of shear_pa",
+                shard.shear_pa.as_ref().map_or((d, 3 * vertex_count), by_vertex),
+                (d, 3 * vertex_count),
+            ),
+            (
+                "shape of outside_calibration",
+                shard.outside_calibration.as_ref().map_or((d, 1), by_sample),
+                (d, 1),
+            ),
         ];
         for (what, found, expected) in shapes {
             if found != expected {
@@ -222,6 +252,23 @@ mod tests {
         assert_eq!(shard.pressure_pa[[1, 3]].to_bits(), expected.to_bits());
         assert_eq!(shard.checks[[0, 4]].to_bits(), records[0].checks.j_min.to_bits());
         assert!(Shard::decode(Path::new("x"), &encoded.bytes, 5).is_err());
+    }
+
+    #[test]
+    fn further_arrays_are_there_only_with_their_effects() {
+        let plain = encode(&[record(1.0, 4)], 4).unwrap().unwrap();
+        let plain = Shard::decode(Path::new("x"), &plain.bytes, 4).unwrap();
+        assert_eq!((plain.shear_pa, plain.outside_calibration), (None, None));
+        let mut records = [record(0.5, 4), record(1.0, 4)];
+        for r in &mut records {
+            r.shear_mpa = vec![[1e-3, -2e-3, 0.0]; 4];
+        }
+        records[1].outside_calibration = 0.125;
+        let encoded = encode(&records, 4).unwrap().unwrap();
+        let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
+        assert_eq!(shard.outside_calibration.unwrap().to_vec(), [0.0, 0.125]);
+        let shear = shard.shear_pa.unwrap();
+        assert_eq!((shear.dim(), shear[[1, 3, 1]].to_bits()), ((2, 4, 3), (-2000f32).to_bits()));
     }
 
     #[test]

@@ -47,6 +47,7 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
         let y = HEAD_PX + row * row_px;
         let lines = [
             format!("press {}", press.id),
+            press.indenter.chars().take(14).collect(),
             format!("pitch {:.1}", press.pose.pitch_deg),
             format!("roll {:.1}", press.pose.roll_deg),
             format!("yaw {:.1}", press.pose.yaw_deg),

@@ -73,6 +73,8 @@ pub struct StatsReport {
     pub samples_test: usize,
     /// Bytes of all shards.
     pub shard_bytes: u64,
+    /// Presses by name of the indenter.
+    pub indenters: BTreeMap<String, usize>,
     /// Pitch over the presses, degrees.
     pub pitch_deg: Range,
     /// Roll over the presses, degrees.
@@ -94,6 +96,9 @@ pub struct StatsReport {
     /// Where the contact sheet was written, if one was asked for.
     pub contact_sheet: Option<PathBuf>,
 }
+
+/// Most depths that get a line of their own.
+const DEPTHS_MAX: usize = 40;
 
 /// The values of one sample that the table shows.
 struct Row {
@@ -124,11 +129,26 @@ pub fn stats(folder: &Path, sheet: Option<&Path>) -> Result<StatsReport, Dataset
             depths.entry(key).or_default().push(row(&shard, sample, &area_mm2));
         }
     }
+    let depths = grouped(depths);
     if let Some(path) = sheet {
         contact_sheet(&dataset, path)?;
     }
     let depths = depths.into_iter().filter_map(|(key, rows)| depth_stats(key, &rows)).collect();
     report(&dataset, depths, shard_bytes, sheet)
+}
+
+/// Depths that differ from press to press would make a line a sample: those are
+/// grouped by the nearest quarter of a millimetre.
+fn grouped(depths: BTreeMap<i64, Vec<Row>>) -> BTreeMap<i64, Vec<Row>> {
+    if depths.len() <= DEPTHS_MAX {
+        return depths;
+    }
+    let mut groups: BTreeMap<i64, Vec<Row>> = BTreeMap::new();
+    for (key, rows) in depths {
+        let group = (key as f64 / 0.25e6).round() as i64 * 250_000;
+        groups.entry(group).or_default().extend(rows);
+    }
+    groups
 }
 
 fn report(
@@ -156,6 +176,10 @@ fn report(
         samples_train,
         samples_test,
         shard_bytes,
+        indenters: m.presses.iter().fold(BTreeMap::new(), |mut count, p| {
+            *count.entry(p.indenter.clone()).or_default() += 1;
+            count
+        }),
         pitch_deg: range(|p| p.pose.pitch_deg)?,
         roll_deg: range(|p| p.pose.roll_deg)?,
         yaw_deg: range(|p| p.pose.yaw_deg)?,

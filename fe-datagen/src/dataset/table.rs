@@ -24,6 +24,8 @@ impl fmt::Display for StatsReport {
             short(&self.dataset_sha256),
             short(&self.atlas_hash)
         )?;
+        let indenters: Vec<_> = self.indenters.iter().map(|(n, c)| format!("{n} {c}")).collect();
+        writeln!(f, "indenters {}", indenters.join(", "))?;
         let pose = [("pitch", self.pitch_deg), ("roll", self.roll_deg), ("yaw", self.yaw_deg)];
         write!(f, "poses    ")?;
         for (name, range) in pose {

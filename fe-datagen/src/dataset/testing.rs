@@ -22,6 +22,8 @@ pub(crate) fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> In
         pressure_mpa: field(0.01),
         sed_dermis_mpa: field(0.002),
         sed_epidermis_mpa: field(0.003),
+        shear_mpa: Vec::new(),
+        outside_calibration: 0.0,
         checks: Checks {
             residual_relative: 1e-9,
             contact_force_vs_pressure_integral: 1e-4,

@@ -7,6 +7,9 @@
 //! [`IndenterSpec`](spec::IndenterSpec) makes it known to scenes.
 
 mod cylinder;
+mod dots;
+mod grating;
+mod heightmap;
 mod placed;
 mod plate;
 mod punch;
@@ -17,16 +20,23 @@ mod spec;
 mod sphere;
 #[cfg(test)]
 mod testing;
+mod touch;
+mod union;
 mod wedge;
 
 pub use cylinder::Cylinder;
+pub use dots::Dots;
+pub use grating::Grating;
+pub use heightmap::{HeightField, Heightmap};
 pub use placed::{Placed, Placement};
 pub use plate::{Plate, RoundedPlate};
 pub use punch::Punch;
 pub use ring::Ring;
 pub use rules::BadValue;
-pub use spec::{IndenterError, IndenterSpec, first_touch_travel};
+pub use spec::{IndenterError, IndenterSpec};
 pub use sphere::Sphere;
+pub use touch::first_touch_travel;
+pub use union::{AnyOf, Part, Union};
 pub use wedge::Wedge;
 
 /// Signed distance with its first two derivatives at a point.
@@ -49,4 +59,10 @@ pub trait SignedDistance: Send + Sync {
     /// How far the body goes along the unit vector `direction`, mm from the
     /// local origin (its support function); infinite where it has no end.
     fn reach_mm(&self, direction: [f64; 3]) -> f64;
+
+    /// A distance that is certainly free around `p`, mm; negative inside. The gap,
+    /// unless that is approximate.
+    fn clearance_mm(&self, p: [f64; 3]) -> f64 {
+        self.distance(p).gap_mm
+    }
 }

@@ -48,9 +48,20 @@ impl Placement {
     /// the world's origin.
     #[must_use]
     pub fn reach_mm(&self, indenter: &dyn SignedDistance, direction: [f64; 3]) -> f64 {
+        self.along_mm(direction, |d| indenter.reach_mm(d))
+    }
+
+    /// The same of anything that knows its `reach` along a local unit vector.
+    pub(super) fn along_mm(&self, direction: [f64; 3], reach: impl Fn([f64; 3]) -> f64) -> f64 {
         let o = self.origin_mm;
-        indenter.reach_mm(self.to_local(direction))
+        reach(self.to_local(direction))
             + (o[0] * direction[0] + o[1] * direction[1] + o[2] * direction[2])
+    }
+
+    /// [`SignedDistance::clearance_mm`] of a world point from a placed indenter.
+    #[must_use]
+    pub fn clearance_mm(&self, indenter: &dyn SignedDistance, p: [f64; 3]) -> f64 {
+        indenter.clearance_mm(self.to_local(std::array::from_fn(|i| p[i] - self.origin_mm[i])))
     }
 
     fn to_local(&self, v: [f64; 3]) -> [f64; 3] {
@@ -78,6 +89,10 @@ impl SignedDistance for Placed {
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         self.placement.reach_mm(self.part.as_ref(), direction)
+    }
+
+    fn clearance_mm(&self, p: [f64; 3]) -> f64 {
+        self.placement.clearance_mm(self.part.as_ref(), p)
     }
 }
 

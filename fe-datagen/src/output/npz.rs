@@ -105,6 +105,15 @@ impl<'a> NpzArrays<'a> {
         Ok(Self { path, reader })
     }
 
+    /// Whether there is an array of that name.
+    ///
+    /// # Errors
+    /// [`OutputError::Malformed`] when the archive cannot be read.
+    pub fn has(&mut self, name: &str) -> Result<bool, OutputError> {
+        let names = self.reader.names().map_err(|e| OutputError::malformed(self.path, &e))?;
+        Ok(names.iter().any(|n| n == name))
+    }
+
     /// Reads one array.
     ///
     /// # Errors

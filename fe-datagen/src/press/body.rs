@@ -237,9 +237,11 @@ impl Body {
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
-        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa) = Default::default();
+        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
+            Default::default();
         if let Some(p) = &self.patch {
             pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            shear_mpa = self.shear_mpa(solver, &p.patch.skin);
             let history = |block, element| solver.history_of(block, element);
             let body = Deformed {
                 mesh: &self.problem.mesh,
@@ -258,6 +260,8 @@ impl Body {
             pressure_mpa,
             sed_dermis_mpa,
             sed_epidermis_mpa,
+            shear_mpa,
+            outside_calibration: self.outside_calibration(solver),
             checks: Checks {
                 residual_relative: report.residual_relative,
                 contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),

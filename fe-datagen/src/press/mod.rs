@@ -6,6 +6,7 @@ pub mod fields;
 pub mod laws;
 pub mod record;
 pub mod setup;
+mod skin;
 pub mod study;
 
 #[cfg(test)]

@@ -46,6 +46,12 @@ pub struct IncrementRecord {
     pub sed_dermis_mpa: Vec<f64>,
     /// SED on the epidermis side at the interface patch's vertices, MPa; length V.
     pub sed_epidermis_mpa: Vec<f64>,
+    /// True shear traction of the indenter on the skin patch's vertices in the
+    /// finger's frame, MPa per deformed area; length V, empty without friction.
+    pub shear_mpa: Vec<[f64; 3]>,
+    /// Share of the volume that has left the stretches to which its law was fitted;
+    /// 0 for laws that hold anywhere.
+    pub outside_calibration: f64,
     /// Self-checks of this equilibrium.
     pub checks: Checks,
     /// Wall time of this increment, s.
