@@ -4,10 +4,14 @@ mod atlas;
 mod dataset;
 mod effects;
 mod explain;
+mod export;
 mod generate;
+mod lines;
+mod s2;
 mod schema;
 mod solve;
 mod verify;
+mod witness;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -35,7 +39,10 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    Export(export::Args),
+    Witness(witness::Args),
     Effects(effects::Args),
+    S2(s2::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -48,8 +55,11 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::S2(args) => s2::run(&args),
     };
     match result {
         Ok(code) => code,

@@ -3,11 +3,10 @@
 use super::revolved::{Rectangle, disc_reach_mm, revolve};
 use super::rules::{BadValue, length, rounding};
 use super::{Distance, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A cylinder along y, centred at the origin; its top is at `z = radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Cylinder {
     /// Radius, mm.

@@ -6,7 +6,6 @@ use super::rules::{BadValue, length, require};
 use super::sphere::Sphere;
 use super::union::nearer;
 use super::{Distance, RoundedPlate, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A grid of spherical caps on a plate; their tops are at `z = 0`, the plate's face at
@@ -16,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Service's Specification 800: dots 1.44 mm wide at the base and 0.48 mm high,
 /// 2.34 mm apart. Where a dot meets the plate the surface has a concave corner, and the
 /// gap a kink; skin that reaches there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dots {
     /// Dots along x and y.

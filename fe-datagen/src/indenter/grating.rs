@@ -4,7 +4,6 @@ use super::plate::THICKNESS_MM;
 use super::rules::{BadValue, length, require, rounding};
 use super::union::nearer;
 use super::{Distance, RoundedPlate, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parallel ridges along y on a base plate; their tops are at `z = 0`, the
@@ -13,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// The union of rounded bars with their base. Where a wall meets the floor of a groove
 /// the surface has a concave corner, and the gap a kink; skin that has closed a groove
 /// down to there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Grating {
     /// Number of ridges.

@@ -2,14 +2,13 @@
 
 use super::rules::{BadValue, lengths, require};
 use super::{Distance, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Thickness of what only has to be thick enough, mm beside its rounded edges.
 pub(super) const THICKNESS_MM: f64 = 4.0;
 
 /// A flat plate; the middle of its pressing face is at `z = 2 + edge_radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plate {
     /// Side lengths along x and y, mm.

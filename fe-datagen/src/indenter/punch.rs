@@ -3,12 +3,11 @@
 use super::revolved::{Rectangle, disc_reach_mm, revolve};
 use super::rules::{BadValue, length, rounding};
 use super::{Distance, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An upright cylinder with rounded rims; the middle of its flat end is the
 /// origin, its body below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Punch {
     /// Outer radius, mm.

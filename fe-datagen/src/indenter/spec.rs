@@ -5,13 +5,12 @@ use super::{
     Cylinder, Dots, Grating, Heightmap, Plate, Punch, Ring, RoundedPlate, SignedDistance, Sphere,
     Union, Wedge,
 };
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// An indenter as a scene describes it: `shape = "plate"` and its dimensions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "shape", rename_all = "snake_case")]
 pub enum IndenterSpec {
     /// Flat plate with rounded edges.

@@ -3,7 +3,6 @@
 use super::revolved::Flat;
 use super::rules::{BadValue, length, require, rounding};
 use super::{Distance, SignedDistance};
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A wedge along y, its tip at `z = 0`, its body below; symmetric about x = 0.
@@ -12,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// 1.0 mm at the base and 2.0 mm high. Its widths are those of the sharp
 /// section. All edges are rounded by `tip_radius_mm`, which leaves the height as
 /// it is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Wedge {
     /// Width at the tip, mm.

@@ -6,6 +6,7 @@ mod extrude;
 pub mod fingertip;
 pub mod gmsh;
 mod half_cube;
+mod mirror;
 mod nail;
 pub mod probe;
 #[cfg(test)]

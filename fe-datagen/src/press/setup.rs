@@ -1,6 +1,6 @@
 //! From a scene to a body and an indenter.
 
-use super::body::{Body, PressError};
+use super::body::{Body, PressError, SectionSpec};
 use super::drive::{Approach, Drive, DrivePoint};
 use super::laws::solids;
 use crate::element::ElementKind;
@@ -59,8 +59,15 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
             let mesh = build_block(&lattice, |p| p);
             Body::from_mesh(mesh, materials, &["z_max".into()], "z_min")
         }
+        Geometry::Section { density, order, extent, shape } => {
+            let mesh = SectionSpec { shape, density: *density, order: *order, extent: *extent };
+            Body::section(&mesh, materials, plan.parts)
+        }
         Geometry::Mesh { file, fixed, contact } => {
             let mesh = crate::mesh::gmsh::read_file(&scene.folder.join(file))?;
+            if mesh.is_planar() != plan.plane_strain {
+                return Err(PressError::Plane { file: file.clone(), planar: mesh.is_planar() });
+            }
             let mesh = crate::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
         }

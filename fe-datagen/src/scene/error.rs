@@ -60,6 +60,9 @@ pub enum SceneError {
     /// A material out of range.
     #[error(transparent)]
     Material(#[from] TissueError),
+    /// A section that contradicts itself.
+    #[error(transparent)]
+    Section(#[from] crate::geometry::section::SectionShapeError),
     /// An indenter out of range.
     #[error(transparent)]
     Indenter(#[from] IndenterError),
@@ -99,6 +102,7 @@ impl SceneError {
             Self::Material(e) => Some(material_field(e)),
             Self::Indenter(e) => Some(indenter_field(e)),
             Self::Shape(e) => Some(e.field()),
+            Self::Section(e) => Some(e.field()),
             Self::Located(e) => e.error.field(),
             _ => None,
         }

@@ -9,6 +9,7 @@ mod cook;
 mod coulomb;
 mod disc;
 mod finger;
+mod half_plane;
 mod hertz;
 mod increments;
 mod locking;
@@ -16,6 +17,7 @@ mod manufactured;
 mod mirror;
 mod ogden;
 mod patch;
+mod punch;
 mod relaxation;
 mod report;
 mod solid_parts;
@@ -107,6 +109,23 @@ pub const CASES: &[Case] = &[
         shows: "Friction: a block that is dragged slips with Coulomb's force and sticks as if \
                 glued.",
         run: coulomb::run,
+    },
+    Case {
+        name: "cylinder",
+        shows: "Line contact in plane strain: a rigid cylinder along a half-plane, half-width \
+                and pressure for its force.",
+        run: half_plane::cylinder,
+    },
+    Case {
+        name: "wedge",
+        shows: "A blunt wedge on a half-plane: half-width and pressure for its force.",
+        run: half_plane::wedge,
+    },
+    Case {
+        name: "punch",
+        shows: "A flat punch: force on a half-space, pressure on a half-plane and its growth \
+                at the edge as elements shrink.",
+        run: punch::run,
     },
     Case {
         name: "locking",
