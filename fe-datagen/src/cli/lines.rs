@@ -2,7 +2,7 @@
 
 use crate::output::OutputError;
 use crate::output::npz::NpzBuilder;
-use crate::output::plot::{Curve, Plot};
+use crate::output::plot::{Axis, Chart, Mark, Series, write_svg};
 use crate::press::body::Body;
 use crate::press::fields::PA_PER_MPA;
 use crate::press::record::IncrementRecord;
@@ -48,22 +48,17 @@ pub(super) fn write(
         ("sed", "SED at the interface, dermis side", "SED, J/m3", &interface, fields[1].1),
     ];
     for (stem, title, axis, places, get) in plots {
-        let curves = chosen(records.len())
-            .enumerate()
-            .map(|(color, i)| {
+        let series = chosen(records.len())
+            .map(|i| {
                 let values = get(&records[i]).iter().map(|v| v * PA_PER_MPA);
-                let points = places.iter().zip(values).map(|(p, v)| [p[0], v]).collect();
-                Curve { name: label(&records[i]), points, color, dashed: false }
+                let points = places.iter().zip(values).map(|(p, v)| (p[0], v)).collect();
+                Series { name: label(&records[i]), points, mark: Mark::Line }
             })
             .collect();
-        let mut plot = Plot {
-            title: title.into(),
-            axes: ["x, mm".into(), axis.into()],
-            curves,
-            ..Plot::default()
-        };
-        trim(&mut plot);
-        plot.write(&folder.join(stem).with_extension("svg"))?;
+        let mut chart =
+            Chart { title: title.into(), x: Axis::linear("x, mm"), y: Axis::linear(axis), series };
+        trim(&mut chart);
+        write_svg(&folder.join(stem).with_extension("svg"), &chart)?;
     }
     Ok(())
 }
@@ -76,12 +71,12 @@ fn chosen(states: usize) -> impl Iterator<Item = usize> {
 
 /// Leaves out what lies beyond 1.2 times the farthest x with more than 1 % of the
 /// largest value.
-fn trim(plot: &mut Plot) {
-    let points = || plot.curves.iter().flat_map(|c| &c.points);
-    let largest = points().map(|p| p[1]).fold(0.0, f64::max);
-    let far = points().filter(|p| p[1] > 0.01 * largest).map(|p| p[0].abs()).fold(0.0, f64::max);
-    for curve in &mut plot.curves {
-        curve.points.retain(|p| p[0].abs() <= 1.2 * far);
+fn trim(chart: &mut Chart) {
+    let points = || chart.series.iter().flat_map(|s| &s.points);
+    let largest = points().map(|p| p.1).fold(0.0, f64::max);
+    let far = points().filter(|p| p.1 > 0.01 * largest).map(|p| p.0.abs()).fold(0.0, f64::max);
+    for series in &mut chart.series {
+        series.points.retain(|p| p.0.abs() <= 1.2 * far);
     }
 }
 
@@ -98,12 +93,16 @@ mod tests {
     }
 
     #[test]
-    fn a_plot_shows_what_is_pressed() {
-        let points = (0..=80).map(|k| 0.1 * f64::from(k)).map(|x| [x, (-4.0 * x).exp()]).collect();
-        let curve = Curve { name: String::new(), points, color: 0, dashed: false };
-        let mut plot = Plot { curves: vec![curve], ..Plot::default() };
-        trim(&mut plot);
-        let end = plot.curves[0].points.last().unwrap()[0];
+    fn a_chart_shows_what_is_pressed() {
+        let points = (0..=80).map(|k| 0.1 * f64::from(k)).map(|x| (x, (-4.0 * x).exp())).collect();
+        let mut chart = Chart {
+            title: String::new(),
+            x: Axis::linear(""),
+            y: Axis::linear(""),
+            series: vec![Series { name: String::new(), points, mark: Mark::Line }],
+        };
+        trim(&mut chart);
+        let (end, _) = chart.series[0].points[chart.series[0].points.len() - 1];
         assert!(end > 1.2 && end < 1.5, "{end}");
     }
 }

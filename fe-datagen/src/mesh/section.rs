@@ -31,7 +31,9 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// How much of the section is meshed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Extent {
     /// `x >= 0`, for what is symmetric about `x = 0`. Forces and energies are
@@ -56,23 +58,25 @@ struct Resolution {
 }
 
 impl Resolution {
+    /// The epidermis' intervals are even: finer ones at the skin are crushed first
+    /// under a tip that presses it to a fifth of its thickness.
     fn new(density: Density) -> Self {
         match density {
             Density::Coarse => Self {
-                layers: [(4, 0.14), (4, 0.1), (8, 0.06), (2, 0.5)],
+                layers: [(4, 0.25), (4, 0.1), (8, 0.06), (2, 0.5)],
                 first: (0.025, 4),
                 growth: 1.3,
                 largest_mm: 0.8,
             },
             Density::Medium => Self {
-                layers: [(8, 0.0625), (8, 0.05), (16, 0.03), (4, 0.25)],
-                first: (0.0125, 8),
+                layers: [(8, 0.125), (8, 0.05), (16, 0.03), (4, 0.25)],
+                first: (0.025, 4),
                 growth: 1.15,
                 largest_mm: 0.4,
             },
             Density::Fine => Self {
-                layers: [(16, 0.03), (16, 0.025), (32, 0.015), (8, 0.125)],
-                first: (0.006_25, 16),
+                layers: [(16, 0.0625), (16, 0.025), (32, 0.015), (8, 0.125)],
+                first: (0.0125, 8),
                 growth: 1.075,
                 largest_mm: 0.2,
             },
@@ -212,12 +216,7 @@ struct Grid {
 const LAYERS: [Tissue; 4] = [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous, Tissue::Bone];
 
 impl Grid {
-    fn new(
-        shape: &SectionShape,
-        parts: Parts,
-        resolution: &Resolution,
-        kind: ElementKind,
-    ) -> Self {
+    fn new(shape: &SectionShape, parts: Parts, resolution: &Resolution, kind: ElementKind) -> Self {
         let step = kind.order();
         let edge_mm = shape.arc_mm(shape.nail_angle());
         let nail_mm = shape.arc_mm(PI) - edge_mm;

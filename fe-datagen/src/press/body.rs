@@ -2,16 +2,15 @@
 
 use super::record::{Checks, IncrementRecord, Pose};
 use crate::atlas::{AtlasReport, BuildAtlasError, build_atlas};
-use crate::element::{ElementKind, Inverted};
+use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
-use crate::geometry::section::SectionShape;
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::sample::Deformed;
-use crate::mesh::section::{Extent, SectionMeshError};
+use crate::mesh::section::SectionMeshError;
 use crate::mesh::surface::norm;
-use crate::mesh::{self, Mesh, Tissue};
+use crate::mesh::{Mesh, Tissue};
 use crate::scene::error::{indenter_field, material_field};
 use crate::scene::{Located, Scene, SceneError, TissueError};
 use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
@@ -140,19 +139,6 @@ pub struct PressedPatch {
     epidermis: SedRecovery,
 }
 
-/// A cross-section and how it is meshed.
-#[derive(Clone, Copy, Debug)]
-pub struct SectionSpec<'a> {
-    /// Dimensions.
-    pub shape: &'a SectionShape,
-    /// Mesh density.
-    pub density: Density,
-    /// Element order.
-    pub order: Order,
-    /// Half or whole.
-    pub extent: Extent,
-}
-
 impl Body {
     /// Meshes a fingertip and holds what carries it.
     ///
@@ -186,28 +172,8 @@ impl Body {
         Self::with_patch(mesh, materials, fixed, patch, false)
     }
 
-    /// Meshes a cross-section of the fingertip, with its supports.
-    ///
-    /// # Errors
-    /// See [`PressError`].
-    pub fn section(
-        spec: &SectionSpec<'_>,
-        materials: Materials,
-        parts: Parts,
-    ) -> Result<Self, PressError> {
-        let kind = match spec.order {
-            Order::Linear => ElementKind::Quad4,
-            Order::Quadratic => ElementKind::Quad9,
-        };
-        let section = mesh::section::build(spec.shape, parts, spec.density, kind, spec.extent)?;
-        let (fixed, mesh) = (section.fixed(), section.mesh);
-        let [skin, interface] = ["skin", "interface"].map(|name| mesh.surfaces[name].walk());
-        let patch = Patch { skin, interface, triangles: Vec::new() };
-        Self::with_patch(mesh, materials, fixed, patch, true)
-    }
-
     /// A body with layers, of which pressure and SED are read at vertices.
-    fn with_patch(
+    pub(super) fn with_patch(
         mesh: Mesh,
         materials: Materials,
         fixed: Vec<bool>,

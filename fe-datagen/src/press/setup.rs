@@ -1,8 +1,9 @@
 //! From a scene to a body and an indenter.
 
-use super::body::{Body, PressError, SectionSpec};
+use super::body::{Body, PressError};
 use super::drive::{Approach, Drive, DrivePoint};
 use super::laws::solids;
+use super::section::SectionSpec;
 use crate::element::ElementKind;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::block::{BlockLattice, build as build_block, even};

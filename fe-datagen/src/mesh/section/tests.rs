@@ -100,7 +100,7 @@ fn surfaces_are_walked_along_the_skin() {
 fn the_tip_and_the_layers_are_resolved() {
     let shape = SectionShape::default();
     for (density, under_tip, through) in
-        [(Density::Coarse, 2, 2), (Density::Medium, 3, 4), (Density::Fine, 5, 8)]
+        [(Density::Coarse, 2, 2), (Density::Medium, 2, 4), (Density::Fine, 3, 8)]
     {
         let kind = ElementKind::Quad9;
         let mesh = build(&shape, Parts::default(), density, kind, Extent::Half).unwrap().mesh;

@@ -27,8 +27,10 @@ fn fits(scene: &Scene) -> Result<(), &'static str> {
     let aside = |[x, y]: [f64; 2]| (x != 0.0, y != 0.0);
     let moves: Vec<_> = shifts().chain([motion.offset_mm]).map(aside).collect();
     if motion.roll_deg != 0.0 || motion.yaw_deg != 0.0 || moves.iter().any(|m| m.1) {
-        return Err("is in a plane: leave out motion.roll_deg, yaw_deg and every second component \
-                    of offset_mm and shift_mm");
+        return Err(
+            "is in a plane: leave out motion.roll_deg, yaw_deg and every second component \
+                    of offset_mm and shift_mm",
+        );
     }
     if half && (motion.pitch_deg != 0.0 || moves.iter().any(|m| m.0)) {
         return Err("of half a section needs a press along its axis of symmetry: give \
