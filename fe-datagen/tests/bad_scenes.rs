@@ -99,6 +99,21 @@ fn an_indenter_that_starts_inside_the_finger() {
 }
 
 #[test]
+fn an_indenter_that_makes_no_sense_or_goes_by() {
+    let with = |table: &str| format!("{FINGER}\n[indenter]\n{table}\n");
+    let text = with("shape = \"sphere\"\nradius_mm = -3.0");
+    assert_refused(&text, 12, &["indenter.radius_mm = -3.0", "positive"]);
+    assert_refused(&with("shape = \"cube\""), 11, &["indenter.shape", "`sphere`"]);
+    assert_refused(&with("shape = \"sphere\"\nradius = 3.0"), 12, &["did you mean `radius_mm`"]);
+    let text =
+        with("shape = \"heightmap\"\nfile = \"none.png\"\nsize_mm = [9.0, 9.0]\nheight_mm = 1.0");
+    assert_refused(&text, 12, &["none.png"]);
+    let text = with("shape = \"sphere\"\nradius_mm = 2.0")
+        .replace("depth_mm = 1.0", "depth_mm = 1.0\noffset_mm = [0.0, 60.0]");
+    assert_refused(&text, 9, &["never meets the body", "motion.offset_mm"]);
+}
+
+#[test]
 fn a_cortex_that_fills_the_bone() {
     let text = format!("{FINGER}\n[geometry.shape]\nbone_cortex_mm = 3.0\n")
         .replace("\"layers\"", "\"elastic_bone\"");

@@ -2,6 +2,7 @@
 
 use super::materials::TissueError;
 use super::origin::{Located, Origin, Place};
+use crate::indenter::IndenterError;
 use crate::material::spec::MaterialError;
 use std::path::PathBuf;
 
@@ -64,7 +65,7 @@ pub enum SceneError {
     Section(#[from] crate::geometry::section::SectionShapeError),
     /// An indenter out of range.
     #[error(transparent)]
-    Indenter(#[from] crate::indenter::IndenterError),
+    Indenter(#[from] IndenterError),
     /// A fingertip whose dimensions make no sense.
     #[error(transparent)]
     Shape(#[from] crate::geometry::fingertip::FingertipShapeError),
@@ -151,11 +152,15 @@ pub(crate) fn material_field(error: &TissueError) -> String {
     format!("materials.{}{field}", error.tissue)
 }
 
-/// The field that an indenter's error is about: its message starts with it.
-pub(crate) fn indenter_field(error: &crate::indenter::IndenterError) -> String {
-    let message = error.to_string();
-    let first = message.split([' ', ':', ',']).next().unwrap_or_default();
-    if first.starts_with("indenter.") { first.into() } else { "indenter".into() }
+/// The field that an indenter's error is about.
+pub(crate) fn indenter_field(error: &IndenterError) -> String {
+    match error {
+        IndenterError::Value(e) => e.field.clone(),
+        IndenterError::Picture { .. } => "indenter.file".into(),
+        IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
+            "motion.offset_mm".into()
+        }
+    }
 }
 
 /// `Ok` if a value keeps its rule.
