@@ -84,9 +84,8 @@ fn a_negative_thickness() {
 
 #[test]
 fn an_incompressible_tissue() {
-    let text = format!(
-        "{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"
-    );
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n");
     assert_refused(&text, 12, &["materials.dermis: Poisson's ratio 0.5", "0.49 to 0.4999"]);
 }
 
@@ -97,6 +96,21 @@ fn an_indenter_that_starts_inside_the_finger() {
         "path = [\n  { time_s = 0.0, depth_mm = 0.5 },\n  { time_s = 1.0, depth_mm = 1.0 },\n]",
     );
     assert_refused(&text, 9, &["motion.path[0].depth_mm", "inside the finger", "later time_s"]);
+}
+
+#[test]
+fn an_indenter_that_makes_no_sense_or_goes_by() {
+    let with = |table: &str| format!("{FINGER}\n[indenter]\n{table}\n");
+    let text = with("shape = \"sphere\"\nradius_mm = -3.0");
+    assert_refused(&text, 12, &["indenter.radius_mm = -3.0", "positive"]);
+    assert_refused(&with("shape = \"cube\""), 11, &["indenter.shape", "`sphere`"]);
+    assert_refused(&with("shape = \"sphere\"\nradius = 3.0"), 12, &["did you mean `radius_mm`"]);
+    let text =
+        with("shape = \"heightmap\"\nfile = \"none.png\"\nsize_mm = [9.0, 9.0]\nheight_mm = 1.0");
+    assert_refused(&text, 12, &["none.png"]);
+    let text = with("shape = \"sphere\"\nradius_mm = 2.0")
+        .replace("depth_mm = 1.0", "depth_mm = 1.0\noffset_mm = [0.0, 60.0]");
+    assert_refused(&text, 9, &["never meets the body", "motion.offset_mm"]);
 }
 
 #[test]
@@ -113,9 +127,8 @@ fn missing_and_absurd_units() {
     assert_refused(&of_motion("depth_mm = \"1 mm\""), 8, &["motion.depth_mm", "bare number"]);
     assert_refused(&of_motion("depth_mm = 1000.0"), 8, &["motion.depth_mm", "at most 100 mm"]);
     assert_refused(&of_motion("force_n = 1e6"), 8, &["motion.force_n", "at most 1000 N"]);
-    let text = format!(
-        "{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.48\n"
-    );
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.48\n");
     assert_refused(&text, 11, &["materials.dermis", "80000 MPa", "was Pa meant?"]);
     let text = format!("{FINGER}\n[geometry.shape]\nepidermis_mm = 200.0\n");
     assert_refused(&text, 11, &["geometry.shape.epidermis_mm = 200 mm", "at most 100"]);

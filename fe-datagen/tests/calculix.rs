@@ -61,11 +61,17 @@ layers = [{ tissue = \"dermis\", thickness_mm = 2.0, elements = 2 }]
 /// What CalculiX cannot express is named, with the cure, and nothing is written.
 #[test]
 fn what_calculix_cannot_express_is_refused() {
-    let four = "[materials.dermis.ogden]\nmu_mpa = [0.01, 0.01, 0.01, 0.01]\nalpha = [2.0, 3.0, 4.0, 5.0]";
+    let four =
+        "[materials.dermis.ogden]\nmu_mpa = [0.01, 0.01, 0.01, 0.01]\nalpha = [2.0, 3.0, 4.0, 5.0]";
     let path = "path = [{ time_s = 1.0, depth_mm = 0.2 }]";
     let cases = [
         ("[\"finite_strain\", \"viscoelastic\"]", path, "", "reads *VISCOELASTIC and ignores it"),
-        ("[\"finite_strain\", \"friction\"]", "depth_mm = 0.2", "[friction]\ncoefficient = 0.5", "friction"),
+        (
+            "[\"finite_strain\", \"friction\"]",
+            "depth_mm = 0.2",
+            "[friction]\ncoefficient = 0.5",
+            "friction",
+        ),
         ("[\"finite_strain\"]", "force_n = 0.2", "", "motion.force_n"),
         ("[\"finite_strain\"]", "depth_mm = 0.2", "[indenter]\nshape = \"ring\"", "'ring'"),
         (
@@ -103,7 +109,8 @@ fn paths_and_ogden_laws_are_expressed() {
     let deck = std::fs::read_to_string(&out).unwrap();
     let points = |name: &str| -> Vec<(f64, f64)> {
         let rows = data(&deck, &format!("*AMPLITUDE, NAME={name}"));
-        let pair = |l: &&str| l.split_once(',').map(|(t, v)| (t.parse().unwrap(), v.parse().unwrap()));
+        let pair =
+            |l: &&str| l.split_once(',').map(|(t, v)| (t.parse().unwrap(), v.parse().unwrap()));
         rows.iter().filter_map(pair).collect()
     };
     assert_eq!(points("ALONG1"), [(0.0, 0.0), (0.25, 0.0), (1.0, 1.0)]);

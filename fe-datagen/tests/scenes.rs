@@ -15,13 +15,15 @@ fn root() -> PathBuf {
 #[test]
 fn every_scene_is_read() {
     let files = std::fs::read_dir(root().join("scenes")).unwrap();
-    let scenes = files.map(|f| f.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml"));
+    let scenes =
+        files.map(|f| f.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "toml"));
     let read = scenes.map(|path| Scene::read(&path).unwrap_or_else(|e| panic!("{e}"))).count();
     assert!(read >= 3);
 }
 
 /// What an example that shows only some tables leaves out.
-const REST: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\ndepth_mm = 1.0\n";
+const REST: &str =
+    "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\ndepth_mm = 1.0\n";
 
 /// Puts what `whole` has and the example lacks into the example, table by table.
 fn complete(example: &mut Table, whole: &Table) {

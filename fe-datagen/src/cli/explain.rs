@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 fn why_not(effect: &Effect, scene: &Scene) -> String {
     let missing: Vec<_> = effect.needs.iter().filter(|n| !scene.has(n)).copied().collect();
     match (effect.fits)(scene) {
-        Err(cannot) => format!("not named, and this scene cannot have it: {cannot}"),
+        Err(cannot) => format!("not named, nor possible as the scene stands: {cannot}"),
         Ok(()) if missing.is_empty() => "not named in effects".into(),
         Ok(()) => format!("not named in effects; it needs {} too", missing.join(", ")),
     }
@@ -143,7 +143,7 @@ fn human(e: &Explanation) -> String {
         e.motion
     );
     for on in &e.simulated {
-        text += &format!("  {:14} {}: {} {}\n", on.effect, on.adds, on.state, on.state_is);
+        text += &format!("  {:14} {} ({} {})\n", on.effect, on.adds, on.state, on.state_is);
     }
     text += "left out\n";
     for off in &e.left_out {

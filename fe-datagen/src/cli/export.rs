@@ -12,10 +12,8 @@ use std::process::ExitCode;
 /// prints displacement, reactions, strain, stress and contact at the stored
 /// states. What CalculiX cannot express is an error.
 #[derive(clap::Args)]
-#[command(
-    after_help = "Run it with `ccx -i FILE` without the ending.\n\
-                  Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp"
-)]
+#[command(after_help = "Run it with `ccx -i FILE` without the ending.\n\
+                  Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp")]
 pub(super) struct Args {
     /// Scene file (see scenes/ and docs/scenes.md).
     scene: PathBuf,

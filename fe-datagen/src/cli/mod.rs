@@ -6,6 +6,8 @@ mod effects;
 mod explain;
 mod export;
 mod generate;
+mod lines;
+mod s2;
 mod schema;
 mod solve;
 mod verify;
@@ -40,6 +42,7 @@ enum Command {
     Export(export::Args),
     Witness(witness::Args),
     Effects(effects::Args),
+    S2(s2::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -56,6 +59,7 @@ pub fn run() -> ExitCode {
         Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::S2(args) => s2::run(&args),
     };
     match result {
         Ok(code) => code,

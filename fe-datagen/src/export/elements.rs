@@ -160,7 +160,8 @@ mod tests {
     fn sides_of_quadrilaterals_are_numbered_around() {
         let (axes, layers) = ([even(1.0, 2), even(1.0, 2), vec![0.0]], vec![Tissue::Dermis]);
         for kind in [ElementKind::Quad8, ElementKind::Quad9] {
-            let mesh = build(&BlockLattice { axes: axes.clone(), layers: layers.clone(), kind }, |p| p);
+            let mesh =
+                build(&BlockLattice { axes: axes.clone(), layers: layers.clone(), kind }, |p| p);
             for (i, side) in ["y_min", "x_max", "y_max", "x_min"].iter().enumerate() {
                 let found = element_faces(&mesh, ElementTypes::default(), &mesh.surfaces[*side]);
                 assert_eq!(found, Ok(vec![(1, i + 1)]), "{kind:?} {side}");

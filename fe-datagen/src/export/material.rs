@@ -319,20 +319,13 @@ mod tests {
         let values: Vec<f64> = fields.map(|f| f.parse().unwrap()).collect();
         assert_eq!(values[6..], [2.0 / 1.6, NO_ENERGY, NO_ENERGY]);
         let neo = MaterialCard::NeoHookean { mu_mpa: 0.5, bulk_mpa: 4.0 }.cards();
-        assert_eq!(
-            neo,
-            "*HYPERELASTIC, NEO HOOKE\n2.500000000000E-1,5.000000000000E-1\n"
-        );
+        assert_eq!(neo, "*HYPERELASTIC, NEO HOOKE\n2.500000000000E-1,5.000000000000E-1\n");
     }
 
     #[test]
     fn what_calculix_would_misread_is_refused() {
         let incompressible = MaterialCard::NeoHookean { mu_mpa: 0.5, bulk_mpa: f64::INFINITY };
-        let four = MaterialCard::Ogden {
-            mu_mpa: vec![0.1; 4],
-            alpha: vec![2.0; 4],
-            bulk_mpa: 1.0,
-        };
+        let four = MaterialCard::Ogden { mu_mpa: vec![0.1; 4], alpha: vec![2.0; 4], bulk_mpa: 1.0 };
         let half = MaterialCard::Linear { youngs_modulus_mpa: 1.0, poissons_ratio: 0.5 };
         for card in [incompressible, four, half] {
             let message = card.check("dermis").unwrap_err().to_string();

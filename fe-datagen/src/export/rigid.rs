@@ -168,11 +168,7 @@ impl Rolled {
         };
         let normal = unit([u.angle.tan(), v.angle.tan(), 1.0]);
         let out = self.radius_mm - thickness * (1.0 - level);
-        let local = [
-            u.offset_mm + out * normal[0],
-            v.offset_mm + out * normal[1],
-            out * normal[2],
-        ];
+        let local = [u.offset_mm + out * normal[0], v.offset_mm + out * normal[1], out * normal[2]];
         std::array::from_fn(|i| {
             self.centre_mm[i] + (0..3).map(|k| local[k] * self.axes[k][i]).sum::<f64>()
         })
@@ -278,7 +274,9 @@ mod tests {
         let at = |z: f64| indenter.refuse_ends([[1.0, 0.0, 5.0], [0.0, 2.0, z]].into_iter());
         assert_eq!(at(9.9), Ok(()));
         let refused = at(-1.0).unwrap_err();
-        assert!(matches!(refused, ExportError::Ends { beyond_mm } if (beyond_mm - 1.0).abs() < 1e-12));
+        assert!(
+            matches!(refused, ExportError::Ends { beyond_mm } if (beyond_mm - 1.0).abs() < 1e-12)
+        );
     }
 
     #[test]

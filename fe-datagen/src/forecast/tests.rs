@@ -70,9 +70,9 @@ fn an_effect_adds_its_own_state_and_no_other() {
     };
     let bare = count(&[]);
     let friction = count(&["friction"]);
-    assert_eq!(Census { friction_states: bare.contact_nodes, ..bare.clone() }, friction);
+    assert_eq!(Census { friction_states: bare.contact_nodes, ..bare }, friction);
     let strain = count(&["finite_strain"]);
-    assert_eq!(Census { finite_strain_points: bare.points, ..bare.clone() }, strain);
+    assert_eq!(Census { finite_strain_points: bare.points, ..bare }, strain);
     let bone = count(&["elastic_bone"]);
     assert!(bone.unknowns > bare.unknowns && bone.history_numbers == 0);
 }

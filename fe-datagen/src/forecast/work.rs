@@ -4,7 +4,7 @@
 //! medium, with each effect on and off (docs/scenes.md, 'What a scene costs');
 //! the number of equilibria follows from the stored states.
 
-use crate::press::drive::Drive;
+use crate::press::drive::{Drive, DrivePoint};
 use crate::press::setup::Setup;
 use crate::scene::effects::Law;
 use serde::Serialize;
@@ -38,6 +38,8 @@ const FORCES_PER_EQUILIBRIUM: f64 = 2.8;
 /// Evaluations of forces for one Newton iteration: the line search's first try is
 /// nearly always taken.
 const FORCES_PER_NEWTON: f64 = 1.1;
+/// Evaluations that the histories of a body with memory take at each equilibrium.
+const FORCES_PER_HISTORY: f64 = 1.0;
 /// Evaluations for one stored state: fields and energies.
 const FORCES_PER_STATE: f64 = 2.0;
 /// Equilibria tried for one prescribed force.
@@ -53,14 +55,17 @@ impl Work {
         } else if setup.plan.law == Law::Linear {
             Rate { newton: 2.8, factorizations: 0.2, cg: 4.4 }
         } else {
-            Rate { newton: 3.6, factorizations: 0.55, cg: 4.2 }
+            Rate { newton: 3.8, factorizations: 0.65, cg: 4.6 }
         };
         let newton = rate.newton * equilibria;
+        let remembers = setup.body.problem.memory.is_some();
+        let per_equilibrium =
+            FORCES_PER_EQUILIBRIUM + if remembers { FORCES_PER_HISTORY } else { 0.0 };
         Self {
             equilibria,
             newton_iterations: newton,
             force_evaluations: FORCES_PER_NEWTON * newton
-                + FORCES_PER_EQUILIBRIUM * equilibria
+                + per_equilibrium * equilibria
                 + FORCES_PER_STATE * setup.drive.len() as f64,
             factorizations: (rate.factorizations * equilibria).max(1.0),
             cg_iterations: rate.cg * newton,
@@ -80,14 +85,17 @@ fn equilibria(setup: &Setup) -> f64 {
     if problem.memory.is_none() {
         return points.len() as f64;
     }
-    // Between two stored times steps start at half the shortest relaxation time
-    // and may double from one to the next.
+    // From a stored time steps start at half the shortest relaxation time. While the
+    // indenter holds still each may be twice as long as the last; while it
+    // moves, spreading contact keeps them short.
     let shortest = problem.materials.iter().filter_map(|m| m.shortest_time_s());
     let first_s = 0.5 * shortest.fold(f64::INFINITY, f64::min);
-    let mut last_s = 0.0;
+    let mut last = DrivePoint::default();
     let steps = points.iter().map(|p| {
-        let lasts_s = p.time_s - std::mem::replace(&mut last_s, p.time_s);
-        (lasts_s / first_s + 1.0).log2().ceil()
+        let from = std::mem::replace(&mut last, *p);
+        let parts = (p.time_s - from.time_s) / first_s;
+        let holds = DrivePoint { time_s: from.time_s, ..*p } == from;
+        if holds { (parts + 1.0).log2().ceil() } else { parts.ceil() }
     });
     steps.sum()
 }

@@ -3,6 +3,7 @@
 use super::body::{Body, PressError};
 use super::drive::{Approach, Drive, DrivePoint};
 use super::laws::solids;
+use super::section::SectionSpec;
 use crate::element::ElementKind;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::block::{BlockLattice, build as build_block, even};
@@ -59,8 +60,15 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
             let mesh = build_block(&lattice, |p| p);
             Body::from_mesh(mesh, materials, &["z_max".into()], "z_min")
         }
+        Geometry::Section { density, order, extent, shape } => {
+            let mesh = SectionSpec { shape, density: *density, order: *order, extent: *extent };
+            Body::section(&mesh, materials, plan.parts)
+        }
         Geometry::Mesh { file, fixed, contact } => {
             let mesh = crate::mesh::gmsh::read_file(&scene.folder.join(file))?;
+            if mesh.is_planar() != plan.plane_strain {
+                return Err(PressError::Plane { file: file.clone(), planar: mesh.is_planar() });
+            }
             let mesh = crate::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
         }

@@ -2,6 +2,7 @@
 
 use super::materials::TissueError;
 use super::origin::{Located, Origin, Place};
+use crate::indenter::IndenterError;
 use crate::material::spec::MaterialError;
 use std::path::PathBuf;
 
@@ -59,9 +60,12 @@ pub enum SceneError {
     /// A material out of range.
     #[error(transparent)]
     Material(#[from] TissueError),
+    /// A section that contradicts itself.
+    #[error(transparent)]
+    Section(#[from] crate::geometry::section::SectionShapeError),
     /// An indenter out of range.
     #[error(transparent)]
-    Indenter(#[from] crate::indenter::IndenterError),
+    Indenter(#[from] IndenterError),
     /// A fingertip whose dimensions make no sense.
     #[error(transparent)]
     Shape(#[from] crate::geometry::fingertip::FingertipShapeError),
@@ -98,6 +102,7 @@ impl SceneError {
             Self::Material(e) => Some(material_field(e)),
             Self::Indenter(e) => Some(indenter_field(e)),
             Self::Shape(e) => Some(e.field()),
+            Self::Section(e) => Some(e.field()),
             Self::Located(e) => e.error.field(),
             _ => None,
         }
@@ -119,7 +124,8 @@ fn cure(message: &str) -> String {
         return format!(": add it (docs/scenes.md has `{missing}` with its unit)");
     }
     if message.starts_with("unknown field") {
-        let meant = |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
+        let meant =
+            |known: &&&str| known.strip_prefix(quoted[0]).is_some_and(|r| r.starts_with('_'));
         return quoted.iter().skip(1).find(meant).map_or_else(String::new, |meant| {
             format!("; did you mean `{meant}`? Units stand in the names of fields")
         });
@@ -146,11 +152,15 @@ pub(crate) fn material_field(error: &TissueError) -> String {
     format!("materials.{}{field}", error.tissue)
 }
 
-/// The field that an indenter's error is about: its message starts with it.
-pub(crate) fn indenter_field(error: &crate::indenter::IndenterError) -> String {
-    let message = error.to_string();
-    let first = message.split([' ', ':', ',']).next().unwrap_or_default();
-    if first.starts_with("indenter.") { first.into() } else { "indenter".into() }
+/// The field that an indenter's error is about.
+pub(crate) fn indenter_field(error: &IndenterError) -> String {
+    match error {
+        IndenterError::Value(e) => e.field.clone(),
+        IndenterError::Picture { .. } => "indenter.file".into(),
+        IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
+            "motion.offset_mm".into()
+        }
+    }
 }
 
 /// `Ok` if a value keeps its rule.

@@ -2,8 +2,10 @@
 
 use super::error::{SceneError, is_length, require};
 use crate::geometry::fingertip::FingertipShape;
+use crate::geometry::section::SectionShape;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::{Density, Order};
+use crate::mesh::section::Extent;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -22,6 +24,21 @@ pub enum Geometry {
         /// Dimensions that differ from the default.
         #[serde(default)]
         shape: FingertipShape,
+    },
+    /// The fingertip's cross-section, for the effect `plane_strain`. Forces and
+    /// energies are per mm of length.
+    Section {
+        /// Mesh density.
+        density: Density,
+        /// Element order: `Quad4` or `Quad9`.
+        #[serde(default = "quadratic")]
+        order: Order,
+        /// Half of it, for symmetric presses, or the whole.
+        #[serde(default)]
+        extent: Extent,
+        /// Dimensions that differ from the default.
+        #[serde(default)]
+        shape: SectionShape,
     },
     /// A block in layers, pressed from below (`z_min`) and held on top (`z_max`).
     Block {
@@ -45,6 +62,10 @@ pub enum Geometry {
         /// Surface that the indenter may touch.
         contact: String,
     },
+}
+
+fn quadratic() -> Order {
+    Order::Quadratic
 }
 
 /// One layer of a block.
@@ -71,6 +92,7 @@ impl Geometry {
             Self::Block { size_mm, elements, layers, .. } => {
                 validate_block(size_mm, elements, layers)
             }
+            Self::Section { shape, .. } => Ok(shape.validate()?),
             Self::Mesh { .. } => Ok(()),
         }
     }

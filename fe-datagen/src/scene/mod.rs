@@ -130,6 +130,12 @@ impl Scene {
             let twice = self.effects[..i].contains(e);
             require(!twice, format!("effects[{i}]"), &e.as_str(), "is named twice: name it once")?;
         }
+        if matches!(self.geometry, Geometry::Section { .. }) && !self.has("plane_strain") {
+            return Err(SceneError::Fields {
+                field: "effects",
+                rule: "geometry.kind = \"section\" is plane: name the effect \"plane_strain\"",
+            });
+        }
         self.materials.validate()?;
         self.plan().map(drop)
     }

@@ -101,7 +101,11 @@ impl Origin {
     /// Field and place that a parser's message with this span is about. Of what
     /// is read by `kind` or `shape` the parser knows the table alone; the word that
     /// it complains of is looked up there.
-    pub(super) fn blamed(&self, span: Option<Range<usize>>, message: &str) -> Option<(String, Place)> {
+    pub(super) fn blamed(
+        &self,
+        span: Option<Range<usize>>,
+        message: &str,
+    ) -> Option<(String, Place)> {
         let span = span.filter(|s| !s.is_empty())?;
         let entries = self.entries();
         let Some(outer) = entries.iter().find(|e| e.key == span || e.value == span) else {

@@ -43,7 +43,11 @@ fn bad_values_name_line_field_and_cure() {
         (finger("depth_mm = 1.0", "depth_mm = 2000.0"), 5, &["at most 100 mm"]),
         (finger("depth_mm = 1.0", ""), 4, &["exactly one of depth_mm"]),
         (finger("increments = 4", "increments = 0"), 6, &["motion.increments"]),
-        (block("thickness_mm = 2.0", "thickness_mm = -2.0"), 7, &["geometry.layers[1].thickness_mm"]),
+        (
+            block("thickness_mm = 2.0", "thickness_mm = -2.0"),
+            7,
+            &["geometry.layers[1].thickness_mm"],
+        ),
         (block("[4.0, 4.0]", "[4.0, 4e6]"), 3, &["geometry.size_mm", "at most 1000 mm"]),
         (
             with("[geometry.shape]\nepidermis_mm = 200.0\n"),
@@ -68,7 +72,8 @@ fn bad_values_name_line_field_and_cure() {
             &["was Pa meant"],
         ),
         (
-            with("[[motion.path]]\ntime_s = 0.0\ndepth_mm = 1.0\n").replace("depth_mm = 1.0\nincr", "incr"),
+            with("[[motion.path]]\ntime_s = 0.0\ndepth_mm = 1.0\n")
+                .replace("depth_mm = 1.0\nincr", "incr"),
             8,
             &["motion.path[0].depth_mm", "inside the finger", "time_s"],
         ),
@@ -79,7 +84,11 @@ fn bad_values_name_line_field_and_cure() {
 fn bad_effects_name_line_and_cure() {
     let with = |effects: &str| format!("effects = {effects}\n{FINGER}");
     assert_refused(&[
-        (with("[\"layers\",\n  \"sound\"]"), 2, &["effects[1]", "unknown effect 'sound'; there are: finite_strain"]),
+        (
+            with("[\"layers\",\n  \"sound\"]"),
+            2,
+            &["effects[1]", "unknown effect 'sound'; there are: finite_strain"],
+        ),
         (with("[\"layers\",\n  \"hyperelastic\"]"), 2, &["needs 'finite_strain'"]),
         (with("[\"viscoelastic\"]"), 1, &["motion.path"]),
         (with("[\"plane_strain\"]"), 1, &["section"]),
@@ -99,7 +108,11 @@ fn what_is_no_scene_names_line_and_cure() {
         (finger("density = \"coarse\"", ""), 1, &["missing field `density`", "add it"]),
         (finger("= 1.0", "= \"1 mm\""), 5, &["motion.depth_mm", "bare number"]),
         (finger("= 1.0", "= 1.0 mm"), 5, &["expected"]),
-        (BLOCK.replace("thickness_mm = 2.0", "thickness = 2.0"), 7, &["did you mean `thickness_mm`"]),
+        (
+            BLOCK.replace("thickness_mm = 2.0", "thickness = 2.0"),
+            7,
+            &["did you mean `thickness_mm`"],
+        ),
         (BLOCK.replace("[4.0, 4.0]", "[4.0]"), 3, &["geometry.size_mm", "length 2"]),
     ]);
     let error = parse("[motion]\ndepth_mm = 1.0\n").unwrap_err().to_string();
@@ -110,9 +123,19 @@ fn what_is_no_scene_names_line_and_cure() {
 fn what_only_meshing_finds_names_its_line_too() {
     use crate::press::setup::Setup;
     let cases = [
-        (format!("effects = [\"elastic_bone\"]\n{FINGER}[geometry.shape]\nbone_cortex_mm = 3.0\n"), 9),
-        (FINGER.replace("kind = \"fingertip\"\ndensity = \"coarse\"",
-            "kind = \"mesh\"\nfile = \"none.msh\"\nfixed = []\ncontact = \"skin\""), 3),
+        (
+            format!(
+                "effects = [\"elastic_bone\"]\n{FINGER}[geometry.shape]\nbone_cortex_mm = 3.0\n"
+            ),
+            9,
+        ),
+        (
+            FINGER.replace(
+                "kind = \"fingertip\"\ndensity = \"coarse\"",
+                "kind = \"mesh\"\nfile = \"none.msh\"\nfixed = []\ncontact = \"skin\"",
+            ),
+            3,
+        ),
     ];
     for (text, line) in cases {
         let Err(error) = Setup::new(&parse(&text).unwrap()) else { panic!("{text} was set up") };

@@ -54,8 +54,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
 
 fn materials() -> [(&'static str, MaterialCard); 3] {
     let bulk_mpa = 0.080 / (3.0 * (1.0 - 2.0 * 0.48));
-    let (mu_mpa, alpha) =
-        (vec![2.3583e-2, 4.5408e-5, 4.0878e-2], vec![-2.0623, 25.0, -3.4784]);
+    let (mu_mpa, alpha) = (vec![2.3583e-2, 4.5408e-5, 4.0878e-2], vec![-2.0623, 25.0, -3.4784]);
     [
         ("neo-Hookean", MaterialCard::NeoHookean { mu_mpa: 0.080 / 2.96, bulk_mpa }),
         ("Ogden", MaterialCard::Ogden { mu_mpa, alpha, bulk_mpa: 1.6 }),

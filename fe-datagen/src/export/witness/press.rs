@@ -69,10 +69,8 @@ impl Pressing<'_> {
         };
         let (sed, their_sed) = (of(&ours), of(&theirs));
         let peak = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
-        let u = relative_l2(
-            ours.displacement_mm.as_flattened(),
-            theirs.displacement_mm.as_flattened(),
-        );
+        let u =
+            relative_l2(ours.displacement_mm.as_flattened(), theirs.displacement_mm.as_flattened());
         let mut rows = vec![
             Check::relative(row("force, N"), ours.force_n, theirs.force_n, tolerance.force, SOURCE),
             Check::vanishes(row("displacement, L2"), u, tolerance.displacement, SOURCE),
@@ -127,7 +125,8 @@ impl Pressing<'_> {
             }
         }
         let along = self.pressing_axis();
-        let force_n = total.first().map_or(f64::NAN, |r| (0..3).map(|i| r.values[i] * along[i]).sum());
+        let force_n =
+            total.first().map_or(f64::NAN, |r| (0..3).map(|i| r.values[i] * along[i]).sum());
         Ok(Answer { force_n, displacement_mm, sed_mpa, cpu_s: run.cpu_s })
     }
 
@@ -175,9 +174,8 @@ fn relative_l2(a: &[f64], b: &[f64]) -> f64 {
 
 /// Elements of the first tissue that share a node with the second.
 fn beside(mesh: &Mesh, [side, other]: [Tissue; 2]) -> Vec<usize> {
-    let elements = || {
-        mesh.blocks.iter().flat_map(|b| (0..b.len()).map(move |e| (b.tissue[e], b.element(e))))
-    };
+    let elements =
+        || mesh.blocks.iter().flat_map(|b| (0..b.len()).map(move |e| (b.tissue[e], b.element(e))));
     let mut shared = vec![false; mesh.nodes.len()];
     for (_, nodes) in elements().filter(|(tissue, _)| *tissue == other) {
         nodes.iter().for_each(|&n| shared[n as usize] = true);

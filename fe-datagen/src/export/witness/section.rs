@@ -11,9 +11,9 @@ use crate::element::ElementKind;
 use crate::export::{ElementTypes, MaterialCard, QuadraticHex, RigidIndenter, RigidShape};
 use crate::geometry::section::SectionShape;
 use crate::indenter::{Placement, RoundedPlate};
-use crate::mesh::fingertip::Density;
-use crate::mesh::section::{SectionParts, build};
 use crate::mesh::Tissue;
+use crate::mesh::fingertip::{Density, Parts};
+use crate::mesh::section::{Extent, build};
 use crate::scene::TissueTable;
 use crate::scene::effects::{Law, Plan};
 use crate::verify::CaseError;
@@ -45,7 +45,7 @@ fn pressing<'a>(
 ) -> Result<Pressing<'a>, CaseError> {
     let density = if context.quick { Density::Coarse } else { Density::Medium };
     let shape = SectionShape::default();
-    let section = build(&shape, SectionParts::default(), density, ElementKind::Quad9)?;
+    let section = build(&shape, Parts::default(), density, ElementKind::Quad9, Extent::Half)?;
     let fixed = section.fixed();
     // Its own +z presses towards +y, from the pad's lowest point.
     let start = Placement {

@@ -9,7 +9,7 @@ pub(super) const EFFECT: Effect = Effect {
     without: "bone is rigid: its surface does not move",
     needs: &[],
     fits: |scene| match scene.geometry {
-        Geometry::Fingertip { .. } => Ok(()),
+        Geometry::Fingertip { .. } | Geometry::Section { .. } => Ok(()),
         _ => Err("only fingertip and section have a bone of their own; a mesh names its tissues"),
     },
     state: |c| c.bone_elements,
