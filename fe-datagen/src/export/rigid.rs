@@ -59,8 +59,8 @@ pub(super) struct RigidMesh {
     pub bricks: Vec<[u32; 20]>,
 }
 
-/// Arc of one quadratic facet, degrees: it leaves the circle by 1e-5 of the radius.
-const FACET_DEG: f64 = 12.5;
+/// Arc of one quadratic facet, degrees: its middle leaves a sphere by 2e-5 of the radius.
+const FACET_DEG: f64 = 6.25;
 /// Steepest part of an edge, ball or cylinder that is meshed, degrees.
 const ANGLE_MAX_DEG: f64 = 75.0;
 
