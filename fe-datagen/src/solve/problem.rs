@@ -127,7 +127,10 @@ impl Problem {
             .filter(used)
             .partition(|&t| t == Tissue::Nail || t == Tissue::Bone);
         let of = |tissues: &[Tissue]| {
-            tissues.iter().map(|t| self.materials[t.index()].shear_modulus_mpa()).fold(0.0, f64::max)
+            tissues
+                .iter()
+                .map(|t| self.materials[t.index()].shear_modulus_mpa())
+                .fold(0.0, f64::max)
         };
         if soft.is_empty() { of(&hard) } else { of(&soft) }
     }
