@@ -23,7 +23,8 @@ use std::time::Instant;
 ///
 /// Writes summary.json, a .vtu series for ParaView (series.pvd) and, for a
 /// fingertip, pressure.png and sed.png (16-bit gray, with -color twins) of the
-/// deepest state and maps.npz of all stored states.
+/// deepest state and maps.npz of all stored states; for a section pressure.svg, sed.svg
+/// and lines.npz along the skin.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press")]
 pub(super) struct Args {
@@ -101,6 +102,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     vtu::write_pvd(&args.out.join("series.pvd"), &series)?;
     if let Some(atlas) = &atlas {
         write_maps(&args.out, atlas, &records)?;
+    } else if body.plane {
+        super::lines::write(&args.out, body, setup.drive.is_timed(), &records)?;
     }
     let summary = Summary {
         plan: setup.plan,

@@ -6,6 +6,7 @@ mod extrude;
 pub mod fingertip;
 pub mod gmsh;
 mod half_cube;
+mod mirror;
 mod nail;
 pub mod probe;
 #[cfg(test)]
@@ -21,7 +22,17 @@ pub use surface::{FaceKind, Surface};
 
 /// What an element is made of.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    serde::Serialize,
+    serde::Deserialize,
+    schemars::JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Tissue {

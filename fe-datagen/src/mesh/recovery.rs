@@ -252,7 +252,7 @@ mod tests {
                 }
                 worst
             };
-            let (coarse, fine) = (error(4), error(8));
+            let (coarse, fine) = (error(6), error(12));
             let order = (coarse / fine).log2();
             let least = if kind.dilatation_functions() > 1 { 1.7 } else { 0.8 };
             assert!(order > least, "{kind:?}: order {order}, error {fine}");

@@ -4,47 +4,44 @@
 //! and dermis (or nail), then to the bone's point of the same eccentric angle. They
 //! are narrowest at the pad's lowest point, where a wedge 0.05 mm wide presses, and
 //! widen along the skin. An elastic bone goes on inward to a segment of its axis,
-//! so all blocks share one grid: node `column * rows + row`.
+//! so all blocks share one grid: node `column * rows + row`. The whole section is
+//! the half and its mirror image.
+//!
+//! What is held, by the [`Parts`] that deform:
+//!
+//! | bone | nail | held |
+//! |---|---|---|
+//! | rigid | rigid | tissue at bone and nail (default; what the 3-D finger does) |
+//! | rigid | elastic | tissue at the bone, the nail's centre |
+//! | elastic | rigid | tissue at the nail; the bone floats in the tissue |
+//! | elastic | elastic | the nail's centre: **Chen, Shuai & Zhu** |
+//!
+//! They hold the nail's centre alone, so their bone floats, held through tissue
+//! and nail: that is the elastic bone here, which at 17 000 MPa against 0.03 MPa is
+//! rigid to five digits. A rigid one that floats would need constraint equations and
+//! tell nothing else.
 
-use super::fingertip::Density;
+use super::fingertip::{Density, Parts};
 use super::half_cube::geometric_fractions;
+use super::mirror::mirrored;
 use super::{Block, FaceKind, Mesh, Surface, Tissue};
 use crate::element::ElementKind;
 use crate::geometry::section::{SectionShape, SectionShapeError};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// How a stiff part is modelled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How much of the section is meshed.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
-pub enum Part {
-    /// Not meshed: tissue is held where it touches the part.
+pub enum Extent {
+    /// `x >= 0`, for what is symmetric about `x = 0`. Forces and energies are
+    /// those of this half.
     #[default]
-    Rigid,
-    /// Meshed with elements of its own.
-    Elastic,
-}
-
-/// Bone and nail.
-///
-/// | bone | nail | held |
-/// |---|---|---|
-/// | rigid | rigid | tissue at bone and nail (default; what the 3-D finger does) |
-/// | rigid | elastic | tissue at the bone, the nail's centre |
-/// | elastic | rigid | tissue at the nail; the bone floats in the tissue |
-/// | elastic | elastic | the nail's centre: **Chen, Shuai & Zhu** |
-///
-/// They hold the nail's centre alone, so their bone floats, held through tissue
-/// and nail: that is the elastic bone here, which at 17 000 MPa against 0.03 MPa is
-/// rigid to five digits. A rigid one that floats would need constraint equations and
-/// tell nothing else.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SectionParts {
-    /// The distal phalanx.
-    pub bone: Part,
-    /// The nail plate.
-    pub nail: Part,
+    Half,
+    /// All of it.
+    Whole,
 }
 
 /// Node intervals of a density; quadratic elements take them in pairs.
@@ -61,23 +58,25 @@ struct Resolution {
 }
 
 impl Resolution {
+    /// The epidermis' intervals are even: finer ones at the skin are crushed first
+    /// under a tip that presses it to a fifth of its thickness.
     fn new(density: Density) -> Self {
         match density {
             Density::Coarse => Self {
-                layers: [(4, 0.14), (4, 0.1), (8, 0.06), (2, 0.5)],
+                layers: [(4, 0.25), (4, 0.1), (8, 0.06), (2, 0.5)],
                 first: (0.025, 4),
                 growth: 1.3,
                 largest_mm: 0.8,
             },
             Density::Medium => Self {
-                layers: [(8, 0.0625), (8, 0.05), (16, 0.03), (4, 0.25)],
-                first: (0.0125, 8),
+                layers: [(8, 0.125), (8, 0.05), (16, 0.03), (4, 0.25)],
+                first: (0.025, 4),
                 growth: 1.15,
                 largest_mm: 0.4,
             },
             Density::Fine => Self {
-                layers: [(16, 0.03), (16, 0.025), (32, 0.015), (8, 0.125)],
-                first: (0.006_25, 16),
+                layers: [(16, 0.0625), (16, 0.025), (32, 0.015), (8, 0.125)],
+                first: (0.0125, 8),
                 growth: 1.075,
                 largest_mm: 0.2,
             },
@@ -116,7 +115,8 @@ pub struct SectionMesh {
     /// The mesh. Node sets `symmetry` (x = 0), `bone` (the bone's outline),
     /// `nail_centre` (through the nail's thickness at x = 0) and, if the nail is
     /// rigid, `nail` (where tissue meets it); surfaces `skin` (edges that may be
-    /// touched, up to the nail) and `interface` (between epidermis and dermis).
+    /// touched, up to the nail) and `interface` (between epidermis and dermis), edges
+    /// in the order in which the skin is walked with the body on the left.
     pub mesh: Mesh,
     /// Held node sets and components; displacement along z is held by the solver.
     pub supports: Vec<(&'static str, [bool; 3])>,
@@ -149,15 +149,16 @@ pub enum SectionMeshError {
     Kind(ElementKind),
 }
 
-/// Meshes the half section `x >= 0`.
+/// Meshes a section.
 ///
 /// # Errors
 /// See [`SectionMeshError`].
 pub fn build(
     shape: &SectionShape,
-    parts: SectionParts,
+    parts: Parts,
     density: Density,
     kind: ElementKind,
+    extent: Extent,
 ) -> Result<SectionMesh, SectionMeshError> {
     if !kind.is_planar() {
         return Err(SectionMeshError::Kind(kind));
@@ -180,26 +181,27 @@ pub fn build(
     set("symmetry", &|c, r| c == 0 || c == last || (r > bone && r == grid.rows() - 1));
     set("bone", &|_, r| r == bone);
     set("nail_centre", &|c, r| c == last && r <= inner);
-    if parts.nail == Part::Rigid {
+    if !parts.nail {
         let edge = grid.nail_column;
         set("nail", &|c, r| (c >= edge && r == inner) || (c == edge && r <= inner));
     }
     mesh.drop_unused_nodes();
-    let mut supports = vec![("symmetry", [true, false, false])];
-    if parts.bone == Part::Rigid {
+    let mut supports = Vec::new();
+    match extent {
+        Extent::Half => supports.push(("symmetry", [true, false, false])),
+        Extent::Whole => mesh = mirrored(&mesh, "symmetry"),
+    }
+    if !parts.bone {
         supports.push(("bone", [true, true, false]));
     }
-    supports.push(match parts.nail {
-        Part::Rigid => ("nail", [true, true, false]),
-        Part::Elastic => ("nail_centre", [true, true, false]),
-    });
+    supports.push((if parts.nail { "nail_centre" } else { "nail" }, [true, true, false]));
     Ok(SectionMesh { mesh, supports })
 }
 
 /// Columns and rows of nodes.
 struct Grid {
     kind: ElementKind,
-    parts: SectionParts,
+    parts: Parts,
     /// Eccentric angle of each column, from the pad's lowest point to the nail's centre.
     angles: Vec<f64>,
     /// Column of the nail's edge.
@@ -214,12 +216,7 @@ struct Grid {
 const LAYERS: [Tissue; 4] = [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous, Tissue::Bone];
 
 impl Grid {
-    fn new(
-        shape: &SectionShape,
-        parts: SectionParts,
-        resolution: &Resolution,
-        kind: ElementKind,
-    ) -> Self {
+    fn new(shape: &SectionShape, parts: Parts, resolution: &Resolution, kind: ElementKind) -> Self {
         let step = kind.order();
         let edge_mm = shape.arc_mm(shape.nail_angle());
         let nail_mm = shape.arc_mm(PI) - edge_mm;
@@ -233,7 +230,7 @@ impl Grid {
         let last = angles.len() - 1;
         (angles[0], angles[last]) = (0.0, PI);
         angles[nail_column] = shape.nail_angle();
-        let layers = if parts.bone == Part::Elastic { 4 } else { 3 };
+        let layers = if parts.bone { 4 } else { 3 };
         let mut fractions = Vec::new();
         let mut row_of = [0; 4];
         for (l, (intervals, first)) in resolution.layers[..layers].iter().enumerate() {
@@ -284,7 +281,7 @@ impl Grid {
             for row in (0..rows - 1).step_by(step) {
                 let layer = self.row_of.iter().rposition(|&r| r <= row).unwrap_or_default();
                 let nail = column >= self.nail_column && row < self.row_of[2];
-                if nail && self.parts.nail == Part::Rigid {
+                if nail && !self.parts.nail {
                     continue;
                 }
                 // xi along the skin, eta inward.
@@ -331,3 +328,6 @@ fn subdivide(at: &[f64], step: usize) -> Vec<f64> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,11 +8,14 @@ use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::sample::Deformed;
+use crate::mesh::section::SectionMeshError;
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
-use crate::scene::{SceneError, TissueError};
+use crate::scene::error::{indenter_field, material_field};
+use crate::scene::{Located, Scene, SceneError, TissueError};
 use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
 use papilla_proto::atlas::Atlas;
+use std::path::PathBuf;
 
 /// Why a body could not be set up or pressed.
 #[derive(Debug, thiserror::Error)]
@@ -35,6 +38,21 @@ pub enum PressError {
     /// The mesh file is bad.
     #[error(transparent)]
     Mesh(#[from] crate::mesh::gmsh::GmshError),
+    /// The section was not meshed.
+    #[error(transparent)]
+    Section(#[from] SectionMeshError),
+    /// A mesh file and the effects disagree about the plane.
+    #[error(
+        "{} {}", file.display(),
+        if *planar { "is a plane section: name the effect 'plane_strain'" }
+        else { "is a solid: leave out the effect 'plane_strain'" }
+    )]
+    Plane {
+        /// The mesh file.
+        file: PathBuf,
+        /// Whether its elements are planar.
+        planar: bool,
+    },
     /// No equilibrium.
     #[error("at depth {depth_mm} mm: {source}")]
     Solve {
@@ -63,6 +81,41 @@ pub enum PressError {
     /// The indenter does not meet the body.
     #[error(transparent)]
     Indenter(#[from] IndenterError),
+    /// Any of these, at the line of the scene that is to blame.
+    #[error(transparent)]
+    Located(Box<Located<Self>>),
+}
+
+impl PressError {
+    /// The field of a scene that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> Option<String> {
+        match self {
+            Self::Shape(e) => Some(e.field()),
+            Self::Scene(e) => e.field(),
+            Self::Material(e) => Some(material_field(e)),
+            Self::Indenter(e) => Some(indenter_field(e)),
+            Self::Problem(ProblemError::Missing { kind: "node set", .. }) => {
+                Some("geometry.fixed".into())
+            }
+            Self::Problem(ProblemError::Missing { .. } | ProblemError::ContactFaces { .. }) => {
+                Some("geometry.contact".into())
+            }
+            Self::Mesh(_) => Some("geometry.file".into()),
+            Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
+            Self::Rising(..) | Self::Empty => Some("motion".into()),
+            Self::Located(e) => e.error.field(),
+            _ => None,
+        }
+    }
+
+    /// The same with the line of `scene` that is to blame, if there is one.
+    pub(super) fn at(self, scene: &Scene) -> Self {
+        match self.field().and_then(|f| scene.place(&f)) {
+            Some(place) => Self::Located(Box::new(Located { place, error: self })),
+            None => self,
+        }
+    }
 }
 
 /// A body ready to be pressed, shared by every press of a campaign.
@@ -71,7 +124,7 @@ pub struct Body {
     pub problem: Problem,
     /// Name of the surface that the indenter may touch.
     pub contact: String,
-    /// The fingertip's atlas patch; other bodies have none.
+    /// The fingertip's atlas patch or the section's line; other bodies have none.
     pub patch: Option<PressedPatch>,
     /// Whether the body is a plane section in x and y.
     pub plane: bool,
@@ -79,7 +132,8 @@ pub struct Body {
 
 /// What is read off a fingertip at each equilibrium.
 pub struct PressedPatch {
-    /// Vertices and triangles.
+    /// Vertices and triangles; of a section the vertices along the skin and
+    /// no triangles.
     pub patch: Patch,
     dermis: SedRecovery,
     epidermis: SedRecovery,
@@ -115,11 +169,22 @@ impl Body {
         for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
+        Self::with_patch(mesh, materials, fixed, patch, false)
+    }
+
+    /// A body with layers, of which pressure and SED are read at vertices.
+    pub(super) fn with_patch(
+        mesh: Mesh,
+        materials: Materials,
+        fixed: Vec<bool>,
+        patch: Patch,
+        plane: bool,
+    ) -> Result<Self, PressError> {
         let side = |tissue| SedRecovery::new(&mesh, "interface", tissue, &patch.interface);
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
         let patch = Some(PressedPatch { patch, dermis, epidermis });
-        Ok(Self { problem, contact: "skin".into(), patch, plane: false })
+        Ok(Self { problem, contact: "skin".into(), patch, plane })
     }
 
     /// Any mesh, held on the surfaces or node sets `held` and touched on the
@@ -144,16 +209,17 @@ impl Body {
                 fixed[3 * n as usize..3 * n as usize + 3].fill(true);
             }
         }
+        let plane = mesh.is_planar();
         let problem = Problem::new(mesh, materials, fixed, Some(contact))?;
-        Ok(Self { problem, contact: contact.into(), patch: None, plane: false })
+        Ok(Self { problem, contact: contact.into(), patch: None, plane })
     }
 
-    /// The atlas of the body's patch; `None` for a body without one.
+    /// The atlas of the body's patch; `None` for a body without one and for a section.
     ///
     /// # Errors
     /// [`BuildAtlasError`] if the patch cannot be flattened.
     pub fn atlas(&self) -> Option<Result<(Atlas, AtlasReport), BuildAtlasError>> {
-        let patch = &self.patch.as_ref()?.patch;
+        let patch = &self.patch.as_ref().filter(|_| !self.plane)?.patch;
         let at = |nodes: &[u32]| -> Vec<[f64; 3]> {
             nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect()
         };
@@ -185,6 +251,23 @@ impl Body {
         solver.force_of_pressure_n(surface, &shown)
     }
 
+    /// The body at the solver's equilibrium; `history` is the solver's
+    /// [`Solver::history_of`].
+    #[must_use]
+    pub fn deformed<'a>(
+        &'a self,
+        solver: &'a Solver<'_>,
+        history: &'a dyn Fn(usize, usize) -> &'a [f64],
+    ) -> Deformed<'a> {
+        Deformed {
+            mesh: &self.problem.mesh,
+            geometry: &self.problem.geometry,
+            materials: &self.problem.materials,
+            u: solver.displacement_mm(),
+            history,
+        }
+    }
+
     /// Vertex values and checks of the solver's equilibrium.
     pub(crate) fn record(
         &self,
@@ -207,13 +290,7 @@ impl Body {
             pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
             shear_mpa = self.shear_mpa(solver, &p.patch.skin);
             let history = |block, element| solver.history_of(block, element);
-            let body = Deformed {
-                mesh: &self.problem.mesh,
-                geometry: &self.problem.geometry,
-                materials: &self.problem.materials,
-                u: solver.displacement_mm(),
-                history: &history,
-            };
+            let body = self.deformed(solver, &history);
             sed_dermis_mpa = p.dermis.sed_mpa(&body)?;
             sed_epidermis_mpa = p.epidermis.sed_mpa(&body)?;
         }

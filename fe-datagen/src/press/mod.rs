@@ -5,6 +5,7 @@ pub mod drive;
 pub mod fields;
 pub mod laws;
 pub mod record;
+pub mod section;
 pub mod setup;
 mod skin;
 pub mod study;

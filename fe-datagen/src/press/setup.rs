@@ -3,6 +3,7 @@
 use super::body::{Body, PressError};
 use super::drive::{Approach, Drive, DrivePoint};
 use super::laws::solids;
+use super::section::SectionSpec;
 use crate::element::ElementKind;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::block::{BlockLattice, build as build_block, even};
@@ -22,11 +23,16 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Meshes and sets up what a scene describes.
+    /// Meshes and sets up what a scene describes, the indenter at first touch.
     ///
     /// # Errors
-    /// [`PressError`] names what cannot be built.
+    /// [`PressError`] names what cannot be built, and the line of the scene that is
+    /// to blame.
     pub fn new(scene: &Scene) -> Result<Self, PressError> {
+        Self::build(scene).map_err(|e| e.at(scene))
+    }
+
+    fn build(scene: &Scene) -> Result<Self, PressError> {
         let plan = scene.plan()?;
         let approach = Approach {
             shape: scene.indenter.build(&scene.folder)?,
@@ -36,7 +42,10 @@ impl Setup {
             friction: plan.friction,
         };
         let body = body(scene, &plan)?;
-        Ok(Self { plan, body, approach, drive: drive(&scene.motion) })
+        let drive = drive(&scene.motion);
+        // An indenter that never touches is found now, not after files are written.
+        body.indenter(&approach, &drive)?;
+        Ok(Self { plan, body, approach, drive })
     }
 }
 
@@ -51,8 +60,15 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
             let mesh = build_block(&lattice, |p| p);
             Body::from_mesh(mesh, materials, &["z_max".into()], "z_min")
         }
+        Geometry::Section { density, order, extent, shape } => {
+            let mesh = SectionSpec { shape, density: *density, order: *order, extent: *extent };
+            Body::section(&mesh, materials, plan.parts)
+        }
         Geometry::Mesh { file, fixed, contact } => {
             let mesh = crate::mesh::gmsh::read_file(&scene.folder.join(file))?;
+            if mesh.is_planar() != plan.plane_strain {
+                return Err(PressError::Plane { file: file.clone(), planar: mesh.is_planar() });
+            }
             let mesh = crate::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
         }

@@ -7,6 +7,7 @@ pub(crate) mod bodies;
 mod check;
 mod cook;
 mod coulomb;
+mod density;
 mod disc;
 mod finger;
 mod half_plane;
@@ -143,6 +144,12 @@ pub const CASES: &[Case] = &[
         name: "finger",
         shows: "The fingertip behaves as published fingertips do.",
         run: finger::sanity,
+    },
+    Case {
+        name: "density",
+        shows: "The discretisation error of each mesh density: force, pressure and SED of a flat \
+                press against the next finer mesh.",
+        run: density::run,
     },
     Case {
         name: "increments",

@@ -9,8 +9,10 @@ pub(super) const EFFECT: Effect = Effect {
     without: "bone is rigid: its surface does not move",
     needs: &[],
     fits: |scene| match scene.geometry {
-        Geometry::Fingertip { .. } => Ok(()),
+        Geometry::Fingertip { .. } | Geometry::Section { .. } => Ok(()),
         _ => Err("only fingertip and section have a bone of their own; a mesh names its tissues"),
     },
+    state: |c| c.bone_elements,
+    state_is: "elements of bone",
     switch_on: |_, plan| plan.parts.bone = true,
 };

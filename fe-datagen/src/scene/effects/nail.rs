@@ -9,8 +9,10 @@ pub(super) const EFFECT: Effect = Effect {
     without: "the nail plate is rigid: the skin under it does not move",
     needs: &[],
     fits: |scene| match scene.geometry {
-        Geometry::Fingertip { .. } => Ok(()),
+        Geometry::Fingertip { .. } | Geometry::Section { .. } => Ok(()),
         _ => Err("only fingertip and section have a nail of their own; a mesh names its tissues"),
     },
+    state: |c| c.nail_elements,
+    state_is: "elements of nail",
     switch_on: |_, plan| plan.parts.nail = true,
 };

@@ -1,0 +1,82 @@
+//! Chen, Shuai & Zhu's section under a flat plate, in plane strain.
+
+use super::ours::Cards;
+use super::press::{Pressing, Tolerance};
+use super::{Check, Context};
+use crate::element::ElementKind;
+use crate::export::{ElementTypes, MaterialCard, RigidIndenter, RigidShape};
+use crate::geometry::section::SectionShape;
+use crate::indenter::{Placement, RoundedPlate};
+use crate::mesh::Tissue;
+use crate::mesh::fingertip::Density;
+use crate::mesh::fingertip::Parts;
+use crate::mesh::section::{Extent, build};
+use crate::scene::TissueTable;
+use crate::scene::effects::{Law, Plan};
+use crate::verify::CaseError;
+use std::sync::Arc;
+
+const DEPTH_MM: f64 = 1.0;
+/// Half sides of the plate, mm; its edges do not touch.
+const PLATE: RoundedPlate = RoundedPlate { half_mm: [10.0, 10.0, 2.0], edge_radius_mm: 0.0 };
+const TOLERANCE: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2 };
+
+pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
+    let mut rows = Vec::new();
+    for (law, kind, name, job) in [
+        (Law::NeoHookean, ElementKind::Quad8, "neo-Hookean, Quad8, CPE8R", "section-neo"),
+        (Law::Ogden, ElementKind::Quad8, "Ogden, Quad8, CPE8R", "section-ogden"),
+        (Law::Linear, ElementKind::Quad8, "linear, Quad8, CPE8R", "section-linear"),
+        (Law::NeoHookean, ElementKind::Quad9, "neo-Hookean, Quad9, CPE8R", "section-quad9"),
+    ] {
+        rows.extend(pressing(context, law, kind, name, job)?.compare(context)?);
+    }
+    Ok(rows)
+}
+
+fn pressing<'a>(
+    context: &Context<'_>,
+    law: Law,
+    kind: ElementKind,
+    name: &'a str,
+    job: &'a str,
+) -> Result<Pressing<'a>, CaseError> {
+    let density = if context.quick { Density::Coarse } else { Density::Medium };
+    let shape = SectionShape::default();
+    let section = build(&shape, Parts::default(), density, kind, Extent::Half)?;
+    let fixed = section.fixed();
+    // Its own +z presses towards +y, from the pad's lowest point.
+    let start = Placement {
+        rotation: [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+        origin_mm: [0.0, -0.5 * shape.height_mm - PLATE.half_mm[2], 0.0],
+    };
+    let RoundedPlate { half_mm, edge_radius_mm } = PLATE;
+    Ok(Pressing {
+        job,
+        name,
+        mesh: section.mesh,
+        cards: cards(law)?,
+        fixed,
+        contact: "skin",
+        indenter: RigidIndenter {
+            shape: RigidShape::Plate { half_mm, edge_radius_mm },
+            start,
+            path: vec![(1.0, [0.0, DEPTH_MM, 0.0])],
+        },
+        shape: Arc::new(PLATE),
+        types: ElementTypes::default(),
+        interface: [Tissue::Dermis, Tissue::Epidermis],
+        steps: 1,
+        tolerance: TOLERANCE,
+    })
+}
+
+/// The design's tissues.
+fn cards(law: Law) -> Result<Cards, CaseError> {
+    let (table, plan) = (TissueTable::default(), Plan { law, ..Plan::usual() });
+    let mut cards = [const { None }; Tissue::ALL.len()];
+    for tissue in Tissue::ALL {
+        cards[tissue.index()] = Some(MaterialCard::of(table.of(tissue), &plan)?);
+    }
+    Ok(cards)
+}
