@@ -9,6 +9,7 @@ mod cook;
 mod coulomb;
 mod density;
 mod disc;
+mod file;
 mod finger;
 mod half_plane;
 mod hertz;
@@ -127,6 +128,12 @@ pub const CASES: &[Case] = &[
         shows: "A flat punch: force on a half-space, pressure on a half-plane and its growth \
                 at the edge as elements shrink.",
         run: punch::run,
+    },
+    Case {
+        name: "file",
+        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
+                code makes itself.",
+        run: file::run,
     },
     Case {
         name: "locking",
