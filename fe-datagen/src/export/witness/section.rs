@@ -12,8 +12,7 @@ use crate::export::{ElementTypes, MaterialCard, QuadraticHex, RigidIndenter, Rig
 use crate::geometry::section::SectionShape;
 use crate::indenter::{Placement, RoundedPlate};
 use crate::mesh::Tissue;
-use crate::mesh::fingertip::Density;
-use crate::mesh::fingertip::Parts;
+use crate::mesh::fingertip::{Density, Parts};
 use crate::mesh::section::{Extent, build};
 use crate::scene::TissueTable;
 use crate::scene::effects::{Law, Plan};
