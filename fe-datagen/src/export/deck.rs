@@ -81,6 +81,10 @@ impl Deck<'_> {
             "** {}\n** Units: mm, N, MPa. Written by fe-datagen for CalculiX 2.20.\n",
             self.title.replace('\n', " ")
         );
+        let uses = |name| self.mesh.blocks.iter().any(|b| self.types.of(b.kind).name == name);
+        if !self.is_nonlinear() && uses("CPE8R") {
+            return Err(ExportError::ZeroEnergy);
+        }
         self.body(&mut out);
         self.sections(&mut out)?;
         self.supports(&mut out);
@@ -236,9 +240,11 @@ impl Deck<'_> {
         Ok(())
     }
 
-    /// Stiffest shear modulus at rest, MPa.
+    /// Stiffest shear modulus at rest of what is soft, MPa.
     fn shear_modulus_mpa(&self) -> f64 {
-        let cards = self.materials.iter().flatten();
+        let soft = |t: &Tissue| *t != Tissue::Nail && *t != Tissue::Bone;
+        let tissues = self.tissues().into_iter().filter(soft);
+        let cards = tissues.filter_map(|t| self.materials[t.index()].as_ref());
         cards.map(MaterialCard::shear_modulus_mpa).fold(0.0, f64::max)
     }
 
@@ -264,8 +270,7 @@ impl Deck<'_> {
             }
             "TIME POINTS=STORED"
         };
-        let hyperelastic = self.materials.iter().flatten().any(MaterialCard::is_hyperelastic);
-        let nonlinear = if hyperelastic { ", NLGEOM" } else { "" };
+        let nonlinear = if self.is_nonlinear() { ", NLGEOM" } else { "" };
         let _ = write!(
             out,
             "*STEP{nonlinear}, INC=100000\n*STATIC\n{},1.,1.E-8,{}\n*CONTROLS, PARAMETERS=FIELD\n{}\n",
@@ -283,6 +288,14 @@ impl Deck<'_> {
             let _ = write!(out, "*CONTACT PRINT, {when}\nCDIS,CSTR\n");
         }
         let _ = write!(out, "*EL PRINT, ELSET={ELEMENTS}, {when}\nE,S\n*END STEP\n");
+    }
+
+    /// Whether the step is geometrically nonlinear.
+    fn is_nonlinear(&self) -> bool {
+        self.tissues()
+            .iter()
+            .filter_map(|t| self.materials[t.index()].as_ref())
+            .any(MaterialCard::is_hyperelastic)
     }
 
     /// Everything that moves as prescribed.

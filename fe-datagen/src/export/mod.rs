@@ -47,6 +47,12 @@ pub enum ExportError {
         /// Shape as scenes name it.
         shape: &'static str,
     },
+    /// Reduced integration without geometric stiffness.
+    #[error(
+        "CPE8R has modes without energy in a geometrically linear step: CalculiX finds forces \
+         several times too small. Take CPE8 (--quadratic c3d20)"
+    )]
+    ZeroEnergy,
     /// A cylinder's ends are not in a deck.
     #[error(
         "skin lies {beyond_mm:.2} mm beyond an end of the cylinder, and a deck leaves its ends \

@@ -1,7 +1,7 @@
 //! Braille-like dots.
 
 use super::grating::{COUNT_MAX, from_nearest};
-use super::plate::{Plate, THICKNESS_MM};
+use super::plate::Plate;
 use super::rules::{BadValue, length, require};
 use super::sphere::Sphere;
 use super::union::nearer;
@@ -106,6 +106,7 @@ impl SignedDistance for Dots {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plate::THICKNESS_MM;
     use super::*;
     use crate::indenter::testing::{Exactness, distance_tests};
 

@@ -7,7 +7,9 @@ pub(crate) mod bodies;
 mod check;
 mod cook;
 mod coulomb;
+mod density;
 mod disc;
+mod file;
 mod finger;
 mod half_plane;
 mod hertz;
@@ -128,6 +130,12 @@ pub const CASES: &[Case] = &[
         run: punch::run,
     },
     Case {
+        name: "file",
+        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
+                code makes itself.",
+        run: file::run,
+    },
+    Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
                 against quadratic elements.",
@@ -143,6 +151,12 @@ pub const CASES: &[Case] = &[
         name: "finger",
         shows: "The fingertip behaves as published fingertips do.",
         run: finger::sanity,
+    },
+    Case {
+        name: "density",
+        shows: "The discretisation error of each mesh density: force, pressure and SED of a flat \
+                press against the next finer mesh.",
+        run: density::run,
     },
     Case {
         name: "increments",

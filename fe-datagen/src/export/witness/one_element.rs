@@ -27,7 +27,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
     for (material, card) in materials() {
         let motions = if card.is_hyperelastic() {
-            [Motion::Uniaxial(0.75), Motion::Uniaxial(1.4), Motion::Shear(0.5)]
+            [Motion::Uniaxial(0.85), Motion::Uniaxial(1.4), Motion::Shear(0.5)]
         } else {
             [Motion::Uniaxial(0.99), Motion::Uniaxial(1.01), Motion::Shear(0.02)]
         };
