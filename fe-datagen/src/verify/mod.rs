@@ -18,6 +18,7 @@ mod ogden;
 mod patch;
 mod relaxation;
 mod report;
+mod ring;
 mod solid_parts;
 mod tangent;
 mod uniaxial;
@@ -93,6 +94,12 @@ pub const CASES: &[Case] = &[
         run: cook::run,
     },
     Case {
+        name: "ring",
+        shows: "A ring under internal pressure opens as Lame's solution says, in plane strain and \
+                nearly incompressible too.",
+        run: ring::run,
+    },
+    Case {
         name: "disc",
         shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
         run: disc::run,
@@ -111,7 +118,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
-                against quadratic elements.",
+                against quadratic elements, solid and in plane strain.",
         run: locking::run,
     },
     Case {
