@@ -1,11 +1,16 @@
 //! Finite-element fingertip: scenes, solver, atlas, dataset.
 
+// Determinism is tested: the same bits, not nearly the same.
+#![cfg_attr(test, allow(clippy::float_cmp))]
+
 pub mod atlas;
 pub mod campaign;
 pub mod cli;
 pub mod contact;
 pub mod dataset;
 pub mod element;
+pub mod export;
+pub mod forecast;
 pub mod geometry;
 pub mod indenter;
 pub mod linear;

@@ -7,7 +7,7 @@ use crate::mesh::fingertip::{Density, Order};
 use crate::output::OutputError;
 use crate::press::record::Pose;
 use crate::scene::effects::usual;
-use crate::scene::{EffectName, Friction, Geometry, Motion, Scene, TissueTable};
+use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Scene, TissueTable};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -169,6 +169,7 @@ impl CampaignSpec {
             friction: self.friction,
             effects: self.effects.clone(),
             folder: self.folder.clone(),
+            origin: Origin::default(),
         }
     }
 

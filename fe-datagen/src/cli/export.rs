@@ -1,12 +1,7 @@
 //! `export`: a scene as an input deck of another solver.
 
-use crate::export::{
-    Deck, ElementTypes, LinearHex, MaterialCard, Press, QuadraticHex, RigidIndenter, RigidShape,
-    StepControl, refuse_inexpressible,
-};
-use crate::mesh::Tissue;
+use crate::export::{ElementTypes, LinearHex, QuadraticHex, SceneDeck};
 use crate::output::atomic;
-use crate::press::body::Body;
 use crate::scene::Scene;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,12 +10,10 @@ use std::process::ExitCode;
 ///
 /// Mesh, materials, supports, rigid indenter, contact and one static step that
 /// prints displacement, reactions, strain, stress and contact at the stored
-/// depths. An effect that CalculiX cannot express is an error.
+/// states. What CalculiX cannot express is an error.
 #[derive(clap::Args)]
-#[command(
-    after_help = "Run it with `ccx -i FILE` without the ending.\n\
-                  Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp"
-)]
+#[command(after_help = "Run it with `ccx -i FILE` without the ending.\n\
+                  Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp")]
 pub(super) struct Args {
     /// Scene file (see scenes/ and docs/scenes.md).
     scene: PathBuf,
@@ -33,7 +26,7 @@ pub(super) struct Args {
     /// Type that stands for Hex8.
     #[arg(long, value_enum, default_value_t)]
     linear: LinearHex,
-    /// Type that stands for Hex27.
+    /// Type that stands for Hex20, Hex27, Quad8 and Quad9.
     #[arg(long, value_enum, default_value_t)]
     quadratic: QuadraticHex,
 }
@@ -46,62 +39,16 @@ enum Format {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let Format::Inp = args.format;
-    let scene = Scene::read(&args.scene)?;
-    let names = serde_json::to_value(&scene.effects)?;
-    let names = names.as_array().into_iter().flatten().filter_map(|n| n.as_str());
-    refuse_inexpressible(names)?;
-    let body = super::solve::body(&scene)?;
-    let depth_mm = scene.motion.depth_mm;
-    let problem = &body.problem;
-    let deck = Deck {
-        title: &format!("{}", args.scene.display()),
-        mesh: &problem.mesh,
-        materials: &materials(&body),
-        fixed: &problem.fixed,
-        prescribed_mm: &[],
-        press: Some(Press {
-            contact: &body.contact,
-            indenter: indenter(&scene, &body),
-            stiffness_mpa_per_mm: None,
-        }),
-        types: ElementTypes { linear: args.linear, quadratic: args.quadratic },
-        step: StepControl {
-            outputs: scene.depths_mm().iter().map(|d| d / depth_mm).collect(),
-            ..StepControl::default()
-        },
-    };
-    let text = deck.to_text()?;
-    atomic::write(&args.out, text.as_bytes())?;
+    let exported = SceneDeck::new(&Scene::read(&args.scene)?)?;
+    let types = ElementTypes { linear: args.linear, quadratic: args.quadratic };
+    let title = args.scene.display().to_string();
+    let deck = exported.deck(&title, types);
+    atomic::write(&args.out, deck.to_text()?.as_bytes())?;
     println!(
         "{} nodes, {} elements: {}",
         deck.nodes().len(),
-        problem.mesh.element_count(),
+        deck.mesh.element_count(),
         args.out.display()
     );
     Ok(ExitCode::SUCCESS)
-}
-
-/// Cards of the body's laws.
-fn materials(body: &Body) -> [Option<MaterialCard>; Tissue::ALL.len()] {
-    Tissue::ALL.map(|tissue| {
-        let law = body.problem.materials[tissue.index()];
-        Some(MaterialCard::NeoHookean { mu_mpa: law.isochoric.mu_mpa, bulk_mpa: law.bulk_mpa })
-    })
-}
-
-/// The scene's plate at first touch.
-fn indenter(scene: &Scene, body: &Body) -> RigidIndenter {
-    let moving = body.plate(scene.pose(), scene.plate, scene.motion.depth_mm);
-    let plate = scene.plate;
-    // Its distance function knows how thick the body made it.
-    let far = 1e3;
-    let thick = far - moving.shape.distance([0.0, 0.0, far]).gap_mm;
-    RigidIndenter {
-        shape: RigidShape::Plate {
-            half_mm: [0.5 * plate.size_mm[0], 0.5 * plate.size_mm[1], thick],
-            edge_radius_mm: plate.edge_radius_mm,
-        },
-        start: moving.start,
-        travel_mm: moving.travel_mm,
-    }
 }

@@ -3,11 +3,15 @@
 mod atlas;
 mod dataset;
 mod effects;
+mod explain;
+mod export;
 mod generate;
 mod lines;
 mod s2;
+mod schema;
 mod solve;
 mod verify;
+mod witness;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -29,12 +33,16 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Solve(solve::Args),
+    Explain(explain::Args),
+    Schema(schema::Args),
     Generate(generate::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
-    S2(s2::Args),
+    Export(export::Args),
+    Witness(witness::Args),
     Effects(effects::Args),
+    S2(s2::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -42,9 +50,13 @@ enum Command {
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Solve(args) => solve::run(&args),
+        Command::Explain(args) => explain::run(&args),
+        Command::Schema(args) => schema::run(&args),
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Export(args) => export::run(&args),
+        Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::S2(args) => s2::run(&args),

@@ -50,8 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scratch = tempfile::tempdir().context("cannot create a folder for the decks")?;
     let folder = args.keep.as_deref().unwrap_or(scratch.path());
     crate::output::atomic::create_folder(folder)?;
-    let wanted =
-        |c: &witness::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
+    let wanted = |c: &witness::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
     if !args.json {
         println!("{}", Row::heading());
     }

@@ -130,7 +130,8 @@ impl Dat {
             if content.is_empty() {
                 continue;
             }
-            if content.starts_with(|c: char| c.is_ascii_alphabetic()) && !content.starts_with("NaN") {
+            if content.starts_with(|c: char| c.is_ascii_alphabetic()) && !content.starts_with("NaN")
+            {
                 let found = HEADINGS.iter().find(|h| content.starts_with(h.0));
                 shape = found.map(|&(_, quantity, names, values)| (quantity, names, values));
                 if let Some((quantity, ..)) = shape {

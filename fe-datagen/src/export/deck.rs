@@ -45,9 +45,9 @@ pub struct Press<'a> {
     pub contact: &'a str,
     /// What touches it.
     pub indenter: RigidIndenter,
-    /// Pressure per overlap, MPa/mm. `None`: 1000 times the stiffest shear
-    /// modulus over the mean edge of a contact face, which leaves an overlap of
-    /// some 1e-4 of that edge.
+    /// Pressure per overlap, MPa/mm. `None`: 10 000 times (face-to-face contact,
+    /// which does not settle with more: 1000 times) the stiffest shear modulus
+    /// over the mean edge of a contact face.
     pub stiffness_mpa_per_mm: Option<f64>,
 }
 
@@ -81,6 +81,10 @@ impl Deck<'_> {
             "** {}\n** Units: mm, N, MPa. Written by fe-datagen for CalculiX 2.20.\n",
             self.title.replace('\n', " ")
         );
+        let uses = |name| self.mesh.blocks.iter().any(|b| self.types.of(b.kind).name == name);
+        if !self.is_nonlinear() && uses("CPE8R") {
+            return Err(ExportError::ZeroEnergy);
+        }
         self.body(&mut out);
         self.sections(&mut out)?;
         self.supports(&mut out);
@@ -89,6 +93,7 @@ impl Deck<'_> {
             self.indenter(rigid, &mut out);
             self.contact(press, &mut out)?;
         }
+        self.amplitudes(&mut out);
         self.step(&mut out);
         Ok(out)
     }
@@ -152,6 +157,10 @@ impl Deck<'_> {
             let material = name.to_uppercase();
             let _ = write!(out, "*MATERIAL, NAME={material}\n{}", card.cards());
             let _ = writeln!(out, "*SOLID SECTION, ELSET={}, MATERIAL={material}", set_of(tissue));
+            if self.mesh.is_planar() {
+                // Thickness, mm: forces are per mm of length, as ours.
+                out.push_str("1.\n");
+            }
         }
         Ok(())
     }
@@ -159,8 +168,10 @@ impl Deck<'_> {
     fn supports(&self, out: &mut String) {
         let mut held = Vec::new();
         let mut boundary = String::new();
+        // Plane strain holds the third one itself.
+        let components = if self.mesh.is_planar() { 2 } else { 3 };
         for n in self.nodes() {
-            let dofs = &self.fixed[3 * n as usize..3 * n as usize + 3];
+            let dofs = &self.fixed[3 * n as usize..3 * n as usize + components];
             for (i, _) in dofs.iter().enumerate().filter(|(_, fixed)| **fixed) {
                 let _ = writeln!(boundary, "{},{},{}", n + 1, i + 1, i + 1);
             }
@@ -204,15 +215,19 @@ impl Deck<'_> {
             let _ = writeln!(out, "{element},S{face}");
         }
         let mu = self.shear_modulus_mpa();
+        let node_contact = takes_node_contact(surface.kind);
         let stiffness = press.stiffness_mpa_per_mm.unwrap_or_else(|| {
             let mut area = 0.0;
             let rule = surface.kind.quadrature();
             surface.integrate(&rule, &|n| self.mesh.nodes[n as usize], &mut |_, _, normal| {
                 area += crate::mesh::surface::norm(normal);
             });
-            1e3 * mu / (area / faces.len().max(1) as f64).sqrt()
+            let mean = area / faces.len().max(1) as f64;
+            // The area of an edge is its length.
+            let size = if surface.kind.corners() == 2 { mean } else { mean.sqrt() };
+            if node_contact { 1e4 * mu / size } else { 1e3 * mu / size }
         });
-        let kind = if takes_node_contact(surface.kind) { "NODE" } else { "SURFACE" };
+        let kind = if node_contact { "NODE" } else { "SURFACE" };
         // The second number is the pull on nodes just out of contact (node-to-face only).
         let _ = write!(
             out,
@@ -225,10 +240,23 @@ impl Deck<'_> {
         Ok(())
     }
 
-    /// Stiffest shear modulus at rest, MPa.
+    /// Stiffest shear modulus at rest of what is soft, MPa.
     fn shear_modulus_mpa(&self) -> f64 {
-        let cards = self.materials.iter().flatten();
+        let soft = |t: &Tissue| *t != Tissue::Nail && *t != Tissue::Bone;
+        let tissues = self.tissues().into_iter().filter(soft);
+        let cards = tissues.filter_map(|t| self.materials[t.index()].as_ref());
         cards.map(MaterialCard::shear_modulus_mpa).fold(0.0, f64::max)
+    }
+
+    /// Displacement over load fraction of an indenter whose path has corners.
+    fn amplitudes(&self, out: &mut String) {
+        let Some(press) = self.press.as_ref().filter(|p| p.indenter.path.len() > 1) else { return };
+        for i in 0..3 {
+            let _ = writeln!(out, "*AMPLITUDE, NAME=ALONG{}\n0.,0.", i + 1);
+            for (t, offset) in &press.indenter.path {
+                let _ = writeln!(out, "{},{}", number(*t), number(offset[i]));
+            }
+        }
     }
 
     fn step(&self, out: &mut String) {
@@ -242,8 +270,7 @@ impl Deck<'_> {
             }
             "TIME POINTS=STORED"
         };
-        let hyperelastic = self.materials.iter().flatten().any(MaterialCard::is_hyperelastic);
-        let nonlinear = if hyperelastic { ", NLGEOM" } else { "" };
+        let nonlinear = if self.is_nonlinear() { ", NLGEOM" } else { "" };
         let _ = write!(
             out,
             "*STEP{nonlinear}, INC=100000\n*STATIC\n{},1.,1.E-8,{}\n*CONTROLS, PARAMETERS=FIELD\n{}\n",
@@ -263,6 +290,14 @@ impl Deck<'_> {
         let _ = write!(out, "*EL PRINT, ELSET={ELEMENTS}, {when}\nE,S\n*END STEP\n");
     }
 
+    /// Whether the step is geometrically nonlinear.
+    fn is_nonlinear(&self) -> bool {
+        self.tissues()
+            .iter()
+            .filter_map(|t| self.materials[t.index()].as_ref())
+            .any(MaterialCard::is_hyperelastic)
+    }
+
     /// Everything that moves as prescribed.
     fn motion(&self, out: &mut String) {
         if self.prescribed_mm.is_empty() && self.press.is_none() {
@@ -272,9 +307,14 @@ impl Deck<'_> {
         for &(dof, value) in self.prescribed_mm {
             let _ = writeln!(out, "{},{2},{2},{1}", dof / 3 + 1, number(value), dof % 3 + 1);
         }
-        if let Some(press) = &self.press {
-            for (i, &t) in press.indenter.travel_mm.iter().enumerate() {
+        let Some(press) = &self.press else { return };
+        if let [(_, travel)] = press.indenter.path[..] {
+            for (i, t) in travel.into_iter().enumerate() {
                 let _ = writeln!(out, "{INDENTER},{0},{0},{1}", i + 1, number(t));
+            }
+        } else {
+            for i in 1..=3 {
+                let _ = writeln!(out, "*BOUNDARY, AMPLITUDE=ALONG{i}\n{INDENTER},{i},{i},1.");
             }
         }
     }

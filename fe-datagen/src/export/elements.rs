@@ -4,13 +4,14 @@ use crate::element::ElementKind;
 use crate::mesh::{FaceKind, Mesh, Surface};
 use std::collections::HashMap;
 
-/// Which CalculiX types stand for our hexahedra. There is no equal of either:
-/// docs/calculix.md says what each choice does near nu = 0.5.
+/// Which CalculiX types stand for our hexahedra and quadrilaterals. None is an
+/// equal near nu = 0.5: docs/calculix.md says what each choice does there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ElementTypes {
     /// For `Hex8`.
     pub linear: LinearHex,
-    /// For `Hex27`, without its face and centre nodes.
+    /// For `Hex20`, `Hex27` without its face and centre nodes, and their likes
+    /// in the plane.
     pub quadratic: QuadraticHex,
 }
 
@@ -26,13 +27,13 @@ pub enum LinearHex {
     C3d8r,
 }
 
-/// A CalculiX type with twenty nodes.
+/// A CalculiX type with twenty nodes, or eight in the plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum QuadraticHex {
-    /// Eight points: hardly locks. The one to compare with.
+    /// Eight points (`CPE8R` in the plane): hardly locks. The one to compare with.
     #[default]
     C3d20r,
-    /// 27 points: locks as nu nears 0.5.
+    /// 27 points (`CPE8`): locks as nu nears 0.5.
     C3d20,
 }
 
@@ -46,13 +47,15 @@ pub struct CcxElement {
     /// Corners of the faces `S1`, `S2`, ….
     faces: &'static [&'static [usize]],
     /// Our kind with the same integration points in the same order; `None`
-    /// for a single one at the centre of a hexahedron.
+    /// for a single one at the centre of a hexahedron. Planar types are bricks
+    /// behind the scenes, of which the third coordinate does not matter.
     points_of: Option<ElementKind>,
 }
 
 const HEX_FACES: &[&[usize]] =
     &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]];
 const TET_FACES: &[&[usize]] = &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
+const QUAD_EDGES: &[&[usize]] = &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
 
 impl ElementTypes {
     /// The CalculiX type that takes elements of `kind`.
@@ -66,11 +69,18 @@ impl ElementTypes {
                 ("C3D8I", 8, HEX_FACES, Some(ElementKind::Hex8))
             }
             (ElementKind::Hex8, LinearHex::C3d8r, _) => ("C3D8R", 8, HEX_FACES, None),
-            (ElementKind::Hex27, _, QuadraticHex::C3d20r) => {
+            (ElementKind::Hex20 | ElementKind::Hex27, _, QuadraticHex::C3d20r) => {
                 ("C3D20R", 20, HEX_FACES, Some(ElementKind::Hex8))
             }
-            (ElementKind::Hex27, _, QuadraticHex::C3d20) => {
+            (ElementKind::Hex20 | ElementKind::Hex27, _, QuadraticHex::C3d20) => {
                 ("C3D20", 20, HEX_FACES, Some(ElementKind::Hex27))
+            }
+            (ElementKind::Quad4, ..) => ("CPE4", 4, QUAD_EDGES, Some(ElementKind::Hex8)),
+            (ElementKind::Quad8 | ElementKind::Quad9, _, QuadraticHex::C3d20r) => {
+                ("CPE8R", 8, QUAD_EDGES, Some(ElementKind::Hex8))
+            }
+            (ElementKind::Quad8 | ElementKind::Quad9, _, QuadraticHex::C3d20) => {
+                ("CPE8", 8, QUAD_EDGES, Some(ElementKind::Hex27))
             }
             (ElementKind::Tet4, ..) => ("C3D4", 4, TET_FACES, Some(ElementKind::Tet4)),
             (ElementKind::Tet10, ..) => ("C3D10", 10, TET_FACES, Some(ElementKind::Tet10)),
@@ -88,17 +98,12 @@ impl CcxElement {
     }
 }
 
-/// Whether CalculiX' node-to-face contact suits a surface; it takes wrong nodal
-/// weights on quadratic faces, which need face-to-face contact.
+/// Whether CalculiX' node-to-face contact suits a surface. It takes wrong nodal
+/// weights on quadratic faces, which need face-to-face contact. Edges are faces
+/// of bricks with their layers tied to each other, where a node's share is that of
+/// the edge; face-to-face contact there does not find out what touches.
 pub(super) const fn takes_node_contact(kind: FaceKind) -> bool {
-    matches!(kind, FaceKind::Quad4 | FaceKind::Tri3)
-}
-
-const fn corners(kind: FaceKind) -> usize {
-    match kind {
-        FaceKind::Quad4 | FaceKind::Quad9 => 4,
-        FaceKind::Tri3 | FaceKind::Tri6 => 3,
-    }
+    matches!(kind, FaceKind::Line2 | FaceKind::Line3 | FaceKind::Quad4 | FaceKind::Tri3)
 }
 
 /// `(element number, face number)` of every face of a surface, both from 1;
@@ -126,7 +131,7 @@ pub(super) fn element_faces(
         }
     }
     let find = |face: &[u32]| {
-        let corners = &face[..corners(surface.kind)];
+        let corners = &face[..surface.kind.corners()];
         owner.get(&key(&mut corners.iter().copied())).copied().ok_or_else(|| face.to_vec())
     };
     surface.faces().map(find).collect()
@@ -152,6 +157,19 @@ mod tests {
     }
 
     #[test]
+    fn sides_of_quadrilaterals_are_numbered_around() {
+        let (axes, layers) = ([even(1.0, 2), even(1.0, 2), vec![0.0]], vec![Tissue::Dermis]);
+        for kind in [ElementKind::Quad8, ElementKind::Quad9] {
+            let mesh =
+                build(&BlockLattice { axes: axes.clone(), layers: layers.clone(), kind }, |p| p);
+            for (i, side) in ["y_min", "x_max", "y_max", "x_min"].iter().enumerate() {
+                let found = element_faces(&mesh, ElementTypes::default(), &mesh.surfaces[*side]);
+                assert_eq!(found, Ok(vec![(1, i + 1)]), "{kind:?} {side}");
+            }
+        }
+    }
+
+    #[test]
     fn a_face_without_an_element_is_reported() {
         let (axes, layers) = ([even(1.0, 1), even(1.0, 1), even(1.0, 1)], vec![Tissue::Dermis]);
         let mesh = build(&BlockLattice { axes, layers, kind: ElementKind::Hex8 }, |p| p);
@@ -168,6 +186,7 @@ mod tests {
         assert_eq!(count(LinearHex::C3d8, ElementKind::Hex8), 8);
         assert_eq!(count(LinearHex::C3d8r, ElementKind::Hex8), 1);
         assert_eq!(count(LinearHex::C3d8, ElementKind::Hex27), 8);
+        assert_eq!(count(LinearHex::C3d8, ElementKind::Quad8), 8);
         assert_eq!(count(LinearHex::C3d8, ElementKind::Tet10), 4);
     }
 }

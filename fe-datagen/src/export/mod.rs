@@ -1,7 +1,7 @@
 //! CalculiX as an independent witness: decks out, results back in.
 //!
 //! [`Deck`] is plain data and knows no scene; [`Deck::to_text`] writes what
-//! CalculiX 2.20 reads, [`Ccx`] runs it and [`Dat`] reads what it prints. The
+//! CalculiX 2.20 reads, [`SceneDeck`] makes one of a scene, [`Ccx`] runs it and [`Dat`] reads what it prints. The
 //! cases that compare both codes are in [`witness`]. What to know of CalculiX
 //! stands in docs/calculix.md.
 
@@ -11,6 +11,7 @@ mod elements;
 mod material;
 mod rigid;
 mod run;
+mod scene;
 pub mod witness;
 
 pub use dat::{Dat, DatError, Quantity, Table};
@@ -19,6 +20,9 @@ pub use elements::{CcxElement, ElementTypes, LinearHex, QuadraticHex};
 pub use material::MaterialCard;
 pub use rigid::{RigidIndenter, RigidShape};
 pub use run::{Ccx, CcxError, CpuClock, Run};
+pub use scene::SceneDeck;
+
+use crate::scene::Scene;
 
 /// Why a body cannot be written as a CalculiX deck.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -30,6 +34,33 @@ pub enum ExportError {
         effect: &'static str,
         /// What CalculiX does with it.
         why: &'static str,
+    },
+    /// A motion that needs an unknown of its own.
+    #[error(
+        "CalculiX cannot express motion.force_n: a deck prescribes where the indenter is. Give \
+         motion.depth_mm; `fe-datagen solve` prints the depth that a force takes"
+    )]
+    Force,
+    /// A shape that no rigid surface here stands for.
+    #[error("no deck for the indenter '{shape}': plates, spheres and cylinders can be exported")]
+    Indenter {
+        /// Shape as scenes name it.
+        shape: &'static str,
+    },
+    /// Reduced integration without geometric stiffness.
+    #[error(
+        "CPE8R has modes without energy in a geometrically linear step: CalculiX finds forces \
+         several times too small. Take CPE8 (--quadratic c3d20)"
+    )]
+    ZeroEnergy,
+    /// A cylinder's ends are not in a deck.
+    #[error(
+        "skin lies {beyond_mm:.2} mm beyond an end of the cylinder, and a deck leaves its ends \
+         open: make indenter.length_mm larger"
+    )]
+    Ends {
+        /// How far the contact surface goes beyond the straight part, mm.
+        beyond_mm: f64,
     },
     /// A material would be misread.
     #[error("material of {tissue}: {why}")]
@@ -69,8 +100,7 @@ pub enum ExportError {
     },
 }
 
-/// Effects that a deck cannot hold, as scenes name them, and what CalculiX
-/// 2.20 does instead.
+/// What a deck cannot hold, as scenes name it, and what CalculiX 2.20 does instead.
 const INEXPRESSIBLE: [(&str, &str); 3] = [
     ("viscoelastic", "it reads *VISCOELASTIC and ignores it"),
     (
@@ -81,19 +111,12 @@ const INEXPRESSIBLE: [(&str, &str); 3] = [
     ("poroelastic", "it has no elements with pore pressure"),
 ];
 
-/// Refuses the first of `effects` (names as in scenes) that CalculiX cannot express.
-///
-/// # Errors
-/// [`ExportError::Effect`] names it and says what CalculiX would do.
-pub fn refuse_inexpressible<'a>(
-    effects: impl IntoIterator<Item = &'a str>,
-) -> Result<(), ExportError> {
-    for name in effects {
-        if let Some(&(effect, why)) = INEXPRESSIBLE.iter().find(|(effect, _)| *effect == name) {
-            return Err(ExportError::Effect { effect, why });
-        }
+/// Refuses a scene's effect that CalculiX cannot express.
+fn refuse_inexpressible(scene: &Scene) -> Result<(), ExportError> {
+    match INEXPRESSIBLE.iter().find(|(effect, _)| scene.has(effect)) {
+        Some(&(effect, why)) => Err(ExportError::Effect { effect, why }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// A number in at most the 20 characters that CalculiX reads of a field.
@@ -113,13 +136,5 @@ mod tests {
             let back: f64 = text.parse().unwrap();
             assert!((back - v).abs() <= 1e-12 * v.abs(), "{text}");
         }
-    }
-
-    #[test]
-    fn an_effect_that_calculix_ignores_is_named() {
-        assert_eq!(refuse_inexpressible(["finite_strain", "layers"]), Ok(()));
-        let refused = refuse_inexpressible(["layers", "viscoelastic"]).unwrap_err();
-        assert!(matches!(refused, ExportError::Effect { effect: "viscoelastic", .. }));
-        assert!(refused.to_string().contains("ignores"), "{refused}");
     }
 }

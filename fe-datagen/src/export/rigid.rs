@@ -13,7 +13,7 @@ use crate::element::reference::HEX27_LATTICE;
 use crate::indenter::Placement;
 use crate::mesh::surface::norm;
 
-/// A rigid shape in its own frame. Lengths in mm.
+/// A rigid shape in its own frame, pressing towards +z. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RigidShape {
     /// A box centred at the origin with rounded edges; the face `z = +half_mm[2]` presses.
@@ -39,14 +39,15 @@ pub enum RigidShape {
 }
 
 /// A rigid shape, where it starts and where it goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RigidIndenter {
     /// Its shape.
     pub shape: RigidShape,
-    /// Where it is at load fraction 0.
+    /// Where it is at load fraction 0; its own +z is the side that presses.
     pub start: Placement,
-    /// Displacement at load fraction 1, mm.
-    pub travel_mm: [f64; 3],
+    /// Displacement, mm, at rising load fractions up to 1; linear in between
+    /// and from none at 0.
+    pub path: Vec<(f64, [f64; 3])>,
 }
 
 /// The layer of bricks; the face `S2` of each is the surface that presses.
@@ -58,10 +59,8 @@ pub(super) struct RigidMesh {
     pub bricks: Vec<[u32; 20]>,
 }
 
-/// Arc of one quadratic facet, degrees: it leaves the circle by 1e-6 of the radius.
-const FACET_DEG: f64 = 7.5;
-/// Facets across a flat side.
-const FLAT_FACETS: usize = 4;
+/// Arc of one quadratic facet, degrees: it leaves the circle by 1e-5 of the radius.
+const FACET_DEG: f64 = 12.5;
 /// Steepest part of an edge, ball or cylinder that is meshed, degrees.
 const ANGLE_MAX_DEG: f64 = 75.0;
 
@@ -117,26 +116,12 @@ impl RigidIndenter {
                 flat([x, y], edge_radius_mm, z - edge_radius_mm, angle)
             }
             RigidShape::Sphere { radius_mm } => {
-                let mut ball = flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm));
-                // The pole is where it presses, however it is turned.
-                let pole = self.direction().unwrap_or(local[2]);
-                let side = if pole[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-                let u = unit(cross(side, pole));
-                ball.axes = [u, cross(pole, u), pole];
-                ball
+                flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm))
             }
             RigidShape::Cylinder { radius_mm, half_length_mm } => {
                 let mut bar = flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm));
                 bar.half_mm[1] = half_length_mm;
                 bar.angle_deg[1] = 0.0;
-                let axis = local[1];
-                let pole = self.direction().unwrap_or(local[2]);
-                let along: f64 = (0..3).map(|i| pole[i] * axis[i]).sum();
-                let across: [f64; 3] = std::array::from_fn(|i| pole[i] - along * axis[i]);
-                if norm(across) > 0.1 {
-                    let pole = unit(across);
-                    bar.axes = [cross(axis, pole), axis, pole];
-                }
                 bar
             }
         };
@@ -148,16 +133,25 @@ impl RigidIndenter {
         Ok(rolled)
     }
 
-    /// Direction of travel; `None` if it does not move.
-    fn direction(&self) -> Option<[f64; 3]> {
-        let length = norm(self.travel_mm);
-        (length > 0.0).then(|| self.travel_mm.map(|t| t / length))
+    /// Refuses a cylinder that does not reach past the body on both sides.
+    pub(super) fn refuse_ends(
+        &self,
+        points: impl Iterator<Item = [f64; 3]>,
+    ) -> Result<(), ExportError> {
+        let RigidShape::Cylinder { half_length_mm, .. } = self.shape else { return Ok(()) };
+        let axis = self.start.rotation.map(|row| row[1]);
+        let along = |p: [f64; 3]| -> f64 {
+            (0..3).map(|i| (p[i] - self.start.origin_mm[i]) * axis[i]).sum()
+        };
+        let beyond_mm = points.map(|p| along(p).abs()).fold(0.0, f64::max) - half_length_mm;
+        if beyond_mm > 0.0 { Err(ExportError::Ends { beyond_mm }) } else { Ok(()) }
     }
 
     /// Half angle of a round shape that a body without hollows can touch, with
     /// some room.
     fn reach_deg(&self, radius_mm: f64) -> f64 {
-        let cosine = (1.0 - norm(self.travel_mm) / radius_mm).max(0.0);
+        let deepest = self.path.iter().map(|(_, offset)| norm(*offset)).fold(0.0, f64::max);
+        let cosine = (1.0 - deepest / radius_mm).max(0.0);
         (1.25 * cosine.acos().to_degrees() + FACET_DEG).min(ANGLE_MAX_DEG)
     }
 }
@@ -174,11 +168,7 @@ impl Rolled {
         };
         let normal = unit([u.angle.tan(), v.angle.tan(), 1.0]);
         let out = self.radius_mm - thickness * (1.0 - level);
-        let local = [
-            u.offset_mm + out * normal[0],
-            v.offset_mm + out * normal[1],
-            out * normal[2],
-        ];
+        let local = [u.offset_mm + out * normal[0], v.offset_mm + out * normal[1], out * normal[2]];
         std::array::from_fn(|i| {
             self.centre_mm[i] + (0..3).map(|k| local[k] * self.axes[k][i]).sum::<f64>()
         })
@@ -192,10 +182,10 @@ struct Station {
     angle: f64,
 }
 
-/// Stations along one axis, two intervals a facet.
+/// Stations along one axis, two intervals a facet; a flat side is one.
 fn stations(half_mm: f64, angle_deg: f64) -> Vec<Station> {
     let arcs = 2 * (angle_deg / FACET_DEG).ceil() as usize;
-    let flats = if half_mm > 0.0 { 2 * FLAT_FACETS } else { 0 };
+    let flats = if half_mm > 0.0 { 2 } else { 0 };
     let mut all = Vec::with_capacity(2 * arcs + flats + 1);
     let arc = |i: usize| angle_deg.to_radians() * i as f64 / arcs as f64;
     all.extend((1..=arcs).rev().map(|i| Station { offset_mm: -half_mm, angle: -arc(i) }));
@@ -212,13 +202,6 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
     v.map(|c| c / length)
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * b[k] - a[k] * b[j]
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,7 +214,7 @@ mod tests {
     };
 
     fn mesh(shape: RigidShape, travel_mm: [f64; 3]) -> RigidMesh {
-        RigidIndenter { shape, start: TURNED, travel_mm }.mesh().unwrap()
+        RigidIndenter { shape, start: TURNED, path: vec![(1.0, travel_mm)] }.mesh().unwrap()
     }
 
     /// Largest distance of a node or of a facet's middle from the true surface.
@@ -284,13 +267,26 @@ mod tests {
     }
 
     #[test]
+    fn a_cylinder_shorter_than_the_body_is_refused() {
+        let shape = RigidShape::Cylinder { radius_mm: 2.0, half_length_mm: 5.0 };
+        let indenter = RigidIndenter { shape, start: TURNED, path: Vec::new() };
+        // Its axis is the world's z; it is centred at z = 5.
+        let at = |z: f64| indenter.refuse_ends([[1.0, 0.0, 5.0], [0.0, 2.0, z]].into_iter());
+        assert_eq!(at(9.9), Ok(()));
+        let refused = at(-1.0).unwrap_err();
+        assert!(
+            matches!(refused, ExportError::Ends { beyond_mm } if (beyond_mm - 1.0).abs() < 1e-12)
+        );
+    }
+
+    #[test]
     fn a_shape_without_size_is_refused() {
         for shape in [
             RigidShape::Sphere { radius_mm: 0.0 },
             RigidShape::Sphere { radius_mm: f64::NAN },
             RigidShape::Plate { half_mm: [1.0, 1.0, 1.0], edge_radius_mm: 2.0 },
         ] {
-            let indenter = RigidIndenter { shape, start: TURNED, travel_mm: [0.0; 3] };
+            let indenter = RigidIndenter { shape, start: TURNED, path: Vec::new() };
             assert!(matches!(indenter.mesh(), Err(ExportError::Shape { .. })), "{shape:?}");
         }
     }

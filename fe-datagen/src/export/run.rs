@@ -117,7 +117,8 @@ impl Ccx {
             return Err(CcxError::Failed { message, log });
         }
         let dat = Dat::read(&folder.join(format!("{job}.dat")))?;
-        let count = |text: &str| output.lines().filter(|l| l.trim_start().starts_with(text)).count();
+        let count =
+            |text: &str| output.lines().filter(|l| l.trim_start().starts_with(text)).count();
         Ok(Run {
             dat,
             cpu_s,

@@ -9,11 +9,12 @@
 //! towards the joint, so a flat plate touches the pad and not the base.
 //! Bone: elliptic rod with base, waist and tuft, its axis offset to the nail.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Dimensions of the fingertip, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FingertipShape {
     /// From the tip to the base plane.
@@ -86,8 +87,8 @@ impl Default for FingertipShape {
 /// Why a shape was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FingertipShapeError {
-    /// A length is not a positive finite number.
-    #[error("geometry.{field} = {value} mm must be positive and finite")]
+    /// A length is not positive, or absurd.
+    #[error("geometry.shape.{field} = {value} mm has to be above 0 and at most 100")]
     NotPositive {
         /// Field name in the scene.
         field: &'static str,
@@ -111,7 +112,7 @@ pub enum FingertipShapeError {
     },
     /// A solid bone's cortex fills the bone.
     #[error(
-        "geometry.bone_cortex_mm = {cortex_mm} leaves no marrow cavity: an elastic bone's cortex may take \
+        "geometry.shape.bone_cortex_mm = {cortex_mm} leaves no marrow cavity: an elastic bone's cortex may take \
          {most_mm:.3} mm of this bone at most; make the cortex thinner, the bone thicker or rigid"
     )]
     CortexTooThick {
@@ -122,12 +123,12 @@ pub enum FingertipShapeError {
     },
     /// A solid nail has no element.
     #[error(
-        "geometry.nail_mm: the nail plate covers no whole face of the skin; make it larger, the mesh \
+        "geometry.shape.nail_mm: the nail plate covers no whole face of the skin; make it larger, the mesh \
          denser or the nail rigid"
     )]
     NailTooSmall,
     /// Lengths contradict each other.
-    #[error("geometry: {0}")]
+    #[error("geometry.shape: {0}")]
     Inconsistent(&'static str),
 }
 
@@ -141,6 +142,23 @@ pub enum SurfaceParameter {
     Body([f64; 2], f64),
 }
 
+impl FingertipShapeError {
+    /// The field of a scene that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> String {
+        let name = match self {
+            Self::NotPositive { field, .. } => *field,
+            Self::CortexTooThick { .. } => "bone_cortex_mm",
+            Self::NailTooSmall => "nail_mm",
+            Self::BoneTooClose { .. } => return "geometry.shape".into(),
+            Self::Inconsistent(rule) => rule.split(' ').find(|w| w.contains('_')).unwrap_or(""),
+        };
+        format!("geometry.shape.{name}")
+    }
+}
+
+/// Beyond it a length in mm must have been meant in another unit.
+const LENGTH_MAX_MM: f64 = 100.0;
 /// Share of the gap between skin and bone that epidermis and dermis may take.
 const SKIN_SHARE_MAX: f64 = 0.75;
 /// Least gap between skin and bone, mm.
@@ -178,7 +196,7 @@ impl FingertipShape {
             ("bone_cortex_mm", self.bone_cortex_mm),
         ];
         for (field, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
+            if !(value > 0.0 && value <= LENGTH_MAX_MM) {
                 return Err(FingertipShapeError::NotPositive { field, value });
             }
         }
@@ -187,7 +205,15 @@ impl FingertipShape {
         }
         if !(self.bone_tip_mm + self.bone_cap_mm < self.length_mm) {
             return Err(FingertipShapeError::Inconsistent(
-                "the bone's end lies beyond the base plane",
+                "bone_tip_mm and bone_cap_mm put the bone's end beyond the base plane",
+            ));
+        }
+        if !(self.bone_waist_at > 0.0 && self.bone_waist_at < 1.0) {
+            return Err(FingertipShapeError::Inconsistent("bone_waist_at must be in (0, 1)"));
+        }
+        if !(self.bone_offset_mm.abs() < self.height_mm) {
+            return Err(FingertipShapeError::Inconsistent(
+                "bone_offset_mm must be within height_mm of the axis",
             ));
         }
         if !(self.crease_depth_mm >= 0.0 && self.crease_depth_mm < 0.5 * self.height_mm) {

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Dimensions of the section, mm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SectionShape {
     /// Width of the skin's ellipse.
@@ -97,6 +97,19 @@ pub enum SectionShapeError {
         /// Inner side of skin or nail.
         y_mm: f64,
     },
+}
+
+impl SectionShapeError {
+    /// The field that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> String {
+        match self {
+            Self::NotPositive { field, .. } => format!("geometry.shape.{field}"),
+            Self::Offset(_) => "geometry.shape.bone_offset_mm".into(),
+            Self::NailTooWide { .. } => "geometry.shape.nail_width_mm".into(),
+            Self::BoneTooClose { .. } => "geometry.shape".into(),
+        }
+    }
 }
 
 impl SectionShape {

@@ -6,7 +6,7 @@ use super::{Distance, SignedDistance};
 use serde::{Deserialize, Serialize};
 
 /// A cylinder along y, centred at the origin; its top is at `z = radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Cylinder {
     /// Radius, mm.

@@ -1,7 +1,7 @@
 //! Braille-like dots.
 
 use super::grating::{COUNT_MAX, from_nearest};
-use super::plate::{Plate, THICKNESS_MM};
+use super::plate::Plate;
 use super::rules::{BadValue, length, require};
 use super::sphere::Sphere;
 use super::union::nearer;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Service's Specification 800: dots 1.44 mm wide at the base and 0.48 mm high,
 /// 2.34 mm apart. Where a dot meets the plate the surface has a concave corner, and the
 /// gap a kink; skin that reaches there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dots {
     /// Dots along x and y.
@@ -106,6 +106,7 @@ impl SignedDistance for Dots {
 
 #[cfg(test)]
 mod tests {
+    use super::super::plate::THICKNESS_MM;
     use super::*;
     use crate::indenter::testing::{Exactness, distance_tests};
 

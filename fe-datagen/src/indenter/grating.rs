@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// The union of rounded bars with their base. Where a wall meets the floor of a groove
 /// the surface has a concave corner, and the gap a kink; skin that has closed a groove
 /// down to there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Grating {
     /// Number of ridges.

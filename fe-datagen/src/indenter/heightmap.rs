@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// differentiable, as Newton's method needs, never above white or below black, and
 /// smoothed over a pixel (kernel 1/6, 4/6, 1/6), so details should be some pixels
 /// wide. Beyond the picture its border goes on without end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Heightmap {
     /// PNG, gray, 8 or 16 bits a pixel, relative to the scene's folder.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub(super) const THICKNESS_MM: f64 = 4.0;
 
 /// A flat plate; the middle of its pressing face is at `z = 2 + edge_radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Plate {
     /// Side lengths along x and y, mm.

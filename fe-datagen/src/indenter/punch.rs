@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// An upright cylinder with rounded rims; the middle of its flat end is the
 /// origin, its body below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Punch {
     /// Outer radius, mm.

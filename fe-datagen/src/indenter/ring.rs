@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// An upright tube with rounded rims about the z axis, its end at `z = 0`, its
 /// body below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Ring {
     /// Outer radius, mm.

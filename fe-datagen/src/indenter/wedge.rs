@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// 1.0 mm at the base and 2.0 mm high. Its widths are those of the sharp
 /// section. All edges are rounded by `tip_radius_mm`, which leaves the height as
 /// it is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Wedge {
     /// Width at the tip, mm.

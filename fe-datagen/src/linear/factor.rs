@@ -5,7 +5,7 @@
 //! drifts. Where the tangent is indefinite, `L B L^T` in f64 solves directly.
 
 use super::structure::{Structure, SymmetricMatrix};
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{IntranodeLbltRef, LltRef};
@@ -21,6 +21,13 @@ pub enum FactorError {
     /// Out of memory.
     #[error("out of memory: the factor needs {0} entries")]
     Memory(usize),
+}
+
+fn scratch(structure: &Structure) -> StackReq {
+    let s = &structure.symbolic;
+    s.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default())
+        .or(s.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, Spec::default()))
+        .or(s.solve_in_place_scratch::<f64>(1, Par::Seq))
 }
 
 /// Owns the memory of one numeric factor; re-used by every factorization.
@@ -57,11 +64,7 @@ impl Factorizer {
     /// [`FactorError::Memory`].
     pub fn new(structure: &Structure) -> Result<Self, FactorError> {
         let s = &structure.symbolic;
-        let request = s
-            .factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default())
-            .or(s.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, Spec::default()))
-            .or(s.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let memory = MemBuffer::try_new(request)
+        let memory = MemBuffer::try_new(scratch(structure))
             .map_err(|_| FactorError::Memory(structure.factor_entries()))?;
         Ok(Self {
             single: vec![0.0; s.len_val()],
@@ -73,6 +76,13 @@ impl Factorizer {
             kind: None,
             right_hand_side: vec![0.0; structure.equations.count],
         })
+    }
+
+    /// Memory that a factorizer takes on `structure`, bytes, with an f32 factor.
+    #[must_use]
+    pub fn bytes(structure: &Structure) -> usize {
+        scratch(structure).unaligned_bytes_required()
+            + 4 * (structure.factor_entries() + structure.row.len() + structure.equations.count)
     }
 
     /// What the held factor is, if there is one.

@@ -6,7 +6,8 @@ use faer::Side;
 use faer::perm::PermRef;
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use std::collections::BTreeSet;
 
@@ -117,6 +118,37 @@ impl Structure {
     #[must_use]
     pub fn factor_entries(&self) -> usize {
         self.symbolic.len_val()
+    }
+
+    /// Multiplications and additions of one numeric factorization: `r^2` for a
+    /// column of the factor with `r` entries, its diagonal included.
+    #[must_use]
+    pub fn factor_flops(&self) -> f64 {
+        let column = |rows: usize| (rows as f64).powi(2);
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(s) => {
+                s.col_ptr().windows(2).map(|w| column(w[1] - w[0])).sum()
+            }
+            SymbolicCholeskyRaw::Supernodal(s) => (0..s.n_supernodes())
+                .map(|k| {
+                    let width = s.supernode_end()[k] - s.supernode_begin()[k];
+                    let below = s.supernode(k).pattern().len();
+                    (1..=width).map(|c| column(below + c)).sum::<f64>()
+                })
+                .sum(),
+        }
+    }
+
+    /// Memory of pattern, scatter maps and symbolic factorization, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let scatter: usize = self.scatter.iter().map(Vec::len).sum();
+        let supernodes = match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(s) => s.len_val(),
+            SymbolicCholeskyRaw::Supernodal(s) => s.row_idx().len(),
+        };
+        8 * (self.row.len() + self.column_start.len() + 2 * self.equations.count + supernodes)
+            + 4 * (scatter + self.equations.of_dof.len())
     }
 
     /// Adds an element's dense tangent (blocks `a <= b` of `3 n x 3 n`).

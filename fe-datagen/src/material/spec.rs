@@ -1,6 +1,7 @@
 //! Materials as scenes write them, and what they become.
 
 use super::{Ogden, OgdenTerm, Prony, PronyTerm, ogden, prony};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Elastic constants as the literature prints them.
@@ -39,7 +40,7 @@ fn poissons_ratio(nu: f64) -> Result<(), MaterialError> {
 }
 
 /// An Ogden law, in Abaqus' convention.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OgdenSpec {
     /// Moduli `mu_p`, MPa.
@@ -102,7 +103,7 @@ impl OgdenSpec {
             return Err(MaterialError::OgdenUnstable(mu0));
         }
         if mu0 > MODULUS_MAX_MPA {
-            return Err(MaterialError::Units(mu0));
+            return Err(MaterialError::OgdenUnits(mu0));
         }
         poissons_ratio(self.poissons_ratio)?;
         let [low, high] = self.calibrated_stretch;
@@ -122,7 +123,7 @@ impl OgdenSpec {
 }
 
 /// Which moduli a law's constants are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Moduli {
     /// Those of a sudden strain.
@@ -133,7 +134,7 @@ pub enum Moduli {
 }
 
 /// A Prony series of shear relaxation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PronySpec {
     /// Shares `g_i`, 0 to 1, together below 1.
@@ -196,7 +197,7 @@ impl PronySpec {
 }
 
 /// All that a scene may say of one tissue. Effects choose what of it is used.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
     /// Young's modulus at rest, MPa: neo-Hookean and linear law.
@@ -234,8 +235,8 @@ pub enum MaterialError {
     /// Young's modulus is not a positive finite number.
     #[error("Young's modulus {0} MPa must be positive and finite")]
     YoungsModulus(f64),
-    /// A modulus that no solid has.
-    #[error("a modulus of {0} MPa is beyond any solid's: moduli are in MPa, was Pa meant?")]
+    /// A modulus that no such tissue has.
+    #[error("a modulus of {0} MPa is beyond any such tissue's: moduli are in MPa, was Pa meant?")]
     Units(f64),
     /// Poisson's ratio is outside (-1, 0.5).
     #[error(
@@ -259,6 +260,9 @@ pub enum MaterialError {
          (Abaqus' convention: mu0 = sum mu_i)"
     )]
     OgdenUnstable(f64),
+    /// A shear modulus that no tissue has.
+    #[error("the sum of ogden.mu_mpa is {0} MPa, beyond any tissue's: was Pa meant?")]
+    OgdenUnits(f64),
     /// Bounds of the calibrated stretch.
     #[error("ogden.calibrated_stretch = [{0}, {1}] must enclose 1")]
     Calibrated(f64, f64),

@@ -11,10 +11,13 @@ use super::extrude::Cells;
 use super::half_cube::{Grid, GridSize};
 use super::{Mesh, Tissue, nail};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Named mesh densities.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Density {
     /// About 10 thousand unknowns: for tests and a first look.
@@ -26,7 +29,7 @@ pub enum Density {
 }
 
 /// Order of the elements.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
     /// `Hex8` with mean dilatation.

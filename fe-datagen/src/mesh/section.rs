@@ -31,7 +31,9 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// How much of the section is meshed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Extent {
     /// `x >= 0`, for what is symmetric about `x = 0`. Forces and energies are

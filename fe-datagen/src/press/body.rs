@@ -11,7 +11,8 @@ use crate::mesh::sample::Deformed;
 use crate::mesh::section::SectionMeshError;
 use crate::mesh::surface::norm;
 use crate::mesh::{Mesh, Tissue};
-use crate::scene::{SceneError, TissueError};
+use crate::scene::error::{indenter_field, material_field};
+use crate::scene::{Located, Scene, SceneError, TissueError};
 use crate::solve::{Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport};
 use papilla_proto::atlas::Atlas;
 use std::path::PathBuf;
@@ -80,6 +81,41 @@ pub enum PressError {
     /// The indenter does not meet the body.
     #[error(transparent)]
     Indenter(#[from] IndenterError),
+    /// Any of these, at the line of the scene that is to blame.
+    #[error(transparent)]
+    Located(Box<Located<Self>>),
+}
+
+impl PressError {
+    /// The field of a scene that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> Option<String> {
+        match self {
+            Self::Shape(e) => Some(e.field()),
+            Self::Scene(e) => e.field(),
+            Self::Material(e) => Some(material_field(e)),
+            Self::Indenter(e) => Some(indenter_field(e)),
+            Self::Problem(ProblemError::Missing { kind: "node set", .. }) => {
+                Some("geometry.fixed".into())
+            }
+            Self::Problem(ProblemError::Missing { .. } | ProblemError::ContactFaces { .. }) => {
+                Some("geometry.contact".into())
+            }
+            Self::Mesh(_) => Some("geometry.file".into()),
+            Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
+            Self::Rising(..) | Self::Empty => Some("motion".into()),
+            Self::Located(e) => e.error.field(),
+            _ => None,
+        }
+    }
+
+    /// The same with the line of `scene` that is to blame, if there is one.
+    pub(super) fn at(self, scene: &Scene) -> Self {
+        match self.field().and_then(|f| scene.place(&f)) {
+            Some(place) => Self::Located(Box::new(Located { place, error: self })),
+            None => self,
+        }
+    }
 }
 
 /// A body ready to be pressed, shared by every press of a campaign.

@@ -23,11 +23,16 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Meshes and sets up what a scene describes.
+    /// Meshes and sets up what a scene describes, the indenter at first touch.
     ///
     /// # Errors
-    /// [`PressError`] names what cannot be built.
+    /// [`PressError`] names what cannot be built, and the line of the scene that is
+    /// to blame.
     pub fn new(scene: &Scene) -> Result<Self, PressError> {
+        Self::build(scene).map_err(|e| e.at(scene))
+    }
+
+    fn build(scene: &Scene) -> Result<Self, PressError> {
         let plan = scene.plan()?;
         let approach = Approach {
             shape: scene.indenter.build(&scene.folder)?,
@@ -37,7 +42,10 @@ impl Setup {
             friction: plan.friction,
         };
         let body = body(scene, &plan)?;
-        Ok(Self { plan, body, approach, drive: drive(&scene.motion) })
+        let drive = drive(&scene.motion);
+        // An indenter that never touches is found now, not after files are written.
+        body.indenter(&approach, &drive)?;
+        Ok(Self { plan, body, approach, drive })
     }
 }
 

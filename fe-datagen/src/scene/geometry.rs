@@ -6,11 +6,12 @@ use crate::geometry::section::SectionShape;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::{Density, Order};
 use crate::mesh::section::Extent;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What is pressed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Geometry {
     /// The fingertip.
@@ -68,7 +69,7 @@ fn quadratic() -> Order {
 }
 
 /// One layer of a block.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
     /// What it is made of.
@@ -79,34 +80,40 @@ pub struct Layer {
     pub elements: usize,
 }
 
+/// Beyond it a length in mm must have been meant in another unit.
+const LENGTH_MAX_MM: f64 = 1000.0;
 /// Most elements of a block along an axis or through a layer.
 const ELEMENTS_MAX: usize = 1000;
 
 impl Geometry {
     pub(super) fn validate(&self) -> Result<(), SceneError> {
-        if let Self::Section { shape, .. } = self {
-            shape.validate()?;
+        match self {
+            Self::Fingertip { shape, .. } => Ok(shape.validate()?),
+            Self::Block { size_mm, elements, layers, .. } => {
+                validate_block(size_mm, elements, layers)
+            }
+            Self::Section { shape, .. } => Ok(shape.validate()?),
+            Self::Mesh { .. } => Ok(()),
         }
-        let Self::Block { size_mm, elements, layers, .. } = self else { return Ok(()) };
-        require(
-            size_mm.iter().all(|&v| is_length(v)),
-            "geometry.size_mm",
-            size_mm,
-            "has to be positive",
-        )?;
-        let count = |n: usize| (1..=ELEMENTS_MAX).contains(&n);
-        require(
-            elements.iter().all(|&n| count(n)),
-            "geometry.elements",
-            elements,
-            "has to be 1 to 1000",
-        )?;
-        let good = |l: &Layer| is_length(l.thickness_mm) && count(l.elements);
-        require(
-            !layers.is_empty() && layers.iter().all(good),
-            "geometry.layers",
-            layers,
-            "has to list layers of positive thickness with 1 to 1000 elements",
-        )
     }
+}
+
+fn validate_block(
+    size_mm: &[f64; 2],
+    elements: &[usize; 2],
+    layers: &[Layer],
+) -> Result<(), SceneError> {
+    let length = |v: f64| is_length(v) && v <= LENGTH_MAX_MM;
+    let count = |n: usize| (1..=ELEMENTS_MAX).contains(&n);
+    let (a_length, a_count) = ("has to be above 0 and at most 1000 mm", "has to be 1 to 1000");
+    require(size_mm.iter().all(|&v| length(v)), "geometry.size_mm", size_mm, a_length)?;
+    require(elements.iter().all(|&n| count(n)), "geometry.elements", elements, a_count)?;
+    require(!layers.is_empty(), "geometry.layers", &layers, "has to list a layer at least")?;
+    for (i, layer) in layers.iter().enumerate() {
+        let field = |name: &str| format!("geometry.layers[{i}].{name}");
+        let thickness = layer.thickness_mm;
+        require(length(thickness), field("thickness_mm"), &thickness, a_length)?;
+        require(count(layer.elements), field("elements"), &layer.elements, a_count)?;
+    }
+    Ok(())
 }

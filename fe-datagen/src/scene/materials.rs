@@ -2,10 +2,11 @@
 
 use crate::material::spec::{MaterialError, MaterialSpec, OgdenSpec, PronySpec};
 use crate::mesh::Tissue;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Constants of every tissue; the design's table where a scene gives none.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TissueTable {
     /// Epidermis: Chen, Shuai & Zhu.
@@ -70,15 +71,23 @@ impl TissueTable {
     /// [`TissueError`] names the tissue and what is out of range.
     pub(super) fn validate(&self) -> Result<(), TissueError> {
         for tissue in Tissue::ALL {
-            check(self.of(tissue))
+            check(self.of(tissue), tissue)
                 .map_err(|source| TissueError { tissue: tissue.name(), source })?;
         }
         Ok(())
     }
 }
 
-fn check(spec: &MaterialSpec) -> Result<(), MaterialError> {
+/// Dry horn has a few thousand MPa: beyond it a soft tissue's modulus must have
+/// been meant in another unit.
+const SOFT_MAX_MPA: f64 = 1e4;
+
+fn check(spec: &MaterialSpec, tissue: Tissue) -> Result<(), MaterialError> {
     spec.constants().moduli_mpa()?;
+    let soft = tissue != Tissue::Nail && tissue != Tissue::Bone;
+    if soft && spec.youngs_modulus_mpa > SOFT_MAX_MPA {
+        return Err(MaterialError::Units(spec.youngs_modulus_mpa));
+    }
     spec.ogden.as_ref().map_or(Ok(()), |o| o.law().map(drop))?;
     spec.prony.as_ref().map_or(Ok(()), |p| p.series().map(drop))
 }

@@ -4,24 +4,29 @@
 //! it wants. What it does not name is not simulated.
 
 pub mod effects;
-mod error;
+pub(crate) mod error;
 mod geometry;
 mod materials;
 mod motion;
+mod origin;
+#[cfg(test)]
+mod tests;
 
 pub use effects::{EffectName, Plan};
 pub use error::SceneError;
 pub use geometry::{Geometry, Layer};
 pub use materials::{TissueError, TissueTable};
 pub use motion::{Motion, PathPoint};
+pub use origin::{Located, Origin, Place};
 
 use crate::indenter::IndenterSpec;
 use error::require;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A scene file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// What is pressed.
@@ -43,14 +48,23 @@ pub struct Scene {
     /// Where the file was: paths in it are relative to this folder.
     #[serde(skip)]
     pub folder: PathBuf,
+    /// What the file said, for errors that point at a line.
+    #[serde(skip)]
+    pub origin: Origin,
 }
 
 /// Coulomb friction.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Friction {
     /// Coefficient.
     pub coefficient: f64,
+}
+
+/// JSON schema of scene files (draft 2020-12), from the types that read them.
+#[must_use]
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(Scene)
 }
 
 /// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
@@ -64,11 +78,37 @@ impl Scene {
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.into(), source })?;
-        let mut scene: Self = toml::from_str(&text)
-            .map_err(|e| SceneError::Parse { path: path.into(), message: e.to_string() })?;
+        Self::parse(path, text)
+    }
+
+    /// Reads and checks the text of a scene; `path` is where it would stand.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file and line, or the field and its rule.
+    pub fn parse(path: &Path, text: String) -> Result<Self, SceneError> {
+        let origin = Origin::new(path, text);
+        let parsed = toml::from_str::<Self>(origin.text());
+        let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
         scene.folder = path.parent().unwrap_or(Path::new("")).into();
-        scene.validate()?;
-        Ok(scene)
+        scene.origin = origin;
+        match scene.validate() {
+            Ok(()) => Ok(scene),
+            Err(e) => {
+                let place = e.field().and_then(|f| scene.place(&f));
+                Err(e.with(place))
+            }
+        }
+    }
+
+    /// Where the file says what `field` is; `None` for a scene made by a program or
+    /// a field that the file leaves to its default.
+    #[must_use]
+    pub fn place(&self, field: &str) -> Option<Place> {
+        let name = field.strip_prefix("effects[").and_then(|f| f.strip_suffix(']'));
+        match name.and_then(|n| self.effects.iter().position(|e| e.as_str() == n)) {
+            Some(i) => self.origin.find(&format!("effects[{i}]")),
+            None => self.origin.find(field),
+        }
     }
 
     /// Checks what the type system cannot.
@@ -88,7 +128,7 @@ impl Scene {
         )?;
         for (i, e) in self.effects.iter().enumerate() {
             let twice = self.effects[..i].contains(e);
-            require(!twice, "effects", &e.as_str(), "is named twice")?;
+            require(!twice, format!("effects[{i}]"), &e.as_str(), "is named twice: name it once")?;
         }
         if matches!(self.geometry, Geometry::Section { .. }) && !self.has("plane_strain") {
             return Err(SceneError::Fields {
@@ -112,71 +152,5 @@ impl Scene {
     /// [`SceneError::Effect`] for an effect that the scene cannot have.
     pub fn plan(&self) -> Result<Plan, SceneError> {
         Plan::new(self)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn parse(text: &str) -> Result<Scene, String> {
-        let scene: Scene = toml::from_str(text).map_err(|e| e.to_string())?;
-        scene.validate().map_err(|e| e.to_string())?;
-        Ok(scene)
-    }
-
-    const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\ndepth_mm = 1.0\nincrements = 4\n";
-
-    #[test]
-    fn a_minimal_scene_takes_the_defaults() {
-        let scene = parse(FINGER).unwrap();
-        assert_eq!(scene.effects, effects::usual());
-        assert_eq!(scene.materials, TissueTable::default());
-        assert_eq!(scene.indenter, IndenterSpec::default());
-        let plan = scene.plan().unwrap();
-        assert!(!plan.relaxes && plan.friction == 0.0 && !plan.plane_strain);
-    }
-
-    #[test]
-    fn bad_scenes_name_the_field_and_the_cure() {
-        let with = |effects: &str| format!("effects = {effects}\n{FINGER}");
-        let section =
-            |e: &str| with(&format!("[\"layers\", \"{e}\"]")).replace("fingertip", "section");
-        let cases = [
-            (FINGER.replace("depth_mm = 1.0", "depth_mm = -1.0"), "motion.depth_mm"),
-            (FINGER.replace("depth_mm = 1.0", ""), "exactly one of depth_mm"),
-            (FINGER.replace("increments = 4", "increments = 0"), "motion.increments"),
-            (FINGER.replace("coarse", "huge"), "huge"),
-            (FINGER.replace("depth_mm", "depth"), "line 5"),
-            (with("[\"sound\"]"), "unknown effect 'sound'; there are: finite_strain"),
-            (with("[\"hyperelastic\"]"), "needs 'finite_strain'"),
-            (with("[\"viscoelastic\"]"), "motion.path"),
-            (with("[\"plane_strain\"]"), "section"),
-            (section("finite_strain"), "name the effect"),
-            (section("plane_strain\", \"nail") + "pitch_deg = 3.0\n", "extent = \"whole\""),
-            (section("plane_strain") + "yaw_deg = 3.0\n", "motion.roll_deg, yaw_deg"),
-            (
-                section("plane_strain") + "[geometry.shape]\ndermis_mm = -1.0\n",
-                "geometry.shape.dermis_mm = -1 mm",
-            ),
-            (with("[\"friction\"]"), "friction.coefficient"),
-            (with("[\"layers\", \"layers\"]"), "twice"),
-            (
-                format!(
-                    "{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"
-                ),
-                "materials.dermis: Poisson's ratio 0.5",
-            ),
-            (
-                format!(
-                    "{FINGER}[materials.dermis]\nyoungs_modulus_mpa = 8e7\npoissons_ratio = 0.4\n"
-                ),
-                "was Pa meant",
-            ),
-        ];
-        for (text, word) in cases {
-            let error = parse(&text).unwrap_err();
-            assert!(error.contains(word), "{error} should name {word}");
-        }
     }
 }

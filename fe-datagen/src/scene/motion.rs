@@ -2,10 +2,11 @@
 
 use super::error::{SceneError, is_length, require};
 use crate::press::record::Pose;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the indenter moves. Exactly one of `depth_mm`, `force_n` and `path` is given.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
     /// Straight to this depth from first touch, mm.
@@ -42,7 +43,7 @@ fn one() -> usize {
 }
 
 /// A point of a path.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PathPoint {
     /// Time since first touch, s.
@@ -58,6 +59,8 @@ pub struct PathPoint {
 const INCREMENTS_MAX: usize = 1000;
 /// Most points of a path.
 const PATH_MAX: usize = 1000;
+/// Beyond it a force in N must have been meant in another unit.
+const FORCE_MAX_N: f64 = 1000.0;
 /// Beyond it a length in mm must have been meant in another unit.
 const DEPTH_MAX_MM: f64 = 100.0;
 
@@ -96,7 +99,8 @@ impl Motion {
             require(ok, "motion.depth_mm", &depth, "has to be above 0 and at most 100 mm")?;
         }
         if let Some(force) = self.force_n {
-            require(is_length(force), "motion.force_n", &force, "has to be positive, N")?;
+            let ok = is_length(force) && force <= FORCE_MAX_N;
+            require(ok, "motion.force_n", &force, "has to be above 0 and at most 1000 N")?;
         }
         require(
             (1..=INCREMENTS_MAX).contains(&self.increments),
@@ -129,23 +133,37 @@ fn validate_path(path: &[PathPoint]) -> Result<(), SceneError> {
         "has to have 1 to 1000 points",
     )?;
     let mut last = 0.0;
-    for p in path {
+    for (i, p) in path.iter().enumerate() {
+        let field = |name: &str| format!("motion.path[{i}].{name}");
+        let inside = p.time_s == 0.0 && p.depth_mm > 0.0;
+        require(
+            !inside,
+            field("depth_mm"),
+            &p.depth_mm,
+            "at time 0 starts the indenter inside the finger: a path starts at first touch, \
+             depth 0 at time 0 without a point of its own; give this point a later time_s",
+        )?;
         require(
             p.time_s.is_finite() && p.time_s > last,
-            "motion.path.time_s",
+            field("time_s"),
             &p.time_s,
             "has to rise from 0, s",
         )?;
         last = p.time_s;
         let sane = |v: f64| v.is_finite() && v.abs() <= DEPTH_MAX_MM;
-        require(sane(p.depth_mm), "motion.path.depth_mm", &p.depth_mm, "has to be within 100 mm")?;
+        require(sane(p.depth_mm), field("depth_mm"), &p.depth_mm, "has to be within 100 mm")?;
         require(
             p.shift_mm.iter().all(|v| sane(*v)),
-            "motion.path.shift_mm",
+            field("shift_mm"),
             &p.shift_mm,
             "has to be within 100 mm",
         )?;
     }
     let deepest = path.iter().map(|p| p.depth_mm).fold(0.0, f64::max);
-    require(deepest > 0.0, "motion.path.depth_mm", &deepest, "never goes below first touch")
+    require(
+        deepest > 0.0,
+        "motion.path",
+        &deepest,
+        "mm is the deepest point, which never touches: give a point a depth_mm above 0",
+    )
 }

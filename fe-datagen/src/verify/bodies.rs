@@ -161,7 +161,7 @@ pub(super) fn quarter_space(
 }
 
 /// Faces of which every node satisfies `keep`.
-fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
+pub(super) fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
     let faces = surface.faces().filter(|f| f.iter().all(|&n| keep(n)));
     Surface { kind: surface.kind, connectivity: faces.flatten().copied().collect() }
 }
@@ -179,7 +179,7 @@ pub(crate) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
     fixed
 }
 
-fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
+pub(super) fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
     for (x, y) in a.iter_mut().zip(b) {
         *x |= y;
     }

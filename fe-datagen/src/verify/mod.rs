@@ -7,8 +7,11 @@ pub(crate) mod bodies;
 mod check;
 mod cook;
 mod coulomb;
+mod density;
 mod disc;
+mod file;
 mod finger;
+mod half_plane;
 mod hertz;
 mod increments;
 mod locking;
@@ -16,6 +19,7 @@ mod manufactured;
 mod mirror;
 mod ogden;
 mod patch;
+mod punch;
 mod relaxation;
 mod report;
 mod ring;
@@ -116,6 +120,29 @@ pub const CASES: &[Case] = &[
         run: coulomb::run,
     },
     Case {
+        name: "cylinder",
+        shows: "Line contact in plane strain: a rigid cylinder along a half-plane, half-width \
+                and pressure for its force.",
+        run: half_plane::cylinder,
+    },
+    Case {
+        name: "wedge",
+        shows: "A blunt wedge on a half-plane: half-width and pressure for its force.",
+        run: half_plane::wedge,
+    },
+    Case {
+        name: "punch",
+        shows: "A flat punch: force on a half-space, pressure on a half-plane and its growth \
+                at the edge as elements shrink.",
+        run: punch::run,
+    },
+    Case {
+        name: "file",
+        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
+                code makes itself.",
+        run: file::run,
+    },
+    Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
                 against quadratic elements, solid and in plane strain.",
@@ -131,6 +158,12 @@ pub const CASES: &[Case] = &[
         name: "finger",
         shows: "The fingertip behaves as published fingertips do.",
         run: finger::sanity,
+    },
+    Case {
+        name: "density",
+        shows: "The discretisation error of each mesh density: force, pressure and SED of a flat \
+                press against the next finer mesh.",
+        run: density::run,
     },
     Case {
         name: "increments",

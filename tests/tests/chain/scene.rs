@@ -5,8 +5,8 @@ use std::{fs, sync::LazyLock};
 
 use fe_datagen::{
     dataset::fault,
-    press::{body::Body, record::IncrementRecord},
-    scene::{Geometry, Scene},
+    press::{record::IncrementRecord, setup::Setup},
+    scene::Scene,
     solve::{Options, Solver, StepReport},
 };
 use papilla_proto::{
@@ -40,21 +40,17 @@ pub(crate) struct Pressed {
 impl Pressed {
     /// Solves a fingertip's scene as `fe-datagen solve` does. Every state passes its checks.
     pub(crate) fn solve(scene: &Scene) -> Self {
-        let Geometry::Fingertip { density, order, shape } = &scene.geometry else {
-            panic!("a fingertip is due")
-        };
-        let body = Body::fingertip(shape, &scene.constants(), *density, *order).unwrap();
+        let Setup { body, approach, drive, .. } = Setup::new(scene).unwrap();
         let (atlas, _) = body.atlas().expect("a fingertip has an atlas").unwrap();
         let mut solver = body.solver(Options::default()).unwrap();
         let mut records = Vec::new();
         let mut keep =
             |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| records.push(r.clone());
-        let depths_mm = scene.depths_mm();
-        body.press(&mut solver, scene.pose(), scene.plate, &depths_mm, 1, &mut keep).unwrap();
+        body.press(&mut solver, &approach, &drive, 1, &mut keep).unwrap();
         for record in &records {
             assert_eq!(fault(record, atlas.vertex_count()), None, "at {} mm", record.depth_mm);
         }
-        assert_eq!(records.len(), depths_mm.len());
+        assert_eq!(records.len(), drive.len());
         Self { atlas, records }
     }
 

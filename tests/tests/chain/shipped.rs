@@ -117,7 +117,7 @@ fn a_shipped_press_can_be_solved_again() {
     scene.motion.pitch_deg = press.pose.pitch_deg;
     scene.motion.roll_deg = press.pose.roll_deg;
     scene.motion.yaw_deg = press.pose.yaw_deg;
-    scene.motion.depth_mm = f64::from(shard.depth_mm[0]);
+    scene.motion.depth_mm = Some(f64::from(shard.depth_mm[0]));
     scene.motion.increments = 1;
     scene.validate().unwrap();
     let pressed = Pressed::solve(&scene);

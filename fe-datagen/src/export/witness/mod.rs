@@ -1,7 +1,10 @@
 //! Cases that both codes solve on equal meshes.
 
+mod finger;
 mod one_element;
 mod ours;
+mod press;
+mod section;
 mod sphere;
 
 use super::Ccx;
@@ -43,6 +46,16 @@ pub const CASES: &[Case] = &[
         shows: "A block of two layers under a rigid sphere: contact, force, displacement, and SED \
                 where the layers meet.",
         run: sphere::run,
+    },
+    Case {
+        name: "section",
+        shows: "The plane-strain section under a flat plate: three laws in two dimensions.",
+        run: section::run,
+    },
+    Case {
+        name: "finger",
+        shows: "The fingertip under a tilted plate, from a scene.",
+        run: finger::run,
     },
 ];
 

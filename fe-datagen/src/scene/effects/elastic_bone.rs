@@ -12,5 +12,7 @@ pub(super) const EFFECT: Effect = Effect {
         Geometry::Fingertip { .. } | Geometry::Section { .. } => Ok(()),
         _ => Err("only fingertip and section have a bone of their own; a mesh names its tissues"),
     },
+    state: |c| c.bone_elements,
+    state_is: "elements of bone",
     switch_on: |_, plan| plan.parts.bone = true,
 };

@@ -8,5 +8,7 @@ pub(super) const EFFECT: Effect = Effect {
     without: "linear elasticity at small strain (contact stays on the deformed skin)",
     needs: &[],
     fits: always,
+    state: |c| c.finite_strain_points,
+    state_is: "quadrature points with geometric stiffness",
     switch_on: |_, plan| plan.law = Law::NeoHookean,
 };

@@ -14,5 +14,7 @@ pub(super) const EFFECT: Effect = Effect {
             Err("friction.coefficient is 0: leave the effect out or give a coefficient")
         }
     },
+    state: |c| c.friction_states,
+    state_is: "tangential states of contact nodes",
     switch_on: |scene, plan| plan.friction = scene.friction.coefficient,
 };

@@ -12,5 +12,7 @@ pub(super) const EFFECT: Effect = Effect {
         let any = Tissue::ALL.iter().any(|&t| scene.materials.of(t).ogden.is_some());
         if any { Ok(()) } else { Err("no tissue has a table [materials.TISSUE.ogden]") }
     },
+    state: |c| c.ogden_points,
+    state_is: "quadrature points with Ogden's law",
     switch_on: |_, plan| plan.law = Law::Ogden,
 };

@@ -9,5 +9,7 @@ pub(super) const EFFECT: Effect = Effect {
     without: "all soft tissue is subcutaneous",
     needs: &[],
     fits: always,
+    state: |c| c.layered_elements,
+    state_is: "elements of skin with constants of their own",
     switch_on: |_, plan| plan.tissues = Tissue::ALL,
 };

@@ -15,9 +15,12 @@ mod plane_strain;
 mod viscoelastic;
 
 use super::{Scene, SceneError};
+use crate::forecast::Census;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::Parts;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// An effect.
 pub struct Effect {
@@ -31,6 +34,10 @@ pub struct Effect {
     pub needs: &'static [&'static str],
     /// Says why a scene cannot have it.
     pub fits: fn(&Scene) -> Result<(), &'static str>,
+    /// What it makes the solver assemble or store; 0 in every scene without it.
+    pub state: fn(&Census) -> usize,
+    /// What `state` counts.
+    pub state_is: &'static str,
     /// Puts it into a plan.
     pub switch_on: fn(&Scene, &mut Plan),
 }
@@ -134,6 +141,17 @@ impl EffectName {
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         EFFECTS.iter().position(|e| e.name == name).map(Self)
+    }
+}
+
+impl JsonSchema for EffectName {
+    fn schema_name() -> Cow<'static, str> {
+        "Effect".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let one = |e: &Effect| json_schema!({ "const": e.name, "description": e.adds });
+        json_schema!({ "oneOf": EFFECTS.map(one) })
     }
 }
 

@@ -12,5 +12,7 @@ pub(super) const EFFECT: Effect = Effect {
         Geometry::Fingertip { .. } | Geometry::Section { .. } => Ok(()),
         _ => Err("only fingertip and section have a nail of their own; a mesh names its tissues"),
     },
+    state: |c| c.nail_elements,
+    state_is: "elements of nail",
     switch_on: |_, plan| plan.parts.nail = true,
 };

@@ -10,6 +10,8 @@ pub(super) const EFFECT: Effect = Effect {
     without: "the solid finger",
     needs: &[],
     fits,
+    state: |c| c.plane_elements,
+    state_is: "plane elements",
     switch_on: |_, plan| plan.plane_strain = true,
 };
 

@@ -15,5 +15,7 @@ pub(super) const EFFECT: Effect = Effect {
         let any = Tissue::ALL.iter().any(|&t| scene.materials.of(t).prony.is_some());
         if any { Ok(()) } else { Err("no tissue has a table [materials.TISSUE.prony]") }
     },
+    state: |c| c.history_numbers,
+    state_is: "numbers of history",
     switch_on: |_, plan| plan.relaxes = true,
 };

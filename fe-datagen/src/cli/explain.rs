@@ -1,0 +1,179 @@
+//! `explain`: what a scene is going to simulate and cost, before it runs.
+
+use super::print;
+use crate::forecast::Forecast;
+use crate::press::drive::Drive;
+use crate::press::setup::Setup;
+use crate::scene::effects::{EFFECTS, Effect};
+use crate::scene::{Plan, Scene};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+/// Say what a scene is going to simulate, what it leaves out and why, and what it
+/// will cost: unknowns, memory, seconds. Nothing is solved and nothing written.
+#[derive(clap::Args)]
+#[command(after_help = "Example: fe-datagen explain scenes/flat-press.toml")]
+pub(super) struct Args {
+    /// Scene file (see scenes/ and docs/scenes.md).
+    scene: PathBuf,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// An effect that is simulated.
+#[derive(Serialize)]
+struct On {
+    effect: &'static str,
+    adds: &'static str,
+    /// What it makes the solver assemble or store.
+    state: usize,
+    state_is: &'static str,
+}
+
+/// An effect that is left out.
+#[derive(Serialize)]
+struct Off {
+    effect: &'static str,
+    instead: &'static str,
+    why: String,
+    /// 0: it costs nothing.
+    state: usize,
+}
+
+/// What `explain` says of a scene.
+#[derive(Serialize)]
+struct Explanation {
+    file: PathBuf,
+    geometry: String,
+    indenter: String,
+    motion: String,
+    plan: Plan,
+    simulated: Vec<On>,
+    left_out: Vec<Off>,
+    /// Mesh, pattern and symbolic factorization, measured; a solve does them too.
+    setup_s: f64,
+    forecast: Forecast,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let scene = Scene::read(&args.scene)?;
+    let clock = Instant::now();
+    let setup = Setup::new(&scene)?;
+    let setup_s = clock.elapsed().as_secs_f64();
+    let forecast = Forecast::new(&scene, &setup);
+    let state = |e: &Effect| (e.state)(&forecast.census);
+    let (on, off): (Vec<_>, Vec<_>) = EFFECTS.into_iter().partition(|e| scene.has(e.name));
+    let simulated = on.into_iter().map(|e| On {
+        effect: e.name,
+        adds: e.adds,
+        state: state(e),
+        state_is: e.state_is,
+    });
+    let left_out = off.into_iter().map(|e| Off {
+        effect: e.name,
+        instead: e.without,
+        why: why_not(e, &scene),
+        state: state(e),
+    });
+    let explanation = Explanation {
+        file: args.scene.clone(),
+        geometry: table(&scene.geometry, "kind")?,
+        indenter: table(&scene.indenter, "shape")?,
+        motion: motion(&scene, &setup.drive),
+        simulated: simulated.collect(),
+        left_out: left_out.collect(),
+        plan: setup.plan,
+        setup_s,
+        forecast,
+    };
+    print(&explanation, args.json, || human(&explanation))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Why an effect is left out, and what naming it would take.
+fn why_not(effect: &Effect, scene: &Scene) -> String {
+    let missing: Vec<_> = effect.needs.iter().filter(|n| !scene.has(n)).copied().collect();
+    match (effect.fits)(scene) {
+        Err(cannot) => format!("not named, nor possible as the scene stands: {cannot}"),
+        Ok(()) if missing.is_empty() => "not named in effects".into(),
+        Ok(()) => format!("not named in effects; it needs {} too", missing.join(", ")),
+    }
+}
+
+/// A table of the scene in one line: its kind, then what is a number or a name.
+fn table(table: &impl Serialize, kind: &str) -> anyhow::Result<String> {
+    let value = serde_json::to_value(table)?;
+    let mut text = value[kind].as_str().unwrap_or_default().to_owned();
+    for (key, value) in value.as_object().into_iter().flatten().filter(|(key, _)| *key != kind) {
+        let tables = value.as_array().filter(|a| a.iter().any(serde_json::Value::is_object));
+        match (value, tables) {
+            (serde_json::Value::Object(_) | serde_json::Value::Null, _) => {}
+            (_, Some(tables)) => text += &format!(", {} {key}", tables.len()),
+            (serde_json::Value::String(name), _) => text += &format!(", {key} {name}"),
+            _ => text += &format!(", {key} {value}"),
+        }
+    }
+    Ok(text)
+}
+
+fn motion(scene: &Scene, drive: &Drive) -> String {
+    let m = &scene.motion;
+    let states = drive.len();
+    let to = match (m.depth_mm, m.force_n, &m.path) {
+        (Some(depth), _, _) => format!("to {depth} mm"),
+        (_, Some(force), _) => format!("to {force} N"),
+        (_, _, Some(path)) => {
+            format!("along {} points in {} s", path.len(), path.last().map_or(0.0, |p| p.time_s))
+        }
+        (None, None, None) => "nowhere".into(),
+    };
+    let [pitch, roll, yaw] = [m.pitch_deg, m.roll_deg, m.yaw_deg];
+    format!("{to}, {states} stored states; pitch {pitch}, roll {roll}, yaw {yaw} degrees")
+}
+
+fn human(e: &Explanation) -> String {
+    let mut text = format!(
+        "{}\n  geometry  {}\n  indenter  {}\n  motion    {}\n\nsimulated\n",
+        e.file.display(),
+        e.geometry,
+        e.indenter,
+        e.motion
+    );
+    for on in &e.simulated {
+        text += &format!("  {:14} {} ({} {})\n", on.effect, on.adds, on.state, on.state_is);
+    }
+    text += "left out\n";
+    for off in &e.left_out {
+        text += &format!("  {:14} {} ({})\n", off.effect, off.instead, off.why);
+    }
+    let (f, c) = (&e.forecast, &e.forecast.census);
+    let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+    text += &format!(
+        "\nunknowns       {}, {} elements, {} quadrature points, {} contact nodes\n\
+         tangent        {} entries; factor {} entries, {:.1} Gflop\n\
+         memory         {:.0} MiB; {:.0} more if a tangent is indefinite\n\
+         work           about {:.0} equilibria, {:.0} Newton iterations, {:.0} factorizations\n",
+        c.unknowns,
+        c.elements,
+        c.points,
+        c.contact_nodes,
+        c.tangent_entries,
+        f.factor_entries,
+        f.factor_flops / 1e9,
+        mib(f.memory_bytes),
+        mib(f.memory_indefinite_bytes),
+        f.work.equilibria,
+        f.work.newton_iterations,
+        f.work.factorizations,
+    );
+    let s = &f.seconds;
+    text += &format!(
+        "seconds        about {:.1} on one core (elements {:.1}, factorization {:.1}, linear \
+         solves {:.1}), after {:.1} of set-up",
+        s.total, s.assembly, s.factorization, s.linear_solves, e.setup_s
+    );
+    text
+}

@@ -1,0 +1,38 @@
+//! The fingertip under a tilted plate, as a scene: the whole way from TOML to deck.
+//! Not run on small meshes: there is none small enough for CalculiX.
+
+use super::press::{Pressing, Tolerance};
+use super::{Check, Context};
+use crate::export::{ElementTypes, SceneDeck};
+use crate::mesh::Tissue;
+use crate::scene::Scene;
+use crate::verify::CaseError;
+
+const SCENE: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"quadratic\"\n\
+                     [motion]\ndepth_mm = 1.0\npitch_deg = 20.0\n";
+const TOLERANCE: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2 };
+
+pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
+    if context.quick {
+        return Ok(Vec::new());
+    }
+    let scene: Scene = toml::from_str(SCENE)?;
+    scene.validate()?;
+    let SceneDeck { setup, cards, indenter, .. } = SceneDeck::new(&scene)?;
+    let problem = setup.body.problem;
+    let pressing = Pressing {
+        job: "finger",
+        name: "Hex27, C3D20R",
+        mesh: problem.mesh,
+        cards,
+        fixed: problem.fixed,
+        contact: &setup.body.contact,
+        indenter,
+        shape: setup.approach.shape,
+        types: ElementTypes::default(),
+        interface: [Tissue::Dermis, Tissue::Epidermis],
+        steps: 2,
+        tolerance: TOLERANCE,
+    };
+    pressing.compare(context)
+}

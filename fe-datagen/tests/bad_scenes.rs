@@ -1,0 +1,172 @@
+//! Bad scenes, given to the real program: one clear error that names file, line,
+//! field and cure, exit code 1, and nothing written.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const FINGER: &str = "effects = [\"finite_strain\", \"layers\"]
+
+[geometry]
+kind = \"fingertip\"
+density = \"coarse\"
+
+[motion]
+depth_mm = 1.0
+";
+
+const BLOCK: &str = "[geometry]
+kind = \"block\"
+size_mm = [4.0, 4.0]
+elements = [4, 4]
+layers = [
+  { tissue = \"dermis\", thickness_mm = 1.0, elements = 1 },
+  { tissue = \"subcutaneous\", thickness_mm = 2.0, elements = 2 },
+]
+
+[motion]
+depth_mm = 0.5
+";
+
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+/// Runs every command that reads a scene on a bad one.
+fn assert_refused(text: &str, line: usize, words: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.toml"), text).unwrap();
+    for arguments in [&["solve", "bad.toml", "--out", "out"][..], &["explain", "bad.toml"]] {
+        let output = run(folder.path(), arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
+        let at = format!("error: bad.toml:{line}:");
+        assert!(error.starts_with(&at), "{error}should start with {at} in\n{text}");
+        assert_eq!(error.matches("error: ").count(), 1, "one error: {error}");
+        for word in words {
+            assert!(error.contains(word), "{error}should say {word}");
+        }
+        assert!(output.stdout.is_empty());
+        let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(left.len(), 1, "nothing is written: {left:?}");
+    }
+}
+
+#[test]
+fn an_unknown_effect() {
+    let text = FINGER.replace("\"layers\"", "\"sound\"");
+    assert_refused(&text, 1, &["effects[1]", "unknown effect 'sound'", "there are: finite_strain"]);
+}
+
+#[test]
+fn contradictory_effects() {
+    let text = FINGER.replace("\"layers\"", "\"plane_strain\"");
+    assert_refused(&text, 1, &["'plane_strain'", "solid", "geometry.kind = \"section\""]);
+    let text = FINGER.replace("\"finite_strain\", \"layers\"", "\"layers\",\n  \"hyperelastic\"");
+    assert_refused(&text, 2, &["'hyperelastic'", "needs 'finite_strain'"]);
+    let text = FINGER.replace("\"layers\"", "\"friction\"");
+    assert_refused(&text, 1, &["'friction'", "friction.coefficient is 0", "give a coefficient"]);
+}
+
+#[test]
+fn a_negative_thickness() {
+    let text = BLOCK.replace("2.0, elements", "-2.0, elements");
+    assert_refused(&text, 7, &["geometry.layers[1].thickness_mm = -2", "above 0"]);
+    let text = format!("{FINGER}\n[geometry.shape]\ndermis_mm = -1.0\n");
+    assert_refused(&text, 11, &["geometry.shape.dermis_mm = -1 mm", "above 0"]);
+}
+
+#[test]
+fn an_incompressible_tissue() {
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n");
+    assert_refused(&text, 12, &["materials.dermis: Poisson's ratio 0.5", "0.49 to 0.4999"]);
+}
+
+#[test]
+fn an_indenter_that_starts_inside_the_finger() {
+    let text = FINGER.replace(
+        "depth_mm = 1.0",
+        "path = [\n  { time_s = 0.0, depth_mm = 0.5 },\n  { time_s = 1.0, depth_mm = 1.0 },\n]",
+    );
+    assert_refused(&text, 9, &["motion.path[0].depth_mm", "inside the finger", "later time_s"]);
+}
+
+#[test]
+fn an_indenter_that_makes_no_sense_or_goes_by() {
+    let with = |table: &str| format!("{FINGER}\n[indenter]\n{table}\n");
+    let text = with("shape = \"sphere\"\nradius_mm = -3.0");
+    assert_refused(&text, 12, &["indenter.radius_mm = -3.0", "positive"]);
+    assert_refused(&with("shape = \"cube\""), 11, &["indenter.shape", "`sphere`"]);
+    assert_refused(&with("shape = \"sphere\"\nradius = 3.0"), 12, &["did you mean `radius_mm`"]);
+    let text =
+        with("shape = \"heightmap\"\nfile = \"none.png\"\nsize_mm = [9.0, 9.0]\nheight_mm = 1.0");
+    assert_refused(&text, 12, &["none.png"]);
+    let text = with("shape = \"sphere\"\nradius_mm = 2.0")
+        .replace("depth_mm = 1.0", "depth_mm = 1.0\noffset_mm = [0.0, 60.0]");
+    assert_refused(&text, 9, &["never meets the body", "motion.offset_mm"]);
+}
+
+#[test]
+fn a_cortex_that_fills_the_bone() {
+    let text = format!("{FINGER}\n[geometry.shape]\nbone_cortex_mm = 3.0\n")
+        .replace("\"layers\"", "\"elastic_bone\"");
+    assert_refused(&text, 11, &["geometry.shape.bone_cortex_mm = 3", "make the cortex thinner"]);
+}
+
+#[test]
+fn missing_and_absurd_units() {
+    let of_motion = |to: &str| FINGER.replace("depth_mm = 1.0", to);
+    assert_refused(&of_motion("depth = 1.0"), 8, &["did you mean `depth_mm`"]);
+    assert_refused(&of_motion("depth_mm = \"1 mm\""), 8, &["motion.depth_mm", "bare number"]);
+    assert_refused(&of_motion("depth_mm = 1000.0"), 8, &["motion.depth_mm", "at most 100 mm"]);
+    assert_refused(&of_motion("force_n = 1e6"), 8, &["motion.force_n", "at most 1000 N"]);
+    let text =
+        format!("{FINGER}\n[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.48\n");
+    assert_refused(&text, 11, &["materials.dermis", "80000 MPa", "was Pa meant?"]);
+    let text = format!("{FINGER}\n[geometry.shape]\nepidermis_mm = 200.0\n");
+    assert_refused(&text, 11, &["geometry.shape.epidermis_mm = 200 mm", "at most 100"]);
+}
+
+#[test]
+fn what_is_no_scene() {
+    assert_refused(&FINGER.replace("coarse", "huge"), 5, &["geometry.density", "`medium`"]);
+    assert_refused(&FINGER.replace("density", "dense"), 5, &["geometry.dense", "`density`"]);
+    assert_refused(&FINGER.replace("= 1.0", "= 1.0 mm"), 8, &["expected"]);
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["solve", "none.toml", "--out", "out"]);
+    assert_eq!(output.status.code(), Some(1));
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.starts_with("error: cannot read none.toml: "), "{error}");
+}
+
+#[test]
+fn a_mesh_that_is_not_there() {
+    let text = "[geometry]\nkind = \"mesh\"\nfile = \"none.msh\"\nfixed = [\"base\"]\n\
+                contact = \"skin\"\n[motion]\ndepth_mm = 1.0\n";
+    assert_refused(text, 3, &["none.msh"]);
+}
+
+#[test]
+fn a_good_scene_is_explained_without_being_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("good.toml"), FINGER).unwrap();
+    let output = run(folder.path(), &["explain", "good.toml", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let names = |list: &str, key: &str| -> Vec<String> {
+        let of = |e: &serde_json::Value| e[key].as_str().unwrap().to_owned();
+        said[list].as_array().unwrap().iter().map(of).collect()
+    };
+    assert_eq!(names("simulated", "effect"), ["finite_strain", "layers"]);
+    assert!(names("left_out", "effect").contains(&"friction".into()));
+    assert!(said["left_out"].as_array().unwrap().iter().all(|e| e["state"] == 0));
+    assert!(said["forecast"]["seconds"]["total"].as_f64().unwrap() > 0.0);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is written");
+}
