@@ -22,6 +22,7 @@ mod patch;
 mod punch;
 mod relaxation;
 mod report;
+mod ring;
 mod solid_parts;
 mod tangent;
 mod uniaxial;
@@ -97,6 +98,12 @@ pub const CASES: &[Case] = &[
         run: cook::run,
     },
     Case {
+        name: "ring",
+        shows: "A ring under internal pressure opens as Lame's solution says, in plane strain and \
+                nearly incompressible too.",
+        run: ring::run,
+    },
+    Case {
         name: "disc",
         shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
         run: disc::run,
@@ -138,7 +145,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
-                against quadratic elements.",
+                against quadratic elements, solid and in plane strain.",
         run: locking::run,
     },
     Case {
