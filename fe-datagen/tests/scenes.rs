@@ -48,7 +48,8 @@ fn complete(example: &mut Table, whole: &Table) {
 
 #[test]
 fn every_example_in_the_documentation_is_a_scene() {
-    let text = std::fs::read_to_string(root().join("docs/scenes.md")).unwrap();
+    let read = |name: &str| std::fs::read_to_string(root().join("docs").join(name)).unwrap();
+    let text = read("scenes.md") + &read("indenters.md");
     let rest: Table = toml::from_str(REST).unwrap();
     let mut seen = 0;
     for block in text.split("```toml\n").skip(1) {
@@ -60,7 +61,7 @@ fn every_example_in_the_documentation_is_a_scene() {
         Scene::parse(&path, whole).unwrap_or_else(|e| panic!("{e}\nin the example\n{example}"));
         seen += 1;
     }
-    assert!(seen >= 8, "{seen} examples");
+    assert!(seen >= 12, "{seen} examples");
 }
 
 #[test]
