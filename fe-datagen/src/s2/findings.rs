@@ -72,7 +72,7 @@ fn nearest(line: &[DepthPoint], depth_mm: f64, tissue: Tissue) -> f64 {
     let found = if depth_mm.is_finite() {
         own().min_by(|p, q| (p.depth_mm - depth_mm).abs().total_cmp(&(q.depth_mm - depth_mm).abs()))
     } else {
-        own().last()
+        own().next_back()
     };
     found.map_or(f64::NAN, |p| p.sed_j_per_m3)
 }

@@ -21,7 +21,7 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
         rows.push(Check::relative(quantity, found, reference, 0.03, SOURCE));
         let reference = force_n(ElementKind::Quad9, 2 * linear, nu)?;
         for (kind, name, cells, tolerance) in [
-            (ElementKind::Quad4, "Quad4", 2 * linear, 0.02),
+            (ElementKind::Quad4, "Quad4", 2 * linear, 0.03),
             (ElementKind::Quad8, "Quad8", linear, 0.02),
             (ElementKind::Quad9, "Quad9", linear, 0.02),
         ] {
