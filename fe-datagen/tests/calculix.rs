@@ -61,8 +61,7 @@ layers = [{ tissue = \"dermis\", thickness_mm = 2.0, elements = 2 }]
 /// What CalculiX cannot express is named, with the cure, and nothing is written.
 #[test]
 fn what_calculix_cannot_express_is_refused() {
-    let four =
-        "[materials.dermis.ogden]\nmu_mpa = [0.01, 0.01, 0.01, 0.01]\nalpha = [2.0, 3.0, 4.0, 5.0]";
+    let four = "[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.48\n[materials.dermis.ogden]\nmu_mpa = [0.01, 0.01, 0.01, 0.01]\nalpha = [2.0, 3.0, 4.0, 5.0]";
     let path = "path = [{ time_s = 1.0, depth_mm = 0.2 }]";
     let cases = [
         ("[\"finite_strain\", \"viscoelastic\"]", path, "", "reads *VISCOELASTIC and ignores it"),

@@ -232,10 +232,10 @@ mod tests {
         let u = dat.table(Quantity::Displacement, "nbody", 1.0).unwrap();
         assert_eq!((u.rows[1].id, u.rows[1].values[0]), (2, 1e-101));
         let force = dat.table(Quantity::TotalForce, "NINDENTER", 1.0).unwrap();
-        assert_eq!(force.rows[0].values[..3], [1.234567, -2e-5, 3.0]);
+        assert_eq!(force.rows[0].values[..3].to_vec(), [1.234567, -2e-5, 3.0]);
         let strain = dat.table(Quantity::Strain, "EBODY", 1.0).unwrap();
         assert_eq!((strain.rows[0].id, strain.rows[0].part), (7, 2));
-        assert_eq!(strain.rows[0].values, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+        assert_eq!(strain.rows[0].values.to_vec(), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
         let contact = dat.table(Quantity::ContactStress, "", 1.0).unwrap();
         assert_eq!((contact.rows[0].id, contact.rows[0].part), (3, 2));
     }

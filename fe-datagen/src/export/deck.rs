@@ -67,7 +67,7 @@ pub struct StepControl {
 
 impl Default for StepControl {
     fn default() -> Self {
-        Self { first: 0.1, largest: 1.0, outputs: Vec::new(), residual_tolerance: 1e-5 }
+        Self { first: 0.05, largest: 1.0, outputs: Vec::new(), residual_tolerance: 1e-5 }
     }
 }
 

@@ -317,7 +317,7 @@ mod tests {
         assert_eq!((first.split(',').count(), second.split(',').count()), (8, 1));
         let fields = first.split(',').chain(second.split(','));
         let values: Vec<f64> = fields.map(|f| f.parse().unwrap()).collect();
-        assert_eq!(values[6..], [2.0 / 1.6, NO_ENERGY, NO_ENERGY]);
+        assert_eq!(values[6..].to_vec(), [2.0 / 1.6, NO_ENERGY, NO_ENERGY]);
         let neo = MaterialCard::NeoHookean { mu_mpa: 0.5, bulk_mpa: 4.0 }.cards();
         assert_eq!(neo, "*HYPERELASTIC, NEO HOOKE\n2.500000000000E-1,5.000000000000E-1\n");
     }

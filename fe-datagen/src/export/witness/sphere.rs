@@ -33,9 +33,13 @@ struct Pair {
 
 /// Equal elements.
 const EQUAL: Tolerance = Tolerance { force: 1e-3, displacement: 1e-3, sed: 2e-3 };
-/// Elements that differ, on a mesh where that hardly matters.
+/// Elements that differ but do not lock.
 const EXPECTED: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2 };
-/// The same on one where it does.
+/// Linear elements that treat volume and bending differently.
+const UNLIKE: Tolerance = Tolerance { force: 1e-2, displacement: 1e-2, sed: 6e-2 };
+/// One of the two locks: the rows show how much.
+const LOCKED: Tolerance = Tolerance { force: 6e-2, displacement: 5e-2, sed: 1e-1 };
+/// Meshes too small for any of these.
 const SMALL: Tolerance = Tolerance { force: 3e-2, displacement: 4e-2, sed: 8e-2 };
 
 pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
@@ -65,7 +69,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             per_mm: [Some(2.0), Some(3.0)],
             name: "Hex8, C3D8, nu 0.3",
             job: "sphere-hex8-soft",
-            tolerance: [SMALL, EXPECTED],
+            tolerance: [SMALL, UNLIKE],
         },
         Pair {
             kind: ElementKind::Hex8,
@@ -74,7 +78,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             per_mm: [None, Some(3.0)],
             name: "Hex8, C3D8",
             job: "sphere-hex8",
-            tolerance: [SMALL, EXPECTED],
+            tolerance: [SMALL, LOCKED],
         },
         Pair {
             kind: ElementKind::Hex8,
@@ -83,14 +87,14 @@ pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
             per_mm: [None, Some(3.0)],
             name: "Hex8, C3D8I",
             job: "sphere-hex8-modes",
-            tolerance: [SMALL, EXPECTED],
+            tolerance: [SMALL, UNLIKE],
         },
     ];
     let mut rows = Vec::new();
     for pair in pairs {
         let size = usize::from(!context.quick);
         if let Some(per_mm) = pair.per_mm[size] {
-            rows.extend(pressing(&pair, per_mm, pair.tolerance[size]).compare(context)?);
+            rows.extend(pressing(&pair, per_mm, pair.tolerance[size]).rows(context));
         }
     }
     Ok(rows)
