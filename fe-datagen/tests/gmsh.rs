@@ -1,7 +1,7 @@
 //! Meshes written by Gmsh 4.15, read back, and what is wrong with bad ones.
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::float_cmp, clippy::unwrap_used)]
 
 use fe_datagen::element::{BlockGeometry, ElementKind};
 use fe_datagen::mesh::complete::for_contact;

@@ -322,7 +322,8 @@ fn the_manifest_names_the_indenter_of_every_press() {
     let planned = presses(&spec);
     for entry in &manifest.presses {
         assert_eq!(entry.indenter, planned[entry.id].indenter);
-        assert_eq!(entry.offset_mm, planned[entry.id].offset_mm);
+        let bits = |offset: [f64; 2]| offset.map(f64::to_bits);
+        assert_eq!(bits(entry.offset_mm), bits(planned[entry.id].offset_mm));
     }
     assert_eq!(manifest.failed[0].indenter, planned[manifest.failed[0].id].indenter);
     let stats = stats(folder.path(), None).unwrap();

@@ -8,6 +8,9 @@ use crate::press::fields::PA_PER_MPA;
 use crate::press::record::IncrementRecord;
 use std::path::Path;
 
+/// Values of a state along the skin.
+type Values = fn(&IncrementRecord) -> &Vec<f64>;
+
 /// States that are drawn; more would hide each other.
 const CURVES_MAX: usize = 5;
 
@@ -30,7 +33,7 @@ pub(super) fn write(
     let states = |get: fn(&IncrementRecord) -> f64| records.iter().map(get).collect::<Vec<_>>();
     npz.add_slice("depth_mm", &[records.len()], &states(|r| r.depth_mm))?;
     npz.add_slice("time_s", &[records.len()], &states(|r| r.time_s))?;
-    let fields: [(&str, fn(&IncrementRecord) -> &Vec<f64>); 3] = [
+    let fields: [(&str, Values); 3] = [
         ("pressure_pa", |r| &r.pressure_mpa),
         ("sed_dermis_j_per_m3", |r| &r.sed_dermis_mpa),
         ("sed_epidermis_j_per_m3", |r| &r.sed_epidermis_mpa),

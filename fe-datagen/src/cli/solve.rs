@@ -1,10 +1,11 @@
 //! `solve`: one scene, with everything that can be looked at.
 
 use super::{CHECKS_FAILED, print};
-use crate::dataset::fault;
+use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
 use crate::output::map_image::{MapView, Quantity, white_of};
 use crate::output::npz::NpzBuilder;
 use crate::output::{atomic, vtu};
+use crate::press::body::PressError;
 use crate::press::fields::{PA_PER_MPA, write_vtu};
 use crate::press::record::{Checks, IncrementRecord};
 use crate::press::setup::Setup;
@@ -44,8 +45,12 @@ struct Increment {
     depth_mm: f64,
     force_n: [f64; 3],
     pressure_pa_max: f64,
-    sed_dermis_j_per_m3_max: f64,
-    sed_epidermis_j_per_m3_max: f64,
+    /// Absent for a body without an interface between epidermis and dermis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sed_dermis_j_per_m3_max: Option<f64>,
+    /// The same of the epidermis side.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sed_epidermis_j_per_m3_max: Option<f64>,
     stored_energy_mj: f64,
     /// Share of the volume beyond the calibrated stretches of its law.
     outside_calibration: f64,
@@ -82,24 +87,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let setup_s = clock.elapsed().as_secs_f64();
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
-    let bar = super::progress("pressing", setup.drive.len());
-    let (mut records, mut reports, mut series) = (Vec::new(), Vec::new(), Vec::new());
-    let mut written = Ok(());
-    let visit = &mut |s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
-        let name = format!("state-{:03}.vtu", records.len());
-        if written.is_ok() {
-            written = write_vtu(&args.out.join(&name), body, s);
-        }
-        let timed = setup.drive.is_timed();
-        series.push((if timed { record.time_s } else { record.depth_mm }, name));
-        records.push(record.clone());
-        reports.push(*report);
-        bar.inc(1);
-    };
-    let solved = body.press(&mut solver, &setup.approach, &setup.drive, 1, visit);
-    bar.finish_and_clear();
-    written?;
-    vtu::write_pvd(&args.out.join("series.pvd"), &series)?;
+    let (pressed, solved) = press(&setup, &mut solver, &args.out)?;
+    let records: Vec<_> = pressed.iter().map(|p| p.record.clone()).collect();
     if let Some(atlas) = &atlas {
         write_maps(&args.out, atlas, &records)?;
     } else if body.plane {
@@ -113,8 +102,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         atlas_hash: atlas.as_ref().map(|a| a.hash().to_owned()),
         setup_s,
         solve_s: clock.elapsed().as_secs_f64(),
-        effort: reports.iter().fold(Effort::default(), |sum, r| sum.plus(&r.effort)),
-        increments: records.iter().zip(&reports).map(|(r, s)| increment(r, s)).collect(),
+        effort: pressed.iter().fold(Effort::default(), |sum, p| sum.plus(&p.report.effort)),
+        increments: pressed.iter().map(increment).collect(),
         scene,
     };
     atomic::write_json(&args.out.join("summary.json"), &summary)?;
@@ -124,12 +113,62 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
 }
 
-fn increment(record: &IncrementRecord, report: &StepReport) -> Increment {
-    let max = |v: &[f64]| PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
+/// A stored equilibrium.
+struct Pressed {
+    record: IncrementRecord,
+    report: StepReport,
+    /// Greatest pressure on the contact surface, MPa.
+    pressure_mpa_max: f64,
+}
+
+/// Presses and writes the fields of every stored equilibrium; those before an error
+/// are kept. States are the same on a finer path, the work integral, which is one of
+/// their checks, is better: a poor one is taken again.
+fn press(
+    setup: &Setup,
+    solver: &mut Solver<'_>,
+    out: &Path,
+) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
+    let Setup { body, approach, drive, .. } = setup;
+    let (mut pressed, mut solved) = (Vec::new(), Ok(()));
+    let mut series = Vec::new();
+    for refinement in [1, 2, 4] {
+        pressed.clear();
+        series.clear();
+        let bar = super::progress("pressing", drive.len());
+        let mut written = Ok(());
+        let visit = &mut |s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
+            let name = format!("state-{:03}.vtu", pressed.len());
+            if written.is_ok() {
+                written = write_vtu(&out.join(&name), body, s);
+            }
+            series.push((if drive.is_timed() { record.time_s } else { record.depth_mm }, name));
+            let surface = &body.problem.mesh.surfaces[&body.contact];
+            let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
+            pressed.push(Pressed { record: record.clone(), report: *report, pressure_mpa_max });
+            bar.inc(1);
+        };
+        solved = body.press(solver, approach, drive, refinement, visit);
+        bar.finish_and_clear();
+        written?;
+        let balanced = |p: &Pressed| p.record.checks.energy_vs_work <= BALANCE_RELATIVE_MAX;
+        if solved.is_err() || !drive.is_refinable() || pressed.iter().all(balanced) {
+            break;
+        }
+    }
+    vtu::write_pvd(&out.join("series.pvd"), &series)?;
+    Ok((pressed, solved))
+}
+
+fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Increment {
+    let max = |v: &[f64]| {
+        let largest = PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
+        (!v.is_empty()).then_some(largest)
+    };
     Increment {
         depth_mm: record.depth_mm,
         force_n: record.force_n,
-        pressure_pa_max: max(&record.pressure_mpa),
+        pressure_pa_max: PA_PER_MPA * pressure_mpa_max,
         sed_dermis_j_per_m3_max: max(&record.sed_dermis_mpa),
         sed_epidermis_j_per_m3_max: max(&record.sed_epidermis_mpa),
         stored_energy_mj: report.stored_mj,
@@ -222,11 +261,11 @@ fn human(s: &Summary, out: &Path) -> String {
     for i in &s.increments {
         let force = crate::mesh::surface::norm(i.force_n);
         text += &format!(
-            "{:8.3} {:9.4} {:14.3} {:17.2} {:12} {:9.2} % {:6.2} %{}\n",
+            "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:9.2} % {:6.2} %{}\n",
             i.depth_mm,
             force,
             i.pressure_pa_max / 1e3,
-            i.sed_dermis_j_per_m3_max,
+            i.sed_dermis_j_per_m3_max.map_or("-".into(), |v| format!("{v:.2}")),
             i.checks.newton_iterations,
             100.0 * i.checks.contact_force_vs_pressure_integral,
             100.0 * i.checks.energy_vs_work,

@@ -91,3 +91,14 @@ fn a_forecast_counts_the_factor_and_predicts_something() {
     assert!(s.assembly > 0.0 && s.factorization > 0.0 && s.linear_solves > 0.0);
     assert!(s.total.is_finite());
 }
+
+#[test]
+fn a_section_counts_its_plane_elements() {
+    let text = "effects = [\"plane_strain\"]\n[geometry]\nkind = \"section\"\ndensity = \"coarse\"\n\
+                [motion]\ndepth_mm = 0.2\n";
+    let scene = Scene::parse(Path::new("section.toml"), text.into()).unwrap();
+    let census = Census::new(&scene, &Setup::new(&scene).unwrap());
+    for effect in EFFECTS {
+        assert_eq!((effect.state)(&census) > 0, effect.name == "plane_strain", "{}", effect.name);
+    }
+}

@@ -70,6 +70,6 @@ mod tests {
         assert!((d.gap_mm - 2.0).abs() < 1e-15);
         assert!((d.normal[0] - 0.6).abs() < 1e-15 && (d.normal[2] - 0.8).abs() < 1e-15);
         let trace = (0..3).map(|i| d.hessian[i][i]).sum::<f64>();
-        assert!((trace - 1.0 / 5.0).abs() < 1e-15 && d.hessian[1] == [0.0; 3]);
+        assert!((trace - 1.0 / 5.0).abs() < 1e-15 && d.hessian[1].iter().all(|&v| v == 0.0));
     }
 }

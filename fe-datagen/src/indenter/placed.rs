@@ -64,11 +64,11 @@ impl Placement {
         indenter.clearance_mm(self.to_local(std::array::from_fn(|i| p[i] - self.origin_mm[i])))
     }
 
-    fn to_local(&self, v: [f64; 3]) -> [f64; 3] {
+    fn to_local(self, v: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| (0..3).map(|k| self.rotation[k][i] * v[k]).sum())
     }
 
-    fn to_world(&self, v: [f64; 3]) -> [f64; 3] {
+    fn to_world(self, v: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| (0..3).map(|k| self.rotation[i][k] * v[k]).sum())
     }
 }

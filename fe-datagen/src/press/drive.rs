@@ -275,6 +275,12 @@ impl Drive {
         }
     }
 
+    /// Whether a finer path between the stored states can be asked for.
+    #[must_use]
+    pub fn is_refinable(&self) -> bool {
+        matches!(self, Self::Depths(_))
+    }
+
     /// Whether nothing is stored.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -47,3 +47,98 @@ impl Body {
         outside / all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::press::record::IncrementRecord;
+    use crate::press::setup::Setup;
+    use crate::scene::Scene;
+    use crate::solve::{Options, Solver, StepReport};
+    use std::path::Path;
+
+    /// A block of skin, pressed and dragged.
+    fn scene(extra: &str) -> Scene {
+        let text = format!(
+            "{extra}
+            [geometry]
+            kind = \"block\"
+            size_mm = [6.0, 6.0]
+            elements = [8, 8]
+            layers = [{{ tissue = \"dermis\", thickness_mm = 2.0, elements = 3 }}]
+            [indenter]
+            shape = \"sphere\"
+            radius_mm = 4.0
+            [motion]
+            path = [{{ time_s = 1.0, depth_mm = 0.5 }},
+                    {{ time_s = 2.0, depth_mm = 0.5, shift_mm = [0.4, 0.1] }}]"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, text).unwrap();
+        Scene::read(Path::new(&path)).unwrap()
+    }
+
+    #[test]
+    fn shear_traction_carries_the_tangential_force() {
+        let rubbing = "effects = [\"finite_strain\", \"friction\"]\nfriction.coefficient = 0.4";
+        let Setup { body, approach, drive, .. } = Setup::new(&scene(rubbing)).unwrap();
+        let mut solver = body.solver(Options::default()).unwrap();
+        body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
+        let surface = &body.problem.mesh.surfaces[&body.contact];
+        let nodes = surface.nodes();
+        let shear = body.shear_mpa(&solver, &nodes);
+        let x = solver.deformed();
+        let mut area = vec![0.0; x.len()];
+        surface.add_nodal_areas(&|n| x[n as usize], &mut area);
+        let balance = solver.balance();
+        for i in 0..3 {
+            let sum: f64 = nodes.iter().zip(&shear).map(|(&n, s)| area[n as usize] * s[i]).sum();
+            let due = balance.contact_force_n[i] - balance.normal_force_n[i];
+            let size = balance.contact_force_n[2].abs();
+            assert!((sum - due).abs() < 1e-9 * size, "{i}: {sum} against {due}");
+        }
+        // The indenter drags the skin along, and no node rubs more than it is pressed.
+        let drag = balance.contact_force_n[0] - balance.normal_force_n[0];
+        assert!(drag > 0.1 * balance.contact_force_n[2], "{drag}");
+        // Bounds settle to a part of the largest.
+        let pressure = solver.pressure_mpa(surface);
+        let slack = 5e-3 * 0.4 * pressure.iter().copied().fold(0.0, f64::max);
+        for (&n, s) in nodes.iter().zip(&shear) {
+            let size = crate::mesh::surface::norm(*s);
+            assert!(size <= 0.4 * pressure[n as usize] + slack, "{size}");
+        }
+    }
+
+    #[test]
+    fn without_friction_and_limits_there_is_nothing_to_say() {
+        let Setup { body, approach, drive, .. } = Setup::new(&scene("")).unwrap();
+        let mut solver = body.solver(Options::default()).unwrap();
+        body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
+        assert!(body.shear_mpa(&solver, &[0, 1]).is_empty());
+        assert!(body.outside_calibration(&solver).abs() < f64::MIN_POSITIVE);
+    }
+
+    #[test]
+    fn what_leaves_its_calibration_is_flagged() {
+        // Chen, Shuai & Zhu's skin, squeezed to half its thickness by a small ball.
+        let mut deep = scene("effects = [\"finite_strain\", \"layers\", \"hyperelastic\"]");
+        deep.indenter = toml::from_str("shape = \"sphere\"\nradius_mm = 1.5").unwrap();
+        deep.motion.path = None;
+        deep.motion.depth_mm = Some(1.0);
+        deep.motion.increments = 5;
+        let mut shallow = deep.clone();
+        shallow.motion.depth_mm = Some(0.05);
+        let [little, much] = [shallow, deep].map(|scene| {
+            let Setup { body, approach, drive, .. } = Setup::new(&scene).unwrap();
+            let mut solver = body.solver(Options::default()).unwrap();
+            let mut flags = Vec::new();
+            let keep = &mut |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| {
+                flags.push(r.outside_calibration);
+            };
+            body.press(&mut solver, &approach, &drive, 1, keep).unwrap();
+            *flags.last().unwrap()
+        });
+        assert!(little.abs() < f64::MIN_POSITIVE, "{little}");
+        assert!(much > 0.0 && much < 0.5, "{much}");
+    }
+}

@@ -72,7 +72,7 @@ pub struct Outcome {
     pub elements: usize,
     /// Depth of the bone under the pad's lowest point, mm.
     pub bone_depth_mm: f64,
-    /// Stored states: the end of the ramp and the end of the hold.
+    /// Stored states, from the end of the ramp to the end of the hold.
     pub states: Vec<State>,
     /// Work.
     pub effort: Effort,
@@ -108,8 +108,8 @@ pub fn run(reading: Reading, density: Density) -> Result<Outcome, S2Error> {
     let clock = Instant::now();
     let setup = Setup::new(&scene)?;
     let body = &setup.body;
-    // A hold of 10 s dissipates for 10 s: at the default its energy is off by 0.6 %.
-    let options = Options { time_error: 5e-4, ..Options::default() };
+    // Nodes at the tip's edges press ten times stiffer tissue than the penalty is made for.
+    let options = Options { augmentations_max: 40, ..Options::default() };
     let mut solver = body.solver(options)?;
     let setup_s = clock.elapsed().as_secs_f64();
     let lines = Lines::new(shape, body)?;

@@ -47,7 +47,7 @@ pub struct Summary {
     pub solve_s: f64,
     /// Work.
     pub effort: Effort,
-    /// End of the ramp, end of the hold.
+    /// From the end of the ramp to the end of the hold.
     pub states: Vec<StateSummary>,
 }
 
@@ -75,10 +75,11 @@ impl From<&Outcome> for Summary {
 }
 
 impl Summary {
-    /// Whether every finding holds at every state.
+    /// Whether every finding holds at the end of the hold, the state that the
+    /// figures are taken to show.
     #[must_use]
     pub fn reproduces(&self) -> bool {
-        !self.states.is_empty() && self.states.iter().flat_map(|s| &s.findings).all(|f| f.holds)
+        self.states.last().is_some_and(|s| s.findings.iter().all(|f| f.holds))
     }
 
     /// For people.
@@ -96,7 +97,7 @@ impl Summary {
         for s in &self.states {
             let _ = writeln!(text, "{} s: {:.4} N per mm", s.time_s, s.force_n_per_mm);
             for f in &s.findings {
-                let verdict = if f.holds { "ok  " } else { "FAIL" };
+                let verdict = if f.holds { "holds" } else { "fails" };
                 let _ = writeln!(text, "  {verdict} {}: {}", f.statement, f.measured);
             }
         }
@@ -135,10 +136,16 @@ pub fn write(folder: &Path, outcome: &Outcome, summary: &Summary) -> Result<(), 
     atomic::write_json(&folder.join("s2.json"), summary)
 }
 
-/// A curve for every layer at every state, broken at the interfaces.
+/// The states that are drawn: the end of the ramp and the end of the hold.
+fn drawn(outcome: &Outcome) -> impl Iterator<Item = &State> {
+    let last = outcome.states.len().saturating_sub(1);
+    outcome.states.iter().enumerate().filter(move |(k, _)| *k == 0 || *k == last).map(|(_, s)| s)
+}
+
+/// A curve for every layer at every drawn state, broken at the interfaces.
 fn depth_chart(outcome: &Outcome) -> Chart {
     let mut series = Vec::new();
-    for s in &outcome.states {
+    for s in drawn(outcome) {
         for tissue in [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous] {
             let own = s.depth_line.iter().filter(|p| p.tissue == tissue);
             series.push(Series {
@@ -158,7 +165,7 @@ fn depth_chart(outcome: &Outcome) -> Chart {
 
 /// SED against x of the lines that `wanted` takes, with their mirror images.
 fn lateral_chart(outcome: &Outcome, title: &str, wanted: &dyn Fn(f64, Tissue) -> bool) -> Chart {
-    let series = outcome.states.iter().flat_map(|s| {
+    let series = drawn(outcome).flat_map(|s| {
         let lines = s.lateral.iter().filter(|l| wanted(l.depth_mm, l.tissue));
         lines.map(|l| {
             let left = l.points.iter().rev().map(|p| (-p[0], p[1]));

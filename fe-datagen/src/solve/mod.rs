@@ -103,6 +103,16 @@ pub enum StepError {
         /// Largest |gap| of a node in contact, mm.
         gap_mm: f64,
     },
+    /// Friction did not settle.
+    #[error(
+        "friction did not settle in {updates} updates: the last changed traction by {change:.1e} of its bound"
+    )]
+    Friction {
+        /// Updates done.
+        updates: u32,
+        /// Last change of traction or bound over the largest bound.
+        change: f64,
+    },
     /// Energy or force is not a finite number.
     #[error("energy or force is not finite")]
     NotFinite,

@@ -7,13 +7,15 @@ use crate::contact::FrictionTrial;
 use crate::mesh::surface::norm;
 
 /// Sets bound and tangent plane of every node from its normal multiplier and its
-/// place at `u`.
+/// place at `u`. The bound goes the share `relax` of its way: large coefficients
+/// couple pressure and drag so strongly that whole steps swing past the answer.
 pub(super) fn bound(
     problem: &Problem,
     loading: &Loading,
     fraction: f64,
     u: &[[f64; 3]],
     multipliers_mpa: &[f64],
+    relax: f64,
     friction: &mut FrictionTrial,
 ) {
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
@@ -23,7 +25,7 @@ pub(super) fn bound(
     {
         let n = n as usize;
         let x = std::array::from_fn(|k| problem.mesh.nodes[n][k] + u[n][k]);
-        node.bound_mpa = coefficient * pressure;
+        node.bound_mpa += relax * (coefficient * pressure - node.bound_mpa);
         node.normal = indenter.distance(fraction, x).normal;
     }
 }

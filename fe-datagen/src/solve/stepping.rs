@@ -12,6 +12,9 @@ use crate::contact::{FrictionNode, FrictionTrial};
 use crate::element::Memory;
 use crate::linear::Equations;
 
+/// Least share of its way that the friction bound goes in one update.
+const RELAX_MIN: f64 = 0.1;
+
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
     newton: Newton<'a>,
@@ -310,11 +313,12 @@ impl<'a> Solver<'a> {
         let dt_s = self.seconds(fraction);
         let rubs = !trial.friction.nodes.is_empty();
         let problem = self.newton.problem;
-        let bound = |trial: &mut State| {
+        let bound = |relax: f64, trial: &mut State| {
             let State { u, multipliers, friction, .. } = trial;
-            rubbing::bound(problem, &self.loading, fraction, u, multipliers, friction);
+            rubbing::bound(problem, &self.loading, fraction, u, multipliers, relax, friction);
         };
-        bound(trial);
+        bound(1.0, trial);
+        let (mut relax, mut last_change) = (1.0f64, f64::INFINITY);
         let updates = if rubs { options.friction_updates_max } else { options.augmentations_max };
         // The first equilibrium only serves to update the multipliers.
         let mut tolerance = 1e-3f64.max(options.residual_tolerance);
@@ -332,9 +336,8 @@ impl<'a> Solver<'a> {
                 self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
             }
             let closed = self.newton.current.gap_error_mm <= options.gap_tolerance_mm;
-            let settled = rubbing::change(&trial.friction, &self.newton.current)
-                <= options.friction_tolerance;
-            if closed && settled {
+            let change = rubbing::change(&trial.friction, &self.newton.current);
+            if closed && change <= options.friction_tolerance {
                 return Ok(());
             }
             if update < updates {
@@ -342,11 +345,20 @@ impl<'a> Solver<'a> {
                 let e = &self.newton.current;
                 trial.multipliers.copy_from_slice(&e.traction_mpa);
                 rubbing::update(&mut trial.friction, e);
-                bound(trial);
+                if change > 0.9 * last_change {
+                    relax = (0.5 * relax).max(RELAX_MIN);
+                }
+                last_change = change;
+                bound(relax, trial);
                 self.newton.effort.augmentations += 1;
             }
         }
-        Err(StepError::Contact { augmentations: updates, gap_mm: self.newton.current.gap_error_mm })
+        let gap_mm = self.newton.current.gap_error_mm;
+        Err(if rubs && gap_mm <= options.gap_tolerance_mm {
+            StepError::Friction { updates, change: last_change }
+        } else {
+            StepError::Contact { augmentations: updates, gap_mm }
+        })
     }
 
     /// Work of the indenter so far, mJ.

@@ -1,6 +1,6 @@
 //! A nearly incompressible block, bonded below, squeezed by a smooth plate.
 
-use super::bodies::{hold, lattice, solve, uniform};
+use super::bodies::{hold, intervals, lattice, solve, uniform};
 use super::{CaseError, Check, Context};
 use crate::element::ElementKind;
 use crate::indenter::{Placement, RoundedPlate};
@@ -9,6 +9,7 @@ use crate::solve::{Loading, MovingIndenter, Options, Problem};
 use std::sync::Arc;
 
 const SOURCE: &str = "this code, Hex27";
+const PLANAR: &str = "this code, Quad9, twice as fine";
 
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     let (linear, quadratic) = if context.quick { (8, 4) } else { (12, 6) };
@@ -18,25 +19,43 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
         let found = force_n(ElementKind::Hex8, linear, nu)?;
         let quantity = format!("Hex8, {linear} cells across, nu {nu}: force at 15 %, N");
         rows.push(Check::relative(quantity, found, reference, 0.03, SOURCE));
+        let reference = force_n(ElementKind::Quad9, 2 * linear, nu)?;
+        for (kind, name, cells, tolerance) in [
+            (ElementKind::Quad4, "Quad4", 2 * linear, 0.03),
+            (ElementKind::Quad8, "Quad8", linear, 0.02),
+            (ElementKind::Quad9, "Quad9", linear, 0.02),
+        ] {
+            let found = force_n(kind, cells, nu)?;
+            let quantity =
+                format!("{name}, {cells} cells across, nu {nu}: force at 15 %, N per mm");
+            rows.push(Check::relative(quantity, found, reference, tolerance, PLANAR));
+        }
     }
     Ok(rows)
 }
 
-/// Force on a quarter of a 10 x 10 x 5 mm block squeezed by 0.75 mm.
+/// Force on a quarter of a 10 x 10 x 5 mm block squeezed by 0.75 mm; of planar
+/// elements on half of a 10 x 5 mm section, 1 mm long.
 fn force_n(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
-    let n = if kind == ElementKind::Hex27 { 2 * cells } else { cells };
+    let n = intervals(kind) * cells;
     let mesh = lattice(kind, [even(5.0, n), even(5.0, n), even(5.0, n)], |p| p);
-    let fixed = hold(
-        &mesh,
-        &[("x_min", [true, false, false]), ("y_min", [false, true, false]), ("z_min", [true; 3])],
-    );
-    let problem = Problem::new(mesh, uniform(0.1, nu)?, fixed, Some("z_max"))?;
+    let up = kind.dimension() - 1;
+    let (held, touched) = [("y_min", "y_max"), ("z_min", "z_max")][up - 1];
+    let mut sides = vec![("x_min", [true, false, false]), (held, [true; 3])];
     // Upside down: the plate presses with its local +z face.
-    let rotation = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+    let rotation = if kind.is_planar() {
+        [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    } else {
+        sides.push(("y_min", [false, true, false]));
+        [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
+    };
+    let fixed = hold(&mesh, &sides);
+    let problem = Problem::new(mesh, uniform(0.1, nu)?, fixed, Some(touched))?;
     let plate = Arc::new(RoundedPlate { half_mm: [20.0, 20.0, 2.0], edge_radius_mm: 0.5 });
-    let start = Placement { rotation, origin_mm: [0.0, 0.0, 7.0] };
-    let indenter = MovingIndenter::straight(plate, start, [0.0, 0.0, -0.75]);
+    let along = |v: f64| std::array::from_fn(|i| if i == up { v } else { 0.0 });
+    let start = Placement { rotation, origin_mm: along(7.0) };
+    let indenter = MovingIndenter::straight(plate, start, along(-0.75));
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
     let (solver, _) = solve(&problem, loading, Options::default(), 3)?;
-    Ok(solver.balance().contact_force_n[2].abs())
+    Ok(solver.balance().contact_force_n[up].abs())
 }

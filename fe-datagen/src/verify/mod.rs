@@ -9,6 +9,7 @@ mod cook;
 mod coulomb;
 mod density;
 mod disc;
+mod file;
 mod finger;
 mod half_plane;
 mod hertz;
@@ -21,6 +22,7 @@ mod patch;
 mod punch;
 mod relaxation;
 mod report;
+mod ring;
 mod solid_parts;
 mod tangent;
 mod uniaxial;
@@ -96,6 +98,12 @@ pub const CASES: &[Case] = &[
         run: cook::run,
     },
     Case {
+        name: "ring",
+        shows: "A ring under internal pressure opens as Lame's solution says, in plane strain and \
+                nearly incompressible too.",
+        run: ring::run,
+    },
+    Case {
         name: "disc",
         shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
         run: disc::run,
@@ -129,9 +137,15 @@ pub const CASES: &[Case] = &[
         run: punch::run,
     },
     Case {
+        name: "file",
+        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
+                code makes itself.",
+        run: file::run,
+    },
+    Case {
         name: "locking",
         shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
-                against quadratic elements.",
+                against quadratic elements, solid and in plane strain.",
         run: locking::run,
     },
     Case {

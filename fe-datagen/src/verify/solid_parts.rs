@@ -29,10 +29,10 @@ fn press(parts: Parts) -> Result<IncrementRecord, CaseError> {
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let rigid = norm(press(Parts::default())?.force_n);
     let mut rows = Vec::new();
-    // A nail carried by skin alone gives way with it; bone hardly does.
+    // Under a flat plate on the pad the nail carries little, and bone hardly gives way.
     for (name, parts, low) in [
         ("bone", Parts { bone: true, nail: false }, 0.98),
-        ("bone and nail", Parts { bone: true, nail: true }, 0.85),
+        ("bone and nail", Parts { bone: true, nail: true }, 0.98),
     ] {
         let record = press(parts)?;
         let c = &record.checks;
