@@ -117,9 +117,11 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
     let (hex8, hex27) = if context.quick { ([4, 8], [2, 4]) } else { ([8, 16], [4, 8]) };
     let (quad4, quad9) = if context.quick { ([8, 16], [4, 8]) } else { ([16, 32], [8, 16]) };
+    // Its one spurious mode (element/reference.rs) makes it late to reach its order.
+    let (hex20, late) = if context.quick { ([4, 8], 0.3) } else { ([8, 16], 0.2) };
     let kinds = [
         (ElementKind::Hex8, "Hex8", hex8, 2.0),
-        (ElementKind::Hex20, "Hex20", hex27, 2.0),
+        (ElementKind::Hex20, "Hex20", hex20, 2.0),
         (ElementKind::Hex27, "Hex27", hex27, 3.0),
         (ElementKind::Quad4, "Quad4", quad4, 2.0),
         (ElementKind::Quad8, "Quad8", quad9, 2.0),
@@ -132,7 +134,8 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
         let observed = |i: usize| (coarse[i] / fine[i]).log2() / halvings;
         let row = |what: &str, value, reference| {
             let quantity = format!("{name}, {} to {} cells: order of {what}", cells[0], cells[1]);
-            Check::absolute(quantity, value, reference, 0.2, SOURCE)
+            let tolerance = if kind == ElementKind::Hex20 { late } else { 0.2 };
+            Check::absolute(quantity, value, reference, tolerance, SOURCE)
         };
         rows.push(row("displacement (L2)", observed(0), order));
         rows.push(row("its gradient (L2)", observed(1), order - 1.0));

@@ -247,7 +247,8 @@ fn the_nail_is_a_plate_of_its_thickness_in_one_piece() {
         assert_eq!(corners.len() + under, edges + 1, "V - E + F of a disc: {density:?} {order:?}");
         let area = volume / shape.nail_thickness_mm;
         println!("{density:?} {order:?}: {under} cells, {area:.1} mm2, rim of {rim} sides");
-        assert!(area > 90.0 && area < 160.0, "{area} mm2");
+        // The plate ends on whole cells: 11 x 12 mm, less where cells are 3 mm wide.
+        assert!(area > 60.0 && area < 160.0, "{area} mm2");
     }
 }
 
