@@ -34,7 +34,7 @@ impl Axis {
 pub enum Mark {
     /// A line through its points.
     Line,
-    /// A dot at each point.
+    /// A dot at each point, the series' name beside it.
     Dots,
 }
 
@@ -114,7 +114,7 @@ fn range(axis: &Axis, values: &[f64]) -> (f64, f64) {
         return (0.1, 1.0);
     }
     if axis.log {
-        return (low / 1.4, high * 1.4);
+        return (low / 1.6, high * 1.6);
     }
     let margin = if high > low { 0.04 * (high - low) } else { 0.5 };
     (if low >= 0.0 { 0.0 } else { low - margin }, high + margin)
@@ -155,15 +155,21 @@ where
         let colour = COLOURS[i % COLOURS.len()];
         let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
         let points = series.points.iter().copied().filter(finite);
-        let drawn = match series.mark {
-            Mark::Line => context.draw_series(LineSeries::new(points, colour.stroke_width(2)))?,
-            Mark::Dots => {
-                context.draw_series(points.map(|p| Circle::new(p, 5, colour.filled())))?
-            }
-        };
-        drawn
+        if series.mark == Mark::Dots {
+            let name = |at| {
+                let text = Text::new(series.name.clone(), (8, -7), ("sans-serif", 14));
+                EmptyElement::at(at) + Circle::new((0, 0), 5, colour.filled()) + text
+            };
+            context.draw_series(points.map(name))?;
+            continue;
+        }
+        context
+            .draw_series(LineSeries::new(points, colour.stroke_width(2)))?
             .label(&series.name)
             .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 16, y + 4)], colour.filled()));
+    }
+    if chart.series.iter().all(|s| s.mark == Mark::Dots) {
+        return Ok(());
     }
     context
         .configure_series_labels()
