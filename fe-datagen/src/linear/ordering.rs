@@ -5,6 +5,12 @@
 //! degrees of freedom: a third of the size and supernodes for free.
 
 use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
+
+/// METIS draws from one generator for the whole process (`srand`/`rand`), so
+/// two threads that order at once would take numbers from each other and get
+/// orders, and with them last bits, that differ from run to run.
+static METIS: Mutex<()> = Mutex::new(());
 
 /// METIS could not order a graph.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -18,7 +24,8 @@ pub enum OrderingError {
 }
 
 /// Order in which to eliminate the vertices: `order[k]` is the vertex that
-/// comes `k`-th. Deterministic: METIS' random seed is fixed.
+/// comes `k`-th. Deterministic: METIS' random seed is fixed, and one thread at
+/// a time orders.
 ///
 /// # Errors
 /// [`OrderingError`] if METIS refuses the graph.
@@ -39,7 +46,10 @@ pub(super) fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>
     }
     let mut permutation = vec![0; neighbours.len()];
     let mut inverse = vec![0; neighbours.len()];
-    let status = call_metis(&mut n, &mut start, &mut adjacent, &mut permutation, &mut inverse);
+    let status = {
+        let _alone = METIS.lock().unwrap_or_else(PoisonError::into_inner);
+        call_metis(&mut n, &mut start, &mut adjacent, &mut permutation, &mut inverse)
+    };
     if status == metis_sys::rstatus_et_METIS_OK {
         Ok(permutation.into_iter().map(|v| v as u32).collect())
     } else {
@@ -79,16 +89,31 @@ fn call_metis(
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_path_is_ordered_by_a_permutation_that_repeats() {
-        let n = 200u32;
-        let graph: Vec<BTreeSet<u32>> = (0..n)
+    fn path(n: u32) -> Vec<BTreeSet<u32>> {
+        (0..n)
             .map(|i| [i.wrapping_sub(1), i + 1].into_iter().filter(|&j| j < n).collect())
-            .collect();
-        let a = nested_dissection(&graph).unwrap();
-        let mut sorted = a.clone();
-        sorted.sort_unstable();
-        assert_eq!(sorted, (0..n).collect::<Vec<_>>());
-        assert_eq!(a, nested_dissection(&graph).unwrap());
+            .collect()
+    }
+
+    #[test]
+    fn a_path_is_ordered_by_a_permutation() {
+        let mut order = nested_dissection(&path(200)).unwrap();
+        order.sort_unstable();
+        assert_eq!(order, (0..200).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn threads_that_order_at_once_get_the_same_order() {
+        let graph = path(2000);
+        let alone = nested_dissection(&graph).unwrap();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..50 {
+                        assert_eq!(alone, nested_dissection(&graph).unwrap());
+                    }
+                });
+            }
+        });
     }
 }
