@@ -4,9 +4,10 @@ use std::{io, time::Duration};
 
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
-    net::TcpStream,
     time::timeout,
 };
+
+use crate::dial::dial;
 
 /// Longest wait for an answer, s.
 const PATIENCE_S: u64 = 60;
@@ -79,8 +80,7 @@ impl Request {
     /// [`HttpError`]; an answer with an error status is an answer.
     pub async fn send(&self, server: &str) -> Result<Response, HttpError> {
         let exchange = async {
-            let mut stream = TcpStream::connect(server).await?;
-            stream.set_nodelay(true)?;
+            let mut stream = dial(server).await?;
             let mut answer = Vec::new();
             // A server that has heard enough answers and closes before all is written: what
             // it says matters more than the pipe that broke.

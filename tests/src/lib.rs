@@ -8,6 +8,7 @@
 //!
 //! The clients share no code with the server beyond the wire contract.
 
+mod dial;
 pub mod http;
 pub mod load;
 pub mod socket;

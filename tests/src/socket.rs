@@ -9,14 +9,13 @@ use futures_util::{
 use papilla_proto::{
     ClientMessage, FrameError, FrameHeader, HEADER_LEN, Hello, Ready, ServerMessage, SessionError,
 };
-use tokio::{
-    net::{TcpSocket, TcpStream, lookup_host},
-    time::timeout,
-};
+use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{
     WebSocketStream, client_async,
     tungstenite::{self, Bytes, Message},
 };
+
+use crate::dial::dial;
 
 /// Longest wait for the server's ready, s.
 const PATIENCE_S: u64 = 30;
@@ -88,7 +87,6 @@ pub async fn open(server: &str, hello: &Hello) -> Result<(Ready, Sender, Receive
     let connect = |source| SocketError::Connect { server: server.to_owned(), source };
     let opening = async {
         let stream = dial(server).await.map_err(connect)?;
-        stream.set_nodelay(true).map_err(connect)?;
         let (stream, _) = client_async(format!("ws://{server}/v1/session"), stream).await?;
         let (sender, receiver) = stream.split();
         let (mut sender, mut receiver) = (Sender(sender), Receiver(receiver));
@@ -103,25 +101,6 @@ pub async fn open(server: &str, hello: &Hello) -> Result<(Ready, Sender, Receive
     };
     let opened = timeout(Duration::from_secs(PATIENCE_S), opening).await;
     opened.map_err(|_| SocketError::Silent(PATIENCE_S))?
-}
-
-/// Room of the system for each direction, bytes: more than the largest frame. With less a
-/// sender waits for room in the middle of a frame (docs/latency.md).
-const SOCKET_BUFFER: u32 = 512 * 1024;
-
-async fn dial(server: &str) -> io::Result<TcpStream> {
-    let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
-    for address in lookup_host(server).await? {
-        let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
-        // Before connecting: the window's scale is agreed on then.
-        socket.set_recv_buffer_size(SOCKET_BUFFER)?;
-        socket.set_send_buffer_size(SOCKET_BUFFER)?;
-        match socket.connect(address).await {
-            Ok(stream) => return Ok(stream),
-            Err(error) => last = error,
-        }
-    }
-    Err(last)
 }
 
 /// A frame: header and samples.

@@ -7,7 +7,7 @@ use crate::press::body::Body;
 use crate::press::drive::{Approach, Drive};
 use crate::press::record::IncrementRecord;
 use crate::press::setup::Setup;
-use crate::solve::{Options, Solver, StepReport};
+use crate::solve::{Options, Solver};
 use anyhow::Context as _;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -47,18 +47,14 @@ impl PressSolver for BodySolver<'_> {
             ..self.approaches[press.candidate].clone()
         };
         let drive = Drive::Depths(press.depths_mm.clone());
-        let mut records = Vec::with_capacity(press.depths_mm.len());
-        // The states are the same on a finer path; the work integral, which is
-        // one of their checks, is better.
-        for refinement in [1, 2, 4] {
-            records.clear();
-            let mut keep =
-                |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| records.push(r.clone());
-            self.body.press(&mut self.solver, &approach, &drive, refinement, &mut keep)?;
-            if records.iter().all(|r| r.checks.energy_vs_work <= BALANCE_RELATIVE_MAX) {
-                break;
-            }
-        }
+        let (records, pressed) = self.body.press_balanced(
+            &mut self.solver,
+            &approach,
+            &drive,
+            BALANCE_RELATIVE_MAX,
+            &mut |_, _, record, _| record.clone(),
+        );
+        pressed?;
         Ok(records)
     }
 }

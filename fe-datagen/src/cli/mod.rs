@@ -87,6 +87,16 @@ fn print<T: serde::Serialize>(
     Ok(())
 }
 
+/// Refuses `--only` with a name that no case has.
+fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
+    match only.iter().find(|n| !known.contains(&n.as_str())) {
+        Some(unknown) => {
+            anyhow::bail!("no case named '{unknown}'; there are: {}", known.join(", "))
+        }
+        None => Ok(()),
+    }
+}
+
 /// A bar on standard error with rate and time left.
 fn progress(what: &'static str, length: usize) -> indicatif::ProgressBar {
     let style = indicatif::ProgressStyle::with_template(

@@ -122,40 +122,33 @@ struct Pressed {
 }
 
 /// Presses and writes the fields of every stored equilibrium; those before an error
-/// are kept. States are the same on a finer path, the work integral, which is one of
-/// their checks, is better: a poor one is taken again.
+/// are kept.
 fn press(
     setup: &Setup,
     solver: &mut Solver<'_>,
     out: &Path,
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
     let Setup { body, approach, drive, .. } = setup;
-    let (mut pressed, mut solved) = (Vec::new(), Ok(()));
-    let mut series = Vec::new();
-    for refinement in [1, 2, 4] {
-        pressed.clear();
-        series.clear();
-        let bar = super::progress("pressing", drive.len());
-        let mut written = Ok(());
-        let visit = &mut |s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
-            let name = format!("state-{:03}.vtu", pressed.len());
+    let bar = super::progress("pressing", drive.len());
+    let mut written = Ok(());
+    let file = |state: usize| format!("state-{state:03}.vtu");
+    let keep =
+        &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
             if written.is_ok() {
-                written = write_vtu(&out.join(&name), body, s);
+                written = write_vtu(&out.join(file(state)), body, s);
             }
-            series.push((if drive.is_timed() { record.time_s } else { record.depth_mm }, name));
+            bar.set_position(state as u64 + 1);
             let surface = &body.problem.mesh.surfaces[&body.contact];
             let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
-            pressed.push(Pressed { record: record.clone(), report: *report, pressure_mpa_max });
-            bar.inc(1);
+            Pressed { record: record.clone(), report: *report, pressure_mpa_max }
         };
-        solved = body.press(solver, approach, drive, refinement, visit);
-        bar.finish_and_clear();
-        written?;
-        let balanced = |p: &Pressed| p.record.checks.energy_vs_work <= BALANCE_RELATIVE_MAX;
-        if solved.is_err() || !drive.is_refinable() || pressed.iter().all(balanced) {
-            break;
-        }
-    }
+    let (pressed, solved) =
+        body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
+    bar.finish_and_clear();
+    written?;
+    let place = |r: &IncrementRecord| if drive.is_timed() { r.time_s } else { r.depth_mm };
+    let series: Vec<_> =
+        pressed.iter().enumerate().map(|(i, p)| (place(&p.record), file(i))).collect();
     vtu::write_pvd(&out.join("series.pvd"), &series)?;
     Ok((pressed, solved))
 }

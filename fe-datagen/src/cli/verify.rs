@@ -2,7 +2,7 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::verify::{self, CASES, Row};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -31,10 +31,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    if let Some(unknown) = args.only.iter().find(|n| CASES.iter().all(|c| c.name != **n)) {
-        let known: Vec<_> = CASES.iter().map(|c| c.name).collect();
-        bail!("no case named '{unknown}'; there are: {}", known.join(", "));
-    }
+    let names: Vec<_> = CASES.iter().map(|c| c.name).collect();
+    super::refuse_unknown(&args.only, &names)?;
     let wanted = |c: &verify::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
     let bar = indicatif::ProgressBar::new(CASES.iter().filter(|c| wanted(c)).count() as u64);
     bar.set_style(indicatif::ProgressStyle::with_template(

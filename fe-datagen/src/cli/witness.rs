@@ -36,10 +36,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    if let Some(unknown) = args.only.iter().find(|n| CASES.iter().all(|c| c.name != **n)) {
-        let known: Vec<_> = CASES.iter().map(|c| c.name).collect();
-        bail!("no case named '{unknown}'; there are: {}", known.join(", "));
-    }
+    let names: Vec<_> = CASES.iter().map(|c| c.name).collect();
+    super::refuse_unknown(&args.only, &names)?;
     let Some(ccx) = Ccx::find(args.ccx.as_deref()) else {
         if let Some(path) = &args.ccx {
             bail!("there is no program at {}", path.display());

@@ -1,6 +1,7 @@
 //! Indenters moved and turned.
 
 use super::{Distance, SignedDistance};
+use crate::material::kinematics::product;
 use std::sync::Arc;
 
 /// A rotation and a translation: `world = rotation * local + origin`.
@@ -20,11 +21,10 @@ impl Placement {
         let (sp, cp) = pitch_deg.to_radians().sin_cos();
         let (sr, cr) = roll_deg.to_radians().sin_cos();
         let (sy, cy) = yaw_deg.to_radians().sin_cos();
-        let rotation = [
-            [cp * cy, -cp * sy, sp],
-            [cr * sy + sr * sp * cy, cr * cy - sr * sp * sy, -sr * cp],
-            [sr * sy - cr * sp * cy, sr * cy + cr * sp * sy, cr * cp],
-        ];
+        let pitch = [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]];
+        let roll = [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]];
+        let yaw = [[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]];
+        let rotation = product(&roll, &product(&pitch, &yaw));
         Self { rotation, origin_mm }
     }
 

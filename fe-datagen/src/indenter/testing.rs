@@ -5,6 +5,7 @@
 //! ```
 
 use super::{Distance, SignedDistance};
+use crate::mesh::surface::norm;
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -33,10 +34,6 @@ pub(super) type Draw = ([f64; 3], u8, f64);
 
 pub(super) fn draw() -> impl Strategy<Value = Draw> {
     (prop::array::uniform3(0.0..1.0f64), 0u8..4, -0.6..2.0f64)
-}
-
-fn norm(v: [f64; 3]) -> f64 {
-    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 fn along(p: [f64; 3], step: f64, v: [f64; 3]) -> [f64; 3] {

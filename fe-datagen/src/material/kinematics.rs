@@ -129,6 +129,12 @@ pub fn cofactor(m: &Mat3) -> Mat3 {
     })
 }
 
+/// `a b`.
+#[must_use]
+pub fn product(a: &Mat3, b: &Mat3) -> Mat3 {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
 /// Sum of the diagonal.
 #[inline]
 #[must_use]

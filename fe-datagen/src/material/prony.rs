@@ -12,7 +12,7 @@
 //! `c U_iso(F) + B : (Cbar - I) / 2` with `c = g_inf + sum g_i gamma`: force and symmetric
 //! tangent follow as for any elastic law.
 
-use super::kinematics::double_dot;
+use super::kinematics::{double_dot, product};
 use super::linear::deviatoric_strain;
 use super::{Isochoric, Kinematics, Mat3, Tensor4};
 
@@ -120,10 +120,6 @@ fn full(s: &[f64; 6]) -> Mat3 {
 
 fn packed(m: &Mat3) -> [f64; 6] {
     [m[0][0], m[1][1], m[2][2], m[0][1], m[1][2], m[0][2]]
-}
-
-fn product(a: &Mat3, b: &Mat3) -> Mat3 {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 impl<L: Isochoric> Isochoric for Relaxing<L> {

@@ -4,7 +4,8 @@ use super::record::{Checks, IncrementRecord, Pose};
 use crate::atlas::{AtlasReport, BuildAtlasError, build_atlas};
 use crate::element::Inverted;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
-use crate::indenter::IndenterError;
+use crate::indenter::{IndenterError, Placement};
+use crate::material::kinematics::product;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::recovery::{NoElement, SedRecovery};
 use crate::mesh::sample::Deformed;
@@ -336,15 +337,5 @@ impl Body {
 /// about x.
 #[must_use]
 pub fn rotation(pose: Pose) -> [[f64; 3]; 3] {
-    let (sp, cp) = pose.pitch_deg.to_radians().sin_cos();
-    let (sr, cr) = pose.roll_deg.to_radians().sin_cos();
-    let (sy, cy) = pose.yaw_deg.to_radians().sin_cos();
-    let pitch = [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]];
-    let roll = [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]];
-    let yaw = [[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]];
-    product(&roll, &product(&pitch, &yaw))
-}
-
-fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+    Placement::turned(pose.pitch_deg, pose.roll_deg, pose.yaw_deg, [0.0; 3]).rotation
 }

@@ -2,7 +2,7 @@
 
 use super::body::{Body, PressError};
 use super::record::{IncrementRecord, Pose};
-use crate::indenter::{Placement, RoundedPlate, SignedDistance, first_touch_travel};
+use crate::indenter::{Placement, Plate, RoundedPlate, SignedDistance, first_touch_travel};
 use crate::mesh::Mesh;
 use crate::mesh::surface::norm;
 use crate::solve::{Effort, Loading, MovingIndenter, Solver, StepReport};
@@ -29,7 +29,7 @@ impl Approach {
     /// S1's plate in a pose, without friction.
     #[must_use]
     pub fn plate(pose: Pose) -> Self {
-        let plate = RoundedPlate { half_mm: [10.0, 10.0, 3.0], edge_radius_mm: 1.0 };
+        let plate = RoundedPlate::from(&Plate::default());
         let top_mm = plate.half_mm[2];
         Self { shape: Arc::new(plate), top_mm, pose, offset_mm: [0.0; 2], friction: 0.0 }
     }
@@ -73,6 +73,9 @@ impl DrivePoint {
 
 /// Called with the solver at each stored equilibrium.
 pub type Visit<'a> = &'a mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport);
+
+/// How often the path between stored states is made finer for the work integral.
+const REFINEMENTS: [u32; 3] = [1, 2, 4];
 
 /// Farthest that a prescribed force is looked for, mm.
 const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
@@ -125,6 +128,36 @@ impl Body {
             }
         };
         Ok(MovingIndenter { shape: approach.shape.clone(), start, path })
+    }
+
+    /// Presses, keeps something of each stored state (`keep` is told its number and may be
+    /// told again), and takes the press again on a finer path as long as energy and work
+    /// part by more than `energy_vs_work_max`: the states are the same there, the work
+    /// integral is better. States before an error are kept.
+    ///
+    /// # Errors
+    /// As [`Self::press`], beside what was kept.
+    pub fn press_balanced<T>(
+        &self,
+        solver: &mut Solver<'_>,
+        approach: &Approach,
+        drive: &Drive,
+        energy_vs_work_max: f64,
+        keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
+    ) -> (Vec<T>, Result<(), PressError>) {
+        let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
+        for refinement in REFINEMENTS {
+            kept.clear();
+            let mut balanced = true;
+            pressed = self.press(solver, approach, drive, refinement, &mut |s, record, report| {
+                balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
+                kept.push(keep(kept.len(), s, record, report));
+            });
+            if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
+                break;
+            }
+        }
+        (kept, pressed)
     }
 
     /// Presses and calls `visit` with the solver at each stored equilibrium and
@@ -273,12 +306,6 @@ impl Drive {
             Self::Depths(v) | Self::Forces(v) => v.len(),
             Self::Path(points) => points.len(),
         }
-    }
-
-    /// Whether a finer path between the stored states can be asked for.
-    #[must_use]
-    pub fn is_refinable(&self) -> bool {
-        matches!(self, Self::Depths(_))
     }
 
     /// Whether nothing is stored.

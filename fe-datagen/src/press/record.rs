@@ -68,3 +68,14 @@ pub struct Pose {
     /// Yaw about the plate's normal, degrees.
     pub yaw_deg: f64,
 }
+
+/// Relative L2 difference of a field from a reference, `|a - b| / |b|`; not a number
+/// for fields of different lengths.
+#[must_use]
+pub fn relative_l2(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return f64::NAN;
+    }
+    let square: f64 = a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum();
+    (square / b.iter().map(|y| y * y).sum::<f64>()).sqrt()
+}

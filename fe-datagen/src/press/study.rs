@@ -3,7 +3,7 @@
 
 use super::body::PressError;
 use super::fields::PA_PER_MPA;
-use super::record::IncrementRecord;
+use super::record::{IncrementRecord, relative_l2};
 use super::setup::Setup;
 use crate::mesh::surface::norm;
 use crate::scene::effects::EFFECTS;
@@ -187,19 +187,12 @@ fn change(base: &Solved, other: &Solved) -> Option<Change> {
     let same = a.pressure_mpa.len() == b.pressure_mpa.len()
         && a.sed_dermis_mpa.len() == b.sed_dermis_mpa.len();
     same.then(|| Change {
-        sed_l2: relative_l2(&a.sed_dermis_mpa, &b.sed_dermis_mpa),
+        sed_l2: relative_l2(&b.sed_dermis_mpa, &a.sed_dermis_mpa),
         sed_peak: other.sed_j_per_m3_max / base.sed_j_per_m3_max - 1.0,
-        pressure_l2: relative_l2(&a.pressure_mpa, &b.pressure_mpa),
+        pressure_l2: relative_l2(&b.pressure_mpa, &a.pressure_mpa),
         pressure_peak: other.pressure_pa_max / base.pressure_pa_max - 1.0,
         force: other.force_n / base.force_n - 1.0,
     })
-}
-
-/// `|b - a| / |a|`.
-fn relative_l2(a: &[f64], b: &[f64]) -> f64 {
-    let difference: f64 = a.iter().zip(b).map(|(x, y)| (y - x).powi(2)).sum();
-    let size: f64 = a.iter().map(|x| x * x).sum();
-    (difference / size).sqrt()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::{CaseError, Check, Context};
 use crate::mesh::fingertip::Density;
 use crate::press::body::Body;
 use crate::press::drive::{Approach, Drive};
-use crate::press::record::{IncrementRecord, Pose};
+use crate::press::record::{IncrementRecord, Pose, relative_l2};
 use crate::solve::Options;
 
 const SOURCE: &str = "the same press on the next finer mesh";
@@ -32,9 +32,7 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
 fn compare(coarse: Density, fine: Density, accepted: Accepted) -> Result<Vec<Check>, CaseError> {
     let (a, b) = (press(coarse)?, press(fine)?);
     let relative = |get: fn(&Pressed) -> &[f64], points: fn(&Pressed) -> &[[f64; 3]]| {
-        let (values, reference) = (get(&a), a.read(&b, get(&b), points));
-        let difference: f64 = values.iter().zip(&reference).map(|(x, y)| (x - y).powi(2)).sum();
-        (difference / reference.iter().map(|y| y * y).sum::<f64>()).sqrt()
+        relative_l2(get(&a), &a.read(&b, get(&b), points))
     };
     let name = |what: &str| {
         format!("{coarse:?} against {fine:?}, flat press to 1 mm: {what}").to_lowercase()

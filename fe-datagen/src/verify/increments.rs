@@ -4,7 +4,7 @@ use super::{CaseError, Check, Context};
 use crate::mesh::fingertip::Density;
 use crate::press::body::Body;
 use crate::press::drive::{Approach, Drive};
-use crate::press::record::{IncrementRecord, Pose};
+use crate::press::record::{IncrementRecord, Pose, relative_l2};
 use crate::solve::{Loading, Options, StepReport};
 
 const SOURCE: &str = "elastic: no memory of the way";
@@ -15,11 +15,8 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     let many = if context.quick { 20 } else { 100 };
     let (once, often) = (press(&finger, 1)?, press(&finger, many)?);
     let row = |what: &str, a: &[f64], b: &[f64]| {
-        let square = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
-        let error =
-            square(&mut a.iter().zip(b).map(|(x, y)| x - y)) / square(&mut b.iter().copied());
         let quantity = format!("1 against {many} steps to 1 mm: {what}, relative L2");
-        Check::vanishes(quantity, error, 1e-5, SOURCE)
+        Check::vanishes(quantity, relative_l2(a, b), 1e-5, SOURCE)
     };
     Ok(vec![
         row("pressure", &once.pressure_mpa, &often.pressure_mpa),

@@ -31,7 +31,6 @@ pub use check::Check;
 pub use report::{Report, Row};
 
 use std::cell::OnceCell;
-use std::time::Instant;
 
 /// Any error that a case may end with; it fails the case.
 pub(crate) type CaseError = Box<dyn std::error::Error + Send + Sync>;
@@ -194,13 +193,7 @@ pub fn run(
     let mut report = Report { quick, ..Report::default() };
     for case in CASES.iter().filter(|c| wanted(c)) {
         visit(case, None);
-        let clock = Instant::now();
-        let checks = (case.run)(&context).unwrap_or_else(|e| vec![Check::failed(e.as_ref())]);
-        let seconds = clock.elapsed().as_secs_f64();
-        let rows: Vec<_> =
-            checks.into_iter().map(|check| Row { case: case.name, check, seconds }).collect();
-        visit(case, Some(&rows));
-        report.rows.extend(rows);
+        visit(case, Some(report.take(case.name, || (case.run)(&context))));
     }
     report
 }

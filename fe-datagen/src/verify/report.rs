@@ -1,8 +1,9 @@
 //! The table of all rows.
 
-use super::{CASES, Check};
+use super::{CASES, CaseError, Check};
 use serde::Serialize;
 use std::fmt::Write;
+use std::time::Instant;
 
 /// A check with the case it belongs to.
 #[derive(Clone, Debug, Serialize)]
@@ -39,6 +40,22 @@ pub struct Report {
     pub quick: bool,
     /// Rows in the order of the cases.
     pub rows: Vec<Row>,
+}
+
+impl Report {
+    /// Runs a case and adds its rows; an error is one row that fails.
+    pub(crate) fn take(
+        &mut self,
+        case: &'static str,
+        run: impl FnOnce() -> Result<Vec<Check>, CaseError>,
+    ) -> &[Row] {
+        let clock = Instant::now();
+        let checks = run().unwrap_or_else(|e| vec![Check::failed(e.as_ref())]);
+        let seconds = clock.elapsed().as_secs_f64();
+        let before = self.rows.len();
+        self.rows.extend(checks.into_iter().map(|check| Row { case, check, seconds }));
+        &self.rows[before..]
+    }
 }
 
 impl Row {

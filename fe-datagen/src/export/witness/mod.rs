@@ -10,7 +10,6 @@ mod sphere;
 use super::Ccx;
 use crate::verify::{CaseError, Check, Report, Row};
 use std::path::Path;
-use std::time::Instant;
 
 /// Where the references come from.
 const SOURCE: &str = "CalculiX";
@@ -72,13 +71,7 @@ pub fn run(
     let mut report = Report { quick, ..Report::default() };
     for case in CASES.iter().filter(|c| wanted(c)) {
         visit(case, None);
-        let clock = Instant::now();
-        let checks = (case.run)(&context).unwrap_or_else(|e| vec![Check::failed(e.as_ref())]);
-        let seconds = clock.elapsed().as_secs_f64();
-        let rows: Vec<_> =
-            checks.into_iter().map(|check| Row { case: case.name, check, seconds }).collect();
-        visit(case, Some(&rows));
-        report.rows.extend(rows);
+        visit(case, Some(report.take(case.name, || (case.run)(&context))));
     }
     report
 }

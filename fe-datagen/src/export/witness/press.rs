@@ -6,6 +6,7 @@ use crate::export::deck::{BODY, ELEMENTS, INDENTER};
 use crate::export::{CpuClock, Deck, ElementTypes, Press, Quantity, RigidIndenter, StepControl};
 use crate::indenter::SignedDistance;
 use crate::mesh::{Mesh, Tissue};
+use crate::press::record::relative_l2;
 use crate::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 use crate::verify::CaseError;
 use std::sync::Arc;
@@ -170,15 +171,6 @@ impl Pressing<'_> {
         }
         Ok(Answer { force_n, displacement_mm, sed_mpa, cpu_s })
     }
-}
-
-/// `|a - b| / |b|`.
-fn relative_l2(a: &[f64], b: &[f64]) -> f64 {
-    if a.len() != b.len() {
-        return f64::NAN;
-    }
-    let square: f64 = a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum();
-    (square / b.iter().map(|y| y * y).sum::<f64>()).sqrt()
 }
 
 /// Elements of the first tissue that share a node with the second.
