@@ -56,6 +56,9 @@ pub struct NodeContact {
     pub force_n: [f64; 3],
     /// Second derivative, N/mm.
     pub stiffness: [[f64; 3]; 3],
+    /// What the indenter's curvature takes from it, N/mm: a node on a convex edge
+    /// is pushed off it. `None` on a flat or hollow side.
+    pub curvature: Option<[[f64; 3]; 3]>,
 }
 
 impl NodeContact {
@@ -72,9 +75,11 @@ impl NodeContact {
                 traction_mpa: 0.0,
                 force_n: [0.0; 3],
                 stiffness: [[0.0; 3]; 3],
+                curvature: None,
             });
         }
         let n = d.normal;
+        let convex = (0..3).map(|i| d.hessian[i][i]).sum::<f64>() > 0.0;
         Some(Self {
             energy_mj: 0.5 * area * (t * t - multiplier_mpa * multiplier_mpa) / penalty,
             traction_mpa: t,
@@ -82,6 +87,7 @@ impl NodeContact {
             stiffness: std::array::from_fn(|i| {
                 std::array::from_fn(|j| area * (penalty * n[i] * n[j] - t * d.hessian[i][j]))
             }),
+            curvature: convex.then(|| d.hessian.map(|row| row.map(|h| area * t * h))),
         })
     }
 }

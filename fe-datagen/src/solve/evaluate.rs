@@ -25,6 +25,9 @@ pub(crate) struct Evaluation {
     /// Tangential traction of each contact node on the indenter, MPa; empty
     /// without friction.
     pub friction: Vec<[f64; 3]>,
+    /// What convex edges take from the tangent at contact nodes, N/mm; filled with a
+    /// tangent only.
+    pub curvature: Vec<(u32, [[f64; 3]; 3])>,
     /// Largest |gap| over nodes in contact, mm.
     pub gap_error_mm: f64,
     /// Smallest `J`.
@@ -143,6 +146,7 @@ fn contact(
 ) -> f64 {
     out.traction_mpa.clear();
     out.friction.clear();
+    out.curvature.clear();
     out.gap_error_mm = 0.0;
     out.contact_force_n = [0.0; 3];
     out.normal_force_n = [0.0; 3];
@@ -167,6 +171,7 @@ fn contact(
         square += out.add_contact_force(n, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
             problem.structure.add_node(t, node, &c.stiffness);
+            out.curvature.extend(c.curvature.map(|k| (node, k)));
         }
     }
     out.normal_force_n = out.contact_force_n;

@@ -225,12 +225,14 @@ impl<'a> Newton<'a> {
         result
     }
 
-    /// Solves `tangent * step = right`.
+    /// Solves `tangent * step = right`; where the tangent is indefinite, a nearby one
+    /// that is not, if there is one.
     fn solve_step(&mut self, tolerance: f64) {
         if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
             self.factorize();
         }
-        for fresh in [false, true] {
+        let mut fresh = false;
+        loop {
             if self.factorizer.held() == Some(Factor::Indefinite) {
                 let clock = Instant::now();
                 self.step.copy_from_slice(&self.right);
@@ -252,22 +254,42 @@ impl<'a> Newton<'a> {
             self.effort.solve_s += clock.elapsed().as_secs_f64();
             self.effort.cg_iterations += found.iterations;
             self.stale = found.iterations > self.options.refactor_after_cg;
+            if found.negative_curvature && self.convexify() {
+                continue;
+            }
             let usable = found.relative_residual <= tolerance
                 || (found.negative_curvature && found.iterations > 0);
             if usable || fresh {
                 return;
             }
             self.factorize();
+            fresh = true;
         }
+    }
+
+    /// Gives back to the tangent what convex edges of the indenter take from it, which is
+    /// what mostly makes it indefinite: a direction downhill then costs no more than
+    /// any other. `false` if that has been done or there is nothing to give back.
+    fn convexify(&mut self) -> bool {
+        let any = !self.current.curvature.is_empty();
+        for (node, k) in self.current.curvature.drain(..) {
+            self.problem.structure.add_node(&mut self.tangent, node, &k);
+        }
+        any
     }
 
     fn factorize(&mut self) {
         let clock = Instant::now();
         self.effort.factorizations += 1;
-        if self.factorizer.cholesky(&self.problem.structure, &self.tangent).is_err() {
+        let structure = &self.problem.structure;
+        let mut definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
+        if !definite && self.convexify() {
+            definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
+        }
+        if !definite {
             tracing::debug!("tangent not positive definite: L B L^T");
             self.effort.indefinite_factorizations += 1;
-            self.factorizer.indefinite(&self.problem.structure, &self.tangent);
+            self.factorizer.indefinite(structure, &self.tangent);
         }
         self.stale = false;
         self.effort.factor_s += clock.elapsed().as_secs_f64();
