@@ -168,6 +168,7 @@ impl CampaignSpec {
             motion: Motion::to_depth(1.0, 1, Pose::default()),
             friction: self.friction,
             effects: self.effects.clone(),
+            outputs: None,
             folder: self.folder.clone(),
             origin: Origin::default(),
         }

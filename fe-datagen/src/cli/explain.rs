@@ -5,7 +5,7 @@ use crate::forecast::Forecast;
 use crate::press::drive::Drive;
 use crate::press::setup::Setup;
 use crate::scene::effects::{EFFECTS, Effect};
-use crate::scene::{Plan, Scene};
+use crate::scene::{Output, Plan, Scene};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,6 +50,8 @@ struct Explanation {
     geometry: String,
     indenter: String,
     motion: String,
+    /// Written by `solve` beside `summary.json`.
+    outputs: Vec<Output>,
     plan: Plan,
     simulated: Vec<On>,
     left_out: Vec<Off>,
@@ -83,6 +85,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         geometry: table(&scene.geometry, "kind")?,
         indenter: table(&scene.indenter, "shape")?,
         motion: motion(&scene, &setup.drive),
+        outputs: Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect(),
         simulated: simulated.collect(),
         left_out: left_out.collect(),
         plan: setup.plan,
@@ -136,11 +139,15 @@ fn motion(scene: &Scene, drive: &Drive) -> String {
 
 fn human(e: &Explanation) -> String {
     let mut text = format!(
-        "{}\n  geometry  {}\n  indenter  {}\n  motion    {}\n\nsimulated\n",
+        "{}\n  geometry  {}\n  indenter  {}\n  motion    {}\n  writes    {}\n\nsimulated\n",
         e.file.display(),
         e.geometry,
         e.indenter,
-        e.motion
+        e.motion,
+        std::iter::once("summary")
+            .chain(e.outputs.iter().map(|o| o.as_str()))
+            .collect::<Vec<_>>()
+            .join(", "),
     );
     for on in &e.simulated {
         text += &format!("  {:14} {} ({} {})\n", on.effect, on.adds, on.state, on.state_is);

@@ -3,9 +3,10 @@
 use crate::output::OutputError;
 use crate::output::npz::NpzBuilder;
 use crate::output::plot::{Axis, Chart, Mark, Series, write_svg};
-use crate::press::body::Body;
 use crate::press::fields::PA_PER_MPA;
 use crate::press::record::IncrementRecord;
+use crate::press::setup::Setup;
+use crate::scene::{Output, Scene};
 use std::path::Path;
 
 /// Values of a state along the skin.
@@ -14,13 +15,15 @@ type Values = fn(&IncrementRecord) -> &Vec<f64>;
 /// States that are drawn; more would hide each other.
 const CURVES_MAX: usize = 5;
 
-/// Writes `lines.npz` of all states and a plot of pressure and of SED.
+/// Writes `lines.npz` of all states and a plot of pressure and of SED, as far as the
+/// scene asks for them.
 pub(super) fn write(
     folder: &Path,
-    body: &Body,
-    timed: bool,
+    scene: &Scene,
+    setup: &Setup,
     records: &[IncrementRecord],
 ) -> Result<(), OutputError> {
+    let (body, timed) = (&setup.body, setup.drive.is_timed());
     let (Some(pressed), Some(_)) = (&body.patch, records.last()) else { return Ok(()) };
     let at = |nodes: &[u32]| -> Vec<[f64; 2]> {
         let position = |&n: &u32| body.problem.mesh.nodes[n as usize];
@@ -42,7 +45,12 @@ pub(super) fn write(
         let values: Vec<f64> = records.iter().flat_map(get).map(|v| v * PA_PER_MPA).collect();
         npz.add_slice(name, &[records.len(), skin.len()], &values)?;
     }
-    npz.write(&folder.join("lines.npz"))?;
+    if scene.writes(Output::Maps) {
+        npz.write(&folder.join("lines.npz"))?;
+    }
+    if !scene.writes(Output::Pictures) {
+        return Ok(());
+    }
     let label = |r: &IncrementRecord| {
         if timed { format!("{:.2} s", r.time_s) } else { format!("{:.2} mm", r.depth_mm) }
     };

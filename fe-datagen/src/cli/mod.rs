@@ -14,6 +14,7 @@ mod verify;
 mod witness;
 
 use clap::{Parser, Subcommand};
+use std::io::Write as _;
 use std::process::ExitCode;
 
 /// A finite-element fingertip: solve presses, run campaigns, check the physics.
@@ -79,12 +80,12 @@ fn print<T: serde::Serialize>(
     json: bool,
     human: impl FnOnce() -> String,
 ) -> anyhow::Result<()> {
-    if json {
-        println!("{}", serde_json::to_string_pretty(report)?);
-    } else {
-        println!("{}", human().trim_end());
+    let text = if json { serde_json::to_string_pretty(report)? } else { human() };
+    // A reader that has seen enough (`| head`) is no error.
+    match writeln!(std::io::stdout(), "{}", text.trim_end()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Refuses `--only` with a name that no case has.

@@ -9,7 +9,7 @@ use crate::press::body::PressError;
 use crate::press::fields::{PA_PER_MPA, write_vtu};
 use crate::press::record::{Checks, IncrementRecord};
 use crate::press::setup::Setup;
-use crate::scene::{Plan, Scene};
+use crate::scene::{Output, Plan, Scene};
 use crate::solve::{Effort, Options, Solver, StepReport};
 use anyhow::Context as _;
 use ndarray::Array2;
@@ -22,10 +22,10 @@ use std::time::Instant;
 
 /// Solve one scene and write everything that can be looked at.
 ///
-/// Writes summary.json, a .vtu series for ParaView (series.pvd) and, for a
-/// fingertip, pressure.png and sed.png (16-bit gray, with -color twins) of the
-/// deepest state and maps.npz of all stored states; for a section pressure.svg, sed.svg
-/// and lines.npz along the skin.
+/// Writes summary.json and what the scene's `outputs` name, by default all: a .vtu
+/// series for ParaView (series.pvd) and, for a fingertip, pressure.png and sed.png
+/// (16-bit gray, with -color twins) of the deepest state and maps.npz of all stored
+/// states; for a section pressure.svg, sed.svg and lines.npz along the skin.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press")]
 pub(super) struct Args {
@@ -82,17 +82,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let clock = Instant::now();
     let setup = Setup::new(&scene)?;
     let body = &setup.body;
-    let atlas = body.atlas().transpose()?.map(|(atlas, _)| atlas);
+    let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
+    let atlas = if mapped { body.atlas().transpose()?.map(|(atlas, _)| atlas) } else { None };
     let mut solver = body.solver(Options::default())?;
     let setup_s = clock.elapsed().as_secs_f64();
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
-    let (pressed, solved) = press(&setup, &mut solver, &args.out)?;
+    let (pressed, solved) =
+        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out))?;
     let records: Vec<_> = pressed.iter().map(|p| p.record.clone()).collect();
     if let Some(atlas) = &atlas {
-        write_maps(&args.out, atlas, &records)?;
+        write_maps(&args.out, &scene, atlas, &records)?;
     } else if body.plane {
-        super::lines::write(&args.out, body, setup.drive.is_timed(), &records)?;
+        super::lines::write(&args.out, &scene, &setup, &records)?;
     }
     let summary = Summary {
         plan: setup.plan,
@@ -121,12 +123,12 @@ struct Pressed {
     pressure_mpa_max: f64,
 }
 
-/// Presses and writes the fields of every stored equilibrium; those before an error
-/// are kept.
+/// Presses and writes the fields of every stored equilibrium into `out`, if given; those
+/// before an error are kept.
 fn press(
     setup: &Setup,
     solver: &mut Solver<'_>,
-    out: &Path,
+    out: Option<&PathBuf>,
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
     let Setup { body, approach, drive, .. } = setup;
     let bar = super::progress("pressing", drive.len());
@@ -134,7 +136,7 @@ fn press(
     let file = |state: usize| format!("state-{state:03}.vtu");
     let keep =
         &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
-            if written.is_ok() {
+            if let (Some(out), true) = (out, written.is_ok()) {
                 written = write_vtu(&out.join(file(state)), body, s);
             }
             bar.set_position(state as u64 + 1);
@@ -149,7 +151,9 @@ fn press(
     let place = |r: &IncrementRecord| if drive.is_timed() { r.time_s } else { r.depth_mm };
     let series: Vec<_> =
         pressed.iter().enumerate().map(|(i, p)| (place(&p.record), file(i))).collect();
-    vtu::write_pvd(&out.join("series.pvd"), &series)?;
+    if let Some(out) = out {
+        vtu::write_pvd(&out.join("series.pvd"), &series)?;
+    }
     Ok((pressed, solved))
 }
 
@@ -174,7 +178,12 @@ fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Incremen
 }
 
 /// Images of the deepest state and arrays of all.
-fn write_maps(folder: &Path, atlas: &Atlas, records: &[IncrementRecord]) -> anyhow::Result<()> {
+fn write_maps(
+    folder: &Path,
+    scene: &Scene,
+    atlas: &Atlas,
+    records: &[IncrementRecord],
+) -> anyhow::Result<()> {
     let Some(deepest) = records.last() else { return Ok(()) };
     let scaled = |v: &[f64]| -> Vec<f32> { v.iter().map(|x| (x * PA_PER_MPA) as f32).collect() };
     let fields = [
@@ -193,8 +202,13 @@ fn write_maps(folder: &Path, atlas: &Atlas, records: &[IncrementRecord]) -> anyh
             mm_per_px: f64::from(atlas.mm_per_px()),
             white: white_of(&pixels),
         };
-        view.write(folder, stem)?;
+        if scene.writes(Output::Pictures) {
+            view.write(folder, stem)?;
+        }
         npz.add_slice(&format!("{stem}_map"), &[MAP_SIDE_PX, MAP_SIDE_PX], &pixels)?;
+    }
+    if !scene.writes(Output::Maps) {
+        return Ok(());
     }
     let columns = deepest.pressure_mpa.len();
     let all = |get: fn(&IncrementRecord) -> &Vec<f64>| {

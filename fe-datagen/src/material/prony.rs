@@ -225,17 +225,24 @@ pub fn advance<L: Isochoric>(
     }
     tensors[..6].copy_from_slice(&now);
     let ended = branch_energies(law, prony, k, tensors);
-    // A Maxwell branch dissipates 2 / tau times what it stores; the trapezoidal
-    // rule over the step, but no more than a full relaxation of it can free.
     rest[0] += prony
         .terms()
         .iter()
-        .enumerate()
-        .map(|(i, t)| {
-            let x = dt_s / t.time_s;
-            (started[i] + ended[i]) * x.min(1.0)
-        })
+        .zip(started.iter().zip(&ended))
+        .map(|(t, (&e0, &e1))| 2.0 * dt_s / t.time_s * mean_energy(e0, e1))
         .sum::<f64>();
+}
+
+/// Mean over a step of what a Maxwell branch stores, of which it dissipates `2 / tau` a
+/// second, from its values at both ends: exponential decay where it falls, which makes a
+/// held strain's dissipation exact, and stress linear in time where it grows.
+fn mean_energy(start: f64, end: f64) -> f64 {
+    if end < start && end > 0.0 {
+        let fall = (start - end) / end;
+        (start - end) / fall.ln_1p()
+    } else {
+        (start + (start * end).sqrt() + end) / 3.0
+    }
 }
 
 /// Energy density that each branch stores, MPa.

@@ -9,6 +9,7 @@ mod geometry;
 mod materials;
 mod motion;
 mod origin;
+mod outputs;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,7 @@ pub use geometry::{Geometry, Layer};
 pub use materials::{TissueError, TissueTable};
 pub use motion::{Motion, PathPoint};
 pub use origin::{Located, Origin, Place};
+pub use outputs::Output;
 
 use crate::indenter::IndenterSpec;
 use error::require;
@@ -45,6 +47,9 @@ pub struct Scene {
     /// What the scene asks for; S1's analysis if not given.
     #[serde(default = "effects::usual")]
     pub effects: Vec<EffectName>,
+    /// What `solve` writes beside `summary.json`; all that the geometry has if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outputs: Option<Vec<Output>>,
     /// Where the file was: paths in it are relative to this folder.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -137,6 +142,7 @@ impl Scene {
             });
         }
         self.materials.validate()?;
+        self.validate_outputs()?;
         self.plan().map(drop)
     }
 

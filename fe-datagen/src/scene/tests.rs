@@ -19,6 +19,23 @@ fn a_minimal_scene_takes_the_defaults() {
     assert!(!plan.relaxes && plan.friction == 0.0 && !plan.plane_strain);
 }
 
+#[test]
+fn outputs_are_what_is_named_or_all_that_the_geometry_has() {
+    let of = |text: &str| {
+        let scene = parse(text).unwrap();
+        Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect::<Vec<_>>()
+    };
+    assert_eq!(of(FINGER), Output::ALL);
+    assert_eq!(of(BLOCK), [Output::Fields]);
+    assert_eq!(of(&format!("outputs = [\"maps\"]\n{FINGER}")), [Output::Maps]);
+    assert_eq!(of(&format!("outputs = []\n{FINGER}")), []);
+    assert_refused(&[
+        (format!("outputs = [\"maps\", \"maps\"]\n{FINGER}"), 1, &["outputs[1]", "twice"]),
+        (format!("outputs = [\"pictures\"]\n{BLOCK}"), 1, &["outputs[0]", "atlas"]),
+        (format!("outputs = [\"movie\"]\n{FINGER}"), 1, &["movie", "fields", "maps", "pictures"]),
+    ]);
+}
+
 /// Text of a bad scene, the line to blame, words that its message has.
 type Bad<'a> = (String, usize, &'a [&'a str]);
 
