@@ -1,5 +1,6 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
+mod answers;
 pub(crate) mod evaluate;
 mod loading;
 mod memory;

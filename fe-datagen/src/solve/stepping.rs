@@ -1,6 +1,5 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
-use super::evaluate::Balance;
 use super::loading::Loading;
 use super::memory::{self, EnergySplit};
 use super::newton::{Effort, Fixed, Newton};
@@ -10,19 +9,18 @@ use super::work::Work;
 use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionNode, FrictionTrial};
 use crate::element::Memory;
-use crate::linear::Equations;
 
 /// Least share of its way that the friction bound goes in one update.
 const RELAX_MIN: f64 = 0.1;
 
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
-    newton: Newton<'a>,
-    loading: Loading,
-    state: State,
+    pub(super) newton: Newton<'a>,
+    pub(super) loading: Loading,
+    pub(super) state: State,
     /// Equilibrium before the last, for extrapolation.
     before: Option<State>,
-    work: Work,
+    pub(super) work: Work,
     /// Load fraction that a time step may take; `None` for bodies without memory.
     pace: Option<f64>,
 }
@@ -30,11 +28,11 @@ pub struct Solver<'a> {
 /// An equilibrium, or the start of the search for one.
 #[derive(Clone, Debug, Default)]
 pub(super) struct State {
-    fraction: f64,
-    u: Vec<[f64; 3]>,
+    pub fraction: f64,
+    pub u: Vec<[f64; 3]>,
     multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
-    memory: Vec<f64>,
+    pub memory: Vec<f64>,
     /// Tangential contact; no nodes without friction.
     friction: FrictionTrial,
 }
@@ -111,43 +109,11 @@ impl<'a> Solver<'a> {
         self.newton.forget();
     }
 
-    /// Displacement, mm, one a mesh node.
-    #[must_use]
-    pub fn displacement_mm(&self) -> &[[f64; 3]] {
-        &self.state.u
-    }
-
-    /// The problem being solved.
-    #[must_use]
-    pub fn problem(&self) -> &'a Problem {
-        self.newton.problem
-    }
-
-    /// Nominal traction of each contact node, MPa per undeformed area.
-    #[must_use]
-    pub fn traction_mpa(&self) -> &[f64] {
-        &self.newton.current.traction_mpa
-    }
-
     /// Forgets how the last equilibria followed each other, because the load is
     /// about to turn.
     pub fn turn(&mut self) {
         self.before = None;
         self.pace = self.first_pace();
-    }
-
-    /// Contact force along a straight path, N.
-    #[must_use]
-    pub fn force_along_path_n(&self) -> f64 {
-        let force = self.newton.current.contact_force_n;
-        let travel = self.loading.indenter.as_ref().and_then(|m| m.straight_travel());
-        travel.map_or(0.0, |(_, direction)| (0..3).map(|i| force[i] * direction[i]).sum())
-    }
-
-    /// Load fraction reached.
-    #[must_use]
-    pub fn fraction(&self) -> f64 {
-        self.state.fraction
     }
 
     /// The present equilibrium, to come back to with [`Self::restore`].
@@ -359,101 +325,5 @@ impl<'a> Solver<'a> {
         } else {
             StepError::Contact { augmentations: updates, gap_mm }
         })
-    }
-
-    /// Work of the indenter so far, mJ.
-    #[must_use]
-    pub fn indenter_work_mj(&self) -> f64 {
-        self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
-    }
-
-    /// History of an element's quadrature points at the equilibrium; empty for
-    /// materials without memory.
-    #[must_use]
-    pub fn history_of(&self, block: usize, element: usize) -> &[f64] {
-        let layout = self.newton.problem.memory.as_ref();
-        layout.map_or(&[], |m| &self.state.memory[m.range(block, element)])
-    }
-
-    /// Tangential traction of the indenter on each contact node, MPa per
-    /// undeformed area; empty without friction.
-    #[must_use]
-    pub fn shear_traction_mpa(&self) -> Vec<[f64; 3]> {
-        self.newton.current.friction.iter().map(|t| t.map(|v| -v)).collect()
-    }
-
-    /// Forces of indenter and supports, and the integral of true pressure.
-    #[must_use]
-    pub fn balance(&self) -> Balance {
-        let problem = self.newton.problem;
-        let e = &self.newton.current;
-        let mut balance = Balance {
-            contact_force_n: e.contact_force_n,
-            normal_force_n: e.normal_force_n,
-            ..Balance::default()
-        };
-        for (dof, &eq) in problem.structure.equations.of_dof.iter().enumerate() {
-            if eq == Equations::FIXED {
-                balance.support_force_n[dof % 3] += e.residual_n[dof];
-            }
-        }
-        balance
-    }
-
-    /// True (Cauchy) pressure at every mesh node, MPa: the nominal traction
-    /// times undeformed over deformed nodal area of the contact surface.
-    #[must_use]
-    pub fn pressure_mpa(&self, surface: &crate::mesh::Surface) -> Vec<f64> {
-        let problem = self.newton.problem;
-        let x = self.deformed();
-        let mut deformed = vec![0.0; x.len()];
-        surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
-        let mut pressure = vec![0.0; x.len()];
-        if let Some(contact) = &problem.contact {
-            for ((&n, &area), &t) in
-                contact.nodes.iter().zip(&contact.area_mm2).zip(&self.newton.current.traction_mpa)
-            {
-                pressure[n as usize] = t * area / deformed[n as usize];
-            }
-        }
-        pressure
-    }
-
-    /// Force that a nodal pressure (MPa) exerts on the deformed surface, N: Gauss
-    /// quadrature of the interpolated field, which acts along the indenter's normal.
-    #[must_use]
-    pub fn force_of_pressure_n(
-        &self,
-        surface: &crate::mesh::Surface,
-        pressure: &[f64],
-    ) -> [f64; 3] {
-        let Some(indenter) = &self.loading.indenter else { return [0.0; 3] };
-        let x = self.deformed();
-        let mut traction = vec![[0.0; 3]; x.len()];
-        for n in surface.nodes() {
-            let n = n as usize;
-            if pressure[n] > 0.0 {
-                let normal = indenter.distance(self.state.fraction, x[n]).normal;
-                traction[n] = normal.map(|v| v * pressure[n]);
-            }
-        }
-        let mut total = [0.0; 3];
-        let rule = surface.kind.quadrature();
-        surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
-            let area = crate::mesh::surface::norm(normal);
-            for (&n, v) in face.iter().zip(value) {
-                for i in 0..3 {
-                    total[i] += v * area * traction[n as usize][i];
-                }
-            }
-        });
-        total
-    }
-
-    /// Deformed node positions, mm.
-    #[must_use]
-    pub fn deformed(&self) -> Vec<[f64; 3]> {
-        let nodes = &self.newton.problem.mesh.nodes;
-        nodes.iter().zip(&self.state.u).map(|(x, u)| std::array::from_fn(|i| x[i] + u[i])).collect()
     }
 }
