@@ -207,6 +207,23 @@ impl Structure {
             y[c] += sum + matrix.values[self.column_start[c]] * xc;
         }
     }
+
+    /// Norm of `|A| |x|`: times the machine's epsilon, how far rounding of `x` alone moves
+    /// `A x`.
+    #[must_use]
+    pub fn absolute_product_norm(&self, matrix: &SymmetricMatrix, x: &[f64]) -> f64 {
+        let mut y = vec![0.0; self.equations.count];
+        for c in 0..self.equations.count {
+            let range = self.column_start[c]..self.column_start[c + 1];
+            for (&r, &v) in self.row[range.clone()].iter().zip(&matrix.values[range]) {
+                y[r] += (v * x[c]).abs();
+                if r != c {
+                    y[c] += (v * x[r]).abs();
+                }
+            }
+        }
+        super::dot(&y, &y).sqrt()
+    }
 }
 
 /// Neighbours of every node through elements, itself left out.

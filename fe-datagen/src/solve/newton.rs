@@ -167,13 +167,28 @@ impl<'a> Newton<'a> {
             let forcing = Self::forcing(norm, previous, tolerance * reference);
             previous = norm;
             self.solve_step(forcing);
-            self.line_search(fixed, u)?;
+            match self.line_search(fixed, u) {
+                // Energy differences drown in rounding, and so does what is left of the residual.
+                Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
+                other => other?,
+            }
             self.effort.newton_iterations += 1;
         }
         Err(StepError::Newton {
             iterations: self.options.newton_max,
             residual: self.current.residual_norm / self.current.reference_norm,
         })
+    }
+
+    /// Residual that the rounding of `u` can make, N, with the tangent in hand.
+    fn rounding_n(&self, u: &[[f64; 3]]) -> f64 {
+        let mut unknowns = vec![0.0; self.right.len()];
+        for (v, &e) in u.as_flattened().iter().zip(&self.problem.structure.equations.of_dof) {
+            if e != Equations::FIXED {
+                unknowns[e as usize] = *v;
+            }
+        }
+        f64::EPSILON * self.problem.structure.absolute_product_norm(&self.tangent, &unknowns)
     }
 
     /// How exactly to solve the linear system: no more than its model of the
@@ -331,7 +346,6 @@ impl<'a> Newton<'a> {
             }
             length *= 0.5;
         }
-        // Energy differences drown in rounding close to the solution.
         Err(StepError::LineSearch { residual: norm / self.current.reference_norm })
     }
 }
