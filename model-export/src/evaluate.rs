@@ -147,7 +147,7 @@ pub fn run(
             let metrics = SampleMetrics::measure(
                 &maps.predicted_j_per_m3,
                 &maps.truth_j_per_m3,
-                dataset.interface.mask(),
+                &dataset.ground,
             )
             .ok_or(ExportError::Truth {
                 path: path.clone(),

@@ -155,6 +155,8 @@ fn card_of(onnx: &[u8]) -> Card {
             relative_l2: worst,
             far_field_relative_l2: None,
             peak_error: worst,
+            peak_distance_mm: None,
+            nail_base_error: None,
             total_energy_error: worst,
             ssim: Similarity { median: 0.0, p5: 0.0 },
         },
