@@ -252,16 +252,20 @@ impl Ladder {
             .iter()
             .map(|rung| Some((rung.time_ms()?, rung.relative_l2(&set)?)))
             .collect();
-        for (rung, point) in self.rungs.iter_mut().zip(&points) {
-            let beaten = |(time, error): (f64, f64)| {
-                let better = |(t, e): (f64, f64)| {
-                    t <= time && e <= error && (t < time || e < error)
-                };
-                points.iter().flatten().any(|other| better(*other))
-            };
-            rung.pareto = point.is_some_and(|point| !beaten(point));
+        for (rung, on_front) in self.rungs.iter_mut().zip(front(&points)) {
+            rung.pareto = on_front;
         }
     }
+}
+
+/// Which points (time, error) no other point beats in one and equals at least in the other.
+#[must_use]
+pub fn front(points: &[Option<(f64, f64)>]) -> Vec<bool> {
+    let beats = |(time, error): (f64, f64), (t, e): (f64, f64)| {
+        t <= time && e <= error && (t < time || e < error)
+    };
+    let stands = |point| !points.iter().flatten().any(|other| beats(point, *other));
+    points.iter().map(|point| point.is_some_and(stands)).collect()
 }
 
 #[cfg(test)]
