@@ -114,13 +114,19 @@ fn font() -> TextStyle<'static> {
     ("sans-serif", FONT_PX).into_font().color(&RGBColor(40, 40, 40))
 }
 
-/// A range on a logarithmic axis with room for labels.
+/// A range on a logarithmic axis with room for labels: a whole decade at least, or the axis
+/// would have no number on it.
 fn range(values: impl Iterator<Item = f64>, low: f64, high: f64) -> std::ops::Range<f64> {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
     for value in values {
         (least, most) = (least.min(value), most.max(value));
     }
-    if most > 0.0 { least / low..most * high } else { 0.1..1.0 }
+    if most <= 0.0 {
+        return 0.1..1.0;
+    }
+    let (least, most) = (least / low, most * high);
+    let decade = 10f64.powf(least.log10().floor());
+    if most / least > 12.0 { least..most } else { decade..(10.0 * decade).max(most) }
 }
 
 fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
@@ -171,7 +177,9 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let at = |ms: f64, error: f64| chart.backend_coord(&(ms, error));
     let places: Vec<(i32, i32)> = points.iter().map(|p| at(p.time_ms, p.error)).collect();
     let base = area.get_base_pixel();
-    let mut labels = Labels::new(&places);
+    let (width, height) = area.dim_in_pixel();
+    let frame = [base.0, base.1, base.0 + width as i32, base.1 + height as i32];
+    let mut labels = Labels::new(&places, frame);
     for (point, place) in points.iter().zip(&places) {
         let (x, y) = labels.place(*place, &point.name);
         area.draw(&Text::new(point.name.clone(), (x - base.0, y - base.1), font()))?;
@@ -201,13 +209,16 @@ fn trimmed(value: f64) -> String {
 
 /// Finds places for names beside dots where they cover neither dots nor each other.
 struct Labels {
-    /// Left, top, right, bottom.
+    /// Left, top, right, bottom of what names must stay within.
+    frame: [i32; 4],
+    /// The same of what they must not cover.
     taken: Vec<[i32; 4]>,
 }
 
 impl Labels {
-    fn new(dots: &[(i32, i32)]) -> Self {
-        Self { taken: dots.iter().map(|(x, y)| [x - 6, y - 6, x + 6, y + 6]).collect() }
+    fn new(dots: &[(i32, i32)], frame: [i32; 4]) -> Self {
+        let taken = dots.iter().map(|(x, y)| [x - 6, y - 6, x + 6, y + 6]).collect();
+        Self { frame, taken }
     }
 
     /// Top left corner of the name of the dot at `(x, y)`.
@@ -217,13 +228,18 @@ impl Labels {
         let height = FONT_PX + 1;
         let beside = |dx: i32, dy: i32| [x + dx, y + dy, x + dx + width, y + dy + height];
         let mut candidates = Vec::new();
-        for lift in [0, 10, -10, 20, -20, 32, -32, 44, -44] {
+        for lift in [0, 10, -10, 18, -18] {
             candidates.push(beside(9, lift - height / 2));
+        }
+        for lift in [0, 10, -10, 18, -18, 28, -28, 40, -40] {
             candidates.push(beside(-9 - width, lift - height / 2));
+            candidates.push(beside(9, lift - height / 2));
         }
         let apart =
             |a: &[i32; 4], b: &[i32; 4]| a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
-        let free = candidates.iter().find(|c| self.taken.iter().all(|t| apart(c, t)));
+        let inside = |c: &[i32; 4]| c[0] >= self.frame[0] && c[2] <= self.frame[2];
+        let free = |c: &&[i32; 4]| inside(c) && self.taken.iter().all(|t| apart(c, t));
+        let free = candidates.iter().find(free);
         let found = *free.unwrap_or(&candidates[0]);
         self.taken.push(found);
         (found[0], found[1])
@@ -301,7 +317,7 @@ mod tests {
     #[test]
     fn names_keep_clear_of_dots_and_each_other() {
         let dots = [(100, 100), (112, 102), (104, 95)];
-        let mut labels = Labels::new(&dots);
+        let mut labels = Labels::new(&dots, [0, 0, 400, 400]);
         for dot in dots {
             labels.place(dot, "some-name");
         }

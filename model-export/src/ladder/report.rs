@@ -1,5 +1,6 @@
 //! The ladder as Markdown.
 
+use crate::metrics::NAIL_BASE_MM;
 use papilla_engine::card::Spread;
 use papilla_engine::ladder::{Kind, Ladder, Percentiles, Rung, SetErrors};
 use std::fmt::Write;
@@ -126,10 +127,11 @@ fn zone(text: &mut String, stem: &str) {
     let _ = write!(
         text,
         "## The zone toward the nail base\n\n![The zone on the atlas]({stem}-zone.svg)\n\n\
-         The interface from {:.0} mm behind the tip on (x in the finger's frame, undeformed). The nail plate of the default fingertip\n\
-         reaches from 2 to 14 mm; its last 2 mm lie over the matrix, the nail's base. Presses on the pad rarely touch the skin over this zone but load it\n\
-         through the tissue. S1 reports that its network misses this spread, and a network that sees 2 mm around a pixel has to.\n",
-        crate::metrics::NAIL_BASE_MM
+         The interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the default\n\
+         fingertip ends at 14 mm, so this is 2 mm to either side of that edge, over the nail's matrix and its fold. Presses on the pad rarely\n\
+         touch the skin here but load it through the tissue. S1 reports that its network misses this spread; one that sees 2 to 3 mm around a pixel\n\
+         has to.\n",
+        NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }
 

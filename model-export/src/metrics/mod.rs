@@ -21,17 +21,19 @@ use papilla_engine::card::{Metrics, Similarity, Spread};
 use papilla_proto::atlas::{Atlas, Raster};
 use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
 use serde::Serialize;
+use std::ops::Range;
 
 /// Where the truth is below this part of its maximum is the far field.
 pub const FAR_FIELD: f32 = 0.1;
 
-/// The nail-base zone is the part of the interface this far from the tip and farther, mm along
-/// the finger.
+/// The nail-base zone: the part of the interface at these distances from the tip, mm along the
+/// finger.
 ///
-/// The nail plate of the default fingertip ends 14 mm from the tip; its matrix, the base, takes
-/// up the last 2 mm. Presses on the pad load this zone through the tissue more than by
-/// touching it, and a network that sees 2 mm around a pixel cannot know of them.
-pub const NAIL_BASE_MM: f32 = 12.0;
+/// The nail plate of the default fingertip ends 14 mm from the tip; the zone reaches 2 mm to
+/// either side of that edge, over the nail's matrix and its fold. Presses on the pad load it
+/// through the tissue more than by touching it, and a network that sees 2 to 3 mm around a
+/// pixel cannot know of them.
+pub const NAIL_BASE_MM: Range<f32> = 12.0..16.0;
 
 /// Where the figures are taken: the interface's pixels and their places.
 #[derive(Clone, Debug)]
@@ -52,7 +54,10 @@ impl Ground {
         let places: Vec<Option<[f32; 3]>> = (0..MAP_LEN).map(place).collect();
         Self {
             mask: interface.mask().to_vec(),
-            nail_base: places.iter().map(|p| p.is_some_and(|[x, ..]| x >= NAIL_BASE_MM)).collect(),
+            nail_base: places
+                .iter()
+                .map(|p| p.is_some_and(|[x, ..]| NAIL_BASE_MM.contains(&x)))
+                .collect(),
             position_mm: places.into_iter().map(Option::unwrap_or_default).collect(),
         }
     }
