@@ -5,6 +5,8 @@ const SVG = 'http://www.w3.org/2000/svg';
 const MARGIN = { left: 52, right: 14, top: 12, bottom: 38 };
 const FONT_PX = 11;
 const DOT_PX = 5;
+/** Least distance of two numbers on the time axis. */
+const TICK_PX = 46;
 const KINDS = {
   closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'S1’s network', fe: 'finite elements',
 };
@@ -17,7 +19,7 @@ export function short(value) {
   return String(Number(value.toFixed(digits)));
 }
 
-export const showTime = (ms) => (ms < 1000 ? `${short(ms)} ms` : ms < 60000 ? `${short(ms / 1000)} s` : `${short(ms / 60000)} min`);
+export const showTime = (ms) => (ms < 1000 ? `${short(ms)} ms` : `${short(ms / 1000)} s`);
 export const showError = (error) => `${short(100 * error)} %`;
 
 /** Names of the sets that were measured; without a ladder the cards' own figures. */
@@ -70,16 +72,19 @@ export function logAxis(values, low, high) {
   return { least, most, ticks, part: (value) => Math.log(value / least) / span };
 }
 
-/** Places a name beside its dot where it covers neither dots nor other names: left end and middle height. */
+/** Left end and middle height of a name beside its dot, clear of dots and other names; null where there is no room. */
 export function placeName(taken, x, y, width, right) {
   const half = FONT_PX / 2 + 1;
   const candidates = [];
-  for (const lift of [0, 12, -12, 20, -20, 30, -30]) candidates.push([x + 9, y + lift], [x - 9 - width, y + lift]);
+  for (const lift of [0, 9, -9]) candidates.push([x + 11, y + lift]);
+  for (const lift of [15, -15]) candidates.push([x - width / 2, y + lift]);
+  for (const lift of [0, 9, -9]) candidates.push([x - 11 - width, y + lift]);
+  for (const lift of [26, -26]) candidates.push([x - width / 2, y + lift], [x + 8, y + lift]);
   const box = ([left, middle]) => [left, middle - half, left + width, middle + half];
   const apart = (a, b) => a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
-  const free = candidates.find((c) => c[0] > MARGIN.left && c[0] + width < right && taken.every((t) => apart(box(c), t)));
-  const found = free ?? candidates[0];
-  taken.push(box(found));
+  const free = (c) => c[0] > MARGIN.left && c[0] + width < right && taken.every((t) => apart(box(c), t));
+  const found = candidates.find(free) ?? null;
+  if (found) taken.push(box(found));
   return found;
 }
 
@@ -143,8 +148,11 @@ export class LadderView {
     const bottom = height - MARGIN.bottom;
     this.x = (ms) => MARGIN.left + Math.min(1, Math.max(0, time.part(ms))) * (width - MARGIN.left - MARGIN.right);
     this.y = (value) => bottom - Math.min(1, Math.max(0, error.part(value))) * (bottom - MARGIN.top);
+    let lastPx = -Infinity;
     for (const tick of time.ticks) {
       make(svg, 'line', { class: 'grid', x1: this.x(tick), x2: this.x(tick), y1: MARGIN.top, y2: bottom });
+      if (this.x(tick) - lastPx < TICK_PX) continue;
+      lastPx = this.x(tick);
       make(svg, 'text', { class: 'tick', x: this.x(tick), y: bottom + 14, 'text-anchor': 'middle' }, showTime(tick));
     }
     for (const tick of error.ticks) {
@@ -168,21 +176,29 @@ export class LadderView {
     const { svg, rungs } = this;
     const taken = rungs.map((rung) => {
       const [x, y] = [this.x(rung.timeMs), this.y(rung.error)];
-      return [x - 7, y - 7, x + 7, y + 7];
+      const reach = rung.tier !== null && rung.tier === this.running ? DOT_PX + 5 : DOT_PX + 2;
+      return [x - reach, y - reach, x + reach, y + reach];
     });
     this.live = make(svg, 'g', { class: 'live', 'aria-hidden': 'true' });
     this.liveLine = make(this.live, 'line', {});
     this.liveDot = make(this.live, 'path', { d: 'M-5 0H5M0 -5V5' });
+    const groups = new Map();
     for (const rung of rungs) {
       const [x, y] = [this.x(rung.timeMs), this.y(rung.error)];
       const group = make(svg, 'g', { class: `rung ${rung.kind}` });
       make(group, 'title', {}, `${rung.name} (${KINDS[rung.kind] ?? rung.kind}): ${showError(rung.error)} in ${showTime(rung.timeMs)}`);
       if (rung.tier) this.#button(group, rung);
-      if (rung.tier === this.running) make(group, 'circle', { class: 'ring', cx: x, cy: y, r: DOT_PX + 4 });
+      if (rung.tier !== null && rung.tier === this.running) make(group, 'circle', { class: 'ring', cx: x, cy: y, r: DOT_PX + 4 });
       if (rung.kind === 'fe') make(group, 'path', { class: rung.reference ? 'dot hollow' : 'dot', d: `M${x} ${y - 6}l6 6l-6 6l-6 -6z` });
       else make(group, 'circle', { class: 'dot', cx: x, cy: y, r: DOT_PX });
-      const [left, middle] = placeName(taken, x, y, rung.name.length * FONT_PX * 0.56, width - 2);
-      make(group, 'text', { x: left, y: middle + 4 }, rung.name);
+      groups.set(rung, group);
+    }
+    // The running rung first, then those that can be had: where room is short, the others stay without a name.
+    const weight = (rung) => (rung.tier === null ? 2 : rung.tier === this.running ? 0 : 1);
+    for (const rung of [...rungs].sort((a, b) => weight(a) - weight(b))) {
+      const boldness = rung.tier !== null && rung.tier === this.running ? 0.62 : 0.56;
+      const place = placeName(taken, this.x(rung.timeMs), this.y(rung.error), rung.name.length * FONT_PX * boldness, width - 2);
+      if (place) make(groups.get(rung), 'text', { x: place[0], y: place[1] + 4 }, rung.name);
     }
   }
 
