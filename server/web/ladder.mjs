@@ -1,6 +1,8 @@
 // The ladder: error against time of every rung, the running one marked; a click on a rung switches to it.
 // Times of rungs that this server serves are its own calibration, the others' are those shipped.
 
+import { fetchJson } from './replay.mjs';
+
 const SVG = 'http://www.w3.org/2000/svg';
 const MARGIN = { left: 52, right: 14, top: 12, bottom: 38 };
 const FONT_PX = 11;
@@ -86,6 +88,19 @@ export function placeName(taken, x, y, width, right) {
   const found = candidates.find(free) ?? null;
   if (found) taken.push(box(found));
   return found;
+}
+
+const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
+
+/** What the server says of its tiers; they go into the choice beside `by budget`. */
+export async function listTiers() {
+  const listing = await fetchJson('v1/tiers');
+  byId('tier').append(...listing.tiers.map((tier) => {
+    const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
+    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
+    return new Option(`${tier.name} (${ms}${error})`, tier.name);
+  }));
+  return listing;
 }
 
 function make(parent, tag, attributes, text) {

@@ -3,7 +3,7 @@
 import { Atlas } from './atlas.mjs';
 import { PressControl } from './control.mjs';
 import { FingerView } from './finger.mjs';
-import { LadderView } from './ladder.mjs';
+import { LadderView, listTiers } from './ladder.mjs';
 import { LOG_DECADES, MapView } from './map.mjs';
 import { Meters } from './meters.mjs';
 import { Press } from './press.mjs';
@@ -254,18 +254,6 @@ function notify(message) {
   noticedAtMs = message === '' ? Infinity : performance.now();
   byId('notice').textContent = message;
   byId('notice').hidden = message === '';
-}
-
-const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
-
-async function listTiers() {
-  const listing = await fetchJson('v1/tiers');
-  byId('tier').append(...listing.tiers.map((tier) => {
-    const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
-    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
-    return new Option(`${tier.name} (${ms}${error})`, tier.name);
-  }));
-  return listing;
 }
 
 /** Says on the page whether this raster equals the server's own mask, pixel by pixel. */

@@ -3,7 +3,7 @@
 use super::print_json;
 use indicatif::{ProgressBar, ProgressStyle};
 use model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
-use model_export::{ExportError, read, write};
+use model_export::{ExportError, read, read_text, write};
 use papilla_engine::{Ladder, MAP_LEN};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -27,6 +27,10 @@ pub(crate) struct Options {
     /// 16 samples of each set and short timings; does not touch MODELS/ladder.json.
     #[arg(long)]
     quick: bool,
+    /// Draw page and pictures anew from these figures (STEM.json or ladder.json); measures
+    /// nothing.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "fe"])]
+    from: Option<PathBuf>,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -36,9 +40,18 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         fe: options.fe.clone(),
         quick: options.quick,
     };
-    let bar = Bar::new(json)?;
-    let ladder = ladder::measure(&task, &bar, &footprint)?;
-    bar.0.finish_and_clear();
+    let ladder = match &options.from {
+        Some(path) => {
+            let refused = |source| ExportError::Engine { path: path.clone(), source };
+            Ladder::from_json(&read_text(path)?).map_err(refused)?
+        }
+        None => {
+            let bar = Bar::new(json)?;
+            let ladder = ladder::measure(&task, &bar, &footprint)?;
+            bar.0.finish_and_clear();
+            ladder
+        }
+    };
     let written = write_all(options, &ladder)?;
     if json {
         return print_json(&ladder);
@@ -64,7 +77,7 @@ fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>>
         (beside("-zone.svg"), plot::nail_base_zone(&canvas.ground).map_err(chart("the zone"))?),
         (beside(".json"), json.clone()),
     ];
-    if !options.quick {
+    if !ladder.quick {
         files.push((options.models.join("ladder.json"), json));
     }
     for (path, text) in &files {

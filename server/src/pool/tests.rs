@@ -1,5 +1,7 @@
 //! The pool with models that stop and go as the tests tell them.
 
+mod gated;
+
 use std::{
     sync::{
         Arc, Mutex,
@@ -11,7 +13,7 @@ use std::{
 };
 
 use bytes::Bytes;
-use papilla_engine::{EngineError, Model, ModelInfo, Session, ladder::Kind};
+use papilla_engine::{ModelInfo, ladder::Kind};
 use papilla_proto::{
     ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType,
     atlas::{Atlas, Patch, PatchVertices, Raster},
@@ -19,6 +21,7 @@ use papilla_proto::{
 use serde_json::json;
 use tokio::sync::mpsc;
 
+use self::gated::{Act, Gate, Gated};
 use super::{Done, Entrance, Job, Outcome, Pool, Slot, Stage};
 use crate::{
     codec::{Input, Output},
@@ -27,57 +30,6 @@ use crate::{
     replay::Replay,
     speed::{Overhead, Speed},
 };
-
-/// A model whose every inference, after those of the warm-up, waits for a go. What it is
-/// told to do, it does: that makes the order of events in these tests certain, which no real
-/// network could.
-struct Gated {
-    info: ModelInfo,
-    gate: Arc<Gate>,
-}
-
-struct Gate {
-    /// Announces that an inference has begun.
-    begun: SyncSender<()>,
-    /// What the inference is to do.
-    go: Mutex<Receiver<Act>>,
-}
-
-enum Act {
-    Finish,
-    Panic,
-}
-
-struct GatedSession {
-    gate: Arc<Gate>,
-    warm: usize,
-}
-
-impl Model for Gated {
-    fn info(&self) -> &ModelInfo {
-        &self.info
-    }
-
-    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
-        Ok(Box::new(GatedSession { gate: Arc::clone(&self.gate), warm: 0 }))
-    }
-}
-
-impl Session for GatedSession {
-    fn infer(&mut self, pressure: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
-        self.warm += 1;
-        sed.copy_from_slice(pressure);
-        // The one run that warms a session is free.
-        if self.warm <= 1 {
-            return Ok(());
-        }
-        self.gate.begun.send(()).unwrap();
-        match self.gate.go.lock().unwrap().recv_timeout(Duration::from_secs(30)).unwrap() {
-            Act::Finish => Ok(()),
-            Act::Panic => panic!("as told"),
-        }
-    }
-}
 
 /// A pool of one thread and the handles of its gate.
 struct Bench {

@@ -1,12 +1,17 @@
 //! The ladder as pictures: error against time, and the nail-base zone on the atlas.
 
+mod labels;
+mod zone;
+
 use super::report;
-use crate::metrics::Ground;
-use papilla_engine::MAP_SIDE_PX;
+use labels::Labels;
 use papilla_engine::ladder::{Kind, Ladder, Rung, front};
 use plotters::coord::Shift;
+use plotters::coord::combinators::LogCoord;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
+
+pub use zone::nail_base_zone;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
@@ -114,9 +119,8 @@ fn font() -> TextStyle<'static> {
     ("sans-serif", FONT_PX).into_font().color(&RGBColor(40, 40, 40))
 }
 
-/// A range on a logarithmic axis with room for labels: a whole decade at least, or the axis
-/// would have no number on it.
-fn range(values: impl Iterator<Item = f64>, low: f64, high: f64) -> std::ops::Range<f64> {
+/// A range on a logarithmic axis with room for labels: two thirds of a decade at least.
+fn range(values: impl Iterator<Item = f64>, low: f64, high: f64) -> Span {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
     for value in values {
         (least, most) = (least.min(value), most.max(value));
@@ -125,8 +129,8 @@ fn range(values: impl Iterator<Item = f64>, low: f64, high: f64) -> std::ops::Ra
         return 0.1..1.0;
     }
     let (least, most) = (least / low, most * high);
-    let decade = 10f64.powf(least.log10().floor());
-    if most / least > 12.0 { least..most } else { decade..(10.0 * decade).max(most) }
+    let grow = (4.6 * least / most).sqrt().max(1.0);
+    least / grow..most * grow
 }
 
 fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
@@ -143,19 +147,9 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
         .caption(title, ("sans-serif", 17))
         .margin(12)
         .x_label_area_size(42)
-        .y_label_area_size(70)
+        .y_label_area_size(52)
         .build_cartesian_2d(times.clone().log_scale(), errors.clone().log_scale())?;
-    chart
-        .configure_mesh()
-        .light_line_style(RGBColor(242, 242, 242))
-        .x_desc("time of one map, ms (one core; FE: one state)")
-        .y_desc("relative L2 error of SED, median")
-        .x_label_formatter(&|ms| {
-            if *ms < 1e3 { trimmed(*ms) } else { format!("{} s", trimmed(ms / 1e3)) }
-        })
-        .y_label_formatter(&|error| format!("{} %", trimmed(100.0 * error)))
-        .label_style(("sans-serif", FONT_PX))
-        .draw()?;
+    axes(area, &chart, &times, &errors)?;
     let dashed =
         |from, to| DashedPathElement::new(vec![from, to], 4, 4, GREY.mix(0.8).stroke_width(1));
     if let Some(floor) = floor {
@@ -177,8 +171,10 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let at = |ms: f64, error: f64| chart.backend_coord(&(ms, error));
     let places: Vec<(i32, i32)> = points.iter().map(|p| at(p.time_ms, p.error)).collect();
     let base = area.get_base_pixel();
-    let (width, height) = area.dim_in_pixel();
-    let frame = [base.0, base.1, base.0 + width as i32, base.1 + height as i32];
+    let (left, top) = at(times.start, errors.end);
+    let (_, bottom) = at(times.end, errors.start);
+    let (width, _) = area.dim_in_pixel();
+    let frame = [left, top, base.0 + width as i32, bottom];
     let mut labels = Labels::new(&places, frame);
     for (point, place) in points.iter().zip(&places) {
         let (x, y) = labels.place(*place, &point.name);
@@ -196,6 +192,53 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     Ok(())
 }
 
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+
+/// Grid, numbers and names of the axes; the library's own logarithmic grid is too dense over
+/// many decades and bare within one.
+fn axes(area: &Area<'_>, chart: &Chart<'_, '_>, times: &Span, errors: &Span) -> Drawn {
+    let line = RGBColor(225, 225, 225);
+    let base = area.get_base_pixel();
+    let (_, height) = area.dim_in_pixel();
+    let at = |ms: f64, error: f64| {
+        let (x, y) = chart.backend_coord(&(ms, error));
+        (x - base.0, y - base.1)
+    };
+    let (left, bottom) = at(times.start, errors.start);
+    let (right, top) = at(times.end, errors.end);
+    for ms in ticks(times) {
+        let (x, _) = at(ms, errors.start);
+        area.draw(&PathElement::new([(x, top), (x, bottom)], line))?;
+        let words = if ms < 1e3 { trimmed(ms) } else { format!("{} s", trimmed(ms / 1e3)) };
+        let shift = words.len() as i32 * FONT_PX / 4;
+        area.draw(&Text::new(words, (x - shift, bottom + 6), font()))?;
+    }
+    for error in ticks(errors) {
+        let (_, y) = at(times.start, error);
+        area.draw(&PathElement::new([(left, y), (right, y)], line))?;
+        let words = format!("{} %", trimmed(100.0 * error));
+        let shift = words.len() as i32 * FONT_PX * 11 / 20 + 6;
+        area.draw(&Text::new(words, (left - shift, y - FONT_PX / 2), font()))?;
+    }
+    area.draw(&PathElement::new([(left, top), (left, bottom), (right, bottom)], GREY))?;
+    let words = "time of one map, ms (one core; FE: one state)";
+    area.draw(&Text::new(words, ((left + right) / 2 - 140, height as i32 - 20), font()))?;
+    area.draw(&Text::new("relative L2 error of SED, median", (left - 44, top - 20), font()))?;
+    Ok(())
+}
+
+type Span = std::ops::Range<f64>;
+
+/// 1, 2, 5 within every decade, or the decades alone where there are many.
+fn ticks(span: &Span) -> Vec<f64> {
+    let steps: &[f64] =
+        if (span.end / span.start).log10() < 2.6 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let first = span.start.log10().floor() as i32;
+    let decades = first..=span.end.log10().ceil() as i32;
+    let all = decades.flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)));
+    all.filter(|tick| (span.start..=span.end).contains(tick)).collect()
+}
+
 /// Two significant digits without needless zeros.
 fn trimmed(value: f64) -> String {
     let digits = (1 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize;
@@ -207,103 +250,9 @@ fn trimmed(value: f64) -> String {
     }
 }
 
-/// Finds places for names beside dots where they cover neither dots nor each other.
-struct Labels {
-    /// Left, top, right, bottom of what names must stay within.
-    frame: [i32; 4],
-    /// The same of what they must not cover.
-    taken: Vec<[i32; 4]>,
-}
-
-impl Labels {
-    fn new(dots: &[(i32, i32)], frame: [i32; 4]) -> Self {
-        let taken = dots.iter().map(|(x, y)| [x - 6, y - 6, x + 6, y + 6]).collect();
-        Self { frame, taken }
-    }
-
-    /// Top left corner of the name of the dot at `(x, y)`.
-    fn place(&mut self, (x, y): (i32, i32), name: &str) -> (i32, i32) {
-        // The fonts are the viewer's: a generous guess of the width.
-        let width = (name.chars().count() as i32 * FONT_PX * 11) / 20;
-        let height = FONT_PX + 1;
-        let beside = |dx: i32, dy: i32| [x + dx, y + dy, x + dx + width, y + dy + height];
-        let mut candidates = Vec::new();
-        for lift in [0, 10, -10, 18, -18] {
-            candidates.push(beside(9, lift - height / 2));
-        }
-        for lift in [0, 10, -10, 18, -18, 28, -28, 40, -40] {
-            candidates.push(beside(-9 - width, lift - height / 2));
-            candidates.push(beside(9, lift - height / 2));
-        }
-        let apart =
-            |a: &[i32; 4], b: &[i32; 4]| a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1];
-        let inside = |c: &[i32; 4]| c[0] >= self.frame[0] && c[2] <= self.frame[2];
-        let free = |c: &&[i32; 4]| inside(c) && self.taken.iter().all(|t| apart(c, t));
-        let free = candidates.iter().find(free);
-        let found = *free.unwrap_or(&candidates[0]);
-        self.taken.push(found);
-        (found[0], found[1])
-    }
-}
-
-/// The nail-base zone on the interface's map, as SVG.
-///
-/// # Errors
-/// What the drawing library reports, in words.
-pub fn nail_base_zone(ground: &Ground) -> Result<String, String> {
-    let mut text = String::new();
-    let drawn = {
-        let root = SVGBackend::with_string(&mut text, (640, 480)).into_drawing_area();
-        draw_zone(&root, ground)
-    };
-    drawn.map_err(|error| error.to_string())?;
-    Ok(text)
-}
-
-fn draw_zone(root: &Area<'_>, ground: &Ground) -> Drawn {
-    const ZOOM: usize = 2;
-    const LEFT: i32 = 10;
-    root.fill(&WHITE)?;
-    let side = (ZOOM * MAP_SIDE_PX) as i32;
-    root.draw(&Rectangle::new([(LEFT, 10), (LEFT + side, 10 + side)], RGBColor(215, 215, 215)))?;
-    for row in 0..MAP_SIDE_PX {
-        let class = |column: usize| {
-            let i = row * MAP_SIDE_PX + column;
-            u8::from(ground.mask[i]) + u8::from(ground.nail_base[i])
-        };
-        let mut column = 0;
-        while column < MAP_SIDE_PX {
-            let start = column;
-            while column < MAP_SIDE_PX && class(column) == class(start) {
-                column += 1;
-            }
-            let shade = match class(start) {
-                0 => continue,
-                1 => RGBColor(205, 214, 222),
-                _ => RGBColor(213, 94, 0),
-            };
-            let corner = |c: usize, r: usize| (LEFT + (ZOOM * c) as i32, 10 + (ZOOM * r) as i32);
-            let run = Rectangle::new([corner(start, row), corner(column, row + 1)], shade.filled());
-            root.draw(&run)?;
-        }
-    }
-    let x = LEFT + side + 14;
-    for (y, shade, words) in
-        [(30, RGBColor(205, 214, 222), "interface"), (54, RGBColor(213, 94, 0), "nail-base zone")]
-    {
-        root.draw(&Rectangle::new([(x, y), (x + 14, y + 14)], shade.filled()))?;
-        root.draw(&Text::new(words, (x + 20, y), font()))?;
-    }
-    for (y, words) in [(90, "tip of the finger up,"), (108, "pad seen from outside")] {
-        root.draw(&Text::new(words, (x, y), font()))?;
-    }
-    root.present()?;
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Labels, trimmed};
+    use super::{range, ticks, trimmed};
 
     #[test]
     fn numbers_of_axes_are_short() {
@@ -315,16 +264,17 @@ mod tests {
     }
 
     #[test]
-    fn names_keep_clear_of_dots_and_each_other() {
-        let dots = [(100, 100), (112, 102), (104, 95)];
-        let mut labels = Labels::new(&dots, [0, 0, 400, 400]);
-        for dot in dots {
-            labels.place(dot, "some-name");
+    fn every_axis_has_numbers() {
+        for (span, due) in
+            [(0.3..6.0, vec![0.5, 1.0, 2.0, 5.0]), (0.3..3e3, vec![1.0, 10.0, 100.0, 1e3])]
+        {
+            let found = ticks(&span);
+            assert!(found.iter().zip(&due).all(|(f, d)| (f / d - 1.0).abs() < 1e-9), "{found:?}");
+            assert_eq!(found.len(), due.len());
         }
-        for (i, a) in labels.taken.iter().enumerate().skip(dots.len()) {
-            for b in &labels.taken[..i] {
-                assert!(a[2] < b[0] || b[2] < a[0] || a[3] < b[1] || b[3] < a[1], "{a:?} {b:?}");
-            }
+        for values in [vec![0.35], vec![0.35, 0.36], vec![0.01, 2e6]] {
+            let span = range(values.into_iter(), 1.6, 1.6);
+            assert!(ticks(&span).len() >= 2, "{span:?}");
         }
     }
 }
