@@ -14,7 +14,7 @@ use tokio::sync::mpsc;
 
 use super::{
     End, Event, Line, drained,
-    hello::{self, Seat, Terms},
+    hello::{self, Terms},
 };
 use crate::{
     codec::{Input, Output},
@@ -27,7 +27,6 @@ use crate::{
 pub(super) struct Session {
     pub(super) number: u64,
     pub(super) terms: Terms,
-    pub(super) seat: Seat,
     pub(super) slot: Arc<Slot>,
     pub(super) answers: mpsc::Receiver<Done>,
     /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
@@ -67,7 +66,6 @@ impl Session {
     async fn renew(&mut self, line: &mut Line, text: &str) -> Result<(), End> {
         match hello::renew(&line.app, text, self.number) {
             Ok((terms, ready)) => {
-                self.seat = Seat::take(&line.app, terms.tier);
                 self.terms = terms;
                 line.say(&ServerMessage::Ready(ready)).await
             }

@@ -20,7 +20,6 @@ use crate::{
 const ATTEMPTS: usize = 8;
 
 /// What hello and ready agreed on.
-#[derive(Debug)]
 pub(super) struct Terms {
     /// Index of the tier in the catalogue.
     pub(super) tier: usize,
@@ -30,6 +29,7 @@ pub(super) struct Terms {
     pub(super) sample_type: SampleType,
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
+    _seat: Seat,
 }
 
 /// Waits for a hello that can be met, and answers ready.
@@ -97,13 +97,13 @@ pub(super) fn renew(app: &App, text: &str, number: u64) -> Result<(Terms, Ready)
 }
 
 /// A place in the count of a tier's sessions; given back when it is dropped.
-pub(super) struct Seat {
+struct Seat {
     catalogue: Arc<Catalogue>,
     tier: usize,
 }
 
 impl Seat {
-    pub(super) fn take(app: &App, tier: usize) -> Self {
+    fn take(app: &App, tier: usize) -> Self {
         app.catalogue.tiers[tier].sessions.fetch_add(1, Ordering::Relaxed);
         Self { catalogue: Arc::clone(&app.catalogue), tier }
     }
@@ -147,6 +147,7 @@ fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         budget_us,
         sample_type: hello.sample_type,
         pressure_scale_pa: hello.pressure_scale_pa,
+        _seat: Seat::take(app, index),
     })
 }
 

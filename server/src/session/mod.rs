@@ -93,7 +93,6 @@ async fn converse(line: &mut Line, number: u64) -> End {
     let (slot, answers) = Slot::new();
     let session = frames::Session {
         number,
-        seat: hello::Seat::take(&line.app, terms.tier),
         terms,
         slot: Arc::new(slot),
         answers,
