@@ -249,6 +249,7 @@ test('the tier can be chosen', async () => {
 test('the ladder marks the running rung, and a click on another switches in the same session', async () => {
   const { tiers } = await (await fetch(new URL('v1/tiers', BASE))).json();
   await page.selectOption('#budget', '500000');
+  await until(() => globalThis.papilla.session.ready !== null);
   const session = await page.evaluate(() => globalThis.papilla.session.ready.session);
   await page.locator('.ladder').scrollIntoViewIfNeeded();
   for (const { name } of tiers) {
