@@ -55,6 +55,14 @@ pub struct Metrics {
     pub far_field_relative_l2: Option<Spread>,
     /// `|max p - max t| / max t`.
     pub peak_error: Spread,
+    /// Distance between the places of the two peaks on the undeformed interface, mm; absent
+    /// from cards written before it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_distance_mm: Option<Spread>,
+    /// `|p - t| / |t|` over the zone toward the nail base; absent as above, and if no sample
+    /// has anything there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nail_base_error: Option<Spread>,
     /// `|sum p - sum t| / sum t`.
     pub total_energy_error: Spread,
     /// Structural similarity of the maps over the truth's maximum; 1 is equal.

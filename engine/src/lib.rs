@@ -26,6 +26,7 @@
 pub mod card;
 mod error;
 mod info;
+pub mod ladder;
 mod onnx;
 #[cfg(feature = "ort")]
 mod ort_backend;
@@ -36,6 +37,7 @@ use std::{fmt, str::FromStr, sync::Arc};
 pub use card::Card;
 pub use error::EngineError;
 pub use info::ModelInfo;
+pub use ladder::Ladder;
 pub use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
 
 /// Version of the metadata contract that this engine reads (`papilla.format`).

@@ -268,6 +268,8 @@ fn card_of(info: &ModelInfo) -> Card {
             relative_l2: spread,
             far_field_relative_l2: None,
             peak_error: spread,
+            peak_distance_mm: None,
+            nail_base_error: None,
             total_energy_error: spread,
             ssim: Similarity { median: 0.9, p5: 0.8 },
         },

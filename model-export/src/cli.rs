@@ -3,6 +3,7 @@
 mod check;
 mod evaluate;
 mod index;
+mod ladder;
 
 use clap::{Parser, Subcommand};
 use model_export::{ExportError, read, read_text, table};
@@ -30,7 +31,9 @@ A new model, from the trainer's file to the service:
   model-export check    models/s1-base8.onnx --atlas models/atlas.json
   model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures/s1-base8
   model-export index    models --default s1-base8
-  model-export table    models/*.json";
+  model-export table    models/*.json
+All models and the solver itself, error against time:
+  model-export ladder   --data data --models models --fe out/rungs --out docs/accuracy-vs-time";
 
 /// Parsed command line.
 #[derive(Debug, Parser)]
@@ -64,7 +67,7 @@ enum Command {
     #[command(after_long_help = EXIT_CODES)]
     Table {
         /// Cards written by `evaluate`, in the order of the rows; other JSON files beside
-        /// them (atlas.json, index.json, replay.json) are passed over.
+        /// them (atlas.json, index.json, ladder.json, replay.json) are passed over.
         #[arg(required = true, value_name = "CARD")]
         cards: Vec<PathBuf>,
     },
@@ -73,6 +76,20 @@ enum Command {
     /// Every NAME.onnx there must have its card NAME.json and the atlas of atlas.json.
     #[command(after_long_help = EXIT_CODES)]
     Index(index::Options),
+    /// Measure the ladder: error against time of every model and of FE itself.
+    ///
+    /// Every model of the index is run on all held-out sets (held-out presses, held-out shapes,
+    /// deeper than any training, the published campaign, the states of the FE reference); FE rungs
+    /// are held against the reference. Written: a page with tables and pictures, the figures as
+    /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
+    #[command(after_long_help = EXIT_CODES)]
+    Ladder(ladder::Options),
+    /// Load one model and say what that took, as JSON; the ladder runs it in a fresh process.
+    #[command(hide = true)]
+    Footprint {
+        /// The model, an `.onnx` file.
+        model: PathBuf,
+    },
 }
 
 /// Does what the command line asks for.
@@ -83,12 +100,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Evaluate(options) => evaluate::run(options, json),
         Command::Table { cards } => print_table(cards, json),
         Command::Index(options) => index::run(options, json),
+        Command::Ladder(options) => ladder::run(options, json),
+        Command::Footprint { model } => ladder::weigh(model),
     }
 }
 
 fn print_table(paths: &[PathBuf], json: bool) -> anyhow::Result<()> {
     let passed_over = |path: &&PathBuf| {
-        let others = ["atlas.json", "index.json", "replay.json"];
+        let others = ["atlas.json", "index.json", "ladder.json", "replay.json"];
         !path.file_name().is_some_and(|name| others.iter().any(|other| name == *other))
     };
     let cards = paths

@@ -2,6 +2,7 @@
 //!
 //! Shards hold values at the atlas's vertices; maps are rasterised from them here.
 
+use crate::metrics::Ground;
 use crate::{ExportError, read, read_text};
 use ndarray::{Array1, Array2, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
@@ -72,6 +73,8 @@ pub struct Dataset {
     pub skin: Raster,
     /// Draws SED.
     pub interface: Raster,
+    /// Where errors are taken.
+    pub ground: Ground,
 }
 
 impl Dataset {
@@ -103,7 +106,8 @@ impl Dataset {
         }
         manifest.check_identity().map_err(bad)?;
         let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
-        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface })
+        let ground = Ground::new(&atlas, &interface);
+        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface, ground })
     }
 
     /// SHA-256 that names the dataset.
@@ -142,6 +146,12 @@ impl Dataset {
             return Err(ExportError::EmptySplit { path, split: split.to_owned() });
         }
         Ok(presses)
+    }
+
+    /// All presses, of whichever split, in the manifest's order.
+    #[must_use]
+    pub fn every_press(&self) -> Vec<&Press> {
+        self.manifest.presses.iter().collect()
     }
 
     /// Path of the shard of a press.

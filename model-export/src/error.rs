@@ -44,7 +44,9 @@ pub enum ExportError {
         reason: String,
     },
     /// Model and dataset (or two files) belong to different atlases.
-    #[error("{what} is of atlas {found}, the model of atlas {expected}; they do not go together")]
+    #[error(
+        "{what} is of atlas {found}, the models are of atlas {expected}; they do not go together"
+    )]
     AtlasMismatch {
         /// What has the other atlas.
         what: String,
@@ -102,6 +104,14 @@ pub enum ExportError {
         sample: usize,
         /// What is wrong with it.
         reason: &'static str,
+    },
+    /// A chart cannot be drawn.
+    #[error("cannot draw {what}: {reason}")]
+    Chart {
+        /// What was to be drawn.
+        what: &'static str,
+        /// The drawing library's words.
+        reason: String,
     },
     /// A picture cannot be encoded.
     #[error("cannot write {path}: {source}")]

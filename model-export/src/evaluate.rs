@@ -147,7 +147,7 @@ pub fn run(
             let metrics = SampleMetrics::measure(
                 &maps.predicted_j_per_m3,
                 &maps.truth_j_per_m3,
-                dataset.interface.mask(),
+                &dataset.ground,
             )
             .ok_or(ExportError::Truth {
                 path: path.clone(),
@@ -205,12 +205,20 @@ pub fn maps_of(
 /// # Errors
 /// [`ExportError::AtlasMismatch`].
 pub fn require_atlas(what: &str, found: &str, info: &ModelInfo) -> Result<(), ExportError> {
-    if found == info.atlas_hash {
+    require_same_atlas(what, found, &info.atlas_hash)
+}
+
+/// Refuses what belongs to another atlas than `expected`.
+///
+/// # Errors
+/// [`ExportError::AtlasMismatch`].
+pub fn require_same_atlas(what: &str, found: &str, expected: &str) -> Result<(), ExportError> {
+    if found == expected {
         return Ok(());
     }
     Err(ExportError::AtlasMismatch {
         what: what.to_owned(),
-        expected: info.atlas_hash.clone(),
+        expected: expected.to_owned(),
         found: found.to_owned(),
     })
 }

@@ -9,6 +9,7 @@
 pub mod dataset;
 mod error;
 pub mod evaluate;
+pub mod ladder;
 pub mod metrics;
 pub mod picture;
 pub mod reference;

@@ -9,7 +9,7 @@ use crate::{ErrorCode, Problem, SampleType};
 #[serde(tag = "type", rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum ClientMessage {
-    /// Opens the session; must be the first message.
+    /// Opens the session; must be the first message. Later ones set new terms.
     Hello(Hello),
 }
 
@@ -84,6 +84,10 @@ pub struct Ready {
     pub predicted_latency_us: u64,
     /// Deadline of frames that name none, us; None: no deadline.
     pub budget_us: Option<u32>,
+    /// Whether the tier is expected to meet that budget; None without one. False: it is the
+    /// fastest there is, or the one the hello named.
+    #[serde(default)]
+    pub meets_budget: Option<bool>,
     /// Columns of every map.
     pub width: u32,
     /// Rows of every map.

@@ -43,6 +43,11 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_DEFAULT_TIER", value_name = "NAME")]
     pub default_tier: Option<String>,
 
+    /// Time for measuring the tiers on this machine at the start, milliseconds; slow tiers take
+    /// two runs each whatever they need. 0: none, the shipped times stand.
+    #[arg(long, env = "PAPILLA_CALIBRATION_MS", default_value = "1500", value_name = "MS")]
+    pub calibration_ms: u64,
+
     /// Log filter, as `info` or `papilla_server=debug`.
     #[arg(long, env = "PAPILLA_LOG", default_value = "info", value_name = "FILTER")]
     pub log: String,
@@ -89,6 +94,7 @@ impl Default for Config {
             models: None,
             threads: None,
             default_tier: None,
+            calibration_ms: 1500,
             log: "info".to_owned(),
             json: false,
             max_sessions: n(64),
@@ -116,6 +122,10 @@ impl Config {
             io: Duration::from_secs(self.io_timeout_s.max(1)),
             idle: Duration::from_secs(self.idle_timeout_s.max(1)),
         }
+    }
+
+    pub(crate) fn calibration(&self) -> Duration {
+        Duration::from_millis(self.calibration_ms)
     }
 
     pub(crate) fn drain_timeout(&self) -> Duration {

@@ -27,6 +27,7 @@ mod pool;
 mod problem;
 mod replay;
 mod session;
+mod speed;
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
@@ -54,7 +55,8 @@ pub struct Server {
     pool: Option<Pool>,
 }
 
-/// Starts the service: loads the models, warms every thread, binds, accepts.
+/// Starts the service: loads the models, measures them on this machine, warms every thread,
+/// binds, accepts.
 ///
 /// Must be called within a tokio runtime. When it returns, the service is ready.
 ///
@@ -96,6 +98,8 @@ fn load(config: &Config) -> Result<Loaded, StartError> {
         None => Assets::embedded(),
     };
     let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref())?);
+    // Before the threads start: they would take time from what is measured.
+    speed::calibrate(&catalogue, config.calibration())?;
     let metrics = Metrics::new(catalogue.tiers.iter().map(|tier| tier.name.as_str()));
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() + config.max_requests.get();

@@ -1,17 +1,22 @@
 //! The tiers this service can render with, their atlas, and the replay.
 
-use std::{
-    sync::Arc,
-    sync::atomic::{AtomicU64, Ordering},
-    time::Duration,
-};
+use std::{sync::Arc, sync::atomic::AtomicUsize, time::Duration};
 
 use bytes::Bytes;
-use papilla_engine::{Card, Model, card::Index};
+use papilla_engine::{
+    Card, Ladder, Model,
+    card::Index,
+    ladder::{Kind, SET_NAMES},
+};
 use papilla_proto::atlas::{Atlas, Patch, Raster};
 use serde_json::Value;
 
-use crate::{StartError, assets::Assets, replay::Replay};
+use crate::{
+    StartError,
+    assets::Assets,
+    replay::Replay,
+    speed::{Overhead, Speed},
+};
 
 /// One way of getting a SED map: a model, and what is known of it.
 pub(crate) struct Tier {
@@ -27,68 +32,14 @@ pub(crate) struct Tier {
     pub(crate) pressure_max_pa: f32,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
-    /// Median relative L2 error on held-out presses, from the card.
+    /// What it is.
+    pub(crate) kind: Kind,
+    /// Median relative L2 error on [`Catalogue::judged_on`].
     pub(crate) relative_l2_median: f64,
     /// How long it takes here.
     pub(crate) speed: Speed,
-}
-
-/// How long the inference of a tier takes on this machine, learnt from its runs.
-#[derive(Debug)]
-pub(crate) struct Speed {
-    fastest_us: AtomicU64,
-    typical_us: AtomicU64,
-}
-
-impl Default for Speed {
-    fn default() -> Self {
-        Self { fastest_us: AtomicU64::new(u64::MAX), typical_us: AtomicU64::new(0) }
-    }
-}
-
-impl Speed {
-    /// Takes note of one run of the warm-up: the fastest is what to expect. The others
-    /// met cold caches, and the other threads warming up beside them.
-    pub(crate) fn warm(&self, time: Duration) {
-        self.learn(time);
-        self.typical_us.store(self.fastest_us.load(Ordering::Relaxed), Ordering::Relaxed);
-    }
-
-    /// Takes note of one run.
-    pub(crate) fn learn(&self, time: Duration) {
-        let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX).max(1);
-        self.fastest_us.fetch_min(us, Ordering::Relaxed);
-        // Threads may overwrite each other's update; a lost one does not matter to a mean.
-        let typical = match self.typical_us.load(Ordering::Relaxed) {
-            0 => us,
-            old => (old * 15 + us) / 16,
-        };
-        self.typical_us.store(typical.max(1), Ordering::Relaxed);
-    }
-
-    /// Less time than any run took so far: half the fastest, so that one lucky
-    /// run on an idle machine does not condemn a frame that could be in time.
-    pub(crate) fn floor(&self) -> Duration {
-        match self.fastest_us.load(Ordering::Relaxed) {
-            u64::MAX => Duration::ZERO,
-            us => Duration::from_micros(us / 2),
-        }
-    }
-
-    /// A running mean, us.
-    pub(crate) fn typical_us(&self) -> u64 {
-        self.typical_us.load(Ordering::Relaxed)
-    }
-}
-
-/// What decoding, encoding and handing over add to the inference, us; for predictions.
-const OVERHEAD_US: u64 = 500;
-
-impl Tier {
-    /// Time from receipt to answer on an idle machine, us.
-    pub(crate) fn predicted_latency_us(&self) -> u64 {
-        self.speed.typical_us() + OVERHEAD_US
-    }
+    /// Sessions that render with it now.
+    pub(crate) sessions: AtomicUsize,
 }
 
 /// All there is to render with and to show.
@@ -102,6 +53,11 @@ pub(crate) struct Catalogue {
     pub(crate) skin: Raster,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
+    /// All rungs as shipped, FE included; none if the folder has no `ladder.json`.
+    pub(crate) ladder: Option<Ladder>,
+    /// The set by which tiers are compared; none: each by its card.
+    pub(crate) judged_on: Option<String>,
+    pub(crate) overhead: Overhead,
 }
 
 impl Catalogue {
@@ -151,9 +107,38 @@ impl Catalogue {
             }
             None => Replay::default(),
         };
+        let ladder = match assets.get("ladder.json") {
+            Some(json) => {
+                Some(load_ladder(json, &atlas, &tiers).map_err(|e| bad("ladder.json", &e))?)
+            }
+            None => None,
+        };
+        let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
         let (skin, interface) =
             (Raster::new(&atlas, Patch::Skin), Raster::new(&atlas, Patch::Interface));
-        Ok(Self { tiers, default, atlas, atlas_json, skin, interface, replay })
+        let overhead = Overhead::default();
+        Ok(Self {
+            tiers,
+            default,
+            atlas,
+            atlas_json,
+            skin,
+            interface,
+            replay,
+            ladder,
+            judged_on,
+            overhead,
+        })
+    }
+
+    /// Time of a tier from receipt to answer on an idle machine, us.
+    pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
+        self.tiers[tier].speed.typical_us().saturating_add(self.overhead.us())
+    }
+
+    /// Whether a tier is expected to meet a budget; none without one.
+    pub(crate) fn meets(&self, tier: usize, budget_us: Option<u32>) -> Option<bool> {
+        budget_us.map(|budget| self.predicted_latency_us(tier) <= u64::from(budget))
     }
 
     /// Index of the tier called `name`.
@@ -181,11 +166,56 @@ impl Catalogue {
             };
         };
         fitting()
-            .filter(|(_, tier)| tier.predicted_latency_us() <= u64::from(budget_us))
+            .filter(|(index, _)| self.meets(*index, Some(budget_us)) == Some(true))
             .min_by(|(_, a), (_, b)| a.relative_l2_median.total_cmp(&b.relative_l2_median))
             .or_else(|| fitting().min_by_key(|(_, tier)| tier.speed.typical_us()))
             .map(|(index, _)| index)
     }
+}
+
+/// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
+/// are of a model that is not served.
+fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<Ladder, String> {
+    let mut ladder = Ladder::from_json(text(json)?).map_err(|error| error.to_string())?;
+    if ladder.atlas_hash != atlas.hash() {
+        let (measured, ours) = (&ladder.atlas_hash, atlas.hash());
+        return Err(format!("measured on atlas {measured}, but atlas.json is {ours}"));
+    }
+    ladder.rungs.retain(|rung| {
+        let Some(tier) = tiers.iter().find(|t| rung.model.as_ref() == Some(&t.name)) else {
+            return rung.model.is_none();
+        };
+        let same = |hash: &String| *hash == tier.model.info().onnx_sha256;
+        let fresh = rung.onnx_sha256.as_ref().is_none_or(same);
+        if !fresh {
+            tracing::warn!(tier = %tier.name, "ladder.json has figures of another file; measure it anew");
+        }
+        fresh
+    });
+    Ok(ladder)
+}
+
+/// Gives the tiers the shipped times, and the errors of the first set that all were measured
+/// on; the name of that set.
+fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
+    for tier in tiers.iter() {
+        if let Some(ms) = ladder.rung_of(&tier.name).and_then(|rung| rung.time_ms()) {
+            tier.speed.expect(milliseconds(ms));
+        }
+    }
+    let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
+    let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
+    let set = SET_NAMES.into_iter().find(complete)?;
+    for tier in tiers.iter_mut() {
+        if let Some(error) = error(tier, set) {
+            tier.relative_l2_median = error;
+        }
+    }
+    Some(set.to_owned())
+}
+
+fn milliseconds(ms: f64) -> Duration {
+    Duration::try_from_secs_f64(ms / 1e3).unwrap_or_default()
 }
 
 fn text(bytes: &[u8]) -> Result<&str, String> {
@@ -200,15 +230,19 @@ fn load_tier(name: &str, onnx: &[u8], card: &[u8]) -> Result<Tier, Box<dyn std::
     if info.name != name {
         return Err(format!("the model calls itself '{}'", info.name).into());
     }
+    let speed = Speed::default();
+    speed.expect(milliseconds(card.latency_ms.p50));
     Ok(Tier {
         name: name.to_owned(),
+        kind: Kind::of_network(&info.network),
+        sessions: AtomicUsize::new(0),
         effects: info.effects.clone(),
         atlas_hash: info.atlas_hash.clone(),
         pressure_max_pa: info.pressure_max_pa,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         relative_l2_median: card.metrics.relative_l2.median,
         card: serde_json::from_str(json)?,
-        speed: Speed::default(),
+        speed,
         model,
     })
 }

@@ -31,6 +31,8 @@ export class Meters {
   constructor() {
     this.stats = new Stats();
     this.pair = [NaN, NaN];
+    /** Median time in the server of the last answers, ms. */
+    this.serverMs = NaN;
     this.budgetMs = 0;
     this.shownAtMs = 0;
     this.errorsNow = null;
@@ -95,15 +97,16 @@ export class Meters {
     this.errorsShown = false;
   }
 
-  /** Writes what changed; `sending` tells a pause from a stall, `connected` whether answers can come. */
+  /** Writes what changed; `sending` tells a pause from a stall, `connected` whether answers can come. False: not yet. */
   refresh(nowMs, sending, connected) {
-    if (nowMs - this.shownAtMs < REFRESH_MS) return;
+    if (nowMs - this.shownAtMs < REFRESH_MS) return false;
     this.shownAtMs = nowMs;
     const { stats, pair } = this;
     put('tier-name', this.tier);
     put('rate', sending ? `${stats.rate(nowMs)} frames/s` : 'idle');
     for (const [name, ring] of [['trip', stats.roundTripMs], ['server', stats.serverMs]]) {
       ring.percentiles(pair);
+      if (name === 'server') [this.serverMs] = pair;
       put(`${name}-p50`, ms(pair[0]));
       put(`${name}-p99`, ms(pair[1]));
       byId(`${name}-p99`).classList.toggle('bad', pair[1] > this.budgetMs);
@@ -119,6 +122,7 @@ export class Meters {
     put('strip-top', top >= this.budgetMs ? `line: ${budget}` : `top: ${ms(top)} ms, ${budget}`);
     this.#showPress();
     this.#showErrors();
+    return true;
   }
 
   #showPress() {

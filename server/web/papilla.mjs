@@ -3,6 +3,7 @@
 import { Atlas } from './atlas.mjs';
 import { PressControl } from './control.mjs';
 import { FingerView } from './finger.mjs';
+import { LadderView, listTiers } from './ladder.mjs';
 import { LOG_DECADES, MapView } from './map.mjs';
 import { Meters } from './meters.mjs';
 import { Press } from './press.mjs';
@@ -15,9 +16,10 @@ const NOTICE_MS = 6000;
 const SED_UNIT = 'J/m³';
 
 class Page {
-  constructor(atlas, tiers) {
+  constructor(atlas, listing) {
     this.atlas = atlas;
-    this.tiers = tiers;
+    this.tiers = listing.tiers;
+    this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
     this.pressureMaxPa = Infinity;
@@ -82,7 +84,13 @@ class Page {
     this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash });
   }
 
+  #switchTo(tier) {
+    byId('tier').value = tier;
+    this.#open();
+  }
+
   #ready(ready) {
+    this.ladder.setReady(ready);
     // The server refuses what lies above; interpolation may round up by a digit.
     this.pressureMaxPa = 0.9999 * ready.pressure_max_pa;
     this.control.changed = true;
@@ -145,7 +153,10 @@ class Page {
     const ready = this.mode === 'press' || this.replay.loaded;
     if (ready && (this.unsent || this.stream.checked)) this.#send(nowMs, map);
     this.finger?.draw();
-    this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null);
+    if (this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null)) {
+      const judged = this.mode === 'replay' && this.replay.judged;
+      this.ladder.showLive(this.meters.serverMs, judged ? this.meters.errorsNow?.relativeL2 ?? NaN : NaN);
+    }
   }
 
   #send(nowMs, map) {
@@ -243,18 +254,6 @@ function notify(message) {
   noticedAtMs = message === '' ? Infinity : performance.now();
   byId('notice').textContent = message;
   byId('notice').hidden = message === '';
-}
-
-const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
-
-async function listTiers() {
-  const { tiers } = await fetchJson('v1/tiers');
-  byId('tier').append(...tiers.map((tier) => {
-    const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
-    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
-    return new Option(`${tier.name} (${ms}${error})`, tier.name);
-  }));
-  return tiers;
 }
 
 /** Says on the page whether this raster equals the server's own mask, pixel by pixel. */

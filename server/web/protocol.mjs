@@ -86,13 +86,24 @@ export class Session {
     this.retryNow = () => this.#connect();
   }
 
-  /** Opens a session of the wished tier (null: the server's choice) and budget; replaces the old one. */
+  /** Asks for the wished tier (null: the server's choice) and budget, in the open session if there is one. */
   open(wish) {
     this.wish = { ...wish };
     // An answer may never come on a slow tier; a lost one must not stop the page for ever.
     this.patienceMs = Math.max(2000, wish.budget_us / 250);
     this.delayMs = BACK_OFF_MS.first;
-    this.#connect();
+    if (!this.ready || this.socket.readyState !== WebSocket.OPEN) {
+      this.#connect();
+      return;
+    }
+    // A frame on its way is still answered by the old tier: that answer says nothing about the new one.
+    this.ready = null;
+    this.inFlight = false;
+    this.#hello(this.socket);
+  }
+
+  #hello(socket) {
+    socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
   }
 
   /** Sends the map in `frame.pressurePa`; false while an answer is due or the session is not ready. */
@@ -117,9 +128,7 @@ export class Session {
     const socket = new WebSocket(this.url);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
-    socket.onopen = () => {
-      socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
-    };
+    socket.onopen = () => this.#hello(socket);
     socket.onmessage = (event) => {
       if (typeof event.data === 'string') this.#text(event.data);
       else this.#binary(event.data);
@@ -160,7 +169,8 @@ export class Session {
       this.callbacks.onfault(message.code, message.message);
       // A refused hello would be refused again: wait for the visitor to choose otherwise. What passes
       // by itself is left to the close that follows, and to the back-off.
-      if (!this.ready && !PASSING.has(message.code)) {
+      const ofFrame = message.sequence !== undefined && message.sequence !== null;
+      if (!this.ready && !ofFrame && !PASSING.has(message.code)) {
         this.#drop();
         this.callbacks.onstate('refused', message.message);
       }

@@ -12,6 +12,7 @@ const { Atlas } = await load('atlas.mjs');
 const { HERTZ, Press } = await load('press.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
+const { logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 
 test('a request frame has the documented bytes', () => {
   const frame = new RequestFrame();
@@ -173,4 +174,56 @@ test('error figures follow their definitions', () => {
   near(figures.farFieldL2, Math.sqrt(0.5 / 0.25));
   near(figures.peak, 0.1);
   near(figures.energy, 1 / 14.5);
+});
+
+/** What /v1/tiers answers, in small. */
+function listing() {
+  const errors = (median) => ({ s1: { samples: 4, relative_l2: { median, p95: 2 * median } } });
+  const tract = (p50) => ({ tract: { p50, p99: 2 * p50 }, ort: null });
+  return {
+    tiers: [
+      { name: 'nano', kind: 'network', predicted_latency_us: 900, calibrated_us: { p50: 700, p99: 800 }, relative_l2_median: 0.2 },
+      { name: 'large', kind: 'network', predicted_latency_us: 30500, calibrated_us: null, relative_l2_median: 0.05 },
+    ],
+    ladder: {
+      sets: [{ name: 's1', samples: 4 }, { name: 'deep', samples: 0 }],
+      discretisation_error: { sed_relative_l2: 0.01, how: 'by hand' },
+      rungs: [
+        { name: 'fe-fine', kind: 'fe', model: null, seconds: { p50: 900, p99: 999 }, reference: true, errors: errors(0) },
+        { name: 'fe-small', kind: 'fe', model: null, seconds: { p50: 4, p99: 5 }, errors: errors(0.3) },
+        { name: 'nano', kind: 'network', model: 'nano', latency_ms: tract(0.5), errors: errors(0.1) },
+        { name: 'large', kind: 'network', model: 'large', latency_ms: tract(20), errors: errors(0.04) },
+        { name: 'unmeasured', kind: 'network', model: 'unmeasured', latency_ms: tract(1), errors: {} },
+      ],
+    },
+  };
+}
+
+test('rungs have this server’s times, the reference its own error, and the front is what nothing beats', () => {
+  const data = listing();
+  assert.deepEqual(setsOf(data), ['s1']);
+  const rungs = rungsOn(data, 's1');
+  assert.deepEqual(rungs.map(({ name, timeMs, error }) => [name, timeMs, error]), [
+    ['nano', 0.7, 0.1], ['large', 30.5, 0.04], ['fe-small', 4000, 0.3], ['fe-fine', 900000, 0.01],
+  ]);
+  assert.deepEqual(rungs.filter((rung) => rung.onFront).map((rung) => rung.name), ['nano', 'large', 'fe-fine']);
+  assert.deepEqual(rungs.map((rung) => rung.tier), ['nano', 'large', null, null]);
+  data.ladder = null;
+  assert.deepEqual(setsOf(data), ['cards']);
+  assert.deepEqual(rungsOn(data, 'cards').map((rung) => rung.error), [0.2, 0.05]);
+});
+
+test('axes hold their values and numbers, names keep clear of each other', () => {
+  for (const values of [[3], [1, 1.1], [0.5, 2e6]]) {
+    const axis = logAxis(values, 2, 2);
+    assert.ok(axis.ticks.length >= 2, `${values}: ${axis.ticks}`);
+    for (const value of [...values, ...axis.ticks]) assert.ok(axis.part(value) >= 0 && axis.part(value) <= 1, `${value}`);
+  }
+  assert.deepEqual([short(0.0302), short(12.34), short(150)], ['0.03', '12', '150']);
+  assert.deepEqual([showTime(0.7), showTime(30500)], ['0.7 ms', '31 s']);
+  const taken = [[195, 95, 205, 105]];
+  const places = Array.from({ length: 40 }, () => placeName(taken, 200, 100, 60, 400));
+  const found = places.filter((place) => place !== null);
+  assert.ok(found.length > 3 && found.length < 40, `${found.length} names round one dot`);
+  assert.equal(new Set(found.map(String)).size, found.length);
 });

@@ -246,6 +246,37 @@ test('the tier can be chosen', async () => {
   assert.equal(peaks.size, tiers.length, 'each tier answers in its own way');
 });
 
+test('the ladder marks the running rung, and a click on another switches in the same session', async () => {
+  const { tiers } = await (await fetch(new URL('v1/tiers', BASE))).json();
+  await page.selectOption('#budget', '500000');
+  await until(() => globalThis.papilla.session.ready !== null);
+  const session = await page.evaluate(() => globalThis.papilla.session.ready.session);
+  await page.locator('.ladder').scrollIntoViewIfNeeded();
+  for (const { name } of tiers) {
+    await page.evaluate((tier) => document.querySelector(`#ladder-plot [data-tier="${tier}"]`).dispatchEvent(new MouseEvent('click')), name);
+    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await nextAnswer();
+    assert.equal(await page.locator('#tier').inputValue(), name);
+    assert.equal(await page.locator('#ladder-plot .ring').count(), 1);
+    assert.equal(await page.locator('#ladder-plot [aria-pressed=true]').getAttribute('data-tier'), name);
+    await until((wanted) => document.getElementById('ladder-now').textContent.startsWith(`${wanted}: `), name);
+    await until(() => /now [\d.]+ m?s in the server/.test(document.getElementById('ladder-now').textContent));
+  }
+  assert.equal(await page.evaluate(() => globalThis.papilla.session.ready.session), session, 'no new connection');
+  // By budget: the server chooses, and the keyboard can choose too.
+  await page.selectOption('#tier', '');
+  await nextAnswer();
+  const other = page.locator('#ladder-plot .served[aria-pressed=false]').first();
+  if (tiers.length > 1) {
+    const name = await other.getAttribute('data-tier');
+    await other.focus();
+    await page.keyboard.press('Enter');
+    await until((wanted) => document.getElementById('tier-name').textContent === wanted, name);
+    await nextAnswer();
+  }
+  await keep('ladder-light');
+});
+
 test('a budget too small for the tier is shown as late frames, not as an old map', async (context) => {
   const { tiers } = await (await fetch(new URL('v1/tiers', BASE))).json();
   const slowest = tiers.reduce((a, b) => (a.predicted_latency_us > b.predicted_latency_us ? a : b));

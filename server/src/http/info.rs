@@ -1,11 +1,13 @@
 //! What the service says of itself.
 
+use std::sync::atomic::Ordering;
+
 use axum::{extract::State, response::Response};
 use papilla_proto::Problem;
 use serde_json::{Value, json};
 
 use super::{Answer, Shared, answer, json_answer, refuse};
-use crate::problem;
+use crate::{models::Catalogue, problem};
 
 /// The description of the HTTP surface, written by hand.
 pub(crate) const OPENAPI: &str = include_str!("../../openapi.json");
@@ -37,24 +39,32 @@ pub(super) async fn openapi() -> Response {
 
 pub(super) async fn tiers(State(app): Shared) -> Response {
     let catalogue = &app.catalogue;
-    let tiers: Vec<Value> = catalogue
-        .tiers
-        .iter()
-        .enumerate()
-        .map(|(index, tier)| {
-            json!({
-                "name": tier.name,
-                "default": index == catalogue.default,
-                "effects": tier.effects,
-                "atlas_hash": tier.atlas_hash,
-                "pressure_max_pa": tier.pressure_max_pa,
-                "sed_max_j_per_m3": tier.sed_max_j_per_m3,
-                "relative_l2_median": tier.relative_l2_median,
-                "predicted_latency_us": tier.predicted_latency_us(),
-            })
-        })
-        .collect();
-    json_answer(&json!({"default": catalogue.tiers[catalogue.default].name, "tiers": tiers}))
+    let tiers: Vec<Value> =
+        (0..catalogue.tiers.len()).map(|index| tier(catalogue, index)).collect();
+    json_answer(&json!({
+        "default": catalogue.tiers[catalogue.default].name,
+        "judged_on": catalogue.judged_on,
+        "overhead_us": catalogue.overhead.us(),
+        "tiers": tiers,
+        "ladder": catalogue.ladder,
+    }))
+}
+
+fn tier(catalogue: &Catalogue, index: usize) -> Value {
+    let tier = &catalogue.tiers[index];
+    json!({
+        "name": tier.name,
+        "kind": tier.kind,
+        "default": index == catalogue.default,
+        "effects": tier.effects,
+        "atlas_hash": tier.atlas_hash,
+        "pressure_max_pa": tier.pressure_max_pa,
+        "sed_max_j_per_m3": tier.sed_max_j_per_m3,
+        "relative_l2_median": tier.relative_l2_median,
+        "predicted_latency_us": catalogue.predicted_latency_us(index),
+        "calibrated_us": tier.speed.calibrated_us(),
+        "sessions": tier.sessions.load(Ordering::Relaxed),
+    })
 }
 
 pub(super) async fn models(State(app): Shared) -> Response {

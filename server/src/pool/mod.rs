@@ -56,7 +56,7 @@ impl Pool {
             let (queue, report) = (Arc::clone(&queue), report.clone());
             let thread = thread::Builder::new()
                 .name(format!("infer-{number}"))
-                .spawn(move || match Worker::prepare(&catalogue, metrics, number == 0) {
+                .spawn(move || match Worker::prepare(&catalogue, metrics) {
                     Ok(mut worker) => {
                         let _ = report.send(Ok(()));
                         // The starter counts reports until all senders are gone.

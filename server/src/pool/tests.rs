@@ -1,8 +1,11 @@
 //! The pool with models that stop and go as the tests tell them.
 
+mod gated;
+
 use std::{
     sync::{
         Arc, Mutex,
+        atomic::AtomicUsize,
         mpsc::{Receiver, SyncSender, sync_channel},
     },
     thread::sleep,
@@ -10,7 +13,7 @@ use std::{
 };
 
 use bytes::Bytes;
-use papilla_engine::{EngineError, Model, ModelInfo, Session};
+use papilla_engine::{ModelInfo, ladder::Kind};
 use papilla_proto::{
     ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType,
     atlas::{Atlas, Patch, PatchVertices, Raster},
@@ -18,63 +21,15 @@ use papilla_proto::{
 use serde_json::json;
 use tokio::sync::mpsc;
 
+use self::gated::{Act, Gate, Gated};
 use super::{Done, Entrance, Job, Outcome, Pool, Slot, Stage};
 use crate::{
     codec::{Input, Output},
     metrics::Metrics,
-    models::{Catalogue, Speed, Tier},
+    models::{Catalogue, Tier},
     replay::Replay,
+    speed::{Overhead, Speed},
 };
-
-/// A model whose every inference, after those of the warm-up, waits for a go. What it is
-/// told to do, it does: that makes the order of events in these tests certain, which no real
-/// network could.
-struct Gated {
-    info: ModelInfo,
-    gate: Arc<Gate>,
-}
-
-struct Gate {
-    /// Announces that an inference has begun.
-    begun: SyncSender<()>,
-    /// What the inference is to do.
-    go: Mutex<Receiver<Act>>,
-}
-
-enum Act {
-    Finish,
-    Panic,
-}
-
-struct GatedSession {
-    gate: Arc<Gate>,
-    warm: usize,
-}
-
-impl Model for Gated {
-    fn info(&self) -> &ModelInfo {
-        &self.info
-    }
-
-    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
-        Ok(Box::new(GatedSession { gate: Arc::clone(&self.gate), warm: 0 }))
-    }
-}
-
-impl Session for GatedSession {
-    fn infer(&mut self, pressure: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
-        self.warm += 1;
-        sed.copy_from_slice(pressure);
-        if self.warm <= 4 {
-            return Ok(());
-        }
-        self.gate.begun.send(()).unwrap();
-        match self.gate.go.lock().unwrap().recv_timeout(Duration::from_secs(30)).unwrap() {
-            Act::Finish => Ok(()),
-            Act::Panic => panic!("as told"),
-        }
-    }
-}
 
 /// A pool of one thread and the handles of its gate.
 struct Bench {
@@ -112,8 +67,10 @@ fn bench() -> Bench {
         atlas_hash: String::new(),
         pressure_max_pa: 100.0,
         sed_max_j_per_m3: 100.0,
+        kind: Kind::Network,
         relative_l2_median: 0.1,
         speed: Speed::default(),
+        sessions: AtomicUsize::new(0),
     };
     let patch = PatchVertices {
         positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
@@ -128,6 +85,9 @@ fn bench() -> Bench {
         interface: Raster::new(&atlas, Patch::Interface),
         atlas,
         replay: Replay::default(),
+        ladder: None,
+        judged_on: None,
+        overhead: Overhead::default(),
     });
     let metrics = Metrics::new(["gated"].into_iter());
     let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();
@@ -226,7 +186,7 @@ fn a_panic_costs_one_frame_and_nothing_else() {
         Outcome::Failed(problem) => assert_eq!(problem.code, ErrorCode::Internal),
         other => panic!("{other:?}"),
     }
-    // The fresh session that takes its place has four free runs, as after a warm-up.
+    // The fresh session that takes its place has a free run, as for a warm-up.
     bench.entrance.submit(&slot, job(2, 2.0, None)).unwrap();
     match wait(&mut answers).outcome {
         Outcome::Map { bytes, .. } => {

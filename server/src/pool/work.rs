@@ -7,7 +7,7 @@ use std::{
 };
 
 use papilla_engine::Session;
-use papilla_proto::{ErrorCode, HEADER_LEN, MAP_LEN, MAP_SIDE_PX, Problem, check_pressure};
+use papilla_proto::{ErrorCode, HEADER_LEN, MAP_LEN, Problem, check_pressure};
 
 use super::{
     Done, Job, LOOK_AROUND, Outcome, Stage, Times,
@@ -20,10 +20,8 @@ use crate::{
     metrics::Metrics,
     models::Catalogue,
     problem,
+    speed::round_press,
 };
-
-/// Timed runs of each tier at the start, after one that warms it; one thread's are enough.
-const WARM_UP_RUNS: usize = 3;
 
 /// Everything a thread owns; nothing is allocated after `prepare`.
 pub(super) struct Worker {
@@ -36,11 +34,10 @@ pub(super) struct Worker {
 }
 
 impl Worker {
-    /// Makes and warms a session of every tier; if `timed`, learns how long each takes.
+    /// Makes and warms a session of every tier.
     pub(super) fn prepare(
         catalogue: &Arc<Catalogue>,
         metrics: Arc<Metrics>,
-        timed: bool,
     ) -> Result<Self, StartError> {
         let mut worker = Self {
             sessions: Vec::with_capacity(catalogue.tiers.len()),
@@ -52,28 +49,15 @@ impl Worker {
         for (index, tier) in catalogue.tiers.iter().enumerate() {
             let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
             worker.sessions.push(tier.model.session().map_err(failed)?);
-            worker.warm_up(index, timed).map_err(failed)?;
+            worker.warm_up(index).map_err(failed)?;
         }
         Ok(worker)
     }
 
-    /// Runs the tier on a round press.
-    fn warm_up(&mut self, index: usize, timed: bool) -> Result<(), papilla_engine::EngineError> {
-        let tier = &self.catalogue.tiers[index];
-        let half = MAP_SIDE_PX as f32 / 2.0;
-        for (i, pressure_pa) in self.pressure_pa.iter_mut().enumerate() {
-            let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
-            let squared = ((row - half).powi(2) + (column - half).powi(2)) / (0.4 * half).powi(2);
-            *pressure_pa = 0.5 * tier.pressure_max_pa * (1.0 - squared).max(0.0);
-        }
-        for run in 0..=if timed { WARM_UP_RUNS } else { 0 } {
-            let start = Instant::now();
-            self.sessions[index].infer(&self.pressure_pa, &mut self.sed_j_per_m3)?;
-            if run > 0 {
-                tier.speed.warm(start.elapsed());
-            }
-        }
-        Ok(())
+    /// Runs the tier on a round press: it touches the memory that frames will use.
+    fn warm_up(&mut self, index: usize) -> Result<(), papilla_engine::EngineError> {
+        round_press(self.catalogue.tiers[index].pressure_max_pa, &mut self.pressure_pa);
+        self.sessions[index].infer(&self.pressure_pa, &mut self.sed_j_per_m3)
     }
 
     /// Serves the queue until it is closed and empty.

@@ -8,11 +8,14 @@ use std::{
 use axum::extract::ws::Message;
 use bytes::{Bytes, BytesMut};
 use papilla_proto::{
-    ErrorCode, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_SIDE_PX, Problem,
+    ErrorCode, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_SIDE_PX, Problem, ServerMessage,
 };
 use tokio::sync::mpsc;
 
-use super::{End, Event, Line, drained, hello::Terms};
+use super::{
+    End, Event, Line, drained,
+    hello::{self, Terms},
+};
 use crate::{
     codec::{Input, Output},
     metrics::Transport,
@@ -22,6 +25,7 @@ use crate::{
 
 /// An open session.
 pub(super) struct Session {
+    pub(super) number: u64,
     pub(super) terms: Terms,
     pub(super) slot: Arc<Slot>,
     pub(super) answers: mpsc::Receiver<Done>,
@@ -48,10 +52,7 @@ pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
             Ok(Event::Message(Message::Binary(frame), received)) => {
                 session.take(line, frame, received, draining).await
             }
-            Ok(Event::Message(Message::Text(_), _)) => {
-                let message = "binary frames are due once the session is ready";
-                line.complain(Problem::new(ErrorCode::UnexpectedText, message), None).await
-            }
+            Ok(Event::Message(Message::Text(text), _)) => session.renew(line, &text).await,
             Ok(Event::Message(..)) => Ok(()),
         };
         if let Err(end) = result {
@@ -61,6 +62,17 @@ pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
 }
 
 impl Session {
+    /// Takes a hello for new terms, such as another tier.
+    async fn renew(&mut self, line: &mut Line, text: &str) -> Result<(), End> {
+        match hello::renew(&line.app, text, self.number) {
+            Ok((terms, ready)) => {
+                self.terms = terms;
+                line.say(&ServerMessage::Ready(ready)).await
+            }
+            Err(problem) => line.complain(problem, None).await,
+        }
+    }
+
     /// Takes one frame: into the slot, or back with an error.
     async fn take(
         &mut self,

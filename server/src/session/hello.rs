@@ -1,4 +1,6 @@
-//! The start of a session: hello and ready.
+//! The terms of a session: hello and ready, at its start and whenever the client asks anew.
+
+use std::sync::{Arc, atomic::Ordering};
 
 use axum::extract::ws::Message;
 use papilla_proto::{
@@ -11,13 +13,13 @@ use super::{End, Event, Line, close, drained};
 use crate::{
     app::App,
     codec::{Output, scale_of},
+    models::Catalogue,
 };
 
 /// Refused hellos after which the session ends.
 const ATTEMPTS: usize = 8;
 
 /// What hello and ready agreed on.
-#[derive(Debug)]
 pub(super) struct Terms {
     /// Index of the tier in the catalogue.
     pub(super) tier: usize,
@@ -27,6 +29,7 @@ pub(super) struct Terms {
     pub(super) sample_type: SampleType,
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
+    _seat: Seat,
 }
 
 /// Waits for a hello that can be met, and answers ready.
@@ -79,6 +82,39 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
     }
 }
 
+/// New terms for an open session; frames that the server has accepted keep the old ones.
+///
+/// # Errors
+/// The text is no hello, or one that cannot be met; the old terms stand.
+pub(super) fn renew(app: &App, text: &str, number: u64) -> Result<(Terms, Ready), Problem> {
+    let Ok(ClientMessage::Hello(hello)) = serde_json::from_str(text) else {
+        let message = "binary frames are due once the session is ready, or a hello for new terms";
+        return Err(Problem::new(ErrorCode::UnexpectedText, message));
+    };
+    let terms = meet(app, &hello)?;
+    let ready = ready(app, number, &terms);
+    Ok((terms, ready))
+}
+
+/// A place in the count of a tier's sessions; given back when it is dropped.
+struct Seat {
+    catalogue: Arc<Catalogue>,
+    tier: usize,
+}
+
+impl Seat {
+    fn take(app: &App, tier: usize) -> Self {
+        app.catalogue.tiers[tier].sessions.fetch_add(1, Ordering::Relaxed);
+        Self { catalogue: Arc::clone(&app.catalogue), tier }
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        self.catalogue.tiers[self.tier].sessions.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
 /// Whether and how the hello can be met.
 fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
     if hello.version != u32::from(PROTOCOL_VERSION) {
@@ -111,19 +147,22 @@ fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         budget_us,
         sample_type: hello.sample_type,
         pressure_scale_pa: hello.pressure_scale_pa,
+        _seat: Seat::take(app, index),
     })
 }
 
 fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     let tier = &app.catalogue.tiers[terms.tier];
+    let meets_budget = app.catalogue.meets(terms.tier, terms.budget_us);
     Ready {
         version: u32::from(PROTOCOL_VERSION),
         session: number,
         tier: tier.name.clone(),
         effects: tier.effects.clone(),
         atlas_hash: tier.atlas_hash.clone(),
-        predicted_latency_us: tier.predicted_latency_us(),
+        predicted_latency_us: app.catalogue.predicted_latency_us(terms.tier),
         budget_us: terms.budget_us,
+        meets_budget,
         width: MAP_SIDE_PX as u32,
         height: MAP_SIDE_PX as u32,
         sample_type: terms.sample_type,

@@ -92,6 +92,7 @@ async fn converse(line: &mut Line, number: u64) -> End {
     };
     let (slot, answers) = Slot::new();
     let session = frames::Session {
+        number,
         terms,
         slot: Arc::new(slot),
         answers,

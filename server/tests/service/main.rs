@@ -7,6 +7,7 @@ mod binary;
 mod drain;
 mod hostile;
 mod information;
+mod ladder;
 mod page;
 mod rendering;
 mod session;

@@ -63,12 +63,51 @@ async fn ready_says_what_was_agreed() {
     assert_eq!((&ready["width"], &ready["height"]), (&json!(224), &json!(224)));
     assert_eq!(ready["atlas_hash"], hash);
     assert_eq!(ready["budget_us"], 60_000_000);
+    assert_eq!(ready["meets_budget"], true);
     assert!(ready["predicted_latency_us"].as_u64().unwrap() > 1000);
     assert!(ready["session"].as_u64().unwrap() > 0);
-    for (budget_us, tier) in [(Value::Null, "quick"), (json!(0), "quick"), (json!(1), "quick")] {
+    // No tier can meet 1 us: the fastest is taken, and said to miss it.
+    for (budget_us, meets) in
+        [(Value::Null, Value::Null), (json!(0), Value::Null), (json!(1), json!(false))]
+    {
         let mut socket = service.socket().await;
         let ready = socket.open(hello(&json!({"budget_us": budget_us}))).await;
-        assert_eq!(ready["tier"], tier, "{budget_us}");
+        assert_eq!(ready["tier"], "quick", "{budget_us}");
+        assert_eq!(ready["meets_budget"], meets, "{budget_us}");
+    }
+    // A tier by name is taken at its word, with the same warning.
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello(&json!({"tier": "slow", "budget_us": 1}))).await;
+    assert_eq!((&ready["tier"], &ready["meets_budget"]), (&json!("slow"), &json!(false)));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_can_change_its_terms() {
+    let service = Service::start().await;
+    let sessions = async || {
+        let tiers = service.json("/v1/tiers").await;
+        [0, 1].map(|tier: usize| tiers["tiers"][tier]["sessions"].as_u64().unwrap())
+    };
+    let mut socket = service.socket().await;
+    let first = socket.open(hello(&json!({"tier": "quick"}))).await;
+    assert_eq!(sessions().await, [1, 0]);
+    let second = socket.open(hello(&json!({"tier": "slow", "sample_type": "u16"}))).await;
+    assert_eq!((&second["tier"], &second["session"]), (&json!("slow"), &first["session"]));
+    assert_eq!(sessions().await, [0, 1]);
+    let scale = PRESSURE_MAX_PA / 65_535.0;
+    socket.send(frame(1, 0, SampleType::U16, scale, &ramp())).await;
+    assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Ok);
+    let done = r#"papilla_stage_seconds_count{tier="slow",stage="infer"}"#;
+    assert_eq!(service.metric(done).await as u64, 1);
+    // What cannot be met changes nothing.
+    socket.send(hello(&json!({"tier": "nobody"})).to_string()).await;
+    socket.hear_refusal("unknown_tier").await;
+    socket.send(frame(2, 0, SampleType::U16, scale, &ramp())).await;
+    assert_eq!(socket.hear_frame().await.0.sequence, 2);
+    assert_eq!(sessions().await, [0, 1]);
+    drop(socket);
+    while sessions().await != [0, 0] {
+        tokio::time::sleep(std::time::Duration::from_millis(5)).await;
     }
 }
 
@@ -153,7 +192,7 @@ async fn a_session_survives_wrong_frames_and_says_so() {
     ] {
         assert_survives(&mut socket, bad, code, sequence).await;
     }
-    socket.send(hello(&json!({})).to_string()).await;
+    socket.send(r#"{"type":"helo"}"#).await;
     socket.hear_refusal("unexpected_text").await;
     socket.send(frame(6, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_eq!(socket.hear_frame().await.0.sequence, 6);

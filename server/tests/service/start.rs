@@ -10,6 +10,7 @@ async fn start(folder: &Path, change: impl FnOnce(&mut Config)) -> Result<(), St
     let mut config = Config {
         models: Some(folder.to_owned()),
         threads: std::num::NonZeroUsize::new(1),
+        calibration_ms: 0,
         ..Config::default()
     };
     change(&mut config);

@@ -10,7 +10,7 @@ use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, PatchVertices},
 };
-use papilla_server::{Config, Server};
+use papilla_server::{Config, Server, StartError};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
@@ -43,15 +43,24 @@ impl Service {
 
     /// The same, with changes to the configuration.
     pub(crate) async fn start_with(change: impl FnOnce(&mut Config)) -> Self {
-        let models = model_folder();
+        Self::on(model_folder(), change).await.unwrap()
+    }
+
+    /// The same, on these models.
+    pub(crate) async fn on(
+        models: TempDir,
+        change: impl FnOnce(&mut Config),
+    ) -> Result<Self, StartError> {
         let mut config = Config {
             models: Some(models.path().to_owned()),
             threads: std::num::NonZeroUsize::new(1),
+            // Two runs of each tier: enough to tell quick from slow.
+            calibration_ms: 1,
             ..Config::default()
         };
         change(&mut config);
-        let server = papilla_server::start(&config).await.unwrap();
-        Self { address: server.address(), server, _models: models }
+        let server = papilla_server::start(&config).await?;
+        Ok(Self { address: server.address(), server, _models: models })
     }
 
     pub(crate) fn get(&self, path: &str) -> Request {

@@ -1,0 +1,272 @@
+//! The ladder: every way of getting a SED map, with its error and its time.
+//!
+//! `model-export ladder` measures it and writes `models/ladder.json`; the server embeds that
+//! file, publishes it, and chooses rungs by it.
+
+use crate::card::{Metrics, Similarity, Spread};
+use crate::{EngineError, MODEL_FORMAT};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Names of the held-out sets, in the order in which errors are looked up for a choice.
+pub const SET_NAMES: [&str; 5] = ["heldout-presses", "heldout-shapes", "reference", "s1", "deep"];
+
+/// All rungs, measured on the same sets.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ladder {
+    /// Version of this layout.
+    pub format: u32,
+    /// Hash of the atlas of all maps.
+    pub atlas_hash: String,
+    /// Processor and system that the times were taken on.
+    pub machine: String,
+    /// Whether only a part of each set was measured.
+    #[serde(default)]
+    pub quick: bool,
+    /// The sets, measured or not.
+    pub sets: Vec<Set>,
+    /// The set whose median relative L2 decides [`Rung::pareto`]; absent if none was measured.
+    #[serde(default)]
+    pub pareto_set: Option<String>,
+    /// Relative L2 by which the reference itself may be off; absent without a reference.
+    #[serde(default)]
+    pub discretisation_error: Option<Discretisation>,
+    /// The rungs.
+    pub rungs: Vec<Rung>,
+    /// What was asked of the ladder, and whether it is met.
+    #[serde(default)]
+    pub bars: Vec<Bar>,
+}
+
+/// One held-out set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Set {
+    /// One of [`SET_NAMES`].
+    pub name: String,
+    /// Samples measured; 0 if the set was not there.
+    pub samples: usize,
+    /// What it holds, or why it was not measured.
+    #[serde(default)]
+    pub about: String,
+    /// SHA-256 of the dataset; absent for the reference, and if the set was not there.
+    #[serde(default)]
+    pub dataset_sha256: Option<String>,
+}
+
+/// How far the reference itself may be off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Discretisation {
+    /// Relative L2 of SED.
+    pub sed_relative_l2: f64,
+    /// How it was estimated.
+    pub how: String,
+}
+
+/// What a rung is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A half-space in place of the finger.
+    ClosedForm,
+    /// This finger's operator at small strain.
+    Operator,
+    /// A trained network.
+    Network,
+    /// The published network that is the baseline.
+    S1Network,
+    /// The finite-element solver itself.
+    Fe,
+}
+
+impl Kind {
+    /// The kind of a model, from the `kind` in its `papilla.network`.
+    #[must_use]
+    pub fn of_network(network: &serde_json::Value) -> Self {
+        match network.get("kind").and_then(serde_json::Value::as_str) {
+            Some("half_space") => Self::ClosedForm,
+            Some("fe_operator") => Self::Operator,
+            Some("s1_unet") => Self::S1Network,
+            _ => Self::Network,
+        }
+    }
+}
+
+/// One way of getting a SED map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rung {
+    /// Its name.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+    /// Name of the model that serves it; none for FE.
+    pub model: Option<String>,
+    /// SHA-256 of the model measured.
+    #[serde(default)]
+    pub onnx_sha256: Option<String>,
+    /// Length of the model file.
+    pub bytes: Option<u64>,
+    /// Time from the file's bytes to the first answer, ms.
+    pub load_ms: Option<f64>,
+    /// Growth of resident memory while it was loaded and answered one map, at its peak, MiB.
+    pub memory_mib: Option<f64>,
+    /// Time of one inference on one thread, by engine.
+    pub latency_ms: Option<LatencyByEngine>,
+    /// Processor seconds of one FE state.
+    #[serde(default)]
+    pub seconds: Option<Percentiles>,
+    /// Unknowns of the FE mesh.
+    #[serde(default)]
+    pub unknowns: Option<u64>,
+    /// Whether its SED is the truth of the set `reference`.
+    #[serde(default)]
+    pub reference: bool,
+    /// Errors by the name of the set.
+    pub errors: BTreeMap<String, SetErrors>,
+    /// Answers that were no energy density (NaN, infinite, negative) and were refused.
+    #[serde(default)]
+    pub refused: usize,
+    /// Greatest answer to a map of zeros over the greatest SED of its training data.
+    #[serde(default)]
+    pub zero_answer: Option<f64>,
+    /// Whether no other rung is both faster and more accurate on [`Ladder::pareto_set`].
+    pub pareto: bool,
+}
+
+impl Rung {
+    /// Time of one map, ms: an inference in tract, or one FE state.
+    #[must_use]
+    pub fn time_ms(&self) -> Option<f64> {
+        let tract = self.latency_ms.as_ref().map(|latency| latency.tract.p50);
+        tract.or(self.seconds.map(|seconds| 1e3 * seconds.p50))
+    }
+
+    /// Median relative L2 on a set.
+    #[must_use]
+    pub fn relative_l2(&self, set: &str) -> Option<f64> {
+        self.errors.get(set).map(|errors| errors.relative_l2.median)
+    }
+}
+
+/// Time of one inference by engine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LatencyByEngine {
+    /// In tract.
+    pub tract: Percentiles,
+    /// In ONNX Runtime; absent if it was not at hand.
+    pub ort: Option<Percentiles>,
+}
+
+/// Median and 99th percentile of a time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+/// Errors on one set; as in a card, with those that only the ladder measures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetErrors {
+    /// Samples measured.
+    pub samples: usize,
+    /// See [`Metrics::relative_l2`].
+    pub relative_l2: Spread,
+    /// See [`Metrics::far_field_relative_l2`].
+    pub far_field_relative_l2: Option<Spread>,
+    /// See [`Metrics::peak_error`].
+    pub peak_error: Spread,
+    /// See [`Metrics::peak_distance_mm`].
+    pub peak_distance_mm: Option<Spread>,
+    /// See [`Metrics::nail_base_error`].
+    pub nail_base_error: Option<Spread>,
+    /// See [`Metrics::total_energy_error`].
+    pub total_energy_error: Spread,
+    /// See [`Metrics::ssim`].
+    pub ssim: Similarity,
+}
+
+impl From<Metrics> for SetErrors {
+    fn from(metrics: Metrics) -> Self {
+        Self {
+            samples: metrics.samples,
+            relative_l2: metrics.relative_l2,
+            far_field_relative_l2: metrics.far_field_relative_l2,
+            peak_error: metrics.peak_error,
+            peak_distance_mm: metrics.peak_distance_mm,
+            nail_base_error: metrics.nail_base_error,
+            total_energy_error: metrics.total_energy_error,
+            ssim: metrics.ssim,
+        }
+    }
+}
+
+/// What was asked of the ladder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bar {
+    /// What was asked.
+    pub bar: String,
+    /// What was measured.
+    pub measured: String,
+    /// Whether it is met; what was not measured is not met.
+    pub met: bool,
+}
+
+impl Ladder {
+    /// Reads a ladder.
+    ///
+    /// # Errors
+    /// [`EngineError::BadCard`] if it is not JSON of this shape,
+    /// [`EngineError::UnsupportedFormat`] if its format is another.
+    pub fn from_json(text: &str) -> Result<Self, EngineError> {
+        let ladder: Self = serde_json::from_str(text)
+            .map_err(|error| EngineError::BadCard { reason: format!("ladder: {error}") })?;
+        if ladder.format == MODEL_FORMAT {
+            return Ok(ladder);
+        }
+        Err(EngineError::UnsupportedFormat { file: "the ladder", found: ladder.format })
+    }
+
+    /// Text of a ladder, indented, with a final newline.
+    ///
+    /// # Errors
+    /// [`EngineError::BadCard`] if the serialiser fails (out of memory apart, it does not).
+    pub fn to_json(&self) -> Result<String, EngineError> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
+        Ok(text + "\n")
+    }
+
+    /// The rung that a model serves.
+    #[must_use]
+    pub fn rung_of(&self, model: &str) -> Option<&Rung> {
+        self.rungs.iter().find(|rung| rung.model.as_deref() == Some(model))
+    }
+
+    /// Marks the Pareto front over [`Rung::time_ms`] and the median relative L2 on
+    /// `pareto_set`. The reference has no error there, so it always is on it.
+    pub fn mark_front(&mut self) {
+        let Some(set) = self.pareto_set.clone() else { return };
+        let points: Vec<Option<(f64, f64)>> = self
+            .rungs
+            .iter()
+            .map(|rung| Some((rung.time_ms()?, rung.relative_l2(&set)?)))
+            .collect();
+        for (rung, on_front) in self.rungs.iter_mut().zip(front(&points)) {
+            rung.pareto = on_front;
+        }
+    }
+}
+
+/// Which points (time, error) no other point beats in one and equals at least in the other.
+#[must_use]
+pub fn front(points: &[Option<(f64, f64)>]) -> Vec<bool> {
+    let beats = |(time, error): (f64, f64), (t, e): (f64, f64)| {
+        t <= time && e <= error && (t < time || e < error)
+    };
+    let stands = |point| !points.iter().flatten().any(|other| beats(point, *other));
+    points.iter().map(|point| point.is_some_and(stands)).collect()
+}
+
+#[cfg(test)]
+mod tests;

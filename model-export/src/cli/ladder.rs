@@ -1,0 +1,144 @@
+//! `model-export ladder`, and the hidden command that weighs one model in a fresh process.
+
+use super::print_json;
+use indicatif::{ProgressBar, ProgressStyle};
+use model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
+use model_export::{ExportError, read, read_text, write};
+use papilla_engine::{Ladder, MAP_LEN};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Folder of the datasets `broad`, `heldout`, `deep` and `s1`; those that are not there
+    /// are reported as not measured.
+    #[arg(long, default_value = "data", value_name = "FOLDER")]
+    data: PathBuf,
+    /// Folder of the models, with index.json and atlas.json.
+    #[arg(long, default_value = "models", value_name = "FOLDER")]
+    models: PathBuf,
+    /// Folders that `fe-datagen rungs` wrote: the reference and the solver's own rungs.
+    #[arg(long, num_args = 1.., value_name = "FOLDER")]
+    fe: Vec<PathBuf>,
+    /// Writes STEM.md, STEM.svg, STEM-zone.svg and STEM.json.
+    #[arg(long, default_value = "docs/accuracy-vs-time", value_name = "STEM")]
+    out: PathBuf,
+    /// 16 samples of each set and short timings; does not touch MODELS/ladder.json.
+    #[arg(long)]
+    quick: bool,
+    /// Draw page and pictures anew from these figures (STEM.json or ladder.json); measures
+    /// nothing.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "fe"])]
+    from: Option<PathBuf>,
+}
+
+pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let task = Task {
+        data: options.data.clone(),
+        models: options.models.clone(),
+        fe: options.fe.clone(),
+        quick: options.quick,
+    };
+    let ladder = match &options.from {
+        Some(path) => {
+            let refused = |source| ExportError::Engine { path: path.clone(), source };
+            Ladder::from_json(&read_text(path)?).map_err(refused)?
+        }
+        None => {
+            let bar = Bar::new(json)?;
+            let ladder = ladder::measure(&task, &bar, &footprint)?;
+            bar.0.finish_and_clear();
+            ladder
+        }
+    };
+    let written = write_all(options, &ladder)?;
+    if json {
+        return print_json(&ladder);
+    }
+    for bar in &ladder.bars {
+        println!("{:<7} {}: {}", if bar.met { "met" } else { "missed" }, bar.bar, bar.measured);
+    }
+    for path in written {
+        println!("wrote {}", path.display());
+    }
+    Ok(())
+}
+
+fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>> {
+    let stem = options.out.file_name().and_then(|name| name.to_str()).unwrap_or("ladder");
+    let beside = |ending: &str| options.out.with_file_name(format!("{stem}{ending}"));
+    let chart = |what| move |reason| ExportError::Chart { what, reason };
+    let canvas = Canvas::read(&options.models)?;
+    let json = ladder.to_json()?;
+    let mut files = vec![
+        (beside(".md"), report::markdown(ladder, stem)),
+        (beside(".svg"), plot::error_against_time(ladder).map_err(chart("error against time"))?),
+        (beside("-zone.svg"), plot::nail_base_zone(&canvas.ground).map_err(chart("the zone"))?),
+        (beside(".json"), json.clone()),
+    ];
+    if !ladder.quick {
+        files.push((options.models.join("ladder.json"), json));
+    }
+    for (path, text) in &files {
+        write(path, text.as_bytes())?;
+    }
+    Ok(files.into_iter().map(|(path, _)| path).collect())
+}
+
+/// Drawn on stderr, and only where that is a terminal.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new(hidden: bool) -> anyhow::Result<Self> {
+        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
+        bar.set_style(ProgressStyle::with_template(
+            "{bar:32} {pos}/{len} samples, {eta} left, {msg}",
+        )?);
+        Ok(Self(bar))
+    }
+}
+
+impl Progress for Bar {
+    fn total(&self, steps: u64) {
+        self.0.set_length(steps);
+    }
+
+    fn stage(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
+
+    fn step(&self) {
+        self.0.inc(1);
+    }
+}
+
+/// Weighs a model in a process of its own; none if that fails, which costs two figures only.
+fn footprint(model: &Path) -> Option<Footprint> {
+    let program = std::env::current_exe().ok()?;
+    let output = Command::new(program).arg("footprint").arg(model).output().ok()?;
+    serde_json::from_slice(&output.stdout).ok()
+}
+
+/// Loads the model, answers one map and prints what that took.
+pub(crate) fn weigh(model: &Path) -> anyhow::Result<()> {
+    let onnx = read(model)?;
+    let mut sed_j_per_m3 = vec![1.0; MAP_LEN];
+    let pressure_pa = vec![1.0; MAP_LEN];
+    let before_kib = status_kib("VmRSS:");
+    let start = Instant::now();
+    let refused = |source| ExportError::Engine { path: model.to_owned(), source };
+    let loaded = papilla_engine::load(&onnx, None).map_err(refused)?;
+    let mut session = loaded.session().map_err(refused)?;
+    session.infer(&pressure_pa, &mut sed_j_per_m3).map_err(refused)?;
+    let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    let growth = status_kib("VmHWM:").zip(before_kib).map(|(peak, before)| peak - before);
+    print_json(&Footprint { load_ms, memory_mib: growth.map(|kib| kib / 1024.0) })
+}
+
+/// A line of `/proc/self/status`, KiB; none on other systems.
+fn status_kib(key: &str) -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(key))?;
+    line.trim().trim_end_matches("kB").trim().parse().ok()
+}

@@ -1,0 +1,182 @@
+//! The ladder: every way of getting a SED map, measured on the same held-out sets.
+//!
+//! Servable rungs are the models of `models/index.json`, run in the serving engine on one
+//! thread; FE rungs come from folders that `fe-datagen rungs` wrote. What is not there is
+//! reported as not measured. The outcome is a [`Ladder`], from which [`report`] makes the
+//! table and [`plot`] the pictures.
+
+mod bars;
+pub mod fe;
+mod model;
+pub mod plot;
+pub mod report;
+mod sets;
+
+use crate::metrics::Ground;
+use crate::{ExportError, read_text};
+use papilla_engine::MODEL_FORMAT;
+use papilla_engine::card::Index;
+use papilla_engine::ladder::{Ladder, SET_NAMES};
+use papilla_proto::atlas::{Atlas, Patch, Raster};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+pub use model::Footprint;
+pub use sets::{DEEP_MM, SampleSet, State};
+
+/// Samples of each set that `--quick` takes, evenly spread.
+pub const QUICK_SAMPLES: usize = 16;
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// Folder that holds the datasets `broad`, `heldout`, `deep` and `s1`.
+    pub data: PathBuf,
+    /// Folder of the models, their index and atlas.
+    pub models: PathBuf,
+    /// Folders that `fe-datagen rungs` wrote.
+    pub fe: Vec<PathBuf>,
+    /// Whether to take a part of each set and shorter timings.
+    pub quick: bool,
+}
+
+/// What is drawn and where it is judged.
+pub struct Canvas {
+    /// Hash of the atlas.
+    pub atlas_hash: String,
+    /// Number of vertices of the atlas.
+    pub vertex_count: usize,
+    /// Draws pressure.
+    pub skin: Raster,
+    /// Draws SED.
+    pub interface: Raster,
+    /// Where errors are taken.
+    pub ground: Ground,
+}
+
+impl Canvas {
+    /// Reads the atlas of a folder of models.
+    ///
+    /// # Errors
+    /// [`ExportError::Io`], [`ExportError::Atlas`].
+    pub fn read(models: &Path) -> Result<Self, ExportError> {
+        let path = models.join("atlas.json");
+        let atlas = Atlas::from_json(&read_text(&path)?)
+            .map_err(|source| ExportError::Atlas { path, source })?;
+        let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
+        let ground = Ground::new(&atlas, &interface);
+        Ok(Self {
+            atlas_hash: atlas.hash().to_owned(),
+            vertex_count: atlas.vertex_count(),
+            skin,
+            interface,
+            ground,
+        })
+    }
+}
+
+/// How long the clock runs for each model and engine.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Timing {
+    rounds: usize,
+    round: Duration,
+    runs_min: usize,
+}
+
+impl Timing {
+    fn of(quick: bool) -> Self {
+        if quick {
+            Self { rounds: 3, round: Duration::from_millis(200), runs_min: 2 }
+        } else {
+            Self { rounds: 5, round: Duration::from_millis(600), runs_min: 5 }
+        }
+    }
+}
+
+/// Hears how far the measurement is.
+pub trait Progress {
+    /// There will be this many steps.
+    fn total(&self, steps: u64);
+    /// What is under way.
+    fn stage(&self, what: &str);
+    /// One step is done.
+    fn step(&self);
+}
+
+/// Measures the ladder.
+///
+/// `footprint` measures load time and memory of one model file, in a process of its own so
+/// that nothing else is counted; none where that cannot be had.
+///
+/// # Errors
+/// What models, datasets or FE folders have wrong. A dataset that is not there is no error.
+pub fn measure(
+    task: &Task,
+    progress: &dyn Progress,
+    footprint: &dyn Fn(&Path) -> Option<Footprint>,
+) -> Result<Ladder, ExportError> {
+    let canvas = Canvas::read(&task.models)?;
+    let fe = fe::Folders::read(&task.fe, &canvas)?;
+    let mut sets = sets::load(&task.data, &canvas)?;
+    sets.push(fe.reference_set());
+    sets.sort_by_key(|set| SET_NAMES.iter().position(|name| *name == set.name));
+    if task.quick {
+        for set in &mut sets {
+            set.thin(QUICK_SAMPLES);
+        }
+    }
+    let index_path = task.models.join("index.json");
+    let index = Index::from_json(&read_text(&index_path)?)
+        .map_err(|source| ExportError::Engine { path: index_path, source })?;
+    let samples: usize = sets.iter().map(|set| set.states.len()).sum();
+    progress.total((index.models.len() * samples) as u64);
+    let mut models = Vec::with_capacity(index.models.len());
+    for name in &index.models {
+        progress.stage(name);
+        let path = task.models.join(format!("{name}.onnx"));
+        models.push(model::measure(
+            &path,
+            &canvas,
+            &sets,
+            Timing::of(task.quick),
+            progress,
+            footprint,
+        )?);
+    }
+    progress.stage("finite elements");
+    let mut ladder = Ladder {
+        format: MODEL_FORMAT,
+        atlas_hash: canvas.atlas_hash.clone(),
+        machine: machine(),
+        quick: task.quick,
+        sets: sets.iter().map(SampleSet::described).collect(),
+        pareto_set: None,
+        discretisation_error: fe.discretisation_error(),
+        rungs: models.iter().map(|model| model.rung.clone()).collect(),
+        bars: Vec::new(),
+    };
+    ladder.rungs.extend(fe.rungs(&canvas)?);
+    // FE can only be held against the reference, so the reference comes first here.
+    let order = ["reference", "heldout-presses", "heldout-shapes", "s1", "deep"];
+    let measured =
+        |name: &&str| ladder.sets.iter().any(|set| set.name == **name && set.samples > 0);
+    ladder.pareto_set = order.iter().find(|name| measured(name)).map(|name| (*name).to_owned());
+    ladder.mark_front();
+    ladder.bars = bars::judge(&ladder, &models, &task.models)?;
+    Ok(ladder)
+}
+
+/// Processor and system, for a reader who compares times.
+fn machine() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let processor = info
+        .lines()
+        .find_map(|line| line.strip_prefix("model name")?.split_once(':'))
+        .map_or("unknown processor", |(_, name)| name.trim());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    format!(
+        "{processor}, {cores} cores, {} {}; one thread",
+        std::env::consts::OS,
+        std::env::consts::ARCH
+    )
+}

@@ -1,0 +1,187 @@
+//! The ladder as Markdown.
+
+use crate::metrics::NAIL_BASE_MM;
+use papilla_engine::card::Spread;
+use papilla_engine::ladder::{Kind, Ladder, Percentiles, Rung, SetErrors};
+use std::fmt::Write;
+
+/// What is written by hand: what is measured and how.
+const HEAD: &str = include_str!("head.md");
+
+/// The page. `stem` is the name of the pictures without `.svg` and `-zone.svg`.
+#[must_use]
+pub fn markdown(ladder: &Ladder, stem: &str) -> String {
+    let mut text = HEAD.to_owned();
+    let quick = if ladder.quick { " A reduced set (`--quick`): figures are rough." } else { "" };
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "\nMeasured on {}.{quick}\n\n![Error against time]({stem}.svg)\n",
+        ladder.machine
+    );
+    if let Some(floor) = &ladder.discretisation_error {
+        let _ = writeln!(
+            text,
+            "The reference itself is good to {} of relative L2 ({}); no comparison means anything below that.\n",
+            percent(floor.sed_relative_l2),
+            floor.how
+        );
+    }
+    bars(&mut text, ladder);
+    costs(&mut text, ladder);
+    for set in &ladder.sets {
+        let _ = writeln!(text, "## Errors on {}\n", set.name);
+        if set.samples == 0 {
+            let _ = writeln!(text, "{}.\n", sentence(&set.about));
+        } else {
+            let _ = writeln!(text, "{} samples: {}.\n", set.samples, set.about);
+            errors(&mut text, ladder, &set.name);
+        }
+    }
+    zone(&mut text, stem);
+    text
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn bars(text: &mut String, ladder: &Ladder) {
+    text.push_str("## What was asked\n\n| asked | measured | |\n|---|---|---|\n");
+    for bar in &ladder.bars {
+        let met = if bar.met { "met" } else { "**missed**" };
+        let _ = writeln!(text, "| {} | {} | {met} |", bar.bar, bar.measured);
+    }
+    text.push('\n');
+}
+
+fn costs(text: &mut String, ladder: &Ladder) {
+    text.push_str("## Time and size\n\nIn bold: nothing else is both faster and more accurate");
+    if let Some(set) = &ladder.pareto_set {
+        let _ = write!(text, " (relative L2 on {set})");
+    }
+    text.push_str(
+        ".\n\n| rung | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for rung in by_time(ladder).filter(|rung| rung.kind != Kind::Fe) {
+        let latency = rung.latency_ms.as_ref();
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {} |",
+            name(rung),
+            kind(rung.kind),
+            times(latency.map(|l| l.tract)),
+            times(latency.and_then(|l| l.ort)),
+            number(rung.load_ms, 0),
+            number(rung.memory_mib, 1),
+            number(rung.bytes.map(|bytes| bytes as f64 / 1e3), 0),
+        );
+    }
+    if ladder.rungs.iter().any(|rung| rung.kind == Kind::Fe) {
+        text.push_str("\n| FE rung | unknowns | s a state, median | p99 |\n|---|---|---|---|\n");
+        for rung in by_time(ladder).filter(|rung| rung.kind == Kind::Fe) {
+            let unknowns = rung.unknowns.unwrap_or_default();
+            let _ = writeln!(text, "| {} | {unknowns} | {} |", name(rung), times(rung.seconds));
+        }
+    }
+    text.push('\n');
+}
+
+fn errors(text: &mut String, ladder: &Ladder, set: &str) {
+    text.push_str(
+        "| rung | ms | relative L2 | p95 | far field | p95 | peak | p95 | place, mm | p95 | nail base | p95 | energy | p95 | SSIM | p5 |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for rung in by_time(ladder) {
+        let Some(errors) = rung.errors.get(set) else { continue };
+        let ms = rung.time_ms().map_or_else(|| "-".to_owned(), milliseconds);
+        if rung.reference {
+            let _ = writeln!(text, "| {} | {ms} | the truth {}|", name(rung), "| ".repeat(13));
+            continue;
+        }
+        let _ = writeln!(text, "| {} | {ms} | {} |", name(rung), row(errors));
+    }
+    text.push('\n');
+}
+
+fn row(errors: &SetErrors) -> String {
+    let place = errors.peak_distance_mm.map_or_else(
+        || "- | -".to_owned(),
+        |spread| format!("{:.2} | {:.2}", spread.median, spread.p95),
+    );
+    [
+        spread(Some(errors.relative_l2)),
+        spread(errors.far_field_relative_l2),
+        spread(Some(errors.peak_error)),
+        place,
+        spread(errors.nail_base_error),
+        spread(Some(errors.total_energy_error)),
+        format!("{:.4} | {:.4}", errors.ssim.median, errors.ssim.p5),
+    ]
+    .join(" | ")
+}
+
+fn zone(text: &mut String, stem: &str) {
+    let _ = write!(
+        text,
+        "## The zone toward the nail base\n\n![The zone on the atlas]({stem}-zone.svg)\n\n\
+         The interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the default\n\
+         fingertip ends at 14 mm, so this is 2 mm to either side of that edge, over the nail's matrix and its fold. Presses on the pad rarely\n\
+         touch the skin here but load it through the tissue. S1 reports that its network misses this spread; one that sees 2 to 3 mm around a pixel\n\
+         has to.\n",
+        NAIL_BASE_MM.start, NAIL_BASE_MM.end
+    );
+}
+
+/// The rungs from fast to slow.
+fn by_time(ladder: &Ladder) -> impl Iterator<Item = &Rung> {
+    let mut rungs: Vec<&Rung> = ladder.rungs.iter().collect();
+    let time = |rung: &Rung| rung.time_ms().unwrap_or(f64::INFINITY);
+    rungs.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    rungs.into_iter()
+}
+
+fn name(rung: &Rung) -> String {
+    if rung.pareto { format!("**{}**", rung.name) } else { rung.name.clone() }
+}
+
+/// The kind in words.
+pub(super) fn kind(kind: Kind) -> &'static str {
+    match kind {
+        Kind::ClosedForm => "closed form",
+        Kind::Operator => "operator",
+        Kind::Network => "network",
+        Kind::S1Network => "S1's network",
+        Kind::Fe => "finite elements",
+    }
+}
+
+fn milliseconds(ms: f64) -> String {
+    match ms {
+        _ if ms < 10.0 => format!("{ms:.2}"),
+        _ if ms < 1000.0 => format!("{ms:.0}"),
+        _ => format!("{:.1} s", ms / 1e3),
+    }
+}
+
+fn times(times: Option<Percentiles>) -> String {
+    times.map_or_else(|| "- | -".to_owned(), |t| format!("{:.2} | {:.2}", t.p50, t.p99))
+}
+
+fn number(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+fn percent(value: f64) -> String {
+    let value = 100.0 * value;
+    if value < 10.0 { format!("{value:.2} %") } else { format!("{value:.1} %") }
+}
+
+fn spread(spread: Option<Spread>) -> String {
+    spread.map_or_else(
+        || "- | -".to_owned(),
+        |s| format!("{} | {}", percent(s.median), percent(s.p95)),
+    )
+}

@@ -1,0 +1,178 @@
+//! The held-out sets.
+
+use super::Canvas;
+use crate::ExportError;
+use crate::dataset::{Dataset, Press};
+use crate::evaluate::require_same_atlas;
+use papilla_engine::ladder::Set;
+use std::path::Path;
+
+/// The set `deep` takes the states pressed deeper than this, mm: beyond all training.
+pub const DEEP_MM: f32 = 2.0;
+
+/// One state: values at the vertices of the atlas.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Where it is from, for messages.
+    pub origin: String,
+    /// Pressure on the skin, Pa.
+    pub pressure_pa: Vec<f32>,
+    /// True SED on the dermis side of the interface, J/m3.
+    pub sed_j_per_m3: Vec<f32>,
+}
+
+/// States that no training saw.
+#[derive(Clone, Debug)]
+pub struct SampleSet {
+    /// One of [`papilla_engine::ladder::SET_NAMES`].
+    pub name: &'static str,
+    /// What it holds, or why it is empty.
+    pub about: String,
+    /// Names the dataset.
+    pub dataset_sha256: Option<String>,
+    /// The states.
+    pub states: Vec<State>,
+}
+
+impl SampleSet {
+    /// Keeps at most `count` states, evenly spread.
+    pub fn thin(&mut self, count: usize) {
+        let have = self.states.len();
+        if have > count {
+            let keep = |k: usize| self.states[(2 * k + 1) * have / (2 * count)].clone();
+            self.states = (0..count).map(keep).collect();
+            self.about = format!("{count} of {have} samples: {}", self.about);
+        }
+    }
+
+    pub(super) fn described(&self) -> Set {
+        Set {
+            name: self.name.to_owned(),
+            samples: self.states.len(),
+            about: self.about.clone(),
+            dataset_sha256: self.dataset_sha256.clone(),
+        }
+    }
+}
+
+/// What a set takes of a dataset.
+struct Source {
+    name: &'static str,
+    folder: &'static str,
+    about: &'static str,
+    test_only: bool,
+    deeper_than_mm: Option<f32>,
+}
+
+const SOURCES: [Source; 4] = [
+    Source {
+        name: "heldout-presses",
+        folder: "broad",
+        about: "presses that no training saw, of the shapes and depths it saw",
+        test_only: true,
+        deeper_than_mm: None,
+    },
+    Source {
+        name: "heldout-shapes",
+        folder: "heldout",
+        about: "shapes that no training saw",
+        test_only: false,
+        deeper_than_mm: None,
+    },
+    Source {
+        name: "deep",
+        folder: "deep",
+        about: "deeper than any training (more than 2.0 mm)",
+        test_only: false,
+        deeper_than_mm: Some(DEEP_MM),
+    },
+    Source {
+        name: "s1",
+        folder: "s1",
+        about: "held-out presses of the published campaign, a plate alone",
+        test_only: true,
+        deeper_than_mm: None,
+    },
+];
+
+/// Reads the sets whose datasets are in `data`; the others come out empty and say why.
+pub(super) fn load(data: &Path, canvas: &Canvas) -> Result<Vec<SampleSet>, ExportError> {
+    SOURCES.iter().map(|source| source.load(data, canvas)).collect()
+}
+
+impl Source {
+    fn load(&self, data: &Path, canvas: &Canvas) -> Result<SampleSet, ExportError> {
+        let folder = data.join(self.folder);
+        let mut set = SampleSet {
+            name: self.name,
+            about: self.about.to_owned(),
+            dataset_sha256: None,
+            states: Vec::new(),
+        };
+        if !folder.join("manifest.json").is_file() {
+            set.about = format!("not measured: there is no dataset '{}'", self.folder);
+            return Ok(set);
+        }
+        let dataset = Dataset::open(&folder)?;
+        let what = folder.display().to_string();
+        require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
+        set.dataset_sha256 = Some(dataset.sha256().to_owned());
+        let presses = if self.test_only { dataset.presses("test")? } else { dataset.every_press() };
+        for press in presses {
+            self.take(&dataset, press, &mut set.states)?;
+        }
+        if set.states.is_empty() {
+            set.about = format!("not measured: '{}' has no such state", self.folder);
+        }
+        Ok(set)
+    }
+
+    fn take(
+        &self,
+        dataset: &Dataset,
+        press: &Press,
+        states: &mut Vec<State>,
+    ) -> Result<(), ExportError> {
+        let shard = dataset.load(press)?;
+        for (index, depth_mm) in shard.depth_mm.iter().enumerate() {
+            // Stored depths are rounded: 2.0 mm itself must not count as deeper.
+            if self.deeper_than_mm.is_some_and(|limit| *depth_mm <= limit + 1e-4) {
+                continue;
+            }
+            states.push(State {
+                origin: format!("{}, sample {index}", dataset.shard_path(press).display()),
+                pressure_pa: shard.pressure_pa.row(index).to_vec(),
+                sed_j_per_m3: shard.sed_j_per_m3.row(index).to_vec(),
+            });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SampleSet, State};
+
+    #[test]
+    fn a_thinned_set_is_spread_over_the_whole() {
+        let state = |i: usize| State {
+            origin: i.to_string(),
+            pressure_pa: Vec::new(),
+            sed_j_per_m3: Vec::new(),
+        };
+        let set = |n: usize| SampleSet {
+            name: "s1",
+            about: "x".into(),
+            dataset_sha256: None,
+            states: (0..n).map(state).collect(),
+        };
+        let mut large = set(100);
+        large.thin(4);
+        let kept: Vec<&str> = large.states.iter().map(|s| s.origin.as_str()).collect();
+        assert_eq!(kept, ["12", "37", "62", "87"]);
+        assert_eq!(large.described().about, "4 of 100 samples: x");
+        let mut small = set(3);
+        small.thin(4);
+        assert_eq!(small.states.len(), 3);
+    }
+}

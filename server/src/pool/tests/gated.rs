@@ -1,0 +1,62 @@
+//! A model that stops and goes as it is told.
+
+use std::{
+    sync::{
+        Arc, Mutex,
+        mpsc::{Receiver, SyncSender},
+    },
+    time::Duration,
+};
+
+use papilla_engine::{EngineError, Model, ModelInfo, Session};
+
+/// A model whose every inference, after those of the warm-up, waits for a go. What it is
+/// told to do, it does: that makes the order of events in these tests certain, which no real
+/// network could.
+pub(super) struct Gated {
+    pub(super) info: ModelInfo,
+    pub(super) gate: Arc<Gate>,
+}
+
+pub(super) struct Gate {
+    /// Announces that an inference has begun.
+    pub(super) begun: SyncSender<()>,
+    /// What the inference is to do.
+    pub(super) go: Mutex<Receiver<Act>>,
+}
+
+pub(super) enum Act {
+    Finish,
+    Panic,
+}
+
+struct GatedSession {
+    gate: Arc<Gate>,
+    warm: usize,
+}
+
+impl Model for Gated {
+    fn info(&self) -> &ModelInfo {
+        &self.info
+    }
+
+    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
+        Ok(Box::new(GatedSession { gate: Arc::clone(&self.gate), warm: 0 }))
+    }
+}
+
+impl Session for GatedSession {
+    fn infer(&mut self, pressure: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
+        self.warm += 1;
+        sed.copy_from_slice(pressure);
+        // The one run that warms a session is free.
+        if self.warm <= 1 {
+            return Ok(());
+        }
+        self.gate.begun.send(()).unwrap();
+        match self.gate.go.lock().unwrap().recv_timeout(Duration::from_secs(30)).unwrap() {
+            Act::Finish => Ok(()),
+            Act::Panic => panic!("as told"),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The ladder: published, measured on this machine, and what tiers are chosen by.
+
+use std::time::{Duration, Instant};
+
+use papilla_server::{Config, StartError};
+use serde_json::{Value, json};
+
+use crate::support::{Service, atlas, hello, model_folder, write};
+
+/// A rung as `model-export ladder` writes it.
+fn rung(name: &str, model: Option<&str>, ms: f64, error: f64) -> Value {
+    let spread = json!({"median": error, "p95": 2.0 * error});
+    let errors = json!({"samples": 3, "relative_l2": spread, "far_field_relative_l2": null,
+        "peak_error": spread, "peak_distance_mm": spread, "nail_base_error": null,
+        "total_energy_error": spread, "ssim": {"median": 0.9, "p5": 0.8}});
+    let (latency, seconds) = match model {
+        Some(_) => (json!({"tract": {"p50": ms, "p99": ms}, "ort": null}), Value::Null),
+        None => (Value::Null, json!({"p50": ms / 1e3, "p99": ms / 1e3})),
+    };
+    let kind = if model.is_some() { "network" } else { "fe" };
+    json!({"name": name, "kind": kind, "model": model, "bytes": null, "load_ms": null,
+        "memory_mib": null, "latency_ms": latency, "seconds": seconds,
+        "errors": {"heldout-presses": errors}, "pareto": true})
+}
+
+/// By this ladder, other than by the cards, `quick` is the more accurate.
+fn ladder() -> Value {
+    let sets = json!([{"name": "heldout-presses", "samples": 3}, {"name": "deep", "samples": 0}]);
+    json!({"format": 1, "atlas_hash": atlas().hash(), "machine": "another", "sets": sets,
+        "rungs": [rung("quick", Some("quick"), 4.0, 0.01), rung("slow", Some("slow"), 9.0, 0.02),
+                  rung("fe-medium", None, 30_000.0, 0.03)],
+        "bars": [{"bar": "a", "measured": "b", "met": true}]})
+}
+
+async fn with(ladder: &Value, calibration_ms: u64) -> Result<Service, StartError> {
+    let models = model_folder();
+    write(models.path(), "ladder.json", ladder.to_string().as_bytes());
+    Service::on(models, |config: &mut Config| config.calibration_ms = calibration_ms).await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tiers_are_chosen_by_the_ladder_and_it_is_published() {
+    let service = with(&ladder(), 1).await.unwrap();
+    let tiers = service.json("/v1/tiers").await;
+    assert_eq!(tiers["judged_on"], "heldout-presses");
+    assert_eq!(tiers["tiers"][0]["relative_l2_median"], 0.01);
+    assert_eq!(tiers["ladder"]["rungs"][2]["name"], "fe-medium");
+    assert_eq!(tiers["ladder"]["rungs"][2]["seconds"]["p50"], 30.0);
+    assert_eq!(tiers["ladder"]["bars"][0]["met"], true);
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello(&json!({"budget_us": 60_000_000}))).await;
+    assert_eq!(ready["tier"], "quick", "the card says slow, the ladder says quick");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn this_machine_has_the_last_word_on_times() {
+    let service = with(&ladder(), 1).await.unwrap();
+    let tiers = service.json("/v1/tiers").await;
+    let tier = |i: usize| tiers["tiers"][i].clone();
+    let p50 = |i: usize| tier(i)["calibrated_us"]["p50"].as_f64().unwrap();
+    assert!(p50(0) < p50(1), "{tiers}");
+    assert!(tier(1)["calibrated_us"]["p99"].as_f64().unwrap() >= p50(1));
+    let overhead = tiers["overhead_us"].as_u64().unwrap();
+    assert_eq!(tier(1)["predicted_latency_us"].as_u64().unwrap(), p50(1) as u64 + overhead);
+    // Without a calibration the shipped times stand: 4 and 9 ms.
+    let service = with(&ladder(), 0).await.unwrap();
+    let tiers = service.json("/v1/tiers").await;
+    assert_eq!(tiers["tiers"][0]["calibrated_us"], Value::Null);
+    let overhead = tiers["overhead_us"].as_u64().unwrap();
+    assert_eq!(tiers["tiers"][0]["predicted_latency_us"], 4_000 + overhead);
+    assert_eq!(tiers["tiers"][1]["predicted_latency_us"], 9_000 + overhead);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_calibration_takes_its_time_and_no_more() {
+    let begun = Instant::now();
+    drop(with(&ladder(), 0).await.unwrap());
+    let without = begun.elapsed();
+    let begun = Instant::now();
+    drop(with(&ladder(), 600).await.unwrap());
+    let added = begun.elapsed().saturating_sub(without);
+    // The slow tier takes its three runs, whatever its share; the machine may be busy.
+    assert!(added > Duration::from_millis(150) && added < Duration::from_secs(20), "{added:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn figures_of_another_file_do_not_count() {
+    let mut ladder = ladder();
+    ladder["rungs"][0]["onnx_sha256"] = json!("0".repeat(64));
+    let service = with(&ladder, 0).await.unwrap();
+    let tiers = service.json("/v1/tiers").await;
+    assert_eq!(tiers["judged_on"], Value::Null, "not all tiers were measured");
+    assert_eq!(tiers["tiers"][0]["relative_l2_median"], 0.2, "the card's");
+    let names: Vec<&Value> =
+        tiers["ladder"]["rungs"].as_array().unwrap().iter().map(|rung| &rung["name"]).collect();
+    assert_eq!(names, ["slow", "fe-medium"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_damaged_ladder_is_named() {
+    let mut stranger = ladder();
+    stranger["atlas_hash"] = json!("f".repeat(64));
+    for bad in [json!({}), stranger] {
+        let error = with(&bad, 0).await.map(drop).unwrap_err();
+        let named = matches!(&error, StartError::Unusable { file, .. } if file == "ladder.json");
+        assert!(named, "{error}");
+    }
+}
