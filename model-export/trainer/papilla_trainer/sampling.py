@@ -1,8 +1,8 @@
 """From a map back to vertex values: the local inverse of the rasteriser, with few pixels a vertex.
 
 A map is linear in each triangle, so the pixels about a vertex determine its value by least squares.
-Of all weights that do so, those of least norm are taken: they amplify noise least. Pixels that matter
-least are then dropped one after another until ``PIXELS`` are left.
+Of all weights that do so, those of least norm are taken: they amplify noise least. Pixels that
+matter least are then dropped one after another until ``PIXELS`` are left.
 """
 
 from __future__ import annotations

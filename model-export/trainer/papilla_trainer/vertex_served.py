@@ -16,7 +16,7 @@ class MapFrame(nn.Module):
     """Everything about the two rasters that the graph needs, as constants.
 
     ``pixel``, ``weight``: ``[PIXELS, V]``, what to sample the pressure map by; ``corner``:
-    ``[3, T + 1]`` vertices of the triangles of the interface; ``triangle``: ``[224 * 224]``, in which
+    ``[3, T]`` vertices of the triangles of the interface; ``triangle``: ``[224 * 224]``, in which
     one each pixel lies; ``share``: ``[3, 224 * 224]``, its linear weights, 0 outside the patch.
     """
 
@@ -26,8 +26,14 @@ class MapFrame(nn.Module):
     triangle: Tensor
     share: Tensor
 
-    def __init__(self, skin: Raster, interface: Raster, vertex_count: int) -> None:
+    def __init__(self, constants: dict[str, Tensor]) -> None:
         super().__init__()
+        for name, value in constants.items():
+            self.register_buffer(name, value)
+
+    @staticmethod
+    def of(skin: Raster, interface: Raster, vertex_count: int) -> MapFrame:
+        """The frame of a dataset's rasters."""
         pixel, weight = vertex_sampler(skin, vertex_count)
         corner, triangle = np.unique(interface.vertex, axis=0, return_inverse=True)
         of_pixel = np.zeros(MAP_LEN, dtype=np.int64)
@@ -35,14 +41,16 @@ class MapFrame(nn.Module):
         share = np.zeros((3, MAP_LEN), dtype=np.float32)
         # A weight is below zero only by rounding at an edge; SED must not be.
         share[:, interface.pixel] = np.clip(interface.weight, 0.0, None).T
-        for name, array in (
-            ("pixel", pixel.T),
-            ("weight", weight.T.astype(np.float32)),
-            ("corner", corner.T),
-            ("triangle", of_pixel),
-            ("share", share),
-        ):
-            self.register_buffer(name, torch.from_numpy(np.ascontiguousarray(array)))
+        constants = {
+            "pixel": pixel.T,
+            "weight": weight.T.astype(np.float32),
+            "corner": corner.T,
+            "triangle": of_pixel,
+            "share": share,
+        }
+        return MapFrame(
+            {name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in constants.items()}
+        )
 
     def sample(self, maps: Tensor) -> Tensor:
         """``[224 * 224]`` to ``[1, V]``."""
