@@ -27,12 +27,13 @@ exit codes: 0 done; 1 a check failed or training diverged; 2 wrong arguments; 3 
 damaged dataset; 4 the run directory does not fit; 130 interrupted (go on with --resume)."""
 
 _TRAIN = """\
-Trains a network on the training presses of a dataset. s1-baseN is S1's U-Net on maps (two
-encoding and two decoding stages, MSE on max-normalised maps, Adam). vertex-rR[-cC][-nK[-g]][-hH[xL]]
-works on the vertices of the atlas: a low-rank linear map of rank R, C components per vertex, a stencil of K
-vertices with or without gains, gated layers of width H; the sum of the components' squares.
- A tenth of the *training* presses is set aside to choose the epoch
-by; the test presses are touched once, after training, for the metrics.
+Trains a network on the training presses of a dataset. A tenth of them is set aside to choose the
+epoch by; the test presses are touched once, after training, for the metrics.
+
+s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
+vertex-rR[-cC][-nK[-g]][-hH[xL]] works on the vertices of the atlas and answers sums of squares: a
+low-rank linear map of rank R, C components a vertex, a stencil of K vertices (-g: with gains that
+depend on the pressures), L gated layers of width H on the low-rank coordinates.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
 and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with

@@ -17,10 +17,12 @@ from papilla_trainer.atlas import Atlas
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-# Triangles nearer than this are cut into 64 parts, those beyond into 4: the parts then are
-# smaller than half the depth where the kernel is steep.
+# Triangles nearer than this are cut into parts with edges of some 0.1 mm, half the depth, for the
+# kernel is steep there; those beyond into four.
 _NEAR_MM = 2.5
-_CUTS_NEAR = 8
+_LARGE_MM = 0.9
+_CUTS_NEAR = 9
+_CUTS_LARGE = 24
 _CUTS_FAR = 2
 
 
@@ -84,12 +86,21 @@ class HalfSpace:
         """
         place = atlas.skin_px * atlas.mm_per_px
         g = np.empty((len(place), 6, len(place)), dtype=np.float32)
-        fine, coarse = (_quadrature(place, atlas.triangles, n) for n in (_CUTS_NEAR, _CUTS_FAR))
-        centre = place[atlas.triangles].mean(axis=1)
+        near, large, far = (
+            _quadrature(place, atlas.triangles, n) for n in (_CUTS_NEAR, _CUTS_LARGE, _CUTS_FAR)
+        )
+        corners = place[atlas.triangles]
+        centre = corners.mean(axis=1)
+        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         for v, at in enumerate(place):
-            near = np.linalg.norm(centre - at, axis=1) < _NEAR_MM
+            close = np.linalg.norm(centre - at, axis=1) < np.maximum(_NEAR_MM, edge)
+            big = close & (edge > _LARGE_MM)
             row = np.zeros((6, len(place)))
-            for points, loads, chosen in ((*fine, near), (*coarse, ~near)):
+            for points, loads, chosen in (
+                (*near, close & ~big),
+                (*large, big),
+                (*far, ~close),
+            ):
                 offset = at - points[chosen]  # [T', Q, 2]
                 kernel = self.components(self.stress(offset[..., 0], offset[..., 1]))
                 at_corners = np.einsum("tqk,tqc->tkc", loads[chosen], kernel)

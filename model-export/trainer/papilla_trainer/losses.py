@@ -35,7 +35,7 @@ def make_loss(name: str, weights: Tensor, far_weight: float) -> Loss:
 
 
 def relative_loss(output: Tensor, target: Tensor, weights: Tensor, far_weight: float) -> Tensor:
-    """Mean over samples ``[N, M]`` of the squared relative L2, and ``far_weight`` x the far field's.
+    """Mean over samples ``[N, M]`` of squared relative L2 and ``far_weight`` x the far field's.
 
     A sample without SED counts nothing.
     """
