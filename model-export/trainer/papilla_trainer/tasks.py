@@ -13,7 +13,7 @@ from papilla_trainer.atlas import Atlas
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import F32, Dataset, Maps
 from papilla_trainer.losses import Loss, make_loss
-from papilla_trainer.network import NetworkSpec, build_network
+from papilla_trainer.network import NetworkSpec, S1UNet, build_network
 from papilla_trainer.vertex_init import Operator, start_from_operator, start_from_pressures
 from papilla_trainer.vertex_network import VertexLayout, VertexNet, VertexSpec
 from papilla_trainer.vertex_served import MapFrame
@@ -97,7 +97,7 @@ def trained_network(spec: NetworkSpec | VertexSpec, weights: dict[str, Tensor]) 
     network = (
         VertexNet(spec, VertexLayout.of_weights(weights))
         if isinstance(spec, VertexSpec)
-        else build_network(spec, 0)
+        else S1UNet(spec.base)
     )
     network.load_state_dict(weights)
     return network

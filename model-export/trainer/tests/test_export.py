@@ -122,5 +122,9 @@ def test_metrics_of_other_weights_are_not_exported(
     (stale / "checkpoint.pt").write_bytes((run_dir / "checkpoint.pt").read_bytes())
     (stale / "metrics.json").write_text(json.dumps({**metrics, "epoch": 99}))
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 4
-    assert evaluate_run(stale, tiny) == metrics
+    again = evaluate_run(stale, tiny)
+    assert again.keys() == metrics.keys()
+    for key, value in metrics.items():
+        # Where in memory the maps lie changes the last bits of a convolution.
+        assert again[key] == (pytest.approx(value, rel=1e-6) if isinstance(value, dict) else value)
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 0
