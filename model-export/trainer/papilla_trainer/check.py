@@ -20,7 +20,12 @@ from papilla_trainer.files import write_atomic
 from papilla_trainer.metrics import F32
 
 OPERATORS = frozenset(
-    {"Conv", "Relu", "MaxPool", "ConvTranspose", "Concat", "Mul", "Clip", "Constant"}
+    {
+        *("Conv", "Relu", "MaxPool", "ConvTranspose", "Concat", "Mul", "Clip", "Constant"),
+        # Networks on vertices.
+        *("Add", "Flatten", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Split", "Sub"),
+        *("Squeeze", "Tanh", "Transpose", "Unsqueeze"),
+    }
 )
 METADATA = (
     "format",
@@ -49,6 +54,7 @@ class CheckReport:
     torch_difference_max: float | None = None
     failures: list[str] = field(default_factory=list)
     reference: str | None = None
+    zero_gives_zero: bool | None = None
 
     def require(self, condition: bool, failure: str) -> None:
         """Note a failure unless the condition holds."""
@@ -74,6 +80,8 @@ def check_model(
     output = np.stack([session.run([OUTPUT], {INPUT: p[None, None]})[0][0, 0] for p in pressure])
     report.samples = len(pressure)
     _check_output(output, dataset, report)
+    zero = session.run([OUTPUT], {INPUT: np.zeros_like(pressure[:1, None])})[0]
+    report.zero_gives_zero = not zero.any()
     if run_dir is not None:
         _compare(run_dir, model, pressure, output, report)
     if reference is not None and not report.failures:

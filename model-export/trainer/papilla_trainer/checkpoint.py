@@ -30,9 +30,11 @@ class Served:
     atlas_hash: str
     effects: list[str]
     dataset_sha256: str
+    # The constants of a vertex network's rasters; a network on maps has none.
+    frame: Weights = field(default_factory=dict)
 
     @staticmethod
-    def of(dataset: Dataset) -> Served:
+    def of(dataset: Dataset, frame: Weights | None = None) -> Served:
         """Mask (uint8 ``[224, 224]``), scales and identities of a dataset."""
         return Served(
             mask=torch.from_numpy(dataset.interface.mask()).to(torch.uint8),
@@ -41,6 +43,7 @@ class Served:
             atlas_hash=dataset.atlas_hash,
             effects=list(dataset.effects),
             dataset_sha256=dataset.dataset_sha256,
+            frame=frame or {},
         )
 
 

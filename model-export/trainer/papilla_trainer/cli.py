@@ -1,4 +1,4 @@
-"""The command line: train, evaluate, export, check."""
+"""The command line: train, evaluate, export, check, operator, half-space."""
 
 from __future__ import annotations
 
@@ -6,63 +6,20 @@ import argparse
 import json
 import os
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from papilla_trainer import __version__
-from papilla_trainer.errors import CheckError, TrainerError
+from papilla_trainer.arguments import Command, make_parser
+from papilla_trainer.errors import CheckError, TrainerError, UsageError
 
 if TYPE_CHECKING:
     from papilla_trainer.training import Progress
 
 INTERRUPTED = 130
 
-_DESCRIPTION = """\
-Trains a network that maps fingertip pressure to strain energy density (SED) and exports it.
-
-From a dataset to a model that the server loads:
-
-  python -m papilla_trainer train    --dataset data/s1 --network s1-base8 --out runs/s1-base8
-  python -m papilla_trainer export   runs/s1-base8 --out models/s1-base8.onnx
-  python -m papilla_trainer check    models/s1-base8.onnx --dataset data/s1 --run runs/s1-base8
-
-`COMMAND --help` explains each one."""
-
-_EPILOG = """\
-exit codes: 0 done; 1 a check failed or training diverged; 2 wrong arguments; 3 unreadable or
-damaged dataset; 4 the run directory does not fit; 130 interrupted (go on with --resume)."""
-
-_TRAIN = """\
-Trains S1's U-Net (two encoding and two decoding stages, MSE on max-normalised maps, Adam) on the
-training presses of a dataset. A tenth of the *training* presses is set aside to choose the epoch
-by; the test presses are touched once, after training, for the metrics.
-
-Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
-and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
---resume goes on from the last whole epoch and ends in the same weights, bit for bit."""
-
-_EVALUATE = """\
-Measures a run on the held-out presses again (train does so at its end): relative L2, far field
-(where SED < 10 % of its maximum), peak, total energy, SSIM; median and bad end. Use it after an
-interrupted run, or to measure the last weights instead of the best."""
-
-_EXPORT = """\
-Writes a run's model as ONNX (opset 17; Conv, Relu, MaxPool, ConvTranspose, Concat, Mul only).
-Input `pressure_pa` and output `sed_j_per_m3` are float32 [1, 1, 224, 224] in physical units:
-scaling, the clamp at zero and the interface mask are inside the graph, and the file carries its
-atlas hash, effects, scales, training settings and held-out metrics as metadata."""
-
-_CHECK = """\
-Checks an exported model: legal ONNX with strict shape inference, plain operators, the interface
-and metadata that the engine expects, finite and non-negative output that is zero outside the
-patch; with --run, ONNX Runtime against PyTorch (1e-5 of the maximum at most). --reference writes
-inputs and ONNX Runtime's outputs of held-out samples, for `model-export evaluate` to compare its
-own engine with."""
-
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    options = make_parser(_COMMANDS).parse_args(arguments)
     try:
         result, text = options.run(options)
     except TrainerError as error:
@@ -73,95 +30,6 @@ def main(arguments: list[str] | None = None) -> int:
         return INTERRUPTED
     print(json.dumps(result) if options.json else text)
     return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(
-        "papilla_trainer", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=raw
-    )
-    parser.add_argument("--version", action="version", version=__version__)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-
-    def command(name: str, summary: str, description: str, run: Any) -> argparse.ArgumentParser:
-        sub = commands.add_parser(
-            name, help=summary, description=description, epilog=_EPILOG, formatter_class=raw
-        )
-        sub.add_argument("--json", action="store_true", help="print one JSON object on stdout")
-        sub.set_defaults(run=run)
-        return sub
-
-    _train_arguments(command("train", "train a network on a dataset", _TRAIN, _train))
-
-    evaluate = command("evaluate", "measure a run on the held-out presses", _EVALUATE, _evaluate)
-    evaluate.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
-    _dataset_argument(evaluate)
-    _weights_argument(evaluate)
-
-    export = command("export", "write a run's model as ONNX", _EXPORT, _export)
-    export.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
-    export.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
-    export.add_argument("--name", help="name of the model (default: the file's stem)")
-    _weights_argument(export)
-
-    check = command("check", "check an exported model", _CHECK, _check)
-    check.add_argument("model", type=Path, metavar="FILE.onnx")
-    _dataset_argument(check)
-    check.add_argument("--run", dest="run_dir", type=Path, metavar="RUN_DIR")
-    check.add_argument("--reference", type=Path, metavar="FILE.npz")
-    check.add_argument("--samples", type=int, default=8, help="held-out samples (default 8)")
-    return parser
-
-
-def _train_arguments(parser: argparse.ArgumentParser) -> None:
-    _dataset_argument(parser)
-    add = parser.add_argument
-    add("--network", default="s1-base8", help="s1-baseN: N channels in the first stage (8)")
-    add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
-    add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
-    add("--epochs", type=int, default=40, help="passes over the training presses (40)")
-    add("--seed", type=int, default=0, help="of initial weights, order and validation presses (0)")
-    add("--batch", type=int, default=4, help="samples in one step (4)")
-    add("--learning-rate", type=float, default=1e-3, help="Adam's (S1: 1e-3)")
-    add(
-        "--schedule",
-        choices=("constant", "cosine"),
-        default="constant",
-        help="learning rate over the epochs (S1: constant; cosine falls to zero at the last)",
-    )
-    add(
-        "--precision",
-        choices=("f32", "bf16"),
-        default="f32",
-        help="bf16: mixed precision, faster where CPU or GPU has bfloat16; weights stay f32",
-    )
-    add(
-        "--validation-presses",
-        type=int,
-        metavar="N",
-        help="training presses set aside to choose the epoch (default a tenth; 0: use the last)",
-    )
-    add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
-    add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
-
-
-def _dataset_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--dataset",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="what `fe-datagen generate` wrote",
-    )
-
-
-def _weights_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--weights",
-        choices=("best", "last"),
-        default="best",
-        help="of the epoch with the least validation loss, or of the last (best)",
-    )
 
 
 def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -191,8 +59,8 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         "network": config.network,
         "epochs": state.epoch,
         "epoch_chosen": state.best_epoch,
-        "train_mse": state.history[-1]["train_mse"],
-        "validation_mse": _finite(state.best_loss),
+        "train_loss": state.history[-1]["train_loss"],
+        "validation_loss": _finite(state.best_loss),
         "seconds": round(state.seconds, 1),
         "samples_per_s": round(rates[len(rates) // 2], 2),
         "metrics": metrics,
@@ -246,6 +114,59 @@ def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return vars(report), "\n".join(lines)
 
 
+def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    from papilla_trainer.dataset import Dataset
+    from papilla_trainer.untrained import write_operator
+
+    _require_rank(options)
+    result = write_operator(
+        options.operator,
+        Dataset(options.dataset),
+        options.rank,
+        options.near,
+        options.out,
+        options.name,
+    )
+    return result, _untrained_text(result)
+
+
+def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    from papilla_trainer.dataset import Dataset
+    from papilla_trainer.halfspace import HalfSpace
+    from papilla_trainer.untrained import write_half_space
+
+    _require_rank(options)
+    body = HalfSpace(options.youngs_modulus_pa, options.poissons_ratio, options.depth_mm)
+    if body.youngs_modulus_pa <= 0 or not 0 <= body.poissons_ratio < 0.5 or body.depth_mm <= 0:
+        raise UsageError("modulus and depth must be positive, Poisson's ratio in 0 .. 0.5")
+    result = write_half_space(
+        body, Dataset(options.dataset), options.rank, options.near, options.out, options.name
+    )
+    return result, _untrained_text(result)
+
+
+def _require_rank(options: argparse.Namespace) -> None:
+    if options.rank < 2 or options.rank % 2 or options.near < 0:
+        raise UsageError("--rank must be even and positive, --near not negative")
+
+
+def _untrained_text(result: dict[str, Any]) -> str:
+    from papilla_trainer.report import metrics_table
+
+    table = _table(result["metrics"], metrics_table)
+    return f"{result['model']}: {result['bytes']} bytes\nheld-out presses:\n{table}"
+
+
+_COMMANDS: dict[str, Command] = {
+    "train": _train,
+    "evaluate": _evaluate,
+    "export": _export,
+    "check": _check,
+    "operator": _operator,
+    "half-space": _half_space,
+}
+
+
 class _Bar:
     """Progress over all epochs (rate, time left) and one line for each epoch, on stderr."""
 
@@ -276,8 +197,8 @@ class _Bar:
             line = progress.epoch
             left = line["seconds"] * (self.epochs - line["epoch"])
             self.bar.write(
-                f"epoch {line['epoch']:.0f}/{self.epochs}: training MSE {line['train_mse']:.3e}, "
-                f"validation MSE {line['validation_mse']:.3e}, "
+                f"epoch {line['epoch']:.0f}/{self.epochs}: training loss {line['train_loss']:.3e}, "
+                f"validation loss {line['validation_loss']:.3e}, "
                 f"{line['samples_per_s']:.1f} samples/s, about {left / 60:.1f} min left",
                 file=sys.stderr,
             )

@@ -11,10 +11,13 @@ import numpy as np
 import torch
 
 from papilla_trainer.errors import RunError, UsageError
+from papilla_trainer.losses import LOSSES
 from papilla_trainer.network import NetworkSpec, parse_network
+from papilla_trainer.vertex_network import VertexSpec, parse_vertex_network
 
 PRECISIONS = ("f32", "bf16")
 SCHEDULES = ("constant", "cosine")
+LOSS_CHOICES = ("auto", *LOSSES)
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,18 @@ class TrainConfig:
     validation_presses: int | None = None
     threads: int | None = None
     device: str = "auto"
+    loss: str = "auto"
+    far_weight: float = 0.2
+    operator: str | None = None
+    train_presses: int | None = None
 
     def __post_init__(self) -> None:
-        parse_network(self.network)
+        if self.operator is not None and not isinstance(self.spec, VertexSpec):
+            raise UsageError("--operator is for vertex networks")
+        if self.loss not in LOSS_CHOICES or self.far_weight < 0.0:
+            raise UsageError(f"--loss {self.loss} --far-weight {self.far_weight}: not a loss")
+        if self.train_presses is not None and self.train_presses < 2:
+            raise UsageError("--train-presses must be at least 2")
         for name, least in (("epochs", 1), ("batch", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise UsageError(f"--{name} must be at least {least}, not {getattr(self, name)}")
@@ -43,9 +55,18 @@ class TrainConfig:
             raise UsageError(f"--threads must be at least 1, not {self.threads}")
 
     @property
-    def spec(self) -> NetworkSpec:
+    def spec(self) -> NetworkSpec | VertexSpec:
         """The network asked for."""
+        if self.network.startswith("vertex-"):
+            return parse_vertex_network(self.network)
         return parse_network(self.network)
+
+    @property
+    def loss_name(self) -> str:
+        """The loss in use: S1's for S1's network, else the one that models are judged by."""
+        if self.loss != "auto":
+            return self.loss
+        return "relative" if isinstance(self.spec, VertexSpec) else "mse"
 
     def validation_count(self, train_presses: int) -> int:
         """How many training presses to set aside: as asked, else a tenth (at least one)."""
@@ -65,10 +86,12 @@ class TrainConfig:
         """
         free = {"threads", "device"} | ({"epochs"} if self.schedule == "constant" else set())
         ours = self.as_json()
+        # A setting that an older run does not know had its default.
+        theirs = {**TrainConfig().as_json(), **earlier}
         differing = [
-            f"{key} was {earlier.get(key)}, now {value}"
+            f"{key} was {theirs[key]}, now {value}"
             for key, value in ours.items()
-            if key not in free and earlier.get(key) != value
+            if key not in free and theirs[key] != value
         ]
         if differing:
             raise RunError(

@@ -129,6 +129,14 @@ class Dataset:
             start = end
         return Maps(pressure, sed, press_id, depth)
 
+    def load_vertices(self, ids: list[int]) -> tuple[F32, F32]:
+        """Pressure (Pa) and SED (J/m3) at the vertices, ``[N, V]`` each, of all depths."""
+        shards = [self._read_shard(self.presses[i]) for i in ids]
+        return (
+            np.concatenate([shard["pressure_pa"] for shard in shards]),
+            np.concatenate([shard["sed_dermis_j_per_m3"] for shard in shards]),
+        )
+
     def _check_identity(self) -> None:
         hashes = "".join(self.presses[i].sha256 for i in sorted(self.presses))
         if hashlib.sha256(hashes.encode()).hexdigest() != self.dataset_sha256:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch import nn
 
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
@@ -15,18 +16,23 @@ from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
 from papilla_trainer.files import write_json
 from papilla_trainer.metrics import F32, METRICS, evaluate, summarise
-from papilla_trainer.network import S1UNet, ServedModel
+from papilla_trainer.network import ServedModel
 from papilla_trainer.report import write_csv
+from papilla_trainer.tasks import trained_network
+from papilla_trainer.vertex_network import VertexSpec
+from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
 METRICS_FILE = "metrics.json"
 SAMPLES_FILE = "metrics.csv"
 
 
-def served_model(checkpoint: Checkpoint, weights: str = "best") -> ServedModel:
+def served_model(checkpoint: Checkpoint, weights: str = "best") -> nn.Module:
     """The model as it is exported, on the CPU; ``weights`` is ``best`` or ``last``."""
-    network = S1UNet(TrainConfig(**checkpoint.config).spec.base)
-    network.load_state_dict(checkpoint.best_model if weights == "best" else checkpoint.model)
-    served = checkpoint.served
+    spec = TrainConfig(**checkpoint.config).spec
+    chosen = checkpoint.best_model if weights == "best" else checkpoint.model
+    network, served = trained_network(spec, chosen), checkpoint.served
+    if isinstance(spec, VertexSpec):
+        return ServedVertexModel(network, MapFrame(served.frame)).eval()
     model = ServedModel(
         network, served.mask.float(), served.pressure_max_pa, served.sed_max_j_per_m3
     )
@@ -39,7 +45,7 @@ def chosen_epoch(checkpoint: Checkpoint, weights: str) -> int:
 
 
 @torch.no_grad()
-def predict(model: ServedModel, pressure_pa: F32) -> F32:
+def predict(model: nn.Module, pressure_pa: F32) -> F32:
     """``[B, 224, 224]`` Pa to ``[B, 224, 224]`` J/m3."""
     inputs = (
         torch.from_numpy(pressure_pa).unsqueeze(1).contiguous(memory_format=torch.channels_last)
@@ -53,8 +59,16 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
     checkpoint = Checkpoint.load(run_dir)
     if checkpoint.served.dataset_sha256 != dataset.dataset_sha256:
         raise RunError(f"{run_dir} was trained on another dataset than {dataset.directory}")
+    metrics, rows = measure(served_model(checkpoint, weights), dataset)
+    metrics |= {"weights": weights, "epoch": chosen_epoch(checkpoint, weights)}
+    write_csv(run_dir / SAMPLES_FILE, rows)
+    write_json(run_dir / METRICS_FILE, metrics)
+    return metrics
+
+
+def measure(model: nn.Module, dataset: Dataset) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Errors on the test presses through the whole graph: their summary, and a row a sample."""
     maps = dataset.load(dataset.test_ids)
-    model = served_model(checkpoint, weights)
     mask = dataset.interface.mask()
     results = evaluate(lambda p: predict(model, p), maps.pressure_pa, maps.sed_j_per_m3, mask)
     rows = [
@@ -76,13 +90,9 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
         "presses": len(dataset.test_ids),
         "samples": len(measured),
         "samples_without_sed": len(results) - len(measured),
-        "weights": weights,
-        "epoch": chosen_epoch(checkpoint, weights),
         **summarise(measured),
     }
-    write_csv(run_dir / SAMPLES_FILE, rows)
-    write_json(run_dir / METRICS_FILE, metrics)
-    return metrics
+    return metrics, rows
 
 
 def read_metrics(run_dir: Path, checkpoint: Checkpoint, weights: str) -> dict[str, Any]:

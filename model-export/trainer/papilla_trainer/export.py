@@ -10,14 +10,15 @@ from typing import Any
 
 import onnx
 import torch
+from torch import nn
 
 from papilla_trainer import __version__
-from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.checkpoint import Checkpoint, Served
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import SIDE_PX
 from papilla_trainer.evaluation import chosen_epoch, read_metrics, served_model
 from papilla_trainer.files import write_atomic
-from papilla_trainer.network import ServedModel, parameter_count
+from papilla_trainer.network import parameter_count
 
 OPSET = 17
 INPUT = "pressure_pa"
@@ -29,14 +30,18 @@ def export_run(run_dir: Path, out: Path, name: str | None = None, weights: str =
     checkpoint = Checkpoint.load(run_dir)
     metrics = read_metrics(run_dir, checkpoint, weights)
     model = to_onnx(served_model(checkpoint, weights))
-    properties = metadata(checkpoint, metrics, name or out.stem, weights)
-    onnx.helper.set_model_props(model, properties)
+    return write_model(model, metadata(checkpoint, metrics, name or out.stem, weights), out)
+
+
+def write_model(model: onnx.ModelProto, metadata_props: dict[str, str], out: Path) -> Path:
+    """Put the metadata in, check that it is legal ONNX, write; returns ``out``."""
+    onnx.helper.set_model_props(model, metadata_props)
     onnx.checker.check_model(model, full_check=True)
     write_atomic(out, model.SerializeToString())
     return out
 
 
-def to_onnx(model: ServedModel) -> onnx.ModelProto:
+def to_onnx(model: nn.Module) -> onnx.ModelProto:
     """Trace the served graph at batch 1, 224 x 224."""
     example = torch.zeros(1, 1, SIDE_PX, SIDE_PX)
     buffer = io.BytesIO()
@@ -45,6 +50,8 @@ def to_onnx(model: ServedModel) -> onnx.ModelProto:
         # The tracing exporter is marked as the older one; it is kept on purpose: it needs no
         # further package and emits a plain graph without functions.
         warnings.simplefilter("ignore", DeprecationWarning)
+        # Batch 1 is what is served: a loop over the batch may well be unrolled once.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)
         torch.onnx.export(
             model,
             (example,),
@@ -67,11 +74,11 @@ def metadata(
     """The ``metadata_props`` that engine and server read; every value is a string."""
     served = checkpoint.served
     config = TrainConfig(**checkpoint.config)
-    training = {
+    training: dict[str, Any] = {
         "seed": config.seed,
         "epochs": checkpoint.epoch,
         "epoch_chosen": chosen_epoch(checkpoint, weights),
-        "chosen_by": "validation_mse" if checkpoint.splits["validation"] else "last epoch",
+        "chosen_by": "validation loss" if checkpoint.splits["validation"] else "last epoch",
         "optimiser": "Adam",
         "learning_rate": config.learning_rate,
         "schedule": config.schedule,
@@ -84,12 +91,27 @@ def metadata(
         "trainer": __version__,
         **checkpoint.environment,
     }
+    if config.loss_name == "relative":
+        training["loss"] = f"relative L2 squared + {config.far_weight} x that of the far field"
+    if config.operator is not None:
+        training["start"] = "linear operator of the finger"
+    return properties(served, name, config.spec.as_json(), training, metrics)
+
+
+def properties(
+    served: Served,
+    name: str,
+    network: dict[str, Any],
+    training: dict[str, Any],
+    metrics: dict[str, Any],
+) -> dict[str, str]:
+    """``metadata_props`` of any model, trained or not."""
     return {
         "papilla.format": "1",
         "papilla.name": name,
         "papilla.atlas_hash": served.atlas_hash,
         "papilla.effects": json.dumps(served.effects),
-        "papilla.network": json.dumps(config.spec.as_json()),
+        "papilla.network": json.dumps(network),
         "papilla.pressure_max_pa": repr(served.pressure_max_pa),
         "papilla.sed_max_j_per_m3": repr(served.sed_max_j_per_m3),
         "papilla.dataset_sha256": served.dataset_sha256,

@@ -36,7 +36,7 @@ def parse_network(name: str) -> NetworkSpec:
     if match is None or int(match.group(1)) < 1:
         raise UsageError(
             f"unknown network '{name}': give s1-baseN, where N is the channels of the first "
-            "stage, e.g. s1-base4, s1-base8, s1-base16"
+            "stage, e.g. s1-base4, s1-base8, s1-base16; or vertex-r128-h128 and the like"
         )
     return NetworkSpec(kind="s1_unet", base=int(match.group(1)))
 

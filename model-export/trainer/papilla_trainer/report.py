@@ -37,12 +37,12 @@ def plot_history(run_dir: Path, history: list[dict[str, float]], title: str, bes
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     epochs = [line["epoch"] for line in history]
-    axes.semilogy(epochs, [line["train_mse"] for line in history], label="training presses")
-    validation = [line["validation_mse"] for line in history]
+    axes.semilogy(epochs, [line["train_loss"] for line in history], label="training presses")
+    validation = [line["validation_loss"] for line in history]
     if all(value == value for value in validation):
         axes.semilogy(epochs, validation, label="validation presses")
         axes.axvline(best, color="0.6", linestyle=":", label=f"epoch chosen ({best})")
-    axes.set(title=title, xlabel="epoch", ylabel="mean squared error (of maximum squared)")
+    axes.set(title=title, xlabel="epoch", ylabel="loss")
     axes.grid(visible=True, which="both", alpha=0.25)
     axes.legend()
     picture = io.BytesIO()

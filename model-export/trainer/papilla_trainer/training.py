@@ -1,4 +1,4 @@
-"""The training loop: MSE on max-normalised maps, Adam, a checkpoint after each epoch."""
+"""The training loop: Adam and a checkpoint after each epoch."""
 
 from __future__ import annotations
 
@@ -11,16 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
 from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
-from papilla_trainer.dataset import Dataset, Maps, validation_split
+from papilla_trainer.dataset import Dataset, validation_split
 from papilla_trainer.errors import RunError, TrainerError
-from papilla_trainer.network import S1UNet, build_network
 from papilla_trainer.report import write_history
+from papilla_trainer.tasks import frame_of, make_task
+from papilla_trainer.vertex_network import VertexSpec
 
 BEST_LOSS_AT_START = math.inf
+_LARGEST_GRADIENT = 1.0
 
 
 @dataclass
@@ -32,26 +34,6 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
-
-
-@dataclass(frozen=True)
-class Samples:
-    """Normalised maps on the device: float32 ``[N, 1, 224, 224]``, inputs and targets in [0, 1]."""
-
-    inputs: Tensor
-    targets: Tensor
-
-    @staticmethod
-    def of(maps: Maps, dataset: Dataset, device: torch.device) -> Samples:
-        """Divide by the dataset's maxima (S1's normalisation)."""
-        inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / dataset.pressure_max_pa)
-        targets = (
-            torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / dataset.sed_max_j_per_m3)
-        )
-        return Samples(inputs.to(device), targets.to(device))
-
-    def __len__(self) -> int:
-        return self.inputs.shape[0]
 
 
 class Trainer:
@@ -72,20 +54,18 @@ class Trainer:
         threads = make_deterministic(config.seed, config.threads)
         count = config.validation_count(len(dataset.train_ids))
         fit_ids, validation_ids = validation_split(dataset.train_ids, count, config.seed)
-        self.fit_samples = Samples.of(dataset.load(fit_ids), dataset, self.device)
-        self.validation = (
-            Samples.of(dataset.load(validation_ids), dataset, self.device)
-            if validation_ids
-            else None
-        )
-        self.network: S1UNet = build_network(config.spec, config.seed)
-        self.network.to(self.device).to(memory_format=torch.channels_last)
+        # A learning curve takes the first of them: their order says nothing.
+        fit_ids = fit_ids[: config.train_presses]
+        task = make_task(dataset, config, fit_ids, validation_ids, self.device)
+        self.network, self.loss = task.network, task.loss
+        self.fit_samples, self.validation = task.fit, task.validation
+        self.on_vertices = isinstance(config.spec, VertexSpec)
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), lr=config.learning_rate, fused=True
         )
         self.state = Checkpoint(
             config=config.as_json(),
-            served=Served.of(dataset),
+            served=Served.of(dataset, frame_of(dataset) if self.on_vertices else None),
             splits={"fit": fit_ids, "validation": validation_ids, "test": dataset.test_ids},
             epoch=0,
             model=copy_weights(self.network.state_dict()),
@@ -106,13 +86,13 @@ class Trainer:
             rate = self._learning_rate(epoch)
             for group in self.optimizer.param_groups:
                 group["lr"] = rate
-            train_mse = self._train_epoch(epoch, listener)
-            validation_mse = self._validate()
+            train_loss = self._train_epoch(epoch, listener)
+            validation_loss = self._validate()
             seconds = time.perf_counter() - began
             line = {
                 "epoch": epoch,
-                "train_mse": train_mse,
-                "validation_mse": validation_mse,
+                "train_loss": train_loss,
+                "validation_loss": validation_loss,
                 "learning_rate": rate,
                 "seconds": seconds,
                 "samples_per_s": len(self.fit_samples) / seconds,
@@ -128,8 +108,11 @@ class Trainer:
             inputs = self.fit_samples.inputs[chosen]
             targets = self.fit_samples.targets[chosen]
             self.optimizer.zero_grad()
-            loss = nn.functional.mse_loss(self._forward(inputs), targets)
+            loss = self.loss(self._forward(inputs), targets)
             loss.backward()
+            if self.on_vertices:
+                # Squares of squares: a first step too far would throw the operator away.
+                torch.nn.utils.clip_grad_norm_(self.network.parameters(), _LARGEST_GRADIENT)
             self.optimizer.step()
             total += loss.item() * len(chosen)
             listener(Progress(samples=len(chosen)))
@@ -150,7 +133,9 @@ class Trainer:
     def _forward(self, inputs: Tensor) -> Tensor:
         bf16 = self.config.precision == "bf16"
         with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=bf16):
-            output: Tensor = self.network(inputs.contiguous(memory_format=torch.channels_last))
+            if not self.on_vertices:
+                inputs = inputs.contiguous(memory_format=torch.channels_last)
+            output: Tensor = self.network(inputs)
         return output.float()
 
     @torch.no_grad()
@@ -161,7 +146,7 @@ class Trainer:
         total = 0.0
         for chosen in torch.arange(len(self.validation)).split(self.config.batch):
             output = self._forward(self.validation.inputs[chosen])
-            loss = nn.functional.mse_loss(output, self.validation.targets[chosen])
+            loss = self.loss(output, self.validation.targets[chosen])
             total += loss.item() * len(chosen)
         return total / len(self.validation)
 
@@ -176,7 +161,7 @@ class Trainer:
         state.epoch = int(line["epoch"])
         state.model = copy_weights(self.network.state_dict())
         state.optimizer = self.optimizer.state_dict()
-        loss = line["validation_mse"]
+        loss = line["validation_loss"]
         # Without validation presses there is nothing to choose by: the last epoch is the best.
         if math.isnan(loss) or loss < state.best_loss:
             state.best_epoch, state.best_loss = state.epoch, loss

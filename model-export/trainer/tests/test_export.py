@@ -108,9 +108,9 @@ def test_check_finds_what_is_wrong(
     assert "differ" in check_model(tmp_path / "weights.onnx", tiny, run_dir, None).failures[0]
 
     graph = onnx.load(str(model))
-    graph.graph.node[-1].op_type = "Sub"
+    graph.graph.node[-1].op_type = "Div"
     onnx.save(graph, str(tmp_path / "operator.onnx"))
-    assert "Sub" in check_model(tmp_path / "operator.onnx", tiny, None, None).failures[0]
+    assert "Div" in check_model(tmp_path / "operator.onnx", tiny, None, None).failures[0]
 
 
 def test_metrics_of_other_weights_are_not_exported(
@@ -122,5 +122,9 @@ def test_metrics_of_other_weights_are_not_exported(
     (stale / "checkpoint.pt").write_bytes((run_dir / "checkpoint.pt").read_bytes())
     (stale / "metrics.json").write_text(json.dumps({**metrics, "epoch": 99}))
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 4
-    assert evaluate_run(stale, tiny) == metrics
+    again = evaluate_run(stale, tiny)
+    assert again.keys() == metrics.keys()
+    for key, value in metrics.items():
+        # Where in memory the maps lie changes the last bits of a convolution.
+        assert again[key] == (pytest.approx(value, rel=1e-6) if isinstance(value, dict) else value)
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 0

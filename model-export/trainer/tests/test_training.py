@@ -18,7 +18,7 @@ from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
 from papilla_trainer.training import Trainer
 
-LOSSES = ("epoch", "train_mse", "validation_mse", "learning_rate")
+LOSSES = ("epoch", "train_loss", "validation_loss", "learning_rate")
 
 
 def assert_same(a: Checkpoint, b: Checkpoint) -> None:
@@ -35,11 +35,11 @@ def assert_same(a: Checkpoint, b: Checkpoint) -> None:
 
 
 def test_the_loss_goes_down(finished: Checkpoint, config: TrainConfig) -> None:
-    losses = [line["train_mse"] for line in finished.history]
+    losses = [line["train_loss"] for line in finished.history]
     assert len(losses) == config.epochs
     assert losses[-1] < 0.7 * losses[0]
     assert finished.best_epoch >= 1
-    assert finished.best_loss == min(line["validation_mse"] for line in finished.history)
+    assert finished.best_loss == min(line["validation_loss"] for line in finished.history)
 
 
 def test_the_same_seed_gives_the_same_weights(
@@ -48,7 +48,7 @@ def test_the_same_seed_gives_the_same_weights(
     assert_same(Trainer(tiny, config, tmp_path / "again").fit(), finished)
     other = dataclasses.replace(config, seed=8, epochs=1)
     another = Trainer(tiny, other, tmp_path / "other").fit()
-    assert another.history[0]["train_mse"] != finished.history[0]["train_mse"]
+    assert another.history[0]["train_loss"] != finished.history[0]["train_loss"]
 
 
 def test_killed_and_resumed_equals_straight_through(
@@ -122,7 +122,7 @@ def test_training_never_sees_a_test_press(
 def test_mixed_precision_trains_too(tiny: Dataset, config: TrainConfig, tmp_path: Path) -> None:
     bf16 = dataclasses.replace(config, precision="bf16", epochs=2)
     history = Trainer(tiny, bf16, tmp_path / "bf16").fit().history
-    assert history[-1]["train_mse"] < history[0]["train_mse"]
+    assert history[-1]["train_loss"] < history[0]["train_loss"]
 
 
 def test_smoke_on_the_shipped_dataset(
@@ -131,4 +131,4 @@ def test_smoke_on_the_shipped_dataset(
     monkeypatch.setattr(shipped, "train_ids", shipped.train_ids[:4])
     small = dataclasses.replace(config, network="s1-base4", epochs=4, threads=2)
     history = Trainer(shipped, small, tmp_path / "run").fit().history
-    assert history[-1]["train_mse"] < history[0]["train_mse"]
+    assert history[-1]["train_loss"] < history[0]["train_loss"]

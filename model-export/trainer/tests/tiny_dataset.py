@@ -69,7 +69,29 @@ def write_tiny_dataset(directory: Path, presses: int = 6, depths: int = 6, seed:
         "dataset_sha256": hashlib.sha256(hashes.encode()).hexdigest(),
     }
     (directory / "manifest.json").write_text(json.dumps(manifest))
+    atlas = tiny_atlas(manifest["atlas_hash"], skin, interface, triangles)
+    (directory / "atlas.json").write_text(json.dumps(atlas))
     return directory
+
+
+def tiny_atlas(
+    hash_: str, skin: np.ndarray, interface: np.ndarray, triangles: np.ndarray
+) -> dict[str, object]:
+    """A flat patch of 0.1 mm per pixel, mirror-symmetric about its middle column."""
+
+    def patch(uv: np.ndarray, height: float) -> dict[str, list]:
+        x, y = 0.1 * uv[:, 1], 0.1 * (uv[:, 0] - 0.5 * (uv[:, 0].min() + uv[:, 0].max()))
+        positions = np.stack([x, y, np.full_like(x, height)], axis=1)
+        return {"positions_mm": positions.tolist(), "uv_px": uv.tolist()}
+
+    return {
+        "version": 1,
+        "hash": hash_,
+        "mm_per_px": 0.1,
+        "triangles": triangles.tolist(),
+        "skin": patch(skin, 0.0),
+        "interface": patch(interface, 0.2),
+    }
 
 
 def _press(uv: np.ndarray, random: np.random.Generator, depths: int) -> dict[str, np.ndarray]:

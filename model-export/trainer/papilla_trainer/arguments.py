@@ -1,0 +1,193 @@
+"""What the command line understands: commands, options, help."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from papilla_trainer import __version__
+
+Command = Callable[[argparse.Namespace], tuple[dict[str, Any], str]]
+
+_DESCRIPTION = """\
+Trains a network that maps fingertip pressure to strain energy density (SED) and exports it.
+
+From a dataset to a model that the server loads:
+
+  python -m papilla_trainer train    --dataset data/s1 --network s1-base8 --out runs/s1-base8
+  python -m papilla_trainer export   runs/s1-base8 --out models/s1-base8.onnx
+  python -m papilla_trainer check    models/s1-base8.onnx --dataset data/s1 --run runs/s1-base8
+
+`COMMAND --help` explains each one."""
+
+_EPILOG = """\
+exit codes: 0 done; 1 a check failed or training diverged; 2 wrong arguments; 3 unreadable or
+damaged dataset; 4 the run directory does not fit; 130 interrupted (go on with --resume)."""
+
+_TRAIN = """\
+Trains a network on the training presses of a dataset. A tenth of them is set aside to choose the
+epoch by; the test presses are touched once, after training, for the metrics.
+
+s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
+vertex-rR[-cC][-nK[-g]][-hH[xL]] works on the vertices of the atlas and answers sums of squares: a
+low-rank linear map of rank R, C components a vertex, a stencil of K vertices (-g: with gains that
+depend on the pressures), L gated layers of width H on the low-rank coordinates.
+
+Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
+and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
+--resume goes on from the last whole epoch and ends in the same weights, bit for bit."""
+
+_EVALUATE = """\
+Measures a run on the held-out presses again (train does so at its end): relative L2, far field
+(where SED < 10 % of its maximum), peak, total energy, SSIM; median and bad end. Use it after an
+interrupted run, or to measure the last weights instead of the best."""
+
+_EXPORT = """\
+Writes a run's model as ONNX (opset 17, plain operators only).
+Input `pressure_pa` and output `sed_j_per_m3` are float32 [1, 1, 224, 224] in physical units:
+scaling, the clamp at zero and the interface mask are inside the graph, and the file carries its
+atlas hash, effects, scales, training settings and held-out metrics as metadata."""
+
+_CHECK = """\
+Checks an exported model: legal ONNX with strict shape inference, plain operators, the interface
+and metadata that the engine expects, finite and non-negative output that is zero outside the
+patch; with --run, ONNX Runtime against PyTorch (1e-5 of the maximum at most). --reference writes
+inputs and ONNX Runtime's outputs of held-out samples, for `model-export evaluate` to compare its
+own engine with."""
+
+
+_OPERATOR = """\
+Writes the finger's own linear operator (what `fe-datagen operator` wrote) as a model, without
+training: a low-rank part of global reach and, with --near, the exact rest at the nearest vertices.
+The dataset's training pressures say which directions matter; its test presses give the metrics."""
+
+_HALF_SPACE = """\
+Writes the closed form as a model, without training: Boussinesq's stresses in one elastic half-space
+under the pressure on the flattened skin (Phillips & Johnson 1981), compressed like an operator."""
+
+
+def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
+    """The parser; each command's function stands under its name."""
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(
+        "papilla_trainer", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=raw
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def command(name: str, summary: str, description: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(
+            name, help=summary, description=description, epilog=_EPILOG, formatter_class=raw
+        )
+        sub.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+        sub.set_defaults(run=commands_to_run[name])
+        return sub
+
+    _train_arguments(command("train", "train a network on a dataset", _TRAIN))
+
+    evaluate = command("evaluate", "measure a run on the held-out presses", _EVALUATE)
+    evaluate.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
+    _dataset_argument(evaluate)
+    _weights_argument(evaluate)
+
+    export = command("export", "write a run's model as ONNX", _EXPORT)
+    export.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
+    export.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    export.add_argument("--name", help="name of the model (default: the file's stem)")
+    _weights_argument(export)
+
+    check = command("check", "check an exported model", _CHECK)
+    check.add_argument("model", type=Path, metavar="FILE.onnx")
+    _dataset_argument(check)
+    check.add_argument("--run", dest="run_dir", type=Path, metavar="RUN_DIR")
+    check.add_argument("--reference", type=Path, metavar="FILE.npz")
+    check.add_argument("--samples", type=int, default=8, help="held-out samples (default 8)")
+
+    operator = command("operator", "write the finger's linear operator as ONNX", _OPERATOR)
+    operator.add_argument("operator", type=Path, metavar="OPERATOR.npz")
+    _untrained_arguments(operator)
+    half_space = command("half-space", "write the closed form as ONNX", _HALF_SPACE)
+    _untrained_arguments(half_space)
+    add = half_space.add_argument
+    add("--youngs-modulus-pa", type=float, default=80e3, help="of the dermis (80e3)")
+    add("--poissons-ratio", type=float, default=0.48, help="(0.48)")
+    add("--depth-mm", type=float, default=0.2, help="of the interface below the skin (0.2)")
+    return parser
+
+
+def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
+    _dataset_argument(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    parser.add_argument("--name", help="name of the model (default: the file's stem)")
+    parser.add_argument("--rank", type=int, default=64, help="of the global part, even (64)")
+    parser.add_argument(
+        "--near", type=int, default=16, help="vertices of the stencil (16; 0: none)"
+    )
+
+
+def _train_arguments(parser: argparse.ArgumentParser) -> None:
+    _dataset_argument(parser)
+    add = parser.add_argument
+    add("--network", default="s1-base8", help="s1-baseN or vertex-... (s1-base8)")
+    add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
+    add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
+    add("--epochs", type=int, default=40, help="passes over the training presses (40)")
+    add("--seed", type=int, default=0, help="of initial weights, order and validation presses (0)")
+    add("--batch", type=int, default=4, help="samples in one step (4)")
+    add("--learning-rate", type=float, default=1e-3, help="Adam's (S1: 1e-3)")
+    add(
+        "--schedule",
+        choices=("constant", "cosine"),
+        default="constant",
+        help="learning rate over the epochs (S1: constant; cosine falls to zero at the last)",
+    )
+    add(
+        "--precision",
+        choices=("f32", "bf16"),
+        default="f32",
+        help="bf16: mixed precision, faster where CPU or GPU has bfloat16; weights stay f32",
+    )
+    add(
+        "--validation-presses",
+        type=int,
+        metavar="N",
+        help="training presses set aside to choose the epoch (default a tenth; 0: use the last)",
+    )
+    add(
+        "--loss",
+        choices=("auto", "mse", "relative"),
+        default="auto",
+        help="mse: S1's, of max-normalised maps; relative: squared relative L2 of each sample, the "
+        "far field once more (auto: mse for s1-*, relative for vertex-*)",
+    )
+    add("--far-weight", type=float, default=0.2, help="of the far field in `relative` (0.2)")
+    add("--operator", metavar="FILE.npz", help="start a vertex network from this linear operator")
+    add(
+        "--train-presses",
+        type=int,
+        metavar="N",
+        help="fit to the first N training presses only, for a learning curve",
+    )
+    add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
+    add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
+
+
+def _dataset_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--dataset",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="what `fe-datagen generate` wrote",
+    )
+
+
+def _weights_argument(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--weights",
+        choices=("best", "last"),
+        default="best",
+        help="of the epoch with the least validation loss, or of the last (best)",
+    )

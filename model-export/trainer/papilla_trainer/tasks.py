@@ -1,0 +1,126 @@
+"""What a run trains: the network, its samples and its loss, for maps (S1) or for vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from papilla_trainer.atlas import Atlas
+from papilla_trainer.config import TrainConfig
+from papilla_trainer.dataset import F32, Dataset, Maps
+from papilla_trainer.losses import Loss, make_loss
+from papilla_trainer.network import NetworkSpec, S1UNet, build_network
+from papilla_trainer.vertex_init import Operator, start_from_operator, start_from_pressures
+from papilla_trainer.vertex_network import VertexLayout, VertexNet, VertexSpec
+from papilla_trainer.vertex_served import MapFrame
+
+
+@dataclass(frozen=True)
+class Samples:
+    """On the device: normalised maps ``[N, 1, 224, 224]``, or values ``[N, V]`` in Pa and J/m3."""
+
+    inputs: Tensor
+    targets: Tensor
+
+    @staticmethod
+    def of(maps: Maps, dataset: Dataset, device: torch.device) -> Samples:
+        """Divide by the dataset's maxima (S1's normalisation)."""
+        inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / dataset.pressure_max_pa)
+        targets = (
+            torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / dataset.sed_max_j_per_m3)
+        )
+        return Samples(inputs.to(device), targets.to(device))
+
+    def __len__(self) -> int:
+        return self.inputs.shape[0]
+
+
+@dataclass(frozen=True)
+class Task:
+    """All that the training loop has to know."""
+
+    network: nn.Module
+    fit: Samples
+    validation: Samples | None
+    loss: Loss
+
+
+def make_task(
+    dataset: Dataset,
+    config: TrainConfig,
+    fit_ids: list[int],
+    validation_ids: list[int],
+    device: torch.device,
+) -> Task:
+    """Load the presses named, and no others, and build the network."""
+    spec = config.spec
+    load = _load_vertices if isinstance(spec, VertexSpec) else _load_maps
+    fit = load(dataset, fit_ids, device)
+    validation = load(dataset, validation_ids, device) if validation_ids else None
+    if isinstance(spec, VertexSpec):
+        network = fresh_vertex_network(dataset, config, fit.inputs.cpu())
+        weights = torch.from_numpy(pixels_of_vertices(dataset))
+    else:
+        network = build_network(spec, config.seed).to(memory_format=torch.channels_last)
+        weights = torch.from_numpy(dataset.interface.mask())
+    loss = make_loss(config.loss_name, weights.to(device), config.far_weight)
+    return Task(network.to(device), fit, validation, loss)
+
+
+def fresh_vertex_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tensor) -> VertexNet:
+    """A start from the linear operator where one is given, else from the data's main directions.
+
+    The same seed gives the same weights.
+    """
+    spec = config.spec
+    if not isinstance(spec, VertexSpec):
+        raise TypeError("not a vertex network")
+    atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(config.seed)
+        network = VertexNet(spec, VertexLayout.of(atlas, spec.near))
+    if config.operator is not None:
+        operator = Operator.read(Path(config.operator), atlas)
+        weights = torch.from_numpy(pixels_of_vertices(dataset))
+        start_from_operator(network, operator, pressure_pa, weights)
+    else:
+        start_from_pressures(network, pressure_pa)
+    return network
+
+
+def trained_network(spec: NetworkSpec | VertexSpec, weights: dict[str, Tensor]) -> nn.Module:
+    """A network that holds these weights."""
+    network = (
+        VertexNet(spec, VertexLayout.of_weights(weights))
+        if isinstance(spec, VertexSpec)
+        else S1UNet(spec.base)
+    )
+    network.load_state_dict(weights)
+    return network
+
+
+def frame_of(dataset: Dataset) -> dict[str, Tensor]:
+    """The constants of `MapFrame`, for the checkpoint."""
+    return dict(MapFrame.of(dataset.skin, dataset.interface, dataset.vertex_count).state_dict())
+
+
+def pixels_of_vertices(dataset: Dataset) -> F32:
+    """``[V]``: the pixels that each interface vertex stands for, which is what its error counts."""
+    raster = dataset.interface
+    counts = np.bincount(
+        raster.vertex.ravel(), weights=raster.weight.ravel(), minlength=dataset.vertex_count
+    )
+    return counts.astype(np.float32)
+
+
+def _load_maps(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
+    return Samples.of(dataset.load(ids), dataset, device)
+
+
+def _load_vertices(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
+    pressure, sed = dataset.load_vertices(ids)
+    return Samples(torch.from_numpy(pressure).to(device), torch.from_numpy(sed).to(device))
