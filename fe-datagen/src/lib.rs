@@ -16,6 +16,7 @@ pub mod indenter;
 pub mod linear;
 pub mod material;
 pub mod mesh;
+pub mod operator;
 pub mod output;
 pub mod press;
 pub mod s2;
