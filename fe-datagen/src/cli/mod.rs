@@ -8,6 +8,7 @@ mod export;
 mod generate;
 mod lines;
 mod operator;
+mod rungs;
 mod s2;
 mod schema;
 mod solve;
@@ -39,6 +40,7 @@ enum Command {
     Schema(schema::Args),
     Generate(generate::Args),
     Operator(operator::Args),
+    Rungs(rungs::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
@@ -63,6 +65,7 @@ pub fn run() -> ExitCode {
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => operator::run(&args),
+        Command::Rungs(args) => rungs::run(&args),
         Command::S2(args) => s2::run(&args),
     };
     match result {

@@ -3,10 +3,10 @@
 use super::print;
 use crate::mesh::fingertip::{Density, Order};
 use crate::operator::{self, Card};
+use crate::press::study::processor_s;
 use crate::scene::TissueTable;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::time::Instant;
 
 /// Solve this finger at small strain for unit pressure at every skin vertex.
 ///
@@ -34,20 +34,21 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let clock = Instant::now();
+    let begun_s = processor_s();
     let (order, materials) = (Order::Linear, TissueTable::default());
     let body = operator::body(args.density, order, &materials)?;
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let bar = super::progress("solving for vertices", vertices);
     let operator = operator::build(&body, &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    let seconds = clock.elapsed().as_secs_f64();
+    let seconds = processor_s() - begun_s;
     let card = Card::new(&operator, args.density, order, &materials, seconds);
     operator::write(&args.out, &operator, &card)?;
     print(&card, args.json, || {
         let q = &card.quality;
         format!(
-            "operator of {} vertices ({} unknowns) in {seconds:.0} s: residual at most {:.1e}, \
+            "operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
+             residual at most {:.1e}, \
              reciprocity to {:.1e}\natlas {}\nwrote {}",
             card.vertices,
             q.unknowns,

@@ -86,6 +86,12 @@ impl SedRecovery {
         &self.samples
     }
 
+    /// Per node the samples that it averages, with weights that sum to 1.
+    #[must_use]
+    pub fn terms(&self) -> &[Vec<(usize, f64)>] {
+        &self.terms
+    }
+
     /// Nodal means of values at [`Self::samples`].
     #[must_use]
     pub fn average(&self, values: &[f64]) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! Assembling, factorizing and solving for every vertex of the skin.
 
-use super::strain::StrainMap;
-use super::{COMPONENTS, Operator, OperatorError, Quality};
+use super::strain::{StrainMap, Weighted};
+use super::{COMPONENTS, Faces, Operator, OperatorError, Quality};
 use crate::linear::{Direct, Equations, Structure, SymmetricMatrix};
 use crate::mesh::Surface;
 use crate::mesh::surface::norm;
@@ -47,22 +47,29 @@ pub fn build(body: &Body, progress: &mut dyn FnMut(usize)) -> Result<Operator, O
     let mut solved = Columns::new(problem, &tangent, &loads)?;
     let vertices = loads.len();
     let mut g = vec![0f32; vertices * COMPONENTS * vertices];
+    let mut of_faces = vec![0f32; strain.samples() * COMPONENTS * vertices];
     for first in (0..vertices).step_by(COLUMNS) {
         let last = (first + COLUMNS).min(vertices);
         for (j, u) in (first..last).zip(solved.solve(first..last)) {
             let at = |node: u32| displacement(&problem.structure, u, node);
-            for (k, component) in strain.apply(at).into_iter().enumerate() {
-                for (v, value) in component.into_iter().enumerate() {
-                    let place = (v * COMPONENTS + k) * vertices + j;
-                    g[place] = (SQRT_J_PER_M3_PER_PA * value) as f32;
-                }
-            }
+            let faces = strain.apply(at);
+            put(&mut g, &strain.average(&faces), j, vertices);
+            put(&mut of_faces, &faces, j, vertices);
         }
         progress(last);
     }
     let quality = solved.quality()?;
     let area_mm2 = loads.iter().map(|l| l.area_mm2).collect();
-    Ok(Operator { atlas_hash: atlas.hash().to_owned(), g, area_mm2, quality })
+    let faces = Faces { g: of_faces, of_vertex: strain.terms().to_vec() };
+    Ok(Operator { atlas_hash: atlas.hash().to_owned(), g, faces, area_mm2, quality })
+}
+
+/// Puts strain under unit pressure at vertex `j` into its column.
+fn put(g: &mut [f32], strain: &[Weighted], j: usize, vertices: usize) {
+    let rows = g.chunks_exact_mut(vertices);
+    for (row, value) in rows.zip(strain.as_flattened()) {
+        row[j] = (SQRT_J_PER_M3_PER_PA * value) as f32;
+    }
 }
 
 /// Loads of unit pressure at `nodes` of the surface.

@@ -8,7 +8,12 @@
 //!
 //! `SED_v = sum_k (sum_j g[v, k, j] p_j)^2`.
 //!
-//! [`Operator`] holds `g`. In prose: `docs/operator.md`.
+//! That averages strain from the faces round a vertex. The record of a press averages SED
+//! instead, which is more where strain changes from face to face, as shear does below
+//! a narrow contact. [`Faces`] holds the strain of each face, of which SED is the mean
+//! of sums of squares, exactly as recorded.
+//!
+//! In prose: `docs/operator.md`.
 
 mod build;
 mod error;
@@ -36,10 +41,22 @@ pub struct Operator {
     pub atlas_hash: String,
     /// sqrt(J/m3) per Pa, `[vertex of the interface][component][vertex of the skin]`.
     pub g: Vec<f32>,
+    /// The same face by face, before strain is averaged to the vertices.
+    pub faces: Faces,
     /// Area of each skin vertex, undeformed, mm2.
     pub area_mm2: Vec<f64>,
     /// How well the systems were solved.
     pub quality: Quality,
+}
+
+/// Strain on the F faces of the interface round its V vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Faces {
+    /// sqrt(J/m3) per Pa, `[face][component][vertex of the skin]`.
+    pub g: Vec<f32>,
+    /// Per vertex of the interface the faces of which its SED is the mean, with weights that
+    /// sum to 1.
+    pub of_vertex: Vec<Vec<(usize, f64)>>,
 }
 
 /// What the operator is checked by.
@@ -61,11 +78,26 @@ impl Operator {
         self.area_mm2.len()
     }
 
-    /// SED on the dermis side, J/m3, of pressures at the skin's vertices, Pa.
+    /// SED on the dermis side, J/m3, of pressures at the skin's vertices, Pa: squares of
+    /// strain averaged to the vertices.
     ///
     /// # Errors
     /// [`OperatorError::Pressures`] for another number of them.
     pub fn sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
+        self.sums_of_squares(&self.g, pressure_pa)
+    }
+
+    /// SED on the dermis side, J/m3, as a press records it: means of the faces' SED.
+    ///
+    /// # Errors
+    /// [`OperatorError::Pressures`] for another number of pressures.
+    pub fn recorded_sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
+        let of_face = self.sums_of_squares(&self.faces.g, pressure_pa)?;
+        let mean = |t: &Vec<(usize, f64)>| t.iter().map(|&(f, w)| w * of_face[f]).sum();
+        Ok(self.faces.of_vertex.iter().map(mean).collect())
+    }
+
+    fn sums_of_squares(&self, g: &[f32], pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
         let vertices = self.vertices();
         if pressure_pa.len() != vertices {
             let found = pressure_pa.len();
@@ -74,8 +106,8 @@ impl Operator {
         let square = |row: &[f32]| {
             row.iter().zip(pressure_pa).map(|(g, p)| f64::from(*g) * p).sum::<f64>().powi(2)
         };
-        let of_vertex = |rows: &[f32]| rows.chunks_exact(vertices).map(square).sum();
-        Ok(self.g.chunks_exact(COMPONENTS * vertices).map(of_vertex).collect())
+        let sum = |rows: &[f32]| rows.chunks_exact(vertices).map(square).sum();
+        Ok(g.chunks_exact(COMPONENTS * vertices).map(sum).collect())
     }
 }
 

@@ -35,15 +35,14 @@ pub fn weighted(h: &Mat3, dilatation: f64, mu_mpa: f64, bulk_mpa: f64) -> Weight
     [a, b, c, d, e, (0.5 * bulk_mpa).sqrt() * dilatation]
 }
 
-/// The map from displacement to weighted strain at the interface's vertices.
+/// The map from displacement to weighted strain on the interface's faces.
 ///
-/// Strain is sampled where SED is sampled and averaged to the vertices by the same
-/// weights, the dilatation being the element's own (constant or linear in an element).
-/// The record of a press averages SED instead, which is the same where neighbouring
-/// faces strain alike and more where they do not.
+/// Strain is sampled where SED is sampled and the dilatation is the element's own
+/// (constant or linear in an element). A vertex averages its samples by the
+/// weights that the record of a press averages SED with.
 pub struct StrainMap {
-    recovery: SedRecovery,
     samples: Vec<SampleMap>,
+    terms: Vec<Vec<(usize, f64)>>,
 }
 
 /// Weighted strain of one sample for a unit displacement of each of its element's
@@ -71,9 +70,18 @@ impl StrainMap {
     /// [`StrainError`] if a node has no dermis below it.
     pub fn new(problem: &Problem, nodes: &[u32]) -> Result<Self, StrainError> {
         let recovery = SedRecovery::new(&problem.mesh, "interface", Tissue::Dermis, nodes)?;
-        let samples = recovery
-            .samples()
+        let mut used: Vec<usize> = recovery.terms().iter().flatten().map(|t| t.0).collect();
+        used.sort_unstable();
+        used.dedup();
+        let place = |s: &usize| used.binary_search(s).unwrap_or_default();
+        let terms = recovery
+            .terms()
             .iter()
+            .map(|terms| terms.iter().map(|(s, w)| (place(s), *w)).collect())
+            .collect();
+        let samples = used
+            .iter()
+            .map(|&s| &recovery.samples()[s])
             .map(|sample| {
                 let block = &problem.mesh.blocks[sample.block];
                 let nodes = block.element(sample.element).to_vec();
@@ -98,18 +106,35 @@ impl StrainMap {
                 Ok(SampleMap { nodes, columns })
             })
             .collect::<Result<Vec<_>, Inverted>>()?;
-        Ok(Self { recovery, samples })
+        Ok(Self { samples, terms })
     }
 
-    /// Weighted strain, sqrt(MPa), at the vertices: one list of vertices a component.
-    /// `u(node)` is a node's displacement, mm.
+    /// Number of samples: faces of the interface round the vertices.
     #[must_use]
-    pub fn apply(&self, u: impl Fn(u32) -> [f64; 3]) -> [Vec<f64>; COMPONENTS] {
-        let values: Vec<Weighted> = self.samples.iter().map(|s| s.apply(&u)).collect();
-        std::array::from_fn(|k| {
-            let component: Vec<f64> = values.iter().map(|v| v[k]).collect();
-            self.recovery.average(&component)
-        })
+    pub fn samples(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Per vertex the samples that it averages, with weights that sum to 1.
+    #[must_use]
+    pub fn terms(&self) -> &[Vec<(usize, f64)>] {
+        &self.terms
+    }
+
+    /// Weighted strain, sqrt(MPa), of every sample. `u(node)` is a node's
+    /// displacement, mm.
+    #[must_use]
+    pub fn apply(&self, u: impl Fn(u32) -> [f64; 3]) -> Vec<Weighted> {
+        self.samples.iter().map(|s| s.apply(&u)).collect()
+    }
+
+    /// Means of the samples' strain at the vertices.
+    #[must_use]
+    pub fn average(&self, samples: &[Weighted]) -> Vec<Weighted> {
+        let mean = |terms: &Vec<(usize, f64)>| {
+            std::array::from_fn(|k| terms.iter().map(|&(s, w)| w * samples[s][k]).sum())
+        };
+        self.terms.iter().map(mean).collect()
     }
 }
 
