@@ -170,7 +170,7 @@ pub(super) fn assemble(
         let mut entry = entry(*rung, parts, &places, v, reference, file);
         entry.reference = is_reference;
         if let (true, Some(check)) = (is_reference, check.first()) {
-            entry.discretisation_error = discretisation(*rung, parts, check, v, &mut left_out);
+            entry.discretisation_error = discretisation(parts, check, v, &mut left_out);
         }
         entries.push(entry);
     }
@@ -264,7 +264,6 @@ fn entry(
 
 /// How far the reference's parts are from the check's.
 fn discretisation(
-    reference: Rung,
     parts: &[Part],
     (rung, check): &Solved,
     v: usize,
@@ -294,11 +293,10 @@ fn discretisation(
         unknowns: check[0].record.unknowns,
         seconds_median: quantiles(seconds.into_iter()).median,
         how: format!(
-            "median over {states} states of {} of the relative L2 difference of SED from {}: the \
-             order above on the same surface lattice, whose own error is smaller",
+            "median over {states} states of {} of the relative L2 difference of SED from {}",
             count(presses.len(), "press", "presses"),
             rung.name(),
-        ) + &format!("; {} is the reference", reference.name()),
+        ),
         presses,
     })
 }

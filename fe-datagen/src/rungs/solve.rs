@@ -4,8 +4,10 @@ use super::store::{Part, Record};
 use super::{Rung, RungsError, Strain};
 use crate::campaign::{CampaignSpec, Press};
 use crate::dataset::fault;
+use crate::mesh::Tissue;
 use crate::mesh::fingertip::{Density, Order};
 use crate::mesh::nearest::NearestPoints;
+use crate::mesh::recovery::SedRecovery;
 use crate::press::body::{Body, PressError};
 use crate::press::drive::{Approach, Drive};
 use crate::press::fields::PA_PER_MPA;
@@ -81,6 +83,7 @@ pub(super) struct Prepared {
     name: String,
     body: Body,
     friction: f64,
+    dermis: SedRecovery,
     skin: NearestPoints,
     interface: NearestPoints,
     setup_s: f64,
@@ -99,7 +102,12 @@ impl Prepared {
         let Some((skin, interface, triangles)) = surfaces(&body) else {
             return Err(RungsError::NoPatch { rung: name });
         };
+        let nodes = &body.patch.as_ref().map_or(&[][..], |p| &p.patch.interface);
+        let dermis =
+            SedRecovery::by_quarters(&body.problem.mesh, "interface", Tissue::Dermis, nodes)
+                .map_err(|e| RungsError::Rung { rung: rung.name(), source: Box::new(e.into()) })?;
         Ok(Self {
+            dermis,
             skin: NearestPoints::new(&skin, &triangles, &target.skin),
             interface: NearestPoints::new(&interface, &triangles, &target.interface),
             name,
@@ -156,7 +164,15 @@ impl Prepared {
     ) -> Result<(), PressError> {
         let mut solver = self.body.solver(Options::default())?;
         let drive = Drive::Depths(press.depths_mm.clone());
-        self.body.press(&mut solver, approach, &drive, 1, &mut |_, record, _| keep(record))
+        let mut read = Ok(());
+        self.body.press(&mut solver, approach, &drive, 1, &mut |solver, record, _| {
+            let history = |block, element| solver.history_of(block, element);
+            match self.dermis.sed_mpa(&self.body.deformed(solver, &history)) {
+                Ok(sed_dermis_mpa) => keep(&IncrementRecord { sed_dermis_mpa, ..record.clone() }),
+                Err(error) => read = Err(error),
+            }
+        })?;
+        Ok(read?)
     }
 
     fn keep(&self, part: &mut Part, record: &IncrementRecord, seconds: f64) {

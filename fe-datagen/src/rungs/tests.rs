@@ -42,11 +42,12 @@ fn spec() -> CampaignSpec {
 }
 
 fn ladder() -> Ladder {
+    let quadratic = Rung::new(Density::Coarse, Order::Quadratic, Strain::Finite);
     Ladder {
         atlas: Density::Coarse,
-        rungs: vec![Rung::new(Density::Coarse, Order::Linear, Strain::Small), COARSE],
-        reference: Rung::new(Density::Coarse, Order::Quadratic, Strain::Finite),
-        check: Some(COARSE),
+        rungs: vec![Rung::new(Density::Coarse, Order::Linear, Strain::Small), quadratic],
+        reference: COARSE,
+        check: Some(quadratic),
         checked: 1,
     }
 }
@@ -60,14 +61,16 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     assert!(report.left_out.is_empty(), "{:?}", report.left_out);
     let shapes: Vec<_> = report.states.iter().map(|s| s.shape.as_str()).collect();
     assert!(shapes.contains(&"plate") && shapes.contains(&"sphere"), "{shapes:?}");
-    let [small, finite, reference] = &report.rungs[..] else { panic!("{:?}", report.rungs) };
-    assert!(reference.reference && !finite.reference);
+    let [small, quadratic, reference] = &report.rungs[..] else { panic!("{:?}", report.rungs) };
+    assert!(reference.reference && !quadratic.reference);
     assert!(reference.sed_relative_l2.p95 == 0.0);
-    // The check is a rung that is solved anyway: it is as far from the reference.
     let own = reference.discretisation_error.as_ref().unwrap();
-    println!("small {:?}, finite {:?}, own {own:?}", small.sed_relative_l2, finite.sed_relative_l2);
-    assert!(own.states == 2 && own.sed_relative_l2 > 0.01);
-    assert!(finite.sed_relative_l2.median > 0.0 && finite.sed_relative_l2.p95 < 0.6);
+    println!("small strain {:?}, own {own:?}", small.sed_relative_l2);
+    assert!(own.states == 2 && own.sed_relative_l2 > 0.01 && own.presses.len() == 1);
+    // At such depths strain is small; these few nodes in contact are no resolved contact, so
+    // of the quadratic rung only force is asked.
+    assert!(small.sed_relative_l2.median > 1e-4 && small.sed_relative_l2.p95 < 0.3);
+    assert!(quadratic.sed_relative_l2.median.is_finite());
     for rung in &report.rungs {
         assert!(rung.seconds.chunks(2).all(|s| 0.0 < s[0] && s[0] < s[1]), "path included");
         let path = folder.path().join(&rung.file);
@@ -77,6 +80,7 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
         let force = npz.get::<f32, Ix2>("force_n").unwrap();
         assert_eq!((sed.nrows(), force.dim()), (4, (4, 3)));
         assert!(sed.iter().all(|s| s.is_finite() && *s >= 0.0));
+        assert!(force.rows().into_iter().all(|f| f[2] > 0.0), "the pad is pushed up");
         assert_eq!(npz.get::<f32, Ix2>("pressure_pa").unwrap().dim(), sed.dim());
     }
     // Again: nothing is solved, so the times are those of the first run; and a part
