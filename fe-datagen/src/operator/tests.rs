@@ -84,8 +84,9 @@ fn a_smooth_pressure_gives_the_sed_that_the_solver_gives() {
 }
 
 /// A real press at small strain: pressure and SED as a dataset records them. What is left
-/// by face is that a press records pressure per deformed area, and that its force acts along
-/// the indenter's normal; with the nominal traction only the second is left.
+/// by face is where its forces point: along the plate's normal, to which the skin has
+/// turned, not along the skin's at rest. That recorded pressure is per deformed area
+/// matters little: the nominal traction does no better.
 #[test]
 fn a_press_of_small_strain_is_reproduced() {
     let (body, operator) = finger();
@@ -103,7 +104,10 @@ fn a_press_of_small_strain_is_reproduced() {
              by vertex {averaged:.4}"
         );
         assert!(averaged >= difference);
-        assert!(difference < accepted && nominal < 0.2, "{depth_mm} mm: {difference} {nominal}");
+        assert!(
+            difference < accepted && nominal < accepted,
+            "{depth_mm} mm: {difference} {nominal}"
+        );
     }
 }
 
