@@ -7,13 +7,14 @@
 
 mod assemble;
 mod error;
+mod report;
 mod solve;
 mod store;
 #[cfg(test)]
 mod tests;
 
-pub use assemble::{LeftOut, Report, RungEntry, StateEntry};
 pub use error::RungsError;
+pub use report::{DiscretisationError, LeftOut, Quantiles, Report, RungEntry, StateEntry};
 
 use crate::campaign::{CampaignSpec, Press, presses, splits};
 use crate::mesh::fingertip::{Density, Order};
