@@ -152,7 +152,7 @@ pub fn run(
                         Some(ready) => ready,
                         None => Prepared::new(spec, rung, &target)?,
                     };
-                    let part = ready.part(spec, press)?;
+                    let part = ready.part(spec, press, &target)?;
                     prepared = Some(ready);
                     store.write(&name, &part)?;
                     part

@@ -20,6 +20,7 @@ use crate::solve::Options;
 /// Where every field is read.
 pub(super) struct Target {
     pub atlas_hash: String,
+    body: Body,
     /// Undeformed vertices of skin and interface, mm.
     skin: Vec<[f64; 3]>,
     interface: Vec<[f64; 3]>,
@@ -33,7 +34,7 @@ impl Target {
         let no_patch = || RungsError::NoPatch { rung: rung.name() };
         let (atlas, _) = body.atlas().ok_or_else(no_patch)??;
         let (skin, interface, _) = surfaces(&body).ok_or_else(no_patch)?;
-        Ok(Self { atlas_hash: atlas.hash().to_owned(), skin, interface })
+        Ok(Self { atlas_hash: atlas.hash().to_owned(), body, skin, interface })
     }
 
     pub(super) fn vertices(&self) -> usize {
@@ -118,7 +119,12 @@ impl Prepared {
     }
 
     /// Presses; a state that finds no equilibrium ends the part and is told of in it.
-    pub(super) fn part(&self, spec: &CampaignSpec, press: &Press) -> Result<Part, RungsError> {
+    pub(super) fn part(
+        &self,
+        spec: &CampaignSpec,
+        press: &Press,
+        target: &Target,
+    ) -> Result<Part, RungsError> {
         let candidate = &spec.candidates()[press.candidate];
         let approach = Approach {
             shape: candidate.indenter.build(&spec.folder)?,
@@ -138,8 +144,15 @@ impl Prepared {
             },
             ..Part::default()
         };
+        let failed =
+            |e: PressError| RungsError::Rung { rung: self.name.clone(), source: Box::new(e) };
+        let (approach, depths_mm) =
+            self.in_place(approach, &press.depths_mm, target).map_err(failed)?;
+        part.record.depth_shift_mm = depths_mm[0] - press.depths_mm[0];
+        part.record.offset_shift_mm =
+            std::array::from_fn(|i| approach.offset_mm[i] - press.offset_mm[i]);
         let begun_s = processor_s();
-        let pressed = self.press(press, &approach, &mut |record| {
+        let pressed = self.press(depths_mm, &approach, &mut |record| {
             let seconds = processor_s() - begun_s;
             self.keep(&mut part, record, seconds);
         });
@@ -156,14 +169,39 @@ impl Prepared {
         Ok(part)
     }
 
+    /// The approach and depths that put the indenter where the target's body has it.
+    ///
+    /// A pose is told from the first skin node that a plate touches and depth from first
+    /// touch, and both depend on the mesh: unmoved, a rung would press another spot.
+    fn in_place(
+        &self,
+        mut approach: Approach,
+        depths_mm: &[f64],
+        target: &Target,
+    ) -> Result<(Approach, Vec<f64>), PressError> {
+        let drive = Drive::Depths(depths_mm.to_vec());
+        let wanted = target.body.indenter(&approach, &drive)?.start.origin_mm;
+        let rotation = self.body.rotation(approach.pose);
+        let mut off = [0.0; 3];
+        for _ in 0..2 {
+            let found = self.body.indenter(&approach, &drive)?.start.origin_mm;
+            off = std::array::from_fn(|k| {
+                (0..3).map(|i| rotation[i][k] * (wanted[i] - found[i])).sum()
+            });
+            approach.offset_mm[0] += off[0];
+            approach.offset_mm[1] += off[1];
+        }
+        Ok((approach, depths_mm.iter().map(|d| d + off[2]).collect()))
+    }
+
     fn press(
         &self,
-        press: &Press,
+        depths_mm: Vec<f64>,
         approach: &Approach,
         keep: &mut dyn FnMut(&IncrementRecord),
     ) -> Result<(), PressError> {
         let mut solver = self.body.solver(Options::default())?;
-        let drive = Drive::Depths(press.depths_mm.clone());
+        let drive = Drive::Depths(depths_mm);
         let mut read = Ok(());
         self.body.press(&mut solver, approach, &drive, 1, &mut |solver, record, _| {
             let history = |block, element| solver.history_of(block, element);

@@ -37,6 +37,10 @@ pub(super) struct Record {
     pub setup_seconds: f64,
     /// Largest distance of a target's vertex from the rung's own surface, mm.
     pub distance_mm_max: f64,
+    /// How much farther than the press says the indenter goes from this mesh's first touch,
+    /// and is offset, to be where the target's mesh has it, mm.
+    pub depth_shift_mm: f64,
+    pub offset_shift_mm: [f64; 2],
     /// Processor seconds from the start of the press to each state.
     pub seconds: Vec<f64>,
     pub checks: Vec<Checks>,
@@ -64,6 +68,8 @@ impl Default for Record {
             factor_entries: 0,
             setup_seconds: 0.0,
             distance_mm_max: 0.0,
+            depth_shift_mm: 0.0,
+            offset_shift_mm: [0.0; 2],
             seconds: Vec::new(),
             checks: Vec::new(),
             faults: Vec::new(),
