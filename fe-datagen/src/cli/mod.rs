@@ -7,6 +7,8 @@ mod explain;
 mod export;
 mod generate;
 mod lines;
+mod operator;
+mod rungs;
 mod s2;
 mod schema;
 mod solve;
@@ -37,6 +39,8 @@ enum Command {
     Explain(explain::Args),
     Schema(schema::Args),
     Generate(generate::Args),
+    Operator(operator::Args),
+    Rungs(rungs::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
@@ -60,6 +64,8 @@ pub fn run() -> ExitCode {
         Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Operator(args) => operator::run(&args),
+        Command::Rungs(args) => rungs::run(&args),
         Command::S2(args) => s2::run(&args),
     };
     match result {

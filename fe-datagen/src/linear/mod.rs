@@ -5,12 +5,14 @@
 //! and shared by every press of a campaign.
 
 mod cg;
+mod direct;
 mod factor;
 mod ordering;
 mod structure;
 
 pub(crate) use cg::dot;
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
+pub use direct::Direct;
 pub use factor::{Factor, FactorError, Factorizer};
 pub use ordering::OrderingError;
 pub use structure::{Equations, Structure, StructureError, SymmetricMatrix};

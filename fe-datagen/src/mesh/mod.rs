@@ -8,6 +8,7 @@ pub mod gmsh;
 mod half_cube;
 mod mirror;
 mod nail;
+pub mod nearest;
 pub mod probe;
 #[cfg(test)]
 mod quality;

@@ -7,6 +7,8 @@
 //! quadratic elements are sampled at the vertex itself. In the plane a face is an
 //! edge and its area the length.
 
+mod quarters;
+
 use super::sample::{Deformed, Sample};
 use super::{Mesh, Surface, Tissue};
 use crate::element::Inverted;
@@ -68,6 +70,16 @@ impl SedRecovery {
                 }
             }
         }
+        Self::of(samples, by_node, nodes, tissue)
+    }
+
+    /// Weights over the samples round each of `nodes`, scaled to sum to 1.
+    fn of(
+        samples: Vec<Sample>,
+        mut by_node: HashMap<u32, Vec<(usize, f64)>>,
+        nodes: &[u32],
+        tissue: Tissue,
+    ) -> Result<Self, NoElement> {
         let mut terms = Vec::with_capacity(nodes.len());
         for &node in nodes {
             let mut t = by_node.remove(&node).ok_or(NoElement { node, tissue: tissue.name() })?;
@@ -84,6 +96,12 @@ impl SedRecovery {
     #[must_use]
     pub fn samples(&self) -> &[Sample] {
         &self.samples
+    }
+
+    /// Per node the samples that it averages, with weights that sum to 1.
+    #[must_use]
+    pub fn terms(&self) -> &[Vec<(usize, f64)>] {
+        &self.terms
     }
 
     /// Nodal means of values at [`Self::samples`].

@@ -173,7 +173,7 @@ fn solve(scene: &Scene) -> Result<Solved, PressError> {
 
 /// Processor time of this thread, s: what an effect costs does not depend on what
 /// else the machine does.
-fn processor_s() -> f64 {
+pub(crate) fn processor_s() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }

@@ -2,6 +2,7 @@
 
 use super::{CaseError, Check, Context};
 use crate::mesh::fingertip::Density;
+use crate::mesh::nearest::NearestPoints;
 use crate::press::body::Body;
 use crate::press::drive::{Approach, Drive};
 use crate::press::record::{IncrementRecord, Pose, relative_l2};
@@ -69,61 +70,8 @@ impl Pressed {
     /// Values of another mesh at this one's points: linear in the triangle whose
     /// plane point is nearest, seen along the finger's own height.
     fn read(&self, other: &Self, values: &[f64], points: fn(&Self) -> &[[f64; 3]]) -> Vec<f64> {
-        let nodes = points(other);
-        points(self).iter().map(|p| interpolate(nodes, &other.triangles, values, *p)).collect()
+        NearestPoints::new(points(other), &other.triangles, points(self)).read(values)
     }
-}
-
-/// Value at the point of the triangulated surface that is nearest to `p`.
-fn interpolate(nodes: &[[f64; 3]], triangles: &[[u32; 3]], values: &[f64], p: [f64; 3]) -> f64 {
-    let mut best = (f64::INFINITY, 0.0);
-    for t in triangles {
-        let [a, b, c] = t.map(|n| nodes[n as usize]);
-        let w = nearest(a, b, c, p);
-        let at = |i: usize| w[0] * a[i] + w[1] * b[i] + w[2] * c[i];
-        let distance: f64 = (0..3).map(|i| (at(i) - p[i]).powi(2)).sum();
-        if distance < best.0 {
-            best = (distance, (0..3).map(|k| w[k] * values[t[k] as usize]).sum());
-        }
-    }
-    best.1
-}
-
-/// Barycentric coordinates of the point of a triangle nearest to `p` (Ericson
-/// 2005, sec. 5.1.5).
-fn nearest(a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> [f64; 3] {
-    let sub = |x: [f64; 3], y: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] - y[i]) };
-    let dot = |x: [f64; 3], y: [f64; 3]| (0..3).map(|i| x[i] * y[i]).sum::<f64>();
-    let (ab, ac) = (sub(b, a), sub(c, a));
-    let (d1, d2) = (dot(ab, sub(p, a)), dot(ac, sub(p, a)));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [1.0, 0.0, 0.0];
-    }
-    let (d3, d4) = (dot(ab, sub(p, b)), dot(ac, sub(p, b)));
-    if d3 >= 0.0 && d4 <= d3 {
-        return [0.0, 1.0, 0.0];
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        let v = d1 / (d1 - d3);
-        return [1.0 - v, v, 0.0];
-    }
-    let (d5, d6) = (dot(ab, sub(p, c)), dot(ac, sub(p, c)));
-    if d6 >= 0.0 && d5 <= d6 {
-        return [0.0, 0.0, 1.0];
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        let w = d2 / (d2 - d6);
-        return [1.0 - w, 0.0, w];
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return [0.0, 1.0 - w, w];
-    }
-    let sum = va + vb + vc;
-    [va / sum, vb / sum, vc / sum]
 }
 
 fn press(density: Density) -> Result<Pressed, CaseError> {
@@ -142,25 +90,4 @@ fn press(density: Density) -> Result<Pressed, CaseError> {
         interface: at(&patch.interface),
         triangles: patch.triangles.clone(),
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_nearest_point_of_a_triangle_is_found_in_every_region() {
-        let (a, b, c) = ([0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]);
-        let close = |p: [f64; 3], w: [f64; 3]| {
-            let found = nearest(a, b, c, p);
-            assert!((0..3).all(|i| (found[i] - w[i]).abs() < 1e-15), "{p:?}: {found:?}");
-        };
-        close([-1.0, -1.0, 5.0], [1.0, 0.0, 0.0]);
-        close([4.0, -1.0, 0.0], [0.0, 1.0, 0.0]);
-        close([-1.0, 5.0, 1.0], [0.0, 0.0, 1.0]);
-        close([1.0, -3.0, 0.0], [0.5, 0.5, 0.0]);
-        close([-2.0, 1.0, 0.0], [0.5, 0.0, 0.5]);
-        close([3.0, 3.0, 1.0], [0.0, 0.5, 0.5]);
-        close([0.5, 0.5, -7.0], [0.5, 0.25, 0.25]);
-    }
 }

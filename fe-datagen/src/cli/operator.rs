@@ -1,0 +1,62 @@
+//! `operator`: the finger's own linear operator.
+
+use super::print;
+use crate::mesh::fingertip::{Density, Order};
+use crate::operator::{self, Card};
+use crate::press::study::processor_s;
+use crate::scene::TissueTable;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Solve this finger at small strain for unit pressure at every skin vertex.
+///
+/// To first order a finger is linear: strain at the interface is a linear map of
+/// pressure on the skin, and SED is a sum of six squares of strain. This writes the map
+/// (operator.npz: g [V, 6, V] and area_mm2 [V]) and a card (operator.json: atlas hash,
+/// materials, checks, seconds). One factorization, V right-hand sides; layers on, rigid
+/// bone and nail. See docs/operator.md.
+#[derive(clap::Args)]
+#[command(
+    after_help = "SED at interface vertex v, J/m3: sum_k (sum_j g[v, k, j] p_j)^2 with p in Pa.\n\
+                        Takes some minutes and 1.5 GB at density medium, seconds at coarse.\n\
+                        Example: fe-datagen operator --density coarse --out out/operator"
+)]
+pub(super) struct Args {
+    /// Mesh density; its skin gives the vertices (a dataset's atlas is of medium).
+    #[arg(long, value_enum, default_value = "medium")]
+    density: Density,
+    /// Folder for operator.npz and operator.json.
+    #[arg(long)]
+    out: PathBuf,
+    /// Print the card as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let begun_s = processor_s();
+    let (order, materials) = (Order::Linear, TissueTable::default());
+    let body = operator::body(args.density, order, &materials)?;
+    let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
+    let bar = super::progress("solving for vertices", vertices);
+    let operator = operator::build(&body, &mut |done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    let seconds = processor_s() - begun_s;
+    let card = Card::new(&operator, args.density, order, &materials, seconds);
+    operator::write(&args.out, &operator, &card)?;
+    print(&card, args.json, || {
+        let q = &card.quality;
+        format!(
+            "operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
+             residual at most {:.1e}, \
+             reciprocity to {:.1e}\natlas {}\nwrote {}",
+            card.vertices,
+            q.unknowns,
+            q.residual_relative,
+            q.reciprocity_relative,
+            card.atlas_hash,
+            args.out.display()
+        )
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
