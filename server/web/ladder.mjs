@@ -138,6 +138,12 @@ export class LadderView {
     this.draw();
   }
 
+  /** Name and median relative L2 of each set that a tier was measured on. */
+  medians(tier) {
+    const sets = setsOf(this.data).map((set) => [set, rungsOn(this.data, set).find((rung) => rung.tier === tier)?.error]);
+    return sets.filter(([, median]) => median > 0);
+  }
+
   draw() {
     const { svg } = this;
     const [width, height] = [svg.clientWidth, svg.clientHeight];

@@ -51,9 +51,11 @@ export class Meters {
     this.tier = '–';
   }
 
-  ready(ready, medianL2) {
+  /** `medians`: name and median relative L2 of each set that the tier was measured on. */
+  ready(ready, medians) {
     this.tier = ready.tier;
-    put('error-context', Number.isNaN(medianL2) ? '' : `median of this tier over all held-out presses: ${percent(medianL2)}`);
+    const each = medians.map(([set, median]) => `${set} ${percent(median)}`);
+    put('error-context', each.length ? `median of this tier: ${each.join(', ')}` : '');
   }
 
   /** One row for each shipped press. */

@@ -18,7 +18,6 @@ const SED_UNIT = 'J/m³';
 class Page {
   constructor(atlas, listing) {
     this.atlas = atlas;
-    this.tiers = listing.tiers;
     this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
@@ -96,8 +95,7 @@ class Page {
     this.control.changed = true;
     this.unsent = true;
     this.replay.forget();
-    const tier = this.tiers.find((known) => known.name === ready.tier);
-    this.meters.ready(ready, tier?.relative_l2_median ?? NaN);
+    this.meters.ready(ready, this.ladder.medians(ready.tier));
     notify('');
   }
 

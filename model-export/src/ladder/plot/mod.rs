@@ -140,8 +140,8 @@ fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let times = range(points.iter().map(|p| p.time_ms), 2.0, 6.0);
     let errors = range(points.iter().map(|p| p.error).chain(floor), 1.6, 1.6);
     let title = match set {
-        "reference" => "Against the reference solution (finest mesh)".to_owned(),
-        _ => format!("On {set} (truth: the FE that taught the networks)"),
+        "reference" => "SED, median relative L2 error against the finest mesh".to_owned(),
+        _ => format!("SED, median relative L2 error on {set}"),
     };
     let mut chart = ChartBuilder::on(area)
         .caption(title, ("sans-serif", 17))
@@ -223,7 +223,6 @@ fn axes(area: &Area<'_>, chart: &Chart<'_, '_>, times: &Span, errors: &Span) -> 
     area.draw(&PathElement::new([(left, top), (left, bottom), (right, bottom)], GREY))?;
     let words = "time of one map, ms (one core; FE: one state)";
     area.draw(&Text::new(words, ((left + right) / 2 - 140, height as i32 - 20), font()))?;
-    area.draw(&Text::new("relative L2 error of SED, median", (left - 44, top - 20), font()))?;
     Ok(())
 }
 
