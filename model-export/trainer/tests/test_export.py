@@ -53,6 +53,8 @@ def test_output_is_not_negative_and_zero_outside(model: Path, tiny: Dataset) -> 
         output = run_onnx(model, pressure)
         assert output.min() >= 0
         assert not output[tiny.interface.mask() == 0].any()
+        # The biases' residue is blanked where there is no pressure at all, and only there.
+        assert output.any() == pressure.any()
 
 
 def test_metadata_say_where_the_model_comes_from(model: Path, tiny: Dataset) -> None:
@@ -123,8 +125,5 @@ def test_metrics_of_other_weights_are_not_exported(
     (stale / "metrics.json").write_text(json.dumps({**metrics, "epoch": 99}))
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 4
     again = evaluate_run(stale, tiny)
-    assert again.keys() == metrics.keys()
-    for key, value in metrics.items():
-        # Where in memory the maps lie changes the last bits of a convolution.
-        assert again[key] == (pytest.approx(value, rel=1e-6) if isinstance(value, dict) else value)
+    assert again == metrics
     assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 0
