@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from papilla_trainer.atlas import Atlas
-from papilla_trainer.face_layout import frames
+from papilla_trainer.face_layout import BLOCK, frames
 from papilla_trainer.face_network import PRESSURE_UNIT_PA, SED_UNIT_J_PER_M3, FaceNet
 from papilla_trainer.linear_operator import COMPONENTS, Operator
 
@@ -44,7 +44,7 @@ def start_from_operator(
     rows = np.repeat(rows, COMPONENTS)
     columns = None
     if network.spec.near:
-        columns = np.repeat(network.near[:, 0].numpy(), COMPONENTS, axis=0)
+        columns = np.repeat(network.near[:, 0].numpy(), BLOCK * COMPONENTS, axis=0)
     stencil = np.zeros_like(full)
     low_rank: list[tuple[F64, F64]] = []
     for _ in range(1 if columns is None else _ROUNDS):
@@ -64,7 +64,7 @@ def start_from_operator(
     _write(network, low_rank)
     if columns is not None:
         values = np.take_along_axis(stencil, columns, axis=1)
-        shaped = values.reshape(network.units, COMPONENTS, -1).transpose(0, 2, 1)
+        shaped = values.reshape(len(network.near), BLOCK * COMPONENTS, -1).transpose(0, 2, 1)
         network.stencil.data.copy_(torch.from_numpy(shaped.copy()))
 
 

@@ -2,6 +2,8 @@
 
 Faces with y > 0 are *units*; each unit has two *slots*: the face itself (side 0) and its mirror
 image (side 1). A slot of side 1 sees the finger in the mirror, so that both have the same weights.
+Units that lie together form *blocks* of eight, which share the vertices of their stencil: one
+product of some size for each block costs the server far less than a small one for each face.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ I64 = NDArray[np.int64]
 RING = 8
 _SPREAD = (1, 3)
 _MIRROR_TOLERANCE_MM = 1e-3
+# Units of a block; the last one repeats a unit where they do not come out even.
+BLOCK = 8
 # Components that change sign in the mirror, in a frame (lengthwise, crosswise, outward): those with
 # one crosswise index.
 _ODD = (2, 4)
@@ -33,11 +37,11 @@ _STEEP = 0.2
 
 @dataclass(frozen=True)
 class FaceLayout:
-    """Indices of V vertices, U units and 2 U slots (slot = 2 unit + side).
+    """Indices of V vertices, U units and 2 U slots: block by block, first side 0, then side 1.
 
     ``vertex``, ``image``: vertices of one half, then of the middle line, and their mirror images;
-    ``unit``: ``[U]`` faces; ``near``: ``[U, 2, K]`` the vertices nearest to each, and the same in
-    the mirror; ``ring``: ``[2, RING, 2 U]`` slots near a slot and further out; ``corner``:
+    ``unit``: ``[U]`` faces; ``near``: ``[U / 8, 2, K]`` the vertices nearest to each block, and the
+    same in the mirror; ``ring``: ``[2, RING, 2 U]`` slots near a slot and further out; ``corner``:
     ``[4, 2 U]`` vertices of a slot's face; ``hand``: ``[2 U, 7]`` what turns a slot's components
     (and pressure) to those of a frame that is not mirrored; ``place``: ``[2 U, 5]`` where on the
     finger; ``vertex_slot``, ``vertex_share``: ``[M, V]`` how slots' SED averages to vertices.
@@ -56,25 +60,31 @@ class FaceLayout:
 
     @staticmethod
     def of(atlas: Atlas, operator: Operator, near: int) -> FaceLayout:
-        """The layout of an operator's faces with ``near`` vertices in each stencil."""
+        """The layout of an operator's faces with ``near`` vertices in each block's stencil."""
         vertex, image = _vertices(atlas)
         skin = operator.face_means(atlas.skin_mm)
         unit, mirror = _units(operator.face_means(atlas.interface_mm))
-        slots = np.stack([unit, mirror[unit]], axis=1).ravel()
-        apart = np.linalg.norm(skin[unit][:, None] - atlas.skin_mm[None], axis=2)
-        nearest = np.argsort(apart, axis=1, kind="stable")
-        own = nearest[:, :near]
-        corner = _corners(operator)
+        count, pad = len(unit), -len(unit) % BLOCK
+        unit = unit[_blocks(skin[unit])]
+        unit = np.concatenate([unit, np.repeat(unit[-1:], pad)])
+        blocks = unit.reshape(-1, BLOCK)
+        slots = np.stack([blocks, mirror[blocks]], axis=1).ravel()
+        used = np.broadcast_to(np.arange(len(unit)) < count, (2, len(unit)))
+        used = used.reshape(2, -1, BLOCK).transpose(1, 0, 2).ravel()
+        apart = np.linalg.norm(skin[blocks][:, :, None] - atlas.skin_mm, axis=3).min(axis=1)
+        own = np.argsort(apart, axis=1, kind="stable")[:, :near]
+        corner = _corners(operator)[blocks]
+        corner = np.stack([corner, atlas.mirror[corner]], axis=1).reshape(-1, 4)
         hand = np.ones((len(slots), COMPONENTS + 1))
-        hand[1::2, _ODD] = -1.0
-        slot, share = _averages(operator, slots)
+        hand.reshape(-1, 2, BLOCK, COMPONENTS + 1)[:, 1, :, _ODD] = -1.0
+        slot, share = _averages(operator, np.where(used, slots, -1))
         arrays = {
             "vertex": vertex,
             "image": image,
             "unit": unit,
             "near": np.stack([own, atlas.mirror[own]], axis=1),
-            "ring": _rings(skin[slots]),
-            "corner": corner[slots].T,
+            "ring": _rings(skin[slots], used),
+            "corner": corner.T,
             "hand": hand.astype(np.float32),
             "place": _place(skin[slots]).astype(np.float32),
             "vertex_slot": slot.T,
@@ -159,7 +169,7 @@ def _units(centre: F64) -> tuple[I64, I64]:
 
 
 def _averages(operator: Operator, slots: I64) -> tuple[I64, F64]:
-    """A vertex' faces as slots; of a face on the middle line both slots count half."""
+    """A vertex' faces as slots (-1: none); of a face on the middle line both slots count half."""
     order = np.argsort(slots, kind="stable")
     first = np.searchsorted(slots[order], np.arange(len(operator.g)))
     last = np.searchsorted(slots[order], np.arange(len(operator.g)), side="right") - 1
@@ -181,11 +191,32 @@ def _corners(operator: Operator) -> I64:
     return vertex[order][place]
 
 
-def _rings(centre: F64) -> I64:
-    """``[2, RING, 2 U]``: slots nearest to each, and every third of those around them."""
-    apart = np.linalg.norm(centre[:, None] - centre[None], axis=2)
-    order = np.argsort(apart, axis=1, kind="stable")
-    return np.stack([order[:, : RING * step : step].T for step in _SPREAD])
+def _blocks(centre: F64) -> I64:
+    """``[U]``: an order in which each eight lie together: halved again and again, lengthwise."""
+    order = np.arange(len(centre))
+    if len(order) <= BLOCK:
+        return order
+    order = np.argsort(centre[:, np.ptp(centre, axis=0).argmax()], kind="stable")
+    half = max(1, round(len(order) / (2 * BLOCK))) * BLOCK
+    parts = (order[:half], order[half:])
+    return np.concatenate([part[_blocks(centre[part])] for part in parts])
+
+
+def _rings(centre: F64, used: NDArray[np.bool_]) -> I64:
+    """``[2, RING, 2 U]``: slots nearest to each, and every third of those around them.
+
+    A slot of side 1 has the images of its unit's, also where two are equally near.
+    """
+    sides = np.arange(len(centre)).reshape(-1, 2, BLOCK)
+    here, image = sides[:, 0].ravel(), sides[:, ::-1].ravel()
+    apart = np.linalg.norm(centre[here][:, None] - centre[None], axis=2)
+    order = np.argsort(np.where(used, apart, np.inf), axis=1, kind="stable")
+    rings = np.empty((len(_SPREAD), RING, len(centre)), dtype=np.int64)
+    for k, step in enumerate(_SPREAD):
+        own = order[:, : RING * step : step].T
+        rings[k][:, here] = own
+        rings[k][:, image[here]] = image[own]
+    return rings
 
 
 def _place(centre: F64) -> F64:

@@ -21,7 +21,7 @@ import torch
 from torch import Tensor, nn
 
 from papilla_trainer.errors import UsageError
-from papilla_trainer.face_layout import RING, FaceLayout
+from papilla_trainer.face_layout import BLOCK, RING, FaceLayout
 from papilla_trainer.linear_operator import COMPONENTS
 
 _NAME = re.compile(
@@ -35,8 +35,8 @@ SED_UNIT_J_PER_M3 = 100.0
 class FaceSpec:
     """What decides a face network's shape.
 
-    ``rank``: coordinates of the low-rank part, even and odd together; ``near``: vertices of the
-    stencil (0: none); ``whole``: width of the gated layer on those coordinates (0: none);
+    ``rank``: coordinates of the low-rank part, even and odd together; ``near``: vertices of a
+    block's stencil (0: none); ``whole``: width of the gated layer on those coordinates (0: none);
     ``hidden``: width of the correction at each face (0: none).
     """
 
@@ -143,7 +143,9 @@ class FaceNet(nn.Module):
         self.out_even = nn.Parameter(torch.zeros(even, self.units * COMPONENTS))
         self.out_odd = nn.Parameter(torch.zeros(odd, self.units * COMPONENTS))
         if spec.near:
-            self.stencil = nn.Parameter(torch.zeros(self.units, spec.near, COMPONENTS))
+            self.stencil = nn.Parameter(
+                torch.zeros(len(layout.near), spec.near, BLOCK * COMPONENTS)
+            )
         self.whole = Gated(spec.rank, spec.whole) if spec.whole else None
         self.correction = None
         if spec.hidden:
@@ -173,13 +175,13 @@ class FaceNet(nn.Module):
         if self.whole is not None:
             # Even outputs of odd inputs: the mean of the layer and its mirror image.
             z = z + self.whole(z) + self.flip * self.whole(self.flip * z)
-        shape = (-1, self.units, COMPONENTS)
+        shape = (-1, self.units // BLOCK, BLOCK * COMPONENTS)
         in_phase = (z[:, : self.even] @ self.out_even).reshape(shape)
         opposed = (z[:, self.even :] @ self.out_odd).reshape(shape)
         # The odd part is opposed in the mirror.
         e = torch.stack([in_phase + opposed, in_phase - opposed], dim=2)
         if self.spec.near:
-            # One product [2, K] x [K, 6] for each face: a gather and a sum cost the server more.
+            # One product [2, K] x [K, 48] for each block.
             e = e + pressure[:, self.near] @ self.stencil
         return e.reshape(-1, 2 * self.units, COMPONENTS)
 

@@ -18,7 +18,7 @@ from papilla_trainer.losses import relative_loss
 from papilla_trainer.sampling import vertex_sampler
 from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
-NAMES = ("face-r8", "face-r8-z6", "face-r8-n5", "face-r8-n5-z4-h6")
+NAMES = ("face-r8", "face-r8-z6", "face-r8-n12", "face-r8-n12-z4-h6")
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_the_mirror_image_is_answered_by_the_mirror_image(
 
 
 def test_without_correction_sed_is_quadratic(atlas: Atlas, operator: Operator) -> None:
-    network = build("face-r8-n5", atlas, operator)
+    network = build("face-r8-n12", atlas, operator)
     pressure = 1e4 * torch.rand(1, atlas.vertex_count)
     with torch.no_grad():
         torch.testing.assert_close(network(3.0 * pressure), 9.0 * network(pressure))
@@ -123,7 +123,7 @@ def test_the_frame_draws_what_the_rasteriser_draws(tiny: Dataset) -> None:
 def test_served_maps_are_the_networks_vertex_values(
     tiny: Dataset, atlas: Atlas, operator: Operator
 ) -> None:
-    network = build("face-r8-n5-z4-h6", atlas, operator)
+    network = build("face-r8-n12-z4-h6", atlas, operator)
     frame = MapFrame.of(tiny.skin, tiny.interface, tiny.vertex_count)
     pressure, _ = tiny.load_vertices(tiny.test_ids)
     maps = torch.from_numpy(tiny.skin.rasterise(pressure))[:, None]

@@ -26,7 +26,7 @@ from papilla_trainer.training import Trainer
 @pytest.fixture(scope="module")
 def face(operator_file: Path) -> TrainConfig:
     return TrainConfig(
-        network="face-r8-n5-z4-h6",
+        network="face-r8-n12-z4-h6",
         epochs=6,
         seed=5,
         batch=2,
