@@ -11,7 +11,7 @@ import torch
 from torch import nn
 
 from papilla_trainer.checkpoint import Checkpoint
-from papilla_trainer.config import TrainConfig
+from papilla_trainer.config import TrainConfig, make_deterministic
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
 from papilla_trainer.face_network import FaceSpec
@@ -59,6 +59,9 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
     checkpoint = Checkpoint.load(run_dir)
     if checkpoint.served.dataset_sha256 != dataset.dataset_sha256:
         raise RunError(f"{run_dir} was trained on another dataset than {dataset.directory}")
+    # The run's own thread count: another one sums in another order, and the last bits differ.
+    config = TrainConfig(**checkpoint.config)
+    make_deterministic(config.seed, config.threads)
     metrics, rows = measure(served_model(checkpoint, weights), dataset)
     metrics |= {"weights": weights, "epoch": chosen_epoch(checkpoint, weights)}
     write_csv(run_dir / SAMPLES_FILE, rows)
