@@ -31,9 +31,9 @@ Trains a network on the training presses of a dataset. A tenth of them is set as
 epoch by; the test presses are touched once, after training, for the metrics.
 
 s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
-vertex-rR[-cC][-nK[-g]][-hH[xL]] works on the vertices of the atlas and answers sums of squares: a
-low-rank linear map of rank R, C components a vertex, a stencil of K vertices (-g: with gains that
-depend on the pressures), L gated layers of width H on the low-rank coordinates.
+face-rR[-nK][-zW][-hH] works on the faces of the interface and starts from --operator: a linear map
+of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a correction
+for finite strain of width H, the same at every face; SED is a mean of sums of squares.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
 and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
@@ -130,7 +130,7 @@ def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
 def _train_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
     add = parser.add_argument
-    add("--network", default="s1-base8", help="s1-baseN or vertex-... (s1-base8)")
+    add("--network", default="s1-base8", help="s1-baseN or face-... (s1-base8)")
     add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
     add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
     add("--epochs", type=int, default=40, help="passes over the training presses (40)")
@@ -160,10 +160,17 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "mse", "relative"),
         default="auto",
         help="mse: S1's, of max-normalised maps; relative: squared relative L2 of each sample, the "
-        "far field once more (auto: mse for s1-*, relative for vertex-*)",
+        "far field once more (auto: mse for s1-*, relative for face-*)",
     )
     add("--far-weight", type=float, default=0.2, help="of the far field in `relative` (0.2)")
-    add("--operator", metavar="FILE.npz", help="start a vertex network from this linear operator")
+    add("--operator", metavar="FILE.npz", help="linear operator that a face network starts from")
+    add(
+        "--base-rate",
+        type=float,
+        default=0.05,
+        help="part of the learning rate by which a face network's linear map learns (0.05; 0: it "
+        "stays the operator)",
+    )
     add(
         "--train-presses",
         type=int,
@@ -178,9 +185,11 @@ def _dataset_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dataset",
         type=Path,
+        action="append",
         required=True,
         metavar="DIR",
-        help="what `fe-datagen generate` wrote",
+        help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas (the "
+        "first one's maxima are the scales)",
     )
 
 

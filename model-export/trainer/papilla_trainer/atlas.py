@@ -1,4 +1,4 @@
-"""The atlas as the vertex networks see it: neighbours, areas and the mirror of the finger."""
+"""The atlas as face networks see it: places, areas and the mirror of the finger."""
 
 from __future__ import annotations
 
@@ -65,11 +65,6 @@ class Atlas:
         """V."""
         return len(self.skin_mm)
 
-    def nearest(self, of: I64, count: int) -> I64:
-        """``[len(of), count]``: the skin vertices nearest to each, itself first."""
-        apart = np.linalg.norm(self.skin_mm[of][:, None] - self.skin_mm[None], axis=2)
-        return np.argsort(apart, axis=1, kind="stable")[:, :count]
-
     def areas_mm2(self, positions_mm: F64) -> F64:
         """``[V]``: each vertex's third of the triangles around it."""
         corners = positions_mm[self.triangles]
@@ -87,6 +82,6 @@ def _mirror(positions_mm: F64, path: Path) -> I64:
     mirror = apart.argmin(axis=1)
     if apart.min(axis=1).max() > _MIRROR_TOLERANCE_MM or np.unique(mirror).size != mirror.size:
         raise DatasetError(
-            f"{path}: the finger is not mirror-symmetric about y = 0, which vertex networks rely on"
+            f"{path}: the finger is not mirror-symmetric about y = 0, which face networks rely on"
         )
     return mirror

@@ -21,10 +21,20 @@ from papilla_trainer.metrics import F32
 
 OPERATORS = frozenset(
     {
-        *("Conv", "Relu", "MaxPool", "ConvTranspose", "Concat", "Mul", "Clip", "Constant"),
-        # Networks on vertices.
-        *("Add", "Flatten", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Split", "Sub"),
-        *("Squeeze", "Tanh", "Transpose", "Unsqueeze"),
+        *(
+            "Conv",
+            "Relu",
+            "MaxPool",
+            "ConvTranspose",
+            "Concat",
+            "Mul",
+            "Clip",
+            "Constant",
+            "ReduceMax",
+        ),
+        # Networks on faces.
+        *("Add", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Sub"),
+        *("Squeeze", "Tanh", "Unsqueeze"),
     }
 )
 METADATA = (

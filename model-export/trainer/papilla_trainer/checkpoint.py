@@ -30,7 +30,9 @@ class Served:
     atlas_hash: str
     effects: list[str]
     dataset_sha256: str
-    # The constants of a vertex network's rasters; a network on maps has none.
+    # The hashes of several datasets that were trained on together, the first giving the scales.
+    datasets: list[str] = field(default_factory=list)
+    # The constants of a face network's rasters; a network on maps has none.
     frame: Weights = field(default_factory=dict)
 
     @staticmethod
@@ -43,6 +45,7 @@ class Served:
             atlas_hash=dataset.atlas_hash,
             effects=list(dataset.effects),
             dataset_sha256=dataset.dataset_sha256,
+            datasets=dataset.hashes,
             frame=frame or {},
         )
 

@@ -34,15 +34,15 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.config import TrainConfig
-    from papilla_trainer.dataset import Dataset
     from papilla_trainer.evaluation import evaluate_run
+    from papilla_trainer.joined import open_datasets
     from papilla_trainer.report import metrics_table, plot_history
     from papilla_trainer.training import Trainer
 
     config = TrainConfig(
         **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
     )
-    dataset = Dataset(options.dataset)
+    dataset = open_datasets(options.dataset)
     trainer = Trainer(dataset, config, options.out, resume=options.resume)
     with _Bar(trainer.state.epoch, config.epochs, len(trainer.fit_samples)) as bar:
         try:
@@ -75,11 +75,11 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _evaluate(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.dataset import Dataset
     from papilla_trainer.evaluation import evaluate_run
+    from papilla_trainer.joined import open_datasets
     from papilla_trainer.report import metrics_table
 
-    metrics = evaluate_run(options.run_dir, Dataset(options.dataset), options.weights)
+    metrics = evaluate_run(options.run_dir, open_datasets(options.dataset), options.weights)
     return metrics, _table(metrics, metrics_table)
 
 
@@ -93,12 +93,16 @@ def _export(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.check import check_model
-    from papilla_trainer.dataset import Dataset
+    from papilla_trainer.joined import open_datasets
 
     if options.samples < 1:
         raise CheckError(f"--samples must be at least 1, not {options.samples}")
     report = check_model(
-        options.model, Dataset(options.dataset), options.run_dir, options.reference, options.samples
+        options.model,
+        open_datasets(options.dataset),
+        options.run_dir,
+        options.reference,
+        options.samples,
     )
     if report.failures:
         raise CheckError(f"{options.model}: " + "; ".join(report.failures))
@@ -115,13 +119,13 @@ def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.dataset import Dataset
+    from papilla_trainer.joined import open_datasets
     from papilla_trainer.untrained import write_operator
 
     _require_rank(options)
     result = write_operator(
         options.operator,
-        Dataset(options.dataset),
+        open_datasets(options.dataset),
         options.rank,
         options.near,
         options.out,
@@ -131,8 +135,8 @@ def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.dataset import Dataset
     from papilla_trainer.halfspace import HalfSpace
+    from papilla_trainer.joined import open_datasets
     from papilla_trainer.untrained import write_half_space
 
     _require_rank(options)
@@ -140,7 +144,7 @@ def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     if body.youngs_modulus_pa <= 0 or not 0 <= body.poissons_ratio < 0.5 or body.depth_mm <= 0:
         raise UsageError("modulus and depth must be positive, Poisson's ratio in 0 .. 0.5")
     result = write_half_space(
-        body, Dataset(options.dataset), options.rank, options.near, options.out, options.name
+        body, open_datasets(options.dataset), options.rank, options.near, options.out, options.name
     )
     return result, _untrained_text(result)
 

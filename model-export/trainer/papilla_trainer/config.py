@@ -11,9 +11,9 @@ import numpy as np
 import torch
 
 from papilla_trainer.errors import RunError, UsageError
+from papilla_trainer.face_network import FaceSpec, parse_face_network
 from papilla_trainer.losses import LOSSES
 from papilla_trainer.network import NetworkSpec, parse_network
-from papilla_trainer.vertex_network import VertexSpec, parse_vertex_network
 
 PRECISIONS = ("f32", "bf16")
 SCHEDULES = ("constant", "cosine")
@@ -38,10 +38,15 @@ class TrainConfig:
     far_weight: float = 0.2
     operator: str | None = None
     train_presses: int | None = None
+    base_rate: float = 0.05
 
     def __post_init__(self) -> None:
-        if self.operator is not None and not isinstance(self.spec, VertexSpec):
-            raise UsageError("--operator is for vertex networks")
+        if (self.operator is not None) != isinstance(self.spec, FaceSpec):
+            raise UsageError(
+                "--operator FILE.npz is what face networks, and they alone, start from"
+            )
+        if not 0.0 <= self.base_rate <= 1.0:
+            raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
         if self.loss not in LOSS_CHOICES or self.far_weight < 0.0:
             raise UsageError(f"--loss {self.loss} --far-weight {self.far_weight}: not a loss")
         if self.train_presses is not None and self.train_presses < 2:
@@ -55,10 +60,10 @@ class TrainConfig:
             raise UsageError(f"--threads must be at least 1, not {self.threads}")
 
     @property
-    def spec(self) -> NetworkSpec | VertexSpec:
+    def spec(self) -> NetworkSpec | FaceSpec:
         """The network asked for."""
-        if self.network.startswith("vertex-"):
-            return parse_vertex_network(self.network)
+        if self.network.startswith("face-"):
+            return parse_face_network(self.network)
         return parse_network(self.network)
 
     @property
@@ -66,7 +71,7 @@ class TrainConfig:
         """The loss in use: S1's for S1's network, else the one that models are judged by."""
         if self.loss != "auto":
             return self.loss
-        return "relative" if isinstance(self.spec, VertexSpec) else "mse"
+        return "relative" if isinstance(self.spec, FaceSpec) else "mse"
 
     def validation_count(self, train_presses: int) -> int:
         """How many training presses to set aside: as asked, else a tenth (at least one)."""

@@ -59,6 +59,7 @@ class Press:
     """One press of the manifest: a shard of several depths."""
 
     id: int
+    directory: Path
     file: str
     sha256: str
     samples: int
@@ -97,7 +98,8 @@ class Dataset:
             self.pressure_max_pa = _positive(manifest, "pressure_max_pa")
             self.sed_max_j_per_m3 = _positive(manifest, "sed_max_j_per_m3")
             self.dataset_sha256 = str(manifest["dataset_sha256"])
-            self.presses = {int(p["id"]): _press(p) for p in manifest["presses"]}
+            self.hashes = [self.dataset_sha256]
+            self.presses = {int(p["id"]): _press(p, directory) for p in manifest["presses"]}
             self.train_ids = [int(i) for i in manifest["splits"]["train"]]
             self.test_ids = [int(i) for i in manifest["splits"]["test"]]
             labels = {int(p["id"]): str(p["split"]) for p in manifest["presses"]}
@@ -185,7 +187,7 @@ class Dataset:
         return Raster(pixel, vertex, weight)
 
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
-        path = self.directory / press.file
+        path = press.directory / press.file
         arrays = _read_npz(path, press.file, sha256=press.sha256)
         for name in ("pressure_pa", "sed_dermis_j_per_m3"):
             values = arrays.get(name)
@@ -248,9 +250,10 @@ def _positive(manifest: dict[str, Any], key: str) -> float:
     return value
 
 
-def _press(entry: dict[str, Any]) -> Press:
+def _press(entry: dict[str, Any], directory: Path) -> Press:
     return Press(
         id=int(entry["id"]),
+        directory=directory,
         file=str(entry["file"]),
         sha256=str(entry["sha256"]),
         samples=int(entry["samples"]),

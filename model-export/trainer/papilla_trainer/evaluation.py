@@ -11,15 +11,15 @@ import torch
 from torch import nn
 
 from papilla_trainer.checkpoint import Checkpoint
-from papilla_trainer.config import TrainConfig
+from papilla_trainer.config import TrainConfig, make_deterministic
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
+from papilla_trainer.face_network import FaceSpec
 from papilla_trainer.files import write_json
 from papilla_trainer.metrics import F32, METRICS, evaluate, summarise
 from papilla_trainer.network import ServedModel
 from papilla_trainer.report import write_csv
 from papilla_trainer.tasks import trained_network
-from papilla_trainer.vertex_network import VertexSpec
 from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
 METRICS_FILE = "metrics.json"
@@ -31,7 +31,7 @@ def served_model(checkpoint: Checkpoint, weights: str = "best") -> nn.Module:
     spec = TrainConfig(**checkpoint.config).spec
     chosen = checkpoint.best_model if weights == "best" else checkpoint.model
     network, served = trained_network(spec, chosen), checkpoint.served
-    if isinstance(spec, VertexSpec):
+    if isinstance(spec, FaceSpec):
         return ServedVertexModel(network, MapFrame(served.frame)).eval()
     model = ServedModel(
         network, served.mask.float(), served.pressure_max_pa, served.sed_max_j_per_m3
@@ -59,6 +59,9 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
     checkpoint = Checkpoint.load(run_dir)
     if checkpoint.served.dataset_sha256 != dataset.dataset_sha256:
         raise RunError(f"{run_dir} was trained on another dataset than {dataset.directory}")
+    # The run's own thread count: another one sums in another order, and the last bits differ.
+    config = TrainConfig(**checkpoint.config)
+    make_deterministic(config.seed, config.threads)
     metrics, rows = measure(served_model(checkpoint, weights), dataset)
     metrics |= {"weights": weights, "epoch": chosen_epoch(checkpoint, weights)}
     write_csv(run_dir / SAMPLES_FILE, rows)

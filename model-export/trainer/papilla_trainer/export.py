@@ -95,6 +95,9 @@ def metadata(
         training["loss"] = f"relative L2 squared + {config.far_weight} x that of the far field"
     if config.operator is not None:
         training["start"] = "linear operator of the finger"
+        training["base_rate"] = config.base_rate
+    if len(served.datasets) > 1:
+        training["datasets"] = served.datasets
     return properties(served, name, config.spec.as_json(), training, metrics)
 
 

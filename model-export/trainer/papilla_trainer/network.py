@@ -36,7 +36,7 @@ def parse_network(name: str) -> NetworkSpec:
     if match is None or int(match.group(1)) < 1:
         raise UsageError(
             f"unknown network '{name}': give s1-baseN, where N is the channels of the first "
-            "stage, e.g. s1-base4, s1-base8, s1-base16; or vertex-r128-h128 and the like"
+            "stage, e.g. s1-base4, s1-base8, s1-base16; or face-r128-n32-h32 and the like"
         )
     return NetworkSpec(kind="s1_unet", base=int(match.group(1)))
 
@@ -87,6 +87,7 @@ class ServedModel(nn.Module):
 
     Scales in, runs the network, clamps at zero (SED is an energy; training itself sees the bare
     network, as S1's did), scales out and blanks what lies outside the interface patch.
+    Networks with biases leave a residue where there is no pressure; the graph blanks that case.
     """
 
     gain: Tensor
@@ -104,7 +105,12 @@ class ServedModel(nn.Module):
     def forward(self, pressure_pa: Tensor) -> Tensor:
         """``[N, 1, H, W]`` Pa to ``[N, 1, H, W]`` J/m3, >= 0, 0 outside the mask."""
         normalised = self.network(pressure_pa * self.pressure_scale)
-        return torch.relu(normalised) * self.gain
+        return torch.relu(normalised) * self.gain * _any(pressure_pa)
+
+
+def _any(pressure_pa: Tensor) -> Tensor:
+    """``[N, 1, 1, 1]``: 0 where a map has no pressure, exactly 1 beyond 1e-20 Pa anywhere."""
+    return (pressure_pa.amax(dim=(2, 3), keepdim=True) * 1e20).clamp(0.0, 1.0)
 
 
 def build_network(spec: NetworkSpec, seed: int) -> S1UNet:

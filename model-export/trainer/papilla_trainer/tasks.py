@@ -12,10 +12,12 @@ from torch import Tensor, nn
 from papilla_trainer.atlas import Atlas
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import F32, Dataset, Maps
+from papilla_trainer.face_init import start_from_operator
+from papilla_trainer.face_layout import FaceLayout
+from papilla_trainer.face_network import FaceNet, FaceSpec
+from papilla_trainer.linear_operator import Operator
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.network import NetworkSpec, S1UNet, build_network
-from papilla_trainer.vertex_init import Operator, start_from_operator, start_from_pressures
-from papilla_trainer.vertex_network import VertexLayout, VertexNet, VertexSpec
 from papilla_trainer.vertex_served import MapFrame
 
 
@@ -58,11 +60,11 @@ def make_task(
 ) -> Task:
     """Load the presses named, and no others, and build the network."""
     spec = config.spec
-    load = _load_vertices if isinstance(spec, VertexSpec) else _load_maps
+    load = _load_vertices if isinstance(spec, FaceSpec) else _load_maps
     fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
-    if isinstance(spec, VertexSpec):
-        network = fresh_vertex_network(dataset, config, fit.inputs.cpu())
+    if isinstance(spec, FaceSpec):
+        network = fresh_face_network(dataset, config, fit.inputs.cpu())
         weights = torch.from_numpy(pixels_of_vertices(dataset))
     else:
         network = build_network(spec, config.seed).to(memory_format=torch.channels_last)
@@ -71,32 +73,26 @@ def make_task(
     return Task(network.to(device), fit, validation, loss)
 
 
-def fresh_vertex_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tensor) -> VertexNet:
-    """A start from the linear operator where one is given, else from the data's main directions.
-
-    The same seed gives the same weights.
-    """
+def fresh_face_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tensor) -> FaceNet:
+    """A start from the linear operator; the same seed gives the same weights."""
     spec = config.spec
-    if not isinstance(spec, VertexSpec):
-        raise TypeError("not a vertex network")
+    if not isinstance(spec, FaceSpec) or config.operator is None:
+        raise TypeError("not a face network")
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
+    operator = Operator.read(Path(config.operator), atlas)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        network = VertexNet(spec, VertexLayout.of(atlas, spec.near))
-    if config.operator is not None:
-        operator = Operator.read(Path(config.operator), atlas)
-        weights = torch.from_numpy(pixels_of_vertices(dataset))
-        start_from_operator(network, operator, pressure_pa, weights)
-    else:
-        start_from_pressures(network, pressure_pa)
+        network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
+    weights = torch.from_numpy(pixels_of_vertices(dataset))
+    start_from_operator(network, atlas, operator, pressure_pa, weights)
     return network
 
 
-def trained_network(spec: NetworkSpec | VertexSpec, weights: dict[str, Tensor]) -> nn.Module:
+def trained_network(spec: NetworkSpec | FaceSpec, weights: dict[str, Tensor]) -> nn.Module:
     """A network that holds these weights."""
     network = (
-        VertexNet(spec, VertexLayout.of_weights(weights))
-        if isinstance(spec, VertexSpec)
+        FaceNet(spec, FaceLayout.of_weights(weights))
+        if isinstance(spec, FaceSpec)
         else S1UNet(spec.base)
     )
     network.load_state_dict(weights)

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
 from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
 from papilla_trainer.dataset import Dataset, validation_split
 from papilla_trainer.errors import RunError, TrainerError
+from papilla_trainer.face_network import FaceNet
 from papilla_trainer.report import write_history
 from papilla_trainer.tasks import frame_of, make_task
-from papilla_trainer.vertex_network import VertexSpec
 
 BEST_LOSS_AT_START = math.inf
 _LARGEST_GRADIENT = 1.0
@@ -59,9 +59,10 @@ class Trainer:
         task = make_task(dataset, config, fit_ids, validation_ids, self.device)
         self.network, self.loss = task.network, task.loss
         self.fit_samples, self.validation = task.fit, task.validation
-        self.on_vertices = isinstance(config.spec, VertexSpec)
+        self.on_vertices = isinstance(self.network, FaceNet)
+        self.rates = _rates(self.network, config.base_rate)
         self.optimizer = torch.optim.Adam(
-            self.network.parameters(), lr=config.learning_rate, fused=True
+            [{"params": params} for _, params in self.rates], lr=config.learning_rate, fused=True
         )
         self.state = Checkpoint(
             config=config.as_json(),
@@ -84,8 +85,8 @@ class Trainer:
             began = time.perf_counter()
             epoch = self.state.epoch + 1
             rate = self._learning_rate(epoch)
-            for group in self.optimizer.param_groups:
-                group["lr"] = rate
+            for group, (part, _) in zip(self.optimizer.param_groups, self.rates, strict=True):
+                group["lr"] = rate * part
             train_loss = self._train_epoch(epoch, listener)
             validation_loss = self._validate()
             seconds = time.perf_counter() - began
@@ -188,6 +189,16 @@ class Trainer:
         torch.set_rng_state(earlier.rng_torch)
         earlier.environment = self.state.environment
         self.state = earlier
+
+
+def _rates(network: nn.Module, base_rate: float) -> list[tuple[float, list[nn.Parameter]]]:
+    """Parameters and their part of the learning rate: a given linear map is only touched up."""
+    if not isinstance(network, FaceNet):
+        return [(1.0, list(network.parameters()))]
+    linear = {id(parameter) for parameter in network.linear_map()}
+    others = [parameter for parameter in network.parameters() if id(parameter) not in linear]
+    groups = [(1.0, others), (base_rate, network.linear_map())]
+    return [(rate, parameters) for rate, parameters in groups if rate > 0.0 and parameters]
 
 
 def _environment(device: torch.device, threads: int) -> dict[str, Any]:

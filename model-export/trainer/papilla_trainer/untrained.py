@@ -13,10 +13,12 @@ from papilla_trainer.checkpoint import Served
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.evaluation import measure
 from papilla_trainer.export import properties, to_onnx, write_model
+from papilla_trainer.face_init import start_from_operator
+from papilla_trainer.face_layout import FaceLayout
+from papilla_trainer.face_network import FaceNet, FaceSpec
 from papilla_trainer.halfspace import HalfSpace
+from papilla_trainer.linear_operator import Operator
 from papilla_trainer.tasks import pixels_of_vertices
-from papilla_trainer.vertex_init import Operator, start_from_operator
-from papilla_trainer.vertex_network import VertexLayout, VertexNet, VertexSpec
 from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
 
@@ -26,7 +28,7 @@ def write_operator(
     """The finger's operator at small strain, compressed; returns its errors on test presses."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
     operator = Operator.read(operator_file, atlas)
-    spec = VertexSpec(rank=rank, near=near, kind="fe_operator")
+    spec = FaceSpec(rank=rank, near=near, kind="fe_operator")
     return _write(operator, atlas, dataset, spec, out, name, {"operator_sha256": operator.sha256})
 
 
@@ -35,8 +37,8 @@ def write_half_space(
 ) -> dict[str, Any]:
     """The closed form, compressed alike; returns its errors on test presses."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
-    operator = Operator(body.operator(atlas), sha256="")
-    spec = VertexSpec(rank=rank, near=near, kind="half_space")
+    operator = Operator.at_vertices(body.operator(atlas))
+    spec = FaceSpec(rank=rank, near=near, kind="half_space")
     return _write(operator, atlas, dataset, spec, out, name, {"half_space": vars(body)})
 
 
@@ -44,16 +46,15 @@ def _write(
     operator: Operator,
     atlas: Atlas,
     dataset: Dataset,
-    spec: VertexSpec,
+    spec: FaceSpec,
     out: Path,
     name: str | None,
     origin: dict[str, Any],
 ) -> dict[str, Any]:
-    torch.manual_seed(0)
-    network = VertexNet(spec, VertexLayout.of(atlas, spec.near))
+    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
     pressure, _ = dataset.load_vertices(dataset.train_ids)
     weights = torch.from_numpy(pixels_of_vertices(dataset))
-    start_from_operator(network, operator, torch.from_numpy(pressure), weights)
+    start_from_operator(network, atlas, operator, torch.from_numpy(pressure), weights)
     frame = MapFrame.of(dataset.skin, dataset.interface, dataset.vertex_count)
     model = ServedVertexModel(network, frame).eval()
     metrics, _ = measure(model, dataset)

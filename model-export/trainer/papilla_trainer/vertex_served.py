@@ -1,4 +1,4 @@
-"""The graph in which a vertex network is served: map in Pa, vertices, network, map in J/m3."""
+"""The graph in which a face network is served: map in Pa, vertices, network, map in J/m3."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tiny_dataset import write_tiny_dataset
+from tiny_dataset import write_tiny_dataset, write_tiny_operator
 
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
@@ -20,6 +20,12 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     """Six presses of six depths; not physics."""
     return Dataset(write_tiny_dataset(tmp_path_factory.mktemp("tiny") / "dataset"))
+
+
+@pytest.fixture(scope="session")
+def operator_file(tiny: Dataset) -> Path:
+    """A made-up linear operator of the tiny dataset's atlas."""
+    return write_tiny_operator(tiny.directory)
 
 
 @pytest.fixture(scope="session")

@@ -94,6 +94,32 @@ def tiny_atlas(
     }
 
 
+def write_tiny_operator(directory: Path, name: str = "operator.npz") -> Path:
+    """A made-up operator of the dataset's atlas: faces are the cells of its grid."""
+    atlas = json.loads((directory / "atlas.json").read_text())
+    skin = np.array(atlas["skin"]["positions_mm"])
+    vertices = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+    corners = np.stack(
+        [vertices[:-1, :-1], vertices[:-1, 1:], vertices[1:, :-1], vertices[1:, 1:]], axis=-1
+    ).reshape(-1, 4)
+    offset = skin[corners].mean(axis=1)[:, None] - skin[None]
+    apart = np.linalg.norm(offset, axis=2)
+    scales = 1.0 + 0.5 * np.arange(6)
+    g = 1e-3 * np.exp(-((apart[:, None] / scales[None, :, None]) ** 2))
+    # Shear across the finger is opposed in the mirror.
+    g[:, (2, 4)] *= offset[:, None, :, 1]
+    face = np.zeros((len(skin), 4), dtype=np.int32)
+    weight = np.zeros((len(skin), 4), dtype=np.float32)
+    for v in range(len(skin)):
+        around = np.flatnonzero((corners == v).any(axis=1))
+        face[v, : len(around)] = around
+        weight[v, : len(around)] = 1.0 / len(around)
+    path = directory / name
+    np.savez(path, face_g=g.astype(np.float32), vertex_face=face, vertex_weight=weight)
+    path.with_suffix(".json").write_text(json.dumps({"atlas_hash": atlas["hash"]}))
+    return path
+
+
 def _press(uv: np.ndarray, random: np.random.Generator, depths: int) -> dict[str, np.ndarray]:
     centre = random.uniform(80, 144, size=2)
     squared = ((uv - centre) ** 2).sum(axis=1)

@@ -1,0 +1,50 @@
+"""Several datasets of one atlas as one."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from pathlib import Path
+
+from papilla_trainer.dataset import Dataset
+from papilla_trainer.errors import DatasetError
+
+# Press 7 of the second dataset is press 1000007 of the joined one.
+STRIDE = 1_000_000
+
+
+class JoinedDataset(Dataset):
+    """Presses of all; scales, rasters and atlas of the first.
+
+    Its SHA-256 is that of the datasets' SHA-256s (hexadecimal) one after another.
+    """
+
+    def __init__(self, parts: list[Dataset]) -> None:
+        first = parts[0]
+        for other in parts[1:]:
+            if other.atlas_hash != first.atlas_hash or other.effects != first.effects:
+                raise DatasetError(
+                    f"{other.directory}: of another atlas or other effects than {first.directory}"
+                )
+        self.directory = first.directory
+        self.atlas_hash, self.effects = first.atlas_hash, first.effects
+        self.vertex_count = first.vertex_count
+        self.pressure_max_pa = first.pressure_max_pa
+        self.sed_max_j_per_m3 = first.sed_max_j_per_m3
+        self.skin, self.interface = first.skin, first.interface
+        self.hashes = [part.dataset_sha256 for part in parts]
+        if len(set(self.hashes)) < len(parts):
+            raise DatasetError(f"{first.directory}: a dataset is given twice")
+        self.dataset_sha256 = hashlib.sha256("".join(self.hashes).encode()).hexdigest()
+        self.presses, self.train_ids, self.test_ids = {}, [], []
+        for k, part in enumerate(parts):
+            for i, press in part.presses.items():
+                self.presses[k * STRIDE + i] = dataclasses.replace(press, id=k * STRIDE + i)
+            self.train_ids += [k * STRIDE + i for i in part.train_ids]
+            self.test_ids += [k * STRIDE + i for i in part.test_ids]
+
+
+def open_datasets(directories: list[Path]) -> Dataset:
+    """One dataset as it is, several joined."""
+    parts = [Dataset(directory) for directory in directories]
+    return parts[0] if len(parts) == 1 else JoinedDataset(parts)
