@@ -19,6 +19,7 @@ pub mod mesh;
 pub mod operator;
 pub mod output;
 pub mod press;
+pub mod processor;
 pub mod rungs;
 pub mod s2;
 pub mod scene;

@@ -3,7 +3,7 @@
 use super::print;
 use crate::mesh::fingertip::{Density, Order};
 use crate::operator::{self, Card};
-use crate::press::study::processor_s;
+use crate::processor;
 use crate::scene::TissueTable;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -12,13 +12,15 @@ use std::process::ExitCode;
 ///
 /// To first order a finger is linear: strain at the interface is a linear map of
 /// pressure on the skin, and SED is a sum of six squares of strain. This writes the map
-/// (operator.npz: g [V, 6, V] and area_mm2 [V]) and a card (operator.json: atlas hash,
+/// (operator.npz: face_g [F, 6, V] on the faces of the interface, vertex_face and
+/// vertex_weight [V, M], which average them to the vertices, g [V, 6, V] and
+/// area_mm2 [V]) and a card (operator.json: atlas hash,
 /// materials, checks, seconds). One factorization, V right-hand sides; layers on, rigid
 /// bone and nail. See docs/operator.md.
 #[derive(clap::Args)]
 #[command(
-    after_help = "SED at interface vertex v, J/m3: sum_k (sum_j g[v, k, j] p_j)^2 with p in Pa.\n\
-                        Takes some minutes and 1.5 GB at density medium, seconds at coarse.\n\
+    after_help = "SED of face f, J/m3: sum_k (sum_j face_g[f, k, j] p_j)^2 with p in Pa; a vertex has its faces' mean.\n\
+                        Takes 14 s and 1.5 GB at density medium, a second at coarse.\n\
                         Example: fe-datagen operator --density coarse --out out/operator"
 )]
 pub(super) struct Args {
@@ -34,14 +36,14 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let begun_s = processor_s();
+    let begun_s = processor::thread_s();
     let (order, materials) = (Order::Linear, TissueTable::default());
     let body = operator::body(args.density, order, &materials)?;
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let bar = super::progress("solving for vertices", vertices);
     let operator = operator::build(&body, &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    let seconds = processor_s() - begun_s;
+    let seconds = processor::thread_s() - begun_s;
     let card = Card::new(&operator, args.density, order, &materials, seconds);
     operator::write(&args.out, &operator, &card)?;
     print(&card, args.json, || {

@@ -19,7 +19,7 @@ pub use deck::{Deck, Press, StepControl};
 pub use elements::{CcxElement, ElementTypes, LinearHex, QuadraticHex};
 pub use material::MaterialCard;
 pub use rigid::{RigidIndenter, RigidShape};
-pub use run::{Ccx, CcxError, CpuClock, Run};
+pub use run::{Ccx, CcxError, Run};
 pub use scene::SceneDeck;
 
 use crate::scene::Scene;

@@ -2,6 +2,7 @@
 
 use super::{Dat, DatError};
 use crate::output::{OutputError, atomic};
+use crate::processor;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -86,7 +87,7 @@ impl Ccx {
         let started = |source| CcxError::Start { path: self.path.clone(), source };
         let file = std::fs::File::create(&log).map_err(started)?;
         let both = file.try_clone().map_err(started)?;
-        let clock = CpuClock::children();
+        let before_s = processor::children_s();
         let mut child = Command::new(&self.path)
             .args(["-i", job])
             .current_dir(folder)
@@ -109,7 +110,7 @@ impl Ccx {
             }
             std::thread::sleep(Duration::from_millis(10));
         };
-        let cpu_s = clock.and_then(|c| c.elapsed_s());
+        let cpu_s = processor::children_s().zip(before_s).map(|(after, before)| after - before);
         let output = std::fs::read(&log).map_err(started)?;
         let output = String::from_utf8_lossy(&output);
         if let (false, _) | (_, Some(_)) = (status.success(), error_message(&output)) {
@@ -133,52 +134,6 @@ fn error_message(output: &str) -> Option<String> {
     let start = output.rfind("*ERROR")?;
     let lines = output[start..].lines().take_while(|l| !l.trim().is_empty()).take(4);
     Some(lines.map(str::trim).collect::<Vec<_>>().join(" "))
-}
-
-/// CPU time since its making, of this thread or of the processes it waited for.
-#[derive(Clone, Copy, Debug)]
-pub struct CpuClock {
-    of_children: bool,
-    start_s: f64,
-}
-
-impl CpuClock {
-    /// Of this thread; `None` where the system does not say (it takes Linux).
-    #[must_use]
-    pub fn thread() -> Option<Self> {
-        Self::new(false)
-    }
-
-    /// Of all processes that this one has started and waited for.
-    #[must_use]
-    pub fn children() -> Option<Self> {
-        Self::new(true)
-    }
-
-    fn new(of_children: bool) -> Option<Self> {
-        Some(Self { of_children, start_s: Self::now(of_children)? })
-    }
-
-    /// Seconds since its making.
-    #[must_use]
-    pub fn elapsed_s(self) -> Option<f64> {
-        Some(Self::now(self.of_children)? - self.start_s)
-    }
-
-    fn now(of_children: bool) -> Option<f64> {
-        if of_children {
-            let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-            // The second field, in brackets, may hold spaces; cutime and cstime
-            // are the 14th and 15th after it, in ticks of 10 ms.
-            let fields = stat.rsplit_once(')')?.1.split_whitespace();
-            let ticks: Option<f64> = fields.skip(13).take(2).map(|f| f.parse::<f64>().ok()).sum();
-            ticks.map(|t| t / 100.0)
-        } else {
-            let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-            let ns: f64 = stat.split_whitespace().next()?.parse().ok()?;
-            Some(1e-9 * ns)
-        }
-    }
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ use super::structure::{Structure, SymmetricMatrix};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::cholesky::LltRef;
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 
 /// An f64 Cholesky factor and memory for solving `columns_max` systems at a time.
@@ -31,23 +30,16 @@ impl<'a> Direct<'a> {
         matrix: &SymmetricMatrix,
         columns_max: usize,
     ) -> Result<Self, FactorError> {
-        let (s, n) = (&structure.symbolic, structure.equations.count);
+        let s = &structure.symbolic;
         let scratch = s
             .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default())
             .or(s.solve_in_place_scratch::<f64>(columns_max, Par::Seq));
         let too_large = |_| FactorError::Memory(structure.factor_entries());
         let mut memory = MemBuffer::try_new(scratch).map_err(too_large)?;
         let mut factor = vec![0.0; s.len_val()];
-        let pattern = SymbolicSparseColMatRef::new_checked(
-            n,
-            n,
-            &structure.column_start,
-            None,
-            &structure.row,
-        );
         s.factorize_numeric_llt(
             &mut factor,
-            SparseColMatRef::new(pattern, &matrix.values),
+            structure.lower(&matrix.values),
             Side::Lower,
             LltRegularization::default(),
             Par::Seq,

@@ -9,7 +9,6 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{IntranodeLbltRef, LltRef};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side, Spec};
 
 /// Why a factorization failed.
@@ -105,17 +104,9 @@ impl Factorizer {
             *s = *v as f32;
         }
         self.kind = None;
-        let n = structure.equations.count;
-        let pattern = SymbolicSparseColMatRef::new_checked(
-            n,
-            n,
-            &structure.column_start,
-            None,
-            &structure.row,
-        );
         let result = structure.symbolic.factorize_numeric_llt(
             &mut self.single,
-            SparseColMatRef::new(pattern, &self.single_matrix),
+            structure.lower(&self.single_matrix),
             Side::Lower,
             LltRegularization::default(),
             Par::Seq,
@@ -140,20 +131,13 @@ impl Factorizer {
         for p in &mut self.pivot {
             p.resize(n, 0);
         }
-        let pattern = SymbolicSparseColMatRef::new_checked(
-            n,
-            n,
-            &structure.column_start,
-            None,
-            &structure.row,
-        );
         let [forward, inverse] = &mut self.pivot;
         structure.symbolic.factorize_numeric_intranode_lblt(
             &mut self.double,
             &mut self.subdiagonal,
             forward,
             inverse,
-            SparseColMatRef::new(pattern, &matrix.values),
+            structure.lower(&matrix.values),
             Side::Lower,
             Par::Seq,
             MemStack::new(&mut self.memory),

@@ -4,11 +4,11 @@ use super::ordering::{OrderingError, nested_dissection};
 use crate::mesh::Mesh;
 use faer::Side;
 use faer::perm::PermRef;
-use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use std::collections::BTreeSet;
 
 /// Which degrees of freedom are unknown.
@@ -191,6 +191,14 @@ impl Structure {
                 }
             }
         }
+    }
+
+    /// The lower triangle with these entries, as the factorizations take it.
+    pub(super) fn lower<'a, T>(&'a self, values: &'a [T]) -> SparseColMatRef<'a, usize, T> {
+        let n = self.equations.count;
+        let pattern =
+            SymbolicSparseColMatRef::new_checked(n, n, &self.column_start, None, &self.row);
+        SparseColMatRef::new(pattern, values)
     }
 
     /// `y = A x` over the unknowns.

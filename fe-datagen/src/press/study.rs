@@ -6,6 +6,7 @@ use super::fields::PA_PER_MPA;
 use super::record::{IncrementRecord, relative_l2};
 use super::setup::Setup;
 use crate::mesh::surface::norm;
+use crate::processor;
 use crate::scene::effects::EFFECTS;
 use crate::scene::{EffectName, Scene};
 use crate::solve::{Effort, Options};
@@ -148,16 +149,16 @@ fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'sta
 }
 
 fn solve(scene: &Scene) -> Result<Solved, PressError> {
-    let begun_s = processor_s();
+    let begun_s = processor::thread_s();
     let setup = Setup::new(scene)?;
     let mut solver = setup.body.solver(Options::default())?;
-    let ready_s = processor_s();
+    let ready_s = processor::thread_s();
     let (mut effort, mut last) = (Effort::default(), None);
     setup.body.press(&mut solver, &setup.approach, &setup.drive, 1, &mut |_, record, report| {
         effort = effort.plus(&report.effort);
         last = Some(record.clone());
     })?;
-    let solve_s = processor_s() - ready_s;
+    let solve_s = processor::thread_s() - ready_s;
     let last = last.ok_or(PressError::Empty)?;
     Ok(Solved {
         unknowns: setup.body.problem.structure.equations.count,
@@ -169,13 +170,6 @@ fn solve(scene: &Scene) -> Result<Solved, PressError> {
         sed_j_per_m3_max: PA_PER_MPA * max(&last.sed_dermis_mpa),
         last,
     })
-}
-
-/// Processor time of this thread, s: what an effect costs does not depend on what
-/// else the machine does.
-pub(crate) fn processor_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 fn max(values: &[f64]) -> f64 {

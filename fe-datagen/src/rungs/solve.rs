@@ -13,7 +13,7 @@ use crate::press::drive::{Approach, Drive};
 use crate::press::fields::PA_PER_MPA;
 use crate::press::record::{Checks, IncrementRecord};
 use crate::press::setup::Setup;
-use crate::press::study::processor_s;
+use crate::processor;
 use crate::scene::{EffectName, Geometry, Scene};
 use crate::solve::Options;
 
@@ -96,9 +96,9 @@ impl Prepared {
         rung: Rung,
         target: &Target,
     ) -> Result<Self, RungsError> {
-        let begun_s = processor_s();
+        let begun_s = processor::thread_s();
         let Setup { body, plan, .. } = setup(spec, rung)?;
-        let setup_s = processor_s() - begun_s;
+        let setup_s = processor::thread_s() - begun_s;
         let name = rung.name();
         let Some((skin, interface, triangles)) = surfaces(&body) else {
             return Err(RungsError::NoPatch { rung: name });
@@ -151,9 +151,9 @@ impl Prepared {
         part.record.depth_shift_mm = depths_mm[0] - press.depths_mm[0];
         part.record.offset_shift_mm =
             std::array::from_fn(|i| approach.offset_mm[i] - press.offset_mm[i]);
-        let begun_s = processor_s();
+        let begun_s = processor::thread_s();
         let pressed = self.press(depths_mm, &approach, &mut |record| {
-            let seconds = processor_s() - begun_s;
+            let seconds = processor::thread_s() - begun_s;
             self.keep(&mut part, record, seconds);
         });
         if let Err(error) = pressed {
@@ -163,7 +163,7 @@ impl Prepared {
         tracing::info!(
             rung = self.name,
             press = press.id,
-            seconds = processor_s() - begun_s,
+            seconds = processor::thread_s() - begun_s,
             "press solved"
         );
         Ok(part)

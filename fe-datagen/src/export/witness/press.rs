@@ -3,10 +3,11 @@
 use super::ours::{Cards, laws, sed_mpa};
 use super::{Check, Context, SOURCE};
 use crate::export::deck::{BODY, ELEMENTS, INDENTER};
-use crate::export::{CpuClock, Deck, ElementTypes, Press, Quantity, RigidIndenter, StepControl};
+use crate::export::{Deck, ElementTypes, Press, Quantity, RigidIndenter, StepControl};
 use crate::indenter::SignedDistance;
 use crate::mesh::{Mesh, Tissue};
 use crate::press::record::relative_l2;
+use crate::processor;
 use crate::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 use crate::verify::CaseError;
 use std::sync::Arc;
@@ -147,7 +148,7 @@ impl Pressing<'_> {
 
     fn solver(self) -> Result<Answer, CaseError> {
         let along = self.pressing_axis();
-        let clock = CpuClock::thread();
+        let begun_s = processor::thread_s();
         let problem = Problem::new(self.mesh, laws(&self.cards)?, self.fixed, Some(self.contact))?;
         let RigidIndenter { start, path, .. } = self.indenter;
         let indenter = MovingIndenter { shape: self.shape, start, path };
@@ -158,7 +159,7 @@ impl Pressing<'_> {
         }
         let u = solver.displacement_mm();
         let sed_mpa = sed_mpa(&problem, self.types, u)?;
-        let cpu_s = clock.and_then(CpuClock::elapsed_s);
+        let cpu_s = Some(processor::thread_s() - begun_s);
         let force = solver.balance().contact_force_n;
         let force_n = (0..3).map(|i| force[i] * along[i]).sum();
         let mut displacement_mm = vec![[0.0; 3]; u.len()];
