@@ -29,7 +29,8 @@ pub struct ModelInfo {
     pub pressure_max_pa: f32,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
-    /// SHA-256 of the dataset it was trained on.
+    /// SHA-256 of the dataset it was trained on; of several, that of their
+    /// [`datasets`](Self::datasets)' hashes one after another.
     pub dataset_sha256: String,
     /// How it was trained: seed, epochs, optimiser, loss, versions, seconds.
     pub training: Value,
@@ -79,6 +80,17 @@ impl ModelInfo {
             trainer_metrics: metadata.json("papilla.metrics", "JSON")?,
             backend: String::new(),
         })
+    }
+
+    /// SHA-256 of each dataset it was trained on: what `papilla.training` lists as `datasets`
+    /// if [`dataset_sha256`](Self::dataset_sha256) follows from that, else this one alone.
+    #[must_use]
+    pub fn datasets(&self) -> Vec<&str> {
+        let own = self.dataset_sha256.as_str();
+        let listed = self.training.get("datasets").and_then(Value::as_array);
+        let parts: Vec<&str> = listed.into_iter().flatten().filter_map(Value::as_str).collect();
+        let joined = hex(&Sha256::digest(parts.concat()));
+        if parts.len() > 1 && joined == own { parts } else { vec![own] }
     }
 }
 

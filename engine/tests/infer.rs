@@ -5,8 +5,9 @@
 
 mod common;
 
-use common::{TINY, altered, expected, graph, press_pa};
+use common::{TINY, altered, expected, graph, press_pa, set_metadata};
 use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX, load, load_with};
+use sha2::{Digest, Sha256};
 
 fn assert_equals_reference(sed_j_per_m3: &[f32]) {
     let expected = expected();
@@ -63,6 +64,27 @@ fn says_what_the_model_is() {
     assert_eq!(info.bytes as usize, TINY.len());
     assert!(info.backend.starts_with("tract "));
     assert_eq!(info.onnx_sha256.len(), 64);
+}
+
+#[test]
+fn a_model_of_several_datasets_names_them_if_their_hash_is_its_own() {
+    let parts = ["1".repeat(64), "2".repeat(64)];
+    let own = Sha256::digest(parts.concat());
+    let own: String = own.iter().map(|byte| format!("{byte:02x}")).collect();
+    let of = |hash: &str| {
+        let onnx = altered(|model| {
+            let training = serde_json::json!({"seed": 7, "datasets": &parts}).to_string();
+            set_metadata(model, "papilla.training", &training);
+            set_metadata(model, "papilla.dataset_sha256", hash);
+        });
+        let model = load(&onnx, None).unwrap();
+        model.info().datasets().into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&own), parts);
+    // A list that does not belong to the hash counts for nothing.
+    assert_eq!(of(&"3".repeat(64)), ["3".repeat(64)]);
+    let alone = load(TINY, None).unwrap();
+    assert_eq!(alone.info().datasets(), [alone.info().dataset_sha256.as_str()]);
 }
 
 #[test]

@@ -263,6 +263,7 @@ fn card_of(info: &ModelInfo) -> Card {
         dataset_sha256: info.dataset_sha256.clone(),
         training: json!({"seed": 7}),
         metrics: Metrics {
+            dataset_sha256: None,
             split: "test".into(),
             samples: 1,
             relative_l2: spread,
