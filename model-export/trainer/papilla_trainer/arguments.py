@@ -68,6 +68,16 @@ Writes the closed form as a model, without training: Boussinesq's stresses in on
 under the pressure on the flattened skin (Phillips & Johnson 1981), compressed like an operator."""
 
 
+_CURVE = """\
+Trains the same network on more and more of the training presses, each time for as many steps as
+--epochs are on all of them, and measures every one on the held-out presses of each dataset and on
+all presses of each --judge: would more data help? The presses of a small set are in every larger
+one. Takes train's options; --train-presses is set by --presses.
+
+Writes to --out: the runs (presses-N; kept, so that the same command goes on after an
+interruption), curve.json, curve.csv and curve.svg."""
+
+
 def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
     """The parser; each command's function stands under its name."""
     raw = argparse.RawDescriptionHelpFormatter
@@ -86,6 +96,20 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
         return sub
 
     _train_arguments(command("train", "train a network on a dataset", _TRAIN))
+
+    curve = command("curve", "train on more and more presses: would more data help?", _CURVE)
+    _train_arguments(curve)
+    curve.add_argument(
+        "--presses", type=int, nargs="+", required=True, metavar="N", help="how many, each a run"
+    )
+    curve.add_argument(
+        "--judge",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a dataset of which nothing is trained on; may be given again",
+    )
 
     evaluate = command("evaluate", "measure a run on the held-out presses", _EVALUATE)
     evaluate.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
@@ -175,7 +199,7 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "--train-presses",
         type=int,
         metavar="N",
-        help="fit to the first N training presses only, for a learning curve",
+        help="fit to N of the training presses only, drawn by the seed",
     )
     add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
