@@ -94,7 +94,8 @@ impl ModelInfo {
     }
 }
 
-/// Floating-point initialisers but for maps (masks, coordinates): the trained part.
+/// Floating-point initialisers, also those stored in 16 bits, but for maps (masks,
+/// coordinates): the trained part.
 fn weight_count(proto: &ModelProto) -> u64 {
     const SIDE: i64 = MAP_SIDE_PX as i64;
     let Some(graph) = &proto.graph else { return 0 };
@@ -103,7 +104,8 @@ fn weight_count(proto: &ModelProto) -> u64 {
     graph
         .initializer
         .iter()
-        .filter(|t| t.data_type == DataType::Float as i32 && !t.dims.ends_with(&[SIDE, SIDE]))
+        .filter(|t| [DataType::Float as i32, DataType::Float16 as i32].contains(&t.data_type))
+        .filter(|t| !t.dims.ends_with(&[SIDE, SIDE]))
         .map(|t| count(&t.dims))
         .fold(0, u64::saturating_add)
 }

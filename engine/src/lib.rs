@@ -31,6 +31,7 @@ mod onnx;
 #[cfg(feature = "ort")]
 mod ort_backend;
 mod tract_backend;
+mod widen;
 
 use std::{fmt, str::FromStr, sync::Arc};
 
@@ -130,7 +131,7 @@ pub fn load_with(
     onnx: &[u8],
     card: Option<&Card>,
 ) -> Result<Arc<dyn Model>, EngineError> {
-    let proto = onnx::decode(onnx)?;
+    let mut proto = onnx::decode(onnx)?;
     let mut info = ModelInfo::read(&proto, onnx)?;
     if let Some(card) = card {
         card.require_model(&info)?;
@@ -139,6 +140,7 @@ pub fn load_with(
     let model: Arc<dyn Model> = match backend {
         Backend::Tract => {
             info.backend = tract_backend::LABEL.to_owned();
+            widen::widen(&mut proto);
             Arc::new(tract_backend::TractModel::load(&proto, info)?)
         }
         #[cfg(feature = "ort")]

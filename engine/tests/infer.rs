@@ -6,8 +6,12 @@
 mod common;
 
 use common::{TINY, altered, expected, graph, press_pa, set_metadata};
+use half::f16;
 use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX, load, load_with};
 use sha2::{Digest, Sha256};
+use tract_onnx::pb::{
+    AttributeProto, NodeProto, attribute_proto::AttributeType, tensor_proto::DataType,
+};
 
 fn assert_equals_reference(sed_j_per_m3: &[f32]) {
     let expected = expected();
@@ -31,6 +35,48 @@ fn tract_answers_as_onnx_runtime_does() {
     let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
     session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
     assert_equals_reference(&sed_j_per_m3);
+}
+
+#[test]
+fn constants_stored_in_16_bits_are_the_same_network() {
+    let halved = |bytes: &[u8; 4]| f16::from_f32(f32::from_le_bytes(*bytes));
+    let plain = altered(|model| {
+        let weights = graph(model).initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
+        let (values, _) = weights.raw_data.as_chunks::<4>();
+        let rounded = values.iter().flat_map(|b| halved(b).to_f32().to_le_bytes());
+        weights.raw_data = rounded.collect::<Vec<u8>>().into();
+    });
+    let stored = altered(|model| {
+        let graph = graph(model);
+        let weights = graph.initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
+        let (values, _) = weights.raw_data.as_chunks::<4>();
+        let halves = values.iter().flat_map(|b| halved(b).to_le_bytes());
+        weights.raw_data = halves.collect::<Vec<u8>>().into();
+        weights.data_type = DataType::Float16 as i32;
+        weights.name = "bottom.w.stored".into();
+        let to = AttributeProto {
+            name: "to".into(),
+            r#type: AttributeType::Int as i32,
+            i: DataType::Float as i64,
+            ..Default::default()
+        };
+        let cast = NodeProto {
+            op_type: "Cast".into(),
+            input: vec!["bottom.w.stored".into()],
+            output: vec!["bottom.w".into()],
+            attribute: vec![to],
+            ..Default::default()
+        };
+        graph.node.insert(0, cast);
+    });
+    let [plain, stored] = [plain, stored].map(|onnx| {
+        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+        let model = load(&onnx, None).unwrap();
+        model.session().unwrap().infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+        sed_j_per_m3
+    });
+    assert!(plain == stored, "the answers differ");
+    assert!(plain.iter().any(|&v| v > 0.0));
 }
 
 #[test]

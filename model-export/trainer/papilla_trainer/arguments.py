@@ -31,9 +31,10 @@ Trains a network on the training presses of a dataset. A tenth of them is set as
 epoch by; the test presses are touched once, after training, for the metrics.
 
 s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
-face-rR[-nK][-zW][-hH] works on the faces of the interface and starts from --operator: a linear map
-of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a correction
-for finite strain of width H, the same at every face; SED is a mean of sums of squares.
+face-rR[-nK][-zW][-hH[s]] works on the faces of the interface and starts from --operator: a linear
+map of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a
+correction for finite strain of width H, the same at every face (s: it sees each neighbour by
+itself); SED is a mean of sums of squares.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
 and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
@@ -194,6 +195,12 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.05,
         help="part of the learning rate by which a face network's linear map learns (0.05; 0: it "
         "stays the operator)",
+    )
+    add(
+        "--dropout",
+        type=float,
+        default=0.0,
+        help="part of a face network's correction that each step leaves out (0)",
     )
     add(
         "--train-presses",

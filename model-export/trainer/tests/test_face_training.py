@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 import torch
 from tiny_dataset import write_tiny_dataset
@@ -149,6 +150,26 @@ def test_two_datasets_are_one(
     found = {entry.key: entry.value for entry in onnx.load(model).metadata_props}
     assert found["papilla.dataset_sha256"] == both.dataset_sha256
     assert json.loads(found["papilla.training"])["datasets"] == both.hashes
+
+
+def test_large_constants_are_stored_small_and_lose_nothing(
+    run_dir: Path, tiny: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = export_run(run_dir, tmp_path / "plain.onnx", "tiny")
+    monkeypatch.setattr("papilla_trainer.export._LARGE", 16)
+    small = export_run(run_dir, tmp_path / "small.onnx", "tiny")
+    stored = [i for i in onnx.load(str(small)).graph.initializer if i.name.endswith(".stored")]
+    kinds = {i.data_type for i in stored}
+    assert kinds == {onnx.TensorProto.FLOAT16, onnx.TensorProto.INT16}
+    assert any("stencil" in i.name for i in stored)
+    assert small.stat().st_size < plain.stat().st_size
+    assert check_model(small, tiny, run_dir, None).failures == []
+    pressure = tiny.load(tiny.test_ids).pressure_pa[0][None, None]
+    answers = [
+        onnxruntime.InferenceSession(str(path)).run(None, {"pressure_pa": pressure})[0]
+        for path in (plain, small)
+    ]
+    assert np.array_equal(*answers)
 
 
 def test_a_learning_curve_grows_and_goes_on(
