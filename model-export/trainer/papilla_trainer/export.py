@@ -120,8 +120,6 @@ def metadata(
     if config.operator is not None:
         training["start"] = "linear operator of the finger"
         training |= {"base_rate": config.base_rate, "dropout": config.dropout}
-    if len(served.datasets) > 1:
-        training["datasets"] = served.datasets
     return properties(served, name, config.spec.as_json(), training, metrics)
 
 
@@ -133,6 +131,8 @@ def properties(
     metrics: dict[str, Any],
 ) -> dict[str, str]:
     """``metadata_props`` of any model, trained or not."""
+    if len(served.datasets) > 1:
+        training = {**training, "datasets": served.datasets}
     return {
         "papilla.format": "1",
         "papilla.name": name,
