@@ -5,11 +5,17 @@
 
 mod binary;
 mod drain;
+mod gate;
 mod hostile;
 mod information;
 mod ladder;
+mod oip;
+mod overload;
 mod page;
+mod process;
+mod reload;
 mod rendering;
 mod session;
 mod start;
 mod support;
+mod tls;
