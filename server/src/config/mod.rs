@@ -44,7 +44,6 @@ Exit codes:
 /// Papilla service: pressure maps in, strain energy density maps out, in time.
 #[derive(Debug, Clone, Parser)]
 #[command(name = "papilla-server", version, after_help = HELP_TAIL)]
-#[command(args_conflicts_with_subcommands = false)]
 pub struct Cli {
     /// What to do; nothing named: serve.
     #[command(subcommand)]

@@ -50,6 +50,9 @@ pub(crate) enum Transport {
     Oip,
 }
 
+/// What became of a reload.
+const RELOADS: [&str; 2] = ["refused", "ok"];
+
 type Stages = Family<StageLabels, Histogram, fn() -> Histogram>;
 type Requests = Family<RequestLabels, Histogram, fn() -> Histogram>;
 
@@ -164,6 +167,13 @@ impl Metrics {
         for shed in Shed::ALL {
             let _ = metrics.shed.get_or_create(&ShedLabels { reason: shed.word() });
         }
+        // Counted from nothing, so that the first one is a rise and not a new line.
+        for outcome in RELOADS {
+            let _ = metrics.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) });
+        }
+        for code in ErrorCode::ALL {
+            let _ = metrics.errors.get_or_create(&CodeLabels { code: Word(code.as_str()) });
+        }
         Arc::new(Self { registry: root, ..metrics })
     }
 
@@ -206,8 +216,9 @@ impl Metrics {
     }
 
     /// Counts a reload.
-    pub(crate) fn reload(&self, outcome: &'static str) {
-        self.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) }).inc();
+    pub(crate) fn reload(&self, is_ok: bool) {
+        let outcome = Word(RELOADS[usize::from(is_ok)]);
+        self.reloads.get_or_create(&ReloadLabels { outcome }).inc();
     }
 
     /// The counts of `transport`.

@@ -89,8 +89,7 @@ impl Reloader {
             Err(TryLockError::WouldBlock) => return Err(ReloadError::Busy),
         };
         let result = self.replace(running);
-        let outcome = if result.is_ok() { "ok" } else { "refused" };
-        self.metrics.reload(outcome);
+        self.metrics.reload(result.is_ok());
         match &result {
             Ok(changes) => tracing::info!(?changes, "models reloaded"),
             Err(error) => tracing::error!(%error, "models not reloaded; nothing has changed"),

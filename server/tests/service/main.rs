@@ -10,6 +10,8 @@ mod hostile;
 mod information;
 mod ladder;
 mod oip;
+#[cfg(feature = "otlp")]
+mod otlp;
 mod overload;
 mod page;
 mod process;

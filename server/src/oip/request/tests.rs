@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::*;
 
-fn input(members: Value) -> Value {
+fn input(members: &Value) -> Value {
     let mut input = json!({"name": "pressure_pa", "shape": SHAPE, "datatype": "FP32"});
     for (name, value) in members.as_object().unwrap() {
         input[name] = value.clone();
@@ -20,8 +20,8 @@ fn read_json(request: &Value) -> Result<(Wish, Bytes), (ErrorCode, Option<String
 fn flat_and_nested_numbers_are_the_same_map() {
     let flat: Vec<usize> = (0..MAP_LEN).collect();
     let rows: Vec<_> = flat.chunks(224).map(<[usize]>::to_vec).collect();
-    let (wish, a) = read_json(&input(json!({"data": flat}))).unwrap();
-    let (_, b) = read_json(&input(json!({"data": [[rows]]}))).unwrap();
+    let (wish, a) = read_json(&input(&json!({"data": flat}))).unwrap();
+    let (_, b) = read_json(&input(&json!({"data": [[rows]]}))).unwrap();
     assert_eq!(wish, Wish { id: None, is_binary_wanted: false, timeout_us: None });
     assert!(a == b && a.len() == MAP_LEN * 4);
     assert_eq!(&a[4 * 300..4 * 301], 300.0_f32.to_le_bytes());
@@ -30,7 +30,7 @@ fn flat_and_nested_numbers_are_the_same_map() {
 #[test]
 fn wishes() {
     let data = vec![0; MAP_LEN];
-    let mut request = input(json!({"data": data}));
+    let mut request = input(&json!({"data": data}));
     request["id"] = json!("seven");
     request["parameters"] = json!({"binary_data_output": true, "timeout": 900});
     let (wish, _) = read_json(&request).unwrap();
@@ -64,11 +64,11 @@ fn what_the_model_does_not_take_is_refused_by_field() {
             "shared_memory_region",
         ),
     ] {
-        let error = read_json(&input(members)).unwrap_err();
+        let error = read_json(&input(&members)).unwrap_err();
         assert_eq!(error, (code, Some(field.to_owned())));
     }
     let with = |name: &str, value: Value| {
-        let mut request = input(json!({"data": data}));
+        let mut request = input(&json!({"data": data}));
         request[name] = value;
         read_json(&request).unwrap_err()
     };
@@ -86,7 +86,7 @@ fn what_the_model_does_not_take_is_refused_by_field() {
 
 #[test]
 fn bytes_behind_the_json_are_the_map() {
-    let head = input(json!({"parameters": {"binary_data_size": MAP_LEN * 4}})).to_string();
+    let head = input(&json!({"parameters": {"binary_data_size": MAP_LEN * 4}})).to_string();
     let mut body = head.clone().into_bytes();
     body.resize(head.len() + MAP_LEN * 4, 7);
     let mut headers = HeaderMap::new();

@@ -25,10 +25,16 @@ pub(crate) struct Running {
 impl Running {
     /// Returns once it listens.
     pub(crate) fn start(models: &Path) -> Self {
+        Self::start_with(models, &[])
+    }
+
+    /// The same, with more arguments.
+    pub(crate) fn start_with(models: &Path, more: &[&str]) -> Self {
         let models = models.to_str().unwrap();
         let args = ["--models", models, "--bind", "127.0.0.1:0", "--json", "--threads", "1"];
         let mut child = papilla(&args)
             .args(["--calibration-ms", "1", "--log", "error"])
+            .args(more)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
