@@ -82,19 +82,6 @@ impl Speed {
         }
     }
 
-    /// Time a map must have left to be worth the inference.
-    ///
-    /// On an idle machine anything that could be in time is tried. While others wait, a run
-    /// that will probably be late would take the time of one that will not.
-    pub(crate) fn needed(&self, others_wait: bool) -> Duration {
-        if others_wait {
-            let typical_us = self.typical_us();
-            self.floor().max(Duration::from_micros(typical_us - typical_us / 8))
-        } else {
-            self.floor()
-        }
-    }
-
     /// A running mean, us.
     pub(crate) fn typical_us(&self) -> u64 {
         self.typical_us.load(Ordering::Relaxed)
@@ -215,8 +202,6 @@ mod tests {
         speed.learn(Duration::from_micros(211));
         assert_eq!(speed.typical_us(), 61);
         assert_eq!(speed.floor(), Duration::ZERO, "half of 1 us");
-        assert_eq!(speed.needed(false), speed.floor());
-        assert_eq!(speed.needed(true), Duration::from_micros(54));
     }
 
     #[test]

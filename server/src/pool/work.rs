@@ -30,8 +30,6 @@ pub(super) struct Worker {
     metrics: Arc<Metrics>,
     /// One per tier, in the catalogue's order.
     sessions: Vec<Box<dyn Session>>,
-    /// Whether other slots waited when the job was taken.
-    others_wait: bool,
     pressure_pa: Vec<f32>,
     sed_j_per_m3: Vec<f32>,
 }
@@ -46,7 +44,6 @@ impl Worker {
             sessions: Vec::with_capacity(catalogue.tiers.len()),
             catalogue: Arc::clone(catalogue),
             metrics,
-            others_wait: false,
             pressure_pa: vec![0.0; MAP_LEN],
             sed_j_per_m3: vec![0.0; MAP_LEN],
         };
@@ -75,9 +72,7 @@ impl Worker {
                 Next::Nothing => continue,
                 Next::Closed => return,
             };
-            let waiting = queue.len();
-            self.metrics.queue_length.set(waiting);
-            self.others_wait = waiting > 0;
+            self.metrics.queue_length.set(queue.len());
             let abandoned = slot.is_abandoned();
             let Some((job, mut recycler)) = slot.take() else { continue };
             let done = if abandoned {
@@ -150,10 +145,7 @@ impl Worker {
             // Nothing touches the finger: nothing is felt, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
-        } else if job
-            .deadline
-            .is_some_and(|deadline| decoded + tier.speed.needed(self.others_wait) >= deadline)
-        {
+        } else if job.deadline.is_some_and(|deadline| decoded + tier.speed.floor() >= deadline) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
             self.sessions[job.tier]
