@@ -5,6 +5,7 @@
 //! checks, infers, encodes, and hands the [`Done`] back through the slot's channel.
 
 mod buffer;
+mod exchange;
 mod job;
 mod queue;
 mod slot;
@@ -17,10 +18,11 @@ use std::{
 };
 
 pub(crate) use buffer::Recycler;
+pub(crate) use exchange::Exchange;
 pub(crate) use job::{Done, Job, Outcome, Stage, is_past};
 pub(crate) use slot::Slot;
 
-use self::{queue::Queue, work::Worker};
+use self::{exchange::Inbox, queue::Queue, work::Worker};
 use crate::{StartError, metrics::Metrics, models::Catalogue};
 use job::Times;
 use slot::Offer;
@@ -28,6 +30,7 @@ use slot::Offer;
 /// The threads and the queue before them.
 pub(crate) struct Pool {
     queue: Arc<Queue>,
+    inboxes: Vec<Arc<Inbox>>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -49,9 +52,14 @@ impl Pool {
         places: usize,
     ) -> Result<Self, StartError> {
         let queue = Arc::new(Queue::new(places));
-        let mut pool = Self { queue: Arc::clone(&queue), threads: Vec::with_capacity(threads) };
+        let inboxes: Vec<_> = (0..threads).map(|_| Arc::default()).collect();
+        let mut pool = Self {
+            queue: Arc::clone(&queue),
+            inboxes: inboxes.clone(),
+            threads: Vec::with_capacity(threads),
+        };
         let (report, reports) = std::sync::mpsc::sync_channel(threads);
-        for number in 0..threads {
+        for (number, inbox) in inboxes.into_iter().enumerate() {
             let (catalogue, metrics) = (Arc::clone(catalogue), Arc::clone(metrics));
             let (queue, report) = (Arc::clone(&queue), report.clone());
             let thread = thread::Builder::new()
@@ -61,7 +69,7 @@ impl Pool {
                         let _ = report.send(Ok(()));
                         // The starter counts reports until all senders are gone.
                         drop(report);
-                        worker.run(&queue);
+                        worker.run(&queue, &inbox);
                     }
                     Err(error) => {
                         let _ = report.send(Err(error));
@@ -84,6 +92,11 @@ impl Pool {
 
     pub(crate) fn entrance(&self, metrics: &Arc<Metrics>) -> Entrance {
         Entrance { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
+    }
+
+    /// The way for new models into the threads.
+    pub(crate) fn exchange(&self) -> Exchange {
+        Exchange::new(self.inboxes.clone())
     }
 
     /// Ends the threads once the queue is empty, and waits for them.

@@ -69,8 +69,10 @@ fn bench() -> Bench {
         sed_max_j_per_m3: 100.0,
         kind: Kind::Network,
         relative_l2_median: 0.1,
-        speed: Speed::default(),
-        sessions: AtomicUsize::new(0),
+        speed: Arc::new(Speed::default()),
+        sessions: Arc::new(AtomicUsize::new(0)),
+        relative_l2_p95: 0.0,
+        retired: false,
     };
     let patch = PatchVertices {
         positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
@@ -89,7 +91,8 @@ fn bench() -> Bench {
         judged_on: None,
         overhead: Overhead::default(),
     });
-    let metrics = Metrics::new(["gated"].into_iter());
+    let metrics = Metrics::new();
+    metrics.name_tiers(&catalogue);
     let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();
     let entrance = pool.entrance(&metrics);
     Bench { pool, entrance, metrics, begun, go }

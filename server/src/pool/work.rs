@@ -12,6 +12,7 @@ use papilla_proto::{ErrorCode, HEADER_LEN, MAP_LEN, Problem, check_pressure};
 use super::{
     Done, Job, LOOK_AROUND, Outcome, Stage, Times,
     buffer::Recycler,
+    exchange::Inbox,
     queue::{Next, Queue},
 };
 use crate::{
@@ -61,9 +62,12 @@ impl Worker {
     }
 
     /// Serves the queue until it is closed and empty.
-    pub(super) fn run(&mut self, queue: &Queue) {
+    pub(super) fn run(&mut self, queue: &Queue, inbox: &Inbox) {
         loop {
-            let slot = match queue.pop(LOOK_AROUND) {
+            let next = queue.pop(LOOK_AROUND);
+            // After the wait: a job for a new tier comes only once its session is there.
+            inbox.collect(&mut self.catalogue, &mut self.sessions);
+            let slot = match next {
                 Next::Slot(slot) => slot,
                 Next::Nothing => continue,
                 Next::Closed => return,
@@ -95,7 +99,7 @@ impl Worker {
                 catch_unwind(AssertUnwindSafe(|| self.render(job, recycler, &mut times)));
             rendered.unwrap_or_else(|_| self.recover(job.tier))
         };
-        let tier = &self.metrics.tiers[job.tier];
+        let tier = self.metrics.tier(job.tier);
         tier.queue.observe(times.queue);
         if let Outcome::Map { .. } = outcome {
             tier.decode.observe(times.decode);

@@ -183,8 +183,11 @@ impl Session {
         put_header(&mut bytes, &head);
         // Counted before it is sent: whoever has the answer finds it in the metrics.
         counts.ok.inc();
+        let timers = metrics.tier(done.tier);
+        let start = Instant::now();
         line.send(Message::Binary(bytes.freeze())).await?;
-        metrics.tiers[done.tier].total.observe(done.received.elapsed());
+        timers.send.observe(start.elapsed());
+        timers.total.observe(done.received.elapsed());
         Ok(())
     }
 

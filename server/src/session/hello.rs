@@ -1,6 +1,9 @@
 //! The terms of a session: hello and ready, at its start and whenever the client asks anew.
 
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use axum::extract::ws::Message;
 use papilla_proto::{
@@ -13,7 +16,7 @@ use super::{End, Event, Line, close, drained};
 use crate::{
     app::App,
     codec::{Output, scale_of},
-    models::Catalogue,
+    models::Tier,
 };
 
 /// Refused hellos after which the session ends.
@@ -97,21 +100,18 @@ pub(super) fn renew(app: &App, text: &str, number: u64) -> Result<(Terms, Ready)
 }
 
 /// A place in the count of a tier's sessions; given back when it is dropped.
-struct Seat {
-    catalogue: Arc<Catalogue>,
-    tier: usize,
-}
+struct Seat(Arc<AtomicUsize>);
 
 impl Seat {
-    fn take(app: &App, tier: usize) -> Self {
-        app.catalogue.tiers[tier].sessions.fetch_add(1, Ordering::Relaxed);
-        Self { catalogue: Arc::clone(&app.catalogue), tier }
+    fn take(tier: &Tier) -> Self {
+        tier.sessions.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(&tier.sessions))
     }
 }
 
 impl Drop for Seat {
     fn drop(&mut self) {
-        self.catalogue.tiers[self.tier].sessions.fetch_sub(1, Ordering::Relaxed);
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -123,11 +123,12 @@ fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
     }
     let budget_us = hello.budget_us.filter(|&us| us > 0);
+    let catalogue = app.catalogue();
     let index = match &hello.tier {
-        Some(name) => app.tier_named(name)?,
-        None => app.catalogue.choose(budget_us, &hello.effects).unwrap_or(app.catalogue.default),
+        Some(name) => catalogue.tier_named(name)?,
+        None => catalogue.choose(budget_us, &hello.effects).unwrap_or(catalogue.default),
     };
-    let tier = &app.catalogue.tiers[index];
+    let tier = &catalogue.tiers[index];
     if let Some(effect) = hello.effects.iter().find(|effect| !tier.effects.contains(effect)) {
         let rendered = tier.effects.join(", ");
         let message = format!("tier {} renders {rendered}, but not '{effect}'", tier.name);
@@ -147,20 +148,21 @@ fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         budget_us,
         sample_type: hello.sample_type,
         pressure_scale_pa: hello.pressure_scale_pa,
-        _seat: Seat::take(app, index),
+        _seat: Seat::take(tier),
     })
 }
 
 fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
-    let tier = &app.catalogue.tiers[terms.tier];
-    let meets_budget = app.catalogue.meets(terms.tier, terms.budget_us);
+    let catalogue = app.catalogue();
+    let tier = &catalogue.tiers[terms.tier];
+    let meets_budget = catalogue.meets(terms.tier, terms.budget_us);
     Ready {
         version: u32::from(PROTOCOL_VERSION),
         session: number,
         tier: tier.name.clone(),
         effects: tier.effects.clone(),
         atlas_hash: tier.atlas_hash.clone(),
-        predicted_latency_us: app.catalogue.predicted_latency_us(terms.tier),
+        predicted_latency_us: catalogue.predicted_latency_us(terms.tier),
         budget_us: terms.budget_us,
         meets_budget,
         width: MAP_SIDE_PX as u32,

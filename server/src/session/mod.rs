@@ -10,7 +10,7 @@ use std::{
 
 use axum::{
     extract::{
-        State, WebSocketUpgrade,
+        Extension, State, WebSocketUpgrade,
         ws::{CloseFrame, Message, Utf8Bytes, WebSocket, rejection::WebSocketUpgradeRejection},
     },
     response::Response,
@@ -18,12 +18,13 @@ use axum::{
 use bytes::Bytes;
 use papilla_proto::{ErrorCode, Problem, ServerMessage, SessionError};
 use tokio::{
-    sync::{OwnedSemaphorePermit, mpsc, watch},
+    sync::{mpsc, watch},
     time::{Instant as TokioInstant, sleep_until, timeout},
 };
 
 use crate::{
-    app::{App, begun},
+    app::{App, SessionPlace, begun},
+    gate::Guest,
     pool::{Done, Recycler, Slot},
     problem::{self, HttpProblem},
 };
@@ -44,6 +45,7 @@ mod close {
 /// Takes the upgrade, or says why not.
 pub(crate) async fn open(
     State(app): State<Arc<App>>,
+    Extension(guest): Extension<Guest>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, HttpProblem> {
     let refuse = |problem: Problem| {
@@ -54,7 +56,7 @@ pub(crate) async fn open(
         let message = format!("a WebSocket handshake is due here: {rejection}");
         refuse(Problem::new(ErrorCode::UpgradeRequired, message))
     })?;
-    let place = app.admit_session().map_err(refuse)?;
+    let place = app.admit_session(&guest).map_err(refuse)?;
     // Taken before the upgrade: from here on the drain waits for this session.
     let drain = app.drain.subscribe();
     Ok(upgrade
@@ -65,12 +67,7 @@ pub(crate) async fn open(
         .on_upgrade(move |socket| run(socket, app, drain, place)))
 }
 
-async fn run(
-    socket: WebSocket,
-    app: Arc<App>,
-    drain: watch::Receiver<bool>,
-    _place: OwnedSemaphorePermit,
-) {
+async fn run(socket: WebSocket, app: Arc<App>, drain: watch::Receiver<bool>, _place: SessionPlace) {
     app.metrics.sessions.inc();
     app.metrics.sessions_open.inc();
     let number = app.session_number();

@@ -1,16 +1,18 @@
 //! The tiers this service can render with, their atlas, and the replay.
 
-use std::{sync::Arc, sync::atomic::AtomicUsize, time::Duration};
+mod load;
+
+use std::sync::{Arc, atomic::AtomicUsize};
 
 use bytes::Bytes;
-use papilla_engine::{
-    Card, Ladder, Model,
-    card::Index,
-    ladder::{Kind, SET_NAMES},
+use papilla_engine::{Ladder, Model, card::Index, ladder::Kind};
+use papilla_proto::{
+    ErrorCode, Problem,
+    atlas::{Atlas, Patch, Raster},
 };
-use papilla_proto::atlas::{Atlas, Patch, Raster};
 use serde_json::Value;
 
+use self::load::{judge, load_ladder, load_tier, text};
 use crate::{
     StartError,
     assets::Assets,
@@ -19,6 +21,7 @@ use crate::{
 };
 
 /// One way of getting a SED map: a model, and what is known of it.
+#[derive(Clone)]
 pub(crate) struct Tier {
     /// Name in the protocol.
     pub(crate) name: String,
@@ -36,13 +39,20 @@ pub(crate) struct Tier {
     pub(crate) kind: Kind,
     /// Median relative L2 error on [`Catalogue::judged_on`].
     pub(crate) relative_l2_median: f64,
+    /// 95th percentile of that error on the card's own split.
+    pub(crate) relative_l2_p95: f64,
     /// How long it takes here.
-    pub(crate) speed: Speed,
+    pub(crate) speed: Arc<Speed>,
     /// Sessions that render with it now.
-    pub(crate) sessions: AtomicUsize,
+    pub(crate) sessions: Arc<AtomicUsize>,
+    /// A reload found it gone: sessions that have it go on, nobody else gets it.
+    pub(crate) retired: bool,
 }
 
 /// All there is to render with and to show.
+///
+/// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
+/// reloaded: jobs and sessions name tiers by their place.
 pub(crate) struct Catalogue {
     /// In the index's order.
     pub(crate) tiers: Vec<Tier>,
@@ -61,11 +71,16 @@ pub(crate) struct Catalogue {
 }
 
 impl Catalogue {
-    /// Loads and checks everything.
+    /// Loads and checks everything. A tier whose file is that of `running` is not loaded again:
+    /// the two share the model, its times and its count of sessions.
     ///
     /// # Errors
     /// A file is missing, unreadable, or at odds with another.
-    pub(crate) fn load(assets: &Assets, default: Option<&str>) -> Result<Self, StartError> {
+    pub(crate) fn load(
+        assets: &Assets,
+        default: Option<&str>,
+        running: Option<&Self>,
+    ) -> Result<Self, StartError> {
         let origin = || assets.origin.clone();
         let read = |name: &str| {
             assets
@@ -87,7 +102,10 @@ impl Catalogue {
         let mut tiers = Vec::with_capacity(index.models.len());
         for name in &index.models {
             let (onnx, card) = (format!("{name}.onnx"), format!("{name}.json"));
-            let tier = load_tier(name, read(&onnx)?, read(&card)?).map_err(|e| bad(&onnx, &e))?;
+            let running =
+                running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
+            let tier =
+                load_tier(name, read(&onnx)?, read(&card)?, running).map_err(|e| bad(&onnx, &e))?;
             if tier.atlas_hash != atlas.hash() {
                 let (model, ours) = (&tier.atlas_hash, atlas.hash());
                 return Err(bad(
@@ -143,12 +161,28 @@ impl Catalogue {
 
     /// Index of the tier called `name`.
     pub(crate) fn find(&self, name: &str) -> Option<usize> {
-        self.tiers.iter().position(|tier| tier.name == name)
+        self.tiers.iter().position(|tier| tier.name == name && !tier.retired)
+    }
+
+    /// Index of the tier called `name`.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
+        self.find(name).ok_or_else(|| {
+            let message = format!("no tier '{name}'; there are {}", self.names());
+            Problem::new(ErrorCode::UnknownTier, message).at("tier")
+        })
+    }
+
+    /// The tiers on offer, each with its place.
+    pub(crate) fn offered(&self) -> impl Iterator<Item = (usize, &Tier)> {
+        self.tiers.iter().enumerate().filter(|(_, tier)| !tier.retired)
     }
 
     /// The names, for messages.
     pub(crate) fn names(&self) -> String {
-        self.tiers.iter().map(|t| t.name.as_str()).collect::<Vec<_>>().join(", ")
+        self.offered().map(|(_, t)| t.name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     /// The tier for a client that named none.
@@ -157,7 +191,7 @@ impl Catalogue {
     /// `effects` and are expected to meet it the most accurate, or else the fastest.
     pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
         let renders = |tier: &Tier| effects.iter().all(|e| tier.effects.contains(e));
-        let fitting = || self.tiers.iter().enumerate().filter(|(_, tier)| renders(tier));
+        let fitting = || self.offered().filter(|(_, tier)| renders(tier));
         let Some(budget_us) = budget_us else {
             return if renders(&self.tiers[self.default]) {
                 Some(self.default)
@@ -171,78 +205,4 @@ impl Catalogue {
             .or_else(|| fitting().min_by_key(|(_, tier)| tier.speed.typical_us()))
             .map(|(index, _)| index)
     }
-}
-
-/// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
-/// are of a model that is not served.
-fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<Ladder, String> {
-    let mut ladder = Ladder::from_json(text(json)?).map_err(|error| error.to_string())?;
-    if ladder.atlas_hash != atlas.hash() {
-        let (measured, ours) = (&ladder.atlas_hash, atlas.hash());
-        return Err(format!("measured on atlas {measured}, but atlas.json is {ours}"));
-    }
-    ladder.rungs.retain(|rung| {
-        let Some(tier) = tiers.iter().find(|t| rung.model.as_ref() == Some(&t.name)) else {
-            return rung.model.is_none();
-        };
-        let same = |hash: &String| *hash == tier.model.info().onnx_sha256;
-        let fresh = rung.onnx_sha256.as_ref().is_none_or(same);
-        if !fresh {
-            tracing::warn!(tier = %tier.name, "ladder.json has figures of another file; measure it anew");
-        }
-        fresh
-    });
-    Ok(ladder)
-}
-
-/// Gives the tiers the shipped times, and the errors of the first set that all were measured
-/// on; the name of that set.
-fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
-    for tier in tiers.iter() {
-        if let Some(ms) = ladder.rung_of(&tier.name).and_then(|rung| rung.time_ms()) {
-            tier.speed.expect(milliseconds(ms));
-        }
-    }
-    let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
-    let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
-    let set = SET_NAMES.into_iter().find(complete)?;
-    for tier in tiers.iter_mut() {
-        if let Some(error) = error(tier, set) {
-            tier.relative_l2_median = error;
-        }
-    }
-    Some(set.to_owned())
-}
-
-fn milliseconds(ms: f64) -> Duration {
-    Duration::try_from_secs_f64(ms / 1e3).unwrap_or_default()
-}
-
-fn text(bytes: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(bytes).map_err(|error| error.to_string())
-}
-
-fn load_tier(name: &str, onnx: &[u8], card: &[u8]) -> Result<Tier, Box<dyn std::error::Error>> {
-    let json = text(card)?;
-    let card = Card::from_json(json)?;
-    let model = papilla_engine::load(onnx, Some(&card))?;
-    let info = model.info();
-    if info.name != name {
-        return Err(format!("the model calls itself '{}'", info.name).into());
-    }
-    let speed = Speed::default();
-    speed.expect(milliseconds(card.latency_ms.p50));
-    Ok(Tier {
-        name: name.to_owned(),
-        kind: Kind::of_network(&info.network),
-        sessions: AtomicUsize::new(0),
-        effects: info.effects.clone(),
-        atlas_hash: info.atlas_hash.clone(),
-        pressure_max_pa: info.pressure_max_pa,
-        sed_max_j_per_m3: info.sed_max_j_per_m3,
-        relative_l2_median: card.metrics.relative_l2.median,
-        card: serde_json::from_str(json)?,
-        speed,
-        model,
-    })
 }
