@@ -49,6 +49,8 @@ pub enum ErrorCode {
     UnknownTier,
     /// No such effect, or the tier does not render it.
     UnknownEffect,
+    /// A parameter of an effect is missing or unusable.
+    BadEffect,
     /// The client's atlas is not the one the tier was trained on.
     AtlasMismatch,
     /// No answer type in `Accept` is offered.
@@ -75,7 +77,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 31] = [
         Self::WrongLength,
         Self::WrongType,
         Self::WrongShape,
@@ -95,6 +97,7 @@ impl ErrorCode {
         Self::BadQuery,
         Self::UnknownTier,
         Self::UnknownEffect,
+        Self::BadEffect,
         Self::AtlasMismatch,
         Self::NotAcceptable,
         Self::NotFound,
@@ -131,6 +134,7 @@ impl ErrorCode {
             Self::BadQuery => "bad_query",
             Self::UnknownTier => "unknown_tier",
             Self::UnknownEffect => "unknown_effect",
+            Self::BadEffect => "bad_effect",
             Self::AtlasMismatch => "atlas_mismatch",
             Self::NotAcceptable => "not_acceptable",
             Self::NotFound => "not_found",
@@ -172,6 +176,7 @@ impl ErrorCode {
             | Self::NegativePressure
             | Self::OutOfRange
             | Self::UnknownEffect
+            | Self::BadEffect
             | Self::AtlasMismatch => 422,
             Self::Internal => 500,
             Self::Superseded | Self::Overloaded | Self::ShuttingDown => 503,

@@ -163,6 +163,15 @@ impl SampleType {
         }
     }
 
+    /// Checks that `bytes` hold that many `samples`, and that the scale is usable.
+    ///
+    /// # Errors
+    /// As [`decode`](Self::decode).
+    pub fn require(self, bytes: usize, samples: usize, scale: f32) -> Result<(), SampleError> {
+        self.checked_scale(scale)?;
+        self.checked_len(bytes, samples)
+    }
+
     /// Decodes `payload` into `values`, in the unit of `scale`. Floats are
     /// taken as they are, NaN and infinities included: checking is
     /// [`check_pressure`](crate::check_pressure)'s. `scale` is ignored for floats.

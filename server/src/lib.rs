@@ -17,6 +17,7 @@ mod app;
 mod assets;
 mod codec;
 mod config;
+mod effects;
 mod error;
 mod http;
 mod metrics;

@@ -101,6 +101,8 @@ pub(crate) struct TransportMetrics {
     pub(crate) superseded: Counter,
     /// Answered late.
     pub(crate) late: Counter,
+    /// Answered stale.
+    pub(crate) stale: Counter,
     /// Refused.
     pub(crate) error: Counter,
 }
@@ -245,6 +247,7 @@ fn transport_metrics(
         ok: count("ok"),
         superseded: count("superseded"),
         late: count("late"),
+        stale: count("stale"),
         error: count("error"),
     }
 }

@@ -14,6 +14,7 @@ use serde_json::Value;
 use crate::{
     StartError,
     assets::Assets,
+    effects,
     replay::Replay,
     speed::{Overhead, Speed},
 };
@@ -58,6 +59,8 @@ pub(crate) struct Catalogue {
     /// The set by which tiers are compared; none: each by its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
+    /// What sessions with effects share.
+    pub(crate) runtime: effects::Shared,
 }
 
 impl Catalogue {
@@ -128,6 +131,7 @@ impl Catalogue {
             ladder,
             judged_on,
             overhead,
+            runtime: effects::Shared::default(),
         })
     }
 

@@ -59,7 +59,7 @@ async fn render(
         None => app.catalogue.choose(query.budget(), &[]).unwrap_or(app.catalogue.default),
     };
     let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
-    let job = Job { tier, payload, input, output, header: None, received, deadline };
+    let job = Job { tier, payload, input, output, frame: None, received, deadline };
     let done = through_pool(app, job).await?;
     let total = received.elapsed();
     match done.outcome {

@@ -17,7 +17,7 @@ use std::{
 };
 
 pub(crate) use buffer::Recycler;
-pub(crate) use job::{Done, Job, Outcome, Stage, is_past};
+pub(crate) use job::{Done, Drawn, Frame, Job, Outcome, Stage, is_past};
 pub(crate) use slot::Slot;
 
 use self::{queue::Queue, work::Worker};

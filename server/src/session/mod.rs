@@ -1,6 +1,7 @@
 //! `GET /v1/session`: a WebSocket on which frames go in and SED maps come out.
 
 mod frames;
+mod fresh;
 mod hello;
 
 use std::{
@@ -22,6 +23,7 @@ use tokio::{
     time::{Instant as TokioInstant, sleep_until, timeout},
 };
 
+use self::fresh::Freshness;
 use crate::{
     app::{App, begun},
     pool::{Done, Recycler, Slot},
@@ -93,6 +95,7 @@ async fn converse(line: &mut Line, number: u64) -> End {
     let (slot, answers) = Slot::new();
     let session = frames::Session {
         number,
+        fresh: Freshness::new(terms.stale_after_us),
         terms,
         slot: Arc::new(slot),
         answers,
