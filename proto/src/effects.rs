@@ -301,10 +301,7 @@ mod tests {
             serde_json::from_value::<Afferents>(json!({"theta_kpa": 5.0})).unwrap(),
             Afferents { theta_kpa: 5.0, ..Afferents::default() }
         );
-        assert_eq!(
-            serde_json::from_value::<Relaxation>(json!({})).unwrap(),
-            Relaxation::default()
-        );
+        assert_eq!(serde_json::from_value::<Relaxation>(json!({})).unwrap(), Relaxation::default());
         let layout: Layout = serde_json::from_value(json!({
             "radius_mm": 1.0, "gain": 0.01,
             "actuators": [{"at": {"px": [10.5, 20.5]}}, {"at": {"mm": [3, 0, -5]}, "gain": 2.0}]

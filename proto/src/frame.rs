@@ -25,9 +25,9 @@
 //! | 34 | u16 | row of the window's first pixel |
 //! | 36 | u32 | answer: us the frame waited for a thread |
 //! | 40 | u32 | answer: us in the network, 0 if it was not asked |
-//! | 44 | u8 | answer: number of the tier, as `ready` gave it |
-//! | 45 | u8 | answer: flags, see [`flags`] |
-//! | 46 | u16 | 0, to be ignored |
+//! | 44 | u16 | answer: number of the tier, as `ready` gave it |
+//! | 46 | u8 | answer: flags, see [`flags`] |
+//! | 47 | u8 | 0, to be ignored |
 //!
 //! The payload follows. A request's: width x height samples, row-major, first row first. An
 //! answer's: the sections that `ready` listed; only answers with status ok carry one.
@@ -96,7 +96,7 @@ pub struct Extension {
     /// Answer: us in the network; 0 if it was not asked.
     pub infer_us: u32,
     /// Answer: number of the tier, as `ready` gave it.
-    pub tier: u8,
+    pub tier: u16,
     /// Answer: bits of [`flags`].
     pub flags: u8,
 }
@@ -244,12 +244,7 @@ impl FrameHeader {
     pub fn windowed(self, window: Window) -> Self {
         let extension =
             Extension { x: window.x, y: window.y, ..self.extension.unwrap_or_default() };
-        Self {
-            width: window.width,
-            height: window.height,
-            extension: Some(extension),
-            ..self
-        }
+        Self { width: window.width, height: window.height, extension: Some(extension), ..self }
     }
 
     /// The pixels that the payload holds.
@@ -299,8 +294,8 @@ impl FrameHeader {
             b[34..36].copy_from_slice(&extension.y.to_le_bytes());
             b[36..40].copy_from_slice(&extension.queue_us.to_le_bytes());
             b[40..44].copy_from_slice(&extension.infer_us.to_le_bytes());
-            b[44] = extension.tier;
-            b[45] = extension.flags;
+            b[44..46].copy_from_slice(&extension.tier.to_le_bytes());
+            b[46] = extension.flags;
         }
         HeaderBytes { bytes: b, len: self.header_len() }
     }
@@ -377,8 +372,8 @@ impl Extension {
             y: u16::from_le_bytes([b[34], b[35]]),
             queue_us: u32::from_le_bytes([b[36], b[37], b[38], b[39]]),
             infer_us: u32::from_le_bytes([b[40], b[41], b[42], b[43]]),
-            tier: b[44],
-            flags: b[45],
+            tier: u16::from_le_bytes([b[44], b[45]]),
+            flags: b[46],
         }
     }
 }

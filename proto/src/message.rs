@@ -170,7 +170,7 @@ pub struct Ready {
     pub sed_scale_j_per_m3: f32,
     /// Number that answers name the tier by. Version 2, as all that follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tier_number: Option<u8>,
+    pub tier_number: Option<u16>,
     /// Sample type of the answers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer_sample_type: Option<SampleType>,

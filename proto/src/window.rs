@@ -46,8 +46,8 @@ impl Window {
     pub fn rows(self) -> impl Iterator<Item = Range<usize>> {
         let columns = usize::from(self.x).min(MAP_SIDE_PX)
             ..(usize::from(self.x) + usize::from(self.width)).min(MAP_SIDE_PX);
-        let rows = usize::from(self.y)
-            ..(usize::from(self.y) + usize::from(self.height)).min(MAP_SIDE_PX);
+        let rows =
+            usize::from(self.y)..(usize::from(self.y) + usize::from(self.height)).min(MAP_SIDE_PX);
         let rows = if columns.is_empty() { 0..0 } else { rows };
         rows.map(move |row| {
             let start = row * MAP_SIDE_PX;

@@ -56,8 +56,7 @@ impl Actuators {
             };
             let radius_mm = due("radius_mm", actuator.radius_mm.or(layout.radius_mm), 0.0)?;
             let gain = due("gain", actuator.gain.or(layout.gain), 0.0)?;
-            let threshold =
-                due("threshold", actuator.threshold.or(Some(layout.threshold)), 0.0)?;
+            let threshold = due("threshold", actuator.threshold.or(Some(layout.threshold)), 0.0)?;
             let name = format_args!("actuator {number}").to_string();
             let (own, centre_mm) = geometry.locate(actuator.at, "actuators", &name)?;
             display.field(own, centre_mm, radius_mm, geometry);

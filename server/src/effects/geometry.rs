@@ -99,8 +99,7 @@ fn areas_mm2(atlas: &Atlas, raster: &Raster, patch: Patch) -> Vec<f32> {
             let normal = [ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx];
             let doubled_mm2 = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
             let [a, b, c] = corners.map(|vertex| vertices.uv_px[vertex as usize].map(f64::from));
-            let doubled_px2 =
-                ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
+            let doubled_px2 = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs();
             if doubled_px2 > 0.0 { (doubled_mm2 / doubled_px2) as f32 } else { 0.0 }
         })
         .collect();

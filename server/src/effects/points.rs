@@ -37,7 +37,8 @@ impl Points {
     /// Appends one value a point.
     pub(super) fn write(&self, map: &[f32], bytes: &mut BytesMut) {
         for taps in &self.0 {
-            bytes.put_f32_le(taps.iter().map(|&(index, weight)| weight * map[index as usize]).sum());
+            bytes
+                .put_f32_le(taps.iter().map(|&(index, weight)| weight * map[index as usize]).sum());
         }
     }
 }

@@ -116,12 +116,8 @@ impl Moments {
     fn central_px2(&self) -> [f32; 3] {
         if self.sum > 0.0 {
             let [u, v] = [self.u / self.sum, self.v / self.sum];
-            [
-                self.uu / self.sum - u * u,
-                self.uv / self.sum - u * v,
-                self.vv / self.sum - v * v,
-            ]
-            .map(|moment| moment as f32)
+            [self.uu / self.sum - u * u, self.uv / self.sum - u * v, self.vv / self.sum - v * v]
+                .map(|moment| moment as f32)
         } else {
             [0.0; 3]
         }

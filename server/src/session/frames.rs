@@ -157,7 +157,8 @@ impl Session {
 
     /// Whether a header is that of a frame this session takes.
     fn check(&self, header: &FrameHeader) -> Result<(), Problem> {
-        let wrong_type = |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
+        let wrong_type =
+            |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
         let version = if header.extension.is_some() { 2 } else { 1 };
         if version != self.terms.version {
             let agreed = self.terms.version;

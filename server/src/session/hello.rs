@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, atomic::Ordering};
 
 use axum::extract::ws::Message;
 use papilla_proto::{
-    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
-    SampleType, ServerMessage,
+    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready,
+    RuntimeEffect, SampleType, ServerMessage,
     effects::{OutOfRange, Section, SectionName},
 };
 use tokio::{task::spawn_blocking, time::timeout};
@@ -204,8 +204,7 @@ fn meet_now(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
-    let effects =
-        if hello.version > 1 { Effects::of(hello, &app.catalogue)? } else { None };
+    let effects = if hello.version > 1 { Effects::of(hello, &app.catalogue)? } else { None };
     let told = effects.as_ref().map_or_else(Told::default, |effects| Told {
         names: effects.names.clone(),
         sections: effects.sections.clone(),
@@ -264,6 +263,6 @@ fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
 }
 
 /// The number by which answers name a tier.
-pub(super) fn tier_number(tier: usize) -> u8 {
-    u8::try_from(tier).unwrap_or(u8::MAX)
+pub(super) fn tier_number(tier: usize) -> u16 {
+    u16::try_from(tier).unwrap_or(u16::MAX)
 }

@@ -5,6 +5,7 @@
 
 mod binary;
 mod drain;
+mod effects;
 mod hostile;
 mod information;
 mod ladder;
