@@ -14,7 +14,7 @@ use papilla_proto::{
     effects::{Moduli, PronyTerm, Relaxation as Parameters},
 };
 
-use super::unusable;
+use super::{summary::peak, unusable};
 
 /// Most terms of a series.
 const TERMS_MAX: usize = 6;
@@ -94,12 +94,10 @@ impl Relaxation {
                 *pa -= share * state;
             }
         }
-        let mut peak_pa = 0.0_f32;
-        for pa in pressure_pa {
+        for pa in pressure_pa.iter_mut() {
             *pa = if *pa < NOTHING_PA { 0.0 } else { *pa };
-            peak_pa = peak_pa.max(*pa);
         }
-        peak_pa
+        peak(pressure_pa)
     }
 
     /// The pressure as it was sent, Pa.

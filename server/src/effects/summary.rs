@@ -19,6 +19,26 @@ pub(super) struct Contact<'a> {
     pub(super) above_pa: f32,
 }
 
+impl Contact<'_> {
+    /// Area of what is touched, mm2.
+    fn area_mm2(self, skin_mm2: &[f32]) -> f64 {
+        let rows =
+            self.pressure_pa.chunks_exact(MAP_SIDE_PX).zip(skin_mm2.chunks_exact(MAP_SIDE_PX));
+        let row = |(pressures, areas): (&[f32], &[f32])| {
+            let mut lanes = [0.0_f32; LANES];
+            let chunks = pressures.as_chunks::<LANES>().0.iter().zip(areas.as_chunks::<LANES>().0);
+            for (pressures, areas) in chunks {
+                for ((lane, &pressure_pa), &area_mm2) in lanes.iter_mut().zip(pressures).zip(areas)
+                {
+                    *lane += if pressure_pa > self.above_pa { area_mm2 } else { 0.0 };
+                }
+            }
+            lanes.iter().map(|&lane| f64::from(lane)).sum::<f64>()
+        };
+        rows.map(row).sum()
+    }
+}
+
 /// Summary of one map.
 pub(super) fn of(
     geometry: &Geometry,
@@ -28,7 +48,7 @@ pub(super) fn of(
 ) -> Summary {
     let pressure = Moments::of(contact.pressure_pa, &geometry.skin_mm2);
     let sed = Moments::of(sed_j_per_m3, &geometry.interface_mm2);
-    let (pressure_max_pa, _) = greatest(contact.pressure_pa);
+    let pressure_max_pa = peak(contact.pressure_pa);
     let (sed_max_j_per_m3, place) = greatest(sed_j_per_m3);
     let [pressure_u_px, pressure_v_px] = pressure.centroid_px();
     let [sed_u_px, sed_v_px] = sed.centroid_px();
@@ -36,9 +56,7 @@ pub(super) fn of(
     let [sed_max_u_px, sed_max_v_px] = place.map_or([0.0; 2], |index| {
         [(index % MAP_SIDE_PX) as f32 + 0.5, (index / MAP_SIDE_PX) as f32 + 0.5]
     });
-    let in_contact = contact.pressure_pa.iter().zip(&geometry.skin_mm2);
-    let contact_area_mm2 =
-        in_contact.map(|(&p, &area)| if p > contact.above_pa { area } else { 0.0 }).sum();
+    let contact_area_mm2 = contact.area_mm2(&geometry.skin_mm2) as f32;
     let rates = rate_hz.map(|rate_hz| Moments::of(rate_hz, &geometry.interface_mm2).sum);
     Summary {
         force_n: (1e-6 * pressure.sum) as f32,
@@ -63,15 +81,20 @@ pub(super) fn of(
 
 /// The greatest value, and its flat index; none if nothing is above zero.
 fn greatest(map: &[f32]) -> (f32, Option<usize>) {
+    let top = peak(map);
+    let place = (top > 0.0).then(|| map.iter().position(|&value| value >= top)).flatten();
+    (top, place)
+}
+
+/// The greatest value, 0 at least.
+pub(super) fn peak(map: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; LANES];
     for values in map.as_chunks::<LANES>().0 {
         for (top, &value) in lanes.iter_mut().zip(values) {
             *top = if value > *top { value } else { *top };
         }
     }
-    let top = lanes.iter().fold(0.0_f32, |top, &lane| top.max(lane));
-    let place = (top > 0.0).then(|| map.iter().position(|&value| value >= top)).flatten();
-    (top, place)
+    lanes.iter().fold(0.0_f32, |top, &lane| top.max(lane))
 }
 
 /// Moments of a map about its middle, where centres lie at whole and a half pixels: that keeps
@@ -93,6 +116,10 @@ impl Moments {
         let mut moments = Self::default();
         let rows = map.chunks_exact(MAP_SIDE_PX).zip(area_mm2.chunks_exact(MAP_SIDE_PX));
         for (row, (values, areas)) in rows.enumerate() {
+            // Most rows of a pressure are empty.
+            if values.iter().all(|&value| value <= 0.0) {
+                continue;
+            }
             let [sum, u, uu] = row_moments(values, areas);
             let v = row as f64 + 0.5 - MIDDLE_PX;
             moments.sum += sum;

@@ -3,7 +3,7 @@
 use bytes::BytesMut;
 use papilla_proto::{Problem, SampleType, Window};
 
-use crate::problem;
+use crate::{codec::append, problem};
 
 /// Appends the samples of `window` to `bytes`; returns their scale. `value_max` is the value of
 /// the greatest unit, unless the window holds a greater one: nothing is clipped.
@@ -24,10 +24,13 @@ pub(super) fn encode(
     } else {
         1.0
     };
+    let failed = |error| problem::internal("the window cannot be encoded", &error);
+    if window == Window::WHOLE {
+        append(sample_type, map, scale, bytes).map_err(failed)?;
+        return Ok(scale);
+    }
     let at = bytes.len();
     bytes.resize(at + window.pixel_count() * sample_type.bytes(), 0);
-    window
-        .encode(sample_type, map, scale, &mut bytes[at..])
-        .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
+    window.encode(sample_type, map, scale, &mut bytes[at..]).map_err(failed)?;
     Ok(scale)
 }

@@ -1,6 +1,7 @@
 //! One inference thread: decode, check, infer, encode.
 
 use std::{
+    mem,
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, PoisonError},
     time::{Duration, Instant},
@@ -70,15 +71,13 @@ impl Worker {
             };
             self.metrics.queue_length.set(queue.len());
             let abandoned = slot.is_abandoned();
-            let Some((job, mut recycler)) = slot.take() else { continue };
+            let Some((mut job, mut recycler)) = slot.take() else { continue };
             let done = if abandoned {
                 let gone = Problem::new(ErrorCode::Internal, "the client is gone");
                 finished(&job, Progress::default(), Outcome::Failed(gone))
             } else {
-                self.serve(&job, &mut recycler)
+                self.serve(&mut job, &mut recycler)
             };
-            // The frame's memory goes back to the socket's reader before the answer leaves.
-            drop(job);
             if slot.finish(done, recycler) {
                 queue.push_again(slot);
             }
@@ -86,7 +85,7 @@ impl Worker {
     }
 
     /// Renders one job; a panic below becomes an error of this job alone.
-    fn serve(&mut self, job: &Job, recycler: &mut Recycler) -> Done {
+    fn serve(&mut self, job: &mut Job, recycler: &mut Recycler) -> Done {
         let mut progress = Progress::default();
         progress.times.queue = job.received.elapsed();
         let outcome = if job.is_late() {
@@ -117,7 +116,12 @@ impl Worker {
         Outcome::Failed(problem::internal("the inference panicked", &tier.name))
     }
 
-    fn render(&mut self, job: &Job, recycler: &mut Recycler, progress: &mut Progress) -> Outcome {
+    fn render(
+        &mut self,
+        job: &mut Job,
+        recycler: &mut Recycler,
+        progress: &mut Progress,
+    ) -> Outcome {
         match self.try_render(job, recycler, progress) {
             Ok(outcome) => outcome,
             Err(problem) => Outcome::Failed(problem),
@@ -126,12 +130,15 @@ impl Worker {
 
     fn try_render(
         &mut self,
-        job: &Job,
+        job: &mut Job,
         recycler: &mut Recycler,
         Progress { times, drawn }: &mut Progress,
     ) -> Result<Outcome, Problem> {
         let start = Instant::now();
-        let (mut summary, range) = self.decode(job)?;
+        // The frame's memory goes back to the socket's reader before the network is asked.
+        let payload = mem::take(&mut job.payload);
+        let (mut summary, range) = self.decode(job, &payload)?;
+        drop(payload);
         let tier = &self.catalogue.tiers[job.tier];
         let time_us = job.frame.as_ref().map_or(0, |frame| frame.header.client_time_us);
         let effects = job.frame.as_ref().and_then(|frame| frame.effects.as_ref());
@@ -187,13 +194,17 @@ impl Worker {
     }
 
     /// Decodes and checks the pressure.
-    fn decode(&mut self, job: &Job) -> Result<(MapSummary, PressureRange), Problem> {
+    fn decode(
+        &mut self,
+        job: &Job,
+        payload: &[u8],
+    ) -> Result<(MapSummary, PressureRange), Problem> {
         match (job.input, &job.frame) {
             (Input::Samples { sample_type, scale }, Some(Frame { header, .. })) => header
                 .window()
-                .decode(sample_type, &job.payload, scale, &mut self.pressure_pa)
+                .decode(sample_type, payload, scale, &mut self.pressure_pa)
                 .map_err(problem::of_samples)?,
-            (input, _) => codec::decode(input, &job.payload, &mut self.pressure_pa)?,
+            (input, _) => codec::decode(input, payload, &mut self.pressure_pa)?,
         }
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,

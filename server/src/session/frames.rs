@@ -35,6 +35,8 @@ pub(super) struct Session {
     pub(super) outstanding: usize,
     /// Buffers of answers that are a header alone.
     pub(super) short_answers: Recycler,
+    /// Copies of frames that have to wait: one with a thread, one in the slot, one to take its place.
+    pub(super) waiting: Recycler<3>,
 }
 
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
@@ -85,7 +87,7 @@ impl Session {
         draining: bool,
     ) -> Result<(), End> {
         let job = if draining { Err(problem::shutting_down()) } else { self.job(&frame, received) };
-        let job = match job {
+        let mut job = match job {
             Ok(job) => job,
             Err(problem) => {
                 line.app.metrics.of(Transport::Session).error.inc();
@@ -103,6 +105,12 @@ impl Session {
         if job.is_late() {
             line.app.metrics.late(Transport::Session, Stage::Admission);
             return self.answer_short(line, &header, job.tier, FrameStatus::Late, received).await;
+        }
+        if self.outstanding > 0 || !line.app.entrance.is_idle() {
+            // Held for as long as it waits, the reader's own memory would have to be replaced.
+            let copy = self.waiting.claim(job.payload.len());
+            copy.extend_from_slice(&job.payload);
+            job.payload = copy.split().freeze();
         }
         match line.app.entrance.submit(&self.slot, job) {
             Ok(None) => {

@@ -179,24 +179,31 @@ fn windowed(sequence: u32, window: Window, map: &[f32]) -> Vec<u8> {
     masked(0x82, &frame)
 }
 
-/// What the engine itself allocates for `frames` maps: that is its own affair.
-fn engines_own(frames: usize) -> u64 {
+/// What the engine itself allocates for a map: that is its own affair.
+fn engines_own() -> u64 {
     let models = model_folder();
     let onnx = fs::read(models.path().join("quick.onnx")).unwrap();
     let mut session = papilla_engine::load(&onnx, None).unwrap().session().unwrap();
     let (map, mut sed) = (ramp(), vec![0.0; MAP_LEN]);
-    let mut run = |frames| (0..frames).for_each(|_| session.infer(&map, &mut sed).unwrap());
+    let mut run = |maps| (0..maps).for_each(|_| session.infer(&map, &mut sed).unwrap());
     run(8);
     LEFT_OUT.set(false);
-    let count = allocations(|| run(frames));
+    let counts = [1, 100].map(|maps| allocations(|| run(maps)));
     LEFT_OUT.set(true);
     assert!((sed[MAP_LEN - 1] - GAIN * map[MAP_LEN - 1]).abs() < 1e-2);
-    count
+    assert_eq!(counts[1], 100 * counts[0], "the engine allocates the same for every map");
+    // What would see nothing could not fail.
+    assert!(counts[0] > 0, "nothing is counted");
+    counts[0]
 }
 
 /// Frames until everything has its place, and frames counted.
 const WARM_UP: usize = 100;
 const FRAMES: usize = 400;
+
+fn plain_hello() -> Value {
+    json!({"type": "hello", "version": 1, "tier": "quick"})
+}
 
 #[test]
 fn a_warm_session_allocates_nothing_for_a_frame() {
@@ -204,32 +211,64 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
     let runtime =
         tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     let service = runtime.block_on(Service::start());
+    let engines_own = engines_own();
+    one_frame_at_a_time(&service, engines_own);
+    frames_that_wait(&service, engines_own);
+    every_effect(&service, engines_own);
+    runtime.block_on(service.server.drain()).unwrap();
+}
+
+fn one_frame_at_a_time(service: &Service, engines_own: u64) {
     // Frames of nothing ask no network: what is counted is the path of the frame alone.
-    let mut client = Client::connect(&service, &json!({"type": "hello", "version": 1}));
+    let mut client = Client::connect(service, &plain_hello());
     let zero = [whole(&vec![0.0; MAP_LEN])];
     client.exchange(&zero, WARM_UP);
     assert_eq!(allocations(|| client.exchange(&zero, FRAMES)), 0, "without contact");
-
     let press = [whole(&ramp())];
     client.exchange(&press, WARM_UP);
-    let engines_own = engines_own(FRAMES);
     let all = allocations(|| client.exchange(&press, FRAMES));
-    assert_eq!(all, engines_own, "beyond what the engine itself does");
+    assert_eq!(all, FRAMES as u64 * engines_own, "beyond what the engine itself does");
+}
 
-    // Every effect at once, windows both ways.
+/// Two sessions, each three frames ahead of its answers, on one inference thread: frames wait, and
+/// some are superseded.
+fn frames_that_wait(service: &Service, engines_own: u64) {
+    let mut clients = [(); 2].map(|()| Client::connect(service, &plain_hello()));
+    let press = whole(&ramp());
+    let mut maps = 0;
+    let mut exchange = |rounds: usize| {
+        maps = 0;
+        for _ in 0..rounds {
+            for _ in 0..3 {
+                clients.iter_mut().for_each(|client| client.send(&press));
+            }
+            for client in &mut clients {
+                for _ in 0..3 {
+                    let header = FrameHeader::decode(client.hear()).unwrap();
+                    maps += u64::from(header.status == FrameStatus::Ok);
+                }
+            }
+        }
+    };
+    exchange(WARM_UP);
+    let all = allocations(|| exchange(FRAMES));
+    assert!(maps < 6 * FRAMES as u64, "some frames were superseded");
+    assert_eq!(all, maps * engines_own, "frames that wait");
+}
+
+/// Every effect at once, windows both ways.
+fn every_effect(service: &Service, engines_own: u64) {
     let effects = ["relaxation", "afferents", "contact_window", "summary", "points", "actuators"];
     let hello = json!({
-        "type": "hello", "version": 2, "effects": effects, "budget_us": 60_000_000,
-        "tier": "quick", "points": [{"px": [110.0, 65.0]}],
+        "type": "hello", "version": 2, "effects": effects, "tier": "quick",
+        "points": [{"px": [110.0, 65.0]}],
         "actuators": {"radius_mm": 1.0, "gain": 1.0, "actuators": [{"at": {"px": [110.0, 65.0]}}]}
     });
-    let mut client = Client::connect(&service, &hello);
+    let mut client = Client::connect(service, &hello);
     let window = Window { x: 60, y: 50, width: 100, height: 80 };
     let frames: Vec<_> =
         (1..=(WARM_UP + FRAMES) as u32).map(|n| windowed(n, window, &ramp())).collect();
     client.exchange(&frames[..WARM_UP], 1);
     let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
-    assert_eq!(all, engines_own, "with every effect, beyond what the engine itself does");
-    drop(client);
-    runtime.block_on(service.server.drain()).unwrap();
+    assert_eq!(all, FRAMES as u64 * engines_own, "with every effect");
 }
