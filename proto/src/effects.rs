@@ -188,9 +188,10 @@ impl Default for Afferents {
 #[serde(rename_all = "snake_case")]
 pub enum Tissue {
     /// Skin, where SED is read.
-    #[default]
     Skin,
-    /// The tissue below it.
+    /// The tissue below it. It takes most of the strain: with its constants the filter follows a
+    /// layered finger best (`docs/physics.md`).
+    #[default]
     Subcutaneous,
 }
 

@@ -143,11 +143,11 @@ fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
     };
     let (at_once, sent, _) = press(&mut effects, 1000.0, 0);
     assert!((at_once - 1000.0).abs() < 0.1 && (sent - 1000.0).abs() < 1e-3);
-    let (later, sent, pixels) = press(&mut effects, 1000.0, 60_000_000);
-    assert!((later - 1000.0 / 0.5209).abs() < 1.0 && (sent - 1000.0).abs() < 1e-3, "{later}");
+    let (later, sent, pixels) = press(&mut effects, 1000.0, 600_000_000);
+    assert!((later - 1000.0 / 0.7).abs() < 1.0 && (sent - 1000.0).abs() < 1e-3, "{later}");
     assert_eq!(pixels, 49 * 49);
-    let (left, sent, pixels) = press(&mut effects, 0.0, 60_000_001);
-    assert!(left > 900.0 && sent <= 0.0 && pixels == 0, "{left} {sent} {pixels}");
+    let (left, sent, pixels) = press(&mut effects, 0.0, 600_000_001);
+    assert!(left > 400.0 && sent <= 0.0 && pixels == 0, "{left} {sent} {pixels}");
 }
 
 #[test]
