@@ -32,9 +32,15 @@
 //! The payload follows. A request's: width x height samples, row-major, first row first. An
 //! answer's: the sections that `ready` listed; only answers with status ok carry one.
 
+mod error;
+mod extension;
+
 use std::ops::Deref;
 
-use crate::{ErrorCode, SampleType, Window};
+pub use error::FrameError;
+pub use extension::{Extension, flags};
+
+use crate::{SampleType, Window};
 
 /// Bytes of the header of version 1, and of the first part of that of version 2.
 pub const HEADER_LEN: usize = 32;
@@ -76,31 +82,6 @@ pub enum FrameStatus {
     Stale = 4,
 }
 
-/// Bits of [`Extension::flags`].
-pub mod flags {
-    /// Some pressure was above what the tier was trained on: the map is an extrapolation.
-    pub const OUT_OF_RANGE: u8 = 1;
-    /// Nothing touches the finger: the map is zero and no network was asked.
-    pub const NO_CONTACT: u8 = 2;
-}
-
-/// What version 2 adds to a header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Extension {
-    /// Column of the window's first pixel.
-    pub x: u16,
-    /// Row of the window's first pixel.
-    pub y: u16,
-    /// Answer: us the frame waited for a thread.
-    pub queue_us: u32,
-    /// Answer: us in the network; 0 if it was not asked.
-    pub infer_us: u32,
-    /// Answer: number of the tier, as `ready` gave it.
-    pub tier: u16,
-    /// Answer: bits of [`flags`].
-    pub flags: u8,
-}
-
 /// The header, decoded. Units and meaning: see the [module](self).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameHeader {
@@ -139,78 +120,6 @@ impl Deref for HeaderBytes {
 
     fn deref(&self) -> &[u8] {
         &self.bytes[..self.len]
-    }
-}
-
-/// What is wrong with a frame's header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrameError {
-    /// Fewer bytes than a header has.
-    #[error("the frame has {bytes} bytes, its header alone has {due}")]
-    TruncatedHeader {
-        /// Bytes found.
-        bytes: usize,
-        /// Bytes of a header.
-        due: usize,
-    },
-    /// Another magic.
-    #[error("the frame starts with the bytes {found:02x?}, not with 'PPL1'")]
-    BadMagic {
-        /// The four bytes found.
-        found: [u8; 4],
-    },
-    /// Another version.
-    #[error("the frame has version {found}, this side speaks 1 and 2")]
-    UnknownVersion {
-        /// The version found.
-        found: u8,
-    },
-    /// A kind with no meaning.
-    #[error("frame kind {found} is unknown; 1 is pressure, 2 is SED, 3 a firing rate")]
-    UnknownKind {
-        /// The kind found.
-        found: u8,
-    },
-    /// A sample type with no meaning.
-    #[error("sample type {found} is unknown; 0 is f32, 1 f16, 2 u16, 3 u8")]
-    UnknownSampleType {
-        /// The sample type found.
-        found: u8,
-    },
-    /// A status with no meaning.
-    #[error("frame status {found} is unknown; 0 is ok, 1 superseded, 2 late, 3 error, 4 stale")]
-    UnknownStatus {
-        /// The status found.
-        found: u8,
-    },
-}
-
-impl FrameError {
-    /// The wire code of this error.
-    #[must_use]
-    pub const fn code(&self) -> ErrorCode {
-        match self {
-            Self::TruncatedHeader { .. } => ErrorCode::TruncatedHeader,
-            Self::BadMagic { .. } => ErrorCode::BadMagic,
-            Self::UnknownVersion { .. } => ErrorCode::UnknownVersion,
-            Self::UnknownKind { .. }
-            | Self::UnknownSampleType { .. }
-            | Self::UnknownStatus { .. } => ErrorCode::WrongType,
-        }
-    }
-
-    /// The header field at fault.
-    #[must_use]
-    pub const fn field(&self) -> Option<&'static str> {
-        match self {
-            Self::TruncatedHeader { .. } => None,
-            Self::BadMagic { .. } => Some("magic"),
-            Self::UnknownVersion { .. } => Some("version"),
-            Self::UnknownKind { .. } => Some("kind"),
-            Self::UnknownSampleType { .. } => Some("sample_type"),
-            Self::UnknownStatus { .. } => Some("status"),
-        }
     }
 }
 
@@ -362,19 +271,6 @@ impl FrameHeader {
     pub fn peek_sequence(frame: &[u8]) -> Option<u32> {
         let b = frame.first_chunk::<12>()?;
         (b[0..4] == MAGIC).then(|| u32::from_le_bytes([b[8], b[9], b[10], b[11]]))
-    }
-}
-
-impl Extension {
-    fn decode(b: &[u8; HEADER_LEN_V2]) -> Self {
-        Self {
-            x: u16::from_le_bytes([b[32], b[33]]),
-            y: u16::from_le_bytes([b[34], b[35]]),
-            queue_us: u32::from_le_bytes([b[36], b[37], b[38], b[39]]),
-            infer_us: u32::from_le_bytes([b[40], b[41], b[42], b[43]]),
-            tier: u16::from_le_bytes([b[44], b[45]]),
-            flags: b[46],
-        }
     }
 }
 

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::ErrorCode;
 
 fn any_header() -> impl Strategy<Value = FrameHeader> {
     let enums = (

@@ -22,10 +22,13 @@ impl<const N: usize> Default for Recycler<N> {
 impl<const N: usize> Recycler<N> {
     /// All buffers with room for `bytes`, so that no claim of as much needs memory later.
     pub(crate) fn with_room(bytes: usize) -> Self {
-        let mut recycler = Self::default();
-        // Splitting makes the count of owners, which takes memory too.
-        (0..N).for_each(|_| drop(recycler.claim(bytes).split()));
-        recycler
+        let buffer = |_| {
+            let mut buffer = BytesMut::with_capacity(bytes);
+            // Splitting makes the count of owners, which takes memory too.
+            drop(buffer.split());
+            buffer
+        };
+        Self { buffers: std::array::from_fn(buffer), next: 0 }
     }
 
     /// An empty buffer with room for `bytes`; memory is taken from the system only if

@@ -104,11 +104,6 @@ impl Drop for Pool {
 }
 
 impl Entrance {
-    /// Whether a thread waits for a job.
-    pub(crate) fn is_idle(&self) -> bool {
-        self.queue.is_idle()
-    }
-
     /// Puts `job` into `slot` and sees to it that a thread comes for it.
     ///
     /// Returns the job whose place it took, if that had not been started.

@@ -27,15 +27,13 @@ pub(super) struct Queue {
 
 struct State {
     slots: VecDeque<Arc<Slot>>,
-    /// Threads that wait for a slot.
-    waiting: usize,
     closed: bool,
 }
 
 impl Queue {
     /// A queue of at most `places` slots; all its memory is taken here.
     pub(super) fn new(places: usize) -> Self {
-        let state = State { slots: VecDeque::with_capacity(places), waiting: 0, closed: false };
+        let state = State { slots: VecDeque::with_capacity(places), closed: false };
         Self { state: Mutex::new(state), arrival: Condvar::new(), places }
     }
 
@@ -63,24 +61,16 @@ impl Queue {
 
     /// The slot that waits longest; waits up to `wait` for one.
     pub(super) fn pop(&self, wait: Duration) -> Next {
-        let mut state = self.state();
-        state.waiting += 1;
+        let state = self.state();
         let (mut state, _) = self
             .arrival
             .wait_timeout_while(state, wait, |s| s.slots.is_empty() && !s.closed)
             .unwrap_or_else(PoisonError::into_inner);
-        state.waiting -= 1;
         match state.slots.pop_front() {
             Some(slot) => Next::Slot(slot),
             None if state.closed => Next::Closed,
             None => Next::Nothing,
         }
-    }
-
-    /// Whether a slot that came now would be taken at once.
-    pub(super) fn is_idle(&self) -> bool {
-        let state = self.state();
-        state.waiting > state.slots.len()
     }
 
     /// How many slots wait.

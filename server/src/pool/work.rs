@@ -135,7 +135,7 @@ impl Worker {
         Progress { times, drawn }: &mut Progress,
     ) -> Result<Outcome, Problem> {
         let start = Instant::now();
-        // The frame's memory goes back to the socket's reader before the network is asked.
+        // The frame's memory goes back to its session before the network is asked.
         let payload = mem::take(&mut job.payload);
         let (mut summary, range) = self.decode(job, &payload)?;
         drop(payload);

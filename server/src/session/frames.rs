@@ -35,7 +35,7 @@ pub(super) struct Session {
     pub(super) outstanding: usize,
     /// Buffers of answers that are a header alone.
     pub(super) short_answers: Recycler,
-    /// Copies of frames that have to wait: one with a thread, one in the slot, one to take its place.
+    /// Copies of frames: one with a thread, one in the slot, one to take its place.
     pub(super) waiting: Recycler<3>,
 }
 
@@ -106,12 +106,11 @@ impl Session {
             line.app.metrics.late(Transport::Session, Stage::Admission);
             return self.answer_short(line, &header, job.tier, FrameStatus::Late, received).await;
         }
-        if self.outstanding > 0 || !line.app.entrance.is_idle() {
-            // Held for as long as it waits, the reader's own memory would have to be replaced.
-            let copy = self.waiting.claim(job.payload.len());
-            copy.extend_from_slice(&job.payload);
-            job.payload = copy.split().freeze();
-        }
+        // Held until a thread has decoded it, the reader's own memory would have to be replaced if
+        // the next frame came before that: an allocation costs more than this copy.
+        let copy = self.waiting.claim(job.payload.len());
+        copy.extend_from_slice(&job.payload);
+        job.payload = copy.split().freeze();
         match line.app.entrance.submit(&self.slot, job) {
             Ok(None) => {
                 self.outstanding += 1;
