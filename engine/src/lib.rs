@@ -200,7 +200,7 @@ fn all(values: &[f32], good: impl Fn(f32) -> bool) -> bool {
 /// Refuses what is no energy density.
 fn check_output(sed_j_per_m3: &[f32]) -> Result<(), EngineError> {
     // One comparison a pixel: NaN fails both, and the good case is the fast one.
-    let good = |v: f32| (v >= 0.0) & (v <= f32::MAX);
+    let good = |v: f32| (0.0..=f32::MAX).contains(&v);
     if all(sed_j_per_m3, good) {
         return Ok(());
     }

@@ -170,7 +170,7 @@ mod tests {
         let wide = Window::around(&map, 0.0, 25);
         assert_eq!(wide, Window { x: 3, y: 0, width: 221, height: 67 });
         assert_eq!(Window::around(&map, 0.0, 500), Window::WHOLE);
-        assert_eq!(Window::around(&[1.0; MAP_LEN], 0.0, 3), Window::WHOLE);
+        assert_eq!(Window::around(&vec![1.0; MAP_LEN], 0.0, 3), Window::WHOLE);
     }
 
     proptest! {

@@ -187,7 +187,7 @@ mod tests {
         assert!(off.contains("actuator 1"), "{off}");
         assert!(refused(&Layout { radius_mm: None, ..good.clone() }).contains("radius_mm"));
         assert!(refused(&Layout { gain: Some(f32::NAN), ..good.clone() }).contains("gain"));
-        assert!(refused(&Layout { max: 0.0, ..good.clone() }).contains("max"));
+        assert!(refused(&Layout { max: 0.0, ..good }).contains("max"));
         let many = Layout { radius_mm: Some(99.0), ..layout(&[at(100.0, 100.0); 99]) };
         assert!(refused(&many).contains("smaller"));
     }

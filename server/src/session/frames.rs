@@ -36,7 +36,7 @@ pub(super) struct Session {
     /// Buffers of answers that are a header alone.
     pub(super) short_answers: Recycler,
     /// Copies of frames: one with a thread, one in the slot, one to take its place.
-    pub(super) waiting: Recycler<3>,
+    pub(super) waiting: Recycler,
 }
 
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
