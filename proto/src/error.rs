@@ -49,6 +49,8 @@ pub enum ErrorCode {
     UnknownTier,
     /// No such effect, or the tier does not render it.
     UnknownEffect,
+    /// A parameter of an effect is missing or unusable.
+    BadEffect,
     /// The client's atlas is not the one the tier was trained on.
     AtlasMismatch,
     /// No answer type in `Accept` is offered.
@@ -84,7 +86,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 35] = [
         Self::WrongLength,
         Self::WrongType,
         Self::WrongShape,
@@ -104,6 +106,7 @@ impl ErrorCode {
         Self::BadQuery,
         Self::UnknownTier,
         Self::UnknownEffect,
+        Self::BadEffect,
         Self::AtlasMismatch,
         Self::NotAcceptable,
         Self::NotFound,
@@ -144,6 +147,7 @@ impl ErrorCode {
             Self::BadQuery => "bad_query",
             Self::UnknownTier => "unknown_tier",
             Self::UnknownEffect => "unknown_effect",
+            Self::BadEffect => "bad_effect",
             Self::AtlasMismatch => "atlas_mismatch",
             Self::NotAcceptable => "not_acceptable",
             Self::NotFound => "not_found",
@@ -191,6 +195,7 @@ impl ErrorCode {
             | Self::NegativePressure
             | Self::OutOfRange
             | Self::UnknownEffect
+            | Self::BadEffect
             | Self::AtlasMismatch
             | Self::BadModel => 422,
             Self::RateLimited => 429,

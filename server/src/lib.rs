@@ -18,6 +18,7 @@ mod assets;
 mod check;
 mod codec;
 mod config;
+mod effects;
 mod error;
 mod gate;
 mod golden;

@@ -13,6 +13,7 @@ use papilla_proto::{MAP_LEN, MAP_SIDE_PX, SampleType, check_pressure};
 use crate::{
     StartError,
     codec::{self, Input, Map, Output, Quantity},
+    effects,
     models::{Catalogue, Tier},
 };
 
@@ -144,6 +145,7 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
     if let Some(codec_us) = codec_us() {
         catalogue.overhead.0.store(codec_us + HAND_OVER_US, Ordering::Relaxed);
     }
+    effects::measure(catalogue);
     Ok(())
 }
 

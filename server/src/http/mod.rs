@@ -3,6 +3,7 @@
 mod admin;
 mod atlas;
 pub(crate) mod body;
+mod effects;
 mod info;
 mod page;
 mod presses;
@@ -47,6 +48,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/openapi.json", get(info::openapi)),
         (g.clone(), "/v1/tiers", get(info::tiers)),
         (g.clone(), "/v1/models", get(info::models)),
+        (g.clone(), "/v1/effects", get(effects::list)),
         (g.clone(), "/v1/atlas", get(atlas::json)),
         (g.clone(), "/v1/atlas.obj", get(atlas::obj)),
         (g.clone(), "/v1/atlas/mask.png", get(atlas::mask)),

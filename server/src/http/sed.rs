@@ -61,7 +61,7 @@ async fn render(
         None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
     };
     let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
-    let job = Job { tier, payload, input, output, header: None, received, deadline };
+    let job = Job { tier, payload, input, output, frame: None, received, deadline };
     // Held until the answer is there: it bounds the queue.
     let _place = app.admit_request()?;
     let rendered = through_pool(app, job, Transport::Http).await?;

@@ -92,6 +92,8 @@ pub(crate) struct TransportMetrics {
     pub(crate) superseded: Counter,
     /// Answered late.
     pub(crate) late: Counter,
+    /// Answered stale.
+    pub(crate) stale: Counter,
     /// Refused.
     pub(crate) error: Counter,
 }
@@ -292,6 +294,7 @@ fn transport_metrics(
         ok: count("ok"),
         superseded: count("superseded"),
         late: count("late"),
+        stale: count("stale"),
         error: count("error"),
     }
 }

@@ -16,6 +16,7 @@ use self::load::{judge, load_ladder, load_tier, text};
 use crate::{
     StartError,
     assets::Assets,
+    effects,
     replay::Replay,
     speed::{Overhead, Speed},
 };
@@ -68,6 +69,8 @@ pub(crate) struct Catalogue {
     /// The set by which tiers are compared; none: each by its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
+    /// What sessions with effects share.
+    pub(crate) runtime: effects::Shared,
 }
 
 impl Catalogue {
@@ -146,6 +149,7 @@ impl Catalogue {
             ladder,
             judged_on,
             overhead,
+            runtime: effects::Shared::default(),
         })
     }
 

@@ -158,7 +158,7 @@ async fn answer(
         payload,
         input: Input::Samples { sample_type: SampleType::F32, scale: 1.0 },
         output: Output::Samples(SampleType::F32),
-        header: None,
+        frame: None,
         received,
         deadline,
     };

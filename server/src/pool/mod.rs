@@ -19,7 +19,7 @@ use std::{
 
 pub(crate) use buffer::Recycler;
 pub(crate) use exchange::Exchange;
-pub(crate) use job::{Done, Job, Outcome, Stage, is_past};
+pub(crate) use job::{Done, Drawn, Frame, Job, Outcome, Stage, is_past};
 pub(crate) use slot::Slot;
 
 use self::{exchange::Inbox, queue::Queue, work::Worker};
@@ -120,9 +120,10 @@ impl Entrance {
     /// Puts `job` into `slot` and sees to it that a thread comes for it.
     ///
     /// Returns the job whose place it took, if that had not been started.
-    /// Err gives the job back: the pool is closed or, against the bounds set
-    /// at the start, full.
-    pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, Job> {
+    ///
+    /// # Errors
+    /// The job was not taken: the pool is closed or, against the bounds set at the start, full.
+    pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, NotTaken> {
         match slot.offer(job) {
             Offer::Scheduled { replaced } => Ok(replaced),
             Offer::Schedule => {
@@ -130,12 +131,16 @@ impl Entrance {
                     self.metrics.queue_length.set(self.queue.len());
                     Ok(None)
                 } else {
-                    slot.retract().map_or(Ok(None), Err)
+                    slot.retract().map_or(Ok(None), |_| Err(NotTaken))
                 }
             }
         }
     }
 }
+
+/// The pool took no job.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct NotTaken;
 
 /// Longest wait of a thread for work before it looks around; every wait is timed.
 const LOOK_AROUND: Duration = Duration::from_millis(500);

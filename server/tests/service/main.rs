@@ -5,6 +5,7 @@
 
 mod binary;
 mod drain;
+mod effects;
 mod gate;
 mod hostile;
 mod information;
