@@ -45,7 +45,7 @@ pub enum Arrivals {
 
 /// Loads a Papilla service with pressure frames and measures when maps come back.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "papilla-load", version, after_help = HELP_TAIL)]
+#[command(name = "papilla-load", version, after_help = HELP_TAIL, args_override_self = true)]
 pub struct Options {
     /// The service.
     #[arg(
