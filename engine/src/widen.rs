@@ -55,11 +55,5 @@ fn widened(tensor: &TensorProto, kind: i32, name: &str) -> Option<TensorProto> {
         return None;
     };
     let (name, dims) = (name.to_owned(), tensor.dims.clone());
-    Some(TensorProto {
-        name,
-        dims,
-        data_type: kind,
-        raw_data: raw_data.into(),
-        ..Default::default()
-    })
+    Some(TensorProto { name, dims, data_type: kind, raw_data, ..Default::default() })
 }

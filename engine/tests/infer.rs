@@ -44,14 +44,14 @@ fn constants_stored_in_16_bits_are_the_same_network() {
         let weights = graph(model).initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
         let (values, _) = weights.raw_data.as_chunks::<4>();
         let rounded = values.iter().flat_map(|b| halved(b).to_f32().to_le_bytes());
-        weights.raw_data = rounded.collect::<Vec<u8>>().into();
+        weights.raw_data = rounded.collect();
     });
     let stored = altered(|model| {
         let graph = graph(model);
         let weights = graph.initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
         let (values, _) = weights.raw_data.as_chunks::<4>();
         let halves = values.iter().flat_map(|b| halved(b).to_le_bytes());
-        weights.raw_data = halves.collect::<Vec<u8>>().into();
+        weights.raw_data = halves.collect();
         weights.data_type = DataType::Float16 as i32;
         weights.name = "bottom.w.stored".into();
         let to = AttributeProto {
