@@ -219,8 +219,7 @@ def _dataset_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="DIR",
-        help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas (the "
-        "first one's maxima are the scales)",
+        help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas",
     )
 
 
