@@ -21,7 +21,7 @@ use crate::{
     codec::Output,
     metrics::Transport,
     negotiate::{self, Query},
-    pool::{Done, Job, Outcome, Slot, Stage, is_past},
+    pool::{Done, Job, Outcome, Recycler, Slot, Stage, is_past},
     problem, telemetry,
 };
 
@@ -110,7 +110,7 @@ pub(crate) async fn through_pool(
 }
 
 async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
-    let (slot, mut answers) = Slot::new();
+    let (slot, mut answers) = Slot::new(Recycler::default());
     if app.entrance.submit(&Arc::new(slot), job).is_err() {
         return Err(problem::shutting_down());
     }

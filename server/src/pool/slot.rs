@@ -46,10 +46,11 @@ struct State {
 }
 
 impl Slot {
-    /// An empty slot and the end its answers come out of.
-    pub(crate) fn new() -> (Self, mpsc::Receiver<Done>) {
+    /// An empty slot, whose answers are written into the buffers of `recycler`, and the end they
+    /// come out of.
+    pub(crate) fn new(recycler: Recycler) -> (Self, mpsc::Receiver<Done>) {
         let (answers, receiver) = mpsc::channel(ANSWERS);
-        let state = State { waiting: None, scheduled: false, recycler: Recycler::default() };
+        let state = State { waiting: None, scheduled: false, recycler };
         (Self { state: Mutex::new(state), answers }, receiver)
     }
 

@@ -22,7 +22,7 @@ use serde_json::json;
 use tokio::sync::mpsc;
 
 use self::gated::{Act, Gate, Gated};
-use super::{Done, Entrance, Frame, Job, Outcome, Pool, Slot, Stage};
+use super::{Done, Entrance, Frame, Job, Outcome, Pool, Recycler, Slot, Stage};
 use crate::{
     codec::{Input, Output},
     effects::Shared,
@@ -115,7 +115,7 @@ fn job(sequence: u32, pressure_pa: f32, deadline: Option<Duration>) -> Job {
 }
 
 fn client() -> (Arc<Slot>, mpsc::Receiver<Done>) {
-    let (slot, answers) = Slot::new();
+    let (slot, answers) = Slot::new(Recycler::default());
     (Arc::new(slot), answers)
 }
 

@@ -1,7 +1,7 @@
 //! The terms of a session: hello and ready, at its start and whenever the client asks anew.
 
 use std::sync::{
-    Arc, Mutex,
+    Arc, Mutex, PoisonError,
     atomic::{AtomicUsize, Ordering},
 };
 
@@ -48,6 +48,17 @@ pub(super) struct Terms {
     /// What the client is told of them.
     told: Told,
     _seat: Seat,
+}
+
+impl Terms {
+    /// Most bytes of an answer, its header included.
+    pub(super) fn answer_len_max(&self) -> usize {
+        let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
+        let effects = self.effects.as_ref();
+        effects.map_or(plain, |effects| {
+            effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
+        })
+    }
 }
 
 /// Waits for a hello that can be met, and answers ready.

@@ -94,7 +94,7 @@ async fn converse(line: &mut Line, number: u64) -> End {
         Ok(terms) => terms,
         Err(end) => return end,
     };
-    let (slot, answers) = Slot::new();
+    let (slot, answers) = Slot::new(Recycler::with_room(terms.answer_len_max()));
     let session = frames::Session {
         number,
         fresh: Freshness::new(terms.stale_after_us),

@@ -8,6 +8,7 @@
 // An allocator is unsafe by its nature; this one hands everything to the system's.
 #![allow(unsafe_code)]
 
+// Shared with the service's tests, which use all of it.
 #[allow(dead_code, unused_imports)]
 #[path = "../service/support/mod.rs"]
 mod support;
@@ -208,10 +209,11 @@ fn plain_hello() -> Value {
 #[test]
 fn a_warm_session_allocates_nothing_for_a_frame() {
     LEFT_OUT.set(true);
+    // Before the service starts: nothing else runs that could be counted.
+    let engines_own = engines_own();
     let runtime =
         tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
     let service = runtime.block_on(Service::start());
-    let engines_own = engines_own();
     one_frame_at_a_time(&service, engines_own);
     frames_that_wait(&service, engines_own);
     every_effect(&service, engines_own);
