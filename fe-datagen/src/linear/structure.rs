@@ -78,29 +78,61 @@ pub struct SymmetricMatrix {
     pub values: Vec<f64>,
 }
 
+/// In which order unknowns are eliminated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Elimination {
+    /// METIS' nested dissection of the nodes: the least fill.
+    #[default]
+    NestedDissection,
+    /// faer's approximate minimum degree.
+    MinimumDegree,
+    /// As the mesh numbers its nodes.
+    Natural,
+}
+
 impl Structure {
     /// Structure of `mesh` with some degrees of freedom prescribed.
     ///
     /// # Errors
     /// See [`StructureError`].
     pub fn new(mesh: &Mesh, fixed: &[bool]) -> Result<Self, StructureError> {
+        Self::eliminated(mesh, fixed, Elimination::default())
+    }
+
+    /// The same with a choice of the elimination order.
+    ///
+    /// # Errors
+    /// See [`StructureError`].
+    pub fn eliminated(
+        mesh: &Mesh,
+        fixed: &[bool],
+        elimination: Elimination,
+    ) -> Result<Self, StructureError> {
         let equations = Equations::new(fixed);
         if equations.count == 0 {
             return Err(StructureError::NoUnknowns);
         }
         let neighbours = node_graph(mesh);
         let (column_start, row) = pattern(&neighbours, &equations);
-        let order = elimination_order(&neighbours, &equations)?;
-        let mut inverse = vec![0; order.len()];
-        for (k, &e) in order.iter().enumerate() {
-            inverse[e] = k;
-        }
         let n = equations.count;
+        let (order, mut inverse);
+        let ordering = match elimination {
+            Elimination::NestedDissection => {
+                order = elimination_order(&neighbours, &equations)?;
+                inverse = vec![0; n];
+                for (k, &e) in order.iter().enumerate() {
+                    inverse[e] = k;
+                }
+                SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n))
+            }
+            Elimination::MinimumDegree => SymmetricOrdering::Amd,
+            Elimination::Natural => SymmetricOrdering::Identity,
+        };
         let a = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row);
         let symbolic = factorize_symbolic_cholesky(
             a,
             Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
+            ordering,
             CholeskySymbolicParams::default(),
         )
         .map_err(|e| StructureError::Symbolic(format!("{e:?}")))?;
@@ -136,6 +168,24 @@ impl Structure {
                     (1..=width).map(|c| column(below + c)).sum::<f64>()
                 })
                 .sum(),
+        }
+    }
+
+    /// Visits the place of every diagonal entry among the factor's values.
+    pub(super) fn visit_diagonal(&self, visit: &mut dyn FnMut(usize)) {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(s) => {
+                let starts = s.col_ptr();
+                starts[..starts.len() - 1].iter().for_each(|&at| visit(at));
+            }
+            SymbolicCholeskyRaw::Supernodal(s) => {
+                for k in 0..s.n_supernodes() {
+                    let width = s.supernode_end()[k] - s.supernode_begin()[k];
+                    // Dense columns of the triangle and of the rows below it.
+                    let rows = width + s.supernode(k).pattern().len();
+                    (0..width).for_each(|c| visit(s.col_ptr_for_val()[k] + c * (rows + 1)));
+                }
+            }
         }
     }
 

@@ -1,0 +1,73 @@
+//! Wedges sharper than anything on the mesh.
+
+use super::lab::{press, scene};
+use super::{Line, Suite};
+use crate::press::setup::Setup;
+use crate::solve::Options;
+use crate::verify::{CaseError, Check};
+
+/// Half the plane section under a wedge on its axis.
+fn section(density: &str, tip_mm: f64, depth_mm: f64) -> String {
+    format!(
+        "effects = [\"plane_strain\", \"finite_strain\", \"layers\"]
+        [geometry]
+        kind = \"section\"
+        density = \"{density}\"
+        order = \"quadratic\"
+        [indenter]
+        shape = \"wedge\"
+        tip_width_mm = {tip_mm:?}
+        base_width_mm = 1.0
+        height_mm = 2.0
+        tip_radius_mm = {:?}
+        [motion]
+        depth_mm = {depth_mm:?}
+        increments = 5",
+        0.4 * tip_mm
+    )
+}
+
+/// A block under a wedge along its middle row of nodes, or half an element beside it.
+fn block(tip_mm: f64, aside_mm: f64) -> String {
+    format!(
+        "[geometry]
+        kind = \"block\"
+        size_mm = [8.0, 8.0]
+        elements = [16, 4]
+        layers = [{{ tissue = \"dermis\", thickness_mm = 3.0, elements = 4 }}]
+        [indenter]
+        shape = \"wedge\"
+        tip_width_mm = {tip_mm:?}
+        base_width_mm = 1.0
+        height_mm = 2.0
+        tip_radius_mm = {:?}
+        [motion]
+        depth_mm = 0.6
+        increments = 4
+        offset_mm = [{aside_mm:?}, 0.0]",
+        0.4 * tip_mm
+    )
+}
+
+pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
+    let mut lines = Vec::new();
+    let densities: &[_] =
+        if suite.long { &["coarse", "medium", "fine"] } else { &["coarse", "medium"] };
+    for tip in [0.05, 0.005] {
+        let fine = press(&scene(&section("medium", tip, 1.0))?, Options::default())?;
+        for density in densities {
+            let pressed = press(&scene(&section(density, tip, 1.0))?, Options::default())?;
+            let source = "medium section";
+            let force = Check::relative("force", pressed.force_n(), fine.force_n(), 0.15, source);
+            lines.push(pressed.line(format!("section, {density}, tip {tip} mm"), vec![force]));
+        }
+        let pressed = press(&scene(&block(tip, 0.0))?, Options::default())?;
+        let side = pressed.record.force_n[0] / pressed.force_n();
+        let side = Check::vanishes("sideways force / force", side, 1e-4, "symmetry");
+        lines.push(pressed.line(format!("block, on a row of nodes, tip {tip} mm"), vec![side]));
+        let between = Setup::new(&scene(&block(tip, 0.25))?).map(drop);
+        let words = &["between the nodes", "finer mesh"];
+        lines.push(Line::refused(format!("block, between nodes, tip {tip} mm"), between, words));
+    }
+    Ok(lines)
+}

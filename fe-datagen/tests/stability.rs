@@ -1,0 +1,20 @@
+//! The hard cases that are quick enough for every test run: each keeps its promise.
+
+use fe_datagen::stability::{self, CASES};
+
+#[test]
+fn every_hard_case_keeps_its_promise() {
+    let report = stability::run(false, &|_| true, &mut |case, lines| {
+        for line in lines.into_iter().flatten() {
+            println!("{}", line.text());
+        }
+        if lines.is_some_and(<[_]>::is_empty) {
+            panic!("{} gave no line", case.name);
+        }
+    });
+    let broken: Vec<_> = report.lines.iter().filter(|l| !l.kept).map(|l| l.text()).collect();
+    assert!(report.passed(), "promises broken:\n{}", broken.join("\n"));
+    for case in CASES {
+        assert!(report.lines.iter().any(|l| l.case == case.name), "{} is missing", case.name);
+    }
+}
