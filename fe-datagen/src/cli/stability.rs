@@ -7,7 +7,7 @@ use crate::stability::scenes::{self, ScenesOptions};
 use crate::stability::{self, CASES};
 use anyhow::Context as _;
 use std::num::NonZero;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Run the hard cases: each converges to a right answer or is refused with a typed error.
@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Also write the report as Markdown to this file.
-    #[arg(long, value_name = "FILE", conflicts_with = "scenes")]
+    #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
     /// Press this many random scenes of --campaign at density coarse, to their deepest state.
     #[arg(long, value_name = "N", requires = "out")]
@@ -67,6 +67,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let spec = CampaignSpec::read(&args.campaign)?;
             let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
             let report = scenes::run(&spec, out, &options)?;
+            if let Some(path) = &args.markdown {
+                write(path, &report.markdown())?;
+            }
             print(&report, args.json, || report.to_string())?;
             Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
         }
@@ -90,18 +93,18 @@ fn suite(args: &Args) -> anyhow::Result<ExitCode> {
         bar.inc(1);
     });
     bar.finish_and_clear();
-    let write = |path: &PathBuf| {
-        std::fs::write(path, report.markdown())
-            .with_context(|| format!("cannot write {}", path.display()))
-    };
     if let Some(folder) = &args.out {
         atomic::create_folder(folder)?;
         atomic::write_json(&folder.join("stability.json"), &report)?;
-        write(&folder.join("stability.md"))?;
+        write(&folder.join("stability.md"), &report.markdown())?;
     }
     if let Some(path) = &args.markdown {
-        write(path)?;
+        write(path, &report.markdown())?;
     }
     print(&report, args.json, || report.summary())?;
     Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -1,6 +1,6 @@
 //! Equation numbers, sparsity pattern and element scatter maps of a mesh.
 
-use super::ordering::{OrderingError, nested_dissection};
+use super::ordering::{OrderingError, cuthill_mckee, nested_dissection};
 use crate::mesh::Mesh;
 use faer::Side;
 use faer::perm::PermRef;
@@ -84,8 +84,8 @@ pub enum Elimination {
     /// METIS' nested dissection of the nodes: the least fill.
     #[default]
     NestedDissection,
-    /// faer's approximate minimum degree.
-    MinimumDegree,
+    /// Reverse Cuthill-McKee of the nodes: the least bandwidth.
+    CuthillMckee,
     /// As the mesh numbers its nodes.
     Natural,
 }
@@ -115,24 +115,16 @@ impl Structure {
         let neighbours = node_graph(mesh);
         let (column_start, row) = pattern(&neighbours, &equations);
         let n = equations.count;
-        let (order, mut inverse);
-        let ordering = match elimination {
-            Elimination::NestedDissection => {
-                order = elimination_order(&neighbours, &equations)?;
-                inverse = vec![0; n];
-                for (k, &e) in order.iter().enumerate() {
-                    inverse[e] = k;
-                }
-                SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n))
-            }
-            Elimination::MinimumDegree => SymmetricOrdering::Amd,
-            Elimination::Natural => SymmetricOrdering::Identity,
-        };
+        let order = elimination_order(&neighbours, &equations, elimination)?;
+        let mut inverse = vec![0; n];
+        for (k, &e) in order.iter().enumerate() {
+            inverse[e] = k;
+        }
         let a = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row);
         let symbolic = factorize_symbolic_cholesky(
             a,
             Side::Lower,
-            ordering,
+            SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
             CholeskySymbolicParams::default(),
         )
         .map_err(|e| StructureError::Symbolic(format!("{e:?}")))?;
@@ -324,10 +316,11 @@ fn pattern(neighbours: &[BTreeSet<u32>], equations: &Equations) -> (Vec<usize>, 
     (start, row)
 }
 
-/// Nested dissection of the nodes with unknowns, expanded to equations.
+/// Order of the nodes with unknowns, expanded to equations.
 fn elimination_order(
     neighbours: &[BTreeSet<u32>],
     equations: &Equations,
+    elimination: Elimination,
 ) -> Result<Vec<usize>, OrderingError> {
     let unknowns = |node: usize| {
         equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
@@ -350,7 +343,11 @@ fn elimination_order(
                 .collect()
         })
         .collect();
-    let order = nested_dissection(&graph)?;
+    let order = match elimination {
+        Elimination::NestedDissection => nested_dissection(&graph)?,
+        Elimination::CuthillMckee => cuthill_mckee(&graph),
+        Elimination::Natural => (0..graph.len() as u32).collect(),
+    };
     Ok(order.iter().flat_map(|&v| unknowns(kept[v as usize]).map(|&e| e as usize)).collect())
 }
 

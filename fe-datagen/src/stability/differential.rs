@@ -148,7 +148,7 @@ fn one(seed: u64) -> Result<(Line, Vec<u64>), CaseError> {
         ),
     ];
     for (name, elimination) in
-        [("minimum degree", Elimination::MinimumDegree), ("natural order", Elimination::Natural)]
+        [("Cuthill-McKee", Elimination::CuthillMckee), ("natural order", Elimination::Natural)]
     {
         let Setup { body, approach, drive, .. } = eliminated(seed, elimination)?;
         let other = find(&body, &approach, &drive, tight(), 1)?;

@@ -44,8 +44,12 @@ impl File {
         );
         let n = self.nodes.len();
         let _ = writeln!(out, "1 {n} 1 {n}\n3 1 0 {n}");
-        (1..=n).for_each(|tag| drop(writeln!(out, "{tag}")));
-        self.nodes.iter().for_each(|[x, y, z]| drop(writeln!(out, "{x} {y} {z}")));
+        for tag in 1..=n {
+            let _ = writeln!(out, "{tag}");
+        }
+        for [x, y, z] in &self.nodes {
+            let _ = writeln!(out, "{x} {y} {z}");
+        }
         let faces: usize = self.faces.iter().map(Vec::len).sum();
         let all = faces + self.elements.len();
         let _ = writeln!(out, "$EndNodes\n$Elements\n3 {all} 1 {all}");
@@ -76,7 +80,7 @@ pub(super) fn run(_: &Suite) -> Result<Vec<Line>, CaseError> {
     refused("inverted element", &file, &["line ", "element 4 is inverted or flat"]);
     let mut file = File::column();
     file.nodes[8..].iter_mut().for_each(|p| p[2] = 1.0);
-    refused("flat element", &file, &["element 4 is inverted or flat"]);
+    refused("flat element", &file, &["element 4 is ", "times as long as thick"]);
     let mut file = File::column();
     file.elements.push((4..12).collect());
     refused(

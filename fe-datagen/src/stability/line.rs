@@ -163,7 +163,7 @@ impl Line {
             End::Converged => out += "converged",
             End::Evaluated => out += "evaluated",
             End::Refused(why) => {
-                let _ = write!(out, "refused: {why}");
+                let _ = write!(out, "refused: {}", first_line(why));
             }
             End::Broken(what) => {
                 let _ = write!(out, "BROKEN: {what}");
@@ -190,6 +190,11 @@ impl Line {
         }
         out
     }
+}
+
+/// What a refusal says, without the lines of the scene that it points at.
+pub(super) fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or("")
 }
 
 /// A check in words.

@@ -1,6 +1,6 @@
 //! The table of all lines.
 
-use super::line::comparison;
+use super::line::{comparison, first_line};
 use super::{CASES, End, Line};
 use serde::Serialize;
 use std::fmt::Write;
@@ -74,7 +74,7 @@ impl Line {
         let end = match &self.end {
             End::Converged => "converged".into(),
             End::Evaluated => "evaluated".into(),
-            End::Refused(why) => format!("refused: *{why}*"),
+            End::Refused(why) => format!("refused: *{}*", first_line(why)),
             End::Broken(what) => format!("**broken: {what}**"),
         };
         let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
@@ -93,7 +93,7 @@ impl Line {
         format!(
             "| {} | {} | {iterations} | {steps} | {j} | {condition} | {balances} | {} | {verdict} |\n",
             self.variant,
-            end.replace('|', "\\|").replace('\n', " "),
+            end.replace('|', "\\|"),
             check.replace('|', "\\|"),
         )
     }
