@@ -137,13 +137,13 @@ pub(super) fn free_modes(_: &Suite) -> Result<Vec<Line>, CaseError> {
     let mesh = cube(ElementKind::Quad4, 2, |p| p);
     let fixed = hold(&mesh, &[("x_min", x)]);
     lines.push(refused("section held along x", mesh, fixed, &["keeps it from moving along y. "])?);
-    let mut fixed = vec![false; 3 * two_cubes(0.5).nodes.len()];
-    for (n, p) in two_cubes(0.5).nodes.iter().enumerate().filter(|(_, p)| p[2] == 0.0) {
-        debug_assert!(p[2].abs() < f64::MIN_POSITIVE);
+    let mesh = two_cubes(0.5);
+    let mut fixed = vec![false; 3 * mesh.nodes.len()];
+    for n in (0..mesh.nodes.len()).filter(|&n| mesh.nodes[n][2] == 0.0) {
         fixed[3 * n..3 * n + 3].fill(true);
     }
     let words = &["a part of 8 of the 16 elements", "connected to nothing else"];
-    lines.push(refused("two parts, one held", two_cubes(0.5), fixed.clone(), words)?);
+    lines.push(refused("two parts, one held", mesh, fixed.clone(), words)?);
     let words = &["9 of its nodes lie on nodes of another part", "Coherence Mesh"];
     lines.push(refused("doubled nodes", two_cubes(0.0), fixed, words)?);
     lines.extend(held()?);

@@ -118,8 +118,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "sharp-wedge",
-        promise: "Wedges with tips of .05 and .005 mm balance in the section; one that is finer \
-                  than the faces it meets is refused.",
+        promise: "Wedges with tips of .05 and .005 mm balance, or are refused with the depth that \
+                  was not reached; one that fits between nodes is refused before anything is solved.",
         run: edges::run,
     },
     Case {

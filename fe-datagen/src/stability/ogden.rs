@@ -99,7 +99,7 @@ fn strips() -> Result<Vec<Line>, CaseError> {
             let corner = problem.mesh.node_sets["z_max"][0] as usize;
             let lateral = 1.0 + solver.displacement_mm()[corner][2];
             let [exact, side] = planar_forces(&law, bulk, stretch, lateral);
-            let beyond = stretch < 0.67 || stretch > 1.5;
+            let beyond = !(0.67..=1.5).contains(&stretch);
             let flagged = outside(&problem, solver.displacement_mm());
             let flags = Check::absolute(
                 "share flagged",
