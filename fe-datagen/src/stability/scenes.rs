@@ -17,6 +17,7 @@ use crate::output::OutputError;
 use crate::press::body::{Body, PressError};
 use crate::press::drive::{Approach, Drive};
 use crate::press::setup::Setup;
+use crate::processor;
 use crate::solve::{Options, Solver};
 use record::Record;
 use report::count;
@@ -25,7 +26,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 /// How many scenes, and how.
 #[derive(Clone, Copy, Debug)]
@@ -142,7 +142,7 @@ pub fn run(
 }
 
 fn solve(body: &Body, solver: &mut Solver<'_>, approach: &Approach, press: &Press) -> SceneRecord {
-    let clock = Instant::now();
+    let began_s = processor::thread_s();
     let drive = Drive::Depths(press.depths_mm.clone());
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let (mut iterations, mut cuts, mut j_min) = (0, 0, None);
@@ -166,7 +166,7 @@ fn solve(body: &Body, solver: &mut Solver<'_>, approach: &Approach, press: &Pres
             }
         }
     };
-    let seconds = clock.elapsed().as_secs_f64();
+    let seconds = processor::thread_s() - began_s;
     SceneRecord {
         press: press.clone(),
         ending,

@@ -31,7 +31,7 @@ pub struct SceneRecord {
     pub cuts: u32,
     /// Smallest `J`; absent without an equilibrium.
     pub j_min: Option<f64>,
-    /// Wall time, s.
+    /// Processor time, s.
     pub seconds: f64,
 }
 
@@ -58,7 +58,7 @@ pub struct ScenesReport {
     pub newton_iterations_max: u32,
     /// Smallest `J` of a scene.
     pub j_min: Option<f64>,
-    /// Mean wall time of a scene, s.
+    /// Mean processor time of a scene, s.
     pub seconds_per_scene: f64,
 }
 
@@ -86,7 +86,7 @@ impl ScenesReport {
              docs/stability-scenes.md` ([stability.md](stability.md)): {}.\n\n\
              | | scenes |\n|---|---|\n| converged, every balance kept | {} |\n| converged, a balance missed | {} |\n\
              | refused with a typed error | {} |\n| panicked | {} |\n| with cut load steps | {} |\n\n\
-             At most {} Newton iterations a scene, smallest J {:.4}, {:.2} s a scene on one core. The bar (99.9 % \
+             At most {} Newton iterations a scene, smallest J {:.4}, {:.2} s of processor time a scene. The bar (99.9 % \
              converge, each of them balances, no panic) is {}.\n",
             self.scenes,
             self.drawn_from,
@@ -98,7 +98,7 @@ impl ScenesReport {
             self.newton_iterations_max,
             self.j_min.unwrap_or(f64::NAN),
             self.seconds_per_scene,
-            if self.passed() { "met" } else { "**not met**" },
+            if self.passed() { "met by these" } else { "**not met by these**" },
         );
         let lists = [&self.unbalanced, &self.refused, &self.panicked];
         if lists.iter().any(|l| !l.is_empty()) {
@@ -116,7 +116,7 @@ impl fmt::Display for ScenesReport {
         writeln!(
             f,
             "{}: {} scenes ({} from an earlier run), {} converged and balanced, {} out of balance, {} typed \
-             errors, {} panics; {} with cut steps, at most {} Newton iterations, least J {:.4}; {:.2} s a scene",
+             errors, {} panics; {} with cut steps, at most {} Newton iterations, least J {:.4}; {:.2} s of processor time a scene",
             self.drawn_from,
             self.scenes,
             self.reused,
