@@ -28,7 +28,8 @@ pub struct Card {
     pub pressure_range_pa: [f32; 2],
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
-    /// SHA-256 of the dataset.
+    /// SHA-256 of the dataset it was trained on, of several that of their hashes one after
+    /// another.
     pub dataset_sha256: String,
     /// How it was trained.
     pub training: Value,
@@ -44,6 +45,10 @@ pub struct Card {
 /// Accuracy over the samples of a split. All but SSIM are errors, relative, without unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
+    /// SHA-256 of the dataset measured on, one of those it was trained on; absent from cards
+    /// written before it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset_sha256: Option<String>,
     /// Which split of the dataset: `test` for presses that training never saw.
     pub split: String,
     /// Number of samples measured.

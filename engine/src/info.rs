@@ -29,7 +29,8 @@ pub struct ModelInfo {
     pub pressure_max_pa: f32,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
-    /// SHA-256 of the dataset it was trained on.
+    /// SHA-256 of the dataset it was trained on; of several, that of their
+    /// [`datasets`](Self::datasets)' hashes one after another.
     pub dataset_sha256: String,
     /// How it was trained: seed, epochs, optimiser, loss, versions, seconds.
     pub training: Value,
@@ -80,9 +81,21 @@ impl ModelInfo {
             backend: String::new(),
         })
     }
+
+    /// SHA-256 of each dataset it was trained on: what `papilla.training` lists as `datasets`
+    /// if [`dataset_sha256`](Self::dataset_sha256) follows from that, else this one alone.
+    #[must_use]
+    pub fn datasets(&self) -> Vec<&str> {
+        let own = self.dataset_sha256.as_str();
+        let listed = self.training.get("datasets").and_then(Value::as_array);
+        let parts: Vec<&str> = listed.into_iter().flatten().filter_map(Value::as_str).collect();
+        let joined = hex(&Sha256::digest(parts.concat()));
+        if parts.len() > 1 && joined == own { parts } else { vec![own] }
+    }
 }
 
-/// Floating-point initialisers but for maps (masks, coordinates): the trained part.
+/// Floating-point initialisers, also those stored in 16 bits, but for maps (masks,
+/// coordinates): the trained part.
 fn weight_count(proto: &ModelProto) -> u64 {
     const SIDE: i64 = MAP_SIDE_PX as i64;
     let Some(graph) = &proto.graph else { return 0 };
@@ -91,7 +104,8 @@ fn weight_count(proto: &ModelProto) -> u64 {
     graph
         .initializer
         .iter()
-        .filter(|t| t.data_type == DataType::Float as i32 && !t.dims.ends_with(&[SIDE, SIDE]))
+        .filter(|t| [DataType::Float as i32, DataType::Float16 as i32].contains(&t.data_type))
+        .filter(|t| !t.dims.ends_with(&[SIDE, SIDE]))
         .map(|t| count(&t.dims))
         .fold(0, u64::saturating_add)
 }

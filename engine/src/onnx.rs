@@ -1,6 +1,7 @@
 //! Checks on the ONNX file itself, before any backend sees it.
 
 use crate::{Backend, EngineError, INPUT_NAME, MAP_SIDE_PX, OUTPUT_NAME};
+use half::f16;
 use tract_onnx::pb::{
     AttributeProto, GraphProto, ModelProto, TensorProto, ValueInfoProto,
     tensor_proto::DataLocation, tensor_proto::DataType,
@@ -150,6 +151,7 @@ fn check_tensor(tensor: &TensorProto, name: &str) -> Result<(), EngineError> {
     let size = match kind {
         DataType::Float | DataType::Int32 => 4,
         DataType::Int64 | DataType::Double => 8,
+        DataType::Float16 | DataType::Int16 => 2,
         DataType::Bool | DataType::Int8 | DataType::Uint8 => 1,
         other => return Err(broken(format!("its type is {other:?}, which no Papilla model has"))),
     };
@@ -171,17 +173,24 @@ fn check_tensor(tensor: &TensorProto, name: &str) -> Result<(), EngineError> {
     if held != count {
         return Err(broken(format!("{held} values for shape {:?}", tensor.dims)));
     }
-    if kind == DataType::Float {
-        let values = tensor
-            .raw_data
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|bytes| f32::from_le_bytes(*bytes))
-            .chain(tensor.float_data.iter().copied());
-        if let Some((index, value)) = values.enumerate().find(|(_, value)| !value.is_finite()) {
-            return Err(EngineError::NonFiniteWeight { tensor: name.to_owned(), index, value });
+    let not_finite = match kind {
+        DataType::Float => {
+            let raw = tensor.raw_data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b));
+            first_not_finite(raw.chain(tensor.float_data.iter().copied()))
         }
+        DataType::Float16 => {
+            let raw = tensor.raw_data.as_chunks::<2>().0.iter().map(|b| u16::from_le_bytes(*b));
+            let listed = tensor.int32_data.iter().map(|&bits| bits as u16);
+            first_not_finite(raw.chain(listed).map(|bits| f16::from_bits(bits).to_f32()))
+        }
+        _ => None,
+    };
+    if let Some((index, value)) = not_finite {
+        return Err(EngineError::NonFiniteWeight { tensor: name.to_owned(), index, value });
     }
     Ok(())
+}
+
+fn first_not_finite(values: impl Iterator<Item = f32>) -> Option<(usize, f32)> {
+    values.enumerate().find(|(_, value)| !value.is_finite())
 }

@@ -5,8 +5,13 @@
 
 mod common;
 
-use common::{TINY, altered, expected, graph, press_pa};
+use common::{TINY, altered, expected, graph, press_pa, set_metadata};
+use half::f16;
 use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX, load, load_with};
+use sha2::{Digest, Sha256};
+use tract_onnx::pb::{
+    AttributeProto, NodeProto, attribute_proto::AttributeType, tensor_proto::DataType,
+};
 
 fn assert_equals_reference(sed_j_per_m3: &[f32]) {
     let expected = expected();
@@ -30,6 +35,48 @@ fn tract_answers_as_onnx_runtime_does() {
     let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
     session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
     assert_equals_reference(&sed_j_per_m3);
+}
+
+#[test]
+fn constants_stored_in_16_bits_are_the_same_network() {
+    let halved = |bytes: &[u8; 4]| f16::from_f32(f32::from_le_bytes(*bytes));
+    let plain = altered(|model| {
+        let weights = graph(model).initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
+        let (values, _) = weights.raw_data.as_chunks::<4>();
+        let rounded = values.iter().flat_map(|b| halved(b).to_f32().to_le_bytes());
+        weights.raw_data = rounded.collect();
+    });
+    let stored = altered(|model| {
+        let graph = graph(model);
+        let weights = graph.initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
+        let (values, _) = weights.raw_data.as_chunks::<4>();
+        let halves = values.iter().flat_map(|b| halved(b).to_le_bytes());
+        weights.raw_data = halves.collect();
+        weights.data_type = DataType::Float16 as i32;
+        weights.name = "bottom.w.stored".into();
+        let to = AttributeProto {
+            name: "to".into(),
+            r#type: AttributeType::Int as i32,
+            i: DataType::Float as i64,
+            ..Default::default()
+        };
+        let cast = NodeProto {
+            op_type: "Cast".into(),
+            input: vec!["bottom.w.stored".into()],
+            output: vec!["bottom.w".into()],
+            attribute: vec![to],
+            ..Default::default()
+        };
+        graph.node.insert(0, cast);
+    });
+    let [plain, stored] = [plain, stored].map(|onnx| {
+        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+        let model = load(&onnx, None).unwrap();
+        model.session().unwrap().infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+        sed_j_per_m3
+    });
+    assert!(plain == stored, "the answers differ");
+    assert!(plain.iter().any(|&v| v > 0.0));
 }
 
 #[test]
@@ -63,6 +110,27 @@ fn says_what_the_model_is() {
     assert_eq!(info.bytes as usize, TINY.len());
     assert!(info.backend.starts_with("tract "));
     assert_eq!(info.onnx_sha256.len(), 64);
+}
+
+#[test]
+fn a_model_of_several_datasets_names_them_if_their_hash_is_its_own() {
+    let parts = ["1".repeat(64), "2".repeat(64)];
+    let own = Sha256::digest(parts.concat());
+    let own: String = own.iter().map(|byte| format!("{byte:02x}")).collect();
+    let of = |hash: &str| {
+        let onnx = altered(|model| {
+            let training = serde_json::json!({"seed": 7, "datasets": &parts}).to_string();
+            set_metadata(model, "papilla.training", &training);
+            set_metadata(model, "papilla.dataset_sha256", hash);
+        });
+        let model = load(&onnx, None).unwrap();
+        model.info().datasets().into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&own), parts);
+    // A list that does not belong to the hash counts for nothing.
+    assert_eq!(of(&"3".repeat(64)), ["3".repeat(64)]);
+    let alone = load(TINY, None).unwrap();
+    assert_eq!(alone.info().datasets(), [alone.info().dataset_sha256.as_str()]);
 }
 
 #[test]

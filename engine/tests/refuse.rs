@@ -11,7 +11,8 @@ use papilla_engine::{EngineError, Model, ModelInfo, load};
 use serde_json::json;
 use std::sync::Arc;
 use tract_onnx::pb::{
-    StringStringEntryProto, ValueInfoProto, tensor_shape_proto::dimension::Value, type_proto,
+    StringStringEntryProto, ValueInfoProto, tensor_proto::DataType,
+    tensor_shape_proto::dimension::Value, type_proto,
 };
 
 fn refused(onnx: &[u8]) -> EngineError {
@@ -142,6 +143,25 @@ fn other_inputs_and_outputs() {
 }
 
 #[test]
+fn weights_of_16_bits_are_checked_too() {
+    let with = |bits: u16| {
+        altered(|m| {
+            let tensor = graph(m).initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
+            let count = tensor.raw_data.len() / 4;
+            tensor.data_type = DataType::Float16 as i32;
+            tensor.raw_data = [[0; 2], bits.to_le_bytes()].concat().repeat(count / 2);
+        })
+    };
+    for (bits, infinite) in [(0x7c00, true), (0x7e00, false)] {
+        let error = refused(&with(bits));
+        let EngineError::NonFiniteWeight { tensor, index: 1, value } = error else {
+            panic!("{error}")
+        };
+        assert_eq!((tensor.as_str(), value.is_infinite()), ("bottom.w", infinite));
+    }
+}
+
+#[test]
 fn weights_that_are_no_numbers_or_not_there() {
     let onnx = altered(|m| {
         let tensor = graph(m).initializer.iter_mut().find(|t| t.name == "bottom.w").unwrap();
@@ -263,6 +283,7 @@ fn card_of(info: &ModelInfo) -> Card {
         dataset_sha256: info.dataset_sha256.clone(),
         training: json!({"seed": 7}),
         metrics: Metrics {
+            dataset_sha256: None,
             split: "test".into(),
             samples: 1,
             relative_l2: spread,

@@ -169,8 +169,9 @@ pub fn run(
     }
     let figures: Vec<SampleMetrics> = samples.iter().map(|sample| sample.metrics).collect();
     let empty = || ExportError::EmptySplit { path: subject.path.into(), split: split.to_owned() };
+    let metrics = summarise(split, &figures).ok_or_else(empty)?;
     Ok(Evaluation {
-        metrics: summarise(split, &figures).ok_or_else(empty)?,
+        metrics: Metrics { dataset_sha256: Some(dataset.sha256().to_owned()), ..metrics },
         latency_ms: bench.latency(info),
         other_engine_difference_max: difference,
         other_engine_latency_ms: other

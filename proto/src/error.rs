@@ -49,6 +49,8 @@ pub enum ErrorCode {
     UnknownTier,
     /// No such effect, or the tier does not render it.
     UnknownEffect,
+    /// A parameter of an effect is missing or unusable.
+    BadEffect,
     /// The client's atlas is not the one the tier was trained on.
     AtlasMismatch,
     /// No answer type in `Accept` is offered.
@@ -59,6 +61,15 @@ pub enum ErrorCode {
     MethodNotAllowed,
     /// The resource speaks WebSocket; plain HTTP arrived.
     UpgradeRequired,
+    /// A bearer token is asked for, and none or an unknown one came.
+    Unauthorized,
+    /// The client is known, but this is not for it: the origin of a page, or an administrator's
+    /// resource.
+    Forbidden,
+    /// The client sends more requests a second than it may.
+    RateLimited,
+    /// The new models cannot be served; those that run were left as they are.
+    BadModel,
     /// The client was too slow to send what was due.
     Timeout,
     /// The deadline passed; the work was dropped.
@@ -75,7 +86,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 35] = [
         Self::WrongLength,
         Self::WrongType,
         Self::WrongShape,
@@ -95,11 +106,16 @@ impl ErrorCode {
         Self::BadQuery,
         Self::UnknownTier,
         Self::UnknownEffect,
+        Self::BadEffect,
         Self::AtlasMismatch,
         Self::NotAcceptable,
         Self::NotFound,
         Self::MethodNotAllowed,
         Self::UpgradeRequired,
+        Self::Unauthorized,
+        Self::Forbidden,
+        Self::RateLimited,
+        Self::BadModel,
         Self::Timeout,
         Self::Late,
         Self::Superseded,
@@ -131,11 +147,16 @@ impl ErrorCode {
             Self::BadQuery => "bad_query",
             Self::UnknownTier => "unknown_tier",
             Self::UnknownEffect => "unknown_effect",
+            Self::BadEffect => "bad_effect",
             Self::AtlasMismatch => "atlas_mismatch",
             Self::NotAcceptable => "not_acceptable",
             Self::NotFound => "not_found",
             Self::MethodNotAllowed => "method_not_allowed",
             Self::UpgradeRequired => "upgrade_required",
+            Self::Unauthorized => "unauthorized",
+            Self::Forbidden => "forbidden",
+            Self::RateLimited => "rate_limited",
+            Self::BadModel => "bad_model",
             Self::Timeout => "timeout",
             Self::Late => "late",
             Self::Superseded => "superseded",
@@ -161,6 +182,8 @@ impl ErrorCode {
             | Self::BadNpy
             | Self::BadPng
             | Self::BadQuery => 400,
+            Self::Unauthorized => 401,
+            Self::Forbidden => 403,
             Self::UnknownTier | Self::NotFound => 404,
             Self::MethodNotAllowed => 405,
             Self::NotAcceptable => 406,
@@ -172,7 +195,10 @@ impl ErrorCode {
             | Self::NegativePressure
             | Self::OutOfRange
             | Self::UnknownEffect
-            | Self::AtlasMismatch => 422,
+            | Self::BadEffect
+            | Self::AtlasMismatch
+            | Self::BadModel => 422,
+            Self::RateLimited => 429,
             Self::Internal => 500,
             Self::Superseded | Self::Overloaded | Self::ShuttingDown => 503,
             Self::Late => 504,

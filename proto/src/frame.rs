@@ -1,29 +1,52 @@
-//! The 32-byte header in front of every binary frame of a session.
+//! The header in front of every binary frame of a session: 32 bytes, and 16 more in version 2.
 //!
-//! All numbers are little-endian. 32 is a multiple of 16, so that a browser can
+//! All numbers are little-endian. 32 and 48 are multiples of 16, so that a browser can
 //! lay an aligned `Float32Array` over the payload.
 //!
 //! | at | type | field |
 //! |---|---|---|
 //! | 0 | u32 | magic, the bytes `PPL1` |
-//! | 4 | u8 | version, 1 |
-//! | 5 | u8 | kind: 1 pressure (client to server), 2 SED (server to client) |
+//! | 4 | u8 | version, 1 or 2: the hello's |
+//! | 5 | u8 | kind: 1 pressure (client to server); 2 SED, 3 firing rate of SA1 units (server to client) |
 //! | 6 | u8 | sample type: 0 f32, 1 f16, 2 u16, 3 u8 |
-//! | 7 | u8 | status: 0 in requests; answers 0 ok, 1 superseded, 2 late, 3 error |
+//! | 7 | u8 | status: 0 in requests; answers 0 ok, 1 superseded, 2 late, 3 error, 4 stale |
 //! | 8 | u32 | sequence, the client's; the answer repeats it |
-//! | 12 | u16 | width, 224 |
-//! | 14 | u16 | height, 224 |
+//! | 12 | u16 | width of the window that is sent, pixels; 224 for a whole map |
+//! | 14 | u16 | height, likewise |
 //! | 16 | u64 | client time, us, of any clock; the answer repeats it |
 //! | 24 | u32 | request: deadline, us from receipt (0: the session's budget); answer: us spent in the server |
-//! | 28 | f32 | scale: Pa or J/m3 per unit for u16 and u8, else 1 |
+//! | 28 | f32 | scale: Pa, J/m3 or Hz per unit for u16 and u8, else 1 |
 //!
-//! The payload follows: width x height samples, row-major, row 0 first. Only
-//! answers with status ok carry one.
+//! Version 2 goes on ([`Extension`]):
+//!
+//! | at | type | field |
+//! |---|---|---|
+//! | 32 | u16 | column of the window's first pixel |
+//! | 34 | u16 | row of the window's first pixel |
+//! | 36 | u32 | answer: us the frame waited for a thread |
+//! | 40 | u32 | answer: us in the network, 0 if it was not asked |
+//! | 44 | u16 | answer: number of the tier, as `ready` gave it |
+//! | 46 | u8 | answer: flags, see [`flags`] |
+//! | 47 | u8 | 0, to be ignored |
+//!
+//! The payload follows. A request's: width x height samples, row-major, first row first. An
+//! answer's: the sections that `ready` listed; only answers with status ok carry one.
 
-use crate::{ErrorCode, MAP_SIDE_PX, PROTOCOL_VERSION, SampleType};
+mod error;
+mod extension;
 
-/// Bytes of the header.
+use std::ops::Deref;
+
+pub use error::FrameError;
+pub use extension::{Extension, flags};
+
+use crate::{SampleType, Window};
+
+/// Bytes of the header of version 1, and of the first part of that of version 2.
 pub const HEADER_LEN: usize = 32;
+
+/// Bytes of the header of version 2.
+pub const HEADER_LEN_V2: usize = 48;
 
 /// The first four bytes of a frame.
 pub const MAGIC: [u8; 4] = *b"PPL1";
@@ -36,6 +59,8 @@ pub enum FrameKind {
     Pressure = 1,
     /// Strain energy density at the dermis-epidermis interface, J/m3; server to client.
     Sed = 2,
+    /// Firing rate of slowly adapting type 1 (SA1) afferents, Hz; server to client, version 2.
+    Sa1Rate = 3,
 }
 
 /// How the frame fared.
@@ -52,6 +77,9 @@ pub enum FrameStatus {
     /// Something is wrong with the frame. Servers of this version send the
     /// JSON error with the frame's sequence instead.
     Error = 3,
+    /// The frame was old when it came: not newer than one taken before, or held up on its way
+    /// for longer than the hello allows. It was not rendered. Version 2.
+    Stale = 4,
 }
 
 /// The header, decoded. Units and meaning: see the [module](self).
@@ -65,91 +93,38 @@ pub struct FrameHeader {
     pub status: FrameStatus,
     /// The client's number of the frame.
     pub sequence: u32,
-    /// Columns of the map.
+    /// Columns of the window that is sent; 224 for a whole map.
     pub width: u16,
-    /// Rows of the map.
+    /// Rows of the window that is sent.
     pub height: u16,
-    /// The client's clock, us; opaque to the server.
+    /// The client's clock, us; repeated. Relaxation, afferents and `stale_after_us` read it.
     pub client_time_us: u64,
     /// Request: deadline in us from receipt, 0 for the session's budget.
     /// Answer: us from receipt to sending.
     pub time_us: u32,
-    /// Pa or J/m3 per unit for u16 and u8; 1 for floats.
+    /// Pa, J/m3 or Hz per unit for u16 and u8; 1 for floats.
     pub scale: f32,
+    /// What version 2 adds; none in version 1.
+    pub extension: Option<Extension>,
 }
 
-/// What is wrong with a frame's header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FrameError {
-    /// Fewer bytes than a header has.
-    #[error("the frame has {bytes} bytes, its header alone has 32")]
-    TruncatedHeader {
-        /// Bytes found.
-        bytes: usize,
-    },
-    /// Another magic.
-    #[error("the frame starts with the bytes {found:02x?}, not with 'PPL1'")]
-    BadMagic {
-        /// The four bytes found.
-        found: [u8; 4],
-    },
-    /// Another version.
-    #[error("the frame has version {found}, this side speaks version 1")]
-    UnknownVersion {
-        /// The version found.
-        found: u8,
-    },
-    /// A kind with no meaning.
-    #[error("frame kind {found} is unknown; 1 is pressure, 2 is SED")]
-    UnknownKind {
-        /// The kind found.
-        found: u8,
-    },
-    /// A sample type with no meaning.
-    #[error("sample type {found} is unknown; 0 is f32, 1 f16, 2 u16, 3 u8")]
-    UnknownSampleType {
-        /// The sample type found.
-        found: u8,
-    },
-    /// A status with no meaning.
-    #[error("frame status {found} is unknown; 0 is ok, 1 superseded, 2 late, 3 error")]
-    UnknownStatus {
-        /// The status found.
-        found: u8,
-    },
+/// The bytes of a header: 32, or 48 in version 2.
+#[derive(Debug, Clone, Copy)]
+pub struct HeaderBytes {
+    bytes: [u8; HEADER_LEN_V2],
+    len: usize,
 }
 
-impl FrameError {
-    /// The wire code of this error.
-    #[must_use]
-    pub const fn code(&self) -> ErrorCode {
-        match self {
-            Self::TruncatedHeader { .. } => ErrorCode::TruncatedHeader,
-            Self::BadMagic { .. } => ErrorCode::BadMagic,
-            Self::UnknownVersion { .. } => ErrorCode::UnknownVersion,
-            Self::UnknownKind { .. }
-            | Self::UnknownSampleType { .. }
-            | Self::UnknownStatus { .. } => ErrorCode::WrongType,
-        }
-    }
+impl Deref for HeaderBytes {
+    type Target = [u8];
 
-    /// The header field at fault.
-    #[must_use]
-    pub const fn field(&self) -> Option<&'static str> {
-        match self {
-            Self::TruncatedHeader { .. } => None,
-            Self::BadMagic { .. } => Some("magic"),
-            Self::UnknownVersion { .. } => Some("version"),
-            Self::UnknownKind { .. } => Some("kind"),
-            Self::UnknownSampleType { .. } => Some("sample_type"),
-            Self::UnknownStatus { .. } => Some("status"),
-        }
+    fn deref(&self) -> &[u8] {
+        &self.bytes[..self.len]
     }
 }
 
 impl FrameHeader {
-    /// The header of a pressure frame of 224 x 224 samples. `deadline_us`
+    /// The header of a pressure frame of 224 x 224 samples, version 1. `deadline_us`
     /// counts from receipt; 0 takes the session's budget.
     #[must_use]
     pub fn pressure(
@@ -164,22 +139,44 @@ impl FrameHeader {
             sample_type,
             status: FrameStatus::Ok,
             sequence,
-            width: MAP_SIDE_PX as u16,
-            height: MAP_SIDE_PX as u16,
+            width: Window::WHOLE.width,
+            height: Window::WHOLE.height,
             client_time_us,
             time_us: deadline_us,
             scale,
+            extension: None,
         }
     }
 
+    /// The same header in version 2, for the pixels of `window` alone.
+    #[must_use]
+    pub fn windowed(self, window: Window) -> Self {
+        let extension =
+            Extension { x: window.x, y: window.y, ..self.extension.unwrap_or_default() };
+        Self { width: window.width, height: window.height, extension: Some(extension), ..self }
+    }
+
+    /// The pixels that the payload holds.
+    #[must_use]
+    pub fn window(&self) -> Window {
+        let Extension { x, y, .. } = self.extension.unwrap_or_default();
+        Window { x, y, width: self.width, height: self.height }
+    }
+
     /// The header that answers `self` with `status`, `total_us` after receipt.
-    /// `scale` is in J/m3 per unit.
+    /// `scale` is in J/m3 per unit. An extension is kept as it is.
     #[must_use]
     pub fn answer(&self, status: FrameStatus, total_us: u32, scale: f32) -> Self {
         Self { kind: FrameKind::Sed, status, time_us: total_us, scale, ..*self }
     }
 
-    /// Bytes of the payload that goes with this header.
+    /// Bytes of this header: 32, or 48 in version 2.
+    #[must_use]
+    pub fn header_len(&self) -> usize {
+        if self.extension.is_some() { HEADER_LEN_V2 } else { HEADER_LEN }
+    }
+
+    /// Bytes of the samples that go with this header.
     #[must_use]
     pub fn payload_len(&self) -> usize {
         usize::from(self.width) * usize::from(self.height) * self.sample_type.bytes()
@@ -187,10 +184,10 @@ impl FrameHeader {
 
     /// The header's bytes.
     #[must_use]
-    pub fn encode(&self) -> [u8; HEADER_LEN] {
-        let mut b = [0; HEADER_LEN];
+    pub fn encode(&self) -> HeaderBytes {
+        let mut b = [0; HEADER_LEN_V2];
         b[0..4].copy_from_slice(&MAGIC);
-        b[4] = PROTOCOL_VERSION;
+        b[4] = 1;
         b[5] = self.kind as u8;
         b[6] = self.sample_type.to_wire();
         b[7] = self.status as u8;
@@ -200,31 +197,45 @@ impl FrameHeader {
         b[16..24].copy_from_slice(&self.client_time_us.to_le_bytes());
         b[24..28].copy_from_slice(&self.time_us.to_le_bytes());
         b[28..32].copy_from_slice(&self.scale.to_le_bytes());
-        b
+        if let Some(extension) = &self.extension {
+            b[4] = 2;
+            b[32..34].copy_from_slice(&extension.x.to_le_bytes());
+            b[34..36].copy_from_slice(&extension.y.to_le_bytes());
+            b[36..40].copy_from_slice(&extension.queue_us.to_le_bytes());
+            b[40..44].copy_from_slice(&extension.infer_us.to_le_bytes());
+            b[44..46].copy_from_slice(&extension.tier.to_le_bytes());
+            b[46] = extension.flags;
+        }
+        HeaderBytes { bytes: b, len: self.header_len() }
     }
 
-    /// Reads the header at the start of `frame`; what follows is the payload.
+    /// Reads the header at the start of `frame`; what follows its
+    /// [`header_len`](Self::header_len) is the payload.
     ///
-    /// Width, height and scale are any numbers here: the receiver checks them
+    /// Width, height, place and scale are any numbers here: the receiver checks them
     /// against what it takes.
     ///
     /// # Errors
     /// Too short, another magic or version, or a kind, sample type or status
     /// with no meaning.
     pub fn decode(frame: &[u8]) -> Result<Self, FrameError> {
-        let Some(b) = frame.first_chunk::<HEADER_LEN>() else {
-            return Err(FrameError::TruncatedHeader { bytes: frame.len() });
-        };
+        let truncated = |due| FrameError::TruncatedHeader { bytes: frame.len(), due };
+        let b = frame.first_chunk::<HEADER_LEN>().ok_or(truncated(HEADER_LEN))?;
         let found = [b[0], b[1], b[2], b[3]];
         if found != MAGIC {
             return Err(FrameError::BadMagic { found });
         }
-        if b[4] != PROTOCOL_VERSION {
-            return Err(FrameError::UnknownVersion { found: b[4] });
-        }
+        let extension = match b[4] {
+            1 => None,
+            2 => Some(Extension::decode(
+                frame.first_chunk::<HEADER_LEN_V2>().ok_or(truncated(HEADER_LEN_V2))?,
+            )),
+            found => return Err(FrameError::UnknownVersion { found }),
+        };
         let kind = match b[5] {
             1 => FrameKind::Pressure,
             2 => FrameKind::Sed,
+            3 => FrameKind::Sa1Rate,
             found => return Err(FrameError::UnknownKind { found }),
         };
         let sample_type =
@@ -234,6 +245,7 @@ impl FrameHeader {
             1 => FrameStatus::Superseded,
             2 => FrameStatus::Late,
             3 => FrameStatus::Error,
+            4 => FrameStatus::Stale,
             found => return Err(FrameError::UnknownStatus { found }),
         };
         Ok(Self {
@@ -248,6 +260,7 @@ impl FrameHeader {
             ]),
             time_us: u32::from_le_bytes([b[24], b[25], b[26], b[27]]),
             scale: f32::from_le_bytes([b[28], b[29], b[30], b[31]]),
+            extension,
         })
     }
 
@@ -262,101 +275,4 @@ impl FrameHeader {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    fn any_header() -> impl Strategy<Value = FrameHeader> {
-        let enums = (
-            prop::sample::select(vec![FrameKind::Pressure, FrameKind::Sed]),
-            prop::sample::select(SampleType::ALL.to_vec()),
-            prop::sample::select(vec![
-                FrameStatus::Ok,
-                FrameStatus::Superseded,
-                FrameStatus::Late,
-                FrameStatus::Error,
-            ]),
-        );
-        let numbers = (any::<u32>(), any::<u16>(), any::<u16>(), any::<u64>(), any::<u32>());
-        (enums, numbers, -1e30f32..1e30).prop_map(|((kind, sample_type, status), n, scale)| {
-            FrameHeader {
-                kind,
-                sample_type,
-                status,
-                sequence: n.0,
-                width: n.1,
-                height: n.2,
-                client_time_us: n.3,
-                time_us: n.4,
-                scale,
-            }
-        })
-    }
-
-    #[test]
-    fn the_layout_is_the_documented_one() {
-        let header = FrameHeader {
-            kind: FrameKind::Sed,
-            sample_type: SampleType::U16,
-            status: FrameStatus::Late,
-            sequence: 0x0403_0201,
-            width: 0x0605,
-            height: 0x0807,
-            client_time_us: 0x100f_0e0d_0c0b_0a09,
-            time_us: 0x1413_1211,
-            scale: 1.0,
-        };
-        let mut expected = b"PPL1\x01\x02\x02\x02".to_vec();
-        expected.extend(1..=20);
-        expected.extend([0, 0, 0x80, 0x3f]);
-        assert_eq!(header.encode().to_vec(), expected);
-    }
-
-    #[test]
-    fn an_answer_repeats_what_the_client_needs() {
-        let request = FrameHeader::pressure(9, 77, 11_000, SampleType::U8, 0.25);
-        assert_eq!(request.payload_len(), 50_176);
-        let answer = request.answer(FrameStatus::Superseded, 42, 3.0);
-        assert_eq!((answer.kind, answer.status), (FrameKind::Sed, FrameStatus::Superseded));
-        assert_eq!((answer.sequence, answer.client_time_us, answer.time_us), (9, 77, 42));
-        assert_eq!((answer.width, answer.height), (224, 224));
-    }
-
-    proptest! {
-        #[test]
-        fn headers_come_back(header in any_header(), tail in prop::collection::vec(any::<u8>(), 0..9)) {
-            let mut frame = header.encode().to_vec();
-            frame.extend(tail);
-            prop_assert_eq!(FrameHeader::decode(&frame), Ok(header));
-            prop_assert_eq!(FrameHeader::peek_sequence(&frame), Some(header.sequence));
-        }
-
-        #[test]
-        fn bytes_of_any_kind_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..80)) {
-            let _ = FrameHeader::peek_sequence(&bytes);
-            if let Ok(header) = FrameHeader::decode(&bytes) {
-                // NaN scales compare unequal; their bytes do not.
-                prop_assert_eq!(&header.encode()[..], &bytes[..HEADER_LEN]);
-            }
-        }
-
-        #[test]
-        fn near_misses_are_named(header in any_header(), at in 0usize..8, flip in 4u8..=255) {
-            let mut frame = header.encode();
-            frame[at] ^= flip;
-            let due = match at {
-                0..=3 => ErrorCode::BadMagic,
-                4 => ErrorCode::UnknownVersion,
-                _ => ErrorCode::WrongType,
-            };
-            prop_assert_eq!(FrameHeader::decode(&frame).unwrap_err().code(), due);
-        }
-
-        #[test]
-        fn short_frames_are_truncated(header in any_header(), len in 0..HEADER_LEN) {
-            let error = FrameHeader::decode(&header.encode()[..len]).unwrap_err();
-            prop_assert_eq!(error, FrameError::TruncatedHeader { bytes: len });
-        }
-    }
-}
+mod tests;

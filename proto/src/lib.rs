@@ -9,24 +9,36 @@
 //! | [`atlas`] | the two unwrapped patches, their rasteriser and hash |
 //! | [`map`] | the 224 x 224 map: length, checks |
 //! | [`sample`] | f32 / f16 / u16 / u8 samples and their quantisation error |
-//! | [`frame`] | the 32-byte header in front of every binary frame |
+//! | [`window`] | a rectangle of the map: finding, decoding and encoding one |
+//! | [`frame`] | the header in front of every binary frame |
+//! | [`effects`] | what a session can ask for beside the map |
+//! | [`summary`] | a map in sixteen numbers |
 //! | [`message`] | the JSON messages of a session |
 //! | [`error`] | error codes and their HTTP status |
 //!
 //! The protocol in prose, with examples: `docs/protocol.md`.
 
 pub mod atlas;
+pub mod effects;
 pub mod error;
 pub mod frame;
 pub mod map;
 pub mod message;
 pub mod sample;
+pub mod summary;
+pub mod window;
 
+pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};
-pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN};
-pub use map::{MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, check_pressure};
+pub use frame::{
+    Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
+};
+pub use map::{MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PressureRange, check_pressure};
 pub use message::{ClientMessage, Hello, Ready, ServerMessage, SessionError};
 pub use sample::{SampleError, SampleType};
+pub use summary::{SUMMARY_LEN, Summary};
+pub use window::Window;
 
-/// Version of the session protocol and of the binary frame.
-pub const PROTOCOL_VERSION: u8 = 1;
+/// Versions of the session protocol and of the binary frame that are spoken. The second adds to
+/// the first: windows, timings in every answer, run-time effects.
+pub const PROTOCOL_VERSIONS: [u8; 2] = [1, 2];

@@ -73,11 +73,23 @@ impl MapError {
     }
 }
 
-/// What [`check_pressure`] learns on its way through the map.
+/// Room above the greatest trained pressure where a map is flagged instead of refused, as a factor.
+pub const FLAGGED_HEADROOM: f32 = 10.0;
+
+/// What [`PressureRange::check`] learns on its way through the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSummary {
     /// Greatest pressure in the map, Pa.
     pub peak_pa: f32,
+}
+
+/// The pressures that are taken, and those that a model was trained on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressureRange {
+    /// Greatest pressure the model was trained on, Pa.
+    pub trained_max_pa: f32,
+    /// Whether pressures beyond are taken, up to [`FLAGGED_HEADROOM`] times as much.
+    pub takes_more: bool,
 }
 
 impl MapSummary {
@@ -88,37 +100,71 @@ impl MapSummary {
     }
 }
 
+impl PressureRange {
+    fn limit_pa(self) -> f32 {
+        self.trained_max_pa * if self.takes_more { FLAGGED_HEADROOM } else { PRESSURE_HEADROOM }
+    }
+
+    /// Whether a map with this peak is an extrapolation.
+    #[must_use]
+    pub fn is_left_by(self, summary: MapSummary) -> bool {
+        summary.peak_pa > self.trained_max_pa * PRESSURE_HEADROOM
+    }
+
+    /// Checks a pressure map, Pa: length, finite, not negative, not above the limit.
+    ///
+    /// # Errors
+    /// The first sample at fault, in row-major order.
+    pub fn check(self, map_pa: &[f32]) -> Result<MapSummary, MapError> {
+        if map_pa.len() != MAP_LEN {
+            return Err(MapError::WrongLength { samples: map_pa.len() });
+        }
+        let limit_pa = self.limit_pa();
+        // One branch-free pass decides, in lanes that the compiler makes vectors of; only a bad
+        // map is searched for the culprit. NaN fails both comparisons.
+        let (mut good, mut peaks) = ([true; LANES], [0.0_f32; LANES]);
+        for lanes in map_pa.as_chunks::<LANES>().0 {
+            for ((good, peak), &p) in good.iter_mut().zip(&mut peaks).zip(lanes) {
+                *good &= (p >= 0.0) & (p <= limit_pa);
+                *peak = if p > *peak { p } else { *peak };
+            }
+        }
+        if good.iter().all(|&good| good) {
+            let peak_pa = peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak });
+            return Ok(MapSummary { peak_pa });
+        }
+        Err(self.culprit(map_pa))
+    }
+
+    fn culprit(self, map_pa: &[f32]) -> MapError {
+        let (limit_pa, pressure_max_pa) = (self.limit_pa(), self.trained_max_pa);
+        for (index, &value) in map_pa.iter().enumerate() {
+            let (row, column) = (index / MAP_SIDE_PX, index % MAP_SIDE_PX);
+            if !value.is_finite() {
+                return MapError::NotFinite { row, column, value };
+            }
+            if value < 0.0 {
+                return MapError::Negative { row, column, value };
+            }
+            if value > limit_pa {
+                return MapError::OutOfRange { row, column, value, pressure_max_pa };
+            }
+        }
+        // Reached only if the limit itself is not a number.
+        MapError::OutOfRange { row: 0, column: 0, value: map_pa[0], pressure_max_pa }
+    }
+}
+
+/// Samples looked at together; [`MAP_LEN`] is a multiple.
+const LANES: usize = 16;
+
 /// Checks a pressure map, Pa: length, finite, not negative, not above
 /// `pressure_max_pa` x [`PRESSURE_HEADROOM`].
 ///
 /// # Errors
 /// The first sample at fault, in row-major order.
 pub fn check_pressure(map_pa: &[f32], pressure_max_pa: f32) -> Result<MapSummary, MapError> {
-    if map_pa.len() != MAP_LEN {
-        return Err(MapError::WrongLength { samples: map_pa.len() });
-    }
-    let limit_pa = pressure_max_pa * PRESSURE_HEADROOM;
-    // One branch-free pass decides; only a bad map is searched for the culprit.
-    // NaN fails both comparisons.
-    let good = map_pa.iter().fold(true, |good, &p| good & (p >= 0.0) & (p <= limit_pa));
-    if good {
-        let peak_pa = map_pa.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak });
-        return Ok(MapSummary { peak_pa });
-    }
-    for (index, &value) in map_pa.iter().enumerate() {
-        let (row, column) = (index / MAP_SIDE_PX, index % MAP_SIDE_PX);
-        if !value.is_finite() {
-            return Err(MapError::NotFinite { row, column, value });
-        }
-        if value < 0.0 {
-            return Err(MapError::Negative { row, column, value });
-        }
-        if value > limit_pa {
-            return Err(MapError::OutOfRange { row, column, value, pressure_max_pa });
-        }
-    }
-    // Reached only if the limit itself is not a number.
-    Err(MapError::OutOfRange { row: 0, column: 0, value: map_pa[0], pressure_max_pa })
+    PressureRange { trained_max_pa: pressure_max_pa, takes_more: false }.check(map_pa)
 }
 
 #[cfg(test)]
@@ -148,6 +194,20 @@ mod tests {
     #[test]
     fn a_limit_that_is_no_number_lets_nothing_through() {
         assert!(check_pressure(&vec![1.0; MAP_LEN], f32::NAN).is_err());
+    }
+
+    #[test]
+    fn pressure_beyond_the_range_is_taken_where_it_is_flagged_and_up_to_ten_times() {
+        let mut map = vec![1.0; MAP_LEN];
+        let range = PressureRange { trained_max_pa: 100.0, takes_more: true };
+        for (pressure_pa, taken, left) in
+            [(100.0, true, false), (102.0, true, true), (999.0, true, true), (1001.0, false, true)]
+        {
+            map[5] = pressure_pa;
+            let found = range.check(&map);
+            assert_eq!(found.is_ok(), taken, "{pressure_pa} Pa");
+            assert!(found.is_err() || range.is_left_by(found.unwrap()) == left, "{pressure_pa} Pa");
+        }
     }
 
     proptest! {

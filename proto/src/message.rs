@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{ErrorCode, Problem, SampleType};
+use crate::{
+    ErrorCode, Problem, RuntimeEffect, SampleType,
+    effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
+};
 
 /// What a client says in text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,9 +22,11 @@ pub enum ClientMessage {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hello {
-    /// Version of the protocol the client speaks: [`PROTOCOL_VERSION`](crate::PROTOCOL_VERSION).
+    /// Version of the protocol the client speaks, one of
+    /// [`PROTOCOL_VERSIONS`](crate::PROTOCOL_VERSIONS).
     pub version: u32,
-    /// Effects the scene calls for, by name; the tier must render them all.
+    /// Effects the scene calls for, by name; the tier must render them all, but for those of the
+    /// session ([`RuntimeEffect`](crate::RuntimeEffect), version 2).
     #[serde(default)]
     pub effects: Vec<String>,
     /// Time a frame may spend in the server, us; also the deadline of frames
@@ -31,7 +36,8 @@ pub struct Hello {
     /// Tier by name. None: the server takes the most accurate that meets the budget.
     #[serde(default)]
     pub tier: Option<String>,
-    /// Sample type of the pressure frames and of their answers.
+    /// Sample type of the pressure frames and, unless `answer_sample_type` says otherwise, of
+    /// their answers.
     #[serde(default)]
     pub sample_type: SampleType,
     /// Pa per unit of u16 and u8 frames whose header says scale 0.
@@ -40,18 +46,81 @@ pub struct Hello {
     /// Hash of the atlas the client draws with; refused if the tier has another.
     #[serde(default)]
     pub atlas_hash: Option<String>,
+    /// Sample type of the answers, if another. Version 2, as all that follows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer_sample_type: Option<SampleType>,
+    /// False: answers carry no map, only what the effects add.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<bool>,
+    /// Pressure above which a pixel is in contact, Pa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_pa: Option<f32>,
+    /// What becomes of pressure above what the tier was trained on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub out_of_range: Option<OutOfRange>,
+    /// A frame that was held up on its way for longer than this, us, against the fastest by
+    /// the client's clock, is answered stale.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stale_after_us: Option<u32>,
+    /// Parameters of the effect `contact_window`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_window: Option<ContactWindow>,
+    /// Parameters of the effect `points`: where. Due.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<Vec<Place>>,
+    /// Parameters of the effect `actuators`: the display. Due.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub actuators: Option<Layout>,
+    /// Parameters of the effect `afferents`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub afferents: Option<Afferents>,
+    /// Parameters of the effect `relaxation`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relaxation: Option<Relaxation>,
+}
+
+impl Hello {
+    /// The first member of version 2 that is there.
+    #[must_use]
+    pub fn member_of_version_2(&self) -> Option<&'static str> {
+        [
+            (self.answer_sample_type.is_some(), "answer_sample_type"),
+            (self.map.is_some(), "map"),
+            (self.contact_pa.is_some(), "contact_pa"),
+            (self.out_of_range.is_some(), "out_of_range"),
+            (self.stale_after_us.is_some(), "stale_after_us"),
+            (self.contact_window.is_some(), "contact_window"),
+            (self.points.is_some(), "points"),
+            (self.actuators.is_some(), "actuators"),
+            (self.afferents.is_some(), "afferents"),
+            (self.relaxation.is_some(), "relaxation"),
+        ]
+        .into_iter()
+        .find_map(|(there, name)| there.then_some(name))
+    }
 }
 
 impl Default for Hello {
+    /// A hello of version 1 without a wish.
     fn default() -> Self {
         Self {
-            version: u32::from(crate::PROTOCOL_VERSION),
+            version: 1,
             effects: Vec::new(),
             budget_us: None,
             tier: None,
             sample_type: SampleType::F32,
             pressure_scale_pa: None,
             atlas_hash: None,
+            answer_sample_type: None,
+            map: None,
+            contact_pa: None,
+            out_of_range: None,
+            stale_after_us: None,
+            contact_window: None,
+            points: None,
+            actuators: None,
+            afferents: None,
+            relaxation: None,
         }
     }
 }
@@ -99,6 +168,18 @@ pub struct Ready {
     /// J/m3 per unit of u16 and u8 answers, 1 for floats. A map that would
     /// clip raises it: the header of each answer has the last word.
     pub sed_scale_j_per_m3: f32,
+    /// Number that answers name the tier by. Version 2, as all that follows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_number: Option<u16>,
+    /// Sample type of the answers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer_sample_type: Option<SampleType>,
+    /// Effects of the session, in the order in which they act.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub session_effects: Option<Vec<RuntimeEffect>>,
+    /// What the payload of an answer with status ok holds, and where.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sections: Option<Vec<Section>>,
 }
 
 /// Something was refused; says whether the session goes on.
@@ -139,6 +220,17 @@ mod tests {
         let hello: ClientMessage =
             serde_json::from_value(json!({"type": "hello", "version": 1})).unwrap();
         assert_eq!(hello, ClientMessage::Hello(Hello::default()));
+    }
+
+    #[test]
+    fn a_hello_of_version_1_keeps_its_form() {
+        let json = serde_json::to_value(Hello::default()).unwrap();
+        let names: Vec<_> = json.as_object().unwrap().keys().cloned().collect();
+        let due = ["atlas_hash", "budget_us", "effects", "pressure_scale_pa", "sample_type"];
+        assert_eq!(names, [&due[..], &["tier", "version"]].concat());
+        assert_eq!(Hello::default().member_of_version_2(), None);
+        let hello = Hello { map: Some(false), ..Hello::default() };
+        assert_eq!(hello.member_of_version_2(), Some("map"));
     }
 
     #[test]
@@ -185,7 +277,7 @@ mod tests {
                 tier,
                 sample_type: SampleType::from_wire(kind).unwrap(),
                 pressure_scale_pa: scale,
-                atlas_hash: None,
+                ..Hello::default()
             });
             let text = serde_json::to_string(&hello).unwrap();
             prop_assert_eq!(serde_json::from_str::<ClientMessage>(&text).unwrap(), hello);

@@ -5,20 +5,27 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
+use arc_swap::ArcSwap;
 use papilla_proto::{ErrorCode, Problem};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use crate::{
     config::{Config, Timeouts},
-    metrics::Metrics,
+    gate::{Gate, Guest},
+    metrics::{Metrics, Shed},
     models::Catalogue,
-    pool::Entrance,
+    pool::{Entrance, Pool},
     problem,
+    reload::{Changes, ReloadError, Reloader},
 };
 
 /// The shared state.
 pub(crate) struct App {
-    pub(crate) catalogue: Arc<Catalogue>,
+    catalogue: ArcSwap<Catalogue>,
+    reloader: Reloader,
+    pub(crate) gate: Gate,
+    /// Largest body of a request, bytes.
+    pub(crate) body_max: usize,
     pub(crate) metrics: Arc<Metrics>,
     pub(crate) entrance: Entrance,
     pub(crate) timeouts: Timeouts,
@@ -34,11 +41,16 @@ impl App {
         config: &Config,
         catalogue: Arc<Catalogue>,
         metrics: Arc<Metrics>,
-        entrance: Entrance,
+        pool: &Pool,
+        gate: Gate,
         drain: Arc<watch::Sender<bool>>,
     ) -> Self {
+        let entrance = pool.entrance(&metrics);
         Self {
-            catalogue,
+            catalogue: ArcSwap::new(catalogue),
+            reloader: Reloader::new(config, pool.exchange(), Arc::clone(&metrics)),
+            gate,
+            body_max: config.max_body_bytes,
             metrics,
             entrance,
             timeouts: config.timeouts(),
@@ -49,17 +61,42 @@ impl App {
         }
     }
 
+    /// What there is to render with now; it may be replaced at any time, so whoever needs it
+    /// twice keeps it.
+    pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
+        self.catalogue.load_full()
+    }
+
+    /// Loads the models anew; takes seconds.
+    ///
+    /// # Errors
+    /// They cannot be served; nothing has changed then.
+    pub(crate) fn reload(&self) -> Result<Changes, ReloadError> {
+        self.reloader.reload(&self.catalogue)
+    }
+
     /// Whether new work is refused.
     pub(crate) fn is_draining(&self) -> bool {
         *self.drain.borrow()
     }
 
-    /// A place for one session.
+    /// A place for one session of this guest.
     ///
     /// # Errors
-    /// All are taken, or the server drains.
-    pub(crate) fn admit_session(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        self.admit(&self.sessions, "session")
+    /// All are taken, or all that the guest may have, or the server drains.
+    pub(crate) fn admit_session(&self, guest: &Guest) -> Result<SessionPlace, Problem> {
+        let holder =
+            guest.holder.as_ref().and_then(|holder| Some((holder, holder.sessions.as_ref()?)));
+        let of_token = holder.map(|(holder, places)| {
+            Arc::clone(places).try_acquire_owned().map_err(|_| {
+                self.metrics.shed(Shed::TokenSessions);
+                let message = format!("token '{}' has all the sessions it may have", holder.name);
+                Problem::new(ErrorCode::Overloaded, message)
+            })
+        });
+        let of_token = of_token.transpose()?;
+        let of_all = self.admit(&self.sessions, "session", Shed::Sessions)?;
+        Ok(SessionPlace { _of_all: of_all, _of_token: of_token })
     }
 
     /// A place for one posted map.
@@ -67,14 +104,20 @@ impl App {
     /// # Errors
     /// All are taken, or the server drains.
     pub(crate) fn admit_request(&self) -> Result<OwnedSemaphorePermit, Problem> {
-        self.admit(&self.requests, "request")
+        self.admit(&self.requests, "request", Shed::Requests)
     }
 
-    fn admit(&self, places: &Arc<Semaphore>, what: &str) -> Result<OwnedSemaphorePermit, Problem> {
+    fn admit(
+        &self,
+        places: &Arc<Semaphore>,
+        what: &str,
+        shed: Shed,
+    ) -> Result<OwnedSemaphorePermit, Problem> {
         if self.is_draining() {
             return Err(problem::shutting_down());
         }
         Arc::clone(places).try_acquire_owned().map_err(|_| {
+            self.metrics.shed(shed);
             let message = format!("every {what} place is taken; try again in a moment");
             Problem::new(ErrorCode::Overloaded, message)
         })
@@ -84,17 +127,12 @@ impl App {
     pub(crate) fn session_number(&self) -> u64 {
         self.next_session.fetch_add(1, Ordering::Relaxed)
     }
+}
 
-    /// Index of the tier called `name`.
-    ///
-    /// # Errors
-    /// There is none.
-    pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
-        self.catalogue.find(name).ok_or_else(|| {
-            let message = format!("no tier '{name}'; there are {}", self.catalogue.names());
-            Problem::new(ErrorCode::UnknownTier, message).at("tier")
-        })
-    }
+/// A place for one session; given back when it is dropped.
+pub(crate) struct SessionPlace {
+    _of_all: OwnedSemaphorePermit,
+    _of_token: Option<OwnedSemaphorePermit>,
 }
 
 /// Waits for the drain to begin; at once if the server is gone.

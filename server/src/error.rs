@@ -2,10 +2,15 @@
 
 use std::{io, net::SocketAddr, path::PathBuf};
 
+use crate::config::SettingError;
+
 /// Why the service does not start.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
+    /// A setting cannot be used.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A file of the model folder is missing.
     #[error(
         "{origin} holds no {file}; build with the shipped files in models/, or name a folder of \
@@ -72,6 +77,7 @@ impl StartError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Setting(_) => 2,
             Self::Missing { .. }
             | Self::Unusable { .. }
             | Self::Folder { .. }

@@ -15,31 +15,44 @@
 
 mod app;
 mod assets;
+mod check;
 mod codec;
 mod config;
+mod effects;
 mod error;
+mod gate;
+mod golden;
 mod http;
 mod metrics;
 mod models;
 mod negotiate;
 mod net;
+mod oip;
 mod pool;
 mod problem;
+mod reload;
 mod replay;
 mod session;
 mod speed;
+mod telemetry;
+mod tls;
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
-pub use config::Config;
+pub use check::{Finding, Report, check};
+pub use config::{Cli, Command, Config, ConfigError, SettingError};
 pub use error::{DrainError, StartError};
+pub use telemetry::Telemetry;
 use tokio::{
     sync::watch,
     task::{JoinHandle, spawn_blocking},
     time::timeout,
 };
 
-use crate::{app::App, assets::Assets, metrics::Metrics, models::Catalogue, pool::Pool};
+use crate::{
+    app::App, assets::Assets, gate::Gate, metrics::Metrics, models::Catalogue, net::Line,
+    pool::Pool,
+};
 
 /// A running service.
 ///
@@ -61,9 +74,11 @@ pub struct Server {
 /// Must be called within a tokio runtime. When it returns, the service is ready.
 ///
 /// # Errors
-/// The models are missing or unusable, a thread cannot be started, or the address cannot be
+/// Settings do not go together, the models are missing or unusable, a thread cannot be started, or the address cannot be
 /// bound; each says what to do.
 pub async fn start(config: &Config) -> Result<Server, StartError> {
+    config.validate()?;
+    let (gate, tls) = (Gate::new(config)?, tls::acceptor(config)?);
     let loading = config.clone();
     let (catalogue, metrics, pool) =
         spawn_blocking(move || load(&loading)).await.map_err(|_| StartError::WorkerPanicked)??;
@@ -71,12 +86,18 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
     let listener = net::listen(config.bind).map_err(bind)?;
     let address = listener.local_addr().map_err(bind)?;
     let drain = Arc::new(watch::Sender::new(false));
-    let entrance = pool.entrance(&metrics);
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app = Arc::new(App::new(config, catalogue, metrics, entrance, Arc::clone(&drain)));
-    let router = http::router(Arc::clone(&app));
-    let accepting = tokio::spawn(net::serve(listener, router, app, config.max_connections.get()));
+    let app = Arc::new(App::new(config, catalogue, metrics, &pool, gate, Arc::clone(&drain)));
+    if let (true, Some(folder)) = (config.watch_models, &config.models) {
+        reload::watch(Arc::clone(&app), folder).map_err(|error| {
+            let reason = format!("{} cannot be watched: {error}", folder.display());
+            SettingError { field: "watch_models", reason }
+        })?;
+    }
+    let router = http::router(Arc::clone(&app), &config.allow_origin);
+    let line = Line { router, app, tls };
+    let accepting = tokio::spawn(net::serve(listener, line, config.max_connections.get()));
     Ok(Server {
         address,
         tiers,
@@ -97,10 +118,11 @@ fn load(config: &Config) -> Result<Loaded, StartError> {
             .map_err(|source| StartError::Folder { folder: folder.clone(), source })?,
         None => Assets::embedded(),
     };
-    let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref())?);
+    let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref(), None)?);
     // Before the threads start: they would take time from what is measured.
     speed::calibrate(&catalogue, config.calibration())?;
-    let metrics = Metrics::new(catalogue.tiers.iter().map(|tier| tier.name.as_str()));
+    let metrics = Metrics::new();
+    metrics.name_tiers(&catalogue);
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() + config.max_requests.get();
     let pool = Pool::start(&catalogue, &metrics, config.thread_count(), places)?;

@@ -1,46 +1,75 @@
 //! The Papilla service; see `--help`.
 
 use std::{
+    env,
     io::{self, Write},
     process::ExitCode,
 };
 
-use clap::Parser;
-use papilla_server::{Config, Server, StartError};
+use papilla_server::{
+    Cli, Command, Config, ConfigError, Server, SettingError, StartError, Telemetry,
+};
 use serde_json::json;
 use tokio::signal::unix::{SignalKind, signal};
-use tracing_subscriber::EnvFilter;
 
 /// Exit code of a drain that took too long.
 const DRAIN_TIMED_OUT: u8 = 5;
 
 fn main() -> ExitCode {
-    let config = Config::parse();
-    match run(&config) {
+    match run() {
         Ok(code) => code,
         Err(error) => {
+            // Help and usage print themselves, with the exit code that is due.
+            if let Some(ConfigError::Usage(usage)) = error.downcast_ref() {
+                usage.exit();
+            }
             eprintln!("papilla-server: {error:#}");
-            let start = error.downcast_ref::<StartError>();
-            ExitCode::from(start.map_or(1, StartError::exit_code))
+            let of_start = error.downcast_ref::<StartError>().map(StartError::exit_code);
+            let is_setting = error.is::<ConfigError>() || error.is::<SettingError>();
+            ExitCode::from(of_start.unwrap_or(if is_setting { 2 } else { 1 }))
         }
     }
 }
 
-fn run(config: &Config) -> anyhow::Result<ExitCode> {
-    let filter = EnvFilter::try_new(&config.log)
-        .map_err(|error| anyhow::anyhow!("--log '{}' is no filter: {error}", config.log))?;
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(io::stderr).init();
-    // The runtime only moves bytes: two threads keep one slow turn from stopping all sessions.
-    let runtime =
-        tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
-    runtime.block_on(serve(config))
+fn run() -> anyhow::Result<ExitCode> {
+    let (cli, printed) = Cli::read_and_print(env::args_os())?;
+    let config = &cli.settings;
+    if cli.print_config {
+        config.validate()?;
+        print!("{printed}");
+        return Ok(ExitCode::SUCCESS);
+    }
+    // It outlives the runtime: what the last tasks log and trace is still sent.
+    let _telemetry = Telemetry::start(config)?;
+    match cli.command {
+        Some(Command::Check) => check(config),
+        None => {
+            // The runtime only moves bytes: two threads keep one slow turn from stopping all
+            // sessions.
+            let runtime = tokio::runtime::Builder::new_multi_thread()
+                .worker_threads(2)
+                .enable_all()
+                .build()?;
+            runtime.block_on(serve(config))
+        }
+    }
+}
+
+fn check(config: &Config) -> anyhow::Result<ExitCode> {
+    let report = papilla_server::check(config);
+    if config.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        println!("{report}");
+    }
+    Ok(ExitCode::from(report.exit_code()))
 }
 
 async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
     let server = papilla_server::start(config).await?;
-    announce(&server, config.json)?;
+    announce(&server, config)?;
     tokio::select! {
         _ = terminate.recv() => {}
         _ = interrupt.recv() => {}
@@ -60,10 +89,10 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
 }
 
 /// Prints where the service is to be found.
-fn announce(server: &Server, as_json: bool) -> io::Result<()> {
-    let address = format!("http://{}", server.address());
+fn announce(server: &Server, config: &Config) -> io::Result<()> {
+    let address = format!("{}://{}", config.scheme(), server.address());
     let mut out = io::stdout().lock();
-    if as_json {
+    if config.json {
         let line = json!({
             "event": "listening",
             "version": env!("CARGO_PKG_VERSION"),

@@ -13,19 +13,21 @@ use std::{
 };
 
 use axum::Router;
-use hyper::server::conn::http1;
-use hyper_util::{
-    rt::{TokioIo, TokioTimer},
-    service::TowerToHyperService,
-};
+use hyper::{body::Incoming, server::conn::http1, service::service_fn};
+use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::{TcpListener, TcpSocket, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::{Sleep, sleep},
+    sync::{OwnedSemaphorePermit, Semaphore, watch},
+    time::{Sleep, sleep, timeout},
 };
+use tokio_rustls::TlsAcceptor;
+use tower::ServiceExt;
 
-use crate::app::{App, begun};
+use crate::{
+    app::{App, begun},
+    gate::Peer,
+};
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
 const BUFFER_MAX: usize = 128 * 1024;
@@ -52,20 +54,29 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
     socket.listen(BACKLOG)
 }
 
+/// What every connection needs.
+#[derive(Clone)]
+pub(crate) struct Line {
+    pub(crate) router: Router,
+    pub(crate) app: Arc<App>,
+    /// None: plain text.
+    pub(crate) tls: Option<TlsAcceptor>,
+}
+
 /// Accepts until the drain begins.
-pub(crate) async fn serve(listener: TcpListener, router: Router, app: Arc<App>, places: usize) {
+pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
     let places = Arc::new(Semaphore::new(places));
-    let mut drain = app.drain.subscribe();
+    let mut drain = line.app.drain.subscribe();
     loop {
         let accepted = async {
             let place = Arc::clone(&places).acquire_owned().await;
             (place, listener.accept().await)
         };
-        let (place, stream) = tokio::select! {
+        let (place, stream, peer) = tokio::select! {
             biased;
             () = begun(&mut drain) => return,
             (place, accepted) = accepted => match (place, accepted) {
-                (Ok(place), Ok((stream, _))) => (place, stream),
+                (Ok(place), Ok((stream, peer))) => (place, stream, peer),
                 (Err(_), _) => return,
                 (_, Err(error)) => {
                     tracing::warn!(%error, "a connection cannot be accepted");
@@ -77,24 +88,41 @@ pub(crate) async fn serve(listener: TcpListener, router: Router, app: Arc<App>, 
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "TCP_NODELAY cannot be set");
         }
-        tokio::spawn(connection(stream, router.clone(), Arc::clone(&app), place));
+        tokio::spawn(connection(stream, Peer(peer.ip()), line.clone(), place));
     }
 }
 
-async fn connection(
-    stream: TcpStream,
-    router: Router,
-    app: Arc<App>,
-    _place: OwnedSemaphorePermit,
-) {
-    app.metrics.connections_open.inc();
-    let mut drain = app.drain.subscribe();
-    let io = TokioIo::new(Patient::new(stream, app.timeouts.io));
+async fn connection(stream: TcpStream, peer: Peer, line: Line, _place: OwnedSemaphorePermit) {
+    line.app.metrics.connections_open.inc();
+    // Taken before anything is read: from here on the drain waits for this connection.
+    let drain = line.app.drain.subscribe();
+    let patience = line.app.timeouts.io;
+    let stream = Patient::new(stream, patience);
+    match &line.tls {
+        None => converse(stream, peer, &line, drain).await,
+        Some(tls) => match timeout(patience, tls.accept(stream)).await {
+            Ok(Ok(stream)) => converse(stream, peer, &line, drain).await,
+            Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
+            Err(_) => tracing::debug!("TLS handshake took too long"),
+        },
+    }
+    line.app.metrics.connections_open.dec();
+}
+
+async fn converse<S>(stream: S, peer: Peer, line: &Line, mut drain: watch::Receiver<bool>)
+where
+    S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+{
+    let router = line.router.clone();
+    let service = service_fn(move |mut request: hyper::Request<Incoming>| {
+        request.extensions_mut().insert(peer);
+        router.clone().oneshot(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
-        .header_read_timeout(app.timeouts.io)
+        .header_read_timeout(line.app.timeouts.io)
         .max_buf_size(BUFFER_MAX)
-        .serve_connection(io, TowerToHyperService::new(router))
+        .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();
     tokio::pin!(connection);
     let mut draining = false;
@@ -104,7 +132,7 @@ async fn connection(
                 if let Err(error) = result {
                     tracing::debug!(%error, "connection ended");
                 }
-                break;
+                return;
             }
             () = begun(&mut drain), if !draining => {
                 draining = true;
@@ -112,7 +140,6 @@ async fn connection(
             }
         }
     }
-    app.metrics.connections_open.dec();
 }
 
 /// A stream whose writes give up when the other side makes no room for a while.

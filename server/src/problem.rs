@@ -2,7 +2,7 @@
 
 use axum::{
     body::Body,
-    http::{HeaderValue, StatusCode, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use papilla_proto::{ErrorCode, FrameError, MapError, Problem, SampleError};
@@ -34,10 +34,21 @@ impl IntoResponse for HttpProblem {
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        if matches!(self.0.code, ErrorCode::Overloaded | ErrorCode::ShuttingDown) {
+        label(headers, self.0.code);
+        response
+    }
+}
+
+/// What clients are told of a refusal beside its body.
+pub(crate) fn label(headers: &mut HeaderMap, code: ErrorCode) {
+    match code {
+        ErrorCode::Overloaded | ErrorCode::ShuttingDown | ErrorCode::RateLimited => {
             headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
         }
-        response
+        ErrorCode::Unauthorized => {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        _ => {}
     }
 }
 

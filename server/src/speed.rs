@@ -13,6 +13,7 @@ use papilla_proto::{MAP_LEN, MAP_SIDE_PX, SampleType, check_pressure};
 use crate::{
     StartError,
     codec::{self, Input, Map, Output, Quantity},
+    effects,
     models::{Catalogue, Tier},
 };
 
@@ -123,8 +124,8 @@ pub(crate) fn round_press(pressure_max_pa: f32, pressure_pa: &mut [f32]) {
     }
 }
 
-/// Measures every tier on this thread, in about `time` altogether, before anything else runs:
-/// an equal share each, but never less than [`RUNS_MIN`] runs after one that warms it.
+/// Measures on this thread every tier that was not measured yet, in about `time` altogether: an
+/// equal share each, but never less than [`RUNS_MIN`] runs after one that warms it.
 ///
 /// With no time, the shipped times stand.
 ///
@@ -134,8 +135,9 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
     if time.is_zero() {
         return Ok(());
     }
-    let share = time / u32::try_from(catalogue.tiers.len()).unwrap_or(u32::MAX).max(1);
-    for tier in &catalogue.tiers {
+    let new = || catalogue.tiers.iter().filter(|tier| tier.speed.calibrated_us().is_none());
+    let share = time / u32::try_from(new().count()).unwrap_or(u32::MAX).max(1);
+    for tier in new() {
         let mut times = runs(tier, share)?;
         tier.speed.calibrate(&mut times);
         tracing::info!(tier = %tier.name, typical_us = tier.speed.typical_us(), runs = times.len(), "calibrated");
@@ -143,6 +145,7 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
     if let Some(codec_us) = codec_us() {
         catalogue.overhead.0.store(codec_us + HAND_OVER_US, Ordering::Relaxed);
     }
+    effects::measure(catalogue);
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use futures_util::{
     stream::{SplitSink, SplitStream},
 };
 use papilla_proto::{
-    ClientMessage, FrameError, FrameHeader, HEADER_LEN, Hello, Ready, ServerMessage, SessionError,
+    ClientMessage, FrameError, FrameHeader, Hello, Ready, ServerMessage, SessionError,
 };
 use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{
@@ -106,7 +106,7 @@ pub async fn open(server: &str, hello: &Hello) -> Result<(Ready, Sender, Receive
 /// A frame: header and samples.
 #[must_use]
 pub fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
-    let mut frame = Vec::with_capacity(HEADER_LEN + payload.len());
+    let mut frame = Vec::with_capacity(header.header_len() + payload.len());
     frame.extend_from_slice(&header.encode());
     frame.extend_from_slice(payload);
     frame
@@ -155,7 +155,7 @@ impl Receiver {
                 }
                 Message::Binary(bytes) => {
                     let header = FrameHeader::decode(&bytes)?;
-                    return Ok(Said::Frame(header, bytes.slice(HEADER_LEN..)));
+                    return Ok(Said::Frame(header, bytes.slice(header.header_len()..)));
                 }
                 Message::Close(_) => return Err(SocketError::Closed),
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}

@@ -22,7 +22,7 @@ pub(crate) struct Options {
     #[arg(long, default_value = "test", value_name = "SPLIT")]
     split: String,
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
-    /// trained on and the split `test`.
+    /// trained on (of several, one of them) and the split `test`.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write NAME-best.png, NAME-median.png and NAME-worst.png into this folder: pressure,
@@ -82,8 +82,9 @@ fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> a
     if options.split != "test" {
         anyhow::bail!("a card tells of held-out presses: --out needs --split test");
     }
-    if info.dataset_sha256 != dataset.sha256() {
-        let (trained, found) = (info.dataset_sha256.clone(), dataset.sha256().to_owned());
+    let trained = info.datasets();
+    if !trained.contains(&dataset.sha256()) {
+        let (trained, found) = (trained.join(", "), dataset.sha256().to_owned());
         return Err(ExportError::OtherDataset { trained, found }.into());
     }
     Ok(())

@@ -18,7 +18,8 @@ pub(crate) struct Options {
     /// Folder of the models, with index.json and atlas.json.
     #[arg(long, default_value = "models", value_name = "FOLDER")]
     models: PathBuf,
-    /// Folders that `fe-datagen rungs` wrote: the reference and the solver's own rungs.
+    /// Folders that `fe-datagen rungs` wrote: the reference and the solver's own rungs
+    /// [default: the folders in DATA/rungs].
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
     fe: Vec<PathBuf>,
     /// Writes STEM.md, STEM.svg, STEM-zone.svg and STEM.json.
@@ -37,7 +38,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let task = Task {
         data: options.data.clone(),
         models: options.models.clone(),
-        fe: options.fe.clone(),
+        fe: if options.fe.is_empty() { fe_folders(&options.data) } else { options.fe.clone() },
         quick: options.quick,
     };
     let ladder = match &options.from {
@@ -63,6 +64,15 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         println!("wrote {}", path.display());
     }
     Ok(())
+}
+
+/// The folders in `data/rungs`, in order; none where there is no such folder.
+fn fe_folders(data: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(data.join("rungs")).into_iter().flatten().flatten();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    folders.retain(|folder| folder.is_dir());
+    folders.sort();
+    folders
 }
 
 fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>> {

@@ -175,6 +175,7 @@ pub fn summarise(split: &str, samples: &[SampleMetrics]) -> Option<Metrics> {
     let nail_base: Vec<f64> = samples.iter().filter_map(|s| s.nail_base_error).collect();
     let ssim = all(|s| s.ssim);
     Some(Metrics {
+        dataset_sha256: None,
         split: split.to_owned(),
         samples: samples.len(),
         relative_l2: spread(&all(|s| s.relative_l2))?,

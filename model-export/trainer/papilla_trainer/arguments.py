@@ -31,9 +31,10 @@ Trains a network on the training presses of a dataset. A tenth of them is set as
 epoch by; the test presses are touched once, after training, for the metrics.
 
 s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
-face-rR[-nK][-zW][-hH] works on the faces of the interface and starts from --operator: a linear map
-of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a correction
-for finite strain of width H, the same at every face; SED is a mean of sums of squares.
+face-rR[-nK][-zW][-hH[s]] works on the faces of the interface and starts from --operator: a linear
+map of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a
+correction for finite strain of width H, the same at every face (s: it sees each neighbour by
+itself); SED is a mean of sums of squares.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
 and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
@@ -68,6 +69,16 @@ Writes the closed form as a model, without training: Boussinesq's stresses in on
 under the pressure on the flattened skin (Phillips & Johnson 1981), compressed like an operator."""
 
 
+_CURVE = """\
+Trains the same network on more and more of the training presses, each time for as many steps as
+--epochs are on all of them, and measures every one on the held-out presses of each dataset and on
+all presses of each --judge: would more data help? The presses of a small set are in every larger
+one. Takes train's options; --train-presses is set by --presses.
+
+Writes to --out: the runs (presses-N; kept, so that the same command goes on after an
+interruption), curve.json, curve.csv and curve.svg."""
+
+
 def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
     """The parser; each command's function stands under its name."""
     raw = argparse.RawDescriptionHelpFormatter
@@ -86,6 +97,20 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
         return sub
 
     _train_arguments(command("train", "train a network on a dataset", _TRAIN))
+
+    curve = command("curve", "train on more and more presses: would more data help?", _CURVE)
+    _train_arguments(curve)
+    curve.add_argument(
+        "--presses", type=int, nargs="+", required=True, metavar="N", help="how many, each a run"
+    )
+    curve.add_argument(
+        "--judge",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a dataset of which nothing is trained on; may be given again",
+    )
 
     evaluate = command("evaluate", "measure a run on the held-out presses", _EVALUATE)
     evaluate.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
@@ -172,10 +197,16 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "stays the operator)",
     )
     add(
+        "--dropout",
+        type=float,
+        default=0.0,
+        help="part of a face network's correction that each step leaves out (0)",
+    )
+    add(
         "--train-presses",
         type=int,
         metavar="N",
-        help="fit to the first N training presses only, for a learning curve",
+        help="fit to N of the training presses only, drawn by the seed",
     )
     add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
@@ -188,8 +219,7 @@ def _dataset_argument(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="DIR",
-        help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas (the "
-        "first one's maxima are the scales)",
+        help="what `fe-datagen generate` wrote; give it again to join datasets of one atlas",
     )
 
 

@@ -33,7 +33,7 @@ OPERATORS = frozenset(
             "ReduceMax",
         ),
         # Networks on faces.
-        *("Add", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Sub"),
+        *("Add", "Cast", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Sub"),
         *("Squeeze", "Tanh", "Unsqueeze"),
     }
 )

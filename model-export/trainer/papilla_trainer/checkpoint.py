@@ -30,7 +30,7 @@ class Served:
     atlas_hash: str
     effects: list[str]
     dataset_sha256: str
-    # The hashes of several datasets that were trained on together, the first giving the scales.
+    # The hashes of several datasets that were trained on together.
     datasets: list[str] = field(default_factory=list)
     # The constants of a face network's rasters; a network on maps has none.
     frame: Weights = field(default_factory=dict)

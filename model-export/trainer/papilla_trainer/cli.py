@@ -1,4 +1,4 @@
-"""The command line: train, evaluate, export, check, operator, half-space."""
+"""The command line: train, curve, evaluate, export, check, operator, half-space."""
 
 from __future__ import annotations
 
@@ -72,6 +72,25 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         f"next: python -m papilla_trainer export {options.out} --out models/{config.network}.onnx"
     )
     return result, text
+
+
+def _curve(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    from papilla_trainer.config import TrainConfig
+    from papilla_trainer.curve import learning_curve, table
+    from papilla_trainer.dataset import Dataset
+
+    config = TrainConfig(
+        **{name: getattr(options, name) for name in TrainConfig.__dataclass_fields__}
+    )
+    rows = learning_curve(
+        [Dataset(directory) for directory in options.dataset],
+        [Dataset(directory) for directory in options.judge],
+        config,
+        options.presses,
+        options.out,
+        _Bar,
+    )
+    return {"network": config.network, "rows": rows}, table(rows)
 
 
 def _evaluate(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -163,6 +182,7 @@ def _untrained_text(result: dict[str, Any]) -> str:
 
 _COMMANDS: dict[str, Command] = {
     "train": _train,
+    "curve": _curve,
     "evaluate": _evaluate,
     "export": _export,
     "check": _check,

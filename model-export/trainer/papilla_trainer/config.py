@@ -39,6 +39,7 @@ class TrainConfig:
     operator: str | None = None
     train_presses: int | None = None
     base_rate: float = 0.05
+    dropout: float = 0.0
 
     def __post_init__(self) -> None:
         if (self.operator is not None) != isinstance(self.spec, FaceSpec):
@@ -47,6 +48,8 @@ class TrainConfig:
             )
         if not 0.0 <= self.base_rate <= 1.0:
             raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
+        if not 0.0 <= self.dropout < 1.0:
+            raise UsageError(f"--dropout must lie in 0 .. 1, not {self.dropout}")
         if self.loss not in LOSS_CHOICES or self.far_weight < 0.0:
             raise UsageError(f"--loss {self.loss} --far-weight {self.far_weight}: not a loss")
         if self.train_presses is not None and self.train_presses < 2:

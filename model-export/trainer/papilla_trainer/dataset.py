@@ -215,6 +215,14 @@ def validation_split(train_ids: list[int], count: int, seed: int) -> tuple[list[
     return [i for i in train_ids if i not in chosen], [i for i in train_ids if i in chosen]
 
 
+def fewer(ids: list[int], count: int | None, seed: int) -> list[int]:
+    """``count`` of the presses by lot, in their order; of two counts the larger has the smaller."""
+    if count is None or count >= len(ids):
+        return ids
+    order = np.random.default_rng([seed, 0xC04E]).permutation(len(ids))
+    return [ids[i] for i in sorted(order[:count])]
+
+
 def _read_manifest(path: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))

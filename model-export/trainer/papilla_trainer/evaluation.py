@@ -69,9 +69,11 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
     return metrics
 
 
-def measure(model: nn.Module, dataset: Dataset) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Errors on the test presses through the whole graph: their summary, and a row a sample."""
-    maps = dataset.load(dataset.test_ids)
+def measure(
+    model: nn.Module, dataset: Dataset, ids: list[int] | None = None
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Errors through the whole graph on the test presses (or ``ids``): summary, a row a sample."""
+    maps = dataset.load(dataset.test_ids if ids is None else ids)
     mask = dataset.interface.mask()
     results = evaluate(lambda p: predict(model, p), maps.pressure_pa, maps.sed_j_per_m3, mask)
     rows = [
@@ -90,7 +92,7 @@ def measure(model: nn.Module, dataset: Dataset) -> tuple[dict[str, Any], list[di
     measured = [sample for sample in results if sample is not None]
     metrics: dict[str, Any] = {
         "split": "test",
-        "presses": len(dataset.test_ids),
+        "presses": len(np.unique(maps.press_id)),
         "samples": len(measured),
         "samples_without_sed": len(results) - len(measured),
         **summarise(measured),

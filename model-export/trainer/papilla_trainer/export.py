@@ -8,7 +8,9 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import onnx
+import onnx.numpy_helper
 import torch
 from torch import nn
 
@@ -23,6 +25,9 @@ from papilla_trainer.network import parameter_count
 OPSET = 17
 INPUT = "pressure_pa"
 OUTPUT = "sed_j_per_m3"
+# A constant of fewer values is not worth a cast.
+_LARGE = 4096
+_SMALL = {"float32": np.float16, "int64": np.int16}
 
 
 def export_run(run_dir: Path, out: Path, name: str | None = None, weights: str = "best") -> Path:
@@ -63,9 +68,28 @@ def to_onnx(model: nn.Module) -> onnx.ModelProto:
             do_constant_folding=True,
         )
     graph = onnx.load_from_string(buffer.getvalue())
+    _store_small(graph)
     graph.producer_name = "papilla_trainer"
     graph.producer_version = __version__
     return graph
+
+
+def _store_small(model: onnx.ModelProto) -> None:
+    """Large constants that lose nothing by it are stored in 16 bits, and cast when loaded."""
+    casts, constants = [], []
+    for constant in model.graph.initializer:
+        values = onnx.numpy_helper.to_array(constant)
+        small = values.astype(_SMALL.get(values.dtype.name, values.dtype))
+        if values.size < _LARGE or small.dtype == values.dtype or (small != values).any():
+            constants.append(constant)
+            continue
+        name = f"{constant.name}.stored"
+        constants.append(onnx.numpy_helper.from_array(small, name))
+        casts.append(onnx.helper.make_node("Cast", [name], [constant.name], to=constant.data_type))
+    nodes = [*casts, *model.graph.node]
+    del model.graph.node[:], model.graph.initializer[:]
+    model.graph.node.extend(nodes)
+    model.graph.initializer.extend(constants)
 
 
 def metadata(
@@ -95,9 +119,7 @@ def metadata(
         training["loss"] = f"relative L2 squared + {config.far_weight} x that of the far field"
     if config.operator is not None:
         training["start"] = "linear operator of the finger"
-        training["base_rate"] = config.base_rate
-    if len(served.datasets) > 1:
-        training["datasets"] = served.datasets
+        training |= {"base_rate": config.base_rate, "dropout": config.dropout}
     return properties(served, name, config.spec.as_json(), training, metrics)
 
 
@@ -109,6 +131,8 @@ def properties(
     metrics: dict[str, Any],
 ) -> dict[str, str]:
     """``metadata_props`` of any model, trained or not."""
+    if len(served.datasets) > 1:
+        training = {**training, "datasets": served.datasets}
     return {
         "papilla.format": "1",
         "papilla.name": name,

@@ -41,10 +41,12 @@ class FaceLayout:
 
     ``vertex``, ``image``: vertices of one half, then of the middle line, and their mirror images;
     ``unit``: ``[U]`` faces; ``near``: ``[U / 8, 2, K]`` the vertices nearest to each block, and the
-    same in the mirror; ``ring``: ``[2, RING, 2 U]`` slots near a slot and further out; ``corner``:
-    ``[4, 2 U]`` vertices of a slot's face; ``hand``: ``[2 U, 7]`` what turns a slot's components
-    (and pressure) to those of a frame that is not mirrored; ``place``: ``[2 U, 5]`` where on the
-    finger; ``vertex_slot``, ``vertex_share``: ``[M, V]`` how slots' SED averages to vertices.
+    same in the mirror; ``ring``: ``[2, RING, 2 U]`` slots near a slot and further out; ``star``:
+    ``[4, 2 U]`` (or ``[0, 2 U]``) its neighbours toward tip and base and to either side;
+    ``corner``: ``[4, 2 U]`` vertices of a slot's face; ``hand``: ``[2 U, 7]`` what turns a slot's
+    components (and pressure) to those of a frame that is not mirrored; ``place``: ``[2 U, 5]``
+    where on the finger; ``vertex_slot``, ``vertex_share``: ``[M, V]`` how slots' SED averages to
+    vertices.
     """
 
     vertex: Tensor
@@ -52,6 +54,7 @@ class FaceLayout:
     unit: Tensor
     near: Tensor
     ring: Tensor
+    star: Tensor
     corner: Tensor
     hand: Tensor
     place: Tensor
@@ -59,7 +62,7 @@ class FaceLayout:
     vertex_share: Tensor
 
     @staticmethod
-    def of(atlas: Atlas, operator: Operator, near: int) -> FaceLayout:
+    def of(atlas: Atlas, operator: Operator, near: int, star: bool = False) -> FaceLayout:
         """The layout of an operator's faces with ``near`` vertices in each block's stencil."""
         vertex, image = _vertices(atlas)
         skin = operator.face_means(atlas.skin_mm)
@@ -84,6 +87,7 @@ class FaceLayout:
             "unit": unit,
             "near": np.stack([own, atlas.mirror[own]], axis=1),
             "ring": _rings(skin[slots], used),
+            "star": _star(skin[slots], _axes(atlas, operator)[slots], used, star),
             "corner": corner.T,
             "hand": hand.astype(np.float32),
             "place": _place(skin[slots]).astype(np.float32),
@@ -110,6 +114,17 @@ def frames(atlas: Atlas, operator: Operator) -> F64:
 
     Rotations of the five deviatoric numbers; the volumetric one stays.
     """
+    axes = _axes(atlas, operator)
+    basis = _basis()
+    turned = np.einsum("fij,ajk,flk->fail", axes, basis, axes)
+    rotation = np.zeros((len(axes), COMPONENTS, COMPONENTS))
+    rotation[:, :5, :5] = np.einsum("fail,bil->fba", turned, basis)
+    rotation[:, 5, 5] = 1.0
+    return rotation
+
+
+def _axes(atlas: Atlas, operator: Operator) -> F64:
+    """``[F, 3, 3]``, rows: lengthwise, crosswise, outward on the skin over each face."""
     normal = operator.face_means(_normals(atlas))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     along = np.array([1.0, 0.0, 0.0]) - normal * normal[:, :1]
@@ -117,13 +132,7 @@ def frames(atlas: Atlas, operator: Operator) -> F64:
     steep = np.linalg.norm(along, axis=1, keepdims=True) < _STEEP
     along = np.where(steep, up, along)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
-    axes = np.stack([along, np.cross(normal, along), normal], axis=1)  # [F, 3, 3], rows
-    basis = _basis()
-    turned = np.einsum("fij,ajk,flk->fail", axes, basis, axes)
-    rotation = np.zeros((len(axes), COMPONENTS, COMPONENTS))
-    rotation[:, :5, :5] = np.einsum("fail,bil->fba", turned, basis)
-    rotation[:, 5, 5] = 1.0
-    return rotation
+    return np.stack([along, np.cross(normal, along), normal], axis=1)
 
 
 def _basis() -> F64:
@@ -207,8 +216,7 @@ def _rings(centre: F64, used: NDArray[np.bool_]) -> I64:
 
     A slot of side 1 has the images of its unit's, also where two are equally near.
     """
-    sides = np.arange(len(centre)).reshape(-1, 2, BLOCK)
-    here, image = sides[:, 0].ravel(), sides[:, ::-1].ravel()
+    here, image = _sides(len(centre))
     apart = np.linalg.norm(centre[here][:, None] - centre[None], axis=2)
     order = np.argsort(np.where(used, apart, np.inf), axis=1, kind="stable")
     rings = np.empty((len(_SPREAD), RING, len(centre)), dtype=np.int64)
@@ -217,6 +225,30 @@ def _rings(centre: F64, used: NDArray[np.bool_]) -> I64:
         rings[k][:, here] = own
         rings[k][:, image[here]] = image[own]
     return rings
+
+
+def _star(centre: F64, axes: F64, used: NDArray[np.bool_], wanted: bool) -> I64:
+    """``[4, 2 U]``: the slots nearest to the places a face's size away, lengthwise and across."""
+    if not wanted:
+        return np.empty((0, len(centre)), dtype=np.int64)
+    here, image = _sides(len(centre))
+    apart = np.linalg.norm(centre[here][:, None] - centre[None], axis=2)
+    others = np.sort(np.where(used & (apart > _MIRROR_TOLERANCE_MM), apart, np.inf), axis=1)
+    size = others[:, :4].mean(axis=1, keepdims=True)
+    star = np.empty((4, len(centre)), dtype=np.int64)
+    for k, (axis, sign) in enumerate(((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))):
+        place = centre[here] + sign * size * axes[here, axis]
+        off = np.linalg.norm(place[:, None] - centre[None], axis=2)
+        own = np.where(used, off, np.inf).argmin(axis=1)
+        star[k][here] = own
+        star[k][image[here]] = image[own]
+    return star
+
+
+def _sides(slots: int) -> tuple[I64, I64]:
+    """Slots of side 0, and the image of every slot."""
+    sides = np.arange(slots).reshape(-1, 2, BLOCK)
+    return sides[:, 0].ravel(), sides[:, ::-1].ravel()
 
 
 def _place(centre: F64) -> F64:

@@ -25,7 +25,7 @@ from papilla_trainer.face_layout import BLOCK, RING, FaceLayout
 from papilla_trainer.linear_operator import COMPONENTS
 
 _NAME = re.compile(
-    r"face-r(?P<rank>\d+)(?:-n(?P<near>\d+))?(?:-z(?P<whole>\d+))?(?:-h(?P<hidden>\d+))?"
+    r"face-r(?P<rank>\d+)(?:-n(?P<near>\d+))?(?:-z(?P<whole>\d+))?(?:-h(?P<hidden>\d+)(?P<star>s)?)?"
 )
 PRESSURE_UNIT_PA = 1e4
 SED_UNIT_J_PER_M3 = 100.0
@@ -37,20 +37,23 @@ class FaceSpec:
 
     ``rank``: coordinates of the low-rank part, even and odd together; ``near``: vertices of a
     block's stencil (0: none); ``whole``: width of the gated layer on those coordinates (0: none);
-    ``hidden``: width of the correction at each face (0: none).
+    ``hidden``: width of the correction at each face (0: none); ``star``: whether that sees each of
+    a face's four neighbours by itself.
     """
 
     rank: int
     near: int = 0
     whole: int = 0
     hidden: int = 0
+    star: bool = False
     kind: str = "face_net"
 
     @property
     def name(self) -> str:
         """The name that `--network` reads."""
         parts = (("n", self.near), ("z", self.whole), ("h", self.hidden))
-        return f"face-r{self.rank}" + "".join(f"-{k}{n}" for k, n in parts if n)
+        name = f"face-r{self.rank}" + "".join(f"-{k}{n}" for k, n in parts if n)
+        return name + ("s" if self.star else "")
 
     def as_json(self) -> dict[str, Any]:
         """The form that the model's metadata carry."""
@@ -58,17 +61,20 @@ class FaceSpec:
 
 
 def parse_face_network(name: str) -> FaceSpec:
-    """Read ``face-rR[-nK][-zW][-hH]``."""
+    """Read ``face-rR[-nK][-zW][-hH[s]]``."""
     match = _NAME.fullmatch(name)
     if match is None:
         raise UsageError(
-            f"unknown network '{name}': give face-rR[-nK][-zW][-hH] (rank, stencil, width of the "
-            "layer on the whole finger and of the one at each face), e.g. face-r128-n32-h48"
+            f"unknown network '{name}': give face-rR[-nK][-zW][-hH[s]] (rank, stencil, width of "
+            "the layer on the whole finger and of the one at each face, with s one that sees its "
+            "neighbours), e.g. face-r128-n32-h48"
         )
-    number = {key: int(value) for key, value in match.groupdict().items() if value is not None}
+    given = match.groupdict()
+    star = given.pop("star") is not None
+    number = {key: int(value) for key, value in given.items() if value is not None}
     if number["rank"] % 2 or 0 in number.values():
         raise UsageError(f"--network {name}: the rank must be even and no number may be 0")
-    return FaceSpec(**number)
+    return FaceSpec(**number, star=star)
 
 
 class Gated(nn.Module):
@@ -95,6 +101,7 @@ class Correction(nn.Module):
 
     def __init__(self, inputs: int, hidden: int, places: int) -> None:
         super().__init__()
+        self.dropout = nn.Dropout(0.0)
         self.value = nn.Parameter(torch.randn(inputs, hidden) / inputs**0.5)
         self.gate = nn.Parameter(torch.randn(inputs, hidden) / inputs**0.5)
         self.value_2 = nn.Parameter(torch.randn(hidden, hidden) * 0.5 / hidden**0.5)
@@ -107,7 +114,7 @@ class Correction(nn.Module):
         """``[N, slots, inputs]`` and ``[slots, places]`` to ``[N, slots, 6]``, ``[N, slots]``."""
         u = (x @ self.value) * torch.tanh(x @ self.gate)
         u = u + (u @ self.value_2) * torch.tanh(x @ self.gate_2)
-        u = u * (1.0 + place @ self.place)
+        u = self.dropout(u * (1.0 + place @ self.place))
         return u @ self.out, (u @ self.load).squeeze(2)
 
 
@@ -118,6 +125,7 @@ class FaceNet(nn.Module):
     image: Tensor
     near: Tensor
     ring: Tensor
+    star: Tensor
     corner: Tensor
     hand: Tensor
     place: Tensor
@@ -149,7 +157,7 @@ class FaceNet(nn.Module):
         self.whole = Gated(spec.rank, spec.whole) if spec.whole else None
         self.correction = None
         if spec.hidden:
-            inputs = (COMPONENTS + 1) * (1 + len(layout.ring))
+            inputs = (COMPONENTS + 1) * (1 + len(layout.ring) + len(layout.star))
             self.correction = Correction(inputs, spec.hidden, layout.place.shape[1])
 
     def linear_map(self) -> list[nn.Parameter]:
@@ -186,10 +194,14 @@ class FaceNet(nn.Module):
         return e.reshape(-1, 2 * self.units, COMPONENTS)
 
     def _surroundings(self, e: Tensor, pressure: Tensor) -> Tensor:
-        """A slot's components and pressure, and their means about it, ``[N, slots, 21]``."""
+        """A slot's components and pressure, its neighbours' and their means about it.
+
+        ``[N, slots, 21]``, with the star ``[N, slots, 49]``.
+        """
         local = pressure[:, self.corner].sum(dim=1) * (1.0 / len(self.corner))
         own = torch.cat([e, local.unsqueeze(2)], dim=2)
         parts, around = [own], own * self.hand
+        parts += [around[:, self.star[k]] * self.hand for k in range(len(self.star))]
         for near in range(len(self.ring)):
             around = around[:, self.ring[near]].sum(dim=1) * (1.0 / RING)
             parts.append(around * self.hand)

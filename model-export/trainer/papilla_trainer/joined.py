@@ -14,7 +14,7 @@ STRIDE = 1_000_000
 
 
 class JoinedDataset(Dataset):
-    """Presses of all; scales, rasters and atlas of the first.
+    """Presses of all, the greatest of their scales; rasters and atlas of the first.
 
     Its SHA-256 is that of the datasets' SHA-256s (hexadecimal) one after another.
     """
@@ -29,8 +29,8 @@ class JoinedDataset(Dataset):
         self.directory = first.directory
         self.atlas_hash, self.effects = first.atlas_hash, first.effects
         self.vertex_count = first.vertex_count
-        self.pressure_max_pa = first.pressure_max_pa
-        self.sed_max_j_per_m3 = first.sed_max_j_per_m3
+        self.pressure_max_pa = max(part.pressure_max_pa for part in parts)
+        self.sed_max_j_per_m3 = max(part.sed_max_j_per_m3 for part in parts)
         self.skin, self.interface = first.skin, first.interface
         self.hashes = [part.dataset_sha256 for part in parts]
         if len(set(self.hashes)) < len(parts):

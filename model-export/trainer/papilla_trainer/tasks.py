@@ -82,7 +82,9 @@ def fresh_face_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tenso
     operator = Operator.read(Path(config.operator), atlas)
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(config.seed)
-        network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
+        network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near, spec.star))
+    if network.correction is not None:
+        network.correction.dropout.p = config.dropout
     weights = torch.from_numpy(pixels_of_vertices(dataset))
     start_from_operator(network, atlas, operator, pressure_pa, weights)
     return network

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
 from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
-from papilla_trainer.dataset import Dataset, validation_split
+from papilla_trainer.dataset import Dataset, fewer, validation_split
 from papilla_trainer.errors import RunError, TrainerError
 from papilla_trainer.face_network import FaceNet
 from papilla_trainer.report import write_history
@@ -54,8 +54,7 @@ class Trainer:
         threads = make_deterministic(config.seed, config.threads)
         count = config.validation_count(len(dataset.train_ids))
         fit_ids, validation_ids = validation_split(dataset.train_ids, count, config.seed)
-        # A learning curve takes the first of them: their order says nothing.
-        fit_ids = fit_ids[: config.train_presses]
+        fit_ids = fewer(fit_ids, config.train_presses, config.seed)
         task = make_task(dataset, config, fit_ids, validation_ids, self.device)
         self.network, self.loss = task.network, task.loss
         self.fit_samples, self.validation = task.fit, task.validation

@@ -18,7 +18,7 @@ from papilla_trainer.losses import relative_loss
 from papilla_trainer.sampling import vertex_sampler
 from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
-NAMES = ("face-r8", "face-r8-z6", "face-r8-n12", "face-r8-n12-z4-h6")
+NAMES = ("face-r8", "face-r8-z6", "face-r8-n12", "face-r8-n12-z4-h6", "face-r8-n12-h6s")
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def operator(operator_file: Path, atlas: Atlas) -> Operator:
 def build(name: str, atlas: Atlas, operator: Operator) -> FaceNet:
     spec = parse_face_network(name)
     torch.manual_seed(3)
-    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
+    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near, spec.star))
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.2 * torch.randn_like(parameter)
@@ -58,7 +58,15 @@ def test_names_are_read() -> None:
     for name in (*NAMES, "face-r128-n32-h48"):
         assert parse_face_network(name).name == name
     assert parse_face_network("face-r64-n8-h32") == FaceSpec(rank=64, near=8, hidden=32)
-    for wrong in ("face", "face-r7", "face-r0", "face-r8-n0", "face-r8-x", "face-r8-h4-n2"):
+    for wrong in (
+        "face",
+        "face-r7",
+        "face-r0",
+        "face-r8-n0",
+        "face-r8-x",
+        "face-r8-h4-n2",
+        "face-r8-s",
+    ):
         with pytest.raises(UsageError, match=r"--network|unknown network"):
             parse_face_network(wrong)
 

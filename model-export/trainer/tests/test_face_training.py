@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import onnx
+import onnxruntime
 import pytest
 import torch
 from tiny_dataset import write_tiny_dataset
@@ -149,3 +150,49 @@ def test_two_datasets_are_one(
     found = {entry.key: entry.value for entry in onnx.load(model).metadata_props}
     assert found["papilla.dataset_sha256"] == both.dataset_sha256
     assert json.loads(found["papilla.training"])["datasets"] == both.hashes
+
+
+def test_large_constants_are_stored_small_and_lose_nothing(
+    run_dir: Path, tiny: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = export_run(run_dir, tmp_path / "plain.onnx", "tiny")
+    monkeypatch.setattr("papilla_trainer.export._LARGE", 16)
+    small = export_run(run_dir, tmp_path / "small.onnx", "tiny")
+    stored = [i for i in onnx.load(str(small)).graph.initializer if i.name.endswith(".stored")]
+    kinds = {i.data_type for i in stored}
+    assert kinds == {onnx.TensorProto.FLOAT16, onnx.TensorProto.INT16}
+    assert any("stencil" in i.name for i in stored)
+    assert small.stat().st_size < plain.stat().st_size
+    assert check_model(small, tiny, run_dir, None).failures == []
+    pressure = tiny.load(tiny.test_ids).pressure_pa[0][None, None]
+    answers = [
+        onnxruntime.InferenceSession(str(path)).run(None, {"pressure_pa": pressure})[0]
+        for path in (plain, small)
+    ]
+    assert np.array_equal(*answers)
+
+
+def test_a_learning_curve_grows_and_goes_on(
+    tiny: Dataset, operator_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_tiny_dataset(tmp_path / "other", seed=9)
+    out = tmp_path / "curve"
+    arguments = ["curve", "--json", "--dataset", str(tiny.directory), "--judge"]
+    arguments += [str(tmp_path / "other"), "--network", "face-r8-n12-h4", "--threads", "1"]
+    arguments += ["--operator", str(operator_file), "--epochs", "2", "--out", str(out)]
+    arguments += ["--validation-presses", "1", "--presses", "4", "2"]
+    assert main(arguments) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [(row["presses"], row["epochs"]) for row in rows[::2]] == [(2, 4), (4, 2)]
+    assert {row["judged_on"] for row in rows} == {f"{tiny.directory.name}, held out", "other"}
+    small, large = (set(Checkpoint.load(out / f"presses-{n}").splits["fit"]) for n in (2, 4))
+    assert small < large
+    assert (out / "curve.svg").read_text(encoding="utf-8").count("<path") > 5
+    # A second time nothing is trained, and the figures are the same.
+    before = (out / "presses-4" / "checkpoint.pt").stat().st_mtime_ns
+    assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out)["rows"] == rows
+    assert (out / "presses-4" / "checkpoint.pt").stat().st_mtime_ns == before
+    # What is trained on does not judge.
+    arguments[5] = str(tiny.directory)
+    assert main(arguments) == 2

@@ -7,7 +7,7 @@ mod png;
 use std::fmt::Display;
 
 use bytes::{BufMut, BytesMut};
-use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleType};
+use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType};
 
 pub(crate) use npy::is_npy;
 pub(crate) use png::{encode_mask, is_png};
@@ -133,15 +133,32 @@ pub(crate) fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Resu
     };
     match output {
         Output::Samples(sample_type) => {
-            let at = bytes.len();
-            bytes.resize(at + values.len() * sample_type.bytes(), 0);
-            sample_type.encode(values, scale, &mut bytes[at..]).map_err(|e| failed(&e))?;
+            append(sample_type, values, scale, bytes).map_err(|e| failed(&e))?;
         }
         Output::Npy => npy::encode(values, bytes),
         Output::Png => png::encode(values, scale, bytes.writer()).map_err(|e| failed(&e))?,
         Output::Json => json::encode(map, bytes.writer()).map_err(|e| failed(&e))?,
     }
     Ok(scale)
+}
+
+/// Appends samples to `bytes`; values as they are, where they can be, are copied once.
+///
+/// # Errors
+/// Only faults of our own.
+pub(crate) fn append(
+    sample_type: SampleType,
+    values: &[f32],
+    scale: f32,
+    bytes: &mut BytesMut,
+) -> Result<(), SampleError> {
+    if sample_type == SampleType::F32 && cfg!(target_endian = "little") {
+        bytes.extend_from_slice(bytemuck::cast_slice(values));
+        return Ok(());
+    }
+    let at = bytes.len();
+    bytes.resize(at + values.len() * sample_type.bytes(), 0);
+    sample_type.encode(values, scale, &mut bytes[at..])
 }
 
 /// The refusal of a map that is not 224 x 224.

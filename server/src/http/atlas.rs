@@ -13,19 +13,21 @@ use crate::{codec, problem};
 
 pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Response {
     let asked = headers.get(header::IF_NONE_MATCH);
-    let (hash, body) = (app.catalogue.atlas.hash(), app.catalogue.atlas_json.clone());
-    tagged("application/json", hash, asked, body)
+    let catalogue = app.catalogue();
+    let body = catalogue.atlas_json.clone();
+    tagged("application/json", catalogue.atlas.hash(), asked, body)
 }
 
 pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Response {
     let asked = headers.get(header::IF_NONE_MATCH);
-    let atlas = &app.catalogue.atlas;
+    let catalogue = app.catalogue();
+    let atlas = &catalogue.atlas;
     tagged("model/obj", atlas.hash(), asked, Bytes::from(atlas.to_obj()))
 }
 
 /// White where the patch is: the interface, or with `?patch=skin` the skin.
 pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let catalogue = &app.catalogue;
+    let catalogue = app.catalogue();
     let (patch, raster) = match uri.query() {
         None | Some("" | "patch=interface") => ("interface", &catalogue.interface),
         Some("patch=skin") => ("skin", &catalogue.skin),

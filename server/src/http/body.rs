@@ -8,19 +8,20 @@ use http_body_util::BodyExt;
 use papilla_proto::{ErrorCode, Problem};
 use tokio::time::timeout;
 
-/// Largest body, bytes: a JSON map with every digit of its f64 takes about 1.2 MB.
-pub(super) const BODY_MAX: usize = 2 << 20;
-
-/// So much more is read and thrown away, so that a client that is still sending gets to
-/// read why it is refused.
-const DISCARD_MAX: usize = 8 << 20;
+/// So much more than is taken is read and thrown away, so that a client that is still sending
+/// gets to read why it is refused.
+const DISCARD_MAX: usize = 6 << 20;
 
 /// The whole body.
 ///
 /// # Errors
-/// Larger than [`BODY_MAX`], slower than `patience`, or cut off.
-pub(super) async fn read(body: Body, patience: Duration) -> Result<Bytes, Problem> {
-    match timeout(patience, collect(body)).await {
+/// Larger than `bytes_max`, slower than `patience`, or cut off.
+pub(crate) async fn read(
+    body: Body,
+    bytes_max: usize,
+    patience: Duration,
+) -> Result<Bytes, Problem> {
+    match timeout(patience, collect(body, bytes_max)).await {
         Ok(result) => result,
         Err(_) => {
             let message = format!("the body did not arrive within {patience:?}");
@@ -29,7 +30,7 @@ pub(super) async fn read(body: Body, patience: Duration) -> Result<Bytes, Proble
     }
 }
 
-async fn collect(mut body: Body) -> Result<Bytes, Problem> {
+async fn collect(mut body: Body, bytes_max: usize) -> Result<Bytes, Problem> {
     let mut whole = BytesMut::new();
     let mut length = 0;
     while let Some(frame) = body.frame().await {
@@ -38,17 +39,17 @@ async fn collect(mut body: Body) -> Result<Bytes, Problem> {
         })?;
         let Ok(data) = frame.into_data() else { continue };
         length += data.len();
-        if length <= BODY_MAX {
+        if length <= bytes_max {
             whole.extend_from_slice(&data);
         } else {
             whole = BytesMut::new();
         }
-        if length > DISCARD_MAX {
+        if length > bytes_max + DISCARD_MAX {
             break;
         }
     }
-    if length > BODY_MAX {
-        let message = format!("the body is larger than {BODY_MAX} bytes; a raw map has 200704");
+    if length > bytes_max {
+        let message = format!("the body is larger than {bytes_max} bytes; a raw map has 200704");
         return Err(Problem::new(ErrorCode::TooLarge, message));
     }
     Ok(whole.freeze())

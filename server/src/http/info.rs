@@ -38,9 +38,8 @@ pub(super) async fn openapi() -> Response {
 }
 
 pub(super) async fn tiers(State(app): Shared) -> Response {
-    let catalogue = &app.catalogue;
-    let tiers: Vec<Value> =
-        (0..catalogue.tiers.len()).map(|index| tier(catalogue, index)).collect();
+    let catalogue = app.catalogue();
+    let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     json_answer(&json!({
         "default": catalogue.tiers[catalogue.default].name,
         "judged_on": catalogue.judged_on,
@@ -68,6 +67,7 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
 }
 
 pub(super) async fn models(State(app): Shared) -> Response {
-    let cards: Vec<&Value> = app.catalogue.tiers.iter().map(|tier| &tier.card).collect();
+    let catalogue = app.catalogue();
+    let cards: Vec<&Value> = catalogue.offered().map(|(_, tier)| &tier.card).collect();
     json_answer(&json!({"models": cards}))
 }

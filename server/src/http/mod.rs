@@ -1,19 +1,22 @@
 //! The HTTP surface: one list of routes, from which the router is built.
 
+mod admin;
 mod atlas;
-mod body;
+pub(crate) mod body;
+mod effects;
 mod info;
 mod page;
 mod presses;
-mod sed;
+pub(crate) mod sed;
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::{
     Router,
     body::Body,
     extract::State,
     http::{HeaderValue, Method, Uri, header},
+    middleware::from_fn_with_state,
     response::{IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
@@ -21,9 +24,15 @@ use bytes::Bytes;
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
 
-use crate::{app::App, problem::HttpProblem, session};
+use crate::{
+    app::App,
+    gate,
+    oip::{self, OipProblem},
+    problem::HttpProblem,
+    session,
+};
 
-type Shared = State<Arc<App>>;
+pub(crate) type Shared = State<Arc<App>>;
 type Answer = Result<Response, HttpProblem>;
 
 /// Every route: method, path, handler. The OpenAPI document lists the same, and a test
@@ -39,6 +48,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/openapi.json", get(info::openapi)),
         (g.clone(), "/v1/tiers", get(info::tiers)),
         (g.clone(), "/v1/models", get(info::models)),
+        (g.clone(), "/v1/effects", get(effects::list)),
         (g.clone(), "/v1/atlas", get(atlas::json)),
         (g.clone(), "/v1/atlas.obj", get(atlas::obj)),
         (g.clone(), "/v1/atlas/mask.png", get(atlas::mask)),
@@ -47,8 +57,32 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/v1/presses/{press}/pressure", get(presses::pressure)),
         (g.clone(), "/v1/presses/{press}/sed", get(presses::sed)),
         (Method::POST, "/v1/sed", post(sed::post)),
-        (g, "/v1/session", get(session::open)),
+        (Method::POST, "/v1/admin/reload", post(admin::reload)),
+        (g.clone(), "/v1/session", get(session::open)),
+        (g.clone(), "/v2", get(oip::server)),
+        (g.clone(), "/v2/health/live", get(oip::live)),
+        (g.clone(), "/v2/health/ready", get(oip::ready)),
+        (g.clone(), "/v2/models/{model}", get(oip::model)),
+        (g.clone(), "/v2/models/{model}/ready", get(oip::model_ready)),
+        (Method::POST, "/v2/models/{model}/infer", post(oip::infer)),
+        (g.clone(), "/v2/models/{model}/versions/{version}", get(oip::model)),
+        (g, "/v2/models/{model}/versions/{version}/ready", get(oip::model_ready)),
+        (Method::POST, "/v2/models/{model}/versions/{version}/infer", post(oip::infer)),
     ]
+}
+
+/// The paths of all routes.
+static PATHS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| routes().into_iter().map(|(_, path, _)| path).collect());
+
+/// The route of this path, as the list has it.
+pub(crate) fn known_route(path: &str) -> Option<&'static str> {
+    PATHS.iter().copied().find(|known| *known == path)
+}
+
+/// Whether the path belongs to the Open Inference Protocol, whose errors look otherwise.
+pub(crate) fn is_oip(path: &str) -> bool {
+    path == "/v2" || path.starts_with("/v2/")
 }
 
 /// The method and path of every route, as OpenAPI writes them.
@@ -57,22 +91,42 @@ pub(crate) fn route_list() -> Vec<(String, String)> {
     list.map(|(method, path, _)| (method.as_str().to_ascii_lowercase(), path.to_owned())).collect()
 }
 
-/// The whole router.
-pub(crate) fn router(app: Arc<App>) -> Router {
+/// The whole router. Pages of `origins` may read its answers.
+pub(crate) fn router(app: Arc<App>, origins: &[String]) -> Router {
     let mut router = Router::new();
     for (_, path, handler) in routes() {
         router = router.route(path, handler);
     }
-    router.fallback(not_found).method_not_allowed_fallback(method_not_allowed).with_state(app)
+    let guard = from_fn_with_state(Arc::clone(&app), gate::guard);
+    let router = router
+        .fallback(not_found)
+        .method_not_allowed_fallback(method_not_allowed)
+        .layer(guard)
+        .with_state(app);
+    match gate::cors(origins) {
+        // Outside of the guard: a browser asks without its token whether it may send one.
+        Some(cors) => router.layer(cors),
+        None => router,
+    }
 }
 
-async fn not_found(State(app): Shared, uri: Uri) -> Answer {
-    refuse(&app, Problem::new(ErrorCode::NotFound, format!("there is nothing at {}", uri.path())))
+async fn not_found(State(app): Shared, uri: Uri) -> Response {
+    let message = format!("there is nothing at {}", uri.path());
+    astray(&app, &uri, Problem::new(ErrorCode::NotFound, message))
 }
 
-async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Answer {
+async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Response {
     let message = format!("{} does not take {method}", uri.path());
-    refuse(&app, Problem::new(ErrorCode::MethodNotAllowed, message))
+    astray(&app, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
+}
+
+fn astray(app: &App, uri: &Uri, problem: Problem) -> Response {
+    app.metrics.error(problem.code);
+    if is_oip(uri.path()) {
+        OipProblem(problem).into_response()
+    } else {
+        HttpProblem(problem).into_response()
+    }
 }
 
 /// Counts a refusal and makes it the answer.
@@ -82,14 +136,14 @@ fn refuse(app: &App, problem: Problem) -> Answer {
 }
 
 /// An answer of `content_type`.
-fn answer(content_type: &'static str, body: impl Into<Body>) -> Response {
+pub(crate) fn answer(content_type: &'static str, body: impl Into<Body>) -> Response {
     let mut response = Response::new(body.into());
     response.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static(content_type));
     response
 }
 
 /// An answer of JSON.
-fn json_answer(value: &impl Serialize) -> Response {
+pub(crate) fn json_answer(value: &impl Serialize) -> Response {
     match serde_json::to_vec(value) {
         Ok(bytes) => answer("application/json", bytes),
         Err(error) => HttpProblem(crate::problem::internal("the answer cannot be encoded", &error))

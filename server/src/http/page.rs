@@ -8,10 +8,12 @@ use axum::{
 };
 use bytes::Bytes;
 use papilla_proto::{ErrorCode, Problem};
-use sha2::{Digest, Sha256};
 
 use super::{Answer, Shared, refuse, tagged};
-use crate::{app::App, assets::PAGE};
+use crate::{
+    app::App,
+    assets::{PAGE, sha256_hex},
+};
 
 struct PageFile {
     name: &'static str,
@@ -24,7 +26,7 @@ static FILES: LazyLock<Vec<PageFile>> = LazyLock::new(|| {
     let files = PAGE.iter().map(|&(name, bytes)| PageFile {
         name,
         content_type: content_type(name),
-        etag: Sha256::digest(bytes)[..16].iter().map(|b| format!("{b:02x}")).collect(),
+        etag: sha256_hex(bytes),
         bytes,
     });
     files.collect()

@@ -11,15 +11,15 @@ use serde_json::{Value, json};
 
 use super::{Answer, Shared, answer, json_answer, refuse};
 use crate::{
-    app::App,
     codec::{self, Map, Output, Quantity},
+    models::Catalogue,
     negotiate, problem,
     replay::Press,
 };
 
 pub(super) async fn list(State(app): Shared) -> Response {
-    let presses: Vec<Value> = app
-        .catalogue
+    let catalogue = app.catalogue();
+    let presses: Vec<Value> = catalogue
         .replay
         .presses
         .iter()
@@ -28,15 +28,15 @@ pub(super) async fn list(State(app): Shared) -> Response {
             json!({"id": id, "name": press.name, "pose": press.pose, "depth_mm": press.depth_mm})
         })
         .collect();
-    json_answer(&json!({"atlas_hash": app.catalogue.atlas.hash(), "presses": presses}))
+    json_answer(&json!({"atlas_hash": catalogue.atlas.hash(), "presses": presses}))
 }
 
 /// The press whose number is the third part of the path, `/v1/presses/{press}`.
 ///
 /// Taken from the raw path: axum's own extractor would refuse broken percent-encoding in
 /// words that are not our JSON.
-fn find<'a>(app: &'a App, uri: &Uri) -> Result<&'a Press, Problem> {
-    let presses = &app.catalogue.replay.presses;
+fn find<'a>(catalogue: &'a Catalogue, uri: &Uri) -> Result<&'a Press, Problem> {
+    let presses = &catalogue.replay.presses;
     let press = uri.path().split('/').nth(3).unwrap_or_default();
     let found = press.parse().ok().and_then(|id: usize| presses.get(id));
     found.ok_or_else(|| {
@@ -47,7 +47,7 @@ fn find<'a>(app: &'a App, uri: &Uri) -> Result<&'a Press, Problem> {
 
 /// Vertex values, as the atlas orders them.
 pub(super) async fn one(State(app): Shared, uri: Uri) -> Answer {
-    match find(&app, &uri) {
+    match find(&app.catalogue(), &uri) {
         Ok(press) => Ok(json_answer(press)),
         Err(problem) => refuse(&app, problem),
     }
@@ -55,16 +55,18 @@ pub(super) async fn one(State(app): Shared, uri: Uri) -> Answer {
 
 /// The pressure as a map, ready to be posted.
 pub(super) async fn pressure(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let map = find(&app, &uri).and_then(|press| {
-        rasterised(&app.catalogue.skin, &press.pressure_pa, Quantity::Pressure, &headers)
+    let catalogue = app.catalogue();
+    let map = find(&catalogue, &uri).and_then(|press| {
+        rasterised(&catalogue.skin, &press.pressure_pa, Quantity::Pressure, &headers)
     });
     map.or_else(|problem| refuse(&app, problem))
 }
 
 /// The FE solver's SED as a map.
 pub(super) async fn sed(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let map = find(&app, &uri).and_then(|press| {
-        rasterised(&app.catalogue.interface, &press.sed_j_per_m3, Quantity::Sed, &headers)
+    let catalogue = app.catalogue();
+    let map = find(&catalogue, &uri).and_then(|press| {
+        rasterised(&catalogue.interface, &press.sed_j_per_m3, Quantity::Sed, &headers)
     });
     map.or_else(|problem| refuse(&app, problem))
 }

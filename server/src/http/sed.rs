@@ -11,6 +11,7 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, Uri},
     response::Response,
 };
+use bytes::BytesMut;
 use papilla_proto::{ErrorCode, Problem};
 use tokio::time::timeout;
 
@@ -21,7 +22,7 @@ use crate::{
     metrics::Transport,
     negotiate::{self, Query},
     pool::{Done, Job, Outcome, Slot, Stage, is_past},
-    problem,
+    problem, telemetry,
 };
 
 /// Longest wait for the pool; only a fault of our own can take so long.
@@ -49,44 +50,66 @@ async fn render(
     body: Body,
 ) -> Result<Response, Problem> {
     // The body first: a client that is still sending would not read our answer.
-    let payload = body::read(body, app.timeouts.io).await?;
+    let payload = body::read(body, app.body_max, app.timeouts.io).await?;
     let received = Instant::now();
     let query = Query::parse(uri.query().unwrap_or_default())?;
     let input = negotiate::input(headers, &query, &payload)?;
     let output = negotiate::output(headers)?;
+    let catalogue = app.catalogue();
     let tier = match &query.tier {
-        Some(name) => app.tier_named(name)?,
-        None => app.catalogue.choose(query.budget(), &[]).unwrap_or(app.catalogue.default),
+        Some(name) => catalogue.tier_named(name)?,
+        None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
     };
     let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
-    let job = Job { tier, payload, input, output, header: None, received, deadline };
-    let done = through_pool(app, job).await?;
-    let total = received.elapsed();
+    let job = Job { tier, payload, input, output, frame: None, received, deadline };
+    // Held until the answer is there: it bounds the queue.
+    let _place = app.admit_request()?;
+    let rendered = through_pool(app, job, Transport::Http).await?;
+    let mut response = answer(output.content_type(), rendered.bytes.freeze());
+    label(&mut response, &catalogue.tiers[tier].name, output, rendered.scale, rendered.times);
+    Ok(response)
+}
+
+/// A map that came out of the pool in time.
+pub(crate) struct Rendered {
+    pub(crate) bytes: BytesMut,
+    pub(crate) scale: f32,
+    /// In the queue, in the network, from receipt until now.
+    pub(crate) times: [Duration; 3],
+}
+
+/// Renders one posted map. The caller holds a place, which bounds the queue.
+///
+/// # Errors
+/// It was late, which is counted, or failed.
+pub(crate) async fn through_pool(
+    app: &App,
+    job: Job,
+    transport: Transport,
+) -> Result<Rendered, Problem> {
+    let late = |stage| {
+        app.metrics.late(transport, stage);
+        problem::late()
+    };
+    if job.is_late() {
+        return Err(late(Stage::Admission));
+    }
+    let done = submit(app, job).await?;
     match done.outcome {
         Outcome::Failed(problem) => Err(problem),
-        Outcome::Late(stage) => Err(late(app, stage)),
-        Outcome::Map { .. } if is_past(done.deadline) => Err(late(app, Stage::Sending)),
+        Outcome::Late(stage) => Err(late(stage)),
+        Outcome::Map { .. } if is_past(done.deadline) => Err(late(Stage::Sending)),
         Outcome::Map { bytes, scale } => {
-            app.metrics.tiers[tier].total.observe(total);
-            let mut response = answer(output.content_type(), bytes.freeze());
-            let name = &app.catalogue.tiers[tier].name;
-            label(&mut response, name, output, scale, [done.times.queue, done.times.infer, total]);
-            Ok(response)
+            let total = done.received.elapsed();
+            app.metrics.tier(done.tier).total.observe(total);
+            let times = [done.times.queue, done.times.infer, total];
+            telemetry::rendered(&app.catalogue().tiers[done.tier].name, times);
+            Ok(Rendered { bytes, scale, times })
         }
     }
 }
 
-fn late(app: &App, stage: Stage) -> Problem {
-    app.metrics.late(Transport::Http, stage);
-    problem::late()
-}
-
-async fn through_pool(app: &App, job: Job) -> Result<Done, Problem> {
-    // Held until the answer is there: it bounds the queue.
-    let _place = app.admit_request()?;
-    if job.is_late() {
-        return Err(late(app, Stage::Admission));
-    }
+async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
     let (slot, mut answers) = Slot::new();
     if app.entrance.submit(&Arc::new(slot), job).is_err() {
         return Err(problem::shutting_down());
@@ -101,6 +124,14 @@ async fn through_pool(app: &App, job: Job) -> Result<Done, Problem> {
 /// What a client may want to know beside the map.
 fn label(response: &mut Response, tier: &str, output: Output, scale: f32, times: [Duration; 3]) {
     let headers = response.headers_mut();
+    label_times(headers, tier, times);
+    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
+        headers.insert("x-sed-max-j-per-m3", white);
+    }
+}
+
+/// Tier and times of an answer.
+pub(crate) fn label_times(headers: &mut HeaderMap, tier: &str, times: [Duration; 3]) {
     if let Ok(tier) = HeaderValue::from_str(tier) {
         headers.insert("x-papilla-tier", tier);
     }
@@ -108,8 +139,5 @@ fn label(response: &mut Response, tier: &str, output: Output, scale: f32, times:
     for (name, time) in names.into_iter().zip(times) {
         let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
         headers.insert(HeaderName::from_static(name), HeaderValue::from(us));
-    }
-    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
-        headers.insert("x-sed-max-j-per-m3", white);
     }
 }

@@ -2,29 +2,47 @@
 
 use bytes::BytesMut;
 
-/// Two buffers in turn: one may still be on its way out while the next is filled.
+/// Buffers in turn. Three are enough for answers: one may still be on its way out, one behind it
+/// in the channel, while the next is filled.
 ///
 /// A buffer is handed out by splitting it off; when whoever sent it lets go,
 /// the memory can be claimed again.
-#[derive(Debug, Default)]
-pub(crate) struct Recycler {
-    buffers: [BytesMut; 2],
+#[derive(Debug)]
+pub(crate) struct Recycler<const N: usize = 3> {
+    buffers: [BytesMut; N],
     next: usize,
 }
 
-impl Recycler {
+impl<const N: usize> Default for Recycler<N> {
+    fn default() -> Self {
+        Self { buffers: std::array::from_fn(|_| BytesMut::new()), next: 0 }
+    }
+}
+
+impl<const N: usize> Recycler<N> {
+    /// All buffers with room for `bytes`, so that no claim of as much needs memory later.
+    pub(crate) fn with_room(bytes: usize) -> Self {
+        let buffer = |_| {
+            let mut buffer = BytesMut::with_capacity(bytes);
+            // Splitting makes the count of owners, which takes memory too.
+            drop(buffer.split());
+            buffer
+        };
+        Self { buffers: std::array::from_fn(buffer), next: 0 }
+    }
+
     /// An empty buffer with room for `bytes`; memory is taken from the system only if
-    /// neither buffer of an earlier answer is back and large enough.
+    /// no buffer of an earlier answer is back and large enough.
     pub(crate) fn claim(&mut self, bytes: usize) -> &mut BytesMut {
-        for turn in 0..2 {
-            let index = (self.next + turn) % 2;
+        for turn in 0..N {
+            let index = (self.next + turn) % N;
             if self.buffers[index].try_reclaim(bytes) {
                 self.next = index;
                 break;
             }
         }
         let index = self.next;
-        self.next = (self.next + 1) % 2;
+        self.next = (self.next + 1) % N;
         let buffer = &mut self.buffers[index];
         buffer.clear();
         buffer.reserve(bytes);
@@ -44,17 +62,17 @@ mod tests {
 
     #[test]
     fn memory_comes_back_once_the_answer_is_sent() {
-        let mut recycler = Recycler::default();
+        let mut recycler = Recycler::<3>::default();
         let mut places = std::collections::HashSet::new();
         for _ in 0..20 {
             places.insert(answer(&mut recycler).as_ptr());
         }
-        assert!(places.len() <= 2, "{} places for 20 answers sent in turn", places.len());
+        assert!(places.len() <= 3, "{} places for 20 answers sent in turn", places.len());
     }
 
     #[test]
     fn one_answer_on_its_way_out_costs_no_allocation() {
-        let mut recycler = Recycler::default();
+        let mut recycler = Recycler::<3>::default();
         let mut places = std::collections::HashSet::new();
         let mut sending = answer(&mut recycler);
         for _ in 0..20 {
@@ -63,12 +81,26 @@ mod tests {
             assert_ne!(next.as_ptr(), sending.as_ptr());
             sending = next;
         }
-        assert!(places.len() <= 2, "{} places", places.len());
+        assert!(places.len() <= 3, "{} places", places.len());
+    }
+
+    #[test]
+    fn room_made_beforehand_is_what_is_claimed() {
+        let mut recycler = Recycler::<3>::with_room(1000);
+        let places = recycler.buffers.each_ref().map(|buffer| buffer.as_ptr());
+        let held: Vec<_> = (0..3)
+            .map(|_| {
+                let buffer = recycler.claim(1000);
+                buffer.resize(1000, 7);
+                buffer.split().freeze()
+            })
+            .collect();
+        assert!(held.iter().all(|answer| places.contains(&answer.as_ptr())));
     }
 
     #[test]
     fn answers_that_are_held_stay_as_they_are() {
-        let mut recycler = Recycler::default();
+        let mut recycler = Recycler::<3>::default();
         let held: Vec<_> = (0..5).map(|_| answer(&mut recycler)).collect();
         assert!(held.iter().all(|a| a.len() == 1000 && a.iter().all(|&b| b == 7)));
     }

@@ -1,11 +1,17 @@
 //! One map to render, and what became of it.
 
-use std::time::{Duration, Instant};
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
 
 use bytes::{Bytes, BytesMut};
-use papilla_proto::{FrameHeader, Problem};
+use papilla_proto::{FrameHeader, FrameKind, Problem, Window};
 
-use crate::codec::{Input, Output};
+use crate::{
+    codec::{Input, Output},
+    effects::Effects,
+};
 
 /// One pressure map on its way to a thread.
 #[derive(Debug)]
@@ -18,12 +24,32 @@ pub(crate) struct Job {
     pub(crate) input: Input,
     /// How to encode the answer.
     pub(crate) output: Output,
-    /// The frame's header; None over HTTP.
-    pub(crate) header: Option<FrameHeader>,
+    /// What a session adds; None over HTTP.
+    pub(crate) frame: Option<Frame>,
     /// When the server had read the map.
     pub(crate) received: Instant,
     /// When the answer is worthless.
     pub(crate) deadline: Option<Instant>,
+}
+
+/// What a session adds to a job.
+#[derive(Debug)]
+pub(crate) struct Frame {
+    /// The request's header; its window is where the payload belongs.
+    pub(crate) header: FrameHeader,
+    /// Whether pressure above what the tier was trained on is taken and flagged.
+    pub(crate) takes_more: bool,
+    /// The session's effects. Only the thread that renders the frame locks them, and a session
+    /// has one frame with a thread at a time.
+    pub(crate) effects: Option<Arc<Mutex<Effects>>>,
+}
+
+impl Frame {
+    /// A frame that asks for the bare map.
+    #[cfg(test)]
+    pub(crate) fn of(header: FrameHeader) -> Self {
+        Self { header, takes_more: false, effects: None }
+    }
 }
 
 impl Job {
@@ -80,6 +106,23 @@ pub(crate) enum Outcome {
     Failed(Problem),
 }
 
+/// What the payload of an answer holds.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drawn {
+    /// What the samples show.
+    pub(crate) kind: FrameKind,
+    /// The pixels that are sent.
+    pub(crate) window: Window,
+    /// Bits of [`papilla_proto::flags`].
+    pub(crate) flags: u8,
+}
+
+impl Default for Drawn {
+    fn default() -> Self {
+        Self { kind: FrameKind::Sed, window: Window::WHOLE, flags: 0 }
+    }
+}
+
 /// A finished job.
 #[derive(Debug)]
 pub(crate) struct Done {
@@ -93,6 +136,10 @@ pub(crate) struct Done {
     pub(crate) deadline: Option<Instant>,
     /// Time by stage.
     pub(crate) times: Times,
+    /// What was drawn.
+    pub(crate) drawn: Drawn,
+    /// How it was encoded.
+    pub(crate) output: Output,
     /// What became of it.
     pub(crate) outcome: Outcome,
 }

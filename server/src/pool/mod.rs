@@ -5,6 +5,7 @@
 //! checks, infers, encodes, and hands the [`Done`] back through the slot's channel.
 
 mod buffer;
+mod exchange;
 mod job;
 mod queue;
 mod slot;
@@ -17,10 +18,11 @@ use std::{
 };
 
 pub(crate) use buffer::Recycler;
-pub(crate) use job::{Done, Job, Outcome, Stage, is_past};
+pub(crate) use exchange::Exchange;
+pub(crate) use job::{Done, Drawn, Frame, Job, Outcome, Stage, is_past};
 pub(crate) use slot::Slot;
 
-use self::{queue::Queue, work::Worker};
+use self::{exchange::Inbox, queue::Queue, work::Worker};
 use crate::{StartError, metrics::Metrics, models::Catalogue};
 use job::Times;
 use slot::Offer;
@@ -28,6 +30,7 @@ use slot::Offer;
 /// The threads and the queue before them.
 pub(crate) struct Pool {
     queue: Arc<Queue>,
+    inboxes: Vec<Arc<Inbox>>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -49,9 +52,14 @@ impl Pool {
         places: usize,
     ) -> Result<Self, StartError> {
         let queue = Arc::new(Queue::new(places));
-        let mut pool = Self { queue: Arc::clone(&queue), threads: Vec::with_capacity(threads) };
+        let inboxes: Vec<_> = (0..threads).map(|_| Arc::default()).collect();
+        let mut pool = Self {
+            queue: Arc::clone(&queue),
+            inboxes: inboxes.clone(),
+            threads: Vec::with_capacity(threads),
+        };
         let (report, reports) = std::sync::mpsc::sync_channel(threads);
-        for number in 0..threads {
+        for (number, inbox) in inboxes.into_iter().enumerate() {
             let (catalogue, metrics) = (Arc::clone(catalogue), Arc::clone(metrics));
             let (queue, report) = (Arc::clone(&queue), report.clone());
             let thread = thread::Builder::new()
@@ -61,7 +69,7 @@ impl Pool {
                         let _ = report.send(Ok(()));
                         // The starter counts reports until all senders are gone.
                         drop(report);
-                        worker.run(&queue);
+                        worker.run(&queue, &inbox);
                     }
                     Err(error) => {
                         let _ = report.send(Err(error));
@@ -86,6 +94,11 @@ impl Pool {
         Entrance { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
     }
 
+    /// The way for new models into the threads.
+    pub(crate) fn exchange(&self) -> Exchange {
+        Exchange::new(self.inboxes.clone())
+    }
+
     /// Ends the threads once the queue is empty, and waits for them.
     pub(crate) fn stop(&mut self) {
         self.queue.close();
@@ -107,9 +120,10 @@ impl Entrance {
     /// Puts `job` into `slot` and sees to it that a thread comes for it.
     ///
     /// Returns the job whose place it took, if that had not been started.
-    /// Err gives the job back: the pool is closed or, against the bounds set
-    /// at the start, full.
-    pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, Job> {
+    ///
+    /// # Errors
+    /// The job was not taken: the pool is closed or, against the bounds set at the start, full.
+    pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, NotTaken> {
         match slot.offer(job) {
             Offer::Scheduled { replaced } => Ok(replaced),
             Offer::Schedule => {
@@ -117,12 +131,16 @@ impl Entrance {
                     self.metrics.queue_length.set(self.queue.len());
                     Ok(None)
                 } else {
-                    slot.retract().map_or(Ok(None), Err)
+                    slot.retract().map_or(Ok(None), |_| Err(NotTaken))
                 }
             }
         }
     }
 }
+
+/// The pool took no job.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) struct NotTaken;
 
 /// Longest wait of a thread for work before it looks around; every wait is timed.
 const LOOK_AROUND: Duration = Duration::from_millis(500);

@@ -1,22 +1,24 @@
 //! One inference thread: decode, check, infer, encode.
 
 use std::{
+    mem,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::Arc,
+    sync::{Arc, PoisonError},
     time::{Duration, Instant},
 };
 
 use papilla_engine::Session;
-use papilla_proto::{ErrorCode, HEADER_LEN, MAP_LEN, Problem, check_pressure};
+use papilla_proto::{ErrorCode, MAP_LEN, MapSummary, PressureRange, Problem, flags};
 
 use super::{
-    Done, Job, LOOK_AROUND, Outcome, Stage, Times,
+    Done, Drawn, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
     buffer::Recycler,
+    exchange::Inbox,
     queue::{Next, Queue},
 };
 use crate::{
     StartError,
-    codec::{self, Map, Quantity},
+    codec::{self, Input, Map, Quantity},
     metrics::Metrics,
     models::Catalogue,
     problem,
@@ -61,24 +63,25 @@ impl Worker {
     }
 
     /// Serves the queue until it is closed and empty.
-    pub(super) fn run(&mut self, queue: &Queue) {
+    pub(super) fn run(&mut self, queue: &Queue, inbox: &Inbox) {
         loop {
-            let slot = match queue.pop(LOOK_AROUND) {
+            let next = queue.pop(LOOK_AROUND);
+            // After the wait: a job for a new tier comes only once its session is there.
+            inbox.collect(&mut self.catalogue, &mut self.sessions);
+            let slot = match next {
                 Next::Slot(slot) => slot,
                 Next::Nothing => continue,
                 Next::Closed => return,
             };
             self.metrics.queue_length.set(queue.len());
             let abandoned = slot.is_abandoned();
-            let Some((job, mut recycler)) = slot.take() else { continue };
+            let Some((mut job, mut recycler)) = slot.take() else { continue };
             let done = if abandoned {
                 let gone = Problem::new(ErrorCode::Internal, "the client is gone");
-                finished(&job, Times::default(), Outcome::Failed(gone))
+                finished(&job, Progress::default(), Outcome::Failed(gone))
             } else {
-                self.serve(&job, &mut recycler)
+                self.serve(&mut job, &mut recycler)
             };
-            // The frame's memory goes back to the socket's reader before the answer leaves.
-            drop(job);
             if slot.finish(done, recycler) {
                 queue.push_again(slot);
             }
@@ -86,16 +89,17 @@ impl Worker {
     }
 
     /// Renders one job; a panic below becomes an error of this job alone.
-    fn serve(&mut self, job: &Job, recycler: &mut Recycler) -> Done {
-        let mut times = Times { queue: job.received.elapsed(), ..Times::default() };
+    fn serve(&mut self, job: &mut Job, recycler: &mut Recycler) -> Done {
+        let mut progress = Progress::default();
+        progress.times.queue = job.received.elapsed();
         let outcome = if job.is_late() {
             Outcome::Late(Stage::Dequeue)
         } else {
             let rendered =
-                catch_unwind(AssertUnwindSafe(|| self.render(job, recycler, &mut times)));
+                catch_unwind(AssertUnwindSafe(|| self.render(job, recycler, &mut progress)));
             rendered.unwrap_or_else(|_| self.recover(job.tier))
         };
-        let tier = &self.metrics.tiers[job.tier];
+        let (tier, times) = (self.metrics.tier(job.tier), progress.times);
         tier.queue.observe(times.queue);
         if let Outcome::Map { .. } = outcome {
             tier.decode.observe(times.decode);
@@ -104,7 +108,7 @@ impl Worker {
                 tier.infer.observe(times.infer);
             }
         }
-        finished(job, times, outcome)
+        finished(job, progress, outcome)
     }
 
     /// A fresh session takes the place of one that panicked.
@@ -116,8 +120,13 @@ impl Worker {
         Outcome::Failed(problem::internal("the inference panicked", &tier.name))
     }
 
-    fn render(&mut self, job: &Job, recycler: &mut Recycler, times: &mut Times) -> Outcome {
-        match self.try_render(job, recycler, times) {
+    fn render(
+        &mut self,
+        job: &mut Job,
+        recycler: &mut Recycler,
+        progress: &mut Progress,
+    ) -> Outcome {
+        match self.try_render(job, recycler, progress) {
             Ok(outcome) => outcome,
             Err(problem) => Outcome::Failed(problem),
         }
@@ -125,15 +134,25 @@ impl Worker {
 
     fn try_render(
         &mut self,
-        job: &Job,
+        job: &mut Job,
         recycler: &mut Recycler,
-        times: &mut Times,
+        Progress { times, drawn }: &mut Progress,
     ) -> Result<Outcome, Problem> {
-        let tier = &self.catalogue.tiers[job.tier];
         let start = Instant::now();
-        codec::decode(job.input, &job.payload, &mut self.pressure_pa)?;
-        let summary =
-            check_pressure(&self.pressure_pa, tier.pressure_max_pa).map_err(problem::of_map)?;
+        // The frame's memory goes back to its session before the network is asked.
+        let payload = mem::take(&mut job.payload);
+        let (mut summary, range) = self.decode(job, &payload)?;
+        drop(payload);
+        let tier = &self.catalogue.tiers[job.tier];
+        let time_us = job.frame.as_ref().map_or(0, |frame| frame.header.client_time_us);
+        let effects = job.frame.as_ref().and_then(|frame| frame.effects.as_ref());
+        let mut effects =
+            effects.map(|effects| effects.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(effects) = &mut effects {
+            let peak_pa = effects.before(&mut self.pressure_pa, time_us);
+            summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
+        }
+        drawn.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
@@ -141,6 +160,7 @@ impl Worker {
             // Nothing touches the finger: nothing is felt, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
+            drawn.flags |= flags::NO_CONTACT;
         } else if job.deadline.is_some_and(|deadline| decoded + tier.speed.floor() >= deadline) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
@@ -152,29 +172,69 @@ impl Worker {
         }
 
         let start = Instant::now();
-        let room = job.header.map_or(0, |_| HEADER_LEN);
-        let buffer = recycler.claim(room + job.output.size_hint());
-        buffer.resize(room, 0);
-        let map = Map {
-            quantity: Quantity::Sed,
-            values: &self.sed_j_per_m3,
-            value_max: tier.sed_max_j_per_m3,
-            source: &tier.name,
+        let room = job.frame.as_ref().map_or(0, |frame| frame.header.header_len());
+        let sed_max = tier.sed_max_j_per_m3;
+        let (bytes, scale) = if let Some(effects) = &mut effects {
+            let buffer = recycler.claim(effects.size_hint());
+            buffer.resize(room, 0);
+            let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
+            let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;
+            (drawn.kind, drawn.window) = (written.kind, written.window);
+            (buffer.split(), written.scale)
+        } else {
+            let buffer = recycler.claim(room + job.output.size_hint());
+            buffer.resize(room, 0);
+            let map = Map {
+                quantity: Quantity::Sed,
+                values: &self.sed_j_per_m3,
+                value_max: sed_max,
+                source: &tier.name,
+            };
+            let scale = codec::encode(job.output, map, buffer)?;
+            (buffer.split(), scale)
         };
-        let scale = codec::encode(job.output, map, buffer)?;
-        let bytes = buffer.split();
         times.encode = start.elapsed();
         Ok(Outcome::Map { bytes, scale })
     }
+
+    /// Decodes and checks the pressure.
+    fn decode(
+        &mut self,
+        job: &Job,
+        payload: &[u8],
+    ) -> Result<(MapSummary, PressureRange), Problem> {
+        match (job.input, &job.frame) {
+            (Input::Samples { sample_type, scale }, Some(Frame { header, .. })) => header
+                .window()
+                .decode(sample_type, payload, scale, &mut self.pressure_pa)
+                .map_err(problem::of_samples)?,
+            (input, _) => codec::decode(input, payload, &mut self.pressure_pa)?,
+        }
+        let range = PressureRange {
+            trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
+            takes_more: job.frame.as_ref().is_some_and(|frame| frame.takes_more),
+        };
+        let summary = range.check(&self.pressure_pa).map_err(problem::of_map)?;
+        Ok((summary, range))
+    }
 }
 
-fn finished(job: &Job, times: Times, outcome: Outcome) -> Done {
+/// How far a job has come.
+#[derive(Debug, Default)]
+struct Progress {
+    times: Times,
+    drawn: Drawn,
+}
+
+fn finished(job: &Job, Progress { times, drawn }: Progress, outcome: Outcome) -> Done {
     Done {
         tier: job.tier,
-        header: job.header,
+        header: job.frame.as_ref().map(|frame| frame.header),
         received: job.received,
         deadline: job.deadline,
         times,
+        drawn,
+        output: job.output,
         outcome,
     }
 }

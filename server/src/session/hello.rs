@@ -1,19 +1,25 @@
 //! The terms of a session: hello and ready, at its start and whenever the client asks anew.
 
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::{
+    Arc, Mutex,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use axum::extract::ws::Message;
 use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, MAP_SIDE_PX, PROTOCOL_VERSION, Problem, Ready, SampleType,
-    ServerMessage,
+    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready,
+    RuntimeEffect, SampleType, ServerMessage,
+    effects::{OutOfRange, Section, SectionName},
 };
-use tokio::time::timeout;
+use tokio::{task::spawn_blocking, time::timeout};
 
 use super::{End, Event, Line, close, drained};
 use crate::{
     app::App,
     codec::{Output, scale_of},
-    models::Catalogue,
+    effects::Effects,
+    models::Tier,
+    problem,
 };
 
 /// Refused hellos after which the session ends.
@@ -25,10 +31,22 @@ pub(super) struct Terms {
     pub(super) tier: usize,
     /// Deadline of frames that name none, us.
     pub(super) budget_us: Option<u32>,
-    /// Sample type of frames both ways.
+    /// Version of the frames, both ways.
+    pub(super) version: u32,
+    /// Sample type of the client's frames.
     pub(super) sample_type: SampleType,
+    /// Sample type of the answers.
+    pub(super) answer_sample_type: SampleType,
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
+    /// Whether pressure above what the tier was trained on is taken and flagged.
+    pub(super) takes_more: bool,
+    /// Longest delay on the way of a frame that is not stale, us.
+    pub(super) stale_after_us: Option<u32>,
+    /// What was asked for beside the bare map.
+    pub(super) effects: Option<Arc<Mutex<Effects>>>,
+    /// What the client is told of them.
+    told: Told,
     _seat: Seat,
 }
 
@@ -78,7 +96,7 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
                 return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
             }
         };
-        return Ok(meet(&line.app, &hello).map(|terms| (terms, hello)));
+        return Ok(meet(&line.app, hello).await);
     }
 }
 
@@ -86,51 +104,96 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
 ///
 /// # Errors
 /// The text is no hello, or one that cannot be met; the old terms stand.
-pub(super) fn renew(app: &App, text: &str, number: u64) -> Result<(Terms, Ready), Problem> {
+pub(super) async fn renew(
+    app: &Arc<App>,
+    text: &str,
+    number: u64,
+) -> Result<(Terms, Ready), Problem> {
     let Ok(ClientMessage::Hello(hello)) = serde_json::from_str(text) else {
         let message = "binary frames are due once the session is ready, or a hello for new terms";
         return Err(Problem::new(ErrorCode::UnexpectedText, message));
     };
-    let terms = meet(app, &hello)?;
+    let (terms, _) = meet(app, hello).await?;
     let ready = ready(app, number, &terms);
     Ok((terms, ready))
 }
 
 /// A place in the count of a tier's sessions; given back when it is dropped.
-struct Seat {
-    catalogue: Arc<Catalogue>,
-    tier: usize,
-}
+struct Seat(Arc<AtomicUsize>);
 
 impl Seat {
-    fn take(app: &App, tier: usize) -> Self {
-        app.catalogue.tiers[tier].sessions.fetch_add(1, Ordering::Relaxed);
-        Self { catalogue: Arc::clone(&app.catalogue), tier }
+    fn take(tier: &Tier) -> Self {
+        tier.sessions.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(&tier.sessions))
     }
 }
 
 impl Drop for Seat {
     fn drop(&mut self) {
-        self.catalogue.tiers[self.tier].sessions.fetch_sub(1, Ordering::Relaxed);
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-/// Whether and how the hello can be met.
-fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
-    if hello.version != u32::from(PROTOCOL_VERSION) {
-        let message =
-            format!("version {} is not spoken here, {PROTOCOL_VERSION} is", hello.version);
-        return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
+/// What `ready` says of the effects of a session.
+#[derive(Default)]
+struct Told {
+    names: Vec<RuntimeEffect>,
+    sections: Vec<Section>,
+    /// Greatest value that the map shows.
+    value_max: Option<f32>,
+}
+
+/// Whether and how the hello can be met. Effects may have to place points and take some MiB: that
+/// is not for a thread that moves bytes.
+async fn meet(app: &Arc<App>, hello: Hello) -> Result<(Terms, Hello), Problem> {
+    if hello.version == 1 {
+        return meet_now(app, &hello).map(|terms| (terms, hello));
     }
-    let budget_us = hello.budget_us.filter(|&us| us > 0);
-    let index = match &hello.tier {
-        Some(name) => app.tier_named(name)?,
-        None => app.catalogue.choose(budget_us, &hello.effects).unwrap_or(app.catalogue.default),
+    let shared = Arc::clone(app);
+    let meeting = spawn_blocking(move || meet_now(&shared, &hello).map(|terms| (terms, hello)));
+    match timeout(app.timeouts.io, meeting).await {
+        Ok(Ok(result)) => result,
+        Ok(Err(error)) => Err(problem::internal("the hello cannot be worked out", &error)),
+        Err(error) => Err(problem::internal("the hello takes too long to work out", &error)),
+    }
+}
+
+fn check_version(hello: &Hello) -> Result<(), Problem> {
+    let refuse = |message: String, field: &str| {
+        Err(Problem::new(ErrorCode::UnknownVersion, message).at(field))
     };
-    let tier = &app.catalogue.tiers[index];
-    if let Some(effect) = hello.effects.iter().find(|effect| !tier.effects.contains(effect)) {
+    if !PROTOCOL_VERSIONS.map(u32::from).contains(&hello.version) {
+        let message = format!("version {} is not spoken here, 1 and 2 are", hello.version);
+        return refuse(message, "version");
+    }
+    match hello.member_of_version_2() {
+        Some(member) if hello.version < 2 => {
+            refuse(format!("'{member}' needs version 2 of the protocol"), member)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The effects of the session that a hello names; all others are the tier's.
+fn runtime_effect(name: &str) -> Option<RuntimeEffect> {
+    name.parse().ok()
+}
+
+fn meet_now(app: &App, hello: &Hello) -> Result<Terms, Problem> {
+    check_version(hello)?;
+    let is_of_tier = |name: &&String| hello.version == 1 || runtime_effect(name).is_none();
+    let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
+    let budget_us = hello.budget_us.filter(|&us| us > 0);
+    let catalogue = app.catalogue();
+    let index = match &hello.tier {
+        Some(name) => catalogue.tier_named(name)?,
+        None => catalogue.choose(budget_us, &wanted).unwrap_or(catalogue.default),
+    };
+    let tier = &catalogue.tiers[index];
+    if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
         let rendered = tier.effects.join(", ");
-        let message = format!("tier {} renders {rendered}, but not '{effect}'", tier.name);
+        let hint = runtime_effect(effect).map_or("", |_| "; effects of sessions need version 2");
+        let message = format!("tier {} renders {rendered}, but not '{effect}'{hint}", tier.name);
         return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
     }
     if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != tier.atlas_hash) {
@@ -142,31 +205,66 @@ fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
+    let effects = if hello.version > 1 { Effects::of(hello, &catalogue)? } else { None };
+    let told = effects.as_ref().map_or_else(Told::default, |effects| Told {
+        names: effects.names.clone(),
+        sections: effects.sections.clone(),
+        value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
+    });
     Ok(Terms {
         tier: index,
         budget_us,
+        version: hello.version,
         sample_type: hello.sample_type,
+        answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        _seat: Seat::take(app, index),
+        takes_more: hello.out_of_range == Some(OutOfRange::Flag),
+        stale_after_us: hello.stale_after_us,
+        effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
+        told,
+        _seat: Seat::take(tier),
     })
 }
 
 fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
-    let tier = &app.catalogue.tiers[terms.tier];
-    let meets_budget = app.catalogue.meets(terms.tier, terms.budget_us);
+    let catalogue = app.catalogue();
+    let tier = &catalogue.tiers[terms.tier];
+    let predicted_latency_us = catalogue
+        .predicted_latency_us(terms.tier)
+        .saturating_add(catalogue.runtime.cost_us(&terms.told.names));
+    let is_new = terms.version > 1;
+    let value_max = terms.told.value_max.unwrap_or(tier.sed_max_j_per_m3);
+    let bare_map = || {
+        let output = Output::Samples(terms.answer_sample_type);
+        let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);
+        vec![Section { name: SectionName::Map, offset, bytes }]
+    };
+    let sections = || match &terms.effects {
+        Some(_) => terms.told.sections.clone(),
+        None => bare_map(),
+    };
     Ready {
-        version: u32::from(PROTOCOL_VERSION),
+        version: terms.version,
         session: number,
         tier: tier.name.clone(),
         effects: tier.effects.clone(),
         atlas_hash: tier.atlas_hash.clone(),
-        predicted_latency_us: app.catalogue.predicted_latency_us(terms.tier),
+        predicted_latency_us,
         budget_us: terms.budget_us,
-        meets_budget,
+        meets_budget: terms.budget_us.map(|us| predicted_latency_us <= u64::from(us)),
         width: MAP_SIDE_PX as u32,
         height: MAP_SIDE_PX as u32,
         sample_type: terms.sample_type,
         pressure_max_pa: tier.pressure_max_pa,
-        sed_scale_j_per_m3: scale_of(Output::Samples(terms.sample_type), tier.sed_max_j_per_m3),
+        sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
+        tier_number: is_new.then(|| tier_number(terms.tier)),
+        answer_sample_type: is_new.then_some(terms.answer_sample_type),
+        session_effects: is_new.then(|| terms.told.names.clone()),
+        sections: is_new.then(sections),
     }
+}
+
+/// The number by which answers name a tier.
+pub(super) fn tier_number(tier: usize) -> u16 {
+    u16::try_from(tier).unwrap_or(u16::MAX)
 }

@@ -1,6 +1,7 @@
 //! `GET /v1/session`: a WebSocket on which frames go in and SED maps come out.
 
 mod frames;
+mod fresh;
 mod hello;
 
 use std::{
@@ -10,20 +11,22 @@ use std::{
 
 use axum::{
     extract::{
-        State, WebSocketUpgrade,
+        Extension, State, WebSocketUpgrade,
         ws::{CloseFrame, Message, Utf8Bytes, WebSocket, rejection::WebSocketUpgradeRejection},
     },
     response::Response,
 };
 use bytes::Bytes;
-use papilla_proto::{ErrorCode, Problem, ServerMessage, SessionError};
+use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem, ServerMessage, SessionError};
 use tokio::{
-    sync::{OwnedSemaphorePermit, mpsc, watch},
+    sync::{mpsc, watch},
     time::{Instant as TokioInstant, sleep_until, timeout},
 };
 
+use self::fresh::Freshness;
 use crate::{
-    app::{App, begun},
+    app::{App, SessionPlace, begun},
+    gate::Guest,
     pool::{Done, Recycler, Slot},
     problem::{self, HttpProblem},
 };
@@ -31,6 +34,10 @@ use crate::{
 /// Largest message read, bytes. Five times a frame, so that a frame that is too long is read,
 /// refused and survived; beyond this the connection is closed.
 const MESSAGE_MAX: usize = 1 << 20;
+
+/// Most bytes of one read. The library fills this room with zeros before every read, and loopback
+/// hands over 64 KiB at a time: more is zeroed in vain.
+const READ_MAX: usize = 64 * 1024;
 
 /// RFC 6455 close codes.
 mod close {
@@ -44,6 +51,7 @@ mod close {
 /// Takes the upgrade, or says why not.
 pub(crate) async fn open(
     State(app): State<Arc<App>>,
+    Extension(guest): Extension<Guest>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, HttpProblem> {
     let refuse = |problem: Problem| {
@@ -54,10 +62,11 @@ pub(crate) async fn open(
         let message = format!("a WebSocket handshake is due here: {rejection}");
         refuse(Problem::new(ErrorCode::UpgradeRequired, message))
     })?;
-    let place = app.admit_session().map_err(refuse)?;
+    let place = app.admit_session(&guest).map_err(refuse)?;
     // Taken before the upgrade: from here on the drain waits for this session.
     let drain = app.drain.subscribe();
     Ok(upgrade
+        .read_buffer_size(READ_MAX)
         .max_message_size(MESSAGE_MAX)
         .max_frame_size(MESSAGE_MAX)
         .max_write_buffer_size(MESSAGE_MAX)
@@ -65,12 +74,7 @@ pub(crate) async fn open(
         .on_upgrade(move |socket| run(socket, app, drain, place)))
 }
 
-async fn run(
-    socket: WebSocket,
-    app: Arc<App>,
-    drain: watch::Receiver<bool>,
-    _place: OwnedSemaphorePermit,
-) {
+async fn run(socket: WebSocket, app: Arc<App>, drain: watch::Receiver<bool>, _place: SessionPlace) {
     app.metrics.sessions.inc();
     app.metrics.sessions_open.inc();
     let number = app.session_number();
@@ -93,11 +97,13 @@ async fn converse(line: &mut Line, number: u64) -> End {
     let (slot, answers) = Slot::new();
     let session = frames::Session {
         number,
+        fresh: Freshness::new(terms.stale_after_us),
         terms,
         slot: Arc::new(slot),
         answers,
         outstanding: 0,
-        short_answers: Recycler::default(),
+        short_answers: Recycler::with_room(HEADER_LEN_V2),
+        waiting: Recycler::with_room(4 * MAP_LEN),
     };
     frames::serve(line, session).await
 }

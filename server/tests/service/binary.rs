@@ -56,7 +56,7 @@ fn exit_codes_are_the_documented_ones() {
         (models.path(), vec!["--default-tier", "best"], 3, "quick, slow"),
         (models.path(), vec!["--bind", &taken], 4, "--bind"),
         (models.path(), vec!["--threads", "none"], 2, "--threads"),
-        (models.path(), vec!["--log", "=="], 1, "--log"),
+        (models.path(), vec!["--log", "=="], 2, "log"),
     ] {
         let mut command = program(folder);
         // The later --bind would be a repetition.

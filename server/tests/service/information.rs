@@ -77,7 +77,7 @@ async fn presses_are_listed_shown_and_rasterised() {
     let text = service.get("/v1/presses/0/pressure").header("accept", "application/json");
     assert_eq!(service.post("/v1/sed", text.send().await.body).send().await.status, 200);
     let sed = service.get("/v1/presses/0/sed").header("accept", "image/png").send().await;
-    assert_eq!(sed.header("x-sed-max-j-per-m3"), Some("400"));
+    assert_eq!(sed.header("x-sed-max-j-per-m3"), Some("200"));
     for path in ["/v1/presses/1", "/v1/presses/-1", "/v1/presses/x", "/v1/presses/9/sed"] {
         service.get(path).send().await.assert_refused(404, "not_found");
     }
@@ -100,6 +100,19 @@ async fn metrics_are_what_a_scraper_reads() {
     for bucket in ["0.001", "0.0055", "0.0111", "+Inf"] {
         assert!(text.contains(&format!("le=\"{bucket}\"")), "{bucket}");
     }
+    let model = "papilla_model{tier=\"quick\",";
+    assert!(text.lines().any(|line| line.starts_with(model) && line.ends_with(" 1")), "{text}");
+    let request = "papilla_request_seconds_count{route=\"/v1/sed\",status=\"200\"} 1\n";
+    assert!(text.contains(request), "{text}");
+    for reason in ["sessions", "requests", "token_sessions", "rate"] {
+        assert!(text.contains(&format!("papilla_shed_total{{reason=\"{reason}\"}} 0\n")));
+    }
+    if cfg!(target_os = "linux") {
+        let resident = service.metric("process_resident_memory_bytes").await;
+        assert!(resident > 1e6, "{resident}");
+        assert!(service.metric("process_open_fds").await >= 3.0);
+        assert!(service.metric("process_cpu_seconds_total").await > 0.0);
+    }
     for (count, due) in [("ok", 1), ("late", 0), ("error", 0)] {
         let line = format!("papilla_maps_total{{transport=\"http\",outcome=\"{count}\"}}");
         assert_eq!(service.metric(&line).await as u64, due, "{count}");
@@ -118,9 +131,13 @@ fn operations(document: &Value) -> Vec<(String, String, Value)> {
 }
 
 /// Asserts that the document foresees the answer: its status and its content type.
-fn assert_foreseen(operation: &Value, answer: &Answer, what: &str) {
+fn assert_foreseen(document: &Value, operation: &Value, answer: &Answer, what: &str) {
     let response = &operation["responses"][answer.status.to_string()];
     assert!(response.is_object(), "{what}: status {} is not in the document", answer.status);
+    let response = match response["$ref"].as_str() {
+        Some(place) => document.pointer(place.trim_start_matches('#')).unwrap(),
+        None => response,
+    };
     if let Some(content) = response.get("content") {
         let found = answer.header("content-type").unwrap().split(';').next().unwrap();
         assert!(content.get(found).is_some(), "{what}: {found} is not in the document");
@@ -137,11 +154,16 @@ async fn the_openapi_document_is_the_truth() {
     assert_eq!(documented, papilla_server::routes().into_iter().collect());
 
     for (method, path, operation) in &operations {
-        let address = path.replace("{press}", "0").replace("{file}", "papilla.css");
+        let address = path
+            .replace("{press}", "0")
+            .replace("{file}", "papilla.css")
+            .replace("{model}", "quick")
+            .replace("{version}", "1");
+        let body = if path.starts_with("/v2") { tensor() } else { bytes_of(&ramp()) };
         let what = format!("{method} {path}");
         let request = Request::new(service.address, &method.to_uppercase(), &address);
-        let request = if method == "post" { request.body(bytes_of(&ramp())) } else { request };
-        assert_foreseen(operation, &request.send().await, &what);
+        let request = if method == "post" { request.body(body) } else { request };
+        assert_foreseen(&document, operation, &request.send().await, &what);
         // Each form of answer the document offers is given when it is asked for.
         let content = operation["responses"]["200"]["content"].as_object();
         if operation["responses"].get("406").is_some() {
@@ -160,7 +182,12 @@ async fn the_openapi_document_is_the_truth() {
         }
         // And no other method is.
         let other = Request::new(service.address, "DELETE", &address).send().await;
-        other.assert_refused(405, "method_not_allowed");
+        if path.starts_with("/v2") {
+            assert_eq!(other.header("x-papilla-code"), Some("method_not_allowed"));
+            assert!(other.json()["error"].is_string());
+        } else {
+            other.assert_refused(405, "method_not_allowed");
+        }
     }
     let codes: BTreeSet<_> =
         ErrorCode::ALL.iter().map(|code| json!(code.as_str()).to_string()).collect();
@@ -168,5 +195,11 @@ async fn the_openapi_document_is_the_truth() {
         ["enum"];
     let listed: BTreeSet<_> = listed.as_array().unwrap().iter().map(Value::to_string).collect();
     assert_eq!(listed, codes);
-    service.get("/v2").send().await.assert_refused(404, "not_found");
+}
+
+/// An inference request in JSON.
+fn tensor() -> Vec<u8> {
+    let input = json!({"name": "pressure_pa", "shape": [1, 1, 224, 224], "datatype": "FP32",
+        "data": ramp()});
+    json!({"inputs": [input]}).to_string().into_bytes()
 }

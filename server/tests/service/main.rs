@@ -5,11 +5,20 @@
 
 mod binary;
 mod drain;
+mod effects;
+mod gate;
 mod hostile;
 mod information;
 mod ladder;
+mod oip;
+#[cfg(feature = "otlp")]
+mod otlp;
+mod overload;
 mod page;
+mod process;
+mod reload;
 mod rendering;
 mod session;
 mod start;
 mod support;
+mod tls;

@@ -1,12 +1,14 @@
 //! Load generator of the Papilla service; see `--help`.
 
 use std::{
+    fmt::Display,
     io::{self, Write},
     process::ExitCode,
 };
 
 use clap::Parser;
 use papilla_tests::load::{self, Options};
+use serde::Serialize;
 
 fn main() -> ExitCode {
     let options = Options::parse();
@@ -21,14 +23,26 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> anyhow::Result<u8> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    let report = runtime.block_on(load::run(options))?;
+    match &options.against {
+        Some(against) => {
+            let comparison = runtime.block_on(load::compare(options, against))?;
+            print(options, &comparison, comparison.exit_code())
+        }
+        None => {
+            let report = runtime.block_on(load::run(options))?;
+            print(options, &report, report.exit_code())
+        }
+    }
+}
+
+fn print(options: &Options, result: &(impl Serialize + Display), code: u8) -> anyhow::Result<u8> {
     let mut out = io::stdout().lock();
     if options.json {
-        serde_json::to_writer_pretty(&mut out, &report)?;
+        serde_json::to_writer_pretty(&mut out, result)?;
         writeln!(out)?;
     } else {
-        write!(out, "{report}")?;
+        write!(out, "{result}")?;
     }
     out.flush()?;
-    Ok(report.exit_code())
+    Ok(code)
 }

@@ -5,6 +5,7 @@
 //! (coordinated omission). One thread keeps the beat of all sessions; the delay between
 //! the intended instant and the actual sending is reported beside the rest.
 
+mod compare;
 mod content;
 mod options;
 mod pacer;
@@ -15,15 +16,17 @@ mod verify;
 
 use std::{
     path::PathBuf,
+    sync::Arc,
     thread,
     time::{Duration, Instant},
 };
 
-use papilla_proto::{Hello, SampleError, atlas::AtlasError};
+use papilla_proto::{Hello, Ready, SampleError, atlas::AtlasError};
 use tokio::sync::mpsc;
 
+pub use compare::{Comparison, Ratios, compare};
 pub use content::Content;
-pub use options::Options;
+pub use options::{Arrivals, Options};
 pub use report::{Percentiles, Report, Verification};
 pub use verify::TOLERANCE;
 
@@ -90,64 +93,77 @@ const RUN_UP: Duration = Duration::from_millis(100);
 /// # Errors
 /// [`LoadError`] if it cannot be run at all; what goes wrong on the way is in the report.
 pub async fn run(options: &Options) -> Result<Report, LoadError> {
-    let content = match &options.dataset {
-        Some(folder) => Content::from_dataset(folder, &options.split, options.maps.get())?,
-        None => Content::from_server(&options.server, options.maps.get()).await?,
-    };
-    let encoded = Encoded::new(&content, options.sample_type)?;
-    // The first session learns the tier; all others ask for that one, so that all load the same.
-    let mut hello = Hello {
-        budget_us: options.budget(),
-        tier: options.tier.clone(),
-        sample_type: options.sample_type,
-        atlas_hash: Some(content.atlas_hash.clone()),
-        ..Hello::default()
-    };
-    let (ready, mut probe, _) = socket::open(&options.server, &hello).await?;
-    probe.close().await;
-    hello.tier = Some(ready.tier.clone());
-    let reference = if options.verify {
-        Some(Reference::new(&options.models, &ready.tier, &encoded)?)
-    } else {
-        None
-    };
-    let tally = load(options, &hello, encoded, reference).await?;
-    Ok(Report::new(options, &content, &ready, &tally))
+    let target = Target::new(options).await?;
+    let tally = target.load(options).await?;
+    Ok(Report::new(options, &target.content, &target.ready, &tally))
 }
 
-/// Opens the sessions, lets the load run, and adds up what they saw.
-async fn load(
-    options: &Options,
-    hello: &Hello,
+/// A service and what it is to be loaded with.
+struct Target {
+    content: Content,
     encoded: Encoded,
-    reference: Option<Reference>,
-) -> Result<Tally, LoadError> {
-    let mut open = Vec::new();
-    for _ in 0..options.sessions.get() {
-        let (_, sender, receiver) = socket::open(&options.server, hello).await?;
-        open.push((sender, receiver));
+    hello: Hello,
+    ready: Ready,
+    reference: Option<Arc<Reference>>,
+}
+
+impl Target {
+    async fn new(options: &Options) -> Result<Self, LoadError> {
+        let content = match &options.dataset {
+            Some(folder) => Content::from_dataset(folder, &options.split, options.maps.get())?,
+            None => Content::from_server(&options.server, options.maps.get()).await?,
+        };
+        let encoded = Encoded::new(&content, options.sample_type)?;
+        // The first session learns the tier; all others ask for that one, so that all load the same.
+        let mut hello = Hello {
+            version: options.protocol,
+            budget_us: options.budget(),
+            tier: options.tier.clone(),
+            sample_type: options.sample_type,
+            atlas_hash: Some(content.atlas_hash.clone()),
+            ..Hello::default()
+        };
+        let (ready, mut probe, _) = socket::open(&options.server, &hello).await?;
+        probe.close().await;
+        hello.tier = Some(ready.tier.clone());
+        let reference = if options.verify {
+            Some(Arc::new(Reference::new(&options.models, &ready.tier, &encoded)?))
+        } else {
+            None
+        };
+        Ok(Self { content, encoded, hello, ready, reference })
     }
-    let shared = std::sync::Arc::new(session::Shared {
-        plan: Plan::new(options, Instant::now() + RUN_UP),
-        encoded,
-        reference,
-        deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
-        drain: Duration::from_secs(options.drain_s),
-    });
-    let (mut beats, mut tasks) = (Vec::new(), Vec::new());
-    for (session, (sender, receiver)) in open.into_iter().enumerate() {
-        // Unbounded, but never more than the frames of the plan: the beat must not wait.
-        let (beat, beaten) = mpsc::unbounded_channel();
-        beats.push(beat);
-        let shared = shared.clone();
-        tasks.push(tokio::spawn(session::run(shared, session, sender, receiver, beaten)));
+
+    /// Opens the sessions, lets the load run, and adds up what they saw.
+    async fn load(&self, options: &Options) -> Result<Tally, LoadError> {
+        let mut open = Vec::new();
+        for _ in 0..options.sessions.get() {
+            let (_, sender, receiver) = socket::open(&options.server, &self.hello).await?;
+            open.push((sender, receiver));
+        }
+        let shared = Arc::new(session::Shared {
+            plan: Plan::new(options, Instant::now() + RUN_UP),
+            encoded: self.encoded.clone(),
+            reference: self.reference.clone(),
+            deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
+            version: options.protocol,
+            drain: Duration::from_secs(options.drain_s),
+        });
+        let (mut beats, mut tasks) = (Vec::new(), Vec::new());
+        for (session, (sender, receiver)) in open.into_iter().enumerate() {
+            // Unbounded, but never more than the frames of the plan: the beat must not wait.
+            let (beat, beaten) = mpsc::unbounded_channel();
+            beats.push(beat);
+            let shared = shared.clone();
+            tasks.push(tokio::spawn(session::run(shared, session, sender, receiver, beaten)));
+        }
+        let plan = shared.plan.clone();
+        let pacer = thread::spawn(move || plan.keep(&beats));
+        let mut total = Tally::default();
+        for task in tasks {
+            total.add(&task.await.map_err(|error| LoadError::Task(error.to_string()))?);
+        }
+        pacer.join().map_err(|_| LoadError::Task("the pacer".to_owned()))?;
+        Ok(total)
     }
-    let plan = shared.plan.clone();
-    let pacer = thread::spawn(move || plan.keep(&beats));
-    let mut total = Tally::default();
-    for task in tasks {
-        total.add(&task.await.map_err(|error| LoadError::Task(error.to_string()))?);
-    }
-    pacer.join().map_err(|_| LoadError::Task("the pacer".to_owned()))?;
-    Ok(total)
 }

@@ -5,7 +5,7 @@ use std::{
     path::PathBuf,
 };
 
-use clap::Parser;
+use clap::{Parser, ValueEnum};
 use papilla_proto::SampleType;
 
 const HELP_TAIL: &str = "\
@@ -20,6 +20,9 @@ Examples:
   papilla-load --budget-us 0 --deadline-us 11111
                                                 drop nothing, count what a 90 Hz frame misses
   papilla-load --dataset data/s1 --sample-type u16 --verify
+  papilla-load --arrivals poisson --sessions 16 --rate-hz 60
+                                                frames that do not keep a beat
+  papilla-load --against 127.0.0.1:7225         two services in turn, and how they compare
   papilla-load --allow-miss-percent 1 --json    for a script
 
 Exit codes:
@@ -28,9 +31,21 @@ Exit codes:
   2  wrong usage
   3  more misses than --allow-miss-percent";
 
+/// How frames follow one another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Arrivals {
+    /// One a period, sessions evenly staggered.
+    Steady,
+    /// At random, independently: gaps are exponential with the period as their mean.
+    Poisson,
+    /// Some at once (--burst), as after a hitch, then none for as many periods.
+    Burst,
+}
+
 /// Loads a Papilla service with pressure frames and measures when maps come back.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "papilla-load", version, after_help = HELP_TAIL)]
+#[command(name = "papilla-load", version, after_help = HELP_TAIL, args_override_self = true)]
 pub struct Options {
     /// The service.
     #[arg(
@@ -48,6 +63,31 @@ pub struct Options {
     /// Frames a second and session.
     #[arg(long, default_value = "90", value_name = "HZ", value_parser = positive)]
     pub rate_hz: f64,
+
+    /// How frames follow one another.
+    #[arg(long, value_enum, default_value = "steady", value_name = "HOW")]
+    pub arrivals: Arrivals,
+
+    /// Frames that come at once with --arrivals burst.
+    #[arg(long, default_value = "4", value_name = "N")]
+    pub burst: NonZeroU32,
+
+    /// Seed of --arrivals poisson.
+    #[arg(long, default_value = "0", value_name = "SEED")]
+    pub seed: u64,
+
+    /// A second service, loaded in turn with the first.
+    #[arg(long, value_name = "HOST:PORT")]
+    pub against: Option<String>,
+
+    /// Turns of each with --against; the measured time is shared between them.
+    #[arg(long, default_value = "4", value_name = "N")]
+    pub rounds: NonZeroU32,
+
+    /// Version of the protocol. The first says neither how long a frame waited nor how long the
+    /// network took.
+    #[arg(long, default_value = "2", value_name = "1|2", value_parser = clap::value_parser!(u32).range(1..=2))]
+    pub protocol: u32,
 
     /// Time measured, seconds.
     #[arg(long, default_value = "10", value_name = "S", value_parser = positive)]

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt};
 use papilla_proto::{Ready, SampleType};
 use serde::{Deserialize, Serialize};
 
-use super::{Content, Options, TOLERANCE, tally::Tally, tally::Times};
+use super::{Arrivals, Content, Options, TOLERANCE, tally::Tally, tally::Times};
 
 /// Percentiles of a time, us.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,6 +64,10 @@ pub struct Report {
     pub rate_hz: f64,
     /// Time measured, s.
     pub duration_s: f64,
+    /// How frames followed one another.
+    pub arrivals: Arrivals,
+    /// Version of the protocol.
+    pub protocol: u32,
     /// Samples on the wire.
     pub sample_type: SampleType,
     /// Budget of a frame, us; none: nothing is dropped.
@@ -86,6 +90,8 @@ pub struct Report {
     pub superseded: u64,
     /// Answered: too late.
     pub late: u64,
+    /// Answered: old when it came.
+    pub stale: u64,
     /// Refusals by code.
     pub errors: BTreeMap<String, u64>,
     /// Never answered.
@@ -102,6 +108,16 @@ pub struct Report {
     pub round_trip_us: Option<Percentiles>,
     /// In the server, from receipt to sending, us.
     pub server_us: Option<Percentiles>,
+    /// Of that, waiting for a thread, us; version 2 of the protocol.
+    pub queue_us: Option<Percentiles>,
+    /// Of that, in the network, us; version 2.
+    pub infer_us: Option<Percentiles>,
+    /// From the sending to the map, but for the network, us: what transport and service add;
+    /// version 2.
+    pub overhead_us: Option<Percentiles>,
+    /// Age of the newest map, looked at every millisecond, us: since the instant its frame was
+    /// meant to leave.
+    pub age_us: Option<Percentiles>,
     /// From the intended instant to the sending, us: the generator's own part.
     pub send_delay_us: Option<Percentiles>,
     /// Comparison with the engine's own answers, if asked for.
@@ -125,6 +141,8 @@ impl Report {
             sessions: options.sessions.get(),
             rate_hz: options.rate_hz,
             duration_s: options.duration_s,
+            arrivals: options.arrivals,
+            protocol: options.protocol,
             sample_type: options.sample_type,
             budget_us: options.budget(),
             deadline_us: options.deadline(),
@@ -136,6 +154,7 @@ impl Report {
             ok: t.ok,
             superseded: t.superseded,
             late: t.late,
+            stale: t.stale,
             errors: t.errors.clone(),
             lost: t.lost,
             out_of_order: t.out_of_order,
@@ -144,6 +163,10 @@ impl Report {
             missed_percent: 100.0 * t.missed() as f64 / t.frames.max(1) as f64,
             round_trip_us: Percentiles::new(&t.round_trip),
             server_us: Percentiles::new(&t.server),
+            queue_us: Percentiles::new(&t.queue),
+            infer_us: Percentiles::new(&t.infer),
+            overhead_us: Percentiles::new(&t.overhead),
+            age_us: Percentiles::new(&t.age),
             send_delay_us: Percentiles::new(&t.send_delay),
             verification,
             ended: t.ended.clone(),
@@ -190,8 +213,14 @@ impl fmt::Display for Report {
         let plural = if self.sessions == 1 { "" } else { "s" };
         writeln!(
             f,
-            "{} session{plural} at {} Hz for {} s, {:?} samples, {} maps from {}",
-            self.sessions, self.rate_hz, self.duration_s, self.sample_type, self.maps, self.source
+            "{} session{plural} at {} Hz ({}) for {} s, {:?} samples, {} maps from {}",
+            self.sessions,
+            self.rate_hz,
+            format!("{:?}", self.arrivals).to_lowercase(),
+            self.duration_s,
+            self.sample_type,
+            self.maps,
+            self.source
         )?;
         write!(f, "tier {}, expected {} us", self.tier, self.predicted_latency_us)?;
         writeln!(
@@ -202,8 +231,14 @@ impl fmt::Display for Report {
         let errors: u64 = self.errors.values().sum();
         writeln!(
             f,
-            "{} frames: {} ok, {} superseded, {} late, {errors} refused, {} lost; {} out of order",
-            self.frames, self.ok, self.superseded, self.late, self.lost, self.out_of_order
+            "{} frames: {} ok, {} superseded, {} late, {} stale, {errors} refused, {} lost; {} out of order",
+            self.frames,
+            self.ok,
+            self.superseded,
+            self.late,
+            self.stale,
+            self.lost,
+            self.out_of_order
         )?;
         for (code, count) in &self.errors {
             writeln!(f, "  refused: {count} {code}")?;
@@ -216,6 +251,10 @@ impl fmt::Display for Report {
         for (name, times) in [
             ("round trip", self.round_trip_us),
             ("  of it in the server", self.server_us),
+            ("    waiting", self.queue_us),
+            ("    in the network", self.infer_us),
+            ("trip without network", self.overhead_us),
+            ("age of the newest map", self.age_us),
             ("sent late by", self.send_delay_us),
         ] {
             write!(f, "{name:24}")?;

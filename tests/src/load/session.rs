@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{FrameHeader, FrameStatus};
+use papilla_proto::{FrameHeader, FrameStatus, Window};
 use tokio::{sync::mpsc::UnboundedReceiver, time::timeout_at};
 
 use super::{
@@ -18,9 +18,11 @@ use crate::socket::{Heard, Receiver, Sender, SocketError, frame};
 pub(super) struct Shared {
     pub(super) plan: Plan,
     pub(super) encoded: Encoded,
-    pub(super) reference: Option<Reference>,
+    pub(super) reference: Option<Arc<Reference>>,
     /// How long a map may take to be in time; none: any time will do.
     pub(super) deadline: Option<Duration>,
+    /// Version of the frames.
+    pub(super) version: u32,
     /// How long to wait after the last frame.
     pub(super) drain: Duration,
 }
@@ -56,11 +58,15 @@ async fn send(
 ) -> (Sender, Times) {
     let Shared { plan, encoded, .. } = shared.as_ref();
     let mut delay = Times::default();
-    let start = plan.intended(session, 0);
     while let Some(number) = beat.recv().await {
         let intended = plan.intended(session, number);
-        let time_us = (intended - start).as_micros() as u64;
-        let header = FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
+        // Comes back with the answer: the listener counts from it.
+        let time_us = plan.start.elapsed().as_micros() as u64;
+        let mut header =
+            FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
+        if shared.version > 1 {
+            header = header.windowed(Window::WHOLE);
+        }
         let payload = &encoded.payloads[encoded.index(session, number)];
         let message = frame(&header, payload);
         if number >= plan.warmup {
@@ -82,8 +88,13 @@ struct Ear<'a> {
     answered: Vec<bool>,
     outstanding: u32,
     last_map: Option<u32>,
+    /// Up to when the age of the newest map has been noted.
+    aged_until: Option<Instant>,
     scratch: Vec<f32>,
 }
+
+/// Time between two looks at the age of the newest map.
+const LOOK: Duration = Duration::from_millis(1);
 
 impl<'a> Ear<'a> {
     fn new(shared: &'a Shared, session: usize) -> Self {
@@ -95,6 +106,7 @@ impl<'a> Ear<'a> {
             answered: vec![false; frames as usize],
             outstanding: frames,
             last_map: None,
+            aged_until: None,
             scratch: Vec::new(),
         }
     }
@@ -135,6 +147,7 @@ impl<'a> Ear<'a> {
         let number = header.sequence;
         let counts = self.settle(number);
         if header.status == FrameStatus::Ok {
+            self.age(now, number);
             self.order(number);
             self.verify(header, payload);
         }
@@ -149,7 +162,9 @@ impl<'a> Ear<'a> {
                 self.tally.in_time += u64::from(self.shared.deadline.is_none_or(|d| time <= d));
                 self.tally.round_trip.record(time);
                 self.tally.server.record(Duration::from_micros(header.time_us.into()));
+                self.version_2(now, header);
             }
+            FrameStatus::Stale => self.tally.stale += 1,
             FrameStatus::Superseded => self.tally.superseded += 1,
             FrameStatus::Late => self.tally.late += 1,
             FrameStatus::Error => {
@@ -171,6 +186,33 @@ impl<'a> Ear<'a> {
                 false
             }
         }
+    }
+
+    /// Where the time went, as answers of version 2 tell.
+    fn version_2(&mut self, now: Instant, header: &FrameHeader) {
+        let Some(extension) = header.extension else { return };
+        let infer = Duration::from_micros(extension.infer_us.into());
+        let sent = self.shared.plan.start + Duration::from_micros(header.client_time_us);
+        self.tally.queue.record(Duration::from_micros(extension.queue_us.into()));
+        self.tally.infer.record(infer);
+        let overhead = now.saturating_duration_since(sent).saturating_sub(infer);
+        self.tally.overhead.record(overhead);
+    }
+
+    /// Takes note of how old the newest map was, each millisecond until this one came.
+    fn age(&mut self, now: Instant, number: u32) {
+        let plan = &self.shared.plan;
+        let Some(last) = self.last_map.filter(|&last| last < number) else { return };
+        if number < plan.warmup {
+            return;
+        }
+        let intended = plan.intended(self.session, last);
+        let mut look = self.aged_until.unwrap_or(now);
+        while look < now {
+            self.tally.age.record(look.saturating_duration_since(intended));
+            look += LOOK;
+        }
+        self.aged_until = Some(look);
     }
 
     fn order(&mut self, number: u32) {

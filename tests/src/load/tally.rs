@@ -38,6 +38,7 @@ pub(super) struct Tally {
     pub(super) ok: u64,
     pub(super) superseded: u64,
     pub(super) late: u64,
+    pub(super) stale: u64,
     /// Refusals by code.
     pub(super) errors: BTreeMap<String, u64>,
     /// Frames that nobody answered.
@@ -52,6 +53,14 @@ pub(super) struct Tally {
     pub(super) round_trip: Times,
     /// Time in the server, as it says.
     pub(super) server: Times,
+    /// Of that, waiting for a thread; version 2.
+    pub(super) queue: Times,
+    /// Of that, in the network; version 2.
+    pub(super) infer: Times,
+    /// From the sending to the map, but for the network; version 2.
+    pub(super) overhead: Times,
+    /// Age of the newest map, every millisecond: since the instant its frame was meant to leave.
+    pub(super) age: Times,
     /// From the intended instant to the sending.
     pub(super) send_delay: Times,
     /// Maps compared, those not equal, and the greatest difference.
@@ -69,6 +78,7 @@ impl Tally {
             (&mut self.ok, other.ok),
             (&mut self.superseded, other.superseded),
             (&mut self.late, other.late),
+            (&mut self.stale, other.stale),
             (&mut self.lost, other.lost),
             (&mut self.out_of_order, other.out_of_order),
             (&mut self.unexpected, other.unexpected),
@@ -81,9 +91,17 @@ impl Tally {
         for (code, count) in &other.errors {
             *self.errors.entry(code.clone()).or_default() += count;
         }
-        self.round_trip.add(&other.round_trip);
-        self.server.add(&other.server);
-        self.send_delay.add(&other.send_delay);
+        for (sum, part) in [
+            (&mut self.round_trip, &other.round_trip),
+            (&mut self.server, &other.server),
+            (&mut self.queue, &other.queue),
+            (&mut self.infer, &other.infer),
+            (&mut self.overhead, &other.overhead),
+            (&mut self.age, &other.age),
+            (&mut self.send_delay, &other.send_delay),
+        ] {
+            sum.add(part);
+        }
         self.difference_max = self.difference_max.max(other.difference_max);
         self.ended.extend_from_slice(&other.ended);
     }

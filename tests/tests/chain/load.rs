@@ -46,6 +46,10 @@ async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
         let verification = report.verification.unwrap();
         assert!(verification.maps >= report.ok && verification.wrong == 0, "{report}");
         assert_eq!(report.exit_code(), 0);
+        // An answer of version 2 says where the time went.
+        let (infer, overhead) = (report.infer_us.unwrap(), report.overhead_us.unwrap());
+        assert_eq!((infer.count, overhead.count), (report.ok, report.ok));
+        assert!(infer.max > 0 && overhead.p50 > 0 && overhead.p50 <= times.max, "{report}");
         let again: Report = serde_json::from_str(&serde_json::to_string(&report).unwrap()).unwrap();
         assert_eq!(again.round_trip_us, report.round_trip_us);
     }
@@ -113,4 +117,45 @@ fn exit_codes_are_the_documented_ones() {
     // Port 1 of the loopback: nobody listens there.
     let (code, said) = run(&["--server", "127.0.0.1:1"]);
     assert!(code == Some(1) && said.contains("is the service running"), "{said}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn two_services_are_compared_in_turn() {
+    let (models, slower) = (models(), models());
+    let first = Service::on(models.path()).await;
+    let second = Service::on(slower.path()).await;
+    let options = Options::try_parse_from([
+        "papilla-load",
+        "--server",
+        &first.address,
+        "--rate-hz",
+        "50",
+        "--duration-s",
+        "0.8",
+        "--warmup-s",
+        "0.1",
+        "--drain-s",
+        "60",
+        "--budget-us",
+        "0",
+        "--rounds",
+        "2",
+        "--arrivals",
+        "burst",
+    ])
+    .unwrap();
+    let comparison = load::compare(&options, &second.address).await.unwrap();
+    for report in [&comparison.server, &comparison.against] {
+        assert_eq!(report.faults(), Vec::<String>::new(), "{report}");
+        assert_eq!(report.frames, 40, "two turns of 0.4 s at 50 Hz");
+        assert!(report.superseded > 0, "bursts of four: {report}");
+        assert_eq!(report.ok + report.superseded, 40);
+        let (trip, infer) = (report.round_trip_us.unwrap(), report.infer_us.unwrap());
+        assert!(infer.p50 > 0 && infer.p50 <= trip.max, "{report}");
+        assert!(report.age_us.is_some_and(|age| age.max >= trip.p50), "{report}");
+    }
+    assert_ne!(comparison.server.server, comparison.against.server);
+    let ratio = comparison.ratios.p50.unwrap();
+    assert!(ratio.is_finite() && ratio > 0.0, "{comparison}");
+    assert_eq!(comparison.exit_code(), 0);
 }

@@ -155,6 +155,7 @@ fn card_of(onnx: &[u8]) -> Card {
         dataset_sha256: info.dataset_sha256.clone(),
         training: info.training.clone(),
         metrics: Metrics {
+            dataset_sha256: None,
             split: "none".to_owned(),
             samples: 0,
             relative_l2: worst,

@@ -1,5 +1,6 @@
 //! A service with small models of its own, and clients that can misbehave.
 
+mod binary;
 mod http;
 mod onnx;
 mod socket;
@@ -15,6 +16,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
+pub(crate) use binary::{Running, papilla};
 pub(crate) use http::{Answer, Request, raw_exchange};
 pub(crate) use socket::{Heard, Socket, frame, hello};
 
@@ -32,7 +34,7 @@ pub(crate) const GAIN: f32 = 0.5;
 pub(crate) struct Service {
     pub(crate) server: Server,
     pub(crate) address: SocketAddr,
-    _models: TempDir,
+    pub(crate) models: TempDir,
 }
 
 impl Service {
@@ -60,7 +62,7 @@ impl Service {
         };
         change(&mut config);
         let server = papilla_server::start(&config).await?;
-        Ok(Self { address: server.address(), server, _models: models })
+        Ok(Self { address: server.address(), server, models })
     }
 
     pub(crate) fn get(&self, path: &str) -> Request {
@@ -83,10 +85,15 @@ impl Service {
 
     /// The value of a metric, by its name and labels as they are printed.
     pub(crate) async fn metric(&self, line: &str) -> f64 {
-        let text = self.get("/metrics").send().await.text();
-        let found = text.lines().find_map(|l| l.strip_prefix(line)?.trim().parse().ok());
-        found.unwrap_or_else(|| panic!("no metric {line} in\n{text}"))
+        metric_at(self.address, line).await
     }
+}
+
+/// The same, of any service.
+pub(crate) async fn metric_at(address: SocketAddr, line: &str) -> f64 {
+    let text = Request::new(address, "GET", "/metrics").send().await.text();
+    let found = text.lines().find_map(|l| l.strip_prefix(line)?.trim().parse().ok());
+    found.unwrap_or_else(|| panic!("no metric {line} in\n{text}"))
 }
 
 /// A folder as the service expects it. Dropped, it is deleted.
@@ -99,8 +106,10 @@ pub(crate) fn model_folder() -> TempDir {
     let index = json!({"default": "quick", "models": ["quick", "slow"]});
     write(folder.path(), "index.json", index.to_string().as_bytes());
     let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| 100.0 * i as f32).collect();
+    // What the test models make of it: their golden answer.
+    let sed: Vec<f32> = values.iter().map(|value| GAIN * value).collect();
     let press = json!({"name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5,
-        "pressure_pa": values, "sed_j_per_m3": values});
+        "pressure_pa": values, "sed_j_per_m3": sed});
     write(folder.path(), "replay.json", json!({"presses": [press]}).to_string().as_bytes());
     folder
 }
@@ -122,6 +131,18 @@ pub(crate) fn atlas() -> Atlas {
 
 /// Writes a model and its card.
 pub(crate) fn add_model(folder: &Path, name: &str, atlas_hash: &str, work: usize, error: f64) {
+    add_model_of_gain(folder, name, atlas_hash, work, error, GAIN);
+}
+
+/// The same, with another factor than [`GAIN`].
+pub(crate) fn add_model_of_gain(
+    folder: &Path,
+    name: &str,
+    atlas_hash: &str,
+    work: usize,
+    error: f64,
+    gain: f32,
+) {
     let network = json!({"kind": "test", "base": work}).to_string();
     let metadata = [
         ("papilla.format", "1".to_owned()),
@@ -135,7 +156,7 @@ pub(crate) fn add_model(folder: &Path, name: &str, atlas_hash: &str, work: usize
         ("papilla.training", json!({"seed": 0}).to_string()),
         ("papilla.metrics", json!({}).to_string()),
     ];
-    let onnx = onnx::model(GAIN, work, &metadata);
+    let onnx = onnx::model(gain, work, &metadata);
     let spread = |median: f64| json!({"median": median, "p95": 2.0 * median});
     let card = json!({
         "format": 1, "name": name, "onnx_sha256": hex(&Sha256::digest(&onnx)), "bytes": onnx.len(),

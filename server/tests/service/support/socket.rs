@@ -5,16 +5,20 @@ use std::{net::SocketAddr, time::Duration};
 use futures_util::{SinkExt, StreamExt};
 use papilla_proto::{FrameHeader, HEADER_LEN, SampleType};
 use serde_json::{Value, json};
-use tokio::{net::TcpStream, time::timeout};
+use tokio::{
+    io::{AsyncRead, AsyncWrite},
+    net::TcpStream,
+    time::timeout,
+};
 use tokio_tungstenite::{
     WebSocketStream, client_async,
-    tungstenite::{Error, Message, protocol::CloseFrame},
+    tungstenite::{Error, Message, client::IntoClientRequest, protocol::CloseFrame},
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
-pub(crate) struct Socket {
-    stream: WebSocketStream<TcpStream>,
+pub(crate) struct Socket<S = TcpStream> {
+    stream: WebSocketStream<S>,
 }
 
 /// What the server said.
@@ -28,9 +32,23 @@ pub(crate) enum Heard {
 impl Socket {
     /// Err: the status the server refused the handshake with, and its body.
     pub(crate) async fn connect(address: SocketAddr) -> Result<Self, (u16, Value)> {
+        Self::connect_with(address, "", &[]).await
+    }
+
+    /// The same, with a query and headers.
+    pub(crate) async fn connect_with(
+        address: SocketAddr,
+        query: &str,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, (u16, Value)> {
+        let url = format!("ws://{address}/v1/session{query}");
+        let mut request = url.into_client_request().unwrap();
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().unwrap());
+        }
         let stream = TcpStream::connect(address).await.unwrap();
         stream.set_nodelay(true).unwrap();
-        match client_async(format!("ws://{address}/v1/session"), stream).await {
+        match client_async(request, stream).await {
             Ok((stream, _)) => Ok(Self { stream }),
             Err(Error::Http(answer)) => {
                 let body = answer.body().as_deref().unwrap_or_default();
@@ -38,6 +56,14 @@ impl Socket {
             }
             Err(error) => panic!("{error}"),
         }
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
+    /// Over a stream that is open already, such as one of TLS.
+    pub(crate) async fn over(stream: S) -> Self {
+        let (stream, _) = client_async("ws://localhost/v1/session", stream).await.unwrap();
+        Self { stream }
     }
 
     pub(crate) async fn send(&mut self, message: impl Into<Message>) {

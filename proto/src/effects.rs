@@ -1,0 +1,285 @@
+//! What a session can ask for beside the SED map: the run-time effects and their parameters.
+//!
+//! A hello names its effects; what it does not name is neither computed nor allocated. What an
+//! effect needs to know goes into the hello's member of the same name, whose members all have a
+//! default unless the text says otherwise. All of this needs version 2.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+
+/// An effect of the session, as opposed to one that a model was trained with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RuntimeEffect {
+    /// The answer's map is cut to the pixels in contact and a margin.
+    ContactWindow,
+    /// The answer carries a [`Summary`](crate::Summary).
+    Summary,
+    /// The answer carries values at listed points.
+    Points,
+    /// The answer carries the intensities of a display's actuators.
+    Actuators,
+    /// Map and points carry the firing rate of SA1 afferents, Hz, in place of SED.
+    Afferents,
+    /// The tissue creeps under the pressure.
+    Relaxation,
+}
+
+impl RuntimeEffect {
+    /// All of them, in the order in which they act.
+    pub const ALL: [Self; 6] = [
+        Self::Relaxation,
+        Self::Afferents,
+        Self::ContactWindow,
+        Self::Summary,
+        Self::Points,
+        Self::Actuators,
+    ];
+
+    /// The name in a hello.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::ContactWindow => "contact_window",
+            Self::Summary => "summary",
+            Self::Points => "points",
+            Self::Actuators => "actuators",
+            Self::Afferents => "afferents",
+            Self::Relaxation => "relaxation",
+        }
+    }
+
+    /// What it changes, in a line.
+    #[must_use]
+    pub const fn what(self) -> &'static str {
+        match self {
+            Self::ContactWindow => "cuts the answer's map to the pixels in contact and a margin",
+            Self::Summary => "adds force, contact area, and SED's maximum, centroid and moments",
+            Self::Points => "adds values at listed points of the finger",
+            Self::Actuators => "adds the intensity of every actuator of a display",
+            Self::Afferents => "turns SED into the firing rate of SA1 afferents in map and points",
+            Self::Relaxation => "lets the tissue creep: a Prony filter on pressure before the map",
+        }
+    }
+}
+
+impl fmt::Display for RuntimeEffect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+impl FromStr for RuntimeEffect {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        Self::ALL.into_iter().find(|effect| effect.as_str() == text).ok_or(())
+    }
+}
+
+/// Parameters of [`RuntimeEffect::ContactWindow`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactWindow {
+    /// Width of the margin on each side, pixels.
+    pub margin_px: u16,
+}
+
+impl Default for ContactWindow {
+    /// 24 px: some 3 mm on the shipped atlas, where SED under an edge has fallen to a few percent.
+    fn default() -> Self {
+        Self { margin_px: 24 }
+    }
+}
+
+/// A place on the interface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Place {
+    /// In the map, `[u, v]`: column + 0.5, row + 0.5 at a pixel's centre.
+    Px([f32; 2]),
+    /// On the undeformed finger, `[x, y, z]`: the nearest pixel of the interface is taken.
+    Mm([f32; 3]),
+}
+
+/// One electrode or tactor; a member that is left out is the [`Layout`]'s.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Actuator {
+    /// Where it sits. Due.
+    pub at: Place,
+    /// Radius of its receptive field on the undeformed interface, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f32>,
+    /// Intensity per unit of input above the threshold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f32>,
+    /// Input below which it is silent, J/m3 or Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threshold: Option<f32>,
+}
+
+/// What actuators are driven by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ActuatorInput {
+    /// Strain energy density, J/m3.
+    #[default]
+    Sed,
+    /// Firing rate of SA1 afferents, Hz; needs [`RuntimeEffect::Afferents`].
+    Sa1Rate,
+}
+
+/// A display: parameters of [`RuntimeEffect::Actuators`].
+///
+/// `intensity = min(max, gain (m - threshold)+)`, where `m` is the input's mean over the pixels
+/// within `radius_mm` of the actuator (chord on the undeformed interface) with the weight
+/// `A_i (1 - d_i^2 / radius^2)`; the nearest pixel alone if none is that near.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// The actuators, in the order of the answer. Due.
+    pub actuators: Vec<Actuator>,
+    /// What drives them.
+    #[serde(default)]
+    pub input: ActuatorInput,
+    /// Radius of a receptive field, mm. Due unless every actuator has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f32>,
+    /// Intensity per unit of input above the threshold. Due unless every actuator has its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f32>,
+    /// Input below which an actuator is silent, J/m3 or Hz.
+    #[serde(default)]
+    pub threshold: f32,
+    /// Greatest intensity.
+    #[serde(default = "one")]
+    pub max: f32,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// Parameters of [`RuntimeEffect::Afferents`]: `sigma = sqrt(2 E_ref SED)`,
+/// `rate = k_s (sigma - theta)+ + k_d (d sigma / dt)+`, time by the client's clock.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Afferents {
+    /// Modulus that turns SED into a stress, kPa: that of the dermis.
+    pub e_ref_kpa: f32,
+    /// Stress below which a unit is silent, kPa.
+    pub theta_kpa: f32,
+    /// Static sensitivity, Hz/kPa.
+    pub k_s_hz_per_kpa: f32,
+    /// Dynamic sensitivity, Hz/(kPa/s).
+    pub k_d_hz_s_per_kpa: f32,
+}
+
+impl Default for Afferents {
+    fn default() -> Self {
+        Self { e_ref_kpa: 80.0, theta_kpa: 8.0, k_s_hz_per_kpa: 1.0, k_d_hz_s_per_kpa: 0.2 }
+    }
+}
+
+/// A tissue whose relaxation is known (`docs/physics.md`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tissue {
+    /// Skin, where SED is read.
+    Skin,
+    /// The tissue below it. It takes most of the strain: with its constants the filter follows a
+    /// layered finger best (`docs/physics.md`).
+    #[default]
+    Subcutaneous,
+}
+
+impl Tissue {
+    /// Its Prony series: Chen, Shuai & Zhu, Table 2, second and first set.
+    #[must_use]
+    pub const fn prony(self) -> [PronyTerm; 2] {
+        match self {
+            Self::Skin => {
+                [PronyTerm { g: 0.2566, tau_s: 0.3834 }, PronyTerm { g: 0.2225, tau_s: 4.6731 }]
+            }
+            Self::Subcutaneous => {
+                [PronyTerm { g: 0.0864, tau_s: 0.2136 }, PronyTerm { g: 0.2136, tau_s: 8.854 }]
+            }
+        }
+    }
+}
+
+/// One term of `G(t)/G(0) = 1 - sum g_i (1 - exp(-t / tau_i))`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PronyTerm {
+    /// Share of the modulus that relaxes.
+    pub g: f64,
+    /// Relaxation time, s.
+    pub tau_s: f64,
+}
+
+/// Which moduli the elastic map stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Moduli {
+    /// Those at once: a press that is held goes on sinking in, SED grows.
+    #[default]
+    Instantaneous,
+    /// Those of long holds: a press is stiffer at first.
+    LongTerm,
+}
+
+/// Parameters of [`RuntimeEffect::Relaxation`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Relaxation {
+    /// Whose constants are taken.
+    pub tissue: Tissue,
+    /// Other constants, one to six terms of different times, `sum g < 1`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prony: Option<Vec<PronyTerm>>,
+    /// Which moduli the elastic map stands for.
+    pub moduli: Moduli,
+}
+
+/// What becomes of pressure above what the tier was trained on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutOfRange {
+    /// The frame is refused with the error `out_of_range`.
+    #[default]
+    Refuse,
+    /// It is rendered and its answer flagged, up to ten times that pressure.
+    Flag,
+}
+
+/// One part of the payload of an answer of version 2. Parts begin at multiples of 16, which the
+/// parts before them reach with zeros.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Section {
+    /// What it holds.
+    pub name: SectionName,
+    /// Where it begins in the message, bytes.
+    pub offset: u32,
+    /// Its bytes; of the map, whose window may differ from answer to answer, the most.
+    pub bytes: u32,
+}
+
+/// What a section holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SectionName {
+    /// A [`Summary`](crate::Summary).
+    Summary,
+    /// One f32 a point.
+    Points,
+    /// One f32 an actuator.
+    Actuators,
+    /// The samples of the map; always last.
+    Map,
+}
+
+#[cfg(test)]
+mod tests;

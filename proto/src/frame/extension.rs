@@ -1,0 +1,41 @@
+//! What version 2 adds to a frame's header.
+
+use super::HEADER_LEN_V2;
+
+/// Bits of [`Extension::flags`].
+pub mod flags {
+    /// Some pressure was above what the tier was trained on: the map is an extrapolation.
+    pub const OUT_OF_RANGE: u8 = 1;
+    /// Nothing touches the finger: the map is zero and no network was asked.
+    pub const NO_CONTACT: u8 = 2;
+}
+
+/// What version 2 adds to a header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extension {
+    /// Column of the window's first pixel.
+    pub x: u16,
+    /// Row of the window's first pixel.
+    pub y: u16,
+    /// Answer: us the frame waited for a thread.
+    pub queue_us: u32,
+    /// Answer: us in the network; 0 if it was not asked.
+    pub infer_us: u32,
+    /// Answer: number of the tier, as `ready` gave it.
+    pub tier: u16,
+    /// Answer: bits of [`flags`].
+    pub flags: u8,
+}
+
+impl Extension {
+    pub(super) fn decode(b: &[u8; HEADER_LEN_V2]) -> Self {
+        Self {
+            x: u16::from_le_bytes([b[32], b[33]]),
+            y: u16::from_le_bytes([b[34], b[35]]),
+            queue_us: u32::from_le_bytes([b[36], b[37], b[38], b[39]]),
+            infer_us: u32::from_le_bytes([b[40], b[41], b[42], b[43]]),
+            tier: u16::from_le_bytes([b[44], b[45]]),
+            flags: b[46],
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! `papilla-server check`: is everything in order, without serving anything?
+
+use std::{fmt, net::TcpListener, time::Instant};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::{
+    StartError, assets::Assets, config::Config, gate::Gate, golden, models::Catalogue, speed, tls,
+};
+
+/// Bytes one connection, one session and one posted map can hold at most; see
+/// docs/operating.md.
+const PER_CONNECTION: usize = 128 * 1024 + 2 * 512 * 1024;
+const PER_SESSION: usize = 5 << 20;
+const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
+
+/// What was found, in the order it was looked at.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Whether everything is in order.
+    pub ok: bool,
+    /// One line each.
+    pub findings: Vec<Finding>,
+    #[serde(skip)]
+    exit_code: u8,
+}
+
+/// One thing that was looked at.
+#[derive(Debug, Serialize)]
+pub struct Finding {
+    /// What.
+    pub what: String,
+    /// Whether it is in order.
+    pub ok: bool,
+    /// What was found, in words.
+    pub detail: String,
+    /// The same as values, where there are any.
+    #[serde(skip_serializing_if = "Value::is_null")]
+    pub values: Value,
+}
+
+impl Report {
+    /// 0 if everything is in order, or else that of the first thing that is not.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        self.exit_code
+    }
+
+    fn good(&mut self, what: &str, detail: String, values: Value) {
+        self.findings.push(Finding { what: what.to_owned(), ok: true, detail, values });
+    }
+
+    fn bad(&mut self, what: &str, exit_code: u8, error: &dyn fmt::Display) {
+        let (what, detail) = (what.to_owned(), error.to_string());
+        self.findings.push(Finding { what, ok: false, detail, values: Value::Null });
+        if self.ok {
+            (self.ok, self.exit_code) = (false, exit_code);
+        }
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for finding in &self.findings {
+            let mark = if finding.ok { "ok    " } else { "FAILED" };
+            writeln!(f, "{mark} {:<20} {}", finding.what, finding.detail)?;
+        }
+        let word = if self.ok { "everything is in order" } else { "not in order" };
+        write!(f, "{word}")
+    }
+}
+
+/// Looks at settings, models, atlas, golden answers, calibration and port.
+#[must_use]
+pub fn check(config: &Config) -> Report {
+    let mut report = Report { ok: true, findings: Vec::new(), exit_code: 0 };
+    match config.validate() {
+        Ok(()) => report.good("settings", "they go together".to_owned(), Value::Null),
+        Err(error) => report.bad("settings", 2, &error),
+    }
+    match tls::acceptor(config) {
+        Ok(Some(_)) => report.good("tls", "certificate and key fit".to_owned(), Value::Null),
+        Ok(None) => report.good("tls", "none; plain HTTP".to_owned(), Value::Null),
+        Err(error) => report.bad("tls", 2, &error),
+    }
+    match Gate::new(config) {
+        Ok(gate) => report.good("tokens", gate.describe(), Value::Null),
+        Err(error) => report.bad("tokens", 2, &error),
+    }
+    match load(config) {
+        Ok(catalogue) => look_at_models(&mut report, config, &catalogue),
+        Err(error) => report.bad("models", error.exit_code(), &error),
+    }
+    match TcpListener::bind(config.bind) {
+        Ok(_) => report.good("port", format!("{} can be bound", config.bind), Value::Null),
+        Err(source) => {
+            let address = config.bind;
+            report.bad("port", 4, &StartError::Bind { address, source });
+        }
+    }
+    let bytes = memory_bound(config);
+    let detail = format!("clients can make it hold {} MiB at most, beside the models", bytes >> 20);
+    report.good("memory", detail, json!({"clients_bytes_max": bytes}));
+    report
+}
+
+fn load(config: &Config) -> Result<Catalogue, StartError> {
+    let assets = match &config.models {
+        Some(folder) => Assets::from_folder(folder)
+            .map_err(|source| StartError::Folder { folder: folder.clone(), source })?,
+        None => Assets::embedded(),
+    };
+    Catalogue::load(&assets, config.default_tier.as_deref(), None)
+}
+
+fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
+    let hash = catalogue.atlas.hash();
+    let vertices = catalogue.atlas.vertex_count();
+    report.good("atlas", format!("{vertices} vertices, {hash}"), json!({"hash": hash}));
+    let start = Instant::now();
+    let measured = speed::calibrate(catalogue, config.calibration());
+    if let Err(error) = &measured {
+        report.bad("calibration", error.exit_code(), error);
+    } else if config.calibration().is_zero() {
+        report.good(
+            "calibration",
+            "none asked for; the shipped times stand".to_owned(),
+            Value::Null,
+        );
+    } else {
+        let (overhead, took) = (catalogue.overhead.us(), start.elapsed().as_millis());
+        let detail = format!("took {took} ms; {overhead} us beside the network");
+        report.good("calibration", detail, json!({"overhead_us": overhead}));
+    }
+    for (index, tier) in catalogue.offered() {
+        let what = format!("model {}", tier.name);
+        let golden = match golden::check(catalogue, tier) {
+            Ok(golden) => golden,
+            Err(error) => {
+                report.bad(&what, 3, &error);
+                continue;
+            }
+        };
+        let predicted_us = catalogue.predicted_latency_us(index);
+        let answers = golden.as_ref().map_or_else(
+            || "no golden answers".to_owned(),
+            |golden| {
+                let (error, most) = (golden.relative_l2, golden.relative_l2_max);
+                format!("{} golden answers within {error:.3} of {most:.3}", golden.presses)
+            },
+        );
+        let is_default = index == catalogue.default;
+        let default = if is_default { ", the default" } else { "" };
+        let values = json!({
+            "tier": tier.name,
+            "default": is_default,
+            "onnx_sha256": tier.model.info().onnx_sha256,
+            "atlas_hash": tier.atlas_hash,
+            "golden": golden,
+            "calibrated_us": tier.speed.calibrated_us(),
+            "predicted_latency_us": predicted_us,
+        });
+        report.good(&what, format!("{predicted_us} us, {answers}{default}"), values);
+    }
+}
+
+/// Bytes that clients can make the service hold, by construction.
+fn memory_bound(config: &Config) -> usize {
+    let requests =
+        config.max_requests.get() * (3 * config.max_body_bytes + PER_REQUEST_BEYOND_BODY);
+    config.max_connections.get() * (PER_CONNECTION + config.max_body_bytes)
+        + config.max_sessions.get() * PER_SESSION
+        + requests
+}

@@ -1,0 +1,133 @@
+use std::{ffi::OsString, fs};
+
+use clap::CommandFactory;
+
+use super::*;
+
+fn read(args: &[&str]) -> Result<(Config, String), String> {
+    let args = std::iter::once("papilla-server").chain(args.iter().copied());
+    match Cli::read_and_print(args.map(OsString::from)) {
+        Ok((cli, text)) => Ok((cli.settings, text)),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// A file of settings; dropped, it is deleted.
+fn file(text: &str) -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("papilla.toml");
+    fs::write(&path, text).unwrap();
+    let path = path.to_str().unwrap().to_owned();
+    (folder, path)
+}
+
+#[test]
+fn defaults_and_command_line_agree() {
+    let (parsed, _) = read(&[]).unwrap();
+    let expected = Config { bind: parsed.bind, ..Config::default() };
+    assert_eq!(format!("{parsed:?}"), format!("{expected:?}"));
+    assert_eq!(parsed.bind.to_string(), "127.0.0.1:7224");
+}
+
+#[test]
+fn the_command_line_is_sound() {
+    Cli::command().debug_assert();
+    for bad in [["--threads", "0"], ["--bind", "nowhere"], ["--max-sessions", "many"]] {
+        assert!(read(&bad).unwrap_err().contains(bad[0]), "{bad:?}");
+    }
+    assert!(read(&["--thread", "1"]).is_err());
+}
+
+#[test]
+fn every_setting_has_its_variable() {
+    for arg in file::settings() {
+        let due = format!("PAPILLA_{}", arg.get_id().as_str().to_ascii_uppercase());
+        let found = arg.get_env().and_then(|name| name.to_str());
+        assert_eq!(found, Some(due.as_str()));
+    }
+}
+
+#[test]
+fn the_command_line_wins_over_the_file_and_the_file_over_the_default() {
+    let (_folder, path) = file(
+        "bind = \"127.0.0.1:9\"\nthreads = 3\nmax_sessions = 5\nallow_origin = \
+         [\"https://a.example\", \"https://b.example\"]\njson = true\nwatch_models = false",
+    );
+    let (settings, text) = read(&["--config", &path, "--threads", "2"]).unwrap();
+    assert_eq!(settings.bind.port(), 9);
+    assert_eq!(settings.threads, NonZeroUsize::new(2));
+    assert_eq!(settings.max_sessions.get(), 5);
+    assert_eq!(settings.max_requests.get(), 64);
+    assert_eq!(settings.allow_origin, ["https://a.example", "https://b.example"]);
+    assert!(settings.json && !settings.watch_models);
+    for line in [
+        "threads = 2 # command line",
+        "max_sessions = 5 # file",
+        "max_requests = 64 # default",
+        "# tokens is not set",
+    ] {
+        assert!(text.contains(line), "{line} is not in\n{text}");
+    }
+    // Whether a flag stands before or after the subcommand does not matter.
+    for args in [["--threads", "7", "check"], ["check", "--threads", "7"]] {
+        let args = std::iter::once("papilla-server").chain(args).map(OsString::from);
+        let cli = Cli::read(args).unwrap();
+        assert_eq!(cli.settings.threads, NonZeroUsize::new(7));
+        assert_eq!(cli.command, Some(Command::Check));
+    }
+}
+
+#[test]
+fn what_is_printed_reads_back() {
+    let args = ["--max-body-bytes", "300000", "--allow-origin", "https://a.example", "--json"];
+    let (settings, text) = read(&args).unwrap();
+    let (_folder, path) = file(&text);
+    let (again, _) = read(&["--config", &path]).unwrap();
+    assert_eq!(format!("{settings:?}"), format!("{again:?}"));
+}
+
+#[test]
+fn a_bad_file_is_refused_by_field() {
+    for (text, words) in [
+        ("max_session = 5", ["'max_session'", "max_sessions"]),
+        ("threads = 0", ["threads", "'0'"]),
+        ("threads = -1", ["threads", "'-1'"]),
+        ("threads = [1, 2]", ["threads", "array"]),
+        ("json = \"yes\"", ["json", "true or false"]),
+        ("bind = \"here\"", ["bind", "'here'"]),
+        ("bind = ", ["not TOML", "line 1"]),
+        ("config = \"other.toml\"", ["'config'", "no setting"]),
+        ("[limits]\nthreads = 1", ["'limits'", "no setting"]),
+    ] {
+        let (_folder, path) = file(text);
+        let error = read(&["--config", &path]).unwrap_err();
+        for word in words {
+            assert!(error.contains(word), "{word} is not in: {error}");
+        }
+        // A value that a flag overrides is still looked at.
+        assert!(read(&["--config", &path, "--threads", "4", "--bind", "[::1]:1"]).is_err());
+    }
+    assert!(read(&["--config", "/no/such/file"]).unwrap_err().contains("/no/such/file"));
+}
+
+#[test]
+fn settings_at_odds_are_refused_by_field() {
+    let refused = |change: fn(&mut Config)| {
+        let mut settings = Config::default();
+        settings.validate().unwrap();
+        change(&mut settings);
+        settings.validate().unwrap_err().field
+    };
+    let public = |s: &mut Config| s.bind = SocketAddr::from(([0, 0, 0, 0], 80));
+    assert_eq!(refused(public), "bind");
+    assert_eq!(refused(|s| s.tls_cert = Some("c.pem".into())), "tls_key");
+    assert_eq!(refused(|s| s.tls_key = Some("k.pem".into())), "tls_cert");
+    assert_eq!(refused(|s| s.watch_models = true), "watch_models");
+    assert_eq!(refused(|s| s.max_body_bytes = 1000), "max_body_bytes");
+    for origin in ["lab.example", "https://", "https://a/b", "ftp://a", "*"] {
+        let settings = Config { allow_origin: vec![origin.into()], ..Config::default() };
+        assert_eq!(settings.validate().unwrap_err().field, "allow_origin", "{origin}");
+    }
+    let open = Config { allow_anyone: true, bind: ([0, 0, 0, 0], 80).into(), ..Config::default() };
+    open.validate().unwrap();
+}

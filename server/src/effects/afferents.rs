@@ -1,0 +1,139 @@
+//! `afferents`: the firing rate of slowly adapting type 1 (SA1) units.
+//!
+//! SED is one accepted predictor of SA1 firing, not the only one. It becomes a stress,
+//! `sigma = sqrt(2 E_ref SED)`, and that a rate, `k_s (sigma - theta)+ + k_d (d sigma / dt)+`.
+
+use papilla_proto::{MAP_LEN, Problem, effects::Afferents as Parameters};
+
+use super::unusable;
+
+/// Parameters, and what the last frame left.
+#[derive(Debug)]
+pub(super) struct Afferents {
+    of: Parameters,
+    /// Stress of the last frame, kPa, and its time by the client's clock.
+    sigma_kpa: Vec<f32>,
+    last_us: Option<u64>,
+    rate_hz: Vec<f32>,
+}
+
+impl Afferents {
+    /// # Errors
+    /// A parameter that is no number, or below zero.
+    pub(super) fn new(of: Parameters) -> Result<Self, Problem> {
+        for (name, value, above) in [
+            ("e_ref_kpa", of.e_ref_kpa, true),
+            ("theta_kpa", of.theta_kpa, false),
+            ("k_s_hz_per_kpa", of.k_s_hz_per_kpa, false),
+            ("k_d_hz_s_per_kpa", of.k_d_hz_s_per_kpa, false),
+        ] {
+            if !(value.is_finite() && value >= 0.0 && !(above && value <= 0.0)) {
+                let message = format!("'{name}' is {value}; it has to be finite and above zero");
+                return Err(unusable("afferents", message));
+            }
+        }
+        let [sigma_kpa, rate_hz] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
+        Ok(Self { of, sigma_kpa, last_us: None, rate_hz })
+    }
+
+    /// Stress at this SED, kPa.
+    fn sigma_kpa(&self, sed_j_per_m3: f32) -> f32 {
+        // J/m3 are Pa; kPa x Pa = 1e-3 kPa^2.
+        (2e-3 * self.of.e_ref_kpa * sed_j_per_m3).sqrt()
+    }
+
+    /// The steady rate at the greatest SED that a tier knows, Hz; 1 at least.
+    pub(super) fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
+        let above_kpa = self.sigma_kpa(sed_max_j_per_m3) - self.of.theta_kpa;
+        (self.of.k_s_hz_per_kpa * above_kpa).max(1.0)
+    }
+
+    /// Takes the next map, `time_us` by the client's clock. Where that has not gone on (and in the
+    /// first frame), the rate is the steady one.
+    pub(super) fn step(&mut self, sed_j_per_m3: &[f32], time_us: u64) {
+        let last_us = self.last_us.replace(time_us);
+        let passed_us = last_us.map_or(0, |last_us| time_us.saturating_sub(last_us));
+        let k_d_hz_per_kpa = match passed_us {
+            0 => 0.0,
+            us => self.of.k_d_hz_s_per_kpa / (us as f64 * 1e-6) as f32,
+        };
+        let factor = 2e-3 * self.of.e_ref_kpa;
+        let (theta, k_s) = (self.of.theta_kpa, self.of.k_s_hz_per_kpa);
+        let maps = self.rate_hz.iter_mut().zip(&mut self.sigma_kpa).zip(sed_j_per_m3);
+        for ((rate_hz, sigma_kpa), sed) in maps {
+            let now_kpa = (factor * sed).sqrt();
+            *rate_hz =
+                k_s * (now_kpa - theta).max(0.0) + k_d_hz_per_kpa * (now_kpa - *sigma_kpa).max(0.0);
+            *sigma_kpa = now_kpa;
+        }
+    }
+
+    /// The rates of the last frame, Hz.
+    pub(super) fn rate_hz(&self) -> &[f32] {
+        &self.rate_hz
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The SED, J/m3, whose stress is `kpa` at 80 kPa.
+    fn sed_of(kpa: f32) -> f32 {
+        kpa * kpa / 0.16
+    }
+
+    fn rate(afferents: &mut Afferents, kpa: f32, time_us: u64) -> f32 {
+        afferents.step(&vec![sed_of(kpa); MAP_LEN], time_us);
+        assert_eq!(afferents.rate_hz()[0].to_bits(), afferents.rate_hz()[MAP_LEN - 1].to_bits());
+        afferents.rate_hz()[0]
+    }
+
+    #[test]
+    fn a_held_stress_gives_what_is_above_the_threshold() {
+        let mut afferents = Afferents::new(Parameters::default()).unwrap();
+        for (kpa, due_hz) in [(5.0, 0.0), (8.0, 0.0), (20.0, 12.0), (50.0, 42.0)] {
+            // Twice at the same time: nothing moves.
+            rate(&mut afferents, kpa, 7);
+            let found_hz = rate(&mut afferents, kpa, 7);
+            assert!((found_hz - due_hz).abs() < 1e-3, "{kpa} kPa: {found_hz} Hz");
+        }
+    }
+
+    #[test]
+    fn a_ramp_adds_its_slope_whatever_the_step_and_its_fall_nothing() {
+        for step_ms in [1, 11, 40] {
+            let mut afferents = Afferents::new(Parameters::default()).unwrap();
+            let slope_kpa_per_s = 100.0;
+            for n in 0..5_u64 {
+                let time_us = 1_000_000 + 1000 * step_ms * n;
+                let kpa = 10.0 + slope_kpa_per_s * (step_ms * n) as f32 * 1e-3;
+                let steady_hz = kpa - 8.0;
+                let due_hz = if n == 0 { steady_hz } else { steady_hz + 0.2 * slope_kpa_per_s };
+                let found_hz = rate(&mut afferents, kpa, time_us);
+                assert!((found_hz - due_hz).abs() < 0.02, "{step_ms} ms: {found_hz}, not {due_hz}");
+            }
+            let found_hz = rate(&mut afferents, 9.0, 9_000_000);
+            assert!((found_hz - 1.0).abs() < 1e-3, "{found_hz}");
+        }
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_makes_no_motion() {
+        let mut afferents = Afferents::new(Parameters::default()).unwrap();
+        rate(&mut afferents, 10.0, 500);
+        assert!((rate(&mut afferents, 30.0, 400) - 22.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused() {
+        for of in [
+            Parameters { e_ref_kpa: 0.0, ..Parameters::default() },
+            Parameters { theta_kpa: -1.0, ..Parameters::default() },
+            Parameters { k_s_hz_per_kpa: f32::NAN, ..Parameters::default() },
+            Parameters { k_d_hz_s_per_kpa: f32::INFINITY, ..Parameters::default() },
+        ] {
+            assert!(Afferents::new(of).is_err(), "{of:?}");
+        }
+    }
+}

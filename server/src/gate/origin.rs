@@ -1,0 +1,101 @@
+//! Which pages may use the service.
+//!
+//! A browser sends any page's WebSocket handshakes and simple posts to any address it can reach,
+//! this machine's loopback included; only the `Origin` it adds tells whose page it is.
+
+use std::net::IpAddr;
+
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
+use papilla_proto::{ErrorCode, Problem};
+use tower_http::cors::CorsLayer;
+
+/// Headers of an answer that a page may read.
+const EXPOSED: [&str; 8] = [
+    "x-papilla-tier",
+    "x-papilla-queue-us",
+    "x-papilla-infer-us",
+    "x-papilla-total-us",
+    "x-sed-max-j-per-m3",
+    "x-pressure-max-pa",
+    "inference-header-content-length",
+    "retry-after",
+];
+
+/// Refuses the pages of strangers. Programs other than browsers send no origin.
+///
+/// # Errors
+/// The origin is neither the service's own nor allowed.
+pub(super) fn check(
+    headers: &HeaderMap,
+    allowed: &[String],
+    is_local: bool,
+) -> Result<(), Problem> {
+    let Some(origin) = headers.get(header::ORIGIN) else { return Ok(()) };
+    let origin = origin.to_str().unwrap_or("?");
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    if is_own(origin, host, is_local) || allowed.iter().any(|a| a.eq_ignore_ascii_case(origin)) {
+        return Ok(());
+    }
+    let message = format!("pages of {origin} may not use this service; see --allow-origin");
+    Err(Problem::new(ErrorCode::Forbidden, message).at("origin"))
+}
+
+/// Whether the page came from the address it now asks.
+///
+/// On the loopback a name that is not its own gives away a rebound DNS entry: a stranger's page
+/// whose name now resolves to this machine.
+fn is_own(origin: &str, host: &str, is_local: bool) -> bool {
+    let Some((_, authority)) = origin.split_once("://") else { return false };
+    authority.eq_ignore_ascii_case(host) && (!is_local || is_loopback_name(host))
+}
+
+fn is_loopback_name(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let bare = name.trim_start_matches('[').trim_end_matches(']');
+    name.eq_ignore_ascii_case("localhost")
+        || bare.parse().is_ok_and(|address: IpAddr| address.is_loopback())
+}
+
+/// Lets the pages of `origins` read answers; None without any.
+pub(crate) fn cors(origins: &[String]) -> Option<CorsLayer> {
+    let origins: Vec<_> = origins.iter().filter_map(|o| HeaderValue::from_str(o).ok()).collect();
+    (!origins.is_empty()).then(|| {
+        CorsLayer::new()
+            .allow_origin(origins)
+            .allow_methods([Method::GET, Method::POST])
+            .allow_headers([
+                header::ACCEPT,
+                header::AUTHORIZATION,
+                header::CONTENT_TYPE,
+                HeaderName::from_static("inference-header-content-length"),
+            ])
+            .expose_headers(EXPOSED.map(HeaderName::from_static))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_pages_are_told_from_strangers() {
+        for (origin, host, local, own) in [
+            ("http://127.0.0.1:7224", "127.0.0.1:7224", true, true),
+            ("http://localhost:7224", "localhost:7224", true, true),
+            ("http://[::1]:7224", "[::1]:7224", true, true),
+            ("http://127.0.0.1:80", "127.0.0.1:7224", true, false),
+            ("http://evil.example:7224", "127.0.0.1:7224", true, false),
+            // A name that was rebound to the loopback.
+            ("http://evil.example:7224", "evil.example:7224", true, false),
+            ("https://lab.example", "lab.example", false, true),
+            ("https://evil.example", "lab.example", false, false),
+            ("null", "127.0.0.1:7224", true, false),
+            ("", "", false, false),
+        ] {
+            assert_eq!(is_own(origin, host, local), own, "{origin} at {host}");
+        }
+    }
+}

@@ -1,0 +1,115 @@
+use axum::http::HeaderValue;
+use proptest::prelude::*;
+use serde_json::json;
+
+use super::*;
+
+fn input(members: &Value) -> Value {
+    let mut input = json!({"name": "pressure_pa", "shape": SHAPE, "datatype": "FP32"});
+    for (name, value) in members.as_object().unwrap() {
+        input[name] = value.clone();
+    }
+    json!({"inputs": [input]})
+}
+
+fn read_json(request: &Value) -> Result<(Wish, Bytes), (ErrorCode, Option<String>)> {
+    read(&Bytes::from(request.to_string()), None).map_err(|p| (p.code, p.field))
+}
+
+#[test]
+fn flat_and_nested_numbers_are_the_same_map() {
+    let flat: Vec<usize> = (0..MAP_LEN).collect();
+    let rows: Vec<_> = flat.chunks(224).map(<[usize]>::to_vec).collect();
+    let (wish, a) = read_json(&input(&json!({"data": flat}))).unwrap();
+    let (_, b) = read_json(&input(&json!({"data": [[rows]]}))).unwrap();
+    assert_eq!(wish, Wish { id: None, is_binary_wanted: false, timeout_us: None });
+    assert!(a == b && a.len() == MAP_LEN * 4);
+    assert_eq!(&a[4 * 300..4 * 301], 300.0_f32.to_le_bytes());
+}
+
+#[test]
+fn wishes() {
+    let data = vec![0; MAP_LEN];
+    let mut request = input(&json!({"data": data}));
+    request["id"] = json!("seven");
+    request["parameters"] = json!({"binary_data_output": true, "timeout": 900});
+    let (wish, _) = read_json(&request).unwrap();
+    assert_eq!(
+        wish,
+        Wish { id: Some("seven".into()), is_binary_wanted: true, timeout_us: Some(900) }
+    );
+    let output = json!({"name": "sed_j_per_m3", "parameters": {"binary_data": false}});
+    request["outputs"] = json!([output]);
+    assert!(!read_json(&request).unwrap().0.is_binary_wanted);
+}
+
+#[test]
+fn what_the_model_does_not_take_is_refused_by_field() {
+    let data = vec![0; MAP_LEN];
+    for (members, code, field) in [
+        (json!({"data": [1]}), ErrorCode::WrongLength, "data"),
+        (json!({"data": vec![0; MAP_LEN + 1]}), ErrorCode::WrongLength, "data"),
+        (json!({"data": data, "name": "x"}), ErrorCode::BadQuery, "inputs"),
+        (json!({"data": data, "datatype": "FP16"}), ErrorCode::WrongType, "datatype"),
+        (json!({"data": data, "shape": [224, 224]}), ErrorCode::WrongShape, "shape"),
+        (json!({}), ErrorCode::WrongType, "inputs"),
+        (
+            json!({"parameters": {"binary_data_size": 200_704}}),
+            ErrorCode::WrongLength,
+            "binary_data_size",
+        ),
+        (
+            json!({"parameters": {"shared_memory_region": "r"}}),
+            ErrorCode::WrongType,
+            "shared_memory_region",
+        ),
+    ] {
+        let error = read_json(&input(&members)).unwrap_err();
+        assert_eq!(error, (code, Some(field.to_owned())));
+    }
+    let with = |name: &str, value: Value| {
+        let mut request = input(&json!({"data": data}));
+        request[name] = value;
+        read_json(&request).unwrap_err()
+    };
+    let output = |members: Value| with("outputs", json!([members]));
+    assert_eq!(output(json!({"name": "x"})).0, ErrorCode::BadQuery);
+    let classes = json!({"name": "sed_j_per_m3", "parameters": {"classification": 3}});
+    assert_eq!(output(classes).0, ErrorCode::WrongType);
+    assert_eq!(with("inputs", json!([])).0, ErrorCode::WrongShape);
+    assert_eq!(with("parameters", json!({"timeout": -1})).1.as_deref(), Some("timeout"));
+    for bad in ["", "{", "[]", "{\"inputs\": 1}", "{\"inputs\": [{\"data\": [\"a\"]}]}"] {
+        let error = read(&Bytes::from(bad), None).unwrap_err();
+        assert_eq!(error.code, ErrorCode::BadJson, "{bad}");
+    }
+}
+
+#[test]
+fn bytes_behind_the_json_are_the_map() {
+    let head = input(&json!({"parameters": {"binary_data_size": MAP_LEN * 4}})).to_string();
+    let mut body = head.clone().into_bytes();
+    body.resize(head.len() + MAP_LEN * 4, 7);
+    let mut headers = HeaderMap::new();
+    assert_eq!(head_len(&headers, body.len()).unwrap(), None);
+    headers.insert(HEAD_LEN, HeaderValue::from(head.len()));
+    let length = head_len(&headers, body.len()).unwrap();
+    assert_eq!(length, Some(head.len()));
+    let (_, map) = read(&Bytes::from(body.clone()), length).unwrap();
+    assert!(map.len() == MAP_LEN * 4 && map.iter().all(|&byte| byte == 7));
+    body.pop();
+    let error = read(&Bytes::from(body), length).unwrap_err();
+    assert_eq!(error.code, ErrorCode::WrongLength);
+    for bad in ["-1", "x", "99"] {
+        headers.insert(HEAD_LEN, HeaderValue::from_static(bad));
+        assert_eq!(head_len(&headers, 98).unwrap_err().code, ErrorCode::WrongLength, "{bad}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_body_panics(text in "[\\[\\]{}\",:a-z0-9 .-]{0,200}", length in 0_usize..300) {
+        let body = Bytes::from(text);
+        let length = (length <= body.len()).then_some(length);
+        prop_assert!(read(&body, length).is_err());
+    }
+}

@@ -1,0 +1,274 @@
+//! A frame costs no allocation once a session is warm: counted by the allocator itself.
+//!
+//! A test binary of its own, since an allocator serves a whole process. The client is a plain
+//! socket on the test's thread, which is not counted; all other threads are the service's.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+// An allocator is unsafe by its nature; this one hands everything to the system's.
+#![allow(unsafe_code)]
+
+#[allow(dead_code, unused_imports)]
+#[path = "../service/support/mod.rs"]
+mod support;
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    cell::Cell,
+    fs,
+    io::{Read, Write},
+    net::TcpStream,
+    sync::atomic::{AtomicBool, AtomicU64, Ordering},
+};
+
+use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, SampleType, Window};
+use serde_json::{Value, json};
+use support::{GAIN, Service, bytes_of, model_folder, ramp};
+
+struct Counting;
+
+static COUNTS: AtomicBool = AtomicBool::new(false);
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+thread_local! {
+    /// Whether what this thread allocates is left out.
+    static LEFT_OUT: Cell<bool> = const { Cell::new(false) };
+}
+
+fn count() {
+    let left_out = LEFT_OUT.try_with(Cell::get).unwrap_or(true);
+    if COUNTS.load(Ordering::Relaxed) && !left_out {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+// SAFETY: every method hands its arguments on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promised.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promised.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promised.
+        unsafe { System.realloc(place, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promised.
+        unsafe { System.dealloc(place, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations while `work` runs, on all threads but those left out.
+fn allocations(work: impl FnOnce()) -> u64 {
+    ALLOCATIONS.store(0, Ordering::SeqCst);
+    COUNTS.store(true, Ordering::SeqCst);
+    work();
+    COUNTS.store(false, Ordering::SeqCst);
+    ALLOCATIONS.load(Ordering::SeqCst)
+}
+
+/// A WebSocket client that sends messages made beforehand and reads into one buffer.
+struct Client {
+    stream: TcpStream,
+    buffer: Vec<u8>,
+}
+
+impl Client {
+    fn connect(service: &Service, hello: &Value) -> Self {
+        let mut stream = TcpStream::connect(service.address).unwrap();
+        stream.set_nodelay(true).unwrap();
+        let handshake = "GET /v1/session HTTP/1.1\r\nhost: test\r\nconnection: upgrade\r\n\
+                         upgrade: websocket\r\nsec-websocket-version: 13\r\n\
+                         sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
+        stream.write_all(handshake.as_bytes()).unwrap();
+        let mut head = Vec::new();
+        while !head.ends_with(b"\r\n\r\n") {
+            let mut byte = [0];
+            stream.read_exact(&mut byte).unwrap();
+            head.extend(byte);
+        }
+        assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
+        let mut client = Self { stream, buffer: vec![0; 1 << 20] };
+        client.send(&masked(0x81, hello.to_string().as_bytes()));
+        let ready: Value = serde_json::from_slice(client.hear()).unwrap();
+        assert_eq!(ready["type"], "ready", "{ready}");
+        client
+    }
+
+    fn send(&mut self, message: &[u8]) {
+        self.stream.write_all(message).unwrap();
+    }
+
+    /// The payload of the next message.
+    fn hear(&mut self) -> &[u8] {
+        let mut head = [0; 2];
+        self.stream.read_exact(&mut head).unwrap();
+        let len = match head[1] {
+            126 => self.number::<2>(),
+            127 => self.number::<8>(),
+            short => usize::from(short),
+        };
+        self.stream.read_exact(&mut self.buffer[..len]).unwrap();
+        &self.buffer[..len]
+    }
+
+    fn number<const BYTES: usize>(&mut self) -> usize {
+        let mut bytes = [0; BYTES];
+        self.stream.read_exact(&mut bytes).unwrap();
+        bytes.iter().fold(0, |number, &byte| number << 8 | usize::from(byte))
+    }
+
+    /// Sends each message `rounds` times in turn and waits for its answer.
+    fn exchange(&mut self, messages: &[Vec<u8>], rounds: usize) {
+        for _ in 0..rounds {
+            for message in messages {
+                self.send(message);
+                let header = FrameHeader::decode(self.hear()).unwrap();
+                assert_eq!(header.status, FrameStatus::Ok, "{header:?}");
+            }
+        }
+    }
+}
+
+/// A client's WebSocket message with a mask of its own.
+fn masked(opcode: u8, payload: &[u8]) -> Vec<u8> {
+    let mask = [0x12, 0x34, 0x56, 0x78];
+    let mut message = vec![opcode];
+    match payload.len() {
+        len @ 0..126 => message.push(0x80 | len as u8),
+        len @ 126..65_536 => {
+            message.push(0x80 | 126);
+            message.extend((len as u16).to_be_bytes());
+        }
+        len => {
+            message.push(0x80 | 127);
+            message.extend((len as u64).to_be_bytes());
+        }
+    }
+    message.extend(mask);
+    message.extend(payload.iter().zip(mask.iter().cycle()).map(|(byte, mask)| byte ^ mask));
+    message
+}
+
+/// A frame of version 1 as a WebSocket message.
+fn whole(map: &[f32]) -> Vec<u8> {
+    let header = FrameHeader::pressure(1, 0, 0, SampleType::F32, 1.0);
+    masked(0x82, &[&header.encode()[..], &bytes_of(map)].concat())
+}
+
+/// A frame of version 2; every one of a list has a sequence of its own.
+fn windowed(sequence: u32, window: Window, map: &[f32]) -> Vec<u8> {
+    let time_us = 11_111 * u64::from(sequence);
+    let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0).windowed(window);
+    let mut frame = header.encode().to_vec();
+    frame.resize(HEADER_LEN_V2 + 4 * window.pixel_count(), 0);
+    window.encode(SampleType::F32, map, 1.0, &mut frame[HEADER_LEN_V2..]).unwrap();
+    masked(0x82, &frame)
+}
+
+/// What the engine itself allocates for a map: that is its own affair.
+fn engines_own() -> u64 {
+    let models = model_folder();
+    let onnx = fs::read(models.path().join("quick.onnx")).unwrap();
+    let mut session = papilla_engine::load(&onnx, None).unwrap().session().unwrap();
+    let (map, mut sed) = (ramp(), vec![0.0; MAP_LEN]);
+    let mut run = |maps| (0..maps).for_each(|_| session.infer(&map, &mut sed).unwrap());
+    run(8);
+    LEFT_OUT.set(false);
+    let counts = [1, 100].map(|maps| allocations(|| run(maps)));
+    LEFT_OUT.set(true);
+    assert!((sed[MAP_LEN - 1] - GAIN * map[MAP_LEN - 1]).abs() < 1e-2);
+    assert_eq!(counts[1], 100 * counts[0], "the engine allocates the same for every map");
+    // What would see nothing could not fail.
+    assert!(counts[0] > 0, "nothing is counted");
+    counts[0]
+}
+
+/// Frames until everything has its place, and frames counted.
+const WARM_UP: usize = 100;
+const FRAMES: usize = 400;
+
+fn plain_hello() -> Value {
+    json!({"type": "hello", "version": 1, "tier": "quick"})
+}
+
+#[test]
+fn a_warm_session_allocates_nothing_for_a_frame() {
+    LEFT_OUT.set(true);
+    let runtime =
+        tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+    let service = runtime.block_on(Service::start());
+    let engines_own = engines_own();
+    one_frame_at_a_time(&service, engines_own);
+    frames_that_wait(&service, engines_own);
+    every_effect(&service, engines_own);
+    runtime.block_on(service.server.drain()).unwrap();
+}
+
+fn one_frame_at_a_time(service: &Service, engines_own: u64) {
+    // Frames of nothing ask no network: what is counted is the path of the frame alone.
+    let mut client = Client::connect(service, &plain_hello());
+    let zero = [whole(&vec![0.0; MAP_LEN])];
+    client.exchange(&zero, WARM_UP);
+    assert_eq!(allocations(|| client.exchange(&zero, FRAMES)), 0, "without contact");
+    let press = [whole(&ramp())];
+    client.exchange(&press, WARM_UP);
+    let all = allocations(|| client.exchange(&press, FRAMES));
+    assert_eq!(all, FRAMES as u64 * engines_own, "beyond what the engine itself does");
+}
+
+/// Two sessions, each three frames ahead of its answers, on one inference thread: frames wait, and
+/// some are superseded.
+fn frames_that_wait(service: &Service, engines_own: u64) {
+    let mut clients = [(); 2].map(|()| Client::connect(service, &plain_hello()));
+    let press = whole(&ramp());
+    let mut maps = 0;
+    let mut exchange = |rounds: usize| {
+        maps = 0;
+        for _ in 0..rounds {
+            for _ in 0..3 {
+                clients.iter_mut().for_each(|client| client.send(&press));
+            }
+            for client in &mut clients {
+                for _ in 0..3 {
+                    let header = FrameHeader::decode(client.hear()).unwrap();
+                    maps += u64::from(header.status == FrameStatus::Ok);
+                }
+            }
+        }
+    };
+    exchange(WARM_UP);
+    let all = allocations(|| exchange(FRAMES));
+    assert!(maps < 6 * FRAMES as u64, "some frames were superseded");
+    assert_eq!(all, maps * engines_own, "frames that wait");
+}
+
+/// Every effect at once, windows both ways.
+fn every_effect(service: &Service, engines_own: u64) {
+    let effects = ["relaxation", "afferents", "contact_window", "summary", "points", "actuators"];
+    let hello = json!({
+        "type": "hello", "version": 2, "effects": effects, "tier": "quick",
+        "points": [{"px": [110.0, 65.0]}],
+        "actuators": {"radius_mm": 1.0, "gain": 1.0, "actuators": [{"at": {"px": [110.0, 65.0]}}]}
+    });
+    let mut client = Client::connect(service, &hello);
+    let window = Window { x: 60, y: 50, width: 100, height: 80 };
+    let frames: Vec<_> =
+        (1..=(WARM_UP + FRAMES) as u32).map(|n| windowed(n, window, &ramp())).collect();
+    client.exchange(&frames[..WARM_UP], 1);
+    let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
+    assert_eq!(all, FRAMES as u64 * engines_own, "with every effect");
+}

@@ -1,0 +1,298 @@
+//! Version 2 of a session: windows, timings, stale frames, and the effects of the session.
+
+use papilla_proto::{
+    Extension, FrameHeader, FrameKind, FrameStatus, HEADER_LEN_V2, MAP_LEN, MAP_SIDE_PX,
+    SampleType, Summary, Window, flags,
+};
+use serde_json::{Value, json};
+
+use crate::support::{
+    GAIN, PRESSURE_MAX_PA, SED_MAX, Service, Socket, bytes_of, floats_of, hello, ramp,
+};
+
+/// A hello of version 2.
+fn hello_2(members: &Value) -> Value {
+    let mut hello = hello(members);
+    hello["version"] = json!(2);
+    hello
+}
+
+/// A frame of version 2 with the samples of `window`.
+fn windowed(sequence: u32, time_us: u64, window: Window, map: &[f32]) -> Vec<u8> {
+    let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0).windowed(window);
+    let mut frame = header.encode().to_vec();
+    frame.resize(HEADER_LEN_V2 + 4 * window.pixel_count(), 0);
+    window.encode(SampleType::F32, map, 1.0, &mut frame[HEADER_LEN_V2..]).unwrap();
+    frame
+}
+
+fn whole(sequence: u32, map: &[f32]) -> Vec<u8> {
+    windowed(sequence, 1000 * u64::from(sequence), Window::WHOLE, map)
+}
+
+impl Socket {
+    /// The next answer of version 2: its header, what that adds, and the whole message.
+    async fn hear_2(&mut self) -> (FrameHeader, Extension, Vec<u8>) {
+        let (header, payload) = self.hear_frame().await;
+        let extension = header.extension.expect("an answer of version 2");
+        // `hear_frame` takes the first 32 bytes off.
+        (header, extension, [vec![0; 32], payload].concat())
+    }
+}
+
+/// 5 kPa on columns 100..=119, rows 60..=69; the test models halve it into SED.
+fn patch() -> Vec<f32> {
+    let inside =
+        |i: usize| (100..120).contains(&(i % MAP_SIDE_PX)) && (60..70).contains(&(i / MAP_SIDE_PX));
+    (0..MAP_LEN).map(|i| if inside(i) { 5000.0 } else { 0.0 }).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_answer_says_how_it_fared() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello_2(&json!({"tier": "slow"}))).await;
+    assert_eq!((&ready["version"], &ready["tier_number"]), (&json!(2), &json!(1)));
+    assert_eq!(ready["sections"], json!([{"name": "map", "offset": 48, "bytes": 4 * MAP_LEN}]));
+    assert_eq!(ready["session_effects"], json!([]));
+    for sequence in 1..=3 {
+        socket.send(whole(sequence, &ramp())).await;
+    }
+    let mut maps = 0;
+    for _ in 0..3 {
+        let (header, extension, message) = socket.hear_2().await;
+        assert_eq!(header.client_time_us, 1000 * u64::from(header.sequence));
+        assert_eq!((extension.tier, extension.flags), (1, 0));
+        if header.status == FrameStatus::Ok {
+            maps += 1;
+            assert_eq!(header.window(), Window::WHOLE);
+            let (queue_us, infer_us) = (extension.queue_us, extension.infer_us);
+            assert!(infer_us > 1000 && queue_us + infer_us <= header.time_us, "{header:?}");
+            let due = bytes_of(&ramp().iter().map(|p| GAIN * p).collect::<Vec<_>>());
+            let found = floats_of(&message[HEADER_LEN_V2..]);
+            assert!(found.iter().zip(floats_of(&due)).all(|(f, d)| (f - d).abs() < 1e-2));
+        } else {
+            assert_eq!(header.status, FrameStatus::Superseded);
+            assert_eq!((message.len(), extension.infer_us), (HEADER_LEN_V2, 0));
+        }
+    }
+    assert!(maps >= 1);
+    socket.send(whole(4, &vec![0.0; MAP_LEN])).await;
+    let (_, extension, message) = socket.hear_2().await;
+    assert_eq!((extension.flags, extension.infer_us), (flags::NO_CONTACT, 0));
+    assert!(message[HEADER_LEN_V2..].iter().all(|&b| b == 0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn stale_frames_are_told_at_once_and_counted() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_2(&json!({"stale_after_us": 1_000_000}))).await;
+    let mut fare = async |sequence, time_us| {
+        socket.send(windowed(sequence, time_us, Window::WHOLE, &ramp())).await;
+        let (header, _, message) = socket.hear_2().await;
+        assert_eq!((header.sequence, header.client_time_us), (sequence, time_us));
+        assert_eq!(message.len() > HEADER_LEN_V2, header.status == FrameStatus::Ok);
+        header.status
+    };
+    let minutes = 60_000_000;
+    assert_eq!(fare(7, 10 * minutes).await, FrameStatus::Ok);
+    assert_eq!(fare(7, 10 * minutes).await, FrameStatus::Stale, "the same number again");
+    assert_eq!(fare(6, 10 * minutes).await, FrameStatus::Stale, "an older number");
+    assert_eq!(fare(8, 10 * minutes).await, FrameStatus::Ok);
+    assert_eq!(fare(9, 9 * minutes).await, FrameStatus::Stale, "a minute on its way");
+    assert_eq!(fare(10, 11 * minutes).await, FrameStatus::Ok);
+    let stale = r#"papilla_maps_total{transport="session",outcome="stale"}"#;
+    assert_eq!(service.metric(stale).await as u64, 3);
+    // In version 1 sequences may be anything.
+    let mut socket = service.socket().await;
+    socket.open(hello(&json!({}))).await;
+    for _ in 0..2 {
+        socket.send(crate::support::frame(5, 0, SampleType::F32, 1.0, &ramp())).await;
+        assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Ok);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_go_both_ways() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let wish = json!({"effects": ["contact_window"], "contact_window": {"margin_px": 3}});
+    socket.open(hello_2(&wish)).await;
+    // A request that is wider than the contact; an answer that is the contact and its margin.
+    let sent = Window { x: 90, y: 50, width: 50, height: 30 };
+    socket.send(windowed(1, 0, sent, &patch())).await;
+    let (header, _, message) = socket.hear_2().await;
+    let window = Window { x: 97, y: 57, width: 26, height: 16 };
+    assert_eq!((header.status, header.window()), (FrameStatus::Ok, window));
+    let mut map = vec![f32::NAN; MAP_LEN];
+    window.decode(SampleType::F32, &message[HEADER_LEN_V2..], 1.0, &mut map).unwrap();
+    assert!(map.iter().zip(patch()).all(|(found, p)| (found - GAIN * p).abs() < 1e-3));
+    // Without contact there is nothing to send.
+    socket.send(windowed(2, 0, Window::EMPTY, &patch())).await;
+    let (header, extension, message) = socket.hear_2().await;
+    assert_eq!((header.window(), message.len()), (Window::EMPTY, HEADER_LEN_V2));
+    assert_eq!(extension.flags, flags::NO_CONTACT);
+    // Errors name the place in the map, not in the window.
+    let mut bad = patch();
+    bad[61 * MAP_SIDE_PX + 91] = -1.0;
+    socket.send(windowed(3, 0, sent, &bad)).await;
+    let error = socket.hear_refusal("negative_pressure").await;
+    assert!(error["message"].as_str().unwrap().contains("row 61, column 91"), "{error}");
+    for (at, bytes, code) in [(32, [200, 0], "wrong_shape"), (12, [49, 0], "wrong_length")] {
+        let mut bad = windowed(4, 0, sent, &patch());
+        bad[at..at + 2].copy_from_slice(&bytes);
+        socket.send(bad).await;
+        assert_eq!(socket.hear_refusal(code).await["sequence"], 4);
+    }
+    socket.send(crate::support::frame(5, 0, SampleType::F32, 1.0, &ramp())).await;
+    socket.hear_refusal("unknown_version").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sample_types_may_differ_by_direction() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello_2(&json!({"answer_sample_type": "u8"}))).await;
+    assert_eq!(
+        (&ready["sample_type"], &ready["answer_sample_type"]),
+        (&json!("f32"), &json!("u8"))
+    );
+    assert_eq!(ready["sections"][0]["bytes"], MAP_LEN);
+    socket.send(whole(1, &ramp())).await;
+    let (header, _, message) = socket.hear_2().await;
+    assert_eq!((header.sample_type, message.len()), (SampleType::U8, HEADER_LEN_V2 + MAP_LEN));
+    assert!((header.scale - SED_MAX / 255.0).abs() < 1e-3);
+    for (unit, p) in message[HEADER_LEN_V2..].iter().zip(ramp()) {
+        assert!((f32::from(*unit) * header.scale - GAIN * p).abs() <= 0.51 * header.scale);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pressure_beyond_the_range_is_flagged_where_that_is_asked_for() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_2(&json!({}))).await;
+    let beyond = vec![2.0 * PRESSURE_MAX_PA; MAP_LEN];
+    socket.send(whole(1, &beyond)).await;
+    socket.hear_refusal("out_of_range").await;
+    socket.open(hello_2(&json!({"out_of_range": "flag"}))).await;
+    socket.send(whole(2, &beyond)).await;
+    let (header, extension, message) = socket.hear_2().await;
+    assert_eq!((header.status, extension.flags), (FrameStatus::Ok, flags::OUT_OF_RANGE));
+    let sed = floats_of(&message[HEADER_LEN_V2..]);
+    assert!(sed.iter().all(|e| (e - GAIN * 2.0 * PRESSURE_MAX_PA).abs() < 1.0));
+    socket.send(whole(3, &ramp())).await;
+    assert_eq!(socket.hear_2().await.1.flags, 0);
+    socket.send(whole(4, &vec![11.0 * PRESSURE_MAX_PA; MAP_LEN])).await;
+    socket.hear_refusal("out_of_range").await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_can_ask_for_less_than_a_map() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let wish = json!({
+        "effects": ["layers", "summary", "points", "actuators"], "map": false,
+        "points": [{"px": [110.0, 65.0]}, {"px": [60.0, 90.0]}],
+        "actuators": {"radius_mm": 0.3, "gain": 0.0004, "threshold": 500,
+                      "actuators": [{"at": {"px": [110.0, 65.0]}}, {"at": {"px": [60, 90]}}]}
+    });
+    let ready = socket.open(hello_2(&wish)).await;
+    let names: Vec<_> =
+        ready["sections"].as_array().unwrap().iter().map(|s| s["name"].clone()).collect();
+    assert_eq!(names, ["summary", "points", "actuators"]);
+    assert_eq!(ready["session_effects"], json!(["summary", "points", "actuators"]));
+    let window = Window { x: 100, y: 60, width: 20, height: 10 };
+    socket.send(windowed(1, 0, window, &patch())).await;
+    let (header, _, message) = socket.hear_2().await;
+    assert_eq!((header.window(), message.len()), (Window::EMPTY, 128 + 8));
+    let summary = Summary::decode(&message[48..]).unwrap();
+    // 200 pixels; the test atlas has 0.1 mm a pixel.
+    assert!((summary.contact_area_mm2 - 2.0).abs() < 0.01, "{summary:?}");
+    assert!((summary.force_n - 0.01).abs() < 1e-4, "5 kPa on 2 mm2: {summary:?}");
+    assert!((summary.sed_max_j_per_m3 - 2500.0).abs() < 0.1, "{summary:?}");
+    assert!((summary.sed_u_px - 110.0).abs() < 0.01 && (summary.sed_v_px - 65.0).abs() < 0.01);
+    let [near, far] = floats_of(&message[112..120])[..] else { panic!("two points") };
+    assert!((near - 2500.0).abs() < 0.1 && far.abs() < 1e-3);
+    let [near, far] = floats_of(&message[128..136])[..] else { panic!("two actuators") };
+    assert!((near - 0.8).abs() < 1e-3 && far.abs() < 1e-6, "0.0004 (2500 - 500): {near}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn time_dependent_effects_follow_the_clients_clock() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let wish = json!({
+        "effects": ["relaxation", "afferents", "points"], "map": false,
+        "points": [{"px": [110.5, 65.5]}],
+        "relaxation": {"prony": [{"g": 0.5, "tau_s": 1.0}]},
+        "afferents": {"theta_kpa": 0, "k_d_hz_s_per_kpa": 0}
+    });
+    socket.open(hello_2(&wish)).await;
+    let mut rate = async |sequence, seconds: f64, map: &[f32]| {
+        socket.send(windowed(sequence, (1e6 * seconds) as u64, Window::WHOLE, map)).await;
+        let (header, _, message) = socket.hear_2().await;
+        assert_eq!(header.kind, FrameKind::Sa1Rate);
+        floats_of(&message[48..52])[0]
+    };
+    // G = 0.5 + 0.5 exp(-t): J = 2 - exp(-t / 2). SED is half the pressure that was filtered.
+    let due = |t: f64| (0.16 * 2500.0 * (2.0 - (-0.5 * t).exp())).sqrt();
+    for (n, t) in (1..).zip([0.0, 0.011, 1.5, 40.0]) {
+        let found = f64::from(rate(n, t, &patch()).await);
+        assert!((found - due(t)).abs() < 1e-3 * due(t), "{found}, not {} at {t} s", due(t));
+    }
+    let after = rate(5, 40.0, &vec![0.0; MAP_LEN]).await;
+    assert!(after > 10.0, "what crept is still there: {after}");
+    // A new hello begins anew.
+    let mut fresh = wish.clone();
+    fresh["effects"] = json!(["relaxation", "points"]);
+    fresh.as_object_mut().unwrap().remove("afferents");
+    let ready = socket.open(hello_2(&fresh)).await;
+    assert_eq!(ready["session_effects"], json!(["relaxation", "points"]));
+    socket.send(windowed(6, 50_000_000, Window::WHOLE, &patch())).await;
+    let (header, _, message) = socket.hear_2().await;
+    assert_eq!(header.kind, FrameKind::Sed);
+    assert!((floats_of(&message[48..52])[0] - 2500.0).abs() < 1.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn wishes_that_cannot_be_met_are_named() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    for (bad, code, field) in [
+        (hello(&json!({"map": false})), "unknown_version", "map"),
+        (hello(&json!({"effects": ["summary"]})), "unknown_effect", "effects"),
+        (hello_2(&json!({"effects": ["friction"]})), "unknown_effect", "effects"),
+        (hello_2(&json!({"effects": ["points"]})), "bad_effect", "points"),
+        (
+            hello_2(&json!({"effects": ["points"], "points": [{"px": [1, 1]}]})),
+            "bad_effect",
+            "points",
+        ),
+        (hello_2(&json!({"relaxation": {}})), "bad_effect", "relaxation"),
+    ] {
+        socket.send(bad.to_string()).await;
+        assert_eq!(socket.hear_refusal(code).await["field"], field);
+    }
+    socket.open(hello_2(&json!({"effects": ["finite_strain", "summary"]}))).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn effects_are_listed_with_what_they_cost() {
+    let service = Service::start().await;
+    let list = service.json("/v1/effects").await;
+    let effects = list["effects"].as_array().unwrap();
+    let of = |kind: &str| effects.iter().filter(|e| e["of"] == kind).collect::<Vec<_>>();
+    assert_eq!(of("session").len(), 6);
+    for effect in of("session") {
+        assert!(effect["cost_us"].as_f64().is_some(), "{effect}");
+        assert!(effect["what"].as_str().is_some_and(|what| what.len() > 20), "{effect}");
+    }
+    assert_eq!(
+        of("tier")[0],
+        &json!({"name": "finite_strain", "of": "tier", "tiers": ["quick", "slow"]})
+    );
+    let service = Service::start_with(|config| config.calibration_ms = 0).await;
+    assert_eq!(service.json("/v1/effects").await["effects"][0]["cost_us"], Value::Null);
+}

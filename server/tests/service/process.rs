@@ -1,0 +1,132 @@
+//! The binary itself: settings, `check`, signals.
+
+use std::{
+    net::TcpListener,
+    process::{Command, Output},
+    time::Duration,
+};
+
+use papilla_proto::{FrameStatus, SampleType};
+use serde_json::{Value, json};
+use tokio::time::sleep;
+
+use crate::support::{
+    Heard, Running, Socket, add_model_of_gain, atlas, frame, hello, model_folder, papilla, ramp,
+    write,
+};
+
+fn run(args: &[&str]) -> (Option<i32>, String, String) {
+    let Output { status, stdout, stderr } = papilla(args).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (status.code(), text(stdout), text(stderr))
+}
+
+#[test]
+fn settings_are_printed_so_that_they_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "a.toml", b"max_sessions = 3\nthreads = 2\n");
+    let file = folder.path().join("a.toml");
+    let output = papilla(&["--config", file.to_str().unwrap(), "--print-config"])
+        .env("PAPILLA_THREADS", "5")
+        .env("PAPILLA_ALLOW_ORIGIN", "https://a.example,https://b.example")
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for line in [
+        "max_sessions = 3 # file",
+        "threads = 5 # environment",
+        "allow_origin = [\"https://a.example\", \"https://b.example\"] # environment",
+        "bind = \"127.0.0.1:7224\" # default",
+    ] {
+        assert!(text.contains(line), "{line} is not in\n{text}");
+    }
+    write(folder.path(), "b.toml", text.as_bytes());
+    let (code, again, _) =
+        run(&["--config", folder.path().join("b.toml").to_str().unwrap(), "--print-config"]);
+    assert_eq!(code, Some(0));
+    let values = |text: &str| text.parse::<toml::Table>().unwrap();
+    assert_eq!(values(&again), values(&text));
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_with_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), "bad.toml", b"max_session = 3\n");
+    let file = folder.path().join("bad.toml");
+    for (args, word) in [
+        (vec!["--config", file.to_str().unwrap()], "max_session"),
+        (vec!["--threads", "none"], "--threads"),
+        (vec!["--bind", "0.0.0.0:0"], "bind"),
+        (vec!["--log", "papilla=loud"], "log"),
+        (vec!["--tls-cert", "c.pem"], "tls_key"),
+    ] {
+        let (code, _, error) = run(&args);
+        assert_eq!(code, Some(2), "{args:?}: {error}");
+        assert!(error.contains(word), "{args:?}: {error}");
+    }
+}
+
+#[test]
+fn check_finds_what_would_keep_it_from_serving() {
+    let models = model_folder();
+    let path = models.path().to_str().unwrap();
+    let base = ["check", "--models", path, "--calibration-ms", "1", "--bind", "127.0.0.1:0"];
+    let with = |more: &[&str]| run(&[&base[..], more].concat());
+    let (code, text, error) = with(&["--json"]);
+    assert_eq!(code, Some(0), "{text}{error}");
+    let report: Value = serde_json::from_str(&text).unwrap();
+    let whats: Vec<_> = report["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f["what"].as_str().unwrap())
+        .collect();
+    for what in ["settings", "atlas", "calibration", "model quick", "model slow", "port", "memory"]
+    {
+        assert!(whats.contains(&what), "{what} is not in {whats:?}");
+    }
+    let (code, text, _) = with(&[]);
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("everything is in order"), "{text}");
+
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let (code, text, _) = run(&["check", "--models", path, "--bind", &address]);
+    assert_eq!(code, Some(4), "{text}");
+    assert!(text.contains("FAILED port") && text.contains(&address), "{text}");
+
+    add_model_of_gain(models.path(), "quick", atlas().hash(), 0, 0.01, 1.0);
+    let (code, text, _) = with(&[]);
+    assert_eq!(code, Some(3), "{text}");
+    assert!(text.contains("FAILED model quick"), "{text}");
+    write(models.path(), "atlas.json", b"{}");
+    let (code, text, _) = with(&["--json"]);
+    assert_eq!(code, Some(3), "{text}");
+    assert!(serde_json::from_str::<Value>(&text).unwrap()["ok"] == json!(false));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sigterm_answers_what_was_accepted_and_ends() {
+    let models = model_folder();
+    let mut running = Running::start(models.path());
+    let mut socket = Socket::connect(running.address).await.unwrap();
+    socket.open(hello(&json!({"tier": "slow"}))).await;
+    socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    // The answer to what comes after a frame says that the frame was taken.
+    socket.send("?").await;
+    socket.hear_refusal("unexpected_text").await;
+    let pid = running.child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    let (header, _) = socket.hear_frame().await;
+    assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
+    socket.hear_end("shutting_down", 1001).await;
+    assert!(matches!(socket.hear().await, Heard::Closed(_)));
+    drop(socket);
+    let status = loop {
+        match running.child.try_wait().unwrap() {
+            Some(status) => break status,
+            None => sleep(Duration::from_millis(20)).await,
+        }
+    };
+    assert_eq!(status.code(), Some(0));
+}

@@ -1,0 +1,142 @@
+//! Models that change while the service runs.
+
+use std::{fs, path::Path, time::Duration};
+
+use papilla_proto::{FrameStatus, SampleType};
+use serde_json::{Value, json};
+
+use crate::support::{
+    Answer, Service, Socket, add_model, add_model_of_gain, atlas, bytes_of, floats_of, frame,
+    hello, ramp, write,
+};
+
+async fn reload(service: &Service) -> Answer {
+    service.post("/v1/admin/reload", "").send().await
+}
+
+fn list(folder: &Path, default: &str, models: &[&str]) {
+    let index = json!({"default": default, "models": models});
+    write(folder, "index.json", index.to_string().as_bytes());
+}
+
+/// What the tier multiplies the pressure by, as a session sees it.
+async fn gain(socket: &mut Socket, sequence: u32) -> f32 {
+    socket.send(frame(sequence, 0, SampleType::F32, 1.0, &ramp())).await;
+    let (header, sed) = socket.hear_frame().await;
+    assert_eq!((header.sequence, header.status), (sequence, FrameStatus::Ok));
+    let (sed, pressure) = (floats_of(&sed), ramp());
+    sed[ramp().len() - 1] / pressure[ramp().len() - 1]
+}
+
+fn names(tiers: &Value) -> Vec<&str> {
+    tiers["tiers"].as_array().unwrap().iter().map(|t| t["name"].as_str().unwrap()).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_changed_model_takes_over_and_sessions_go_on() {
+    let service = Service::start_with(|c| c.threads = std::num::NonZeroUsize::new(2)).await;
+    let mut socket = service.socket().await;
+    socket.open(hello(&json!({"tier": "quick"}))).await;
+    assert!((gain(&mut socket, 1).await - 0.5).abs() < 1e-4);
+
+    let answer = reload(&service).await;
+    assert_eq!(answer.status, 200, "{}", answer.text());
+    let due = json!({"default": "quick", "added": [], "changed": [], "removed": [],
+        "unchanged": ["quick", "slow"]});
+    assert_eq!(answer.json(), due);
+
+    add_model_of_gain(service.models.path(), "quick", atlas().hash(), 0, 0.2, 0.51);
+    let answer = reload(&service).await.json();
+    assert_eq!((&answer["changed"], &answer["unchanged"]), (&json!(["quick"]), &json!(["slow"])));
+    // Both threads serve it, and from the first frame on.
+    for sequence in 2..12 {
+        assert!((gain(&mut socket, sequence).await - 0.51).abs() < 1e-4);
+    }
+    let sed = service.post("/v1/sed?tier=quick", bytes_of(&ramp())).send().await;
+    assert!((floats_of(&sed.body)[50_000] / ramp()[50_000] - 0.51).abs() < 1e-4);
+    assert_eq!(service.metric("papilla_reloads_total{outcome=\"ok\"}").await as u64, 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_bad_model_changes_nothing_and_says_why() {
+    let service = Service::start().await;
+    let folder = service.models.path();
+    let before = service.json("/v1/models").await;
+    let mut socket = service.socket().await;
+    socket.open(hello(&json!({}))).await;
+    let good = fs::read(folder.join("quick.onnx")).unwrap();
+    let card = fs::read(folder.join("quick.json")).unwrap();
+    let mut sequence = 0;
+    for (bad, word) in [
+        ("torn", "quick.onnx"),
+        ("missing", "quick.onnx"),
+        ("of another atlas", "trained on atlas"),
+        ("wrong", "is off by"),
+    ] {
+        match bad {
+            "torn" => write(folder, "quick.onnx", &good[..good.len() / 2]),
+            "missing" => fs::remove_file(folder.join("quick.onnx")).unwrap(),
+            "of another atlas" => add_model(folder, "quick", &"f".repeat(64), 0, 0.2),
+            // It loads, belongs to its card and answers; but not what its card promises.
+            _ => add_model_of_gain(folder, "quick", atlas().hash(), 0, 0.01, 1.0),
+        }
+        let answer = reload(&service).await;
+        assert!(answer.text().contains(word), "{bad}: {}", answer.text());
+        assert!(answer.text().contains("left as they are"), "{bad}: {}", answer.text());
+        answer.assert_refused(422, "bad_model");
+        sequence += 1;
+        assert!((gain(&mut socket, sequence).await - 0.5).abs() < 1e-4, "{bad}");
+    }
+    assert_eq!(service.json("/v1/models").await, before);
+    assert_eq!(service.metric("papilla_reloads_total{outcome=\"refused\"}").await as u64, 4);
+    write(folder, "quick.onnx", &good);
+    write(folder, "quick.json", &card);
+    assert_eq!(reload(&service).await.status, 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn tiers_come_and_go_but_keep_their_sessions() {
+    let service = Service::start().await;
+    let folder = service.models.path();
+    let mut socket = service.socket().await;
+    socket.open(hello(&json!({"tier": "slow"}))).await;
+    add_model_of_gain(folder, "third", atlas().hash(), 0, 0.1, 0.52);
+    list(folder, "third", &["third", "quick"]);
+    let answer = reload(&service).await.json();
+    assert_eq!((&answer["added"], &answer["removed"]), (&json!(["third"]), &json!(["slow"])));
+    let tiers = service.json("/v1/tiers").await;
+    assert_eq!((&tiers["default"], names(&tiers)), (&json!("third"), vec!["quick", "third"]));
+    // The session that has the tier goes on; a new one does not get it.
+    assert!((gain(&mut socket, 1).await - 0.5).abs() < 1e-4);
+    let mut late = service.socket().await;
+    late.send(hello(&json!({"tier": "slow"})).to_string()).await;
+    late.hear_refusal("unknown_tier").await;
+    let ready = late.open(hello(&json!({}))).await;
+    assert_eq!(ready["tier"], "third");
+    assert!((gain(&mut late, 1).await - 0.52).abs() < 1e-4);
+    let text = service.get("/metrics").send().await.text();
+    assert!(text.contains("papilla_model{tier=\"third\""), "{text}");
+    assert!(!text.contains("papilla_model{tier=\"slow\""), "{text}");
+    // It comes back to the place it had.
+    list(folder, "quick", &["quick", "slow"]);
+    let answer = reload(&service).await.json();
+    assert_eq!((&answer["added"], &answer["removed"]), (&json!(["slow"]), &json!(["third"])));
+    assert!((gain(&mut socket, 2).await - 0.5).abs() < 1e-4);
+    assert!((gain(&mut late, 2).await - 0.52).abs() < 1e-4);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_watched_folder_is_read_when_it_changes() {
+    let service = Service::start_with(|config| config.watch_models = true).await;
+    add_model(service.models.path(), "third", atlas().hash(), 0, 0.1);
+    list(service.models.path(), "quick", &["quick", "slow", "third"]);
+    while names(&service.json("/v1/tiers").await).len() < 3 {
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    // Reading the folder must not look like another change: once it is quiet, so is the watch.
+    let ok = "papilla_reloads_total{outcome=\"ok\"}";
+    let after = service.metric(ok).await;
+    tokio::time::sleep(Duration::from_millis(2000)).await;
+    assert!(service.metric(ok).await - after < 0.5, "it reads itself in circles");
+    service.server.drain().await.unwrap();
+}
