@@ -24,4 +24,5 @@ pub mod rungs;
 pub mod s2;
 pub mod scene;
 pub mod solve;
+pub mod stability;
 pub mod verify;

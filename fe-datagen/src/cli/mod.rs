@@ -12,6 +12,7 @@ mod rungs;
 mod s2;
 mod schema;
 mod solve;
+mod stability;
 mod verify;
 mod witness;
 
@@ -44,6 +45,7 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
+    Stability(stability::Args),
     Export(export::Args),
     Witness(witness::Args),
     Effects(effects::Args),
@@ -60,6 +62,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Witness(args) => witness::run(&args),
         Command::Effects(args) => effects::run(&args),

@@ -39,6 +39,9 @@ pub(super) struct Args {
     json: bool,
 }
 
+/// Field of the last equilibrium before a solve was given up.
+const LAST_STATE: &str = "last-state.vtu";
+
 /// One stored equilibrium in `summary.json`.
 #[derive(Serialize)]
 struct Increment {
@@ -55,6 +58,11 @@ struct Increment {
     /// Share of the volume beyond the calibrated stretches of its law.
     outside_calibration: f64,
     checks: Checks,
+    /// Block of the mesh and element in it where J is smallest.
+    j_min_at: [usize; 2],
+    /// The tangent's condition number is at least this; absent if only an indefinite one was
+    /// factorized.
+    condition_at_least: Option<f64>,
     effort: Effort,
     seconds: f64,
     /// Why this state would not enter a dataset; absent if it would.
@@ -109,6 +117,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         scene,
     };
     atomic::write_json(&args.out.join("summary.json"), &summary)?;
+    if solved.is_err() && summary.scene.writes(Output::Fields) {
+        eprintln!("{} shows the last equilibrium", args.out.join(LAST_STATE).display());
+    }
     solved?;
     print(&summary, args.json, || human(&summary, &args.out))?;
     let clean = summary.increments.iter().all(|i| i.fault.is_none());
@@ -147,6 +158,9 @@ fn press(
     let (pressed, solved) =
         body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
     bar.finish_and_clear();
+    if let (Err(_), Some(out), true) = (&solved, out, written.is_ok()) {
+        written = write_vtu(&out.join(LAST_STATE), body, solver);
+    }
     written?;
     let place = |r: &IncrementRecord| if drive.is_timed() { r.time_s } else { r.depth_mm };
     let series: Vec<_> =
@@ -171,6 +185,8 @@ fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Incremen
         stored_energy_mj: report.stored_mj,
         outside_calibration: record.outside_calibration,
         checks: record.checks,
+        j_min_at: report.j_min_at,
+        condition_at_least: Some(report.condition_at_least).filter(|c| c.is_finite()),
         effort: report.effort,
         seconds: record.seconds,
         fault: fault(record, record.pressure_mpa.len()),

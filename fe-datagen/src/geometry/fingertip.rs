@@ -88,8 +88,22 @@ impl Default for FingertipShape {
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum FingertipShapeError {
     /// A length is not positive, or absurd.
-    #[error("geometry.shape.{field} = {value} mm has to be above 0 and at most 100")]
+    #[error(
+        "geometry.shape.{field} = {value} mm has to be above 0 and at most 100{}",
+        if *value > LENGTH_MAX_MM { ": lengths are in mm, was um meant?" } else { "" }
+    )]
     NotPositive {
+        /// Field name in the scene.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A whole finger smaller than a grain.
+    #[error(
+        "geometry.shape.{field} = {value} mm is not believed of a finger, {LENGTH_MIN_MM} mm is the least: \
+         lengths are in mm, was m meant?"
+    )]
+    TooSmall {
         /// Field name in the scene.
         field: &'static str,
         /// Its value.
@@ -147,7 +161,7 @@ impl FingertipShapeError {
     #[must_use]
     pub fn field(&self) -> String {
         let name = match self {
-            Self::NotPositive { field, .. } => *field,
+            Self::NotPositive { field, .. } | Self::TooSmall { field, .. } => *field,
             Self::CortexTooThick { .. } => "bone_cortex_mm",
             Self::NailTooSmall => "nail_mm",
             Self::BoneTooClose { .. } => return "geometry.shape".into(),
@@ -159,6 +173,8 @@ impl FingertipShapeError {
 
 /// Beyond it a length in mm must have been meant in another unit.
 const LENGTH_MAX_MM: f64 = 100.0;
+/// A finger below it must have been meant in another unit.
+const LENGTH_MIN_MM: f64 = 1.0;
 /// Share of the gap between skin and bone that epidermis and dermis may take.
 const SKIN_SHARE_MAX: f64 = 0.75;
 /// Least gap between skin and bone, mm.
@@ -198,6 +214,11 @@ impl FingertipShape {
         for (field, value) in positive {
             if !(value > 0.0 && value <= LENGTH_MAX_MM) {
                 return Err(FingertipShapeError::NotPositive { field, value });
+            }
+        }
+        for (field, value) in &positive[..3] {
+            if *value < LENGTH_MIN_MM {
+                return Err(FingertipShapeError::TooSmall { field, value: *value });
             }
         }
         if !(self.cap_length_mm < self.length_mm) {

@@ -62,6 +62,17 @@ pub enum IndenterError {
          the angles, or take a larger one"
     )]
     NeverTouches,
+    /// A part of it fits between the nodes that contact is found at.
+    #[error(
+        "the indenter is finer than the mesh: {by_mm:.3} mm of it goes in between the nodes of a face \
+         {face_mm:.3} mm wide before one is touched. Take a finer mesh, or an indenter as wide as a few faces"
+    )]
+    FinerThanMesh {
+        /// How deep a face's middle is in the indenter at first touch of a node, mm.
+        by_mm: f64,
+        /// Width of the face, mm.
+        face_mm: f64,
+    },
     /// It is in the body before it moves.
     #[error(
         "the indenter starts {by_mm:.3e} mm inside the body: move it back along its way \

@@ -146,6 +146,23 @@ impl Factorizer {
         self.kind = Some(Kind::Lblt);
     }
 
+    /// A lower bound of the condition number of the matrix that was last factorized by
+    /// Cholesky, from its factor's diagonal: `(max l / min l)^2`. A triangular matrix's least
+    /// singular value is at most its least diagonal entry, its largest at least the largest.
+    /// `None` without a Cholesky factor.
+    #[must_use]
+    pub fn condition_at_least(&self, structure: &Structure) -> Option<f64> {
+        if self.kind != Some(Kind::Cholesky) {
+            return None;
+        }
+        let (mut least, mut largest) = (f32::INFINITY, 0.0f32);
+        structure.visit_diagonal(&mut |at| {
+            least = least.min(self.single[at]);
+            largest = largest.max(self.single[at]);
+        });
+        Some((f64::from(largest) / f64::from(least)).powi(2))
+    }
+
     /// Solves in place with the held factor; without one, leaves `x` as it is.
     pub fn solve(&mut self, structure: &Structure, x: &mut [f64]) {
         let n = x.len();
@@ -185,6 +202,41 @@ impl Factorizer {
                     MemStack::new(&mut self.memory),
                 );
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::ElementKind;
+    use crate::linear::Elimination;
+    use crate::verify::bodies::{cube, hold};
+
+    #[test]
+    fn the_condition_of_a_diagonal_matrix_is_exact() {
+        use Elimination::{CuthillMckee, Natural, NestedDissection};
+        // Few unknowns are factorized simplicially, many by supernodes.
+        for (cells, elimination) in [
+            (1, Natural),
+            (2, CuthillMckee),
+            (6, Natural),
+            (6, CuthillMckee),
+            (6, NestedDissection),
+        ] {
+            let mesh = cube(ElementKind::Hex8, cells, |p| p);
+            let fixed = hold(&mesh, &[("z_min", [true; 3])]);
+            let structure = Structure::eliminated(&mesh, &fixed, elimination).unwrap();
+            let mut matrix = structure.zeros();
+            let count = structure.equations.count;
+            for c in 0..count {
+                matrix.values[structure.column_start[c]] = 1.0 + c as f64;
+            }
+            let mut factorizer = Factorizer::new(&structure).unwrap();
+            assert_eq!(factorizer.condition_at_least(&structure), None);
+            factorizer.cholesky(&structure, &matrix).unwrap();
+            let found = factorizer.condition_at_least(&structure).unwrap();
+            assert!((found / count as f64 - 1.0).abs() < 1e-5, "{found} {count}");
         }
     }
 }

@@ -15,4 +15,4 @@ pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
 pub use direct::Direct;
 pub use factor::{Factor, FactorError, Factorizer};
 pub use ordering::OrderingError;
-pub use structure::{Equations, Structure, StructureError, SymmetricMatrix};
+pub use structure::{Elimination, Equations, Structure, StructureError, SymmetricMatrix};

@@ -57,6 +57,33 @@ pub(super) fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>
     }
 }
 
+/// Reverse Cuthill-McKee: breadth first from a vertex with few neighbours, those with few
+/// first, and the whole turned round.
+pub(super) fn cuthill_mckee(neighbours: &[BTreeSet<u32>]) -> Vec<u32> {
+    let degree = |v: &u32| neighbours[*v as usize].len();
+    let mut starts: Vec<u32> = (0..neighbours.len() as u32).collect();
+    starts.sort_by_key(degree);
+    let mut seen = vec![false; neighbours.len()];
+    let mut order: Vec<u32> = Vec::with_capacity(neighbours.len());
+    for start in starts {
+        if std::mem::replace(&mut seen[start as usize], true) {
+            continue;
+        }
+        let mut at = order.len();
+        order.push(start);
+        while let Some(&v) = order.get(at) {
+            at += 1;
+            let mut next: Vec<u32> =
+                neighbours[v as usize].iter().copied().filter(|&n| !seen[n as usize]).collect();
+            next.sort_by_key(degree);
+            next.iter().for_each(|&n| seen[n as usize] = true);
+            order.extend(next);
+        }
+    }
+    order.reverse();
+    order
+}
+
 /// The one foreign call of this crate.
 #[allow(unsafe_code)]
 fn call_metis(
@@ -100,6 +127,18 @@ mod tests {
         let mut order = nested_dissection(&path(200)).unwrap();
         order.sort_unstable();
         assert_eq!(order, (0..200).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn cuthill_mckee_orders_two_paths_with_neighbours_beside_each_other() {
+        let mut graph = path(50);
+        graph.extend(path(30).into_iter().map(|s| s.into_iter().map(|v| v + 50).collect()));
+        let order = cuthill_mckee(&graph);
+        let mut place = vec![0i64; 80];
+        order.iter().enumerate().for_each(|(k, &v)| place[v as usize] = k as i64);
+        for (v, set) in graph.iter().enumerate() {
+            assert!(set.iter().all(|&n| (place[v] - place[n as usize]).abs() == 1), "{order:?}");
+        }
     }
 
     #[test]

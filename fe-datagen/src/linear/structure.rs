@@ -1,6 +1,6 @@
 //! Equation numbers, sparsity pattern and element scatter maps of a mesh.
 
-use super::ordering::{OrderingError, nested_dissection};
+use super::ordering::{OrderingError, cuthill_mckee, nested_dissection};
 use crate::mesh::Mesh;
 use faer::Side;
 use faer::perm::PermRef;
@@ -78,24 +78,48 @@ pub struct SymmetricMatrix {
     pub values: Vec<f64>,
 }
 
+/// In which order unknowns are eliminated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Elimination {
+    /// METIS' nested dissection of the nodes: the least fill.
+    #[default]
+    NestedDissection,
+    /// Reverse Cuthill-McKee of the nodes: the least bandwidth.
+    CuthillMckee,
+    /// As the mesh numbers its nodes.
+    Natural,
+}
+
 impl Structure {
     /// Structure of `mesh` with some degrees of freedom prescribed.
     ///
     /// # Errors
     /// See [`StructureError`].
     pub fn new(mesh: &Mesh, fixed: &[bool]) -> Result<Self, StructureError> {
+        Self::eliminated(mesh, fixed, Elimination::default())
+    }
+
+    /// The same with a choice of the elimination order.
+    ///
+    /// # Errors
+    /// See [`StructureError`].
+    pub fn eliminated(
+        mesh: &Mesh,
+        fixed: &[bool],
+        elimination: Elimination,
+    ) -> Result<Self, StructureError> {
         let equations = Equations::new(fixed);
         if equations.count == 0 {
             return Err(StructureError::NoUnknowns);
         }
         let neighbours = node_graph(mesh);
         let (column_start, row) = pattern(&neighbours, &equations);
-        let order = elimination_order(&neighbours, &equations)?;
-        let mut inverse = vec![0; order.len()];
+        let n = equations.count;
+        let order = elimination_order(&neighbours, &equations, elimination)?;
+        let mut inverse = vec![0; n];
         for (k, &e) in order.iter().enumerate() {
             inverse[e] = k;
         }
-        let n = equations.count;
         let a = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &row);
         let symbolic = factorize_symbolic_cholesky(
             a,
@@ -136,6 +160,24 @@ impl Structure {
                     (1..=width).map(|c| column(below + c)).sum::<f64>()
                 })
                 .sum(),
+        }
+    }
+
+    /// Visits the place of every diagonal entry among the factor's values.
+    pub(super) fn visit_diagonal(&self, visit: &mut dyn FnMut(usize)) {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(s) => {
+                let starts = s.col_ptr();
+                starts[..starts.len() - 1].iter().for_each(|&at| visit(at));
+            }
+            SymbolicCholeskyRaw::Supernodal(s) => {
+                for k in 0..s.n_supernodes() {
+                    let width = s.supernode_end()[k] - s.supernode_begin()[k];
+                    // Dense columns of the triangle and of the rows below it.
+                    let rows = width + s.supernode(k).pattern().len();
+                    (0..width).for_each(|c| visit(s.col_ptr_for_val()[k] + c * (rows + 1)));
+                }
+            }
         }
     }
 
@@ -274,10 +316,11 @@ fn pattern(neighbours: &[BTreeSet<u32>], equations: &Equations) -> (Vec<usize>, 
     (start, row)
 }
 
-/// Nested dissection of the nodes with unknowns, expanded to equations.
+/// Order of the nodes with unknowns, expanded to equations.
 fn elimination_order(
     neighbours: &[BTreeSet<u32>],
     equations: &Equations,
+    elimination: Elimination,
 ) -> Result<Vec<usize>, OrderingError> {
     let unknowns = |node: usize| {
         equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
@@ -300,7 +343,11 @@ fn elimination_order(
                 .collect()
         })
         .collect();
-    let order = nested_dissection(&graph)?;
+    let order = match elimination {
+        Elimination::NestedDissection => nested_dissection(&graph)?,
+        Elimination::CuthillMckee => cuthill_mckee(&graph),
+        Elimination::Natural => (0..graph.len() as u32).collect(),
+    };
     Ok(order.iter().flat_map(|&v| unknowns(kept[v as usize]).map(|&e| e as usize)).collect())
 }
 

@@ -34,6 +34,9 @@ pub struct Ogden {
     bounds: [[f64; 3]; 2],
 }
 
+/// Least principal Green strain that has a finite logarithm of the stretch.
+const STRAIN_MIN: f64 = -0.5 + 0.5 * f64::EPSILON;
+
 /// Share of the modulus at rest that the continuation's curvature has at least.
 const CURVATURE_MIN: f64 = 1e-2;
 
@@ -121,7 +124,10 @@ impl Ogden {
     /// Principal frame of the deformation.
     fn principal(&self, k: &Kinematics) -> Principal {
         let (strain, axes) = eigen::symmetric(&k.green_strain());
-        let x = strain.map(|e| 0.5 * (2.0 * e).ln_1p());
+        // A stretch below 1e-8 is not told from 0 by its Green strain, -1/2; its logarithm
+        // would be infinite. A NaN stays one.
+        let told = |e: f64| if e < STRAIN_MIN { STRAIN_MIN } else { e };
+        let x = strain.map(|e| 0.5 * (2.0 * told(e)).ln_1p());
         let mean = k.j_minus_1.ln_1p() / 3.0;
         let y = x.map(|v| v - mean);
         let w = y.map(|v| self.everywhere(v));
@@ -316,7 +322,7 @@ mod tests {
     #[test]
     fn nothing_overflows_and_the_flag_is_set_far_outside() {
         for law in [skin()] {
-            for stretch in [1e-3f64, 0.05, 3.0, 1e4] {
+            for stretch in [1e-12f64, 1e-8, 1e-3, 0.05, 3.0, 1e4, 1e12] {
                 let h = [[stretch - 1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
                 let k = Kinematics::new(h);
                 assert!(law.outside_calibration(&k));

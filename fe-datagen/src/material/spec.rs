@@ -25,10 +25,21 @@ impl ElasticConstants {
             return Err(MaterialError::YoungsModulus(e));
         }
         if e > MODULUS_MAX_MPA {
-            return Err(MaterialError::Units(e));
+            return Err(MaterialError::Units { value: e, low: 0.0, high: MODULUS_MAX_MPA });
         }
         poissons_ratio(nu)?;
         Ok([e / (2.0 * (1.0 + nu)), e / (3.0 * (1.0 - 2.0 * nu))])
+    }
+}
+
+/// The unit that would bring a modulus nearest to what is believed.
+fn meant(value: f64, low: f64, high: f64) -> &'static str {
+    if value < low {
+        "GPa"
+    } else if value > 1e3 * high {
+        "Pa"
+    } else {
+        "kPa"
     }
 }
 
@@ -236,8 +247,18 @@ pub enum MaterialError {
     #[error("Young's modulus {0} MPa must be positive and finite")]
     YoungsModulus(f64),
     /// A modulus that no such tissue has.
-    #[error("a modulus of {0} MPa is beyond any such tissue's: moduli are in MPa, was Pa meant?")]
-    Units(f64),
+    #[error(
+        "a modulus of {value} MPa is not believed of such a tissue ({low} to {high} MPa is): moduli are in \
+         MPa, was {} meant?", meant(*value, *low, *high)
+    )]
+    Units {
+        /// Modulus, MPa.
+        value: f64,
+        /// Least that is believed, MPa.
+        low: f64,
+        /// Most that is believed, MPa.
+        high: f64,
+    },
     /// Poisson's ratio is outside (-1, 0.5).
     #[error(
         "Poisson's ratio {0} must lie in (-1, 0.5); nearly incompressible tissue is 0.49 to 0.4999"
@@ -291,7 +312,10 @@ mod tests {
         let c = |e, nu| ElasticConstants { youngs_modulus_mpa: e, poissons_ratio: nu }.moduli_mpa();
         assert_eq!(c(1.0, 0.5), Err(MaterialError::PoissonsRatio(0.5)));
         assert_eq!(c(-1.0, 0.3), Err(MaterialError::YoungsModulus(-1.0)));
-        assert_eq!(c(8e4 * 1e3, 0.3), Err(MaterialError::Units(8e7)));
+        assert_eq!(
+            c(8e4 * 1e3, 0.3),
+            Err(MaterialError::Units { value: 8e7, low: 0.0, high: 2e6 })
+        );
         assert!(c(f64::NAN, 0.3).is_err());
     }
 

@@ -105,6 +105,9 @@ impl PressError {
             Self::Mesh(_) => Some("geometry.file".into()),
             Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
             Self::Rising(..) | Self::Empty => Some("motion".into()),
+            Self::Solve { source: SolveError::RigidBodyMode(_), .. } => {
+                Some("geometry.fixed".into())
+            }
             Self::Located(e) => e.error.field(),
             _ => None,
         }
@@ -281,7 +284,7 @@ impl Body {
         let integral = self.force_of_pressure_n(solver, &pressure);
         let balance = solver.balance();
         let force = balance.contact_force_n;
-        let size = norm(force).max(f64::MIN_POSITIVE);
+        let size = norm(force).max(solver.least_force_n());
         let difference =
             |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
         let work = solver.indenter_work_mj();
@@ -309,7 +312,7 @@ impl Body {
                 contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),
                 plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
                 energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
-                    / work.abs().max(f64::MIN_POSITIVE),
+                    / solver.indenter_work_mj_max().max(f64::MIN_POSITIVE),
                 j_min: report.j_min,
                 penetration_mm_max: report.gap_error_mm,
                 newton_iterations: report.effort.newton_iterations,

@@ -2,7 +2,9 @@
 
 use super::body::{Body, PressError};
 use super::record::{IncrementRecord, Pose};
-use crate::indenter::{Placement, Plate, RoundedPlate, SignedDistance, first_touch_travel};
+use crate::indenter::{
+    IndenterError, Placement, Plate, RoundedPlate, SignedDistance, first_touch_travel,
+};
 use crate::mesh::Mesh;
 use crate::mesh::surface::norm;
 use crate::solve::{Effort, Loading, MovingIndenter, Solver, StepReport};
@@ -79,6 +81,9 @@ const REFINEMENTS: [u32; 3] = [1, 2, 4];
 
 /// Farthest that a prescribed force is looked for, mm.
 const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
+/// Part of a face's width that may be in the indenter before a node touches: a ball as wide
+/// as four faces has a sixteenth, a knife comes to a half.
+const UNSEEN_MAX: f64 = 0.4;
 /// How closely a prescribed force is met.
 const FORCE_TOLERANCE: f64 = 1e-4;
 /// Equilibria tried for one prescribed force.
@@ -115,6 +120,7 @@ impl Body {
                 start.origin_mm[i] += travel * normal[i];
             }
         }
+        self.sees(approach.shape.as_ref(), &start)?;
         let offset = |depth: f64, shift: [f64; 2]| -> [f64; 3] {
             std::array::from_fn(|i| depth * normal[i] + shift[0] * x[i] + shift[1] * y[i])
         };
@@ -128,6 +134,38 @@ impl Body {
             }
         };
         Ok(MovingIndenter { shape: approach.shape.clone(), start, path })
+    }
+
+    /// Refuses an indenter of which, at first touch of a node, a face's middle or an edge's is
+    /// already deep inside: contact is at nodes and would never see what fits between.
+    fn sees(&self, shape: &dyn SignedDistance, start: &Placement) -> Result<(), IndenterError> {
+        let mesh = &self.problem.mesh;
+        let surface = &mesh.surfaces[&self.contact];
+        let corners = surface.kind.corners();
+        let at = |n: u32| mesh.nodes[n as usize];
+        let mut worst = (0.0, 1.0);
+        let mut look = |p: [f64; 3], width: f64| {
+            let inside = -start.clearance_mm(shape, p);
+            if inside / width > worst.0 / worst.1 {
+                worst = (inside, width);
+            }
+        };
+        for face in surface.faces() {
+            let mut longest = 0.0f64;
+            for k in 0..corners {
+                let (a, b) = (at(face[k]), at(face[(k + 1) % corners]));
+                let length = norm(std::array::from_fn(|i| a[i] - b[i]));
+                look(std::array::from_fn(|i| 0.5 * (a[i] + b[i])), length);
+                longest = longest.max(length);
+            }
+            let corner = |i: usize| face[..corners].iter().map(move |&n| at(n)[i]);
+            look(std::array::from_fn(|i| corner(i).sum::<f64>() / corners as f64), longest);
+        }
+        let (by_mm, face_mm) = worst;
+        if by_mm > UNSEEN_MAX * face_mm {
+            return Err(IndenterError::FinerThanMesh { by_mm, face_mm });
+        }
+        Ok(())
     }
 
     /// Presses, keeps something of each stored state (`keep` is told its number and may be

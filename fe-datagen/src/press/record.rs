@@ -11,7 +11,7 @@ pub struct Checks {
     pub contact_force_vs_pressure_integral: f64,
     /// |plate reaction - support reaction| over the plate reaction.
     pub plate_vs_support_reaction: f64,
-    /// |stored energy - external work| over the external work.
+    /// |stored energy - external work| over the largest external work so far.
     pub energy_vs_work: f64,
     /// Smallest volume ratio J at any quadrature point.
     pub j_min: f64,

@@ -139,7 +139,7 @@ fn cure(message: &str) -> String {
 /// The field that a material's error is about.
 pub(crate) fn material_field(error: &TissueError) -> String {
     let field = match error.source {
-        MaterialError::YoungsModulus(_) | MaterialError::Units(_) => ".youngs_modulus_mpa",
+        MaterialError::YoungsModulus(_) | MaterialError::Units { .. } => ".youngs_modulus_mpa",
         MaterialError::PoissonsRatio(_) => ".poissons_ratio",
         MaterialError::OgdenTerms { .. }
         | MaterialError::OgdenUnstable(_)
@@ -160,6 +160,7 @@ pub(crate) fn indenter_field(error: &IndenterError) -> String {
         IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
             "motion.offset_mm".into()
         }
+        IndenterError::FinerThanMesh { .. } => "indenter".into(),
     }
 }
 

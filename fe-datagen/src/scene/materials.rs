@@ -1,5 +1,6 @@
 //! What each tissue may be made of.
 
+use crate::material::Isochoric as _;
 use crate::material::spec::{MaterialError, MaterialSpec, OgdenSpec, PronySpec};
 use crate::mesh::Tissue;
 use schemars::JsonSchema;
@@ -78,16 +79,31 @@ impl TissueTable {
     }
 }
 
-/// Dry horn has a few thousand MPa: beyond it a soft tissue's modulus must have
-/// been meant in another unit.
-const SOFT_MAX_MPA: f64 = 1e4;
+/// Young's moduli that are believed of a tissue, MPa. The softest tissues have a few
+/// hundred Pa; dry horn has thousands of MPa, a collagen bundle tens, cancellous bone
+/// from fifty.
+const fn believed_mpa(tissue: Tissue) -> [f64; 2] {
+    match tissue {
+        Tissue::Epidermis => [2e-4, 1e4],
+        Tissue::Dermis => [2e-4, 50.0],
+        Tissue::Subcutaneous => [2e-4, 10.0],
+        Tissue::Nail => [1.0, 2e4],
+        Tissue::Bone => [50.0, 2e6],
+    }
+}
 
 fn check(spec: &MaterialSpec, tissue: Tissue) -> Result<(), MaterialError> {
     spec.constants().moduli_mpa()?;
-    let soft = tissue != Tissue::Nail && tissue != Tissue::Bone;
-    if soft && spec.youngs_modulus_mpa > SOFT_MAX_MPA {
-        return Err(MaterialError::Units(spec.youngs_modulus_mpa));
+    let ([low, high], value) = (believed_mpa(tissue), spec.youngs_modulus_mpa);
+    if value < low || value > high {
+        return Err(MaterialError::Units { value, low, high });
     }
-    spec.ogden.as_ref().map_or(Ok(()), |o| o.law().map(drop))?;
+    if let Some(ogden) = &spec.ogden {
+        let (law, _) = ogden.law()?;
+        let mu0 = law.shear_modulus_mpa();
+        if 3.0 * mu0 > high {
+            return Err(MaterialError::OgdenUnits(mu0));
+        }
+    }
     spec.prony.as_ref().map_or(Ok(()), |p| p.series().map(drop))
 }

@@ -44,6 +44,13 @@ impl<'a> Solver<'a> {
         self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
     }
 
+    /// Largest amount of the indenter's work at an equilibrium so far, mJ: what energies are
+    /// small against once the indenter has given its work back.
+    #[must_use]
+    pub fn indenter_work_mj_max(&self) -> f64 {
+        self.indenter_work_mj().abs().max(self.work.largest_mj)
+    }
+
     /// History of an element's quadrature points at the equilibrium; empty for
     /// materials without memory.
     #[must_use]

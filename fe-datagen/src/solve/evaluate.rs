@@ -32,6 +32,8 @@ pub(crate) struct Evaluation {
     pub gap_error_mm: f64,
     /// Smallest `J`.
     pub j_min: f64,
+    /// Block and element where it is.
+    pub j_min_at: [usize; 2],
     /// Sum of contact forces on the body, N.
     pub contact_force_n: [f64; 3],
     /// What of it is normal, N.
@@ -122,7 +124,9 @@ fn elements(
                 .evaluate(geometry.element(e), &local[..n], memory, &mut force[..n], stiffness)
                 .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
             out.stored_mj += state.energy_mj;
-            out.j_min = out.j_min.min(state.j_min);
+            if state.j_min < out.j_min {
+                (out.j_min, out.j_min_at) = (state.j_min, [b, e]);
+            }
             for (f, &node) in force.iter().zip(nodes) {
                 for i in 0..3 {
                     out.residual_n[3 * node as usize + i] += f[i];

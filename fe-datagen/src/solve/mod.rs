@@ -2,6 +2,7 @@
 
 mod answers;
 pub(crate) mod evaluate;
+mod free;
 mod loading;
 mod memory;
 mod newton;
@@ -11,6 +12,7 @@ mod stepping;
 mod work;
 
 pub use evaluate::Balance;
+pub use free::{FreeMode, FreePart};
 pub use loading::{Loading, MovingIndenter};
 pub use memory::{EnergySplit, MemoryLayout};
 pub use newton::Effort;
@@ -34,6 +36,8 @@ pub struct Options {
     pub augmentations_max: u32,
     /// Halvings of one load increment before the solve is given up.
     pub cuts_max: u32,
+    /// Load steps of one increment before the solve is given up.
+    pub steps_max: u32,
     /// Iterations of conjugate gradients after which the tangent is factorized afresh.
     pub cg_max: u32,
     /// A linear solve that needed more than this makes the next one refactorize.
@@ -59,6 +63,7 @@ impl Default for Options {
             newton_max: 40,
             augmentations_max: 12,
             cuts_max: 10,
+            steps_max: 10_000,
             cg_max: 60,
             refactor_after_cg: 8,
             line_search_max: 12,
@@ -134,15 +139,20 @@ pub enum SolveError {
         /// Error of the last try.
         cause: StepError,
     },
+    /// Materials with memory asked for ever more and shorter time steps.
+    #[error("no end in sight at load fraction {reached:.6} after {steps} load steps")]
+    StepsExhausted {
+        /// Last load fraction in equilibrium.
+        reached: f64,
+        /// Steps done.
+        steps: u32,
+    },
     /// The factor does not fit in memory.
     #[error(transparent)]
     Factor(#[from] FactorErrorText),
-    /// A degree of freedom can move freely.
-    #[error(
-        "the body can move as a rigid whole: the tangent at rest is singular. Constrain it \
-         (fixed surfaces: bone, nail, base) or add contact that holds it"
-    )]
-    RigidBodyMode,
+    /// A part of the body can move freely.
+    #[error(transparent)]
+    RigidBodyMode(#[from] FreePart),
 }
 
 /// [`FactorError`] as a value that can be cloned and compared.

@@ -30,6 +30,10 @@ pub struct Effort {
     pub augmentations: u32,
     /// Halved load steps.
     pub cuts: u32,
+    /// Equilibria found.
+    pub steps: u32,
+    /// Halved Newton steps.
+    pub backtracks: u32,
     /// Elements and contact, s.
     pub assemble_s: f64,
     /// Numeric factorization, s.
@@ -50,6 +54,8 @@ impl Effort {
             cg_iterations: self.cg_iterations + other.cg_iterations,
             augmentations: self.augmentations + other.augmentations,
             cuts: self.cuts + other.cuts,
+            steps: self.steps + other.steps,
+            backtracks: self.backtracks + other.backtracks,
             assemble_s: self.assemble_s + other.assemble_s,
             factor_s: self.factor_s + other.factor_s,
             solve_s: self.solve_s + other.solve_s,
@@ -67,6 +73,8 @@ impl Effort {
             cg_iterations: self.cg_iterations - earlier.cg_iterations,
             augmentations: self.augmentations - earlier.augmentations,
             cuts: self.cuts - earlier.cuts,
+            steps: self.steps - earlier.steps,
+            backtracks: self.backtracks - earlier.backtracks,
             assemble_s: self.assemble_s - earlier.assemble_s,
             factor_s: self.factor_s - earlier.factor_s,
             solve_s: self.solve_s - earlier.solve_s,
@@ -102,11 +110,15 @@ pub(super) struct Newton<'a> {
     pub problem: &'a Problem,
     pub options: Options,
     pub penalty: f64,
+    /// Forces below this are rounding of a body at rest, N.
+    pub rounding_force_n: f64,
     pub effort: Effort,
     factorizer: Factorizer,
     tangent: SymmetricMatrix,
     /// Renew the factor at the next linear solve.
     stale: bool,
+    /// See [`Factorizer::condition_at_least`]; of the last Cholesky factor.
+    pub condition: f64,
     cg: CgWorkspace,
     right: Vec<f64>,
     step: Vec<f64>,
@@ -122,10 +134,12 @@ impl<'a> Newton<'a> {
             problem,
             options,
             penalty: options.penalty_mpa_per_mm.unwrap_or_else(|| problem.penalty_mpa_per_mm()),
+            rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
             factorizer: Factorizer::new(&problem.structure)?,
             tangent: problem.structure.zeros(),
             stale: true,
+            condition: f64::NAN,
             cg: CgWorkspace::default(),
             right: vec![0.0; n],
             step: vec![0.0; n],
@@ -138,6 +152,7 @@ impl<'a> Newton<'a> {
     /// Forgets the factor, so that a new press does not depend on the last one.
     pub(super) fn forget(&mut self) {
         self.stale = true;
+        self.condition = f64::NAN;
         self.effort = Effort::default();
     }
 
@@ -150,8 +165,7 @@ impl<'a> Newton<'a> {
         u: &mut [[f64; 3]],
     ) -> Result<(), StepError> {
         self.evaluate(fixed, u)?;
-        // Forces below this are rounding of a body at rest.
-        let floor = 1e-13 * self.force_scale_n();
+        let floor = self.rounding_force_n;
         let mut previous = f64::INFINITY;
         for iteration in 0..=self.options.newton_max {
             let (norm, reference) = (self.current.residual_norm, self.current.reference_norm);
@@ -160,7 +174,14 @@ impl<'a> Newton<'a> {
             if norm <= tolerance * reference || norm <= floor {
                 return Ok(());
             }
-            if iteration == self.options.newton_max {
+            let last = iteration == self.options.newton_max;
+            // Nearly incompressible bodies round more than is asked of the residual: where it
+            // no longer falls, what is left is as good as it gets.
+            if (norm > 0.5 * previous || (last && iteration > 0)) && norm <= self.rounding_n(u) {
+                tracing::debug!(residual = norm / reference, "the residual is down to rounding");
+                return Ok(());
+            }
+            if last {
                 break;
             }
             self.assemble(fixed, u)?;
@@ -200,21 +221,6 @@ impl<'a> Newton<'a> {
         let wanted = if previous.is_finite() { gamma * ratio * ratio } else { first };
         let enough = 0.3 * target / norm;
         wanted.min(first).max(enough).min(0.3)
-    }
-
-    /// A force typical of the body: its soft tissue's shear modulus times its extent
-    /// squared.
-    fn force_scale_n(&self) -> f64 {
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for p in &self.problem.mesh.nodes {
-            for i in 0..3 {
-                low[i] = low[i].min(p[i]);
-                high[i] = high[i].max(p[i]);
-            }
-        }
-        let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
-        self.problem.soft_mpa() * extent * extent
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
@@ -301,6 +307,10 @@ impl<'a> Newton<'a> {
         if !definite && self.convexify() {
             definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
         }
+        if let Some(condition) = self.factorizer.condition_at_least(structure) {
+            self.condition = condition;
+            tracing::trace!(condition, "tangent factorized");
+        }
         if !definite {
             tracing::debug!("tangent not positive definite: L B L^T");
             self.effort.indefinite_factorizations += 1;
@@ -339,13 +349,31 @@ impl<'a> Newton<'a> {
             if found.is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
                 if falls || self.trial.residual_norm < 0.5 * norm {
+                    if length < 1.0 {
+                        tracing::trace!(length, energy, "newton step shortened");
+                    }
                     u.copy_from_slice(&self.trial_u);
                     std::mem::swap(&mut self.current, &mut self.trial);
                     return Ok(());
                 }
             }
+            self.effort.backtracks += 1;
             length *= 0.5;
         }
         Err(StepError::LineSearch { residual: norm / self.current.reference_norm })
     }
+}
+
+/// A force typical of the body: its soft tissue's shear modulus times its extent squared.
+fn force_scale_n(problem: &Problem) -> f64 {
+    let mut low = [f64::INFINITY; 3];
+    let mut high = [f64::NEG_INFINITY; 3];
+    for p in &problem.mesh.nodes {
+        for i in 0..3 {
+            low[i] = low[i].min(p[i]);
+            high[i] = high[i].max(p[i]);
+        }
+    }
+    let extent = (0..3).map(|i| high[i] - low[i]).fold(0.0, f64::max);
+    problem.soft_mpa() * extent * extent
 }

@@ -13,6 +13,10 @@ use crate::element::Memory;
 /// Least share of its way that the friction bound goes in one update.
 const RELAX_MIN: f64 = 0.1;
 
+/// Least load fraction of a time step: what relaxes within it has relaxed at its end, and
+/// its history is exact for what changes linearly.
+const PACE_MIN: f64 = 1e-9;
+
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
     pub(super) newton: Newton<'a>,
@@ -60,6 +64,11 @@ pub struct StepReport {
     pub dissipated_mj: f64,
     /// Smallest `J`.
     pub j_min: f64,
+    /// Block of the mesh and element in it where it is.
+    pub j_min_at: [usize; 2],
+    /// The tangent's condition number is at least this, by the diagonal of its last
+    /// Cholesky factor; not a number if there has been none.
+    pub condition_at_least: f64,
     /// Work since the last report.
     pub effort: Effort,
 }
@@ -68,8 +77,10 @@ impl<'a> Solver<'a> {
     /// Memory for solving `problem`.
     ///
     /// # Errors
-    /// [`SolveError::Factor`] if the factor does not fit in memory.
+    /// [`SolveError::Factor`] if the factor does not fit in memory,
+    /// [`SolveError::RigidBodyMode`] if a part of the body is not held.
     pub fn new(problem: &'a Problem, options: Options) -> Result<Self, SolveError> {
+        problem.is_held()?;
         let mut solver = Self {
             newton: Newton::new(problem, options)?,
             loading: Loading::default(),
@@ -133,35 +144,86 @@ impl<'a> Solver<'a> {
     /// many equilibria as it takes.
     ///
     /// # Errors
-    /// [`SolveError::CutsExhausted`]; the state is then the last equilibrium.
+    /// [`SolveError::CutsExhausted`] and [`SolveError::StepsExhausted`]; the state is then
+    /// the last equilibrium.
     pub fn advance_to(&mut self, target: f64) -> Result<StepReport, SolveError> {
         let first = self.newton.effort;
+        let found = self.steps_to(target);
+        let report = self.report(&first);
+        let StepReport { load_fraction, j_min, condition_at_least, effort, .. } = report;
+        if let Err(error) = found {
+            let [block, element] = report.j_min_at;
+            tracing::warn!(
+                reached = load_fraction, target, %error, j_min, block, element, condition_at_least,
+                cuts = effort.cuts, iterations = effort.newton_iterations, "solve given up"
+            );
+            return Err(error);
+        }
+        tracing::debug!(
+            load_fraction,
+            steps = effort.steps,
+            cuts = effort.cuts,
+            iterations = effort.newton_iterations,
+            j_min,
+            condition_at_least,
+            "increment done"
+        );
+        Ok(report)
+    }
+
+    fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {
         let mut step = self.paced(target - self.state.fraction);
-        let mut cuts = 0;
+        let (mut cuts, mut steps) = (0, 0);
         while self.state.fraction < target {
-            let next = if self.state.fraction + 1.000_001 * step >= target {
-                target
-            } else {
-                self.state.fraction + step
-            };
+            let reached = self.state.fraction;
+            if steps == self.newton.options.steps_max {
+                self.settle();
+                return Err(SolveError::StepsExhausted { reached, steps });
+            }
+            let end = reached + 1.000_001 * step >= target;
+            let next = if end { target } else { reached + step };
             match self.try_step(next) {
-                Ok(()) => step = self.paced(1.5 * step),
+                Ok(()) => {
+                    steps += 1;
+                    self.newton.effort.steps += 1;
+                    step = self.paced(1.5 * step);
+                }
                 Err(cause) => {
                     cuts += 1;
                     self.newton.effort.cuts += 1;
-                    tracing::debug!(reached = self.state.fraction, next, %cause, "load step cut");
+                    tracing::debug!(reached, next, %cause, "load step cut");
                     if cuts > self.newton.options.cuts_max {
-                        return Err(SolveError::CutsExhausted {
-                            reached: self.state.fraction,
-                            cuts: cuts - 1,
-                            cause,
-                        });
+                        self.settle();
+                        return Err(SolveError::CutsExhausted { reached, cuts: cuts - 1, cause });
                     }
-                    step = 0.5 * (next - self.state.fraction);
+                    step = 0.5 * (next - reached);
                 }
             }
         }
-        Ok(self.report(&first))
+        Ok(())
+    }
+
+    /// After a step that failed: forces and tractions are again those of the last equilibrium.
+    fn settle(&mut self) {
+        let State { fraction, u, multipliers, memory, friction } = &self.state;
+        let fixed = Fixed {
+            loading: &self.loading,
+            load_fraction: *fraction,
+            multipliers,
+            memory: Memory { history: memory, dt_s: 0.0 },
+            friction: (!friction.nodes.is_empty()).then_some(friction),
+        };
+        // It was in equilibrium: nothing in it is inverted.
+        if let Err(error) = self.newton.evaluate(fixed, u) {
+            tracing::warn!(%error, "the last equilibrium cannot be evaluated");
+        }
+    }
+
+    /// Force that is told from rounding, N: what is small is measured by it where nothing
+    /// touches.
+    #[must_use]
+    pub fn least_force_n(&self) -> f64 {
+        self.newton.rounding_force_n / self.newton.options.residual_tolerance
     }
 
     fn report(&self, since: &Effort) -> StepReport {
@@ -174,11 +236,13 @@ impl<'a> Solver<'a> {
         };
         StepReport {
             load_fraction: self.state.fraction,
-            residual_relative: e.residual_norm / e.reference_norm.max(f64::MIN_POSITIVE),
+            residual_relative: e.residual_norm / e.reference_norm.max(self.least_force_n()),
             gap_error_mm: e.gap_error_mm,
             stored_mj: energy.stored_mj,
             dissipated_mj: energy.dissipated_mj + self.state.friction.heat_mj,
             j_min: e.j_min,
+            j_min_at: e.j_min_at,
+            condition_at_least: self.newton.condition,
             effort: self.newton.effort.since(since),
         }
     }
@@ -189,7 +253,8 @@ impl<'a> Solver<'a> {
         match self.augmented(next, &mut trial) {
             Ok(()) => {}
             // The extrapolation may be what failed: once more from the last equilibrium.
-            Err(_) if self.before.is_some() => {
+            Err(cause) if self.before.is_some() => {
+                tracing::debug!(next, %cause, "extrapolated start failed");
                 trial = self.state.clone();
                 self.prescribe(next, &mut trial.u);
                 self.augmented(next, &mut trial)?;
@@ -222,7 +287,7 @@ impl<'a> Solver<'a> {
 
     /// `step`, no longer than time integration allows.
     fn paced(&self, step: f64) -> f64 {
-        self.pace.map_or(step, |p| step.min(p))
+        self.pace.map_or(step, |p| step.min(p.max(PACE_MIN)))
     }
 
     /// Sets the next time step by how far linear extrapolation missed this one:

@@ -11,6 +11,8 @@ pub(super) struct Work {
     last: ([f64; 3], [f64; 3]),
     /// Trapezoidal sum of any other path, mJ.
     sum_mj: f64,
+    /// Its largest amount so far.
+    pub largest_mj: f64,
 }
 
 impl Work {
@@ -27,6 +29,7 @@ impl Work {
         let (from, before) = self.last;
         self.sum_mj +=
             (0..3).map(|i| 0.5 * (before[i] + force[i]) * (offset[i] - from[i])).sum::<f64>();
+        self.largest_mj = self.largest_mj.max(self.sum_mj.abs());
         self.last = (offset, force);
     }
 

@@ -13,7 +13,7 @@ use crate::solve::{Loading, Materials, Options, Problem, Solver, StepError, Step
 use std::collections::HashMap;
 
 /// The same material for every tissue.
-pub(super) fn uniform(e_mpa: f64, nu: f64) -> Result<Materials, MaterialError> {
+pub(crate) fn uniform(e_mpa: f64, nu: f64) -> Result<Materials, MaterialError> {
     let constants = ElasticConstants { youngs_modulus_mpa: e_mpa, poissons_ratio: nu };
     let [mu_mpa, bulk_mpa] = constants.moduli_mpa()?;
     let solid = Elastic::shared(NeoHookean { mu_mpa }, bulk_mpa);
@@ -21,12 +21,12 @@ pub(super) fn uniform(e_mpa: f64, nu: f64) -> Result<Materials, MaterialError> {
 }
 
 /// Options that drive the residual to rounding.
-pub(super) fn tight() -> Options {
+pub(crate) fn tight() -> Options {
     Options { residual_tolerance: 1e-12, ..Options::default() }
 }
 
 /// A repeatable number in `[-1, 1]` (splitmix64).
-pub(super) fn noise(seed: u64) -> f64 {
+pub(crate) fn noise(seed: u64) -> f64 {
     let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -35,7 +35,7 @@ pub(super) fn noise(seed: u64) -> f64 {
 
 /// Meshes `axes` with elements of `kind`, all of one tissue, nodes moved by
 /// `map`. Planar elements take the first two axes.
-pub(super) fn lattice(
+pub(crate) fn lattice(
     kind: ElementKind,
     mut axes: [Vec<f64>; 3],
     map: impl Fn([f64; 3]) -> [f64; 3],
@@ -116,7 +116,7 @@ pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
 
 /// Coordinates from 0: steps of `h` up to `fine`, then growing by `ratio` up to
 /// `end` exactly; an even number of intervals, as quadratic elements need.
-pub(super) fn graded(h: f64, fine: f64, ratio: f64, end: f64) -> Vec<f64> {
+pub(crate) fn graded(h: f64, fine: f64, ratio: f64, end: f64) -> Vec<f64> {
     let n = (fine / h).round() as usize;
     let mut axis: Vec<f64> = (0..=n).map(|i| h * i as f64).collect();
     let start = axis[n];
@@ -137,7 +137,7 @@ pub(super) fn graded(h: f64, fine: f64, ratio: f64, end: f64) -> Vec<f64> {
 
 /// A quarter of a half-space `z <= 0`, symmetric about `x = 0` and `y = 0`,
 /// refined at the origin, far sides `end` away, the bottom held.
-pub(super) fn quarter_space(
+pub(crate) fn quarter_space(
     kind: ElementKind,
     h: f64,
     fine: f64,
@@ -161,7 +161,7 @@ pub(super) fn quarter_space(
 }
 
 /// Faces of which every node satisfies `keep`.
-pub(super) fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
+pub(crate) fn part(surface: &Surface, keep: impl Fn(u32) -> bool) -> Surface {
     let faces = surface.faces().filter(|f| f.iter().all(|&n| keep(n)));
     Surface { kind: surface.kind, connectivity: faces.flatten().copied().collect() }
 }
@@ -179,7 +179,7 @@ pub(crate) fn hold(mesh: &Mesh, sets: &[(&str, [bool; 3])]) -> Vec<bool> {
     fixed
 }
 
-pub(super) fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
+pub(crate) fn merge(mut a: Vec<bool>, b: &[bool]) -> Vec<bool> {
     for (x, y) in a.iter_mut().zip(b) {
         *x |= y;
     }
@@ -213,7 +213,7 @@ pub(crate) fn prescribe(
 }
 
 /// Solves `loading` in `steps` equal steps and hands over the solver.
-pub(super) fn solve<'a>(
+pub(crate) fn solve<'a>(
     problem: &'a Problem,
     loading: Loading,
     options: Options,
@@ -244,13 +244,13 @@ pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f6
 }
 
 /// Deformation and stress at one quadrature point.
-pub(super) struct Point {
+pub(crate) struct Point {
     /// First Piola-Kirchhoff stress, MPa.
     pub stress: Mat3,
 }
 
 /// Visits every quadrature point of the body.
-pub(super) fn points(
+pub(crate) fn points(
     problem: &Problem,
     u: &[[f64; 3]],
     visit: &mut dyn FnMut(Point),
@@ -274,6 +274,6 @@ pub(super) fn points(
 }
 
 /// Largest entry by magnitude.
-pub(super) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
+pub(crate) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, |m, v| if v.is_nan() { f64::NAN } else { m.max(v.abs()) })
 }

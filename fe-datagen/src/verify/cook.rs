@@ -79,6 +79,18 @@ fn planar() -> Result<Vec<Check>, CaseError> {
 
 /// Rise of the middle of the loaded end under 1 N per mm of thickness.
 fn rise_mm(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
+    let (problem, loading, tip) = membrane(kind, cells, nu)?;
+    let options = Options { residual_tolerance: 1e-9, ..Options::default() };
+    let (solver, _) = solve(&problem, loading, options, 4)?;
+    Ok(solver.displacement_mm()[tip][1])
+}
+
+/// The membrane, its load and the node in the middle of the loaded end.
+pub(crate) fn membrane(
+    kind: ElementKind,
+    cells: usize,
+    nu: f64,
+) -> Result<(Problem, Loading, usize), CaseError> {
     let step = intervals(kind);
     let n = step * cells;
     let mesh = lattice(kind, [even(1.0, n), even(1.0, n), even(1.0, step)], |[s, t, z]| {
@@ -99,8 +111,5 @@ fn rise_mm(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
     let middle = |p: &[f64; 3]| p[0] > 47.999 && (p[1] - 52.0).abs() < 1e-6;
     let tip = mesh.nodes.iter().position(middle).ok_or("no node in the middle of the end")?;
     let problem = Problem::new(mesh, uniform(2.0 * MU_MPA * (1.0 + nu), nu)?, fixed, None)?;
-    let loading = Loading { dead_n, ..Loading::default() };
-    let options = Options { residual_tolerance: 1e-9, ..Options::default() };
-    let (solver, _) = solve(&problem, loading, options, 4)?;
-    Ok(solver.displacement_mm()[tip][1])
+    Ok((problem, Loading { dead_n, ..Loading::default() }, tip))
 }

@@ -34,9 +34,19 @@ pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     Ok(rows)
 }
 
-/// Force on a quarter of a 10 x 10 x 5 mm block squeezed by 0.75 mm; of planar
-/// elements on half of a 10 x 5 mm section, 1 mm long.
 fn force_n(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
+    let (problem, loading, up) = squeezed(kind, cells, nu)?;
+    let (solver, _) = solve(&problem, loading, Options::default(), 3)?;
+    Ok(solver.balance().contact_force_n[up].abs())
+}
+
+/// The problem of a quarter of a 10 x 10 x 5 mm block squeezed by 0.75 mm; of planar
+/// elements of half of a 10 x 5 mm section, 1 mm long. The number is the axis of the squeeze.
+pub(crate) fn squeezed(
+    kind: ElementKind,
+    cells: usize,
+    nu: f64,
+) -> Result<(Problem, Loading, usize), CaseError> {
     let n = intervals(kind) * cells;
     let mesh = lattice(kind, [even(5.0, n), even(5.0, n), even(5.0, n)], |p| p);
     let up = kind.dimension() - 1;
@@ -56,6 +66,5 @@ fn force_n(kind: ElementKind, cells: usize, nu: f64) -> Result<f64, CaseError> {
     let start = Placement { rotation, origin_mm: along(7.0) };
     let indenter = MovingIndenter::straight(plate, start, along(-0.75));
     let loading = Loading { indenter: Some(indenter), ..Loading::default() };
-    let (solver, _) = solve(&problem, loading, Options::default(), 3)?;
-    Ok(solver.balance().contact_force_n[up].abs())
+    Ok((problem, loading, up))
 }

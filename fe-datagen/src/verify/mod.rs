@@ -5,8 +5,8 @@
 
 pub(crate) mod bodies;
 mod check;
-mod cook;
-mod coulomb;
+pub(crate) mod cook;
+pub(crate) mod coulomb;
 mod density;
 mod disc;
 mod file;
@@ -14,13 +14,13 @@ mod finger;
 mod half_plane;
 mod hertz;
 mod increments;
-mod locking;
+pub(crate) mod locking;
 mod manufactured;
 mod mirror;
 mod ogden;
 mod patch;
 mod punch;
-mod relaxation;
+pub(crate) mod relaxation;
 mod report;
 mod ring;
 mod solid_parts;

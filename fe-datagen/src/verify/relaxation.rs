@@ -13,9 +13,9 @@ use std::sync::Arc;
 
 const RELAXATION: &str = "closed form: K + 4/3 mu G(t), convolved with the ramp";
 const CREEP: &str = "closed form: creep compliance of one Prony term";
-const MU_MPA: f64 = 0.03;
-const BULK_MPA: f64 = 0.2;
-const HEIGHT_MM: f64 = 2.0;
+pub(crate) const MU_MPA: f64 = 0.03;
+pub(crate) const BULK_MPA: f64 = 0.2;
+pub(crate) const HEIGHT_MM: f64 = 2.0;
 
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let mut rows = relaxation()?;
@@ -24,7 +24,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
 }
 
 /// A column of 1 mm2 that can only change its height.
-fn column(prony: Prony) -> Result<Problem, CaseError> {
+pub(crate) fn column(prony: Prony) -> Result<Problem, CaseError> {
     let axes = [even(1.0, 2), even(1.0, 2), even(HEIGHT_MM, 4)];
     let mesh: Mesh = lattice(ElementKind::Hex8, axes, |p| p);
     let sides = [true, true, false];

@@ -19,7 +19,17 @@ struct Builder<'a> {
     number: HashMap<u32, u32>,
     /// Solid elements of each side, by sorted corners: tissue and outward corners.
     owners: HashMap<Vec<u32>, Vec<(Tissue, Vec<u32>)>>,
+    /// Line and tag of each solid element, by sorted corners.
+    seen: HashMap<Vec<u32>, (usize, u64)>,
 }
+
+/// Least share of a brick's volume, by its angles, that an element may keep.
+const SCALED_JACOBIAN_MIN: f64 = 1e-3;
+/// Most that an element may be longer than thick: stiffness goes with the square, and
+/// preconditioners are of single precision.
+const ASPECT_MAX: f64 = 1e4;
+/// Extents that are believed to be in mm: a finger is 25 mm long, a ridge 0.5 mm wide.
+const EXTENT_MM: [f64; 2] = [0.1, 1000.0];
 
 pub(super) fn build(raw: &Raw) -> Result<Mesh, GmshError> {
     let mut b = Builder {
@@ -28,6 +38,7 @@ pub(super) fn build(raw: &Raw) -> Result<Mesh, GmshError> {
         mesh: Mesh::default(),
         number: HashMap::new(),
         owners: HashMap::new(),
+        seen: HashMap::new(),
     };
     let dimension = if b.planar { 2 } else { 3 };
     for block in raw.blocks.iter().filter(|b| b.entity.0 == dimension) {
@@ -36,6 +47,7 @@ pub(super) fn build(raw: &Raw) -> Result<Mesh, GmshError> {
     if b.mesh.blocks.is_empty() {
         return Err(GmshError::NoSolid);
     }
+    b.check_units()?;
     for block in raw.blocks.iter().filter(|b| b.entity.0 < dimension) {
         for name in b.group_names(block)? {
             if block.entity.0 == dimension - 1 {
@@ -144,6 +156,7 @@ impl Builder<'_> {
                 nodes = turned.iter().map(|&i| nodes[i]).collect();
             }
             self.check_shape(solid.kind, &nodes, element)?;
+            self.check_single(&nodes[..corners(solid.kind)], element)?;
             for side in solid.kind.sides() {
                 let corners: Vec<u32> = side.iter().map(|&c| nodes[c]).collect();
                 self.owners.entry(sorted(&corners)).or_default().push((tissue, corners));
@@ -200,6 +213,55 @@ impl Builder<'_> {
             if !(determinant > 0.0) {
                 return Err(GmshError::InvertedElement { line, element, determinant });
             }
+            let edges = self.edges(kind, nodes, &gradient);
+            let shape = determinant / edges.iter().product::<f64>();
+            if shape < SCALED_JACOBIAN_MIN {
+                return Err(GmshError::Sliver { line, element, shape, least: SCALED_JACOBIAN_MIN });
+            }
+            let longest = edges.iter().copied().fold(0.0, f64::max);
+            let aspect = longest / edges.iter().copied().fold(f64::INFINITY, f64::min);
+            if aspect > ASPECT_MAX {
+                return Err(GmshError::Aspect { line, element, aspect, most: ASPECT_MAX });
+            }
+        }
+        Ok(())
+    }
+
+    /// Lengths of the columns of `dX/dxi`, mm.
+    fn edges(&self, kind: ElementKind, nodes: &[u32], gradient: &[[f64; 3]]) -> Vec<f64> {
+        let column = |k: usize| -> [f64; 3] {
+            std::array::from_fn(|i| {
+                let of = |(&n, d): (&u32, &[f64; 3])| self.mesh.nodes[n as usize][i] * d[k];
+                nodes.iter().zip(gradient).map(of).sum()
+            })
+        };
+        (0..kind.dimension()).map(|k| crate::mesh::surface::norm(column(k))).collect()
+    }
+
+    /// An element on the corners of another would count its material twice.
+    fn check_single(
+        &mut self,
+        corners: &[u32],
+        &(line, element, _): &(usize, u64, Vec<u64>),
+    ) -> Result<(), GmshError> {
+        match self.seen.insert(sorted(corners), (line, element)) {
+            Some((first_line, first)) => {
+                Err(GmshError::DuplicateElement { line, element, first, first_line })
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn check_units(&self) -> Result<(), GmshError> {
+        let along = |i: usize| {
+            let of = self.mesh.nodes.iter().map(move |p| p[i]);
+            of.clone().fold(f64::NEG_INFINITY, f64::max) - of.fold(f64::INFINITY, f64::min)
+        };
+        let extent = (0..3).map(along).fold(0.0, f64::max);
+        let [least, most] = EXTENT_MM;
+        let meant = if extent < least { "m" } else { "um" };
+        if extent < least || extent > most {
+            return Err(GmshError::Units { extent, least, most, meant });
         }
         Ok(())
     }
@@ -247,6 +309,11 @@ impl Builder<'_> {
         }
         Ok(())
     }
+}
+
+/// Corner nodes, which come first.
+fn corners(kind: ElementKind) -> usize {
+    kind.sides().iter().copied().flatten().max().map_or(0, |last| last + 1)
 }
 
 fn sorted(nodes: &[u32]) -> Vec<u32> {

@@ -168,6 +168,66 @@ pub enum GmshError {
         /// Smallest Jacobian determinant found.
         determinant: f64,
     },
+    /// An element all but folds.
+    #[error(
+        "line {line}: element {element} is a sliver: its angles leave it {shape:.1e} of the volume of a \
+         brick with its edges, {least:.0e} is the least; remesh there (Gmsh: Tools > Statistics finds them)"
+    )]
+    Sliver {
+        /// Line.
+        line: usize,
+        /// Element tag.
+        element: u64,
+        /// Least scaled Jacobian at a quadrature point.
+        shape: f64,
+        /// Least that is accepted.
+        least: f64,
+    },
+    /// An element is far longer than thick.
+    #[error(
+        "line {line}: element {element} is {aspect:.1e} times as long as thick, at most {most:.0e} can be \
+         solved; are two of its nodes all but one?"
+    )]
+    Aspect {
+        /// Line.
+        line: usize,
+        /// Element tag.
+        element: u64,
+        /// Longest over shortest column of `dX/dxi`.
+        aspect: f64,
+        /// Most that is accepted.
+        most: f64,
+    },
+    /// Two elements on the same corners.
+    #[error(
+        "line {line}: element {element} has the same corners as element {first} of line {first_line}; \
+         remove one (Gmsh: Mesh > Reclassify or Coherence, or the volume is in the file twice)"
+    )]
+    DuplicateElement {
+        /// Line of the second.
+        line: usize,
+        /// Its tag.
+        element: u64,
+        /// Tag of the first.
+        first: u64,
+        /// Line of the first.
+        first_line: usize,
+    },
+    /// Lengths that no body under a fingertip-sized indenter has.
+    #[error(
+        "the mesh is {extent:.3e} mm across, {least} to {most} mm is believed: lengths in the file are taken \
+         as mm; was {meant} meant? In Gmsh scale it with Mesh.ScalingFactor"
+    )]
+    Units {
+        /// Largest extent, mm.
+        extent: f64,
+        /// Least that is believed, mm.
+        least: f64,
+        /// Most that is believed, mm.
+        most: f64,
+        /// Unit that would make it one.
+        meant: &'static str,
+    },
     /// A surface face on no solid element.
     #[error("line {line}: face {element} of surface '{name}' is no side of a solid element")]
     LooseFace {

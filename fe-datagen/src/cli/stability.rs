@@ -1,0 +1,110 @@
+//! `stability`: the named suite of hard cases, and random scenes by the thousand.
+
+use super::{CHECKS_FAILED, print};
+use crate::campaign::CampaignSpec;
+use crate::output::atomic;
+use crate::stability::scenes::{self, ScenesOptions};
+use crate::stability::{self, CASES};
+use anyhow::Context as _;
+use std::num::NonZero;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Run the hard cases: each converges to a right answer or is refused with a typed error.
+///
+/// Prints one line a variant: how it ended, how hard it was (iterations, cuts, smallest J,
+/// condition, balances) and the check that came nearest to its tolerance. With --scenes,
+/// presses random scenes of a campaign's distribution instead.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Exit code 3 if any case breaks its promise. docs/stability.md is the report.\n\
+                  Examples: fe-datagen stability --case snap-through\n          \
+                  fe-datagen stability --scenes 10000 --seed 5 --threads 2 --out out/stability"
+)]
+pub(super) struct Args {
+    /// Run only this case; may be given several times.
+    #[arg(long = "case", value_name = "NAME")]
+    cases: Vec<String>,
+    /// List the cases with their promises.
+    #[arg(long)]
+    list: bool,
+    /// Finer meshes and more problems.
+    #[arg(long)]
+    long: bool,
+    /// Print the lines as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write stability.md and stability.json into this folder; with --scenes the scenes'
+    /// record, by which a later run goes on.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Also write the report as Markdown to this file.
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Press this many random scenes of --campaign at density coarse, to their deepest state.
+    #[arg(long, value_name = "N", requires = "out")]
+    scenes: Option<NonZero<usize>>,
+    /// Seed of the random scenes.
+    #[arg(long, default_value_t = 5)]
+    seed: u64,
+    /// Scenes solved at a time.
+    #[arg(long, default_value = "1")]
+    threads: NonZero<usize>,
+    /// Campaign whose distribution the scenes are drawn from.
+    #[arg(long, value_name = "FILE", default_value = "campaigns/broad.toml")]
+    campaign: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    if args.list {
+        for case in CASES {
+            println!("{:<18} {}", case.name, case.promise);
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    match (args.scenes, &args.out) {
+        (Some(count), Some(out)) => {
+            let spec = CampaignSpec::read(&args.campaign)?;
+            let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
+            let report = scenes::run(&spec, out, &options)?;
+            if let Some(path) = &args.markdown {
+                write(path, &report.markdown())?;
+            }
+            print(&report, args.json, || report.to_string())?;
+            Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+        }
+        _ => suite(args),
+    }
+}
+
+fn suite(args: &Args) -> anyhow::Result<ExitCode> {
+    let names: Vec<_> = CASES.iter().map(|c| c.name).collect();
+    super::refuse_unknown(&args.cases, &names)?;
+    let wanted =
+        |c: &stability::Case| args.cases.is_empty() || args.cases.iter().any(|n| n == c.name);
+    let bar = super::progress("cases", CASES.iter().filter(|c| wanted(c)).count());
+    let report = stability::run(args.long, &wanted, &mut |_, lines| {
+        let Some(lines) = lines else { return };
+        bar.suspend(|| {
+            for line in lines.iter().filter(|_| !args.json) {
+                println!("{}", line.text());
+            }
+        });
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    if let Some(folder) = &args.out {
+        atomic::create_folder(folder)?;
+        atomic::write_json(&folder.join("stability.json"), &report)?;
+        write(&folder.join("stability.md"), &report.markdown())?;
+    }
+    if let Some(path) = &args.markdown {
+        write(path, &report.markdown())?;
+    }
+    print(&report, args.json, || report.summary())?;
+    Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}

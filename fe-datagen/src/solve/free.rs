@@ -1,0 +1,328 @@
+//! Parts of a body that nothing holds: found before anything is solved.
+//!
+//! A part is what elements connect. Its rigid motions are three translations and three
+//! rotations; the held degrees of freedom of its nodes, each a linear form of the six,
+//! have to leave none of them. What they leave is the null space of the forms' Gram
+//! matrix.
+
+use super::problem::Problem;
+use crate::mesh::Mesh;
+use std::collections::HashMap;
+use std::fmt;
+
+/// A rigid motion that nothing holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FreeMode {
+    /// Along a unit vector.
+    Slide([f64; 3]),
+    /// About an axis of this direction through the point, mm.
+    Turn([f64; 3], [f64; 3]),
+}
+
+/// A part that can move as a rigid whole.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "{part} can move freely: nothing keeps it from {motion}. Hold more of its surface \
+     (fixed surfaces: bone, nail, base); contact alone does not hold it{hint}",
+    part = self.part(), motion = self.motion(), hint = self.hint()
+)]
+pub struct FreePart {
+    /// Elements of the part, of how many.
+    pub elements: [usize; 2],
+    /// Middle of the part, mm.
+    pub middle_mm: [f64; 3],
+    /// What it can do.
+    pub modes: Vec<FreeMode>,
+    /// Nodes of the part that lie on nodes of another.
+    pub coincident_nodes: usize,
+}
+
+/// A motion is held if the forms see this share of it.
+const HELD: f64 = 1e-8;
+
+impl FreePart {
+    fn part(&self) -> String {
+        let [own, all] = self.elements;
+        if own == all {
+            return "the body".into();
+        }
+        let [x, y, z] = self.middle_mm;
+        format!(
+            "a part of {own} of the {all} elements around ({x:.3}, {y:.3}, {z:.3}) mm, connected \
+             to nothing else,"
+        )
+    }
+
+    fn motion(&self) -> String {
+        self.modes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    }
+
+    fn hint(&self) -> String {
+        match self.coincident_nodes {
+            0 => String::new(),
+            n => format!(
+                ". {n} of its nodes lie on nodes of another part: were the two meant to be one? In \
+                 Gmsh, Coherence Mesh merges them"
+            ),
+        }
+    }
+}
+
+impl fmt::Display for FreeMode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Slide(d) => write!(f, "moving along {}", direction(*d)),
+            Self::Turn(d, [x, y, z]) => {
+                let axis = direction(*d);
+                write!(f, "turning about {axis} through ({x:.3}, {y:.3}, {z:.3}) mm")
+            }
+        }
+    }
+}
+
+/// An axis by its name, another direction by its components.
+fn direction(d: [f64; 3]) -> String {
+    match d.iter().position(|v| v.abs() > 1.0 - 1e-6) {
+        Some(axis) => ["x", "y", "z"][axis].into(),
+        None => format!("({:.3}, {:.3}, {:.3})", d[0], d[1], d[2]),
+    }
+}
+
+impl Problem {
+    /// Whether every part of the body is held.
+    ///
+    /// # Errors
+    /// [`FreePart`], the first that is not.
+    pub fn is_held(&self) -> Result<(), FreePart> {
+        let part_of = parts(&self.mesh);
+        let count = part_of.iter().max().map_or(0, |p| *p as usize + 1);
+        let mut members = vec![Vec::new(); count];
+        for (node, part) in part_of.iter().enumerate() {
+            members[*part as usize].push(node);
+        }
+        for (part, nodes) in members.iter().enumerate() {
+            let modes = free_modes(&self.mesh, nodes, &self.fixed);
+            if !modes.is_empty() {
+                return Err(self.free_part(part as u32, nodes, modes, &part_of));
+            }
+        }
+        Ok(())
+    }
+
+    fn free_part(
+        &self,
+        part: u32,
+        nodes: &[usize],
+        modes: Vec<FreeMode>,
+        part_of: &[u32],
+    ) -> FreePart {
+        let mesh = &self.mesh;
+        let own = |b: &crate::mesh::Block| {
+            (0..b.len()).filter(|&e| part_of[b.element(e)[0] as usize] == part).count()
+        };
+        // Adding zero turns -0 into 0.
+        let key = |p: &[f64; 3]| p.map(|v| (v + 0.0).to_bits());
+        let others: std::collections::HashSet<_> = (0..part_of.len())
+            .filter(|&n| part_of[n] != part)
+            .map(|n| key(&mesh.nodes[n]))
+            .collect();
+        FreePart {
+            elements: [mesh.blocks.iter().map(own).sum(), mesh.element_count()],
+            middle_mm: middle(mesh, nodes),
+            modes,
+            coincident_nodes: nodes
+                .iter()
+                .filter(|&&n| others.contains(&key(&mesh.nodes[n])))
+                .count(),
+        }
+    }
+}
+
+/// Part of every node, numbered from 0 in the order of nodes.
+fn parts(mesh: &Mesh) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
+    fn root(parent: &mut [u32], mut n: u32) -> u32 {
+        while parent[n as usize] != n {
+            parent[n as usize] = parent[parent[n as usize] as usize];
+            n = parent[n as usize];
+        }
+        n
+    }
+    for block in &mesh.blocks {
+        for e in 0..block.len() {
+            let nodes = block.element(e);
+            let first = root(&mut parent, nodes[0]);
+            for &n in &nodes[1..] {
+                let other = root(&mut parent, n);
+                parent[other as usize] = first;
+            }
+        }
+    }
+    let mut number = HashMap::new();
+    (0..mesh.nodes.len() as u32)
+        .map(|n| {
+            let next = number.len() as u32;
+            *number.entry(root(&mut parent, n)).or_insert(next)
+        })
+        .collect()
+}
+
+fn middle(mesh: &Mesh, nodes: &[usize]) -> [f64; 3] {
+    let sum = |i: usize| nodes.iter().map(|&n| mesh.nodes[n][i]).sum::<f64>();
+    std::array::from_fn(|i| sum(i) / nodes.len() as f64)
+}
+
+/// Motions of a part that its held degrees of freedom leave.
+fn free_modes(mesh: &Mesh, nodes: &[usize], fixed: &[bool]) -> Vec<FreeMode> {
+    let centre = middle(mesh, nodes);
+    let arm = |n: usize| -> [f64; 3] { std::array::from_fn(|i| mesh.nodes[n][i] - centre[i]) };
+    let size = nodes.iter().map(|&n| crate::mesh::surface::norm(arm(n))).fold(0.0, f64::max);
+    let scale = if size > 0.0 { size } else { 1.0 };
+    let mut gram = [[0.0; 6]; 6];
+    let mut count = 0.0;
+    for &n in nodes {
+        let r = arm(n).map(|v| v / scale);
+        for i in (0..3).filter(|&i| fixed[3 * n + i]) {
+            // u = t + w x r.
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let mut form = [0.0; 6];
+            (form[i], form[3 + j], form[3 + k]) = (1.0, r[k], -r[j]);
+            for a in 0..6 {
+                for b in 0..6 {
+                    gram[a][b] += form[a] * form[b];
+                }
+            }
+            count += 1.0;
+        }
+    }
+    let (values, vectors) = eigen(gram);
+    let free = (0..6).filter(|&a| values[a] <= HELD * f64::max(count, 1.0));
+    reduced(free.map(|a| vectors[a]).collect())
+        .into_iter()
+        .map(|v| mode([v[0], v[1], v[2]], [v[3], v[4], v[5]].map(|w| w / scale), centre))
+        .collect()
+}
+
+/// The motion of translation `t` and rotation `w` about `centre`.
+fn mode(t: [f64; 3], w: [f64; 3], centre: [f64; 3]) -> FreeMode {
+    let norm = crate::mesh::surface::norm;
+    let (slide, turn) = (norm(t), norm(w));
+    if turn <= 1e-9 * slide {
+        return FreeMode::Slide(t.map(|v| v / slide));
+    }
+    // The point of the axis next to the centre: w x t / |w|^2.
+    let cross = [w[1] * t[2] - w[2] * t[1], w[2] * t[0] - w[0] * t[2], w[0] * t[1] - w[1] * t[0]];
+    let through = std::array::from_fn(|i| centre[i] + cross[i] / (turn * turn) + 0.0);
+    FreeMode::Turn(w.map(|v| v / turn), through)
+}
+
+/// The same space by vectors of which each has an entry that the others lack: single
+/// translations and rotations where the space holds them.
+fn reduced(mut rows: Vec<[f64; 6]>) -> Vec<[f64; 6]> {
+    let mut done = 0;
+    // Rotations first, so that what is left over are pure translations.
+    for column in [3, 4, 5, 0, 1, 2] {
+        let size = |r: &[f64; 6]| r[column].abs();
+        let Some(best) =
+            (done..rows.len()).max_by(|&a, &b| size(&rows[a]).total_cmp(&size(&rows[b])))
+        else {
+            break;
+        };
+        if size(&rows[best]) < 1e-6 {
+            continue;
+        }
+        rows.swap(done, best);
+        let pivot = rows[done].map(|v| v / rows[done][column]);
+        rows[done] = pivot;
+        for (i, row) in rows.iter_mut().enumerate() {
+            if i != done {
+                let factor = row[column];
+                for (v, p) in row.iter_mut().zip(pivot) {
+                    *v -= factor * p;
+                }
+            }
+        }
+        done += 1;
+    }
+    let clean = |v: f64| if v.abs() < 1e-9 { 0.0 } else { v };
+    rows.into_iter().map(|r| r.map(clean)).collect()
+}
+
+/// Eigenvalues and eigenvectors (rows) of a symmetric 6 x 6 matrix by Jacobi's method.
+fn eigen(mut a: [[f64; 6]; 6]) -> ([f64; 6], [[f64; 6]; 6]) {
+    let mut v = [[0.0; 6]; 6];
+    for i in 0..6 {
+        v[i][i] = 1.0;
+    }
+    // Converges quadratically; ten sweeps are plenty for six columns.
+    for _ in 0..30 {
+        for p in 0..6 {
+            for q in p + 1..6 {
+                if a[p][q] == 0.0 {
+                    continue;
+                }
+                let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+                let t = tau.signum() / (tau.abs() + tau.hypot(1.0));
+                let c = 1.0 / t.hypot(1.0);
+                let s = t * c;
+                for k in 0..6 {
+                    (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+                }
+                for k in 0..6 {
+                    (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+                    (v[p][k], v[q][k]) = (c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]);
+                }
+                (a[p][q], a[q][p]) = (0.0, 0.0);
+            }
+        }
+    }
+    (std::array::from_fn(|i| a[i][i]), v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::element::ElementKind;
+    use crate::verify::bodies::{cube, hold};
+
+    fn modes(sets: &[(&str, [bool; 3])]) -> Vec<FreeMode> {
+        let mesh = cube(ElementKind::Hex8, 2, |[x, y, z]| [x + 5.0, y, z]);
+        let nodes: Vec<_> = (0..mesh.nodes.len()).collect();
+        free_modes(&mesh, &nodes, &hold(&mesh, sets))
+    }
+
+    fn text(sets: &[(&str, [bool; 3])]) -> Vec<String> {
+        modes(sets).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn what_is_held_leaves_what_is_free() {
+        assert_eq!(modes(&[]).len(), 6);
+        assert_eq!(modes(&[("z_min", [true; 3])]), []);
+        // Three planes of symmetry hold a corner piece.
+        let [x, y, z] = [[true, false, false], [false, true, false], [false, false, true]];
+        assert_eq!(modes(&[("x_min", x), ("y_min", y), ("z_min", z)]), []);
+        assert_eq!(text(&[("y_min", y), ("z_min", z)]), ["moving along x"]);
+        let on_ice = text(&[("z_min", z)]);
+        assert_eq!(on_ice.len(), 3, "{on_ice:?}");
+        assert!(on_ice.iter().any(|m| m == "moving along x"), "{on_ice:?}");
+        assert!(on_ice.iter().any(|m| m.starts_with("turning about z")), "{on_ice:?}");
+    }
+
+    #[test]
+    fn a_hinge_turns_about_its_edge() {
+        let mesh = cube(ElementKind::Hex8, 2, |p| p);
+        let nodes: Vec<_> = (0..mesh.nodes.len()).collect();
+        let mut fixed = vec![false; 3 * nodes.len()];
+        for n in
+            nodes.iter().copied().filter(|&n| mesh.nodes[n][0] == 0.0 && mesh.nodes[n][2] == 0.0)
+        {
+            fixed[3 * n..3 * n + 3].fill(true);
+        }
+        let [FreeMode::Turn(axis, through)] = free_modes(&mesh, &nodes, &fixed)[..] else {
+            panic!("one rotation is free")
+        };
+        assert!((axis[1].abs() - 1.0).abs() < 1e-9 && axis[0].abs() + axis[2].abs() < 1e-9);
+        assert!(through[0].abs() < 1e-9 && through[2].abs() < 1e-9, "{through:?}");
+    }
+}

@@ -1,0 +1,49 @@
+//! nu = .49 to .49999.
+
+use super::lab::solve;
+use super::{Hardness, Line, Suite};
+use crate::element::ElementKind;
+use crate::solve::Options;
+use crate::verify::cook::membrane;
+use crate::verify::locking::squeezed;
+use crate::verify::{CaseError, Check};
+
+const RATIOS: [f64; 4] = [0.49, 0.499, 0.4999, 0.49999];
+
+pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
+    let (linear, quadratic) = if suite.long { (64, 32) } else { (32, 16) };
+    let mut lines = Vec::new();
+    for nu in RATIOS {
+        let (rise, hard) = cook_mm(ElementKind::Quad4, linear, nu)?;
+        let (reference, _) = cook_mm(ElementKind::Quad9, quadratic, nu)?;
+        let rise =
+            Check::relative("rise of the tip", rise, reference, 0.01, "Quad9, condensed pressure");
+        lines.push(Line::converged(format!("Cook, Quad4, nu {nu}"), hard, vec![rise]));
+    }
+    let (solid, cube) = if suite.long { (12, 6) } else { (8, 4) };
+    for nu in RATIOS {
+        for (kind, name, cells, twin, twin_cells, source) in [
+            (ElementKind::Hex8, "Hex8", solid, ElementKind::Hex27, cube, "Hex27"),
+            (ElementKind::Quad4, "Quad4", linear / 2, ElementKind::Quad9, linear / 2, "Quad9"),
+        ] {
+            let (force, hard) = squeeze_n(kind, cells, nu)?;
+            let (reference, _) = squeeze_n(twin, twin_cells, nu)?;
+            let force = Check::relative("force of the press", force, reference, 0.03, source);
+            lines.push(Line::converged(format!("press, {name}, nu {nu}"), hard, vec![force]));
+        }
+    }
+    Ok(lines)
+}
+
+fn cook_mm(kind: ElementKind, cells: usize, nu: f64) -> Result<(f64, Hardness), CaseError> {
+    let (problem, loading, tip) = membrane(kind, cells, nu)?;
+    let options = Options { residual_tolerance: 1e-9, ..Options::default() };
+    let (solver, report) = solve(&problem, loading, options, 2)?;
+    Ok((solver.displacement_mm()[tip][1], (&report).into()))
+}
+
+fn squeeze_n(kind: ElementKind, cells: usize, nu: f64) -> Result<(f64, Hardness), CaseError> {
+    let (problem, loading, up) = squeezed(kind, cells, nu)?;
+    let (solver, report) = solve(&problem, loading, Options::default(), 1)?;
+    Ok((solver.balance().contact_force_n[up].abs(), (&report).into()))
+}
