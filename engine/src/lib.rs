@@ -30,6 +30,7 @@ pub mod ladder;
 mod onnx;
 #[cfg(feature = "ort")]
 mod ort_backend;
+mod sparse;
 mod tract_backend;
 mod widen;
 

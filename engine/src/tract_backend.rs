@@ -1,7 +1,8 @@
 //! tract, the backend that is always there.
 
 use crate::{
-    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps, check_output,
+    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
+    check_output, sparse,
 };
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -28,7 +29,9 @@ impl TractModel {
             tract_onnx::onnx().model_for_proto_model(proto)?.into_typed()
         })?;
         check_sizes(&typed)?;
-        let plan = guarded("optimise the model", || typed.into_optimized()?.into_runnable())?;
+        let plan = guarded("optimise the model", || {
+            sparse::fuse(typed.into_decluttered()?)?.into_optimized()?.into_runnable()
+        })?;
         Ok(Self { info, plan })
     }
 }
