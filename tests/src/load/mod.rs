@@ -9,6 +9,7 @@ mod compare;
 mod content;
 mod options;
 mod pacer;
+mod post;
 mod report;
 mod session;
 mod tally;
@@ -21,18 +22,19 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{Hello, Ready, SampleError, atlas::AtlasError};
-use tokio::sync::mpsc;
+use papilla_proto::{Hello, SampleError, SampleType, atlas::AtlasError};
+use tokio::{sync::mpsc, task::JoinHandle};
 
 pub use compare::{Comparison, Ratios, compare};
 pub use content::Content;
-pub use options::{Arrivals, Options};
+pub use options::{Arrivals, Options, Speak};
 pub use report::{Percentiles, Report, Verification};
 pub use verify::TOLERANCE;
 
 use crate::{http::HttpError, socket, socket::SocketError};
 use content::Encoded;
 use pacer::Plan;
+use post::Letter;
 use tally::Tally;
 use verify::Reference;
 
@@ -80,6 +82,9 @@ pub enum LoadError {
     /// The model for --verify cannot be run.
     #[error(transparent)]
     Engine(#[from] papilla_engine::EngineError),
+    /// Over HTTP nobody says which tier renders, and samples are float32.
+    #[error("--speak http and --speak oip need --tier, and --sample-type f32")]
+    NoTier,
     /// A task of the generator's own died.
     #[error("a task of the load generator died: {0}")]
     Task(String),
@@ -95,16 +100,23 @@ const RUN_UP: Duration = Duration::from_millis(100);
 pub async fn run(options: &Options) -> Result<Report, LoadError> {
     let target = Target::new(options).await?;
     let tally = target.load(options).await?;
-    Ok(Report::new(options, &target.content, &target.ready, &tally))
+    Ok(Report::new(options, &target, &tally))
 }
 
 /// A service and what it is to be loaded with.
 struct Target {
     content: Content,
     encoded: Encoded,
-    hello: Hello,
-    ready: Ready,
+    tier: String,
+    predicted_latency_us: Option<u64>,
+    opening: Opening,
     reference: Option<Arc<Reference>>,
+}
+
+/// How a client begins.
+enum Opening {
+    Session(Box<Hello>),
+    Post(Letter),
 }
 
 impl Target {
@@ -114,7 +126,31 @@ impl Target {
             None => Content::from_server(&options.server, options.maps.get()).await?,
         };
         let encoded = Encoded::new(&content, options.sample_type)?;
-        // The first session learns the tier; all others ask for that one, so that all load the same.
+        let (tier, predicted_latency_us, opening) = match options.speak {
+            Speak::Session => Self::agree(options, &content).await?,
+            speak => {
+                let tier = options.tier.clone().ok_or(LoadError::NoTier)?;
+                if options.sample_type != SampleType::F32 {
+                    return Err(LoadError::NoTier);
+                }
+                let letter = Letter::new(&options.server, speak, &tier, options.budget());
+                (tier, None, Opening::Post(letter))
+            }
+        };
+        let reference = if options.verify {
+            Some(Arc::new(Reference::new(&options.models, &tier, &encoded)?))
+        } else {
+            None
+        };
+        Ok(Self { content, encoded, tier, predicted_latency_us, opening, reference })
+    }
+
+    /// Opens a first session, which learns the tier: all others ask for that one, so that all
+    /// load the same.
+    async fn agree(
+        options: &Options,
+        content: &Content,
+    ) -> Result<(String, Option<u64>, Opening), LoadError> {
         let mut hello = Hello {
             version: options.protocol,
             budget_us: options.budget(),
@@ -126,20 +162,14 @@ impl Target {
         let (ready, mut probe, _) = socket::open(&options.server, &hello).await?;
         probe.close().await;
         hello.tier = Some(ready.tier.clone());
-        let reference = if options.verify {
-            Some(Arc::new(Reference::new(&options.models, &ready.tier, &encoded)?))
-        } else {
-            None
-        };
-        Ok(Self { content, encoded, hello, ready, reference })
+        Ok((ready.tier, Some(ready.predicted_latency_us), Opening::Session(Box::new(hello))))
     }
 
     /// Opens the sessions, lets the load run, and adds up what they saw.
     async fn load(&self, options: &Options) -> Result<Tally, LoadError> {
         let mut open = Vec::new();
         for _ in 0..options.sessions.get() {
-            let (_, sender, receiver) = socket::open(&options.server, &self.hello).await?;
-            open.push((sender, receiver));
+            open.push(self.opening.open(&options.server).await?);
         }
         let shared = Arc::new(session::Shared {
             plan: Plan::new(options, Instant::now() + RUN_UP),
@@ -150,12 +180,11 @@ impl Target {
             drain: Duration::from_secs(options.drain_s),
         });
         let (mut beats, mut tasks) = (Vec::new(), Vec::new());
-        for (session, (sender, receiver)) in open.into_iter().enumerate() {
+        for (session, client) in open.into_iter().enumerate() {
             // Unbounded, but never more than the frames of the plan: the beat must not wait.
             let (beat, beaten) = mpsc::unbounded_channel();
             beats.push(beat);
-            let shared = shared.clone();
-            tasks.push(tokio::spawn(session::run(shared, session, sender, receiver, beaten)));
+            tasks.push(client.start(shared.clone(), session, beaten));
         }
         let plan = shared.plan.clone();
         let pacer = thread::spawn(move || plan.keep(&beats));
@@ -165,5 +194,39 @@ impl Target {
         }
         pacer.join().map_err(|_| LoadError::Task("the pacer".to_owned()))?;
         Ok(total)
+    }
+}
+
+/// A client that is connected.
+enum Client {
+    Session(socket::Sender, socket::Receiver),
+    Post(post::Post),
+}
+
+impl Opening {
+    async fn open(&self, server: &str) -> Result<Client, LoadError> {
+        Ok(match self {
+            Self::Session(hello) => {
+                let (_, sender, receiver) = socket::open(server, hello).await?;
+                Client::Session(sender, receiver)
+            }
+            Self::Post(letter) => Client::Post(letter.connect().await?),
+        })
+    }
+}
+
+impl Client {
+    fn start(
+        self,
+        shared: Arc<session::Shared>,
+        session: usize,
+        beat: mpsc::UnboundedReceiver<u32>,
+    ) -> JoinHandle<Tally> {
+        match self {
+            Self::Session(sender, receiver) => {
+                tokio::spawn(session::run(shared, session, sender, receiver, beat))
+            }
+            Self::Post(post) => tokio::spawn(post::run(shared, session, post, beat)),
+        }
     }
 }

@@ -23,6 +23,8 @@ Examples:
   papilla-load --arrivals poisson --sessions 16 --rate-hz 60
                                                 frames that do not keep a beat
   papilla-load --against 127.0.0.1:7225         two services in turn, and how they compare
+  papilla-load --speak oip --tier nano --sessions 8 --against 127.0.0.1:8000 --dataset data/heldout
+                                                beside any other Open Inference server
   papilla-load --allow-miss-percent 1 --json    for a script
 
 Exit codes:
@@ -43,6 +45,19 @@ pub enum Arrivals {
     Burst,
 }
 
+/// What is spoken with the service.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Speak {
+    /// WebSocket sessions.
+    Session,
+    /// POST /v1/sed with raw float32, a kept connection a client. Any service that answers it
+    /// with the raw map can be loaded so.
+    Http,
+    /// Open Inference Protocol with binary tensors, likewise: also Triton and its kin.
+    Oip,
+}
+
 /// Loads a Papilla service with pressure frames and measures when maps come back.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "papilla-load", version, after_help = HELP_TAIL, args_override_self = true)]
@@ -55,6 +70,11 @@ pub struct Options {
         value_name = "HOST:PORT"
     )]
     pub server: String,
+
+    /// What is spoken with it. Over http and oip a client has one request under way; frames that
+    /// come meanwhile replace each other, and those that never leave count as superseded.
+    #[arg(long, value_enum, default_value = "session", value_name = "WHAT")]
+    pub speak: Speak,
 
     /// Sessions at a time, their frames evenly staggered.
     #[arg(long, default_value = "1", value_name = "K")]

@@ -2,10 +2,10 @@
 
 use std::{collections::BTreeMap, fmt};
 
-use papilla_proto::{Ready, SampleType};
+use papilla_proto::SampleType;
 use serde::{Deserialize, Serialize};
 
-use super::{Arrivals, Content, Options, TOLERANCE, tally::Tally, tally::Times};
+use super::{Arrivals, Options, Speak, TOLERANCE, Target, tally::Tally, tally::Times};
 
 /// Percentiles of a time, us.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -58,6 +58,8 @@ pub struct Verification {
 pub struct Report {
     /// Host and port of the service.
     pub server: String,
+    /// What was spoken with it.
+    pub speak: Speak,
     /// Sessions at a time.
     pub sessions: usize,
     /// Frames a second and session.
@@ -76,8 +78,8 @@ pub struct Report {
     pub deadline_us: Option<u32>,
     /// The tier that rendered.
     pub tier: String,
-    /// Latency that the server expected on an idle machine, us.
-    pub predicted_latency_us: u64,
+    /// Latency that the server expected on an idle machine, us; sessions are told.
+    pub predicted_latency_us: Option<u64>,
     /// Where the presses are from.
     pub source: String,
     /// Maps that took turns.
@@ -129,7 +131,7 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) fn new(options: &Options, content: &Content, ready: &Ready, t: &Tally) -> Self {
+    pub(super) fn new(options: &Options, target: &Target, t: &Tally) -> Self {
         let verification = options.verify.then_some(Verification {
             maps: t.verified,
             wrong: t.wrong,
@@ -138,6 +140,7 @@ impl Report {
         });
         Self {
             server: options.server.clone(),
+            speak: options.speak,
             sessions: options.sessions.get(),
             rate_hz: options.rate_hz,
             duration_s: options.duration_s,
@@ -146,10 +149,10 @@ impl Report {
             sample_type: options.sample_type,
             budget_us: options.budget(),
             deadline_us: options.deadline(),
-            tier: ready.tier.clone(),
-            predicted_latency_us: ready.predicted_latency_us,
-            source: content.source.clone(),
-            maps: content.maps_pa.len(),
+            tier: target.tier.clone(),
+            predicted_latency_us: target.predicted_latency_us,
+            source: target.content.source.clone(),
+            maps: target.content.maps_pa.len(),
             frames: t.frames,
             ok: t.ok,
             superseded: t.superseded,
@@ -210,10 +213,15 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self.speak {
+            Speak::Session => "session",
+            Speak::Http => "HTTP client",
+            Speak::Oip => "Open Inference client",
+        };
         let plural = if self.sessions == 1 { "" } else { "s" };
         writeln!(
             f,
-            "{} session{plural} at {} Hz ({}) for {} s, {:?} samples, {} maps from {}",
+            "{} {what}{plural} at {} Hz ({}) for {} s, {:?} samples, {} maps from {}",
             self.sessions,
             self.rate_hz,
             format!("{:?}", self.arrivals).to_lowercase(),
@@ -222,7 +230,10 @@ impl fmt::Display for Report {
             self.maps,
             self.source
         )?;
-        write!(f, "tier {}, expected {} us", self.tier, self.predicted_latency_us)?;
+        write!(f, "tier {}", self.tier)?;
+        if let Some(us) = self.predicted_latency_us {
+            write!(f, ", expected {us} us")?;
+        }
         writeln!(
             f,
             "; {}",

@@ -81,7 +81,7 @@ async fn send(
 }
 
 /// Hears the answers of one session.
-struct Ear<'a> {
+pub(super) struct Ear<'a> {
     shared: &'a Shared,
     session: usize,
     tally: Tally,
@@ -97,7 +97,7 @@ struct Ear<'a> {
 const LOOK: Duration = Duration::from_millis(1);
 
 impl<'a> Ear<'a> {
-    fn new(shared: &'a Shared, session: usize) -> Self {
+    pub(super) fn new(shared: &'a Shared, session: usize) -> Self {
         let frames = shared.plan.frames;
         Self {
             shared,
@@ -129,7 +129,7 @@ impl<'a> Ear<'a> {
         self.tally.ended.push(format!("session {}: {error}", self.session));
     }
 
-    fn take(&mut self, now: Instant, heard: &Heard) {
+    pub(super) fn take(&mut self, now: Instant, heard: &Heard) {
         match heard {
             Heard::Frame(header, payload) => self.frame(now, header, payload),
             Heard::Error(error) => {
@@ -229,7 +229,14 @@ impl<'a> Ear<'a> {
         self.tally.compare(difference, TOLERANCE);
     }
 
-    fn tally(mut self) -> Tally {
+    /// Takes note that a frame was refused, and why.
+    pub(super) fn refused(&mut self, number: u32, reason: &str) {
+        if self.settle(number) {
+            *self.tally.errors.entry(reason.to_owned()).or_default() += 1;
+        }
+    }
+
+    pub(super) fn tally(mut self) -> Tally {
         let counted = self.answered.iter().skip(self.shared.plan.warmup as usize);
         self.tally.lost = counted.filter(|answered| !**answered).count() as u64;
         self.tally

@@ -56,6 +56,29 @@ async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn maps_over_http_and_open_inference_are_the_engines_too() {
+    let models = models();
+    let folder = models.path().to_str().unwrap();
+    let service = Service::on(models.path()).await;
+    for speak in ["http", "oip"] {
+        let arguments = ["--speak", speak, "--tier", "tiny", "--sessions", "2", "--budget-us", "0"];
+        let verify = ["--verify", "--models", folder];
+        let report = run(&service, &[&arguments[..], &verify].concat()).await.unwrap();
+        assert_eq!(report.faults(), Vec::<String>::new(), "{report}");
+        assert_eq!((report.frames, report.ok + report.superseded), (40, 40), "{report}");
+        let verification = report.verification.unwrap();
+        assert!(report.ok > 0 && verification.maps >= report.ok, "{report}");
+        // Nobody is told a tier, and the map of a service that has none is refused.
+        let error = run(&service, &["--speak", speak]).await.unwrap_err();
+        assert!(matches!(error, LoadError::NoTier), "{error}");
+        let other = ["--speak", speak, "--tier", "nobody", "--sessions", "2"];
+        let report = run(&service, &other).await.unwrap();
+        assert_eq!((report.ok, report.exit_code()), (0, 1), "{report}");
+        assert_eq!(report.errors.keys().collect::<Vec<_>>(), ["status 404"], "{report}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn misses_are_counted_and_judged() {
     let models = models();
     let service = Service::on(models.path()).await;
