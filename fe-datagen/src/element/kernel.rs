@@ -37,7 +37,7 @@ pub struct ElementState {
 }
 
 /// Displacement gradient at a point from nodal displacements.
-#[inline]
+#[inline(always)]
 pub fn displacement_gradient(u: &[[f64; 3]], gradients: &[[f64; 3]]) -> Mat3 {
     let mut h = [[0.0; 3]; 3];
     for (v, g) in u.iter().zip(gradients) {
@@ -54,6 +54,8 @@ pub fn displacement_gradient(u: &[[f64; 3]], gradients: &[[f64; 3]]) -> Mat3 {
 const VOLUME_GRADIENTS_MAX: usize = 4 * 27;
 /// Largest number of quadrature points.
 const POINTS_MAX: usize = 27;
+/// Largest number of nodes.
+const NODES_MAX: usize = 27;
 
 /// Evaluates one element with nodal displacements `u` (mm) and the bulk modulus
 /// `bulk_mpa`; `points` gives the isochoric law of each quadrature point.
@@ -63,6 +65,7 @@ const POINTS_MAX: usize = 27;
 ///
 /// # Errors
 /// [`Inverted`] where `J <= 0`; outputs are then meaningless.
+#[inline(always)]
 pub fn evaluate<P: Points>(
     geometry: ElementGeometry<'_>,
     law: &P,
@@ -120,13 +123,16 @@ pub fn evaluate<P: Points>(
             add_point_stiffness(s, &point_tangent(&law, k, pressure, weight), gradients);
         }
     }
+    if let Some(s) = stiffness {
+        by_nodes(s, n);
+    }
     Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta })
 }
 
 const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// `weight (A + pressure d cof / dF)`.
-#[inline]
+#[inline(always)]
 fn point_tangent<L: Isochoric>(
     law: &L,
     k: &Kinematics,
@@ -148,7 +154,7 @@ fn point_tangent<L: Isochoric>(
 }
 
 /// `force[a] += weight * p . gradients[a]`.
-#[inline]
+#[inline(always)]
 fn add_times(force: &mut [[f64; 3]], weight: f64, p: &Mat3, gradients: &[[f64; 3]]) {
     for (f, g) in force.iter_mut().zip(gradients) {
         for i in 0..3 {
@@ -157,7 +163,8 @@ fn add_times(force: &mut [[f64; 3]], weight: f64, p: &Mat3, gradients: &[[f64; 3
     }
 }
 
-/// Overwrites with `K sum_mn M^-1_mn g_m g_n^T`.
+/// Overwrites with `K sum_mn M^-1_mn g_m g_n^T`, laid out as in [`add_point_stiffness`].
+#[inline(always)]
 fn volumetric_stiffness(
     stiffness: &mut [f64],
     bulk: f64,
@@ -166,7 +173,6 @@ fn volumetric_stiffness(
     n: usize,
     m: usize,
 ) {
-    let row = 3 * n;
     for a in 0..n {
         for i in 0..3 {
             let mut left = [0.0; 4];
@@ -174,43 +180,77 @@ fn volumetric_stiffness(
                 left[c] =
                     bulk * (0..m).map(|r| g[r * n + a][i] * inverse_gram[r * m + c]).sum::<f64>();
             }
-            let line = &mut stiffness[(3 * a + i) * row..(3 * a + i + 1) * row];
-            for b in a..n {
-                for k in 0..3 {
-                    line[3 * b + k] = (0..m).map(|c| left[c] * g[c * n + b][k]).sum();
+            let line = &mut stiffness[(3 * a + i) * 3 * n..][..3 * n];
+            for k in 0..3 {
+                for b in 0..n {
+                    line[k * n + b] = (0..m).map(|c| left[c] * g[c * n + b][k]).sum();
                 }
             }
         }
     }
 }
 
-/// `K[a i][b k] += dN_a,j A_ijkl dN_b,l` for `a <= b`.
-#[inline]
+/// `K[a i][k b] += dN_a,j A_ijkl dN_b,l` for `a <= b`; some others are touched.
+///
+/// Columns are ordered by component first, so that the innermost loops run over nodes and
+/// fill vector registers; [`by_nodes`] puts them right in the end.
+#[inline(always)]
 fn add_point_stiffness(
     stiffness: &mut [f64],
     a4: &crate::material::Tensor4,
     gradients: &[[f64; 3]],
 ) {
-    let n = gradients.len();
-    let row = 3 * n;
-    for b in 0..n {
-        let gb = gradients[b];
-        let mut t = [[[0.0; 3]; 3]; 3]; // [i][k][j]
-        for i in 0..3 {
+    match gradients.len() {
+        // The number of nodes as a constant: loops without remainders.
+        8 => add_stiffness_of(8, stiffness, a4, gradients),
+        27 => add_stiffness_of(27, stiffness, a4, gradients),
+        n => add_stiffness_of(n, stiffness, a4, gradients),
+    }
+}
+
+#[inline(always)]
+fn add_stiffness_of(
+    n: usize,
+    stiffness: &mut [f64],
+    a4: &crate::material::Tensor4,
+    gradients: &[[f64; 3]],
+) {
+    let mut g = [[0.0; NODES_MAX]; 3];
+    for (b, gradient) in gradients[..n].iter().enumerate() {
+        for l in 0..3 {
+            g[l][b] = gradient[l];
+        }
+    }
+    for i in 0..3 {
+        for k in 0..3 {
+            let mut t = [[0.0; NODES_MAX]; 3];
             for j in 0..3 {
-                for k in 0..3 {
-                    let v = &a4[i][j][k];
-                    t[i][k][j] = v[0] * gb[0] + v[1] * gb[1] + v[2] * gb[2];
+                let v = &a4[i][j][k];
+                for b in 0..n {
+                    t[j][b] = v[0] * g[0][b] + v[1] * g[1][b] + v[2] * g[2][b];
+                }
+            }
+            for a in 0..n {
+                let ga = [g[0][a], g[1][a], g[2][a]];
+                let line = &mut stiffness[((3 * a + i) * 3 + k) * n..][..n];
+                // From a multiple of a vector's length on.
+                for b in a & !3..n {
+                    line[b] += ga[0] * t[0][b] + ga[1] * t[1][b] + ga[2] * t[2][b];
                 }
             }
         }
-        for (a, ga) in gradients.iter().take(b + 1).enumerate() {
-            for i in 0..3 {
-                let base = (3 * a + i) * row + 3 * b;
-                for k in 0..3 {
-                    let v = &t[i][k];
-                    stiffness[base + k] += ga[0] * v[0] + ga[1] * v[1] + ga[2] * v[2];
-                }
+    }
+}
+
+/// Orders columns by node first, blocks `a <= b`.
+#[inline(always)]
+fn by_nodes(stiffness: &mut [f64], n: usize) {
+    let mut by_component = [0.0; 3 * NODES_MAX];
+    for (row, line) in stiffness.chunks_exact_mut(3 * n).enumerate() {
+        by_component[..3 * n].copy_from_slice(line);
+        for b in row / 3..n {
+            for k in 0..3 {
+                line[3 * b + k] = by_component[k * n + b];
             }
         }
     }

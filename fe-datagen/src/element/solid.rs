@@ -102,6 +102,13 @@ impl<L: Isochoric> Elastic<L> {
     }
 }
 
+/// Runs `work` compiled for the widest vectors of this processor. Products and sums stay what
+/// they are, one by one, so the result is the same bit for bit on any.
+#[inline(always)]
+fn vectorized<T>(work: impl FnOnce() -> T) -> T {
+    pulp::Arch::new().dispatch(work)
+}
+
 /// `K (theta - 1)` as a first Piola-Kirchhoff stress, added to `p`.
 fn with_volumetric<L: Isochoric>(p: &Mat3, pressure: f64, k: &Kinematics) -> Mat3 {
     std::array::from_fn(|i| {
@@ -121,7 +128,10 @@ impl<L: Isochoric> Solid for Elastic<L> {
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
-        evaluate(geometry, &Same(self.law), self.bulk_mpa, u, force, stiffness)
+        vectorized(
+            #[inline(always)]
+            || evaluate(geometry, &Same(self.law), self.bulk_mpa, u, force, stiffness),
+        )
     }
 
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, _history: &[f64]) -> f64 {
@@ -193,7 +203,10 @@ impl<L: Isochoric> Solid for Viscoelastic<L> {
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
         let points = Remembering { solid: self, memory, len: self.history_len() };
-        evaluate(geometry, &points, self.bulk_mpa, u, force, stiffness)
+        vectorized(
+            #[inline(always)]
+            || evaluate(geometry, &points, self.bulk_mpa, u, force, stiffness),
+        )
     }
 
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64 {

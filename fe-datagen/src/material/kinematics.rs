@@ -28,7 +28,7 @@ pub struct Kinematics {
 
 impl Kinematics {
     /// Deformation measures of the displacement gradient `h`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn new(h: Mat3) -> Self {
         let mut f = h;
@@ -44,14 +44,14 @@ impl Kinematics {
     }
 
     /// Volume ratio `J = det F`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn j(&self) -> f64 {
         1.0 + self.j_minus_1
     }
 
     /// `F^-1`; meaningful for `J > 0` only.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn f_inverse(&self) -> Mat3 {
         let r = 1.0 / self.j();
@@ -60,7 +60,7 @@ impl Kinematics {
     }
 
     /// `J^(-2/3)`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn j_pow_minus_two_thirds(&self) -> f64 {
         (-2.0 / 3.0 * self.j_minus_1.ln_1p()).exp()
@@ -79,7 +79,7 @@ impl Kinematics {
     }
 
     /// `tr C - 3 = 2 tr E`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn i1_minus_3(&self) -> f64 {
         2.0 * trace(&self.h) + double_dot(&self.h, &self.h)
@@ -90,7 +90,7 @@ impl Kinematics {
     /// `I1bar - 3 = J^(-2/3) (2 tr E - 3 (J^(2/3) - 1))`; the terms linear in
     /// `H` cancel exactly when both are written with `J - 1`, which leaves
     /// `H:H - 2 II(H) - 2 det H - r(J - 1)` with `r` of second order.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn i1_bar_minus_3(&self) -> f64 {
         let quadratic = double_dot(&self.h, &self.h) - 2.0 * self.h_invariant_2 - 2.0 * self.h_det;
@@ -117,7 +117,7 @@ fn volumetric_remainder(x: f64) -> f64 {
 }
 
 /// Cofactor matrix: `cof[i][j]` is the signed minor of `m[i][j]`.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn cofactor(m: &Mat3) -> Mat3 {
     std::array::from_fn(|i| {
@@ -136,14 +136,14 @@ pub fn product(a: &Mat3, b: &Mat3) -> Mat3 {
 }
 
 /// Sum of the diagonal.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn trace(m: &Mat3) -> f64 {
     m[0][0] + m[1][1] + m[2][2]
 }
 
 /// `a : b`, the sum of products of entries.
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn double_dot(a: &Mat3, b: &Mat3) -> f64 {
     let mut s = 0.0;
@@ -156,6 +156,7 @@ pub fn double_dot(a: &Mat3, b: &Mat3) -> f64 {
 }
 
 /// `d cof(F)[i][j] / dF[k][l] = eps(i,k,m) eps(j,l,n) F[m][n]`, linear in `F`.
+#[inline(always)]
 #[must_use]
 pub fn cofactor_derivative(f: &Mat3) -> Tensor4 {
     let mut d = [[[[0.0; 3]; 3]; 3]; 3];

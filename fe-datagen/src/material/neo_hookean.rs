@@ -13,7 +13,7 @@ pub struct NeoHookean {
 impl Isochoric for NeoHookean {
     const FINITE: bool = true;
 
-    #[inline]
+    #[inline(always)]
     fn energy(&self, k: &Kinematics) -> f64 {
         0.5 * self.mu_mpa * k.i1_bar_minus_3()
     }
@@ -23,7 +23,7 @@ impl Isochoric for NeoHookean {
     /// The bracket is `(J F - I1/3 cof F) / J`. In
     /// `cof F = I + tr(H) I - H^T + cof H` the unit matrices cancel symbolically
     /// and small strain keeps all digits.
-    #[inline]
+    #[inline(always)]
     fn first_piola(&self, k: &Kinematics) -> Mat3 {
         let j = k.j_minus_1;
         let third = k.i1_minus_3() / 3.0;
@@ -42,7 +42,7 @@ impl Isochoric for NeoHookean {
 
     /// `A = mu J^(-2/3) [ I(x)I - 2/3 (F (x) F^-T + F^-T (x) F)
     ///      + 2/9 I1 F^-T (x) F^-T + I1/3 F^-T (boxed) F^-1 ]`.
-    #[inline]
+    #[inline(always)]
     fn tangent(&self, k: &Kinematics) -> Tensor4 {
         let g = k.f_inverse();
         let i1 = 3.0 + k.i1_minus_3();
@@ -64,7 +64,7 @@ impl Isochoric for NeoHookean {
         t
     }
 
-    #[inline]
+    #[inline(always)]
     fn shear_modulus_mpa(&self) -> f64 {
         self.mu_mpa
     }

@@ -62,6 +62,20 @@ pub enum PressError {
         /// Why.
         source: SolveError,
     },
+    /// Nodes slipped off an edge of the indenter.
+    #[error(
+        "at depth {depth_mm} mm: {:.0} % of the contact force acts along the skin, not into it: nodes \
+         {spacing_mm:.2} mm apart have slipped off an edge of the indenter, which now stands between \
+         them, unseen. Take a finer mesh, or rounder edges", 100.0 * share
+    )]
+    Slipped {
+        /// Depth of the state.
+        depth_mm: f64,
+        /// Share of the contact force along the skin.
+        share: f64,
+        /// Mean distance of the nodes in contact, mm.
+        spacing_mm: f64,
+    },
     /// An element is inside out where SED is wanted.
     #[error(transparent)]
     Inverted(#[from] Inverted),
@@ -104,6 +118,7 @@ impl PressError {
             }
             Self::Mesh(_) => Some("geometry.file".into()),
             Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
+            Self::Slipped { .. } => Some("indenter".into()),
             Self::Rising(..) | Self::Empty => Some("motion".into()),
             Self::Solve { source: SolveError::RigidBodyMode(_), .. } => {
                 Some("geometry.fixed".into())
@@ -273,12 +288,17 @@ impl Body {
     }
 
     /// Vertex values and checks of the solver's equilibrium.
+    ///
+    /// # Errors
+    /// [`PressError::Slipped`] where the skin does not follow the indenter,
+    /// [`PressError::Inverted`] where SED cannot be read.
     pub(crate) fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,
         report: &StepReport,
     ) -> Result<IncrementRecord, PressError> {
+        self.follows(solver, depth_mm)?;
         let skin = &self.problem.mesh.surfaces[&self.contact];
         let pressure = solver.pressure_mpa(skin);
         let integral = self.force_of_pressure_n(solver, &pressure);

@@ -3,6 +3,7 @@
 pub mod body;
 pub mod drive;
 pub mod fields;
+mod fit;
 pub mod laws;
 pub mod record;
 pub mod section;

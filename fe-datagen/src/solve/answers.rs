@@ -3,6 +3,7 @@
 use super::evaluate::Balance;
 use super::problem::Problem;
 use super::stepping::Solver;
+use crate::indenter::Distance;
 use crate::linear::Equations;
 
 impl<'a> Solver<'a> {
@@ -30,6 +31,12 @@ impl<'a> Solver<'a> {
         let force = self.newton.current.contact_force_n;
         let travel = self.loading.indenter.as_ref().and_then(|m| m.straight_travel());
         travel.map_or(0.0, |(_, direction)| (0..3).map(|i| force[i] * direction[i]).sum())
+    }
+
+    /// Distance of the point `x` (mm) to the indenter where it is now; `None` without one.
+    #[must_use]
+    pub fn distance(&self, x: [f64; 3]) -> Option<Distance> {
+        Some(self.loading.indenter.as_ref()?.distance(self.state.fraction, x))
     }
 
     /// Load fraction reached.

@@ -102,7 +102,11 @@ pub enum StepError {
         residual: f64,
     },
     /// Contact multipliers did not settle.
-    #[error("contact did not settle in {augmentations} augmentations: gap error {gap_mm:.3e} mm")]
+    #[error(
+        "contact did not settle in {augmentations} augmentations: gap error {gap_mm:.3e} mm. Where the \
+         indenter is sharper than the mesh is fine, nodes jump from one of its sides to the other: \
+         refine the mesh or round the indenter"
+    )]
     Contact {
         /// Augmentations done.
         augmentations: u32,

@@ -363,7 +363,9 @@ impl<'a> Solver<'a> {
                 friction: rubs.then_some(&trial.friction),
             };
             self.newton.equilibrate(tolerance, fixed, u)?;
-            if self.newton.current.gap_error_mm <= options.gap_tolerance_mm {
+            let e = &self.newton.current;
+            let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
+            if e.gap_error_mm <= options.gap_tolerance_mm && !exact {
                 self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
             }
             let closed = self.newton.current.gap_error_mm <= options.gap_tolerance_mm;
