@@ -69,14 +69,28 @@ pub enum EngineError {
         /// What is wrong with it.
         reason: String,
     },
+    /// An operator that no model needs, or that could make any amount of data of little.
+    #[error(
+        "node '{node}' of the model is of the kind '{kind}': {reason}; docs/models.md lists what is taken"
+    )]
+    Operator {
+        /// Name of the node.
+        node: String,
+        /// Its operator.
+        kind: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The model asks for far more memory than any map needs.
-    #[error("node '{node}' of the model makes a tensor of {values} values, more than {limit}")]
+    #[error(
+        "node '{node}' of the model makes a tensor of {values} values; {limit} are left of what a model may hold"
+    )]
     TooLarge {
         /// Name of the node.
         node: String,
         /// Values of its output.
         values: String,
-        /// Most values a tensor may have.
+        /// Most values that it might have.
         limit: i64,
     },
     /// The card cannot be read.

@@ -28,6 +28,7 @@ mod error;
 mod info;
 pub mod ladder;
 mod onnx;
+mod operators;
 #[cfg(feature = "ort")]
 mod ort_backend;
 mod sparse;

@@ -36,7 +36,7 @@ pub(crate) fn decode(onnx: &[u8]) -> Result<ModelProto, EngineError> {
 ///
 /// # Errors
 /// [`EngineError::Interface`], [`EngineError::BrokenTensor`],
-/// [`EngineError::NonFiniteWeight`].
+/// [`EngineError::NonFiniteWeight`], [`EngineError::Operator`], [`EngineError::TooLarge`].
 pub(crate) fn check(proto: &ModelProto) -> Result<(), EngineError> {
     let Some(graph) = &proto.graph else { return Ok(()) };
     if !proto.functions.is_empty() {
@@ -53,7 +53,8 @@ pub(crate) fn check(proto: &ModelProto) -> Result<(), EngineError> {
         graph.input.iter().filter(|i| !weights.contains(i.name.as_str())).collect();
     check_side("input", INPUT_NAME, &inputs)?;
     check_side("output", OUTPUT_NAME, &graph.output.iter().collect::<Vec<_>>())?;
-    check_graph(graph, 0)
+    check_graph(graph, 0)?;
+    crate::operators::check(graph)
 }
 
 fn check_side(

@@ -14,9 +14,9 @@ use tract_onnx::tract_core::model::TypedSimpleState;
 /// Backend and version, for cards and logs; a test holds it to `Cargo.lock`.
 pub(crate) const LABEL: &str = "tract 0.23.9";
 
-/// Most values in one intermediate tensor (1 GiB of f32): a garbled shape is refused
+/// Most values in all tensors together (1 GiB of f32): a garbled shape is refused
 /// before it asks the system for more memory than there is, which would abort.
-const TENSOR_LEN_MAX: i64 = 1 << 28;
+pub(crate) const TENSOR_LEN_MAX: i64 = 1 << 28;
 
 pub(crate) struct TractModel {
     info: ModelInfo,
@@ -37,15 +37,19 @@ impl TractModel {
 }
 
 fn check_sizes(model: &TypedModel) -> Result<(), EngineError> {
+    let mut left = TENSOR_LEN_MAX;
     for node in &model.nodes {
         for outlet in &node.outputs {
             let values = outlet.fact.shape.volume();
-            if !values.to_i64().is_ok_and(|values| (0..=TENSOR_LEN_MAX).contains(&values)) {
-                return Err(EngineError::TooLarge {
-                    node: node.name.clone(),
-                    values: values.to_string(),
-                    limit: TENSOR_LEN_MAX,
-                });
+            match values.to_i64() {
+                Ok(values) if (0..=left).contains(&values) => left -= values,
+                _ => {
+                    return Err(EngineError::TooLarge {
+                        node: node.name.clone(),
+                        values: values.to_string(),
+                        limit: left,
+                    });
+                }
             }
         }
     }

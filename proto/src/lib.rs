@@ -33,7 +33,9 @@ pub use error::{ErrorCode, Problem};
 pub use frame::{
     Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
 };
-pub use map::{MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PressureRange, check_pressure};
+pub use map::{
+    MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PressureRange, check_pressure, keep_inside,
+};
 pub use message::{ClientMessage, Hello, Ready, ServerMessage, SessionError};
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};

@@ -20,6 +20,9 @@ mod codec;
 mod config;
 mod effects;
 mod error;
+#[cfg(any(test, fuzzing))]
+#[doc(hidden)]
+pub mod fuzz;
 mod gate;
 mod golden;
 mod http;

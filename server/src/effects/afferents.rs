@@ -7,6 +7,10 @@ use papilla_proto::{MAP_LEN, Problem, effects::Afferents as Parameters};
 
 use super::unusable;
 
+/// Greatest value of a parameter: far beyond any tissue, and no rate overflows f32 with it, not
+/// even that of a jump within 1 us.
+const PARAMETER_MAX: f32 = 1e6;
+
 /// Parameters, and what the last frame left.
 #[derive(Debug)]
 pub(super) struct Afferents {
@@ -27,8 +31,10 @@ impl Afferents {
             ("k_s_hz_per_kpa", of.k_s_hz_per_kpa, false),
             ("k_d_hz_s_per_kpa", of.k_d_hz_s_per_kpa, false),
         ] {
-            if !(value.is_finite() && value >= 0.0 && !(above && value <= 0.0)) {
-                let message = format!("'{name}' is {value}; it has to be finite and above zero");
+            if !((0.0..=PARAMETER_MAX).contains(&value) && !(above && value <= 0.0)) {
+                let message = format!(
+                    "'{name}' is {value}; it has to be above zero and at most {PARAMETER_MAX}"
+                );
                 return Err(unusable("afferents", message));
             }
         }
@@ -126,12 +132,32 @@ mod tests {
     }
 
     #[test]
+    fn no_parameter_and_no_clock_makes_a_rate_that_is_no_number() {
+        let most = Parameters {
+            e_ref_kpa: PARAMETER_MAX,
+            theta_kpa: 0.0,
+            k_s_hz_per_kpa: PARAMETER_MAX,
+            k_d_hz_s_per_kpa: PARAMETER_MAX,
+        };
+        let mut afferents = Afferents::new(most).unwrap();
+        // From nothing to 1e12 J/m3 within 1 us, and the other way round by a clock that jumps.
+        for (sed, time_us) in [(0.0, 0), (1e12, 1), (0.0, 2), (1e12, u64::MAX), (1e12, 0), (0.0, 9)]
+        {
+            afferents.step(&vec![sed; MAP_LEN], time_us);
+            assert!(afferents.rate_hz().iter().all(|rate| rate.is_finite() && *rate >= 0.0));
+        }
+        assert!(afferents.value_max(1e12).is_finite());
+    }
+
+    #[test]
     fn numbers_that_are_none_are_refused() {
         for of in [
             Parameters { e_ref_kpa: 0.0, ..Parameters::default() },
             Parameters { theta_kpa: -1.0, ..Parameters::default() },
             Parameters { k_s_hz_per_kpa: f32::NAN, ..Parameters::default() },
             Parameters { k_d_hz_s_per_kpa: f32::INFINITY, ..Parameters::default() },
+            Parameters { e_ref_kpa: 1e38, ..Parameters::default() },
+            Parameters { k_d_hz_s_per_kpa: 1e35, ..Parameters::default() },
         ] {
             assert!(Afferents::new(of).is_err(), "{of:?}");
         }

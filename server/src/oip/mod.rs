@@ -188,3 +188,19 @@ async fn read(body: Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Pro
         .await
         .map_err(|error| problem::internal("the request was not read", &error))?
 }
+
+/// For [`crate::fuzz`].
+#[cfg(any(test, fuzzing))]
+pub(crate) mod fuzz {
+    use super::{Bytes, HeaderMap, HeaderValue, Problem, request};
+
+    /// Reads a request as [`super::infer`] does; the bytes of its map.
+    pub(crate) fn read(body: &Bytes, head_len: Option<HeaderValue>) -> Result<Bytes, Problem> {
+        let mut headers = HeaderMap::new();
+        if let Some(value) = head_len {
+            headers.insert("inference-header-content-length", value);
+        }
+        let head_len = request::head_len(&headers, body.len())?;
+        request::read(body, head_len).map(|(_, payload)| payload)
+    }
+}

@@ -76,10 +76,11 @@ fn bench() -> Bench {
         retired: false,
     };
     let patch = PatchVertices {
-        positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-        uv_px: vec![[10.0, 10.0], [10.0, 90.0], [90.0, 10.0]],
+        positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+        // All of the map is skin.
+        uv_px: vec![[0.0, 0.0], [0.0, 224.0], [224.0, 224.0], [224.0, 0.0]],
     };
-    let atlas = Atlas::new(0.1, vec![[0, 1, 2]], patch.clone(), patch).unwrap();
+    let atlas = Atlas::new(0.1, vec![[0, 1, 2], [0, 2, 3]], patch.clone(), patch).unwrap();
     let catalogue = Arc::new(Catalogue {
         tiers: vec![tier],
         default: 0,

@@ -8,7 +8,7 @@ use std::{
 };
 
 use papilla_engine::Session;
-use papilla_proto::{ErrorCode, MAP_LEN, MapSummary, PressureRange, Problem, flags};
+use papilla_proto::{ErrorCode, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside};
 
 use super::{
     Done, Drawn, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
@@ -197,7 +197,7 @@ impl Worker {
         Ok(Outcome::Map { bytes, scale })
     }
 
-    /// Decodes and checks the pressure.
+    /// Decodes and checks the pressure; what lies off the skin is taken off.
     fn decode(
         &mut self,
         job: &Job,
@@ -214,7 +214,8 @@ impl Worker {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
             takes_more: job.frame.as_ref().is_some_and(|frame| frame.takes_more),
         };
-        let summary = range.check(&self.pressure_pa).map_err(problem::of_map)?;
+        range.check(&self.pressure_pa).map_err(problem::of_map)?;
+        let summary = keep_inside(&mut self.pressure_pa, self.catalogue.skin.mask());
         Ok((summary, range))
     }
 }

@@ -61,9 +61,9 @@ impl Freshness {
         let lag_us = (since_begun.as_micros() as i64).wrapping_sub(client_time_us as i64);
         let best_us = self.fastest.map_or(lag_us, |Fastest { lag_us, at }| {
             let passed = received.saturating_duration_since(at);
-            lag_us.saturating_add(drift_us(passed))
+            lag_us.wrapping_add(drift_us(passed))
         });
-        let delay_us = lag_us.saturating_sub(best_us);
+        let delay_us = lag_us.wrapping_sub(best_us);
         if delay_us > i64::from(stale_after_us) && self.in_a_row < IN_A_ROW_MAX {
             self.in_a_row += 1;
             return true;
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_frame_that_was_held_up_is_stale_whatever_the_clocks() {
-        for clock_us in [0, 1_700_000_000_000_000, u64::MAX - 5000] {
+        for clock_us in [0, 1_700_000_000_000_000, i64::MAX as u64 - 25_000, u64::MAX - 5000] {
             let mut fresh = Freshness::new(Some(5000));
             let found = stale(&mut fresh, clock_us, &[3, 2, 4, 7, 8, 2]);
             // Against 2 ms, the fastest: 7 is 5 later, 8 is 6 later.

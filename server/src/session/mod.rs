@@ -82,7 +82,9 @@ async fn run(socket: WebSocket, app: Arc<App>, drain: watch::Receiver<bool>, _pl
     let end = converse(&mut line, number).await;
     match &end {
         End::Client => tracing::debug!(session = number, "the client ended the session"),
-        End::Broken(reason) => tracing::debug!(session = number, reason, "session broken"),
+        End::Broken(reason) | End::Garbled(reason) => {
+            tracing::debug!(session = number, reason, "session broken");
+        }
         End::Refused(problem, _) => tracing::debug!(session = number, %problem, "session ended"),
     }
     line.part(&end).await;
@@ -115,6 +117,8 @@ enum End {
     Client,
     /// The client does not take what it is sent, or the connection broke.
     Broken(String),
+    /// What came is not WebSocket, or the connection broke in the middle of it.
+    Garbled(String),
     /// The server says so, with this error and this close code.
     Refused(Problem, u16),
 }
@@ -194,6 +198,8 @@ impl Line {
     async fn part(&mut self, end: &End) {
         let (code, reason) = match end {
             End::Broken(_) => return,
+            // There may be nobody left to read it.
+            End::Garbled(_) => (close::PROTOCOL, "what came is not WebSocket"),
             End::Client => (close::NORMAL, ""),
             End::Refused(problem, code) => {
                 self.app.metrics.error(problem.code);
@@ -227,7 +233,7 @@ fn heard(message: Option<Result<Message, axum::Error>>) -> Result<Event, End> {
                 let message = "a text message is not UTF-8";
                 Err(End::Refused(Problem::new(ErrorCode::BadJson, message), close::PROTOCOL))
             } else {
-                Err(End::Broken(text))
+                Err(End::Garbled(text))
             }
         }
     }

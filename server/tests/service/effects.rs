@@ -11,14 +11,14 @@ use crate::support::{
 };
 
 /// A hello of version 2.
-fn hello_2(members: &Value) -> Value {
+pub(crate) fn hello_2(members: &Value) -> Value {
     let mut hello = hello(members);
     hello["version"] = json!(2);
     hello
 }
 
 /// A frame of version 2 with the samples of `window`.
-fn windowed(sequence: u32, time_us: u64, window: Window, map: &[f32]) -> Vec<u8> {
+pub(crate) fn windowed(sequence: u32, time_us: u64, window: Window, map: &[f32]) -> Vec<u8> {
     let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0).windowed(window);
     let mut frame = header.encode().to_vec();
     frame.resize(HEADER_LEN_V2 + 4 * window.pixel_count(), 0);

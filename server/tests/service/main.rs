@@ -4,12 +4,14 @@
 #![allow(clippy::unwrap_used)]
 
 mod binary;
+mod clocks;
 mod drain;
 mod effects;
 mod gate;
 mod hostile;
 mod information;
 mod ladder;
+mod network;
 mod oip;
 #[cfg(feature = "otlp")]
 mod otlp;

@@ -3,6 +3,7 @@
 mod binary;
 mod http;
 mod onnx;
+pub(crate) mod raw;
 mod socket;
 
 use std::{fs, net::SocketAddr, path::Path};
@@ -98,8 +99,12 @@ pub(crate) async fn metric_at(address: SocketAddr, line: &str) -> f64 {
 
 /// A folder as the service expects it. Dropped, it is deleted.
 pub(crate) fn model_folder() -> TempDir {
+    model_folder_on(&atlas())
+}
+
+/// The same on another atlas.
+pub(crate) fn model_folder_on(atlas: &Atlas) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let atlas = atlas();
     write(folder.path(), "atlas.json", atlas.to_json().unwrap().as_bytes());
     add_model(folder.path(), "quick", atlas.hash(), 0, 0.2);
     add_model(folder.path(), "slow", atlas.hash(), 8, 0.05);
@@ -118,15 +123,21 @@ pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) {
     fs::write(folder.join(name), bytes).unwrap();
 }
 
-/// A square patch of four triangles around a middle vertex.
+/// Square patches of four triangles around a middle vertex. The skin is all of the map, the
+/// interface the pixels from 20 to 200 both ways.
 pub(crate) fn atlas() -> Atlas {
-    let uv_px = vec![[20.0, 20.0], [200.0, 20.0], [200.0, 200.0], [20.0, 200.0], [110.5, 110.5]];
-    let patch = |z: f32| PatchVertices {
-        positions_mm: uv_px.iter().map(|&[u, v]: &[f32; 2]| [0.1 * v, -0.1 * u, z]).collect(),
-        uv_px: uv_px.clone(),
+    atlas_of_skin(0.0, 224.0)
+}
+
+/// The same with a skin from pixel `from` to `to` both ways.
+pub(crate) fn atlas_of_skin(from: f32, to: f32) -> Atlas {
+    let patch = |z: f32, from: f32, to: f32| {
+        let uv_px = vec![[from, from], [to, from], [to, to], [from, to], [110.5, 110.5]];
+        let place = |&[u, v]: &[f32; 2]| [0.1 * v, -0.1 * u, z];
+        PatchVertices { positions_mm: uv_px.iter().map(place).collect(), uv_px }
     };
     let triangles = vec![[0, 4, 1], [1, 4, 2], [2, 4, 3], [3, 4, 0]];
-    Atlas::new(0.1, triangles, patch(-1.0), patch(-0.5)).unwrap()
+    Atlas::new(0.1, triangles, patch(-1.0, from, to), patch(-0.5, 20.0, 200.0)).unwrap()
 }
 
 /// Writes a model and its card.

@@ -1,0 +1,215 @@
+//! Maps that no press makes, through every shipped model: each is answered by a map that is finite,
+//! not negative and empty outside of the interface, or refused by name; and the next is answered
+//! as if nothing had been.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+use papilla_engine::{Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Index, load};
+use papilla_proto::{
+    MapError, PressureRange, SampleType,
+    atlas::{Atlas, Patch, Raster},
+};
+use std::fs;
+
+fn read(name: &str) -> Vec<u8> {
+    fs::read(format!("{}/../models/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap()
+}
+
+fn text(name: &str) -> String {
+    String::from_utf8(read(name)).unwrap()
+}
+
+/// The pixels of both patches.
+fn masks() -> [Vec<bool>; 2] {
+    let atlas = Atlas::from_json(&text("atlas.json")).unwrap();
+    Patch::ALL.map(|patch| Raster::new(&atlas, patch).mask().to_vec())
+}
+
+/// A shipped model, and whether a map takes it long.
+struct Tier {
+    card: Card,
+    session: Box<dyn Session>,
+    is_slow: bool,
+}
+
+/// All shipped models, one after another.
+fn each(mut look: impl FnMut(&mut Tier)) {
+    for name in Index::from_json(&text("index.json")).unwrap().models {
+        let card = Card::from_json(&text(&format!("{name}.json"))).unwrap();
+        let model = load(&read(&format!("{name}.onnx")), Some(&card)).unwrap();
+        let (session, is_slow) = (model.session().unwrap(), name.starts_with("s1-base16"));
+        look(&mut Tier { card, session, is_slow });
+    }
+}
+
+impl Tier {
+    fn max_pa(&self) -> f32 {
+        self.card.pressure_range_pa[1]
+    }
+
+    fn answer(&mut self, pressure_pa: &[f32]) -> Result<Vec<f32>, EngineError> {
+        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+        self.session.infer(pressure_pa, &mut sed_j_per_m3).map(|()| sed_j_per_m3)
+    }
+
+    /// An answer that is due.
+    #[track_caller]
+    fn map(&mut self, what: &str, pressure_pa: &[f32], interface: &[bool]) -> Vec<f32> {
+        let name = self.card.name.clone();
+        let sed = self.answer(pressure_pa).unwrap_or_else(|e| panic!("{name}, {what}: {e}"));
+        assert!(sed.iter().all(|v| v.is_finite() && *v >= 0.0), "{name}, {what}");
+        let off = sed.iter().zip(interface).position(|(v, inside)| !inside && *v > 0.0);
+        assert_eq!(off, None, "{name}, {what}: there is SED off the interface");
+        sed
+    }
+}
+
+fn single(pixel: usize, pressure_pa: f32) -> Vec<f32> {
+    let mut map = vec![0.0; MAP_LEN];
+    map[pixel] = pressure_pa;
+    map
+}
+
+/// A round press of `peak_pa` in the middle of the pad, as smooth as real ones.
+fn press(peak_pa: f32) -> Vec<f32> {
+    let pressure_pa = |i: usize| {
+        let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
+        let r2 = ((row - 80.0) / 34.0).powi(2) + ((column - 112.0) / 30.0).powi(2);
+        peak_pa * (1.0 - r2).max(0.0).sqrt()
+    };
+    (0..MAP_LEN).map(pressure_pa).collect()
+}
+
+/// A pixel in the middle, one at the rim and one outside of a mask, and where memory ends.
+fn places(mask: &[bool]) -> Vec<usize> {
+    let rim = (1..MAP_LEN).find(|&i| mask[i] && !mask[i - 1]).unwrap();
+    let middle = 112 * MAP_SIDE_PX + 112;
+    assert!(mask[middle] && !mask[0]);
+    vec![0, MAP_SIDE_PX - 1, MAP_SIDE_PX, rim - 1, rim, middle, MAP_LEN - MAP_SIDE_PX, MAP_LEN - 1]
+}
+
+#[test]
+fn maps_that_no_press_makes() {
+    let [skin, interface] = masks();
+    each(|tier| {
+        let max_pa = tier.max_pa();
+        let nothing = tier.map("all zero", &vec![0.0; MAP_LEN], &interface);
+        assert!(nothing.iter().all(|v| *v <= 0.0), "{}: SED of nothing", tier.card.name);
+        let minus = tier.map("minus zero", &vec![-0.0; MAP_LEN], &interface);
+        assert!(minus.iter().all(|v| *v <= 0.0), "{}: SED of minus nothing", tier.card.name);
+        for (what, pressure_pa) in [
+            ("denormals", 1e-40),
+            ("1e-30 Pa", 1e-30),
+            ("the least normal number", f32::MIN_POSITIVE),
+            ("saturated", max_pa),
+            ("ten times saturated", 10.0 * max_pa),
+        ] {
+            tier.map(what, &vec![pressure_pa; MAP_LEN], &interface);
+        }
+        let is_black = |i: usize| (i / MAP_SIDE_PX + i % MAP_SIDE_PX).is_multiple_of(2);
+        let board: Vec<f32> =
+            (0..MAP_LEN).map(|i| if is_black(i) { max_pa } else { 0.0 }).collect();
+        tier.map("checkerboard", &board, &interface);
+        let some = if tier.is_slow { 5..6 } else { 0..8 };
+        for pixel in &places(&skin)[some] {
+            for pressure_pa in [max_pa, 10.0 * max_pa, 1e-30] {
+                tier.map(&format!("pixel {pixel}"), &single(*pixel, pressure_pa), &interface);
+            }
+        }
+    });
+}
+
+#[test]
+fn what_is_no_pressure_is_named_and_leaves_no_trace() {
+    let [skin, interface] = masks();
+    each(|tier| {
+        let max_pa = tier.max_pa();
+        let good = press(0.5 * max_pa);
+        let due = tier.map("a press", &good, &interface);
+        assert!(due.iter().any(|v| *v > 0.0));
+        for place in places(&skin) {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut bad = good.clone();
+                bad[place] = value;
+                let error = tier.answer(&bad).unwrap_err();
+                let at = (place / MAP_SIDE_PX, place % MAP_SIDE_PX);
+                assert!(
+                    matches!(error, EngineError::NonFiniteInput { row, column, .. } if (row, column) == at),
+                    "{}: {error}",
+                    tier.card.name
+                );
+            }
+            // Negative pressure is the service's to refuse, before any model is asked.
+            let mut bad = good.clone();
+            bad[place] = -1.0;
+            let range = PressureRange { trained_max_pa: max_pa, takes_more: true };
+            assert!(matches!(range.check(&bad), Err(MapError::Negative { .. })));
+        }
+        // Far beyond all that a range lets through: a map that is one, or an error.
+        for pressure_pa in [1e20, 1e30, f32::MAX] {
+            match tier.answer(&vec![pressure_pa; MAP_LEN]) {
+                Ok(sed) => assert!(sed.iter().all(|v| v.is_finite() && *v >= 0.0)),
+                Err(error) => assert!(
+                    matches!(
+                        error,
+                        EngineError::NonFiniteOutput { .. } | EngineError::NegativeOutput { .. }
+                    ),
+                    "{}: {error}",
+                    tier.card.name
+                ),
+            }
+        }
+        let again = tier.map("the same press", &good, &interface);
+        assert!(again == due, "{}: what was refused left a trace", tier.card.name);
+    });
+}
+
+/// The card's range is what tells an extrapolation.
+#[test]
+fn what_the_card_does_not_know_is_flagged() {
+    each(|tier| {
+        assert!(tier.max_pa() > 1e3 && tier.max_pa() < 1e6, "{}", tier.card.name);
+        let flagged = PressureRange { trained_max_pa: tier.max_pa(), takes_more: true };
+        let strict = PressureRange { takes_more: false, ..flagged };
+        for (times, is_left) in [(0.5, false), (1.0, false), (1.02, true), (9.9, true)] {
+            let map = press(times * tier.max_pa());
+            let peak_pa = map.iter().copied().fold(0.0, f32::max);
+            let summary = flagged.check(&map).unwrap();
+            assert_eq!(flagged.is_left_by(summary), peak_pa > 1.01 * tier.max_pa());
+            assert_eq!(flagged.is_left_by(summary), is_left, "{} x {times}", tier.card.name);
+            assert_eq!(strict.check(&map).is_err(), is_left);
+        }
+        let far = press(10.5 * tier.max_pa());
+        assert!(matches!(flagged.check(&far), Err(MapError::OutOfRange { .. })));
+    });
+}
+
+/// What quantised pressure costs in SED: `docs/hard-cases.md` states these bounds.
+#[test]
+fn quantised_pressure_changes_sed_within_the_stated_bounds() {
+    let [_, interface] = masks();
+    each(|tier| {
+        let max_pa = tier.max_pa();
+        let exact = press(0.6 * max_pa);
+        let due = tier.map("f32", &exact, &interface);
+        let size = |map: &[f32]| map.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
+        for (sample_type, bound) in
+            [(SampleType::F16, 1e-3), (SampleType::U16, 1e-4), (SampleType::U8, 1e-2)]
+        {
+            let scale = max_pa / sample_type.unit_max();
+            let mut bytes = vec![0; MAP_LEN * sample_type.bytes()];
+            sample_type.encode(&exact, scale, &mut bytes).unwrap();
+            let mut coarse = vec![0.0; MAP_LEN];
+            sample_type.decode(&bytes, scale, &mut coarse).unwrap();
+            for (p, q) in exact.iter().zip(&coarse) {
+                assert!((p - q).abs() <= sample_type.error_max(*p, scale));
+            }
+            let found = tier.map("quantised", &coarse, &interface);
+            let off: Vec<f32> = found.iter().zip(&due).map(|(f, d)| f - d).collect();
+            let error = size(&off) / size(&due);
+            println!("{} {sample_type:?}: {error:.2e}", tier.card.name);
+            assert!(error <= bound, "{} {sample_type:?}: {error:.2e}", tier.card.name);
+        }
+    });
+}
