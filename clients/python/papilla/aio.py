@@ -103,7 +103,9 @@ class AsyncSession:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._socket is not None:
             await self._socket.close()
-        self._lose(self._waiting)
+        for frame in [*self._sent.values(), self._waiting]:
+            self._lose(frame)
+        self._sent.clear()
         self._waiting = None
 
     @property
@@ -173,6 +175,8 @@ class AsyncSession:
         return _Frame(self._sequence, time_us, message)
 
     def hand_over(self, frame: _Frame) -> None:
+        if self._closed or self._fault is not None:
+            return self._lose(frame)
         old, self._waiting = self._waiting, frame
         if old is not None:
             self.superseded_by_client += 1
@@ -196,7 +200,7 @@ class AsyncSession:
             await self._socket.send(self._words(self._hello))
             said = await asyncio.wait_for(self._socket.recv(), _PATIENCE_S)
         except InvalidStatus as error:
-            raise refusal(error.response.body or b"", str(error)) from None
+            raise refusal(bytes(error.response.body or b""), str(error)) from None
         except (OSError, WebSocketException) as error:
             raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
         message = json.loads(said)
@@ -298,9 +302,7 @@ async def _dial(host: str, port: int) -> socket.socket:
     """A connection with room for a whole frame each way; the room must be named before."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
-    for family, kind, proto, _, address in await loop.getaddrinfo(
-        host, port, type=socket.SOCK_STREAM
-    ):
+    for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
         raw = socket.socket(family, kind, proto)
         try:
             raw.setblocking(False)
@@ -313,5 +315,3 @@ async def _dial(host: str, port: int) -> socket.socket:
             raw.close()
             last = error
     raise last
-
-

@@ -34,22 +34,18 @@ class Atlas:
         self.triangles: NDArray[np.int64] = np.asarray(file["triangles"], np.int64)
         # As f32 first: the file's decimal numbers are those of f32 values.
         skin = file["skin"]
-        self.positions_mm: NDArray[np.float64] = np.asarray(
-            skin["positions_mm"], np.float32
-        ).astype(np.float64)
+        self.positions_mm: NDArray[np.float64] = np.asarray(skin["positions_mm"], np.float32).astype(np.float64)
         uv_px = np.asarray(skin["uv_px"], np.float32).astype(np.float64)
         self._owner, self._weights = _cover(uv_px, self.triangles)
         self.pixels: NDArray[np.int64] = np.flatnonzero(self._owner >= 0)
         """Flat indices of the skin's pixels, ascending."""
         corners = self.triangles[self._owner[self.pixels]]
         self._corners = corners
-        self.places_mm: NDArray[np.float64] = np.einsum(
-            "pi,pix->px", self._weights, self.positions_mm[corners]
-        )
+        self.places_mm: NDArray[np.float64] = np.einsum("pi,pix->px", self._weights, self.positions_mm[corners])
         """Where each of `pixels` is on the undeformed finger."""
-        self.areas_mm2: NDArray[np.float64] = _areas_mm2(
-            self.positions_mm, uv_px, self.triangles
-        )[self._owner[self.pixels]]
+        self.areas_mm2: NDArray[np.float64] = _areas_mm2(self.positions_mm, uv_px, self.triangles)[
+            self._owner[self.pixels]
+        ]
         """Area of the finger that each of `pixels` shows."""
 
     @classmethod
@@ -95,9 +91,7 @@ class Atlas:
         return whole.reshape(SIDE_PX, SIDE_PX)
 
 
-def _cover(
-    uv_px: NDArray[np.float64], triangles: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _cover(uv_px: NDArray[np.float64], triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Triangle of every pixel (-1: none), and the weights of those that have one."""
     owner = np.full(SIDE_PX * SIDE_PX, -1, np.int64)
     weights = np.zeros((SIDE_PX * SIDE_PX, 3))
@@ -116,9 +110,7 @@ def _cover(
     return owner, weights[owner >= 0]
 
 
-def _doubled(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _doubled(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
     """Twice the signed area; exact, for `uv_px` are multiples of 1/4096."""
     along, across = b - a, c - a
     area: NDArray[np.float64] = along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]

@@ -10,6 +10,7 @@ import os
 import sys
 import time
 import urllib.request
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -161,10 +162,13 @@ class Run:
         finished: list[int] = []
         outcomes = []
         for number, map_pa in enumerate(maps):
+
+            def done(sent: Future[Answer], number: int = number) -> None:
+                if sent.result().status == "ok":
+                    finished.append(number)
+
             sent = session.send(map_pa)
-            sent.add_done_callback(
-                lambda done, n=number: finished.append(n) if done.result().status == "ok" else None
-            )
+            sent.add_done_callback(done)
             outcomes.append(sent)
             time.sleep(step.get("gap_ms", 0) * 1e-3)
         if step.get("paused"):

@@ -123,9 +123,6 @@ def sed(
 def press(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Press:
     """One of the FE presses that the service ships: input and truth."""
     name = get_json(url, "/v1/presses", token)["presses"][number]["name"]
-    maps = [
-        _array(request(url, f"/v1/presses/{number}/{what}", None, _NPY, token)[0])
-        for what in ("pressure", "sed")
-    ]
+    maps = [_array(request(url, f"/v1/presses/{number}/{what}", None, _NPY, token)[0]) for what in ("pressure", "sed")]
     assert all(map_.shape == (SIDE_PX, SIDE_PX) for map_ in maps)
     return Press(name, *maps)

@@ -46,9 +46,7 @@ class Session:
     def __enter__(self) -> Session:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         self.close()
 
     def close(self) -> None:
@@ -109,9 +107,7 @@ class Session:
         timeout_s: float | None = None,
     ) -> Answer:
         """`send`, and waits for the outcome; raises TimeoutError after `timeout_s`."""
-        sent = self.send(
-            pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us
-        )
+        sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
         return sent.result(timeout_s)
 
     def terms(self, **hello: Any) -> dict[str, Any]:

@@ -13,9 +13,7 @@ const NOTHING_PA: f64 = 1.0;
 pub struct Pressure {
     gaussians: Vec<[f64; 4]>,
     disc: Option<[f64; 4]>,
-    // Only in frames that are refused: no values are recorded of them.
-    #[serde(rename = "bad")]
-    _bad: Option<(usize, usize, Value)>,
+    bad: Option<(usize, usize, Value)>,
 }
 
 /// Values at vertices by formula.
@@ -29,9 +27,12 @@ pub struct Vertices {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
-    pub(super) at_mm: [f64; 3],
-    pub(super) force_n: f64,
-    pub(super) radius_mm: f64,
+    /// On or near the undeformed skin.
+    pub at_mm: [f64; 3],
+    /// Normal force, N.
+    pub force_n: f64,
+    /// Radius of the contact, mm.
+    pub radius_mm: f64,
 }
 
 impl Pressure {
@@ -47,6 +48,15 @@ impl Pressure {
             if inside {
                 *sample = self.at(column as f64 + 0.5, row as f64 + 0.5, share) as f32;
             }
+        }
+        if let Some((row, column, value)) = &self.bad
+            && let Some(sample) = map_pa.get_mut(row * MAP_SIDE_PX + column)
+        {
+            *sample = match value.as_str() {
+                Some("inf") => f32::INFINITY,
+                Some(_) => f32::NAN,
+                None => value.as_f64().unwrap_or(f64::NAN) as f32,
+            };
         }
         map_pa
     }
