@@ -51,6 +51,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/v1/effects", get(effects::list)),
         (g.clone(), "/v1/atlas", get(atlas::json)),
         (g.clone(), "/v1/atlas.obj", get(atlas::obj)),
+        (g.clone(), "/v1/atlas.glb", get(atlas::glb)),
         (g.clone(), "/v1/atlas/mask.png", get(atlas::mask)),
         (g.clone(), "/v1/presses", get(presses::list)),
         (g.clone(), "/v1/presses/{press}", get(presses::one)),

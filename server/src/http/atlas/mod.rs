@@ -1,4 +1,6 @@
-//! The atlas: as it was shipped, as OBJ, and its mask.
+//! The atlas: as it was shipped, as OBJ and glTF, and its mask.
+
+mod glb;
 
 use axum::{
     extract::State,
@@ -23,6 +25,20 @@ pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Response {
     let catalogue = app.catalogue();
     let atlas = &catalogue.atlas;
     tagged("model/obj", atlas.hash(), asked, Bytes::from(atlas.to_obj()))
+}
+
+/// Both patches as binary glTF, each with its mask as a texture.
+pub(super) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
+    let catalogue = app.catalogue();
+    let mut masks = [Vec::new(), Vec::new()];
+    for (raster, png) in [&catalogue.skin, &catalogue.interface].into_iter().zip(&mut masks) {
+        codec::encode_mask(raster.mask(), png)
+            .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
+    }
+    let atlas = &catalogue.atlas;
+    let asked = headers.get(header::IF_NONE_MATCH);
+    let tag = format!("{}-glb", atlas.hash());
+    Ok(tagged("model/gltf-binary", &tag, asked, Bytes::from(glb::write(atlas, &masks))))
 }
 
 /// White where the patch is: the interface, or with `?patch=skin` the skin.

@@ -1,0 +1,282 @@
+// A session over a socket of its own: two threads, latest wins, reconnects by itself.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core.hpp"
+#include "websocket.hpp"
+
+namespace papilla {
+
+/// Microseconds of a steady clock.
+inline std::uint64_t now_us() {
+  using namespace std::chrono;
+  return static_cast<std::uint64_t>(
+      duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
+}
+
+class Session {
+ public:
+  struct Options {
+    std::string url = "127.0.0.1:7224";
+    std::string token;                ///< bearer token, if the service asks for one
+    /// Members of the protocol's hello as JSON without braces: "\"tier\": \"small\"".
+    std::string hello;
+    /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
+    /// what is needed and return.
+    std::function<void(const Answer&)> on_outcome;
+    int retry_ms = 150;
+  };
+
+  Session() : Session(Options()) {}
+  explicit Session(Options options)
+      : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(options_.hello) {
+    core_.on_outcome = [this](const Answer& answer) { outcome(answer); };
+  }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+  ~Session() { close(); }
+
+  /// Connects and says hello; false: `problem()` says why not.
+  bool open() {
+    if (!connect()) return false;
+    reader_ = std::thread([this] { live(); });
+    writer_ = std::thread([this] { write(); });
+    return true;
+  }
+
+  /// Ends the session; frames without an outcome are lost.
+  void close() {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (closed_) return;
+      closed_ = true;
+      socket_.shut();
+    }
+    changed_.notify_all();
+    if (reader_.joinable()) reader_.join();
+    if (writer_.joinable()) writer_.join();
+    std::lock_guard<std::mutex> lock(mutex_);
+    core_.end();
+    socket_.close();
+  }
+
+  /// Hands over one frame, the whole map (224 x 224, Pa, row by row) or the samples of a window,
+  /// and returns its sequence at once. Replaces one that has not left. Allocates nothing.
+  std::uint32_t send(const float* pressure_pa, Window window = {}, std::uint64_t client_time_us = now_us(),
+                     std::uint32_t deadline_us = 0) {
+    std::uint32_t sequence;
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      sequence = core_.send(pressure_pa, window, client_time_us, deadline_us);
+    }
+    changed_.notify_all();
+    return sequence;
+  }
+
+  /// The newest answer with status ok, once; false if none came since. Swaps, so that nothing is
+  /// copied: `mine` is what a game loop calls this with every frame.
+  bool latest(Answer& mine) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    if (!fresh_) return false;
+    fresh_ = false;
+    std::swap(mine, latest_);
+    return true;
+  }
+
+  /// `send`, and waits for the outcome, at most so long; status lost if it does not come.
+  const Answer& render(const float* pressure_pa, Window window = {}, std::uint64_t client_time_us = now_us(),
+                       std::uint32_t deadline_us = 0, int timeout_ms = 30000) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    wanted_ = core_.send(pressure_pa, window, client_time_us, deadline_us);
+    wants_ = true;
+    rendered_.status = Status::lost;
+    rendered_.has_map = false;
+    changed_.notify_all();
+    changed_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !wants_ || closed_; });
+    wants_ = false;
+    return rendered_;
+  }
+
+  /// Says hello again in the open session; false: `problem()` says why not, and the old terms stand.
+  bool terms(const std::string& hello, int timeout_ms = 30000) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!core_.agreed()) return problem_ = {"", "there is no session just now", ""}, false;
+    new_hello_ = Core::words(hello);
+    told_ = granted_ = false;
+    changed_.notify_all();
+    const auto wait = std::chrono::milliseconds(timeout_ms);
+    const bool good = changed_.wait_for(lock, wait, [this] { return told_ || closed_; }) && granted_;
+    told_ = true;  // also after a timeout: frames go on under the old terms
+    if (good) core_.set_hello(hello);
+    return good;
+  }
+
+  Terms agreed() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return core_.terms();
+  }
+  bool connected() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return core_.agreed();
+  }
+  /// Times that a session was opened: more than 1 after a reconnect.
+  std::uint64_t connections() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return connections_;
+  }
+  std::uint64_t superseded_by_client() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return core_.superseded_by_client();
+  }
+  /// Why the last `open` or `terms` failed.
+  Problem problem() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return problem_;
+  }
+
+ private:
+  Options options_;
+  net::Address address_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  Core core_;
+  WebSocket socket_;
+  std::thread reader_, writer_;
+  std::vector<std::uint8_t> message_;
+  bool closed_ = false;
+  bool sending_ = false;              ///< the writer has the socket
+  Problem problem_;
+  std::uint64_t connections_ = 0;
+  Answer latest_, rendered_;
+  bool fresh_ = false;
+  bool wants_ = false;
+  std::uint32_t wanted_ = 0;
+  std::string new_hello_, pong_;
+  bool told_ = true, granted_ = false, pong_due_ = false;
+
+  void outcome(const Answer& answer) {
+    if (options_.on_outcome) options_.on_outcome(answer);
+    if (answer.status == Status::ok) {
+      latest_ = answer;               // keeps its room: no allocation
+      fresh_ = true;
+    }
+    if (wants_ && answer.sequence == wanted_) {
+      rendered_ = answer;
+      wants_ = false;
+      changed_.notify_all();
+    }
+  }
+
+  bool connect() {
+    std::string error, answer;
+    if (!socket_.open(address_, "/v1/session", options_.token, error, answer)) {
+      json::Value value;
+      json::parse(answer, value);
+      const json::Value& said = value["error"];
+      std::lock_guard<std::mutex> lock(mutex_);
+      problem_ = said.is_null() ? Problem{"", error, ""}
+                                : Problem{said["code"].string, said["message"].string, said["field"].string};
+      return false;
+    }
+    socket_.patience(30);
+    if (!socket_.send_text(core_.hello())) return false;
+    const auto kind = socket_.receive(message_);
+    std::lock_guard<std::mutex> lock(mutex_);
+    const auto heard = kind == WebSocket::Message::text ? core_.text(text()) : Core::Heard::broken;
+    if (heard != Core::Heard::ready) {
+      problem_ = heard == Core::Heard::refused ? core_.refusal() : Problem{"", "no ready came", ""};
+      return false;
+    }
+    socket_.patience(0);
+    ++connections_;
+    return true;
+  }
+
+  std::string_view text() const {
+    return {reinterpret_cast<const char*>(message_.data()), message_.size()};
+  }
+
+  /// Reads until the connection breaks, and opens another.
+  void live() {
+    for (;;) {
+      read();
+      std::unique_lock<std::mutex> lock(mutex_);
+      core_.lost();
+      told_ = true, granted_ = false, pong_due_ = false;
+      socket_.shut();
+      changed_.notify_all();
+      changed_.wait(lock, [this] { return !sending_; });
+      const auto pause = std::chrono::milliseconds(options_.retry_ms);
+      do {
+        if (changed_.wait_for(lock, pause, [this] { return closed_; })) return;
+        lock.unlock();
+        const bool good = connect();
+        lock.lock();
+        if (closed_) socket_.shut();
+        if (good) break;
+      } while (!closed_);
+      changed_.notify_all();
+      if (closed_) return;
+    }
+  }
+
+  void read() {
+    for (;;) {
+      const auto kind = socket_.receive(message_);
+      if (kind == WebSocket::Message::closed) return;
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (kind == WebSocket::Message::ping) {
+        pong_ = socket_.ping();
+        pong_due_ = true;
+        changed_.notify_all();
+        continue;
+      }
+      const auto heard = kind == WebSocket::Message::text
+                             ? core_.text(text())
+                             : core_.binary(message_.data(), message_.size());
+      if (heard == Core::Heard::broken) return;
+      if (core_.waiting()) changed_.notify_all();
+      if (heard == Core::Heard::nothing || told_) continue;
+      told_ = true;
+      granted_ = heard == Core::Heard::ready;
+      if (!granted_) problem_ = core_.refusal();
+      changed_.notify_all();
+    }
+  }
+
+  /// Sends what waits, one message at a time; a frame not while new terms are being agreed on.
+  void write() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] {
+        const bool frame = core_.can_take() && told_;
+        return closed_ || (core_.agreed() && (frame || pong_due_ || !new_hello_.empty()));
+      });
+      if (closed_) return;
+      std::string hello, pong;
+      const bool answers = std::exchange(pong_due_, false);
+      if (answers) pong = pong_;
+      hello.swap(new_hello_);
+      Outgoing* frame = !answers && hello.empty() ? core_.take() : nullptr;
+      sending_ = true;
+      lock.unlock();
+      bool good = true;
+      if (answers) good = socket_.send_pong(pong);
+      if (!hello.empty()) good = socket_.send_text(hello);
+      if (frame) good = socket_.send(true, frame->data(), frame->size);
+      lock.lock();
+      sending_ = false;
+      if (!good) socket_.shut();
+      changed_.notify_all();
+    }
+  }
+};
+
+}  // namespace papilla

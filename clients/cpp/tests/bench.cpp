@@ -1,0 +1,71 @@
+// Round trips of the C++ client at a steady rate, as one line of JSON (docs/clients/README.md).
+//   bench [--rate-hz 90] [--duration-s 60]     PAPILLA_URL names the service
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+#include <papilla/papilla.hpp>
+
+static std::atomic<unsigned long long> allocations{0};
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* const room = std::malloc(size)) return room;
+  std::abort();
+}
+void operator delete(void* room) noexcept { std::free(room); }
+void operator delete(void* room, std::size_t) noexcept { std::free(room); }
+
+int main(int argc, char** argv) {
+  double rate_hz = 90.0, duration_s = 60.0;
+  for (int i = 1; i + 1 < argc; i += 2) {
+    if (std::strcmp(argv[i], "--rate-hz") == 0) rate_hz = std::atof(argv[i + 1]);
+    if (std::strcmp(argv[i], "--duration-s") == 0) duration_s = std::atof(argv[i + 1]);
+  }
+  const auto frames = static_cast<std::size_t>(rate_hz * duration_s);
+  const auto warm_up = static_cast<std::size_t>(rate_hz);
+  std::vector<double> times_us;
+  times_us.reserve(frames + warm_up);
+  papilla::Session::Options options;
+  const char* const url = std::getenv("PAPILLA_URL");
+  if (url) options.url = url;
+  options.hello = "\"tier\": \"half-space\"";
+  // The client time is the instant at which the frame was meant to leave.
+  options.on_outcome = [&](const papilla::Answer& answer) {
+    if (answer.status == papilla::Status::ok) {
+      times_us.push_back(double(papilla::now_us() - answer.client_time_us));
+    }
+  };
+  papilla::Session session(options);
+  if (!session.open()) return std::fprintf(stderr, "%s\n", session.problem().message.c_str()), 1;
+  std::vector<float> pressure_pa(papilla::map_len);
+  for (std::size_t i = 0; i < papilla::map_len; ++i) {
+    const double x = double(i % 224) - 112.0, y = double(i / 224) - 112.0;
+    pressure_pa[i] = float(20000.0 * std::exp(-(x * x + y * y) / 288.0));
+  }
+  const std::uint64_t start_us = papilla::now_us() + 20000;
+  unsigned long long before = 0;
+  for (std::size_t i = 0; i < warm_up + frames; ++i) {
+    const auto due_us = start_us + static_cast<std::uint64_t>(1e6 * double(i) / rate_hz);
+    const std::uint64_t now = papilla::now_us();
+    if (due_us > now) std::this_thread::sleep_for(std::chrono::microseconds(due_us - now));
+    if (i == warm_up) before = allocations;
+    session.send(pressure_pa.data(), {}, due_us);
+  }
+  const unsigned long long made = allocations - before;
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  session.close();
+  times_us.erase(times_us.begin(), times_us.begin() + std::ptrdiff_t(std::min(warm_up, times_us.size())));
+  if (times_us.empty()) return std::fputs("no answers\n", stderr), 1;
+  std::sort(times_us.begin(), times_us.end());
+  const auto share = [&](double of) { return times_us[std::size_t(of * double(times_us.size() - 1))]; };
+  std::printf("{\"client\": \"cpp\", \"rate_hz\": %g, \"frames\": %zu, \"p50_us\": %.0f, \"p99_us\": %.0f, "
+              "\"max_us\": %.0f, \"missing\": %zu, \"allocations_per_frame\": %g}\n",
+              rate_hz, times_us.size(), share(0.5), share(0.99), share(1.0), frames - std::min(frames, times_us.size()),
+              double(made) / double(frames));
+  return 0;
+}

@@ -1,0 +1,371 @@
+// Runs the conformance script with the C++ client (docs/conformance.md).
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <sstream>
+
+#include <papilla/papilla.hpp>
+
+using namespace papilla;
+using json::Value;
+
+namespace {
+
+struct Nonconformity {
+  std::string what;
+};
+
+void must(bool good, const std::string& what) {
+  if (!good) throw Nonconformity{what};
+}
+
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);
+  must(value != nullptr, std::string(name) + " is not set");
+  return value;
+}
+
+void control(const std::string& action) {
+  const HttpAnswer answer = http(environment("PAPILLA_CONTROL"), "POST", "/" + action);
+  must(answer.status == 200, "the control refuses " + action + ": " + answer.problem.message);
+}
+
+void sleep_ms(double ms) {
+  std::this_thread::sleep_for(std::chrono::microseconds(static_cast<long long>(1000 * ms)));
+}
+
+std::vector<float> pressure(const Value& pattern, double share = 1.0) {
+  std::vector<float> map(map_len);
+  for (std::size_t i = 0; i < map_len; ++i) {
+    const double u = double(i % side_px) + 0.5, v = double(i / side_px) + 0.5;
+    double sum = 0.0;
+    const auto squared = [&](const Value& of) {
+      return (u - of[0].number) * (u - of[0].number) + (v - of[1].number) * (v - of[1].number);
+    };
+    for (const Value& g : pattern["gaussians"].items) {
+      sum += g[3].number * std::exp(-squared(g) / (2.0 * g[2].number * g[2].number));
+    }
+    const Value& disc = pattern["disc"];
+    if (!disc.is_null() && squared(disc) <= disc[2].number * disc[2].number) sum += disc[3].number;
+    map[i] = static_cast<float>(sum < 1.0 ? 0.0 : share * sum);
+  }
+  if (const Value& bad = pattern["bad"]; !bad.is_null()) {
+    float& sample = map[bad[0].whole() * side_px + bad[1].whole()];
+    sample = bad[2].string == "nan"   ? std::nanf("")
+             : bad[2].string == "inf" ? HUGE_VALF
+                                      : static_cast<float>(bad[2].number);
+  }
+  return map;
+}
+
+void near(const std::string& what, double found, const Value& due, std::size_t at = 0) {
+  const double off = std::abs(found - due[at].number);
+  must(off <= due[at + 1].number, what + " is " + std::to_string(found) + ", " +
+                                      std::to_string(due[at].number) + " is due");
+}
+
+template <class List>
+void check_list(const char* what, const List& found, const Value& due) {
+  must(found.size() == due.size(), std::string(what) + ": another number of values");
+  for (std::size_t i = 0; i < due.size(); ++i) near(what + std::to_string(i), found[i], due[i]);
+}
+
+template <class At>
+void check_map(const Value& expect, const At& at) {
+  double sum = 0.0, top = 0.0;
+  for (int row = 0; row < side_px; ++row) {
+    for (int column = 0; column < side_px; ++column) {
+      sum += at(row, column);
+      top = std::max<double>(top, at(row, column));
+    }
+  }
+  for (const Value& pixel : expect["pixels"].items) {
+    near("pixel", at(int(pixel[0].number), int(pixel[1].number)), pixel, 2);
+  }
+  if (expect.has("sum")) near("sum", sum, expect["sum"]);
+  if (expect.has("max")) near("max", top, expect["max"]);
+}
+
+void check_problem(const Value& expect, const Problem& problem) {
+  must(problem.code == expect["code"].string, "the code is " + problem.code + ": " + problem.message);
+  must(!expect.has("field") || problem.field == expect["field"].string, "the field is " + problem.field);
+}
+
+const char* name_of(Status status) {
+  constexpr const char* names[] = {"ok", "superseded", "late", "error", "stale", "lost"};
+  return names[static_cast<int>(status)];
+}
+
+std::string due_status(const Value& expect) {
+  return expect.has("status") ? expect["status"].string : "ok";
+}
+
+void check_answer(const Value& expect, const Answer& answer) {
+  const std::string status = name_of(answer.status);
+  must(status == due_status(expect), "the status is " + status + " " + answer.problem.message);
+  if (answer.status == Status::error) check_problem(expect, answer.problem);
+  if (answer.status != Status::ok) return;
+  if (expect.has("kind")) {
+    must((answer.kind == Kind::sed) == (expect["kind"].string == "sed"), "another kind");
+  }
+  if (expect.has("tier")) must(answer.tier == expect["tier"].string, "the tier is " + answer.tier);
+  if (expect.has("flags")) {
+    std::uint8_t flags = 0;
+    for (const Value& flag : expect["flags"].items) {
+      flags |= flag.string == "out_of_range" ? out_of_range : no_contact;
+    }
+    must(answer.flags == flags, "the flags are " + std::to_string(answer.flags));
+  }
+  must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole");
+  if (expect.has("map")) {
+    must(!answer.has_map, "the answer carries a map");
+  } else {
+    must(answer.has_map, "the answer carries no map");
+    check_map(expect, [&](int row, int column) { return answer.at(row, column); });
+  }
+  if (const Value& due = expect["window"]; !due.is_null()) {
+    const Window& w = answer.window;
+    must(w.column == due[0].number && w.row == due[1].number && w.width == due[2].number &&
+             w.height == due[3].number, "another window");
+  }
+  if (expect.has("summary")) {
+    must(answer.has_summary, "there is no summary");
+    check_list("summary", answer.summary, expect["summary"]);
+  }
+  if (expect.has("points")) check_list("points", answer.points, expect["points"]);
+  if (expect.has("actuators")) check_list("actuators", answer.actuators, expect["actuators"]);
+}
+
+/// Members of an object without its braces.
+std::string members(const Value& hello) {
+  const std::string text = json::print(hello);
+  return text.substr(1, text.size() - 2);
+}
+
+struct Outcome {
+  std::uint32_t sequence;
+  Status status;
+  bool by_client;
+};
+
+class Run {
+ public:
+  explicit Run(double timeout_s) : timeout_ms_(int(1000 * timeout_s)) {}
+  std::string note;
+
+  void step(const Value& step) {
+    const std::string& name = step["do"].string;
+    const auto steps = std::map<std::string, void (Run::*)(const Value&)>{
+        {"hello", &Run::hello},         {"frame", &Run::frame},         {"burst", &Run::burst},
+        {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
+        {"contacts", &Run::contacts}};
+    must(steps.count(name) != 0, "there is no step " + name);
+    (this->*steps.at(name))(step);
+  }
+
+ private:
+  int timeout_ms_;
+  const std::string url_ = environment("PAPILLA_URL");
+  std::mutex mutex_;
+  std::vector<Outcome> outcomes_;
+  std::unique_ptr<Atlas> atlas_;
+  // Last: its threads end before what they use.
+  std::unique_ptr<Session> session_;
+
+  Session& session() {
+    must(session_ != nullptr, "no session is open");
+    return *session_;
+  }
+
+  void hello(const Value& step) {
+    const Value& expect = step["expect"];
+    bool good;
+    Problem problem;
+    if (session_) {
+      good = session_->terms(members(step["hello"]));
+      problem = session_->problem();
+    } else {
+      Session::Options options;
+      options.url = url_;
+      options.hello = members(step["hello"]);
+      options.on_outcome = [this](const Answer& answer) {
+        std::lock_guard<std::mutex> lock(mutex_);
+        outcomes_.push_back({answer.sequence, answer.status, answer.by_client});
+      };
+      auto session = std::make_unique<Session>(std::move(options));
+      good = session->open();
+      problem = session->problem();
+      if (good) session_ = std::move(session);
+    }
+    must(good == (due_status(expect) == "ok"), "the hello: " + problem.code + " " + problem.message);
+    if (!good) return check_problem(expect, problem);
+    const Terms terms = session_->agreed();
+    for (const auto& [name, due] : expect["ready"].members) {
+      must(json::print(terms.ready[name]) == json::print(due), "ready." + name + " is another");
+    }
+  }
+
+  void frame(const Value& step) {
+    const std::vector<float> map = pressure(step["pressure"]);
+    Window window;
+    std::vector<float> samples = map;
+    if (const Value& w = step["window"]; !w.is_null()) {
+      const auto at = [&](std::size_t i) { return static_cast<std::uint16_t>(w[i].whole()); };
+      window = {at(0), at(1), at(2), at(3)};
+      samples.clear();
+      for (int row = window.row; row < window.row + window.height; ++row) {
+        for (int column = window.column; column < window.column + window.width; ++column) {
+          const bool inside = row < side_px && column < side_px;
+          samples.push_back(inside ? map[std::size_t(row) * side_px + std::size_t(column)] : 0.0F);
+        }
+      }
+    }
+    const bool timed = step.has("client_time_us");
+    const std::uint64_t attempts = std::max<std::uint64_t>(1, step["attempts"].whole());
+    for (std::uint64_t i = 0; i < attempts; ++i) {
+      const std::uint64_t time_us = timed ? step["client_time_us"].whole() : now_us();
+      const Answer& answer = session().render(samples.data(), window, time_us,
+                                              std::uint32_t(step["deadline_us"].whole()), timeout_ms_);
+      if (answer.status == Status::lost && i + 1 < attempts) continue;
+      must(answer.client_time_us == time_us, "another client time comes back");
+      return check_answer(step["expect"], answer);
+    }
+  }
+
+  void burst(const Value& step) {
+    const auto count = std::size_t(step["count"].whole());
+    const Value& expect = step["expect"];
+    std::vector<std::vector<float>> maps;
+    for (std::size_t k = 1; k <= count; ++k) {
+      maps.push_back(pressure(step["pressure"], double(k) / double(count)));
+    }
+    outcomes_.clear();
+    const std::uint64_t before = session().superseded_by_client();
+    if (step["paused"].boolean) control("pause");
+    std::vector<std::uint32_t> sent;
+    for (const auto& map : maps) {
+      sent.push_back(session().send(map.data()));
+      sleep_ms(step["gap_ms"].number);
+    }
+    if (step["paused"].boolean) control("resume");
+    std::vector<Outcome> found;
+    for (int waited = 0; found.size() < count; waited += 5) {
+      must(waited < timeout_ms_, "only " + std::to_string(found.size()) + " outcomes");
+      sleep_ms(5);
+      std::lock_guard<std::mutex> lock(mutex_);
+      found = outcomes_;
+    }
+    std::set<std::uint32_t> named;
+    std::uint32_t last = 0;
+    std::size_t replaced = 0, here = 0, good = 0;
+    for (const Outcome& outcome : found) {
+      named.insert(outcome.sequence);
+      must(outcome.status == Status::ok || outcome.status == Status::superseded, name_of(outcome.status));
+      here += outcome.by_client;
+      if (outcome.status == Status::superseded) {
+        ++replaced;
+        continue;
+      }
+      ++good;
+      must(outcome.sequence > last, "answers came out of order");
+      last = outcome.sequence;
+    }
+    must(named == std::set<std::uint32_t>(sent.begin(), sent.end()), "two outcomes of one frame");
+    must(last == sent.back(), "the newest frame was not rendered last");
+    must(here == session().superseded_by_client() - before, "the client miscounts what it replaced");
+    must(replaced >= expect["superseded"].whole(), "too few were superseded");
+    must(here >= expect["superseded_by_client"].whole(), "the client replaced too few");
+    Answer newest;
+    must(session().latest(newest) && newest.sequence == last, "latest() gives another answer");
+    check_answer(expect["newest"], newest);
+    note = " (" + std::to_string(good) + " ok, " + std::to_string(here) + " replaced here, " +
+           std::to_string(replaced - here) + " by the service)";
+  }
+
+  void reconnect(const Value& step) {
+    const std::uint64_t before = session().connections();
+    control("restart");
+    const std::uint64_t begin = now_us();
+    while (session().connections() == before) {
+      must(double(now_us() - begin) < 1e6 * step["within_s"].number, "no new session in time");
+      sleep_ms(5);
+    }
+    note = " (connected " + std::to_string(double(now_us() - begin) * 1e-6) + " s after the server was back)";
+  }
+
+  void post(const Value& step) {
+    HttpAnswer answer;
+    const std::vector<float> map = sed(pressure(step["pressure"]), url_, step["tier"].string, &answer);
+    const bool good = due_status(step["expect"]) == "ok";
+    must(map.empty() != good, "status " + std::to_string(answer.status) + " " + answer.problem.message);
+    if (!good) return check_problem(step["expect"], answer.problem);
+    must(answer.header("x-papilla-tier") == step["expect"]["tier"].string, "another tier");
+    check_map(step["expect"], [&](int row, int column) { return map[std::size_t(row * side_px + column)]; });
+  }
+
+  const Atlas& atlas() {
+    if (!atlas_) {
+      atlas_ = std::make_unique<Atlas>();
+      must(atlas_->parse(http(url_, "GET", "/v1/atlas").body), "the atlas cannot be read");
+    }
+    return *atlas_;
+  }
+
+  void rasterise(const Value& step) {
+    const Value& g = step["vertices"]["gaussian_mm"];
+    std::vector<float> values, map(map_len);
+    for (const auto& p : atlas().positions_mm) {
+      double squared = 0.0;
+      for (std::size_t i = 0; i < 3; ++i) squared += (p[i] - g[i].number) * (p[i] - g[i].number);
+      values.push_back(float(g[4].number * std::exp(-squared / (2.0 * g[3].number * g[3].number))));
+    }
+    atlas().rasterise(values.data(), map.data());
+    check_map(step["expect"], [&](int row, int column) { return map[std::size_t(row * side_px + column)]; });
+  }
+
+  void contacts(const Value& step) {
+    std::vector<Contact> contacts;
+    for (const Value& c : step["contacts"].items) {
+      const Value& at = c["at_mm"];
+      contacts.push_back({{at[0].number, at[1].number, at[2].number}, c["force_n"].number, c["radius_mm"].number});
+    }
+    std::vector<float> map(map_len);
+    atlas().contacts(contacts.data(), contacts.size(), map.data());
+    check_map(step["expect"], [&](int row, int column) { return map[std::size_t(row * side_px + column)]; });
+    if (step["expect"].has("force_n")) near("force_n", atlas().force_n(map.data()), step["expect"]["force_n"]);
+  }
+};
+
+}  // namespace
+
+int main() {
+  int failed = 0;
+  try {
+    std::ifstream file(environment("PAPILLA_CONFORMANCE"));
+    std::stringstream text;
+    text << file.rdbuf();
+    Value script;
+    must(json::parse(text.str(), script), "the script cannot be read");
+    for (const Value& each : script["cases"].items) {
+      const std::string& name = each["name"].string;
+      std::size_t number = 0;
+      try {
+        Run run(script["timeout_s"].number);
+        for (const Value& step : each["steps"].items) run.step(step), ++number;
+        std::printf("ok %s%s\n", name.c_str(), run.note.c_str());
+      } catch (const Nonconformity& error) {
+        ++failed;
+        std::printf("FAIL %s: step %zu: %s\n", name.c_str(), number, error.what.c_str());
+      }
+      std::fflush(stdout);
+    }
+  } catch (const Nonconformity& error) {
+    std::fprintf(stderr, "%s\n", error.what.c_str());
+    return 2;
+  }
+  return failed ? 1 : 0;
+}

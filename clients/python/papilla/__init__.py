@@ -1,0 +1,38 @@
+"""Client of Papilla, a service that renders what a fingertip feels.
+
+Pressure on the skin (Pa) in, strain energy density (SED) at the dermis-epidermis interface (J/m3)
+out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
+
+- `sed(pressure_pa)`: one map over HTTP
+- `Session`, `AsyncSession`: many maps over a WebSocket; the latest frame wins
+- `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
+"""
+
+from .aio import AsyncSession
+from .answer import Answer, FrameProblem, Summary
+from .atlas import Atlas, Contact
+from .errors import Closed, NotRendered, PapillaError, Refused, Unreachable
+from .http import DEFAULT_URL, Press, post, press, sed
+from .sync import Session
+from .wire import SIDE_PX
+
+__all__ = [
+    "DEFAULT_URL",
+    "SIDE_PX",
+    "Answer",
+    "AsyncSession",
+    "Atlas",
+    "Closed",
+    "Contact",
+    "FrameProblem",
+    "NotRendered",
+    "PapillaError",
+    "Press",
+    "Refused",
+    "Session",
+    "Summary",
+    "Unreachable",
+    "post",
+    "press",
+    "sed",
+]

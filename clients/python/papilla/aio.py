@@ -1,0 +1,317 @@
+"""A session for asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import socket
+import time
+from concurrent.futures import Future
+from types import TracebackType
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import ArrayLike
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import InvalidStatus, WebSocketException
+
+from . import answer as answers
+from . import wire
+from .answer import Answer, FrameProblem
+from .errors import Closed, Refused, Unreachable
+from .http import DEFAULT_URL, refusal
+from .wire import Window
+
+_SOCKET_BYTES: Final = 512 * 1024
+_PATIENCE_S: Final = 30.0
+_RETRY_S: Final = 0.15
+
+
+class _Frame:
+    """A frame on its way, and who waits for its outcome."""
+
+    __slots__ = ("client_time_us", "message", "outcome", "ready", "sequence")
+
+    def __init__(self, sequence: int, client_time_us: int, message: bytes) -> None:
+        self.sequence = sequence
+        self.client_time_us = client_time_us
+        self.message = message
+        self.outcome: Future[Answer] = Future()
+        self.ready: dict[str, Any] = {}
+
+    def end(self, status: str, by_client: bool = False, problem: FrameProblem | None = None) -> None:
+        self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem))
+
+    def give(self, answer: Answer) -> None:
+        if not self.outcome.done():
+            self.outcome.set_result(answer)
+
+
+class AsyncSession:
+    """A session: pressure maps in, SED maps out, the latest frame wins.
+
+    `async with AsyncSession(tier="small") as session: (await session.render(pressure_pa)).sed`
+
+    The arguments after `url` and `token` are the members of the protocol's hello
+    (docs/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
+    so on. When the connection breaks, the session opens another by itself.
+    """
+
+    def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
+        self.url = url.rstrip("/")
+        self.ready: dict[str, Any] = {}
+        """What the service agreed to: tier, ranges, sections, ..."""
+        self.superseded_by_client = 0
+        """Frames that a newer one replaced before they left."""
+        self.connections = 0
+        """Times that a session was opened; more than 1 after a reconnect."""
+        self._token = token
+        self._hello = hello
+        self._socket: ClientConnection | None = None
+        self._tiers: dict[int, str] = {}
+        self._sequence = 0
+        self._waiting: _Frame | None = None
+        self._sent: dict[int, _Frame] = {}
+        self._wake = asyncio.Event()
+        self._connected = asyncio.Event()
+        self._terms: asyncio.Future[dict[str, Any]] | None = None
+        self._writing = asyncio.Lock()
+        self._tasks: list[asyncio.Task[None]] = []
+        self._closed = False
+        self._fault: Refused | None = None
+
+    async def __aenter__(self) -> AsyncSession:
+        await self.open()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def open(self) -> None:
+        """Connects and says hello; raises Refused or Unreachable."""
+        await self._connect()
+        self._tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._live())]
+
+    async def close(self) -> None:
+        """Ends the session; frames without an outcome are `lost`."""
+        self._closed = True
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._socket is not None:
+            await self._socket.close()
+        for frame in [*self._sent.values(), self._waiting]:
+            self._lose(frame)
+        self._sent.clear()
+        self._waiting = None
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a session with the service just now."""
+        return self._connected.is_set()
+
+    def send(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+    ) -> Future[Answer]:
+        """Hands over one frame and returns at once; its outcome comes in the future.
+
+        `pressure_pa` is the whole map (224 x 224), or the samples of `window` (column, row, width,
+        height; all other pixels are 0); None is no contact. `deadline_us` counts from receipt, 0:
+        the session's budget. A frame that has not left yet is replaced. From other threads than
+        the loop's use `Session`.
+        """
+        frame = self.encode(pressure_pa, window, client_time_us, deadline_us)
+        self.hand_over(frame)
+        return frame.outcome
+
+    async def render(self, pressure_pa: ArrayLike | None = None, **more: Any) -> Answer:
+        """`send`, and waits for the outcome."""
+        return await asyncio.wrap_future(self.send(pressure_pa, **more))
+
+    async def terms(self, **hello: Any) -> dict[str, Any]:
+        """Says hello again, in the open session; raises Refused, and the old terms stand."""
+        async with self._writing:
+            if self._socket is None:
+                raise Unreachable(f"{self.url} is not connected")
+            self._terms = asyncio.get_running_loop().create_future()
+            try:
+                await self._socket.send(self._words(hello))
+                ready = await asyncio.wait_for(self._terms, _PATIENCE_S)
+            finally:
+                self._terms = None
+            await self._agree(ready)
+            self._hello = hello
+            return ready
+
+    def encode(
+        self,
+        pressure_pa: ArrayLike | None,
+        window: Window | None,
+        client_time_us: int | None,
+        deadline_us: int,
+    ) -> _Frame:
+        if self._closed:
+            raise Closed("the session is closed")
+        if self._fault is not None:
+            raise self._fault
+        if pressure_pa is None:
+            pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
+        samples = np.asarray(pressure_pa, np.float32)
+        window = window or wire.WHOLE
+        if samples.shape != (window[3], window[2]):
+            raise ValueError(f"{samples.shape} samples for a window of {window[3], window[2]}")
+        self._sequence = (self._sequence + 1) % 2**32
+        time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
+        kind = self.ready["sample_type"]
+        message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
+        return _Frame(self._sequence, time_us, message)
+
+    def hand_over(self, frame: _Frame) -> None:
+        if self._closed or self._fault is not None:
+            return self._lose(frame)
+        old, self._waiting = self._waiting, frame
+        if old is not None:
+            self.superseded_by_client += 1
+            old.end("superseded", by_client=True)
+        self._wake.set()
+
+    def _words(self, hello: dict[str, Any]) -> str:
+        return json.dumps({"type": "hello", "version": 2, **hello})
+
+    async def _connect(self) -> None:
+        parts = urlsplit(self.url)
+        secure = parts.scheme in ("https", "wss")
+        host, port = parts.hostname or "127.0.0.1", parts.port or (443 if secure else 80)
+        headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
+        try:
+            raw = await _dial(host, port)
+            ws = f"{'wss' if secure else 'ws'}://{parts.netloc}/v1/session"
+            self._socket = await connect(
+                ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None
+            )
+            await self._socket.send(self._words(self._hello))
+            said = await asyncio.wait_for(self._socket.recv(), _PATIENCE_S)
+        except InvalidStatus as error:
+            raise refusal(bytes(error.response.body or b""), str(error)) from None
+        except (OSError, WebSocketException) as error:
+            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
+        message = json.loads(said)
+        if message["type"] != "ready":
+            await self._socket.close()
+            raise Refused(message["code"], message["message"], message.get("field"))
+        await self._agree(message)
+        self.connections += 1
+        self._connected.set()
+
+    async def _agree(self, ready: dict[str, Any]) -> None:
+        self.ready = ready
+        self._tiers.setdefault(ready["tier_number"], ready["tier"])
+
+    async def _live(self) -> None:
+        """Reads until the connection breaks, and then opens another."""
+        while True:
+            await self._read()
+            self._connected.clear()
+            self._wake.set()
+            if self._terms is not None and not self._terms.done():
+                self._terms.set_exception(Unreachable("the connection broke"))
+            for frame in list(self._sent.values()):
+                self._lose(frame)
+            self._sent.clear()
+            while not self._connected.is_set():
+                await asyncio.sleep(_RETRY_S)
+                try:
+                    async with self._writing:
+                        await self._connect()
+                except Unreachable:
+                    continue
+                except Refused as error:
+                    if error.code in ("overloaded", "shutting_down", "rate_limited", "timeout"):
+                        continue
+                    # The service is another one now: the program has to know.
+                    self._fault = error
+                    self._lose(self._waiting)
+                    self._waiting = None
+                    return
+            self._wake.set()
+
+    async def _read(self) -> None:
+        assert self._socket is not None
+        try:
+            async for message in self._socket:
+                if isinstance(message, bytes):
+                    self._answered(message)
+                else:
+                    self._told(json.loads(message))
+        except (OSError, WebSocketException, ValueError):
+            # Broken, or no longer the protocol: either way this connection is over.
+            await self._socket.close()
+
+    def _answered(self, message: bytes) -> None:
+        header = wire.decode(message)
+        frame = self._sent.pop(header.sequence, None)
+        if frame is not None:
+            tier = self._tiers.get(header.tier, "")
+            frame.give(answers.read(message, header, frame.ready, tier))
+
+    def _told(self, message: dict[str, Any]) -> None:
+        frame = self._sent.pop(message.get("sequence", -1), None)
+        if frame is not None:
+            problem = FrameProblem(message["code"], message["message"], message.get("field"))
+            frame.end("error", problem=problem)
+        elif self._terms is not None and not self._terms.done():
+            if message["type"] == "ready":
+                self._terms.set_result(message)
+            else:
+                refused = Refused(message["code"], message["message"], message.get("field"))
+                self._terms.set_exception(refused)
+
+    async def _write(self) -> None:
+        """Sends what waits, one frame at a time."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            await self._connected.wait()
+            async with self._writing:
+                frame, self._waiting = self._waiting, None
+                if frame is None or self._socket is None:
+                    continue
+                frame.ready = self.ready
+                self._sent[frame.sequence] = frame
+                try:
+                    await self._socket.send(frame.message)
+                except (OSError, WebSocketException):
+                    if self._sent.pop(frame.sequence, None):
+                        self._lose(frame)
+
+    @staticmethod
+    def _lose(frame: _Frame | None) -> None:
+        if frame is not None:
+            frame.end("lost")
+
+
+async def _dial(host: str, port: int) -> socket.socket:
+    """A connection with room for a whole frame each way; the room must be named before."""
+    loop = asyncio.get_running_loop()
+    last: OSError = OSError(f"{host} has no address")
+    for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+        raw = socket.socket(family, kind, proto)
+        try:
+            raw.setblocking(False)
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SOCKET_BYTES)
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
+            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            await loop.sock_connect(raw, address)
+            return raw
+        except OSError as error:
+            raw.close()
+            last = error
+    raise last

@@ -1,0 +1,122 @@
+"""What becomes of a frame."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import wire
+from .errors import NotRendered
+from .wire import Map, Window
+
+
+class Summary(NamedTuple):
+    """A map in sixteen numbers; formulas in docs/protocol.md."""
+
+    force_n: float
+    contact_area_mm2: float
+    pressure_max_pa: float
+    pressure_u_px: float
+    pressure_v_px: float
+    sed_max_j_per_m3: float
+    sed_max_u_px: float
+    sed_max_v_px: float
+    sed_integral_uj_per_m: float
+    sed_u_px: float
+    sed_v_px: float
+    sed_uu_px2: float
+    sed_uv_px2: float
+    sed_vv_px2: float
+    sed_mean_j_per_m3: float
+    sa1_rate_hz: float
+
+
+class FrameProblem(NamedTuple):
+    """Why the service refused a frame."""
+
+    code: str
+    message: str
+    field: str | None
+
+
+@dataclass(slots=True)
+class Answer:
+    """The outcome of one frame."""
+
+    sequence: int
+    status: str
+    """`ok`, `superseded`, `late`, `stale`, `error` or `lost` (the connection broke)."""
+    client_time_us: int
+    by_client: bool = False
+    """Superseded here: the frame never left the client."""
+    problem: FrameProblem | None = None
+    """With status `error`."""
+    kind: str = "sed"
+    """`sed` (J/m3) or, with the effect `afferents`, `sa1_rate` (Hz)."""
+    flags: frozenset[str] = field(default_factory=frozenset)
+    """Of `out_of_range` and `no_contact`."""
+    tier: str = ""
+    window: Window = wire.WHOLE
+    """Column, row, width and height of `values`."""
+    total_us: int = 0
+    """Time in the server, of which `queue_us` waiting for a thread and `infer_us` in the network."""
+    queue_us: int = 0
+    infer_us: int = 0
+    values: Map | None = None
+    """The samples of the window, (height, width)."""
+    summary: Summary | None = None
+    points: Map | None = None
+    actuators: Map | None = None
+
+    @property
+    def map(self) -> Map:
+        """The whole map, 224 x 224, 0 outside of the window.
+
+        Raises NotRendered if the answer carries none.
+        """
+        if self.values is None:
+            reason = self.problem.message if self.problem else "it carries no map"
+            raise NotRendered(self.status, reason)
+        if self.window == wire.WHOLE:
+            return self.values
+        whole = np.zeros((wire.SIDE_PX, wire.SIDE_PX), np.float32)
+        column, row, width, height = self.window
+        whole[row : row + height, column : column + width] = self.values
+        return whole
+
+    @property
+    def sed(self) -> Map:
+        """`map`, J/m3."""
+        return self.map
+
+
+def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) -> Answer:
+    """The answer that a message is, in a session on the terms of `ready`."""
+    answer = Answer(
+        header.sequence,
+        header.status,
+        header.client_time_us,
+        kind=header.kind,
+        flags=header.flags,
+        tier=tier,
+        window=header.window,
+        total_us=header.total_us,
+        queue_us=header.queue_us,
+        infer_us=header.infer_us,
+    )
+    if header.status != "ok":
+        return answer
+    for section in ready["sections"]:
+        name, offset, size = section["name"], section["offset"], section["bytes"]
+        if name == "summary":
+            answer.summary = Summary(*struct.unpack_from("<16f", message, offset))
+        elif name == "points":
+            answer.points = wire.floats(message, offset, size)
+        elif name == "actuators":
+            answer.actuators = wire.floats(message, offset, size)
+        elif name == "map":
+            answer.values = wire.samples(message, offset, header)
+    return answer

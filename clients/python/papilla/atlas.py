@@ -1,0 +1,128 @@
+"""The atlas: which point of the finger each pixel is, and pressure maps from what engines have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .http import DEFAULT_URL, get_json
+from .wire import SIDE_PX, Map
+
+_REACH_MM = 5.0
+
+
+class Contact(NamedTuple):
+    """A contact point: a place on or near the undeformed skin, a force and a radius."""
+
+    at_mm: tuple[float, float, float]
+    force_n: float
+    radius_mm: float = 2.5
+
+
+class Atlas:
+    """The skin's part of the atlas, and tables made of it once (some 0.1 s).
+
+    Formulas: docs/atlas.md, 'Helpers of the clients'.
+    """
+
+    def __init__(self, file: dict[str, Any]) -> None:
+        """`file` is what `GET /v1/atlas` answers."""
+        self.hash: str = file["hash"]
+        self.triangles: NDArray[np.int64] = np.asarray(file["triangles"], np.int64)
+        # As f32 first: the file's decimal numbers are those of f32 values.
+        skin = file["skin"]
+        self.positions_mm: NDArray[np.float64] = np.asarray(skin["positions_mm"], np.float32).astype(np.float64)
+        uv_px = np.asarray(skin["uv_px"], np.float32).astype(np.float64)
+        self._owner, self._weights = _cover(uv_px, self.triangles)
+        self.pixels: NDArray[np.int64] = np.flatnonzero(self._owner >= 0)
+        """Flat indices of the skin's pixels, ascending."""
+        corners = self.triangles[self._owner[self.pixels]]
+        self._corners = corners
+        self.places_mm: NDArray[np.float64] = np.einsum("pi,pix->px", self._weights, self.positions_mm[corners])
+        """Where each of `pixels` is on the undeformed finger."""
+        self.areas_mm2: NDArray[np.float64] = _areas_mm2(self.positions_mm, uv_px, self.triangles)[
+            self._owner[self.pixels]
+        ]
+        """Area of the finger that each of `pixels` shows."""
+
+    @classmethod
+    def load(cls, url: str = DEFAULT_URL, token: str | None = None) -> Atlas:
+        """From a service; raises Unreachable or Refused."""
+        return cls(get_json(url, "/v1/atlas", token))
+
+    def rasterise(self, vertex_values: ArrayLike) -> Map:
+        """A field given at the vertices of the skin, as a map: linear in each triangle."""
+        values = np.asarray(vertex_values, np.float64)
+        if values.shape != (len(self.positions_mm),):
+            raise ValueError(f"{values.shape} values; the skin has {len(self.positions_mm)} vertices")
+        return self._map((self._weights * values[self._corners]).sum(axis=1))
+
+    def contacts(self, contacts: Iterable[Contact]) -> Map:
+        """Pressure (Pa) of contact points, each with the pressure of Hertz's contact.
+
+        A contact more than 5 mm from the skin adds nothing.
+        """
+        pressure_pa = np.zeros(len(self.pixels))
+        for at_mm, force_n, radius_mm in contacts:
+            squared = ((self.places_mm - np.asarray(at_mm, np.float64)) ** 2).sum(axis=1)
+            own = int(np.argmin(squared))
+            if squared[own] > _REACH_MM**2:
+                continue
+            off = ((self.places_mm - self.places_mm[own]) ** 2).sum(axis=1)
+            if radius_mm > 0.0:
+                weights = np.sqrt(np.maximum(0.0, 1.0 - off / radius_mm**2))
+            else:
+                weights = np.zeros_like(off)
+            weights[own] = 1.0
+            pressure_pa += 1e6 * force_n * weights / (weights * self.areas_mm2).sum()
+        return self._map(pressure_pa)
+
+    def force_n(self, pressure_pa: ArrayLike) -> float:
+        """`1e-6 sum p A` of a pressure map: what `summary` calls `force_n`."""
+        flat = np.asarray(pressure_pa, np.float64).reshape(-1)[self.pixels]
+        return float(1e-6 * (flat * self.areas_mm2).sum())
+
+    def _map(self, values: NDArray[np.float64]) -> Map:
+        whole = np.zeros(SIDE_PX * SIDE_PX, np.float32)
+        whole[self.pixels] = values
+        return whole.reshape(SIDE_PX, SIDE_PX)
+
+
+def _cover(uv_px: NDArray[np.float64], triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Triangle of every pixel (-1: none), and the weights of those that have one."""
+    owner = np.full(SIDE_PX * SIDE_PX, -1, np.int64)
+    weights = np.zeros((SIDE_PX * SIDE_PX, 3))
+    for number, corners in enumerate(triangles):
+        a, b, c = uv_px[corners]
+        low = np.maximum(np.floor(np.minimum(np.minimum(a, b), c) - 0.5), 0).astype(int)
+        high = np.minimum(np.ceil(np.maximum(np.maximum(a, b), c) + 0.5), SIDE_PX).astype(int)
+        column, row = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+        at = np.stack([column + 0.5, row + 0.5], axis=-1)
+        total = _doubled(a, b, c)
+        shares = np.stack([_doubled(b, c, at), _doubled(c, a, at), _doubled(a, b, at)], -1) / total
+        index = row * SIDE_PX + column
+        taken = (shares >= 0).all(axis=-1) & (owner[index] < 0)
+        owner[index[taken]] = number
+        weights[index[taken]] = shares[taken]
+    return owner, weights[owner >= 0]
+
+
+def _doubled(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice the signed area; exact, for `uv_px` are multiples of 1/4096."""
+    along, across = b - a, c - a
+    area: NDArray[np.float64] = along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]
+    return area
+
+
+def _areas_mm2(
+    positions_mm: NDArray[np.float64], uv_px: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Area of the finger per pixel, of every triangle."""
+    a, b, c = (positions_mm[triangles[:, i]] for i in range(3))
+    doubled_mm2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    p, q, r = (uv_px[triangles[:, i]] for i in range(3))
+    areas: NDArray[np.float64] = doubled_mm2 / np.abs(_doubled(p, q, r))
+    return areas

@@ -1,0 +1,256 @@
+"""Runs the conformance script with this client (docs/conformance.md): `python -m papilla.conformance`.
+
+Sessions are driven through `Session`, which drives `AsyncSession`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import urllib.request
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .answer import Answer
+from .atlas import Atlas, Contact
+from .errors import Refused
+from .http import post
+from .sync import Session
+from .wire import SIDE_PX, Map
+
+Step = dict[str, Any]
+
+
+class Nonconformity(Exception):
+    """What a step found otherwise than expected."""
+
+
+def must(good: bool, what: str) -> None:
+    if not good:
+        raise Nonconformity(what)
+
+
+def pressure(pattern: Step, share: float = 1.0) -> Map:
+    v, u = np.mgrid[:SIDE_PX, :SIDE_PX] + 0.5
+    map_pa = np.zeros((SIDE_PX, SIDE_PX))
+    for u0, v0, sigma, peak in pattern.get("gaussians", []):
+        map_pa += peak * np.exp(-((u - u0) ** 2 + (v - v0) ** 2) / (2 * sigma**2))
+    if "disc" in pattern:
+        u0, v0, radius, value = pattern["disc"]
+        map_pa += value * ((u - u0) ** 2 + (v - v0) ** 2 <= radius**2)
+    map_pa = np.where(map_pa < 1.0, 0.0, share * map_pa)
+    drawn = map_pa.astype(np.float32)
+    if "bad" in pattern:
+        row, column, value = pattern["bad"]
+        drawn[row, column] = float(value)
+    return drawn
+
+
+def near(what: str, found: float, due: list[float]) -> None:
+    must(abs(found - due[0]) <= due[1], f"{what} is {found}, {due[0]} +- {due[1]} is due")
+
+
+def check_list(what: str, found: Any, due: list[list[float]]) -> None:
+    must(found is not None and len(found) == len(due), f"{what}: {len(due)} values are due")
+    for number, (value, pair) in enumerate(zip(found, due, strict=True)):
+        near(f"{what}[{number}]", float(value), pair)
+
+
+def check_map(expect: Step, map_: Map) -> None:
+    for row, column, value, tolerance in expect.get("pixels", []):
+        near(f"pixel {row}, {column}", float(map_[row, column]), [value, tolerance])
+    if "sum" in expect:
+        near("sum", float(map_.sum(dtype=np.float64)), expect["sum"])
+    if "max" in expect:
+        near("max", float(map_.max()), expect["max"])
+
+
+def check_problem(expect: Step, code: str, field: str | None) -> None:
+    must(code == expect["code"], f"the code is {code}, {expect['code']} is due")
+    if "field" in expect:
+        must(field == expect["field"], f"the field is {field}, {expect['field']} is due")
+
+
+def check_answer(expect: Step, answer: Answer) -> None:
+    status = expect.get("status", "ok")
+    said = f" ({answer.problem.message})" if answer.problem else ""
+    must(answer.status == status, f"the status is {answer.status}{said}, {status} is due")
+    if answer.problem:
+        check_problem(expect, answer.problem.code, answer.problem.field)
+    if status != "ok":
+        return
+    for name in ("kind", "tier"):
+        if name in expect:
+            must(getattr(answer, name) == expect[name], f"{name} is {getattr(answer, name)}")
+    if "flags" in expect:
+        must(set(expect["flags"]) == answer.flags, f"flags are {set(answer.flags)}")
+    must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole")
+    if expect.get("map") is False:
+        must(answer.values is None, "the answer carries a map")
+    else:
+        check_map(expect, answer.map)
+    if "window" in expect:
+        must(list(answer.window) == expect["window"], f"the window is {answer.window}")
+    for name in ("summary", "points", "actuators"):
+        if name in expect:
+            check_list(name, getattr(answer, name), expect[name])
+
+
+class Run:
+    """One case."""
+
+    def __init__(self, file: Step) -> None:
+        self.url = os.environ["PAPILLA_URL"]
+        self.timeout_s = float(file["timeout_s"])
+        self.session: Session | None = None
+        self.atlas: Atlas | None = None
+        self.note = ""
+
+    def open_session(self) -> Session:
+        must(self.session is not None, "no session is open")
+        assert self.session is not None
+        return self.session
+
+    def hello(self, step: Step) -> None:
+        expect = step["expect"]
+        try:
+            if self.session is None:
+                self.session = Session(self.url, **step["hello"])
+            else:
+                self.session.terms(**step["hello"])
+        except Refused as error:
+            must(expect.get("status") == "error", f"the hello is refused: {error}")
+            return check_problem(expect, error.code, error.field)
+        must(expect.get("status") != "error", "the hello is not refused")
+        for name, value in expect.get("ready", {}).items():
+            found = self.session.ready.get(name)
+            must(found == value, f"ready.{name} is {found}, {value} is due")
+
+    def frame(self, step: Step) -> None:
+        session, map_pa = self.open_session(), pressure(step["pressure"])
+        more: dict[str, Any] = {"deadline_us": step.get("deadline_us", 0)}
+        if "client_time_us" in step:
+            more["client_time_us"] = step["client_time_us"]
+        samples: NDArray[np.float32] = map_pa
+        if "window" in step:
+            column, row, width, height = more["window"] = tuple(step["window"])
+            room = np.zeros((row + height, column + width), np.float32)
+            kept = map_pa[: row + height, : column + width]
+            room[: kept.shape[0], : kept.shape[1]] = kept
+            samples = room[row:, column:]
+        for _ in range(step.get("attempts", 1)):
+            before = session.send(samples, **more)
+            answer = before.result(self.timeout_s)
+            if answer.status != "lost":
+                break
+        if "client_time_us" in step:
+            must(answer.client_time_us == step["client_time_us"], "another client time comes back")
+        check_answer(step["expect"], answer)
+
+    def burst(self, step: Step) -> None:
+        session, expect, count = self.open_session(), step["expect"], step["count"]
+        maps = [pressure(step["pressure"], (k + 1) / count) for k in range(count)]
+        replaced_before = session.superseded_by_client
+        if step.get("paused"):
+            control("pause")
+        finished: list[int] = []
+        outcomes = []
+        for number, map_pa in enumerate(maps):
+
+            def done(sent: Future[Answer], number: int = number) -> None:
+                if sent.result().status == "ok":
+                    finished.append(number)
+
+            sent = session.send(map_pa)
+            sent.add_done_callback(done)
+            outcomes.append(sent)
+            time.sleep(step.get("gap_ms", 0) * 1e-3)
+        if step.get("paused"):
+            control("resume")
+        answers = [sent.result(self.timeout_s) for sent in outcomes]
+        replaced = sum(answer.status == "superseded" for answer in answers)
+        good = sum(answer.status == "ok" for answer in answers)
+        must(replaced + good == count, f"statuses {sorted({a.status for a in answers})}")
+        must(len({answer.sequence for answer in answers}) == count, "two outcomes of one frame")
+        must(finished == sorted(finished), f"answers came in the order {finished}")
+        must(replaced >= expect.get("superseded", 0), f"only {replaced} frames were superseded")
+        here = session.superseded_by_client - replaced_before
+        must(here == sum(a.by_client for a in answers), "the client miscounts what it replaced")
+        must(here >= expect.get("superseded_by_client", 0), f"the client replaced {here} frames")
+        check_answer(expect["newest"], answers[-1])
+        self.note = f"({good} ok, {here} replaced here, {replaced - here} by the service)"
+
+    def reconnect(self, step: Step) -> None:
+        session = self.open_session()
+        before = session.connections
+        control("restart")
+        begin = time.monotonic()
+        while session.connections == before:
+            must(time.monotonic() < begin + step["within_s"], "no new session in time")
+            time.sleep(0.005)
+        self.note = f"(connected {time.monotonic() - begin:.2f} s after the server was back)"
+
+    def http(self, step: Step) -> None:
+        expect = step["expect"]
+        try:
+            answer = post(pressure(step["pressure"]), url=self.url, tier=step["tier"])
+        except Refused as error:
+            must(expect["status"] == "error", f"refused: {error}")
+            return check_problem(expect, error.code, error.field)
+        must(expect["status"] == "ok", "the request is not refused")
+        must(answer.tier == expect.get("tier", answer.tier), f"the tier is {answer.tier}")
+        check_map(expect, answer.sed)
+
+    def finger(self) -> Atlas:
+        self.atlas = self.atlas or Atlas.load(self.url)
+        return self.atlas
+
+    def rasterise(self, step: Step) -> None:
+        *centre, sigma, peak = step["vertices"]["gaussian_mm"]
+        off = ((self.finger().positions_mm - centre) ** 2).sum(axis=1)
+        values = (peak * np.exp(-off / (2 * sigma**2))).astype(np.float32)
+        check_map(step["expect"], self.finger().rasterise(values))
+
+    def contacts(self, step: Step) -> None:
+        contacts = [Contact(**contact) for contact in step["contacts"]]
+        map_pa = self.finger().contacts(contacts)
+        check_map(step["expect"], map_pa)
+        if "force_n" in step["expect"]:
+            near("force_n", self.finger().force_n(map_pa), step["expect"]["force_n"])
+
+
+def control(action: str) -> None:
+    request = urllib.request.Request(f"{os.environ['PAPILLA_CONTROL']}/{action}", b"", method="POST")
+    with urllib.request.urlopen(request, timeout=120):
+        pass
+
+
+def main() -> int:
+    file = json.loads(Path(os.environ["PAPILLA_CONFORMANCE"]).read_text())
+    failed = 0
+    for case in file["cases"]:
+        run = Run(file)
+        try:
+            for number, step in enumerate(case["steps"]):
+                try:
+                    getattr(run, step["do"])(step)
+                except Nonconformity as error:
+                    raise Nonconformity(f"step {number}: {error}") from None
+            print(f"ok {case['name']} {run.note}".rstrip(), flush=True)
+        except Exception as error:  # any failure of a case is a finding, and the next case follows
+            failed += 1
+            print(f"FAIL {case['name']}: {type(error).__name__}: {error}", flush=True)
+        finally:
+            if run.session is not None:
+                run.session.close()
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

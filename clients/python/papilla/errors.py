@@ -1,0 +1,33 @@
+"""What can go wrong."""
+
+from __future__ import annotations
+
+
+class PapillaError(Exception):
+    """Any error of this package."""
+
+
+class Unreachable(PapillaError):
+    """The service does not answer."""
+
+
+class Closed(PapillaError):
+    """The session was closed by this program."""
+
+
+class Refused(PapillaError):
+    """The service refused a request or a hello; `code` is one of docs/protocol.md's."""
+
+    def __init__(self, code: str, message: str, field: str | None = None) -> None:
+        super().__init__(f"{code}: {message}" + (f" (in '{field}')" if field else ""))
+        self.code = code
+        self.message = message
+        self.field = field
+
+
+class NotRendered(PapillaError):
+    """An answer without a map was asked for its map; `status` says why it has none."""
+
+    def __init__(self, status: str, reason: str) -> None:
+        super().__init__(f"the frame is {status}: {reason}")
+        self.status = status

@@ -1,0 +1,128 @@
+"""One map over HTTP, and the rest of the HTTP surface that a client needs."""
+
+from __future__ import annotations
+
+import io
+import json
+import urllib.error
+import urllib.parse
+import urllib.request
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .errors import Refused, Unreachable
+from .wire import SIDE_PX, Map
+
+DEFAULT_URL: Final = "http://127.0.0.1:7224"
+_NPY: Final = "application/x-npy"
+# No proxy of the environment between a VR engine and the service beside it.
+_OPENER: Final = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+
+
+class HttpAnswer(NamedTuple):
+    """A map over HTTP: SED, J/m3, the tier that rendered it, and times in the server, us."""
+
+    sed: Map
+    tier: str
+    queue_us: int
+    infer_us: int
+    total_us: int
+
+
+class Press(NamedTuple):
+    """A press that the FE solver computed: its pressure, Pa, and its SED, J/m3."""
+
+    name: str
+    pressure_pa: Map
+    sed_j_per_m3: Map
+
+
+def request(
+    url: str,
+    path: str,
+    body: bytes | None = None,
+    accept: str = "*/*",
+    token: str | None = None,
+    timeout_s: float = 30.0,
+) -> tuple[bytes, dict[str, str]]:
+    """Body and headers of an answer; raises Refused or Unreachable."""
+    headers = {"accept": accept}
+    if body is not None:
+        headers["content-type"] = _NPY
+    if token:
+        headers["authorization"] = f"Bearer {token}"
+    asked = urllib.request.Request(url.rstrip("/") + path, body, headers)
+    try:
+        with _OPENER.open(asked, timeout=timeout_s) as answer:
+            return answer.read(), dict(answer.headers)
+    except urllib.error.HTTPError as error:
+        raise refusal(error.read(), f"status {error.code}") from None
+    except OSError as error:
+        raise Unreachable(f"{url}: {error}; is papilla-server running there?") from error
+
+
+def refusal(body: bytes, otherwise: str) -> Refused:
+    """The error that the body of an answer holds."""
+    try:
+        problem = json.loads(body)["error"]
+        return Refused(problem["code"], problem["message"], problem.get("field"))
+    except (ValueError, KeyError, TypeError):
+        return Refused("internal", otherwise)
+
+
+def get_json(url: str, path: str, token: str | None = None) -> Any:
+    """What a path answers, as JSON."""
+    return json.loads(request(url, path, token=token)[0])
+
+
+def _array(body: bytes) -> Map:
+    return np.asarray(np.load(io.BytesIO(body), allow_pickle=False), np.float32)
+
+
+def post(
+    pressure_pa: ArrayLike,
+    *,
+    url: str = DEFAULT_URL,
+    tier: str | None = None,
+    budget_us: int | None = None,
+    token: str | None = None,
+) -> HttpAnswer:
+    """SED of one pressure map (224 x 224, Pa), with what is known about it.
+
+    Raises Refused (with the code of docs/protocol.md) or Unreachable.
+    """
+    body = io.BytesIO()
+    np.save(body, np.asarray(pressure_pa, "<f4"))
+    asked = {"tier": tier, "budget_us": budget_us}
+    query = urllib.parse.urlencode({k: v for k, v in asked.items() if v is not None})
+    path = "/v1/sed" + (f"?{query}" if query else "")
+    answer, headers = request(url, path, body.getvalue(), _NPY, token)
+    told = {name.lower(): value for name, value in headers.items()}
+    times = [int(told.get(f"x-papilla-{name}-us", 0)) for name in ("queue", "infer", "total")]
+    return HttpAnswer(_array(answer), told.get("x-papilla-tier", ""), *times)
+
+
+def sed(
+    pressure_pa: ArrayLike,
+    *,
+    url: str = DEFAULT_URL,
+    tier: str | None = None,
+    budget_us: int | None = None,
+    token: str | None = None,
+) -> Map:
+    """SED (J/m3) of one pressure map (Pa), both 224 x 224.
+
+    `tier` by name, or the most accurate that meets `budget_us`, or the service's default.
+    Raises Refused or Unreachable.
+    """
+    return post(pressure_pa, url=url, tier=tier, budget_us=budget_us, token=token).sed
+
+
+def press(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Press:
+    """One of the FE presses that the service ships: input and truth."""
+    name = get_json(url, "/v1/presses", token)["presses"][number]["name"]
+    maps = [_array(request(url, f"/v1/presses/{number}/{what}", None, _NPY, token)[0]) for what in ("pressure", "sed")]
+    assert all(map_.shape == (SIDE_PX, SIDE_PX) for map_ in maps)
+    return Press(name, *maps)

@@ -1,0 +1,115 @@
+"""A session for programs without asyncio."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Coroutine
+from concurrent.futures import Future
+from types import TracebackType
+from typing import Any, TypeVar
+
+from numpy.typing import ArrayLike
+
+from .aio import AsyncSession
+from .answer import Answer
+from .http import DEFAULT_URL
+from .wire import Window
+
+_T = TypeVar("_T")
+
+
+class Session:
+    """As `AsyncSession`, on a thread of its own; can be used from several threads.
+
+    `with Session(tier="small") as session: session.render(pressure_pa).sed`
+    """
+
+    def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
+        """Connects and says hello; raises Refused or Unreachable."""
+        self._loop = asyncio.new_event_loop()
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True, name="papilla")
+        self._thread.start()
+        try:
+            self._session = self._call(self._make(url, token, hello))
+        except BaseException:
+            self._stop()
+            raise
+
+    @staticmethod
+    async def _make(url: str, token: str | None, hello: dict[str, Any]) -> AsyncSession:
+        session = AsyncSession(url, token, **hello)
+        await session.open()
+        return session
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the session; frames without an outcome are `lost`."""
+        if self._thread.is_alive():
+            self._call(self._session.close())
+            self._stop()
+
+    def _stop(self) -> None:
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    def _call(self, work: Coroutine[Any, Any, _T]) -> _T:
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    @property
+    def ready(self) -> dict[str, Any]:
+        """What the service agreed to: tier, ranges, sections, ..."""
+        return self._session.ready
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a session with the service just now."""
+        return self._session.connected
+
+    @property
+    def superseded_by_client(self) -> int:
+        """Frames that a newer one replaced before they left."""
+        return self._session.superseded_by_client
+
+    @property
+    def connections(self) -> int:
+        """Times that a session was opened; more than 1 after a reconnect."""
+        return self._session.connections
+
+    def send(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+    ) -> Future[Answer]:
+        """Hands over one frame and returns at once; see `AsyncSession.send`."""
+        with self._lock:
+            frame = self._session.encode(pressure_pa, window, client_time_us, deadline_us)
+            self._loop.call_soon_threadsafe(self._session.hand_over, frame)
+        return frame.outcome
+
+    def render(
+        self,
+        pressure_pa: ArrayLike | None = None,
+        *,
+        window: Window | None = None,
+        client_time_us: int | None = None,
+        deadline_us: int = 0,
+        timeout_s: float | None = None,
+    ) -> Answer:
+        """`send`, and waits for the outcome; raises TimeoutError after `timeout_s`."""
+        sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
+        return sent.result(timeout_s)
+
+    def terms(self, **hello: Any) -> dict[str, Any]:
+        """Says hello again, in the open session; raises Refused, and the old terms stand."""
+        return self._call(self._session.terms(**hello))

@@ -1,0 +1,98 @@
+"""What the conformance script does not cover: the asyncio session, misuse, the example."""
+
+import asyncio
+import os
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import papilla
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def bump(peak_pa=1e4):
+    v, u = np.mgrid[:224, :224]
+    return peak_pa * np.exp(-((u - 118.0) ** 2 + (v - 105.0) ** 2) / 250)
+
+
+def test_http_and_sessions_give_the_same_map(url):
+    over_http = papilla.sed(bump(), url=url, tier="nano")
+    with papilla.Session(url, tier="nano") as session:
+        answer = session.render(bump())
+    assert over_http.shape == (224, 224) and over_http.max() > 10
+    np.testing.assert_allclose(answer.sed, over_http, rtol=1e-5, atol=1e-4)
+
+
+def test_asyncio_sessions_side_by_side(url):
+    async def render(scale):
+        async with papilla.AsyncSession(url, tier="half-space", effects=["summary"]) as session:
+            answers = [await session.render(scale * bump()) for _ in range(3)]
+            assert session.connected and session.connections == 1
+            return answers[-1]
+
+    async def both():
+        return await asyncio.gather(render(1.0), render(0.5))
+
+    whole, half = asyncio.run(both())
+    # The half-space is linear, SED is quadratic.
+    assert half.summary.sed_max_j_per_m3 == pytest.approx(whole.summary.sed_max_j_per_m3 / 4, rel=0.01)
+    assert half.summary.force_n == pytest.approx(whole.summary.force_n / 2, rel=1e-5)
+
+
+def test_the_presses_of_the_service_are_rendered_as_its_card_promises(url):
+    press = papilla.press(0, url=url)
+    rendered = papilla.sed(press.pressure_pa, url=url)
+    error = np.linalg.norm(rendered - press.sed_j_per_m3) / np.linalg.norm(press.sed_j_per_m3)
+    assert error < 0.3, f"relative L2 {error}"
+
+
+def test_a_contact_presses_with_its_force(url):
+    atlas = papilla.Atlas.load(url)
+    pressure_pa = atlas.contacts([papilla.Contact((11.25, 0.0, -6.5), 0.3, 2.0)])
+    with papilla.Session(url, tier="half-space", effects=["summary"]) as session:
+        assert session.ready["atlas_hash"] == atlas.hash
+        answer = session.render(pressure_pa)
+    assert answer.summary.force_n == pytest.approx(0.3, rel=1e-4)
+    assert answer.summary.contact_area_mm2 == pytest.approx(np.pi * 4, rel=0.1)
+
+
+def test_misuse_is_told(url):
+    with pytest.raises(papilla.Unreachable, match="papilla-server"):
+        papilla.Session("http://127.0.0.1:1")
+    with pytest.raises(papilla.Unreachable, match="papilla-server"):
+        papilla.sed(bump(), url="http://127.0.0.1:1")
+    with pytest.raises(papilla.Refused) as refused:
+        papilla.Session(url, tier="none-such")
+    assert (refused.value.code, refused.value.field) == ("unknown_tier", "tier")
+    with pytest.raises(papilla.Refused) as refused:
+        papilla.sed(-bump(), url=url)
+    assert refused.value.code == "negative_pressure"
+    with papilla.Session(url, tier="half-space") as session:
+        with pytest.raises(ValueError, match="window"):
+            session.send(np.zeros((10, 12)))
+        with pytest.raises(ValueError, match="window"):
+            session.send(np.zeros((10, 12)), window=(0, 0, 10, 12))
+        late = session.render(bump(), deadline_us=1)
+        with pytest.raises(papilla.NotRendered, match="late"):
+            _ = late.sed
+    with pytest.raises(papilla.Closed):
+        session.send(bump())
+
+
+def test_a_frame_that_waits_can_be_closed_on(url):
+    session = papilla.Session(url, tier="s1-base16")
+    sent = [session.send(bump()) for _ in range(3)]
+    session.close()
+    assert {outcome.result(5).status for outcome in sent} <= {"ok", "superseded", "lost"}
+
+
+def test_figure_4_is_drawn(url, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    names = runpy.run_path(str(EXAMPLES / "figure4.py"))
+    assert (tmp_path / "figure4.png").stat().st_size > 20_000
+    assert len(names["presses"]) == 3
+    assert os.environ["PAPILLA_URL"] == url

@@ -1,0 +1,165 @@
+//! What becomes of a frame.
+
+use papilla_proto::{
+    Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
+    Window, effects::SectionName,
+};
+
+use crate::ClientError;
+
+/// How a frame fared.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It was rendered.
+    Ok,
+    /// A newer frame took its place.
+    Superseded {
+        /// Before it left this client.
+        by_client: bool,
+    },
+    /// Its deadline passed.
+    Late,
+    /// It was old when it arrived.
+    Stale,
+    /// The service refused it; the session goes on.
+    Error(Problem),
+    /// The connection broke before its answer.
+    Lost,
+}
+
+/// The outcome of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// Number of the frame, as [`Session::send`](crate::Session::send) gave it.
+    pub sequence: u32,
+    /// How it fared; everything below `client_time_us` is of rendered frames.
+    pub outcome: Outcome,
+    /// The frame's time by the client's clock, us.
+    pub client_time_us: u64,
+    /// SED (J/m3), or with the effect `afferents` firing rates (Hz).
+    pub kind: FrameKind,
+    /// Bits of [`flags`](papilla_proto::flags).
+    pub flags: u8,
+    /// Name of the tier that rendered.
+    pub tier: String,
+    /// Time in the server, us.
+    pub total_us: u32,
+    /// Of which waiting for a thread.
+    pub queue_us: u32,
+    /// Of which in the network.
+    pub infer_us: u32,
+    /// The pixels of `map` that the answer carried; all others are 0.
+    pub window: Window,
+    /// The whole map, 224 x 224, row-major; empty if the session asked for none.
+    pub map: Vec<f32>,
+    /// The effect `summary`.
+    pub summary: Option<Summary>,
+    /// The effect `points`.
+    pub points: Vec<f32>,
+    /// The effect `actuators`.
+    pub actuators: Vec<f32>,
+}
+
+impl Answer {
+    /// Whether there is a map (or what the session asked for in its place).
+    #[must_use]
+    pub fn is_ok(&self) -> bool {
+        self.outcome == Outcome::Ok
+    }
+
+    /// The greatest value of the map; 0 without one.
+    #[must_use]
+    pub fn max(&self) -> f32 {
+        self.map.iter().copied().fold(0.0, f32::max)
+    }
+
+    pub(crate) fn without_map(sequence: u32, client_time_us: u64, outcome: Outcome) -> Self {
+        Self {
+            sequence,
+            outcome,
+            client_time_us,
+            kind: FrameKind::Sed,
+            flags: 0,
+            tier: String::new(),
+            total_us: 0,
+            queue_us: 0,
+            infer_us: 0,
+            window: Window::EMPTY,
+            map: Vec::new(),
+            summary: None,
+            points: Vec::new(),
+            actuators: Vec::new(),
+        }
+    }
+
+    /// Reads a binary message in a session on the terms of `ready`.
+    pub(crate) fn read(
+        header: &FrameHeader,
+        message: &[u8],
+        ready: &Ready,
+        tier: String,
+    ) -> Result<Self, ClientError> {
+        let Extension { queue_us, infer_us, flags, .. } = header.extension.unwrap_or_default();
+        let outcome = match header.status {
+            FrameStatus::Ok => Outcome::Ok,
+            FrameStatus::Superseded => Outcome::Superseded { by_client: false },
+            FrameStatus::Late => Outcome::Late,
+            FrameStatus::Stale => Outcome::Stale,
+            FrameStatus::Error => {
+                return Err(ClientError::Protocol("an error came as a frame".to_owned()));
+            }
+        };
+        let mut answer = Self {
+            kind: header.kind,
+            flags,
+            tier,
+            total_us: header.time_us,
+            queue_us,
+            infer_us,
+            window: header.window(),
+            ..Self::without_map(header.sequence, header.client_time_us, outcome)
+        };
+        if answer.is_ok() {
+            answer.read_sections(header, message, ready)?;
+        }
+        Ok(answer)
+    }
+
+    fn read_sections(
+        &mut self,
+        header: &FrameHeader,
+        message: &[u8],
+        ready: &Ready,
+    ) -> Result<(), ClientError> {
+        for section in ready.sections.iter().flatten() {
+            let bytes = match section.name {
+                // Its window may differ from answer to answer.
+                SectionName::Map => header.payload_len(),
+                _ => section.bytes as usize,
+            };
+            let at = section.offset as usize;
+            let short = || ClientError::Protocol(format!("an answer ends in {:?}", section.name));
+            let part = message.get(at..at + bytes).ok_or_else(short)?;
+            match section.name {
+                SectionName::Summary => self.summary = Summary::decode(part),
+                SectionName::Points => self.points = floats(part)?,
+                SectionName::Actuators => self.actuators = floats(part)?,
+                SectionName::Map => {
+                    self.map = vec![0.0; MAP_LEN];
+                    self.window
+                        .decode(header.sample_type, part, header.scale, &mut self.map)
+                        .map_err(|error| ClientError::Protocol(error.to_string()))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn floats(bytes: &[u8]) -> Result<Vec<f32>, ClientError> {
+    let mut values = vec![0.0; bytes.len() / 4];
+    SampleType::F32
+        .decode(bytes, 1.0, &mut values)
+        .map_err(|error| ClientError::Protocol(error.to_string()))?;
+    Ok(values)
+}

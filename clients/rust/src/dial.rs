@@ -1,0 +1,34 @@
+//! How a session connects.
+
+use std::io;
+
+use tokio::net::{TcpSocket, TcpStream, lookup_host};
+
+/// Room of the system for each direction, bytes: more than the largest frame. With less a
+/// sender waits for room in the middle of a frame (docs/latency.md).
+const SOCKET_BUFFER: u32 = 512 * 1024;
+
+/// Connects to `server` (host and port): room for a whole frame, `TCP_NODELAY` set.
+pub(crate) async fn dial(server: &str) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
+    for address in lookup_host(server).await? {
+        let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;
+        // Before connecting: the window's scale is agreed on then.
+        socket.set_recv_buffer_size(SOCKET_BUFFER)?;
+        socket.set_send_buffer_size(SOCKET_BUFFER)?;
+        match socket.connect(address).await {
+            Ok(stream) => {
+                stream.set_nodelay(true)?;
+                return Ok(stream);
+            }
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+/// Host and port of a URL, or of what is that already.
+pub(crate) fn host_and_port(url: &str) -> &str {
+    let rest = url.split_once("://").map_or(url, |(_, rest)| rest);
+    rest.split('/').next().unwrap_or(rest)
+}

@@ -1,0 +1,71 @@
+//! What can go wrong.
+
+use papilla_proto::{ErrorCode, FrameError, Problem, atlas::AtlasError};
+use tokio_tungstenite::tungstenite;
+
+/// Why there is no session or no map.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ClientError {
+    /// Nobody listens, or the connection broke.
+    #[error("{server}: {reason}; is papilla-server running there?")]
+    Unreachable {
+        /// Host and port.
+        server: String,
+        /// What the system or the library says.
+        reason: String,
+    },
+    /// The service refused.
+    #[error("refused: {0}")]
+    Refused(Problem),
+    /// What the service said is not of the protocol.
+    #[error("not of the protocol: {0}")]
+    Protocol(String),
+    /// A frame of the service's is damaged.
+    #[error("a frame of the service's is damaged: {0}")]
+    Frame(#[from] FrameError),
+    /// The atlas cannot be used.
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
+    /// The session was closed by this program.
+    #[error("the session is closed")]
+    Closed,
+}
+
+impl ClientError {
+    /// The code of a refusal.
+    #[must_use]
+    pub fn code(&self) -> Option<ErrorCode> {
+        match self {
+            Self::Refused(problem) => Some(problem.code),
+            _ => None,
+        }
+    }
+
+    /// Whether it may be gone when one tries again.
+    pub(crate) fn passes(&self) -> bool {
+        use ErrorCode::{Overloaded, RateLimited, ShuttingDown, Timeout};
+        let passing = [Overloaded, RateLimited, ShuttingDown, Timeout];
+        self.code().is_none_or(|code| passing.contains(&code))
+    }
+
+    pub(crate) fn unreachable(server: &str, reason: &dyn std::fmt::Display) -> Self {
+        Self::Unreachable { server: server.to_owned(), reason: reason.to_string() }
+    }
+
+    pub(crate) fn of_socket(server: &str, error: &tungstenite::Error) -> Self {
+        if let tungstenite::Error::Http(answer) = error {
+            let body = answer.body().as_deref().unwrap_or_default();
+            if let Some(problem) = problem_of(body) {
+                return Self::Refused(problem);
+            }
+        }
+        Self::unreachable(server, error)
+    }
+}
+
+/// The problem in the body of an answer over HTTP.
+pub(crate) fn problem_of(body: &[u8]) -> Option<Problem> {
+    let value: serde_json::Value = serde_json::from_slice(body).ok()?;
+    serde_json::from_value(value.get("error")?.clone()).ok()
+}

@@ -1,0 +1,26 @@
+//! Client of Papilla, a service that renders what a fingertip feels.
+//!
+//! Pressure on the skin (Pa) in, strain energy density (SED) at the dermis-epidermis interface
+//! (J/m3) out, both 224 x 224 `f32`, row-major, row 0 at the fingertip's far end.
+//!
+//! | | |
+//! |---|---|
+//! | [`Session`] | many maps over a WebSocket; the latest frame wins; reconnects by itself |
+//! | [`sed`] | one map over HTTP, blocking |
+//! | [`Skin`] | pressure maps from values at vertices or from contact points |
+//!
+//! The protocol itself is the crate `papilla-proto`, whose types this one hands through.
+
+mod answer;
+mod dial;
+mod error;
+mod http;
+mod session;
+mod skin;
+
+pub use answer::{Answer, Outcome};
+pub use error::ClientError;
+pub use http::{Rendered, atlas, get, sed};
+pub use papilla_proto as proto;
+pub use session::{Frame, Session};
+pub use skin::{Contact, Skin};

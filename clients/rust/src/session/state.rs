@@ -1,0 +1,205 @@
+//! What is agreed, what waits, what is on its way.
+
+use std::{collections::HashMap, sync::Arc};
+
+use papilla_proto::{FrameHeader, Hello, Problem, Ready, SampleType, ServerMessage, SessionError};
+use tokio::sync::oneshot;
+
+use super::Frame;
+use crate::{Answer, ClientError, Outcome};
+
+/// Waits for its turn or its answer.
+#[derive(Debug)]
+struct Pending {
+    sequence: u32,
+    client_time_us: u64,
+    ready: Arc<Ready>,
+    outcome: oneshot::Sender<Answer>,
+}
+
+impl Pending {
+    fn end(self, outcome: Outcome) {
+        let answer = Answer::without_map(self.sequence, self.client_time_us, outcome);
+        // Err: nobody waits for it any more.
+        let _ = self.outcome.send(answer);
+    }
+}
+
+/// New terms that are being agreed on.
+#[derive(Debug)]
+pub(super) struct Asked {
+    pub(super) hello: Hello,
+    pub(super) said: bool,
+    pub(super) reply: oneshot::Sender<Result<Arc<Ready>, ClientError>>,
+}
+
+/// What the writer is to send.
+pub(super) enum Next {
+    Hello(Box<Hello>),
+    Frame(Vec<u8>),
+}
+
+#[derive(Debug)]
+pub(super) struct State {
+    pub(super) hello: Hello,
+    pub(super) ready: Arc<Ready>,
+    pub(super) asked: Option<Asked>,
+    pub(super) replaced: u64,
+    tiers: HashMap<u16, String>,
+    sequence: u32,
+    waiting: Option<(Pending, Vec<u8>)>,
+    sent: Vec<Pending>,
+    over: bool,
+}
+
+impl State {
+    pub(super) fn new(hello: Hello, ready: Ready) -> Self {
+        let mut state = Self {
+            hello,
+            ready: Arc::new(ready),
+            asked: None,
+            replaced: 0,
+            tiers: HashMap::new(),
+            sequence: 0,
+            waiting: None,
+            sent: Vec::new(),
+            over: false,
+        };
+        state.agree(Arc::clone(&state.ready));
+        state
+    }
+
+    pub(super) fn agree(&mut self, ready: Arc<Ready>) {
+        if let Some(number) = ready.tier_number {
+            self.tiers.insert(number, ready.tier.clone());
+        }
+        self.ready = ready;
+    }
+
+    /// Encodes a frame and lets it wait in place of the one that waits.
+    pub(super) fn put(
+        &mut self,
+        frame: &Frame<'_>,
+        client_time_us: u64,
+    ) -> Result<oneshot::Receiver<Answer>, ClientError> {
+        if self.over {
+            return Err(ClientError::Closed);
+        }
+        self.sequence = self.sequence.wrapping_add(1);
+        let sequence = self.sequence;
+        let (outcome, receiver) = oneshot::channel();
+        let ready = Arc::clone(&self.ready);
+        let pending = Pending { sequence, client_time_us, ready, outcome };
+        match encode(frame, sequence, client_time_us, self.ready.sample_type) {
+            Err(problem) => pending.end(Outcome::Error(problem)),
+            Ok(message) => {
+                if let Some((old, _)) = self.waiting.replace((pending, message)) {
+                    self.replaced += 1;
+                    old.end(Outcome::Superseded { by_client: true });
+                }
+            }
+        }
+        Ok(receiver)
+    }
+
+    /// What to send next; a frame not while terms are being agreed on. It then counts as sent.
+    pub(super) fn next(&mut self) -> Option<Next> {
+        if let Some(asked) = &mut self.asked {
+            if asked.said {
+                return None;
+            }
+            asked.said = true;
+            return Some(Next::Hello(Box::new(asked.hello.clone())));
+        }
+        let (mut pending, message) = self.waiting.take()?;
+        // New terms may have come while it waited. Another sample type is the service's to refuse.
+        pending.ready = Arc::clone(&self.ready);
+        self.sent.push(pending);
+        Some(Next::Frame(message))
+    }
+
+    /// Takes a binary message.
+    pub(super) fn answered(&mut self, message: &[u8]) -> Result<(), ClientError> {
+        let header = FrameHeader::decode(message)?;
+        let Some(pending) = self.forget(header.sequence) else { return Ok(()) };
+        let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
+        let tier = self.tiers.get(&number).cloned().unwrap_or_default();
+        let answer = Answer::read(&header, message, &pending.ready, tier)?;
+        // Err: nobody waits for it any more.
+        let _ = pending.outcome.send(answer);
+        Ok(())
+    }
+
+    /// Takes a text message.
+    pub(super) fn told(&mut self, message: ServerMessage) {
+        match message {
+            ServerMessage::Ready(ready) => {
+                let ready = Arc::new(ready);
+                self.agree(Arc::clone(&ready));
+                if let Some(Asked { hello, reply, .. }) = self.asked.take() {
+                    self.hello = hello;
+                    let _ = reply.send(Ok(ready));
+                }
+            }
+            ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
+                let problem = Problem { code, message, field };
+                match sequence.and_then(|sequence| self.forget(sequence)) {
+                    Some(pending) => pending.end(Outcome::Error(problem)),
+                    None => {
+                        if let Some(asked) = self.asked.take_if(|asked| asked.said) {
+                            let _ = asked.reply.send(Err(ClientError::Refused(problem)));
+                        }
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The connection broke: what was sent is lost, what waits goes on waiting.
+    pub(super) fn lose(&mut self) {
+        self.sent.drain(..).for_each(|pending| pending.end(Outcome::Lost));
+        if let Some(asked) = self.asked.take_if(|asked| asked.said) {
+            let reason = "the connection broke".to_owned();
+            let _ = asked.reply.send(Err(ClientError::Protocol(reason)));
+        }
+    }
+
+    /// No session will follow.
+    pub(super) fn end(&mut self) {
+        self.over = true;
+        self.lose();
+        if let Some((pending, _)) = self.waiting.take() {
+            pending.end(Outcome::Lost);
+        }
+        self.asked = None;
+    }
+
+    fn forget(&mut self, sequence: u32) -> Option<Pending> {
+        let at = self.sent.iter().position(|pending| pending.sequence == sequence)?;
+        Some(self.sent.remove(at))
+    }
+}
+
+/// The message of a frame.
+fn encode(
+    frame: &Frame<'_>,
+    sequence: u32,
+    client_time_us: u64,
+    sample_type: SampleType,
+) -> Result<Vec<u8>, Problem> {
+    let Frame { pressure_pa, window, deadline_us, .. } = *frame;
+    let top_pa = pressure_pa.iter().copied().fold(0.0, f32::max);
+    // The finest scale that clips nothing.
+    let scale =
+        if sample_type.is_scaled() && top_pa > 0.0 { top_pa / sample_type.unit_max() } else { 1.0 };
+    let header = FrameHeader::pressure(sequence, client_time_us, deadline_us, sample_type, scale)
+        .windowed(window);
+    let head = header.encode();
+    let mut message = vec![0; head.len() + window.pixel_count() * sample_type.bytes()];
+    message[..head.len()].copy_from_slice(&head);
+    sample_type
+        .encode(pressure_pa, scale, &mut message[head.len()..])
+        .map_err(|error| Problem::new(error.code(), error.to_string()).at("pressure_pa"))?;
+    Ok(message)
+}

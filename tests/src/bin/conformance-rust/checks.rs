@@ -1,0 +1,107 @@
+//! What a step found against what it was to find.
+
+use anyhow::{Result, bail, ensure};
+use papilla_client::{Answer, Outcome};
+use papilla_proto::{FrameKind, MAP_SIDE_PX, Problem, flags};
+use serde_json::{Value, json};
+
+fn near(what: &str, found: f64, due: f64, tolerance: f64) -> Result<()> {
+    // Not `off > tolerance`: NaN must fail.
+    ensure!((found - due).abs() <= tolerance, "{what} is {found}, {due} +- {tolerance} is due");
+    Ok(())
+}
+
+/// Compares a number with a pair of value and tolerance.
+pub(crate) fn check_pair(what: &str, found: f64, pair: &Value) -> Result<()> {
+    let number = |i: usize| pair[i].as_f64().unwrap_or(f64::NAN);
+    near(what, found, number(0), number(1))
+}
+
+fn check_list(what: &str, found: &[f32], due: &Value) -> Result<()> {
+    let due = due.as_array().map(Vec::as_slice).unwrap_or_default();
+    ensure!(found.len() == due.len(), "{what}: {} values, {} are due", found.len(), due.len());
+    for (i, (&found, due)) in found.iter().zip(due).enumerate() {
+        check_pair(&format!("{what} {i}"), f64::from(found), due)?;
+    }
+    Ok(())
+}
+
+pub(crate) fn check_map(expect: &Value, map: &[f32]) -> Result<()> {
+    for pixel in expect["pixels"].as_array().into_iter().flatten() {
+        let at = |i: usize| pixel[i].as_u64().unwrap_or(u64::MAX) as usize;
+        let number = |i: usize| pixel[i].as_f64().unwrap_or(f64::NAN);
+        let found = map.get(at(0) * MAP_SIDE_PX + at(1)).copied().unwrap_or(f32::NAN);
+        near(&format!("pixel {}, {}", at(0), at(1)), f64::from(found), number(2), number(3))?;
+    }
+    if let Some(due) = expect.get("sum") {
+        check_pair("the sum", map.iter().copied().map(f64::from).sum(), due)?;
+    }
+    if let Some(due) = expect.get("max") {
+        check_pair("the maximum", map.iter().copied().map(f64::from).fold(0.0, f64::max), due)?;
+    }
+    Ok(())
+}
+
+pub(crate) fn check_problem(expect: &Value, problem: &Problem) -> Result<()> {
+    let code = problem.code.as_str();
+    ensure!(expect["status"] == "error", "refused: {problem}");
+    ensure!(expect["code"] == code, "the code is {code}, {} is due", expect["code"]);
+    if let Some(due) = expect.get("field") {
+        ensure!(*due == json!(problem.field), "the field is {:?}", problem.field);
+    }
+    Ok(())
+}
+
+pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
+    let status = match &answer.outcome {
+        Outcome::Ok => "ok",
+        Outcome::Superseded { .. } => "superseded",
+        Outcome::Late => "late",
+        Outcome::Stale => "stale",
+        Outcome::Error(problem) => return check_problem(expect, problem),
+        Outcome::Lost => "lost",
+    };
+    let due = expect.get("status").and_then(Value::as_str).unwrap_or("ok");
+    ensure!(status == due, "the status is {status}, {due} is due");
+    if status != "ok" {
+        return Ok(());
+    }
+    let parts = u64::from(answer.queue_us) + u64::from(answer.infer_us);
+    ensure!(parts <= u64::from(answer.total_us), "parts take longer than the whole");
+    if let Some(due) = expect.get("kind") {
+        let kind = if answer.kind == FrameKind::Sa1Rate { "sa1_rate" } else { "sed" };
+        ensure!(due == kind, "the kind is {kind}");
+    }
+    if let Some(due) = expect.get("tier") {
+        ensure!(*due == json!(answer.tier), "the tier is {}", answer.tier);
+    }
+    if let Some(due) = expect["flags"].as_array() {
+        let bit = |name: &Value| {
+            if name == "out_of_range" { flags::OUT_OF_RANGE } else { flags::NO_CONTACT }
+        };
+        let due = due.iter().fold(0, |all, name| all | bit(name));
+        ensure!(answer.flags == due, "the flags are {}, {due} is due", answer.flags);
+    }
+    if let Some(due) = expect.get("window") {
+        let w = answer.window;
+        ensure!(*due == json!([w.x, w.y, w.width, w.height]), "the window is {w:?}");
+    }
+    if expect.get("map") == Some(&json!(false)) {
+        ensure!(answer.map.is_empty(), "the answer carries a map");
+    } else {
+        check_map(expect, &answer.map)?;
+    }
+    if let Some(due) = expect.get("summary") {
+        let Some(summary) = &answer.summary else { bail!("there is no summary") };
+        let bytes = summary.encode();
+        let values: Vec<f32> =
+            bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
+        check_list("summary", &values, due)?;
+    }
+    for (name, found) in [("points", &answer.points), ("actuators", &answer.actuators)] {
+        if let Some(due) = expect.get(name) {
+            check_list(name, found, due)?;
+        }
+    }
+    Ok(())
+}

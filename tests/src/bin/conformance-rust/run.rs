@@ -1,0 +1,225 @@
+//! The steps of a case.
+
+use std::{
+    env,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, Result, bail, ensure};
+use papilla_client::{Answer, ClientError, Contact, Frame, Outcome, Session, Skin, atlas, sed};
+use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch};
+use papilla_tests::{
+    conformance::pattern::{self, Pressure, Vertices},
+    http::Request,
+};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+use tokio::{task::spawn_blocking, time};
+
+use crate::checks::{check_answer, check_map, check_pair, check_problem};
+
+/// One case.
+pub(crate) struct Run {
+    server: String,
+    patience: Duration,
+    session: Option<Session>,
+    /// For people.
+    pub(crate) note: String,
+}
+
+fn member<T: DeserializeOwned>(step: &Value, name: &str) -> Result<T> {
+    serde_json::from_value(step[name].clone()).with_context(|| name.to_owned())
+}
+
+async fn control(action: &str) -> Result<()> {
+    let address = env::var("PAPILLA_CONTROL").context("PAPILLA_CONTROL")?;
+    let address = address.trim_start_matches("http://");
+    let answer = Request::post(&format!("/{action}"), Vec::new()).send(address).await?;
+    ensure!(answer.status == 200, "the control refuses {action}");
+    Ok(())
+}
+
+impl Run {
+    pub(crate) fn new(timeout_s: f64) -> Result<Self> {
+        let url = env::var("PAPILLA_URL").context("PAPILLA_URL")?;
+        let server = url.trim_start_matches("http://").to_owned();
+        let patience = Duration::from_secs_f64(timeout_s);
+        Ok(Self { server, patience, session: None, note: String::new() })
+    }
+
+    pub(crate) async fn step(&mut self, step: &Value) -> Result<()> {
+        match step["do"].as_str().unwrap_or_default() {
+            "hello" => self.hello(step).await,
+            "frame" => self.frame(step).await,
+            "burst" => self.burst(step).await,
+            "reconnect" => self.reconnect(step).await,
+            "http" => self.post(step).await,
+            "rasterise" => self.rasterise(step).await,
+            "contacts" => self.contacts(step).await,
+            other => bail!("there is no step {other}"),
+        }
+    }
+
+    fn session(&self) -> Result<&Session> {
+        self.session.as_ref().context("no session is open")
+    }
+
+    async fn hello(&mut self, step: &Value) -> Result<()> {
+        let mut hello = step["hello"].clone();
+        hello["version"] = json!(2);
+        let hello: Hello = serde_json::from_value(hello)?;
+        let opened = match &self.session {
+            Some(session) => session.terms(hello).await.map(|_| None),
+            None => Session::open(&self.server, hello).await.map(Some),
+        };
+        match opened {
+            Err(ClientError::Refused(problem)) => return check_problem(&step["expect"], &problem),
+            Err(error) => return Err(error.into()),
+            Ok(Some(session)) => self.session = Some(session),
+            Ok(None) => {}
+        }
+        ensure!(step["expect"]["status"] != "error", "the hello is not refused");
+        let ready = serde_json::to_value(&*self.session()?.ready())?;
+        for (name, due) in step["expect"]["ready"].as_object().into_iter().flatten() {
+            ensure!(ready[name] == *due, "ready.{name} is {}, {due} is due", ready[name]);
+        }
+        Ok(())
+    }
+
+    async fn frame(&self, step: &Value) -> Result<()> {
+        let map: Vec<f32> = member::<Pressure>(step, "pressure")?.draw(1.0, None);
+        let window = match member::<Option<[u16; 4]>>(step, "window")? {
+            Some([x, y, width, height]) => Window { x, y, width, height },
+            None => Window::WHOLE,
+        };
+        let [x, y, width, height] =
+            [window.x, window.y, window.width, window.height].map(usize::from);
+        let at = |row: usize, column: usize| {
+            let inside = row < MAP_SIDE_PX && column < MAP_SIDE_PX;
+            if inside { map[row * MAP_SIDE_PX + column] } else { 0.0 }
+        };
+        let samples: Vec<f32> = (y..y + height)
+            .flat_map(|row| (x..x + width).map(move |column| (row, column)))
+            .map(|(r, c)| at(r, c))
+            .collect();
+        let client_time_us: Option<u64> = member(step, "client_time_us")?;
+        let deadline_us = member::<Option<u32>>(step, "deadline_us")?.unwrap_or(0);
+        let frame = Frame { pressure_pa: &samples, window, client_time_us, deadline_us };
+        for attempt in (0..member::<Option<u32>>(step, "attempts")?.unwrap_or(1)).rev() {
+            let answer = time::timeout(self.patience, self.session()?.render(frame)).await??;
+            if answer.outcome == Outcome::Lost && attempt > 0 {
+                continue;
+            }
+            let same = client_time_us.is_none_or(|time_us| time_us == answer.client_time_us);
+            ensure!(same, "another client time comes back");
+            return check_answer(&step["expect"], &answer);
+        }
+        bail!("no attempt")
+    }
+
+    async fn burst(&mut self, step: &Value) -> Result<()> {
+        let (session, expect) = (self.session()?, &step["expect"]);
+        let (count, pattern): (u32, Pressure) = (member(step, "count")?, member(step, "pressure")?);
+        let maps: Vec<_> =
+            (1..=count).map(|k| pattern.draw(f64::from(k) / f64::from(count), None)).collect();
+        let before = session.superseded_by_client();
+        let paused = step["paused"] == json!(true);
+        if paused {
+            control("pause").await?;
+        }
+        let (finished, mut finish) = tokio::sync::mpsc::unbounded_channel::<(u32, Answer)>();
+        for (number, map) in maps.iter().enumerate() {
+            let outcome = session.send(map)?;
+            let finished = finished.clone();
+            tokio::spawn(async move {
+                if let Ok(answer) = outcome.await {
+                    // Err: the case is over.
+                    let _ = finished.send((number as u32, answer));
+                }
+            });
+            let gap_ms = step["gap_ms"].as_u64().unwrap_or(0);
+            time::sleep(Duration::from_millis(gap_ms)).await;
+        }
+        if paused {
+            control("resume").await?;
+        }
+        let mut outcomes = Vec::new();
+        while outcomes.len() < maps.len() {
+            let next = time::timeout(self.patience, finish.recv()).await?;
+            outcomes.push(next.context("a frame without an outcome")?);
+        }
+        let by_client = |a: &Answer| a.outcome == (Outcome::Superseded { by_client: true });
+        let by_service = |a: &Answer| a.outcome == (Outcome::Superseded { by_client: false });
+        let here = outcomes.iter().filter(|(_, answer)| by_client(answer)).count() as u64;
+        let there = outcomes.iter().filter(|(_, answer)| by_service(answer)).count() as u64;
+        // Tasks wake in any order: the session's order is that of its sequences, and answers are
+        // compared by what they hold.
+        let good: Vec<_> = outcomes.iter().filter(|(_, answer)| answer.is_ok()).collect();
+        ensure!(good.len() as u64 + here + there == u64::from(count), "other outcomes: {good:?}");
+        let newest = outcomes.iter().find(|(number, _)| number + 1 == count);
+        let (_, newest) = newest.context("the newest has no outcome")?;
+        let mut sequences: Vec<u32> = outcomes.iter().map(|(_, answer)| answer.sequence).collect();
+        sequences.sort_unstable();
+        sequences.dedup();
+        ensure!(sequences.len() == maps.len(), "two outcomes of one frame");
+        ensure!(here == session.superseded_by_client() - before, "the client miscounts");
+        ensure!(here + there >= expect["superseded"].as_u64().unwrap_or(0), "{here} + {there}");
+        let due = expect["superseded_by_client"].as_u64().unwrap_or(0);
+        ensure!(here >= due, "the client replaced {here}");
+        check_answer(&expect["newest"], newest)?;
+        self.note = format!(" ({} ok, {here} replaced here, {there} by the service)", good.len());
+        Ok(())
+    }
+
+    async fn reconnect(&mut self, step: &Value) -> Result<()> {
+        let mut opened = self.session()?.connections();
+        let before = *opened.borrow_and_update();
+        control("restart").await?;
+        let begin = Instant::now();
+        let within = Duration::from_secs_f64(member(step, "within_s")?);
+        time::timeout(within, opened.wait_for(|opened| *opened > before)).await??;
+        let seconds = begin.elapsed().as_secs_f64();
+        self.note = format!(" (connected {seconds:.2} s after the server was back)");
+        Ok(())
+    }
+
+    async fn post(&self, step: &Value) -> Result<()> {
+        let (server, tier) = (self.server.clone(), member::<String>(step, "tier")?);
+        let map = member::<Pressure>(step, "pressure")?.draw(1.0, None);
+        match spawn_blocking(move || sed(&server, &map, Some(&tier))).await? {
+            Err(ClientError::Refused(problem)) => check_problem(&step["expect"], &problem),
+            Err(error) => Err(error.into()),
+            Ok(rendered) => {
+                ensure!(step["expect"]["status"] == "ok", "the request is not refused");
+                ensure!(step["expect"]["tier"] == rendered.tier, "the tier is {}", rendered.tier);
+                check_map(&step["expect"], &rendered.sed_j_per_m3)
+            }
+        }
+    }
+
+    async fn rasterise(&self, step: &Value) -> Result<()> {
+        let server = self.server.clone();
+        let atlas = spawn_blocking(move || atlas(&server)).await??;
+        let vertices: Vertices = member(step, "vertices")?;
+        let values = vertices.values(&atlas.patch(Patch::Skin).positions_mm);
+        let mut map = vec![0.0; MAP_LEN];
+        Skin::new(&atlas).rasterise(&values, &mut map)?;
+        check_map(&step["expect"], &map)
+    }
+
+    async fn contacts(&self, step: &Value) -> Result<()> {
+        let server = self.server.clone();
+        let skin = Skin::new(&spawn_blocking(move || atlas(&server)).await??);
+        let contacts: Vec<pattern::Contact> = member(step, "contacts")?;
+        let contact = |c: &pattern::Contact| Contact {
+            at_mm: c.at_mm,
+            force_n: c.force_n,
+            radius_mm: c.radius_mm,
+        };
+        let map_pa = skin.contacts(&contacts.iter().map(contact).collect::<Vec<_>>());
+        if let Some(due) = step["expect"].get("force_n") {
+            check_pair("the force", skin.force_n(&map_pa), due)?;
+        }
+        check_map(&step["expect"], &map_pa)
+    }
+}
