@@ -41,11 +41,10 @@ export class Atlas {
     /** Area of the undeformed skin that belongs to each vertex, mm2. */
     this.areasMm2 = vertexAreas(this.triangles, this.skin.positionsMm);
     this.#taps = interfaceTaps(this.interface);
-    this.#vertexPa = new Float32Array(this.vertexCount);
   }
 
   #taps;
-  #vertexPa;
+  /** @type {ReturnType<typeof pixelPlaces> | null} */ #pixelPlaces = null;
 
   /**
    * @param {string} [base] http(s)://host[:port]; '' for the server of the page
@@ -69,43 +68,39 @@ export class Atlas {
   }
 
   /**
-   * Contact points of a physics engine to a map. Each point is a force spread over a disc of the undeformed skin with
-   * the weight `1 - d^2 / radius^2`, d the straight distance; a disc without a vertex goes to the nearest one. Forces are kept:
-   * the sum of pressure times `areasMm2` is the sum of the forces.
+   * Contact points of a physics engine to a map, each as the pressure of Hertz's contact of that force and radius around the
+   * nearest point of the skin (docs/atlas.md, 'Helpers of the clients'). A point more than 5 mm off the skin adds nothing.
    * @param {ArrayLike<number>} positionsMm x, y, z of each point, in the finger's frame
    * @param {ArrayLike<number>} forcesN normal force of each
-   * @param {number} radiusMm radius of the discs; the vertices are 0.7 mm apart under the pad
+   * @param {ArrayLike<number>} radiiMm radius of each contact; 2 to 3 for a light touch of a flat object
    * @param {Float32Array} map 224 x 224, overwritten
    */
-  contactMap(positionsMm, forcesN, radiusMm, map) {
-    this.#vertexPa.fill(0);
+  contactMap(positionsMm, forcesN, radiiMm, map) {
+    this.#pixelPlaces ??= pixelPlaces(this.triangles, this.skin);
+    const { xyzMm, areasMm2 } = this.#pixelPlaces;
+    const { pixels } = this.skin.raster;
+    map.fill(0);
     for (let c = 0; c < forcesN.length; c++) {
-      this.#spread(positionsMm[3 * c], positionsMm[3 * c + 1], positionsMm[3 * c + 2], forcesN[c], radiusMm);
+      const nearest = nearestPlace(xyzMm, positionsMm[3 * c], positionsMm[3 * c + 1], positionsMm[3 * c + 2]);
+      if (nearest < 0) continue;
+      const weight = (/** @type {number} */ n) => {
+        if (n === nearest) return 1;
+        const d2 = (xyzMm[3 * n] - xyzMm[3 * nearest]) ** 2 + (xyzMm[3 * n + 1] - xyzMm[3 * nearest + 1]) ** 2
+          + (xyzMm[3 * n + 2] - xyzMm[3 * nearest + 2]) ** 2;
+        return Math.sqrt(Math.max(0, 1 - d2 / radiiMm[c] ** 2));
+      };
+      let total = 0;
+      for (let n = 0; n < pixels.length; n++) total += weight(n) * areasMm2[n];
+      for (let n = 0; n < pixels.length; n++) map[pixels[n]] += (1e6 * forcesN[c] * weight(n)) / total;
     }
-    return this.pressureMap(this.#vertexPa, map);
+    return map;
   }
 
-  /** @param {number} x @param {number} y @param {number} z @param {number} forceN @param {number} radiusMm */
-  #spread(x, y, z, forceN, radiusMm) {
-    const p = this.skin.positionsMm;
-    const { areasMm2 } = this;
-    let total = 0;
-    let nearest = 0;
-    let least = Infinity;
-    for (let i = 0; i < areasMm2.length; i++) {
-      const d2 = (p[3 * i] - x) ** 2 + (p[3 * i + 1] - y) ** 2 + (p[3 * i + 2] - z) ** 2;
-      if (d2 < least) { least = d2; nearest = i; }
-      if (d2 < radiusMm * radiusMm) total += (1 - d2 / (radiusMm * radiusMm)) * areasMm2[i];
-    }
-    if (total === 0) {
-      this.#vertexPa[nearest] += (1e6 * forceN) / areasMm2[nearest];
-      return;
-    }
-    const peakPa = (1e6 * forceN) / total;
-    for (let i = 0; i < areasMm2.length; i++) {
-      const d2 = (p[3 * i] - x) ** 2 + (p[3 * i + 1] - y) ** 2 + (p[3 * i + 2] - z) ** 2;
-      if (d2 < radiusMm * radiusMm) this.#vertexPa[i] += peakPa * (1 - d2 / (radiusMm * radiusMm));
-    }
+  /** Force of a pressure map over the undeformed skin, N. @param {Float32Array} map */
+  forceN(map) {
+    this.#pixelPlaces ??= pixelPlaces(this.triangles, this.skin);
+    const { areasMm2 } = this.#pixelPlaces;
+    return this.skin.raster.pixels.reduce((sum, pixel, n) => sum + 1e-6 * map[pixel] * areasMm2[n], 0);
   }
 
   /**
@@ -162,6 +157,43 @@ function eachTriangle(triangles, p, visit) {
     const [vx, vy, vz] = [p[c] - p[a], p[c + 1] - p[a + 1], p[c + 2] - p[a + 2]];
     visit(corners, uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
   }
+}
+
+/**
+ * Where each pixel of a patch lies on the finger, mm, and how much of it the pixel shows, mm2.
+ * @param {Uint32Array} triangles @param {Patch} patch
+ */
+function pixelPlaces(triangles, { raster, positionsMm, uvPx }) {
+  const { corners, weights, pixels, owners } = raster;
+  const xyzMm = new Float64Array(3 * pixels.length);
+  const areasMm2 = new Float64Array(pixels.length);
+  const ratios = new Float64Array(triangles.length / 3);
+  let triangle = 0;
+  eachTriangle(triangles, positionsMm, ([a, b, c], nx, ny, nz) => {
+    const [ux, uy] = [uvPx[2 * b] - uvPx[2 * a], uvPx[2 * b + 1] - uvPx[2 * a + 1]];
+    const [vx, vy] = [uvPx[2 * c] - uvPx[2 * a], uvPx[2 * c + 1] - uvPx[2 * a + 1]];
+    ratios[triangle++] = Math.hypot(nx, ny, nz) / Math.abs(ux * vy - uy * vx);
+  });
+  for (let n = 0; n < pixels.length; n++) {
+    areasMm2[n] = ratios[owners[n]];
+    for (let k = 0; k < 3; k++) {
+      for (let axis = 0; axis < 3; axis++) xyzMm[3 * n + axis] += weights[3 * n + k] * positionsMm[3 * corners[3 * n + k] + axis];
+    }
+  }
+  return { xyzMm, areasMm2 };
+}
+
+const REACH_MM = 5;
+
+/** The place nearest to (x, y, z); -1 beyond REACH_MM. @param {Float64Array} xyzMm @param {number} x @param {number} y @param {number} z */
+function nearestPlace(xyzMm, x, y, z) {
+  let nearest = -1;
+  let least = REACH_MM ** 2;
+  for (let n = 0; n < xyzMm.length / 3; n++) {
+    const d2 = (xyzMm[3 * n] - x) ** 2 + (xyzMm[3 * n + 1] - y) ** 2 + (xyzMm[3 * n + 2] - z) ** 2;
+    if (d2 <= least && (d2 < least || nearest < 0)) { least = d2; nearest = n; }
+  }
+  return nearest;
 }
 
 /**

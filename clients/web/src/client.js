@@ -8,8 +8,10 @@ import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js'
 /** @typedef {import('./types.js').State} State */
 /** @typedef {import('./types.js').Options} Options */
 
-const RETRY_FIRST_MS = 50;
-const RETRY_LAST_MS = 500;
+/** Attempts to connect are this far apart, with some chance in it. */
+const RETRY_MS = { least: 100, most: 250 };
+/** Frames that may be without an answer at once; the next one waits. */
+const OUTSTANDING_MAX = 1024;
 /** An attempt that has not come to a ready by then is given up. */
 const ATTEMPT_MS = 5000;
 /** How long a frame waits before the socket is looked at again, ms. */
@@ -45,12 +47,13 @@ function sessionUrl(base, token) {
 /**
  * A session. Frames are pressure maps (Pa); answers are maps of strain energy density (J/m3).
  *
- * The newest frame wins on this side too: while earlier bytes have not left the socket a frame waits, and
+ * The newest frame wins on this side too: while an earlier frame has not left the socket a frame waits, and
  * a newer one takes its place (`replaced` counts). A lost connection is made anew by itself, with the terms of
  * the last hello; a frame that waits then goes out first.
  *
- * `onready(ready)`, `onanswer(answer)` for every answer whatever its status (also `superseded`, `late`, `stale`),
- * `onproblem(problem)` for errors of frames and hellos, `onstate(state, why)`.
+ * `onanswer(answer)` is called exactly once for every frame, with `answer.status`: `ok`, `superseded` (by this client or the
+ * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke before the answer). `onready(ready)`,
+ * `onproblem(problem)` for refused hellos and faults of the session, `onstate(state, why)`.
  */
 export class Papilla {
   /** @type {(ready: Ready) => void} */ onready = () => {};
@@ -79,8 +82,9 @@ export class Papilla {
   /** @type {WebSocket | null} */ #socket = null;
   #sequence = 0;
   #waits = false;
+  #outstanding = new Uint32Array(OUTSTANDING_MAX);
+  #outstandingCount = 0;
   #drainTimer = false;
-  #retryMs = RETRY_FIRST_MS;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #timer;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
   // Answers up to the hello of a renewal have the sections of before.
@@ -99,7 +103,7 @@ export class Papilla {
   constructor(base = '', hello = {}, options = {}) {
     this.#url = sessionUrl(base, options.token);
     this.#hello = { ...hello };
-    this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs, retryMs: options.retryMs ?? RETRY_LAST_MS };
+    this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
 
   /**
@@ -130,7 +134,7 @@ export class Papilla {
   close() {
     this.#opened = false;
     this.#drop();
-    this.#fail(new Error('the session was closed'));
+    this.#loseAll(true);
     this.#enter('closed', '');
   }
 
@@ -140,7 +144,7 @@ export class Papilla {
    */
   renew(hello) {
     // A frame that waits was encoded by the terms of before.
-    this.#waits = false;
+    this.#supersede();
     if (this.ready) this.#before = { hello: this.#hello, ready: this.ready, termsFrom: this.#termsFrom };
     this.#hello = { ...hello };
     this.#termsFrom = (this.#sequence + 1) >>> 0;
@@ -155,7 +159,7 @@ export class Papilla {
    * @returns {number} the frame's sequence, which its answer repeats
    */
   send(pressurePa) {
-    if (pressurePa.length !== MAP_LEN) throw new RangeError(`a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
+    if (pressurePa.length !== MAP_LEN) throw refusal('wrong_length', `a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
     if (!this.#options.crop) return this.#put(pressurePa, 0, SIDE_PX, 0, 0, SIDE_PX, SIDE_PX);
     let top = 0;
     let end = MAP_LEN - 1;
@@ -182,7 +186,7 @@ export class Papilla {
    */
   sendWindow(samplesPa, column, row, width, height) {
     if (width * height > samplesPa.length || column + width > SIDE_PX || row + height > SIDE_PX || Math.min(column, row, width, height) < 0) {
-      throw new RangeError(`${width} x ${height} samples at (${column}, ${row}) do not fit the map or the ${samplesPa.length} samples given`);
+      throw refusal('wrong_shape', `${width} x ${height} samples at (${column}, ${row}) do not fit the map or the ${samplesPa.length} samples given`);
     }
     return this.#put(samplesPa, 0, width, column, row, width, height);
   }
@@ -192,7 +196,7 @@ export class Papilla {
    * by `send` and `onanswer`.
    * @param {Float32Array} pressurePa
    * @returns {Promise<Answer>} rejected with a PapillaError where the server refuses the frame, or does
-   *   not render it (code `superseded`, `late`, `stale`)
+   *   not render it (code `superseded`, `late`, `stale`, `lost`)
    */
   render(pressurePa) {
     return new Promise((resolve, reject) => this.#promised.set(this.send(pressurePa), { resolve, reject }));
@@ -203,33 +207,76 @@ export class Papilla {
    * @param {number} column @param {number} row @param {number} width @param {number} height
    */
   #put(values, first, stride, column, row, width, height) {
+    const timeUs = this.#options.clockUs();
     const type = SAMPLE_TYPES.indexOf(this.#hello.sample_type ?? 'f32');
     let scale = 0;
     if (type >= 2) {
       scale = this.#hello.pressure_scale_pa ?? greatest(values, first, stride, width, height) / (type === 2 ? 65535 : 255);
       if (!(scale > 0)) scale = 1;
     }
-    if (this.#waits) this.#supersede();
+    this.#supersede();
     this.#sequence = (this.#sequence + 1) >>> 0;
     this.#frame.encode(values, first, stride, column, row, width, height, type, scale);
-    this.#frame.stamp(this.#sequence, this.#options.clockUs(), this.deadlineUs);
+    this.#frame.stamp(this.#sequence, timeUs, this.deadlineUs);
     this.#waits = true;
     this.#flush();
     return this.#sequence;
   }
 
-  /** The frame that waits is never sent: a newer one takes its place. */
+  /** The frame that waits, if one does, is never sent. */
   #supersede() {
+    if (!this.#waits) return;
+    this.#waits = false;
     this.replaced++;
-    const promised = this.#promised.get(this.#sequence);
+    this.#settle(this.#sequence, 'superseded', null);
+  }
+
+  /** The outcome of a frame of which the server sent no binary answer. @param {number} sequence @param {Answer['status']} status @param {Problem | null} problem */
+  #settle(sequence, status, problem) {
+    const { answer } = this;
+    answer.sequence = sequence;
+    answer.status = status;
+    answer.problem = problem;
+    this.#tell();
+  }
+
+  #tell() {
+    const { answer } = this;
+    this.onanswer(answer);
+    const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
     if (!promised) return;
-    this.#promised.delete(this.#sequence);
-    promised.reject(missed('superseded', this.#sequence));
+    this.#promised.delete(answer.sequence);
+    if (answer.status === 'ok') promised.resolve(answer);
+    else promised.reject(new PapillaError(answer.problem ?? missed(answer.status, answer.sequence)));
+  }
+
+  /** Takes the frame out of those without an answer; false if it is none of them. @param {number} sequence */
+  #answered(sequence) {
+    const list = this.#outstanding;
+    for (let k = 0; k < this.#outstandingCount; k++) {
+      if (list[k] !== sequence) continue;
+      list.copyWithin(k, k + 1, this.#outstandingCount--);
+      return true;
+    }
+    return false;
+  }
+
+  /** What went out on a lost connection is never answered. @param {boolean} alsoWaiting */
+  #loseAll(alsoWaiting) {
+    while (this.#outstandingCount > 0) {
+      const sequence = this.#outstanding[0];
+      this.#answered(sequence);
+      this.#settle(sequence, 'lost', null);
+    }
+    if (!alsoWaiting || !this.#waits) return;
+    this.#waits = false;
+    this.#settle(this.#sequence, 'lost', null);
   }
 
   #flush() {
     const socket = this.#socket;
     if (!this.#waits || !this.ready || !socket || socket.readyState !== WebSocket.OPEN) return;
+    if (this.#outstandingCount === OUTSTANDING_MAX) return;
     if (socket.bufferedAmount > 0) {
       if (!this.#drainTimer) {
         this.#drainTimer = true;
@@ -239,6 +286,7 @@ export class Papilla {
     }
     this.#waits = false;
     this.sent++;
+    this.#outstanding[this.#outstandingCount++] = this.#sequence;
     const { buffer, bytes } = this.#frame;
     // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
     socket.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
@@ -285,26 +333,16 @@ export class Papilla {
   #lost(socket, why) {
     if (socket !== this.#socket) return;
     this.#drop();
-    this.#fail(new Error(why));
+    this.#loseAll(!this.#opened);
     if (!this.#opened) return;
     this.#enter('waiting', why);
-    this.#timer = setTimeout(() => this.#connect(), this.#retryMs * (0.75 + 0.25 * Math.random()));
-    this.#retryMs = Math.min(2 * this.#retryMs, this.#options.retryMs);
+    this.#timer = setTimeout(() => this.#connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
   }
 
   /** @param {State} state @param {string} why */
   #enter(state, why) {
     this.state = state;
     this.onstate(state, why);
-  }
-
-  /** Answers to frames that went out on a lost connection never come. @param {Error} error */
-  #fail(error) {
-    for (const [sequence, promised] of this.#promised) {
-      if (this.#waits && sequence === this.#sequence && this.#opened) continue;
-      this.#promised.delete(sequence);
-      promised.reject(error);
-    }
   }
 
   /** @param {string} text */
@@ -317,7 +355,6 @@ export class Papilla {
   /** @param {Ready} ready */
   #welcome(ready) {
     clearTimeout(this.#attempt);
-    this.#retryMs = RETRY_FIRST_MS;
     this.#viewsBefore = this.#views;
     this.#views = this.answer.views(ready.sections);
     this.#before = null;
@@ -329,14 +366,12 @@ export class Papilla {
 
   /** @param {Problem} problem */
   #problem(problem) {
-    const ofFrame = problem.sequence !== undefined && problem.sequence !== null;
-    if (ofFrame) {
-      const promised = this.#promised.get(/** @type {number} */ (problem.sequence));
-      this.#promised.delete(/** @type {number} */ (problem.sequence));
-      promised?.reject(new PapillaError(problem));
-    } else if (!this.ready && !problem.closes && !PASSING.has(problem.code)) {
-      this.#refused(problem);
+    const { sequence } = problem;
+    if (typeof sequence === 'number') {
+      if (this.#answered(sequence)) this.#settle(sequence, 'error', problem);
+      return;
     }
+    if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
     this.onproblem(problem);
   }
 
@@ -349,7 +384,7 @@ export class Papilla {
     }
     this.#opened = false;
     this.#drop();
-    this.#fail(new PapillaError(problem));
+    this.#loseAll(true);
     this.#enter('refused', problem.message);
   }
 
@@ -366,21 +401,21 @@ export class Papilla {
       this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
       return;
     }
+    if (!this.#answered(answer.sequence)) return;
     answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
+    answer.problem = null;
     this.#flush();
-    this.onanswer(answer);
-    const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
-    if (!promised) return;
-    this.#promised.delete(answer.sequence);
-    if (answer.status === 'ok') promised.resolve(answer);
-    else promised.reject(missed(answer.status, answer.sequence));
+    this.#tell();
   }
 }
 
-/** @param {string} code @param {number} sequence */
+/** @param {string} code as the server's @param {string} message */
+const refusal = (code, message) => new PapillaError({ type: 'error', code, message, closes: false });
+
+/** @param {string} code @param {number} sequence @returns {Problem} */
 function missed(code, sequence) {
   const message = code === 'superseded' ? 'a newer frame took its place' : `the frame was ${code}`;
-  return new PapillaError({ type: 'error', code, message, sequence, closes: false });
+  return { type: 'error', code, message, sequence, closes: false };
 }
 
 /**

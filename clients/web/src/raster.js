@@ -24,12 +24,15 @@ export class Raster {
     this.pixels = new Uint32Array(count);
     this.corners = new Uint32Array(3 * count);
     this.weights = new Float32Array(3 * count);
+    /** Triangle of each of these pixels. */
+    this.owners = new Uint32Array(count);
     /** 1 inside, 0 outside. */
     this.mask = new Uint8Array(MAP_LEN);
     for (let i = 0, n = 0; i < MAP_LEN; i++) {
       if (owner[i] < 0) continue;
       this.mask[i] = 1;
       this.pixels[n] = i;
+      this.owners[n] = owner[i] / 3;
       for (let k = 0; k < 3; k++) {
         this.corners[3 * n + k] = triangles[owner[i] + k];
         this.weights[3 * n + k] = weight[3 * i + k];

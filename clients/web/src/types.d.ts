@@ -93,6 +93,4 @@ export interface Options {
   crop?: boolean;
   /** us of the client's clock, for the header (default: performance.now). */
   clockUs?: () => number;
-  /** Longest wait between two attempts to connect, ms (default 500). */
-  retryMs?: number;
 }

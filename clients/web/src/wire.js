@@ -141,10 +141,12 @@ export class Answer {
   #u16 = new Uint16Array(this.#buffer);
 
   constructor() {
-    /** @type {'ok' | 'superseded' | 'late' | 'stale' | 'error'} */
-    this.status = 'error';
+    /** @type {'ok' | 'superseded' | 'late' | 'stale' | 'error' | 'lost'} */
+    this.status = 'lost';
     this.sequence = 0;
-    /** What the map holds: SED in J/m3, or firing rates in Hz (effect `afferents`). @type {'sed' | 'rate'} */
+    /** What was wrong with a frame of status `error`. @type {import('./types.js').Problem | null} */
+    this.problem = null;
+    /** What the map holds: SED in J/m3, or firing rates in Hz (effect `afferents`). @type {'sed' | 'sa1_rate'} */
     this.kind = 'sed';
     /** 224 x 224, row-major; 0 outside the window. Overwritten by the next answer. */
     this.map = new Float32Array(MAP_LEN);
@@ -198,7 +200,7 @@ export class Answer {
     if (view.getUint8(4) !== VERSION) throw new Error(`an answer has protocol version ${view.getUint8(4)}`);
     const kind = view.getUint8(5);
     if (kind !== KIND.sed && kind !== KIND.rate) throw new Error(`an answer is of kind ${kind}`);
-    this.kind = kind === KIND.sed ? 'sed' : 'rate';
+    this.kind = kind === KIND.sed ? 'sed' : 'sa1_rate';
     this.status = STATUS[view.getUint8(7)] ?? 'error';
     this.sequence = view.getUint32(8, true);
     this.clientTimeUs = view.getUint32(16, true) + TWO_POW_32 * view.getUint32(20, true);
