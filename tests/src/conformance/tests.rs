@@ -1,0 +1,69 @@
+use std::path::PathBuf;
+
+use super::*;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Members whose lists of numbers end in value and tolerance.
+const MEASURED: [&str; 7] = ["pixels", "sum", "max", "force_n", "summary", "points", "actuators"];
+
+/// Compares recorded numbers; returns how many there were.
+fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
+    match (found, due) {
+        (Value::Object(found), Value::Object(due)) => {
+            assert!(found.keys().eq(due.keys()), "{path}: other members");
+            let of = |(name, value): (&String, &Value)| {
+                let measured = measured || MEASURED.contains(&name.as_str());
+                compare(&format!("{path}.{name}"), measured, value, &due[name])
+            };
+            found.iter().map(of).sum()
+        }
+        (Value::Array(found), Value::Array(due)) => {
+            assert_eq!(found.len(), due.len(), "{path}: another length");
+            if !measured || found.iter().any(Value::is_array) {
+                let parts = found.iter().zip(due).enumerate();
+                return parts
+                    .map(|(i, (f, d))| compare(&format!("{path}[{i}]"), measured, f, d))
+                    .sum();
+            }
+            let number = |of: &Value| of.as_f64().unwrap_or_else(|| panic!("{path}: no number"));
+            let (value, tolerance) = (found.len() - 2, found.len() - 1);
+            let off = (number(&found[value]) - number(&due[value])).abs();
+            // A tenth: what clients are allowed has to cover their own rounding.
+            assert!(
+                off <= 0.1 * number(&found[tolerance]) + 1e-6,
+                "{path}: {found:?}, due {due:?}"
+            );
+            assert!(number(&found[tolerance]) <= 1.2 * number(&due[tolerance]) + 1e-9, "{path}");
+            assert_eq!(found[..value], due[..value], "{path}");
+            1
+        }
+        _ => {
+            assert_eq!(found, due, "{path}");
+            0
+        }
+    }
+}
+
+#[test]
+fn the_committed_script_is_what_engine_and_formulas_say() {
+    let text = fs::read_to_string(root().join("proto/conformance.json")).unwrap();
+    let committed: Value = serde_json::from_str(&text).unwrap();
+    let mut recorded = committed.clone();
+    Recorder::new(&root().join("models")).unwrap().fill(&mut recorded).unwrap();
+    let numbers = compare("", false, &committed, &recorded);
+    assert!(numbers > 250, "only {numbers} numbers are expected in the whole script");
+    assert_eq!(print(&committed), text, "not as `conformance-record` prints it");
+}
+
+#[test]
+fn a_pattern_on_a_limit_is_refused() {
+    let mut file = serde_json::json!({"cases": [{"name": "limit", "steps": [
+        {"do": "hello", "hello": {"tier": "half-space"}},
+        {"do": "frame", "pressure": {"disc": [100.5, 100.5, 4.0, 5000.0]}, "expect": {}},
+    ]}]});
+    let error = Recorder::new(&root().join("models")).unwrap().fill(&mut file).unwrap_err();
+    assert!(error.to_string().contains("case limit, step 1"), "{error}");
+}
