@@ -22,3 +22,4 @@ mod session;
 mod start;
 mod support;
 mod tls;
+mod xr;
