@@ -98,7 +98,7 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
             SettingError { field: "watch_models", reason }
         })?;
     }
-    let router = http::router(Arc::clone(&app), &config.allow_origin);
+    let router = http::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref());
     let line = Line { router, app, tls };
     let accepting = tokio::spawn(net::serve(listener, line, config.max_connections.get()));
     Ok(Server {

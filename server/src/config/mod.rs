@@ -139,6 +139,12 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_ALLOW_ORIGIN", value_name = "ORIGIN", value_delimiter = ',')]
     pub allow_origin: Vec<String>,
 
+    /// Folder whose files are served at /xr, with an index.html: the WebXR scene that `npm run build`
+    /// makes in clients/web.
+    #[arg(long, env = "PAPILLA_XR_DIR", value_name = "DIR")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub xr_dir: Option<PathBuf>,
+
     /// Greatest number of open sessions; further ones are answered 503.
     #[arg(long, env = "PAPILLA_MAX_SESSIONS", default_value = "64", value_name = "N")]
     pub max_sessions: NonZeroUsize,
@@ -201,6 +207,7 @@ impl Default for Config {
             tls_cert: None,
             tls_key: None,
             allow_origin: Vec::new(),
+            xr_dir: None,
             max_sessions: n(64),
             max_requests: n(64),
             max_connections: n(256),

@@ -43,6 +43,13 @@ impl Config {
             let reason = "the models in the binary cannot change; name a folder with --models";
             return refuse("watch_models", reason.to_owned());
         }
+        if let Some(folder) = self.xr_dir.as_ref().filter(|dir| !dir.join("index.html").is_file()) {
+            let reason = format!(
+                "{} has no index.html; `npm run build` in clients/web makes a folder that has",
+                folder.display()
+            );
+            return refuse("xr_dir", reason);
+        }
         let least = MAP_LEN * 4;
         let greatest = 64 << 20;
         if !(least..=greatest).contains(&self.max_body_bytes) {

@@ -123,6 +123,7 @@ fn settings_at_odds_are_refused_by_field() {
     assert_eq!(refused(|s| s.tls_cert = Some("c.pem".into())), "tls_key");
     assert_eq!(refused(|s| s.tls_key = Some("k.pem".into())), "tls_cert");
     assert_eq!(refused(|s| s.watch_models = true), "watch_models");
+    assert_eq!(refused(|s| s.xr_dir = Some("/no/such/folder".into())), "xr_dir");
     assert_eq!(refused(|s| s.max_body_bytes = 1000), "max_body_bytes");
     for origin in ["lab.example", "https://", "https://a/b", "ftp://a", "*"] {
         let settings = Config { allow_origin: vec![origin.into()], ..Config::default() };

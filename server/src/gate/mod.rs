@@ -37,6 +37,11 @@ const COOKIE: &str = "papilla_token";
 const PUBLIC: [&str; 7] =
     ["/", "/{file}", "/healthz", "/readyz", "/openapi.json", "/v2/health/live", "/v2/health/ready"];
 
+/// Whether a route asks for no token.
+fn is_public(route: &str) -> bool {
+    PUBLIC.contains(&route) || http::xr::PATHS.contains(&route)
+}
+
 /// A browser opens WebSockets to any address, whosever page it shows, and without CORS.
 const WEBSOCKET: &str = "/v1/session";
 
@@ -118,7 +123,7 @@ impl Gate {
             origin::check(headers, &self.origins, self.is_local)?;
         }
         let is_known = self.tokens.is_none() || holder.is_some();
-        if !is_known && (in_query.is_some() || !PUBLIC.contains(&route)) {
+        if !is_known && (in_query.is_some() || !is_public(route)) {
             let message = "a token is asked for here: Authorization: Bearer TOKEN";
             return Err(Problem::new(ErrorCode::Unauthorized, message).at("authorization"));
         }

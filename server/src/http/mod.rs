@@ -8,8 +8,12 @@ mod info;
 mod page;
 mod presses;
 pub(crate) mod sed;
+pub(crate) mod xr;
 
-use std::sync::{Arc, LazyLock};
+use std::{
+    path::Path,
+    sync::{Arc, LazyLock},
+};
 
 use axum::{
     Router,
@@ -78,7 +82,7 @@ static PATHS: LazyLock<Vec<&'static str>> =
 
 /// The route of this path, as the list has it.
 pub(crate) fn known_route(path: &str) -> Option<&'static str> {
-    PATHS.iter().copied().find(|known| *known == path)
+    PATHS.iter().chain(&xr::PATHS).copied().find(|known| *known == path)
 }
 
 /// Whether the path belongs to the Open Inference Protocol, whose errors look otherwise.
@@ -92,11 +96,14 @@ pub(crate) fn route_list() -> Vec<(String, String)> {
     list.map(|(method, path, _)| (method.as_str().to_ascii_lowercase(), path.to_owned())).collect()
 }
 
-/// The whole router. Pages of `origins` may read its answers.
-pub(crate) fn router(app: Arc<App>, origins: &[String]) -> Router {
+/// The whole router. Pages of `origins` may read its answers; the files of `xr_dir` are at `/xr`.
+pub(crate) fn router(app: Arc<App>, origins: &[String], xr_dir: Option<&Path>) -> Router {
     let mut router = Router::new();
     for (_, path, handler) in routes() {
         router = router.route(path, handler);
+    }
+    if let Some(folder) = xr_dir {
+        router = router.merge(xr::routes(folder));
     }
     let guard = from_fn_with_state(Arc::clone(&app), gate::guard);
     let router = router

@@ -24,3 +24,4 @@ mod session;
 mod start;
 mod support;
 mod tls;
+mod xr;

@@ -1,0 +1,64 @@
+# What needs no session: the atlas, and one map at a time. Calls wait for the answer: make them while a scene loads, or in a Thread.
+extends Reference
+
+const Samples = preload("samples.gd")
+const PATIENCE_MS = 10000
+
+
+# {status, headers, body}; status 0 where no answer came.
+static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PoolByteArray()):
+	var parts = url.split("://")
+	var host = parts[1].rstrip("/").split(":")
+	var is_tls = parts[0] == "https"
+	var port = int(host[1]) if host.size() > 1 else (443 if is_tls else 80)
+	var http = HTTPClient.new()
+	http.set_blocking_mode(false)
+	http.read_chunk_size = 1 << 20
+	http.connect_to_host(host[0], port, is_tls)
+	var end = OS.get_ticks_msec() + PATIENCE_MS
+	var answer = {"status": 0, "headers": {}, "body": PoolByteArray()}
+	var is_asked = false
+	while OS.get_ticks_msec() < end:
+		http.poll()
+		var status = http.get_status()
+		if status == HTTPClient.STATUS_CONNECTED and not is_asked:
+			is_asked = true
+			http.request_raw(method, "/" + path, headers, body)
+		elif is_asked and http.has_response():
+			answer.status = http.get_response_code()
+			answer.headers = http.get_response_headers_as_dictionary()
+			# A variable of its own: what is in a Dictionary is a copy, to which nothing can be appended.
+			var received = PoolByteArray()
+			while http.get_status() == HTTPClient.STATUS_BODY and OS.get_ticks_msec() < end:
+				http.poll()
+				received.append_array(http.read_response_body_chunk())
+			answer.body = received
+			return answer
+		elif status == HTTPClient.STATUS_CANT_CONNECT or status == HTTPClient.STATUS_CANT_RESOLVE or status == HTTPClient.STATUS_CONNECTION_ERROR:
+			return answer
+		OS.delay_msec(1)
+	return answer
+
+
+static func _headers(token):
+	var headers = ["Content-Type: application/octet-stream", "Accept: application/octet-stream, application/json;q=0.5"]
+	if token != "":
+		headers.append("Authorization: Bearer " + token)
+	return headers
+
+
+# The text for Atlas.new; "" where the server does not answer.
+static func atlas_text(url, token = ""):
+	var answer = fetch(url, "v1/atlas", HTTPClient.METHOD_GET, _headers(token))
+	return answer.body.get_string_from_utf8() if answer.status == 200 else ""
+
+
+# {map: 224 x 224 floats (J/m3), tier} or {problem: {code, message, field}}.
+static func post_pressure(url, pressure_pa, tier = "", token = ""):
+	var path = "v1/sed" + ("?tier=" + tier.percent_encode() if tier != "" else "")
+	var answer = fetch(url, path, HTTPClient.METHOD_POST, _headers(token), Samples.floats_to_bytes(pressure_pa))
+	if answer.status == 0:
+		return {"problem": {"code": "no_answer", "message": "no answer from " + url, "field": null}}
+	if answer.status != 200:
+		return {"problem": JSON.parse(answer.body.get_string_from_utf8()).result.error}
+	return {"map": Samples.bytes_to_floats(answer.body), "tier": answer.headers.get("x-papilla-tier", "")}

@@ -1,0 +1,390 @@
+# A session of Papilla: pressure maps (Pa) out, maps of strain energy density (J/m3) in. For Godot 3.
+#
+# Put the node into the scene, connect `map_received`, call `send` or `send_window`. The newest frame wins here too: with
+# `in_flight_max` frames without an answer a frame waits, and a newer one takes its place. A lost connection is made anew
+# by itself.
+extends Node
+
+const Samples = preload("samples.gd")
+
+# An answer with a map; see `map_of`, `image_of`.
+signal map_received(answer)
+# What became of a frame, once for each: `answer.status` is ok, superseded, late, stale, error or lost.
+signal answered(answer)
+# A session began; `terms` is the server's ready.
+signal session_began(terms)
+# A hello was refused.
+signal refused(problem)
+
+const STATUS = ["ok", "superseded", "late", "error", "stale"]
+const HEADER_BYTES = 48
+const ATTEMPT_MS = 5000
+const RETRY_LEAST_MS = 100
+const RETRY_MOST_MS = 250
+# A frame has up to 200 768 bytes; Godot's buffers have 64 KiB unless they are asked for before connecting.
+const BUFFER_KB = 2048
+const BUFFER_PACKETS = 256
+const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_limited"]
+
+# Address of the server.
+export var url = "http://127.0.0.1:7224"
+# Bearer token, for a server that asks for one.
+export var token = ""
+# What to ask for, as in docs/protocol.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
+export var hello = {}
+# Connect when the scene starts.
+export var auto_open = true
+# Frames that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
+export var in_flight_max = 3
+
+# The server's ready; null while there is no session.
+var terms = null
+# Deadline of the frames to come, us; 0: the session's budget.
+var deadline_us = 0
+# us of the header; 0: the clock.
+var time_us = 0
+# Frames that went out, and frames that a newer one replaced before.
+var sent = 0
+var replaced = 0
+
+var _socket = null
+var _open = false
+var _has_begun = false
+var _has_ended = false
+var _is_refused = false
+var _next_try_ms = 0
+var _gives_up_ms = 0
+var _sequence = 0
+var _waiting = null
+var _waiting_sequence = 0
+var _outstanding = []
+var _asked = {}
+var _before = null
+var _older_terms = null
+var _terms_from = 0
+
+
+func _ready():
+	if auto_open:
+		open()
+
+
+func _process(_delta):
+	poll()
+
+
+func _exit_tree():
+	close()
+
+
+# Connects, and again whenever the connection is lost.
+func open():
+	_open = true
+	_is_refused = false
+	_asked = hello.duplicate(true)
+	_connect()
+
+
+func close():
+	_open = false
+	_drop()
+	_lose_all()
+	if _waiting != null:
+		_waiting = null
+		_tell({"status": "lost", "sequence": _waiting_sequence})
+
+
+# New terms in the open session: `session_began`, or `refused` and the old ones stay.
+func renew(next):
+	_replace_waiting()
+	if terms != null:
+		_before = {"asked": _asked, "terms": terms}
+	_asked = next.duplicate(true)
+	_terms_from = _sequence + 1
+	terms = null
+	if _socket != null and _socket.get_connection_status() == NetworkedMultiplayerPeer.CONNECTION_CONNECTED:
+		_greet()
+	elif _is_refused:
+		_is_refused = false
+		_open = true
+		_next_try_ms = OS.get_ticks_msec() + RETRY_LEAST_MS
+
+
+# Sends a whole map: 224 x 224 floats, Pa, row by row. Returns the frame's sequence.
+func send(pressure_pa):
+	return send_window(pressure_pa, 0, 0, Samples.SIDE_PX, Samples.SIDE_PX)
+
+
+# Sends a rectangle of the map, width x height floats; all other pixels are 0. -1 where it does not fit.
+func send_window(samples_pa, column, row, width, height):
+	if column < 0 or row < 0 or column + width > Samples.SIDE_PX or row + height > Samples.SIDE_PX or samples_pa.size() != width * height:
+		push_error("%d samples are no window of %d x %d at %d, %d" % [samples_pa.size(), width, height, column, row])
+		return -1
+	_replace_waiting()
+	_sequence = (_sequence + 1) & 0xffffffff
+	var stamp = time_us if time_us > 0 else OS.get_ticks_usec()
+	_waiting = _encode(samples_pa, column, row, width, height, stamp)
+	_waiting_sequence = _sequence
+	_flush()
+	return _sequence
+
+
+# The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
+func map_of(answer):
+	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
+	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
+		return values
+	var map = PoolRealArray()
+	map.resize(Samples.MAP_LEN)
+	for i in Samples.MAP_LEN:
+		map[i] = 0.0
+	for y in answer.height:
+		for x in answer.width:
+			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]
+	return map
+
+
+# The window of an answer as a picture for a texture, without a loop: f32 (red in J/m3), f16 or u8 (red 1 is 255 x answer.scale).
+func image_of(answer):
+	var formats = [Image.FORMAT_RF, Image.FORMAT_RH, -1, Image.FORMAT_R8]
+	var format = formats[answer.sample_type]
+	if format < 0 or answer.width == 0:
+		return null
+	var image = Image.new()
+	image.create_from_data(answer.width, answer.height, false, format, answer.samples)
+	return image
+
+
+# Moves bytes; the node does so every frame. Call it oftener for answers between frames.
+func poll():
+	if not _open:
+		return
+	var now = OS.get_ticks_msec()
+	if _socket == null:
+		if now >= _next_try_ms and not _is_refused:
+			_connect()
+		return
+	# What the socket tells while it polls is only noted: it must not be freed within its own signals.
+	_socket.poll()
+	if _has_begun:
+		_has_begun = false
+		# On by default too; said here because everything hangs on it.
+		_socket.get_peer(1).set_no_delay(true)
+		_greet()
+	_receive()
+	if _socket == null:
+		return
+	if _has_ended or (terms == null and now > _gives_up_ms):
+		_lost()
+		return
+	_flush()
+
+
+func _receive():
+	while _socket != null and not _has_ended:
+		var peer = _socket.get_peer(1)
+		if peer.get_available_packet_count() == 0:
+			return
+		var packet = peer.get_packet()
+		if peer.was_string_packet():
+			_text(JSON.parse(packet.get_string_from_utf8()).result)
+		else:
+			_binary(packet)
+
+
+func _connect():
+	_drop()
+	_socket = WebSocketClient.new()
+	_socket.set_buffers(BUFFER_KB, BUFFER_PACKETS, BUFFER_KB, BUFFER_PACKETS)
+	_has_begun = false
+	_has_ended = false
+	_socket.connect("connection_established", self, "_on_begin")
+	_socket.connect("connection_closed", self, "_on_end")
+	_socket.connect("connection_error", self, "_on_end")
+	_gives_up_ms = OS.get_ticks_msec() + ATTEMPT_MS
+	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
+	if token != "":
+		address += "?access_token=" + token.percent_encode()
+	if _socket.connect_to_url(address) != OK:
+		_lost()
+
+
+func _on_begin(_protocol):
+	_has_begun = true
+
+
+func _on_end(_was_clean = false):
+	_has_ended = true
+
+
+func _greet():
+	var message = _asked.duplicate(true)
+	message["type"] = "hello"
+	message["version"] = 2
+	var peer = _socket.get_peer(1)
+	peer.set_write_mode(WebSocketPeer.WRITE_MODE_TEXT)
+	peer.put_packet(JSON.print(message).to_utf8())
+	_gives_up_ms = OS.get_ticks_msec() + ATTEMPT_MS
+
+
+func _drop():
+	terms = null
+	_before = null
+	if _socket == null:
+		return
+	var old = _socket
+	_socket = null
+	for name in ["connection_established", "connection_closed", "connection_error"]:
+		for connection in old.get_signal_connection_list(name):
+			old.disconnect(name, connection.target, connection.method)
+	old.disconnect_from_host()
+
+
+func _lost():
+	_drop()
+	_lose_all()
+	_next_try_ms = OS.get_ticks_msec() + RETRY_LEAST_MS + randi() % (RETRY_MOST_MS - RETRY_LEAST_MS)
+
+
+# What went out on a lost connection is never answered.
+func _lose_all():
+	var lost = _outstanding
+	_outstanding = []
+	for sequence in lost:
+		_tell({"status": "lost", "sequence": sequence})
+
+
+func _replace_waiting():
+	if _waiting == null:
+		return
+	_waiting = null
+	replaced += 1
+	_tell({"status": "superseded", "sequence": _waiting_sequence})
+
+
+func _flush():
+	if _waiting == null or terms == null or _outstanding.size() >= in_flight_max:
+		return
+	var frame = _waiting
+	_waiting = null
+	_outstanding.append(_waiting_sequence)
+	sent += 1
+	var peer = _socket.get_peer(1)
+	peer.set_write_mode(WebSocketPeer.WRITE_MODE_BINARY)
+	if peer.put_packet(frame) != OK:
+		_lost()
+
+
+func _encode(values, column, row, width, height, stamp):
+	var type = Samples.TYPES.find(_asked.get("sample_type", "f32"))
+	var scale = 1.0
+	if type >= 2:
+		scale = _asked.get("pressure_scale_pa", 0.0)
+		if scale == null or scale <= 0:
+			var most = 0.0
+			for value in values:
+				most = max(most, value)
+			scale = most / (65535.0 if type == 2 else 255.0) if most > 0 else 1.0
+	var head = StreamPeerBuffer.new()
+	head.put_data("PPL1".to_ascii())
+	for byte in [2, 1, type, 0]:
+		head.put_u8(byte)
+	head.put_u32(_sequence)
+	head.put_u16(width)
+	head.put_u16(height)
+	head.put_u64(stamp)
+	head.put_u32(deadline_us)
+	head.put_float(scale)
+	head.put_u16(column)
+	head.put_u16(row)
+	head.put_u32(0)
+	head.put_u64(0)
+	var frame = head.data_array
+	frame.append_array(Samples.encode(values, type, scale))
+	return frame
+
+
+func _text(message):
+	if message.type == "ready":
+		_older_terms = _before.terms if _before != null else null
+		_before = null
+		terms = message
+		emit_signal("session_began", terms)
+		_flush()
+	elif message.get("sequence") != null:
+		var sequence = int(message.sequence)
+		if _outstanding.has(sequence):
+			_outstanding.erase(sequence)
+			_tell({"status": "error", "sequence": sequence, "problem": message})
+			_flush()
+	else:
+		_on_refusal(message)
+		emit_signal("refused", message)
+
+
+# A refused renewal leaves the old terms; a refused first hello ends it, unless the reason passes by itself.
+func _on_refusal(problem):
+	if terms != null or problem.closes or PASSING.has(problem.code):
+		return
+	if _before != null:
+		_asked = _before.asked
+		terms = _before.terms
+		_before = null
+		return
+	_is_refused = true
+	_drop()
+
+
+func _binary(packet):
+	var head = StreamPeerBuffer.new()
+	head.data_array = packet.subarray(0, HEADER_BYTES - 1)
+	head.seek(4)
+	head.get_u8()
+	var answer = {"kind": "sa1_rate" if head.get_u8() == 3 else "sed", "sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
+	answer.sequence = head.get_u32()
+	if not _outstanding.has(answer.sequence):
+		return
+	_outstanding.erase(answer.sequence)
+	answer.width = head.get_u16()
+	answer.height = head.get_u16()
+	answer.client_time_us = head.get_u64()
+	answer.total_us = head.get_u32()
+	answer.scale = head.get_float()
+	answer.column = head.get_u16()
+	answer.row = head.get_u16()
+	answer.queue_us = head.get_u32()
+	answer.infer_us = head.get_u32()
+	answer.tier_number = head.get_u16()
+	var flags = head.get_u8()
+	answer.out_of_range = flags & 1 != 0
+	answer.no_contact = flags & 2 != 0
+	answer.round_trip_us = OS.get_ticks_usec() - answer.client_time_us
+	var is_older = _older_terms != null and answer.sequence < _terms_from
+	if answer.status == "ok":
+		_sections(answer, packet, _older_terms if is_older else terms)
+	if not is_older:
+		_older_terms = null
+	_flush()
+	_tell(answer)
+
+
+func _sections(answer, packet, its_terms):
+	answer.samples = PoolByteArray()
+	var has_map = false
+	for section in its_terms.sections:
+		var from = int(section.offset)
+		if section.name == "map":
+			has_map = true
+			if from < packet.size():
+				answer.samples = packet.subarray(from, packet.size() - 1)
+		else:
+			answer[section.name] = Samples.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
+	if not has_map:
+		answer.width = 0
+		answer.height = 0
+
+
+func _tell(answer):
+	emit_signal("answered", answer)
+	if answer.status == "ok":
+		emit_signal("map_received", answer)

@@ -1,0 +1,10 @@
+tool
+extends EditorPlugin
+
+
+func _enter_tree():
+	add_custom_type("Papilla", "Node", preload("papilla.gd"), null)
+
+
+func _exit_tree():
+	remove_custom_type("Papilla")

@@ -1,0 +1,322 @@
+# The steps of docs/conformance.md by this client: godot3-server --path . -s test/conformance.gd
+extends SceneTree
+
+const Papilla = preload("res://addons/papilla/papilla.gd")
+const Atlas = preload("res://addons/papilla/atlas.gd")
+const Http = preload("res://addons/papilla/http.gd")
+const Samples = preload("res://addons/papilla/samples.gd")
+
+var url = OS.get_environment("PAPILLA_URL")
+var atlas
+var patience_ms
+var why = ""
+var client
+var outcomes = {}
+var order = []
+var tiers = {}
+var reply = null
+
+
+func _init():
+	var file = File.new()
+	file.open(OS.get_environment("PAPILLA_CONFORMANCE"), File.READ)
+	var script = JSON.parse(file.get_as_text()).result
+	patience_ms = int(script.timeout_s) * 1000
+	atlas = Atlas.new(Http.atlas_text(url))
+	if atlas.hash_hex != script.atlas_hash:
+		print("another atlas: ", atlas.hash_hex)
+		quit(1)
+		return
+	var failed = 0
+	for one in script.cases:
+		why = ""
+		outcomes = {}
+		order = []
+		var at = 0
+		for step in one.steps:
+			at += 1
+			call("step_" + step.do, step, step.get("expect", {}))
+			if why != "":
+				break
+		if client != null:
+			client.close()
+			client.free()
+			client = null
+		print("ok " + one.name if why == "" else "FAIL %s: step %d: %s" % [one.name, at, why])
+		failed += int(why != "")
+	quit(1 if failed else 0)
+
+
+func fail(what):
+	if why == "":
+		why = what
+
+
+func same(what, found, due):
+	if typeof(found) != typeof(due) and not (typeof(found) in [TYPE_INT, TYPE_REAL] and typeof(due) in [TYPE_INT, TYPE_REAL]) or found != due:
+		fail("%s is %s, not %s" % [what, found, due])
+
+
+func near(what, found, value, tolerance):
+	if not abs(found - value) <= tolerance:
+		fail("%s is %s, not %s +- %s" % [what, found, value, tolerance])
+
+
+func all_near(what, found, due):
+	if found == null or found.size() != due.size():
+		fail("%s is missing" % what)
+		return
+	for k in due.size():
+		near("%s %d" % [what, k], found[k], due[k][0], due[k][1])
+
+
+# Polls until the method (or its argument) says true.
+func wait_for(method, argument = null, patience = 0):
+	var end = OS.get_ticks_msec() + (patience if patience > 0 else patience_ms)
+	while not call(method, argument):
+		client.poll()
+		OS.delay_msec(1)
+		if OS.get_ticks_msec() > end:
+			fail("%s: not in time" % method)
+			return false
+	return true
+
+
+func has_reply(_none):
+	return reply != null
+
+
+func has_outcome(sequence):
+	return outcomes.has(sequence)
+
+
+func has_outcomes(sequences):
+	for sequence in sequences:
+		if not outcomes.has(sequence):
+			return false
+	return true
+
+
+func on_answered(answer):
+	if outcomes.has(answer.sequence):
+		fail("frame %d has two outcomes" % answer.sequence)
+	outcomes[answer.sequence] = answer
+	order.append(answer.sequence)
+
+
+func on_session(terms):
+	reply = terms
+	tiers[int(terms.tier_number)] = terms.tier
+
+
+func on_refused(problem):
+	reply = problem
+
+
+func step_hello(step, expect):
+	reply = null
+	if client == null:
+		client = Papilla.new()
+		client.url = url
+		client.hello = step.hello
+		client.connect("answered", self, "on_answered")
+		client.connect("session_began", self, "on_session")
+		client.connect("refused", self, "on_refused")
+		client.open()
+	else:
+		client.renew(step.hello)
+	if not wait_for("has_reply"):
+		return
+	if expect.get("status") == "error":
+		same("reply", reply.type, "error")
+		for member in ["code", "field"]:
+			if expect.has(member):
+				same(member, reply.get(member), expect[member])
+		return
+	if reply.type != "ready":
+		fail("%s: %s" % [reply.code, reply.message])
+		return
+	var due = expect.get("ready", {})
+	for member in due:
+		same("ready." + member, to_json(reply[member]), to_json(due[member]))
+
+
+func step_frame(step, expect):
+	var map = pattern(step.pressure, 1.0)
+	client.deadline_us = int(step.get("deadline_us", 0))
+	for attempt in int(step.get("attempts", 1)):
+		client.time_us = int(step.get("client_time_us", 0))
+		var before = OS.get_ticks_usec()
+		var sequence
+		if step.has("window"):
+			var w = step.window
+			sequence = client.send_window(cut(map, w), int(w[0]), int(w[1]), int(w[2]), int(w[3]))
+		else:
+			sequence = client.send(map)
+		var after = OS.get_ticks_usec()
+		if sequence < 0:
+			check(expect, {"status": "error", "problem": {"code": "wrong_shape"}})
+			return
+		if not wait_for("has_outcome", sequence):
+			return
+		var outcome = outcomes[sequence]
+		if outcome.status == "lost":
+			continue
+		if outcome.has("client_time_us"):
+			var stamp = outcome.client_time_us
+			if stamp != client.time_us if client.time_us > 0 else (stamp < before or stamp > after):
+				fail("client time %d" % stamp)
+		check(expect, outcome)
+		return
+	fail("the frame was lost")
+
+
+func check(expect, outcome):
+	same("status (%s)" % outcome.get("problem"), outcome.status, expect.get("status", "ok"))
+	if expect.has("code"):
+		same("code", outcome.problem.code, expect.code)
+	if expect.has("field") and outcome.problem.has("field"):
+		same("field", outcome.problem.field, expect.field)
+	if outcome.status != "ok" or why != "":
+		return
+	if outcome.infer_us + outcome.queue_us > outcome.total_us:
+		fail("times do not add up")
+	if expect.has("kind"):
+		same("kind", outcome.kind, expect.kind)
+	if expect.has("flags"):
+		var flags = []
+		for flag in ["out_of_range", "no_contact"]:
+			if outcome[flag]:
+				flags.append(flag)
+		same("flags", str(flags), str(expect.flags))
+	if expect.has("tier"):
+		same("tier", tiers[outcome.tier_number], expect.tier)
+	if expect.has("window"):
+		var found = [outcome.column, outcome.row, outcome.width, outcome.height]
+		for k in 4:
+			same("window", found[k], expect.window[k])
+	if expect.get("map") == false:
+		same("samples", outcome.samples.size(), 0)
+	for section in ["summary", "points", "actuators"]:
+		if expect.has(section):
+			all_near(section, outcome.get(section), expect[section])
+	if expect.has("pixels") or expect.has("sum") or expect.has("max"):
+		check_map(expect, client.map_of(outcome))
+
+
+func check_map(expect, map):
+	for pixel in expect.get("pixels", []):
+		near("pixel %s" % [pixel], map[int(pixel[0]) * 224 + int(pixel[1])], pixel[2], pixel[3])
+	var sum = 0.0
+	var most = 0.0
+	for value in map:
+		sum += value
+		most = max(most, value)
+	if expect.has("sum"):
+		near("sum", sum, expect.sum[0], expect.sum[1])
+	if expect.has("max"):
+		near("max", most, expect.max[0], expect.max[1])
+
+
+func steer(what):
+	var answer = Http.fetch(OS.get_environment("PAPILLA_CONTROL"), what, HTTPClient.METHOD_POST, ["Content-Length: 0"])
+	if answer.status != 200:
+		fail("the runner does not " + what)
+
+
+func step_burst(step, expect):
+	var replaced = client.replaced
+	var paused = step.get("paused", false)
+	var sequences = []
+	if paused:
+		steer("pause")
+	for k in int(step.count):
+		sequences.append(client.send(pattern(step.pressure, (k + 1) / float(step.count))))
+		client.poll()
+		OS.delay_msec(int(step.get("gap_ms", 0)))
+	if paused:
+		steer("resume")
+	if not wait_for("has_outcomes", sequences):
+		return
+	var superseded = 0
+	for sequence in sequences:
+		var status = outcomes[sequence].status
+		superseded += int(status == "superseded")
+		if not status in ["ok", "superseded"]:
+			fail("a frame was " + status)
+	var last = -1
+	for sequence in order:
+		if outcomes[sequence].status == "ok":
+			if sequence < last:
+				fail("answers came out of order")
+			last = sequence
+	check(expect.get("newest", {}), outcomes[sequences[-1]])
+	if superseded < expect.get("superseded", 0):
+		fail("%d superseded" % superseded)
+	if client.replaced - replaced < expect.get("superseded_by_client", 0):
+		fail("%d superseded by the client" % (client.replaced - replaced))
+
+
+func step_reconnect(step, _expect):
+	reply = null
+	steer("restart")
+	wait_for("has_reply", null, int(step.within_s * 1000))
+
+
+func step_http(step, expect):
+	var answer = Http.post_pressure(url, pattern(step.pressure, 1.0), step.tier)
+	if answer.has("problem"):
+		check(expect, {"status": "error", "problem": answer.problem})
+		return
+	if expect.has("tier"):
+		same("tier", answer.tier, expect.tier)
+	same("status", "ok", expect.get("status", "ok"))
+	check_map(expect, answer.map)
+
+
+func step_rasterise(step, expect):
+	var g = step.vertices.gaussian_mm
+	var values = PoolRealArray()
+	for i in atlas.vertex_count():
+		var d2 = 0.0
+		for k in 3:
+			d2 += pow(atlas.skin_mm[3 * i + k] - g[k], 2)
+		values.append(g[4] * exp(-d2 / (2 * g[3] * g[3])))
+	check_map(expect, atlas.pressure_map(values))
+
+
+func step_contacts(step, expect):
+	var map = atlas.contact_map(step.contacts)
+	check_map(expect, map)
+	if expect.has("force_n"):
+		near("force", atlas.force_n(map), expect.force_n[0], expect.force_n[1])
+
+
+func cut(map, w):
+	var samples = PoolRealArray()
+	for y in int(w[3]):
+		for x in int(w[2]):
+			samples.append(map[((int(w[1]) + y) * 224 + int(w[0]) + x) % map.size()])
+	return samples
+
+
+func pattern(what, part):
+	var map = Atlas.zeros()
+	for i in Samples.MAP_LEN:
+		var u = i % 224 + 0.5
+		var v = i / 224 + 0.5
+		var p = 0.0
+		for g in what.get("gaussians", []):
+			p += g[3] * exp(-((u - g[0]) * (u - g[0]) + (v - g[1]) * (v - g[1])) / (2 * g[2] * g[2]))
+		if what.has("disc"):
+			var d = what.disc
+			if (u - d[0]) * (u - d[0]) + (v - d[1]) * (v - d[1]) <= d[2] * d[2]:
+				p += d[3]
+		if p >= 1:
+			map[i] = p * part
+	if what.has("bad"):
+		var value = what.bad[2]
+		if typeof(value) == TYPE_STRING:
+			value = NAN if value == "nan" else INF
+		map[int(what.bad[0]) * 224 + int(what.bad[1])] = value
+	return map

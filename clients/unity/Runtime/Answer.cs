@@ -1,0 +1,103 @@
+using System;
+
+namespace Papilla
+{
+    /// <summary>
+    /// What became of a frame. Its memory is made once and used again: copy what has to stay. <see cref="Map"/> and the
+    /// other sections are those of a frame whose <see cref="Status"/> is Ok.
+    /// </summary>
+    public sealed class Answer
+    {
+        public Status Status;
+        public uint Sequence;
+        /// <summary>What was wrong with a frame of status Error.</summary>
+        public Problem Problem;
+        /// <summary>224 x 224, row-major: SED in J/m3, or firing rates in Hz where <see cref="IsRate"/>; 0 outside the window.</summary>
+        public readonly float[] Map = new float[Wire.MapLength];
+        public bool IsRate;
+        /// <summary>The window of the map that came.</summary>
+        public int Column, Row, Width, Height;
+        /// <summary>The sixteen numbers of the effect <c>summary</c>; force (N) and contact area (mm2) come first.</summary>
+        public readonly float[] Summary = new float[16];
+        /// <summary>Values of the effects <c>points</c> and <c>actuators</c>: the first PointCount and ActuatorCount.</summary>
+        public readonly float[] Points = new float[1024];
+        public readonly float[] Actuators = new float[1024];
+        public int PointCount, ActuatorCount;
+        public bool HasSummary, OutOfRange, NoContact;
+        public ulong ClientTimeUs;
+        public long RoundTripUs;
+        public uint TotalUs, QueueUs, InferUs;
+        public int TierNumber;
+
+        /// <summary>Reads a message; a fault is a FormatException that says what is wrong.</summary>
+        internal unsafe void Read(byte[] message, int bytes, Ready terms)
+        {
+            fixed (byte* m = message)
+            {
+                Status = (Status)m[7];
+                Sequence = *(uint*)(m + 8);
+                Problem = null;
+                IsRate = m[5] == 3;
+                ClientTimeUs = *(ulong*)(m + 16);
+                TotalUs = *(uint*)(m + 24);
+                QueueUs = *(uint*)(m + 36);
+                InferUs = *(uint*)(m + 40);
+                TierNumber = *(ushort*)(m + 44);
+                OutOfRange = (m[46] & Wire.FlagOutOfRange) != 0;
+                NoContact = (m[46] & Wire.FlagNoContact) != 0;
+                if (Status != Status.Ok) return;
+                Clear();
+                HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);
+                PointCount = Copy(m, terms.PointsAt, terms.PointsCount, bytes, Points) ? terms.PointsCount : 0;
+                ActuatorCount = Copy(m, terms.ActuatorsAt, terms.ActuatorsCount, bytes, Actuators) ? terms.ActuatorsCount : 0;
+                if (terms.MapAt >= 0) ReadMap(m, bytes, terms.MapAt);
+            }
+        }
+
+        internal static unsafe uint PeekSequence(byte[] message, int bytes)
+        {
+            if (bytes < Wire.HeaderBytes) throw new FormatException("an answer of " + bytes + " bytes has no header");
+            fixed (byte* m = message)
+            {
+                if (*(uint*)m != Wire.Magic || m[4] != 2) throw new FormatException("an answer does not start with PPL1 and version 2");
+                return *(uint*)(m + 8);
+            }
+        }
+
+        static unsafe bool Copy(byte* m, int at, int count, int bytes, float[] to)
+        {
+            if (at < 0) return false;
+            if (at + 4 * count > bytes) throw new FormatException("an answer of " + bytes + " bytes ends before its sections");
+            for (int k = 0; k < count; k++) to[k] = ((float*)(m + at))[k];
+            return true;
+        }
+
+        unsafe void ReadMap(byte* m, int bytes, int at)
+        {
+            int width = *(ushort*)(m + 12), height = *(ushort*)(m + 14), column = *(ushort*)(m + 32), row = *(ushort*)(m + 34);
+            var type = (SampleType)m[6];
+            if (type > SampleType.U8 || at + width * height * Wire.Bytes(type) != bytes || column + width > Wire.SidePx || row + height > Wire.SidePx)
+            {
+                throw new FormatException("an answer of " + bytes + " bytes is no map of " + width + " x " + height + " at " + column + ", " + row);
+            }
+            Width = width;
+            Height = height;
+            Column = column;
+            Row = row;
+            fixed (float* map = Map)
+            {
+                for (int y = 0; y < height; y++)
+                {
+                    Wire.Decode(m + at + y * width * Wire.Bytes(type), width, type, *(float*)(m + 28), map + (row + y) * Wire.SidePx + column);
+                }
+            }
+        }
+
+        /// <summary>Only what the last answer wrote has to go.</summary>
+        void Clear()
+        {
+            for (int y = Row; y < Row + Height; y++) Array.Clear(Map, y * Wire.SidePx + Column, Width);
+            Width = Height = Column = Row = 0;
+        }
+    }
+}

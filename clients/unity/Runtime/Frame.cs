@@ -1,0 +1,66 @@
+using System;
+
+namespace Papilla
+{
+    /// <summary>A request whose buffer is made once and filled anew for every frame.</summary>
+    sealed class Frame
+    {
+        internal readonly byte[] Buffer = new byte[Headroom.Bytes + Wire.HeaderBytes + 4 * Wire.MapLength];
+        internal int Bytes;
+        internal uint Sequence;
+
+        /// <summary>
+        /// Encodes a window; sample (x, y) is <c>values[first + y * stride + x]</c>. A scale of 0 is chosen so that the
+        /// greatest pressure is the greatest unit.
+        /// </summary>
+        internal unsafe void Encode(float[] values, int first, int stride, int column, int row, int width, int height, SampleType type, float scale)
+        {
+            int sampleBytes = Wire.Bytes(type), most = type == SampleType.U16 ? 65535 : 255;
+            Bytes = Wire.HeaderBytes + width * height * sampleBytes;
+            fixed (float* from = values)
+            fixed (byte* start = Buffer)
+            {
+                if (type < SampleType.U16) scale = 1;
+                else if (!(scale > 0)) scale = Greatest(from + first, stride, width, height) / most;
+                if (!(scale > 0)) scale = 1;
+                byte* m = start + Headroom.Bytes;
+                for (int k = 0; k < Wire.HeaderBytes; k++) m[k] = 0;
+                *(uint*)m = Wire.Magic;
+                m[4] = 2;
+                m[5] = 1;
+                m[6] = (byte)type;
+                *(ushort*)(m + 12) = (ushort)width;
+                *(ushort*)(m + 14) = (ushort)height;
+                *(float*)(m + 28) = scale;
+                *(ushort*)(m + 32) = (ushort)column;
+                *(ushort*)(m + 34) = (ushort)row;
+                for (int y = 0; y < height; y++)
+                {
+                    Wire.Encode(from + first + y * stride, width, type, 1.0 / scale, m + Wire.HeaderBytes + y * width * sampleBytes);
+                }
+            }
+        }
+
+        internal unsafe void Stamp(uint sequence, ulong timeUs, uint deadlineUs)
+        {
+            Sequence = sequence;
+            fixed (byte* start = Buffer)
+            {
+                byte* m = start + Headroom.Bytes;
+                *(uint*)(m + 8) = sequence;
+                *(ulong*)(m + 16) = timeUs;
+                *(uint*)(m + 24) = deadlineUs;
+            }
+        }
+
+        static unsafe float Greatest(float* from, int stride, int width, int height)
+        {
+            float most = 0;
+            for (int y = 0; y < height; y++)
+            {
+                for (int x = 0; x < width; x++) if (from[y * stride + x] > most) most = from[y * stride + x];
+            }
+            return most;
+        }
+    }
+}

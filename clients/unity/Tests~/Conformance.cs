@@ -1,0 +1,370 @@
+using System;
+using System.Collections.Generic;
+using System.Diagnostics;
+using System.IO;
+using System.Linq;
+using System.Net;
+using System.Threading;
+using Newtonsoft.Json.Linq;
+using Papilla;
+
+/// <summary>The steps of docs/conformance.md by this client. --transport client-web-socket: with the framework's WebSocket.</summary>
+static class Conformance
+{
+    static int Main(string[] arguments)
+    {
+        var file = JObject.Parse(File.ReadAllText(Environment.GetEnvironmentVariable("PAPILLA_CONFORMANCE")));
+        var url = Environment.GetEnvironmentVariable("PAPILLA_URL");
+        var atlas = PapillaHttp.LoadAtlas(url);
+        if (atlas.Hash != (string)file["atlas_hash"]) throw new Exception("another atlas: " + atlas.Hash);
+        bool isFramework = arguments.Contains("client-web-socket");
+        int failed = 0;
+        foreach (var one in file["cases"])
+        {
+            int at = 0;
+            using (var run = new Run(url, atlas, 1000 * (int)file["timeout_s"], isFramework))
+            {
+                try
+                {
+                    foreach (JObject step in one["steps"])
+                    {
+                        at++;
+                        run.Do(step);
+                    }
+                    Console.WriteLine("ok " + one["name"]);
+                }
+                catch (Exception error)
+                {
+                    failed++;
+                    Console.WriteLine("FAIL " + one["name"] + ": step " + at + ": " + (error is Missed ? error.Message : error.ToString().Replace('\n', ' ')));
+                }
+            }
+        }
+        return failed == 0 ? 0 : 1;
+    }
+}
+
+sealed class Missed : Exception
+{
+    internal Missed(string message) : base(message) { }
+}
+
+/// <summary>What was seen of an answer, copied.</summary>
+sealed class Outcome
+{
+    internal Status Status;
+    internal string Code, Field;
+    internal float[] Map, Summary, Points, Actuators;
+    internal int[] Window;
+    internal bool IsRate, OutOfRange, NoContact;
+    internal ulong ClientTimeUs;
+    internal int TierNumber;
+    internal uint TotalUs, QueueUs, InferUs;
+}
+
+/// <summary>One case.</summary>
+sealed class Run : IDisposable
+{
+    readonly string url;
+    readonly Atlas atlas;
+    readonly int patienceMs;
+    readonly bool isFramework;
+    readonly object gate = new object();
+    readonly Dictionary<uint, Outcome> outcomes = new Dictionary<uint, Outcome>();
+    readonly List<uint> order = new List<uint>();
+    readonly Dictionary<int, string> tiers = new Dictionary<int, string>();
+    PapillaClient client;
+    object reply;
+    string twice;
+    ulong clockUs;
+
+    internal Run(string url, Atlas atlas, int patienceMs, bool isFramework)
+    {
+        this.url = url;
+        this.atlas = atlas;
+        this.patienceMs = patienceMs;
+        this.isFramework = isFramework;
+    }
+
+    public void Dispose()
+    {
+        if (client != null) client.Dispose();
+    }
+
+    internal void Do(JObject step)
+    {
+        var expect = (JObject)step["expect"];
+        switch ((string)step["do"])
+        {
+            case "hello": Hello(step, expect); break;
+            case "frame": Frame(step, expect); break;
+            case "burst": Burst(step, expect); break;
+            case "reconnect": Reconnect((double)step["within_s"]); break;
+            case "http": Http(step, expect); break;
+            case "rasterise": Rasterise(step, expect); break;
+            case "contacts": Contacts(step, expect); break;
+            default: throw new Missed("no step " + step["do"]);
+        }
+    }
+
+    void Hello(JObject step, JObject expect)
+    {
+        var hello = Papilla.Hello.FromJson((JObject)step["hello"]);
+        lock (gate) reply = null;
+        if (client == null)
+        {
+            client = new PapillaClient(url, hello, null, isFramework ? (Func<ITransport>)(() => new ClientWebSocketTransport()) : null);
+            client.ClockUs = () => clockUs != 0 ? clockUs : PapillaClient.Now();
+            client.SessionReady += ready => { lock (gate) { reply = ready; tiers[ready.TierNumber] = ready.Tier; Monitor.PulseAll(gate); } };
+            client.Refused += problem => { lock (gate) { reply = problem; Monitor.PulseAll(gate); } };
+            client.Answered += Keep;
+            client.Open();
+        }
+        else
+        {
+            client.Renew(hello);
+        }
+        object got = Until("a reply", () => reply, patienceMs);
+        var refused = got as Problem;
+        if ((string)expect["status"] == "error")
+        {
+            if (refused == null) throw new Missed("the hello was taken");
+            Same("code", refused.Code, (string)expect["code"]);
+            if (expect["field"] != null) Same("field", refused.Field, (string)expect["field"]);
+            return;
+        }
+        if (refused != null) throw new Missed(refused.ToString());
+        foreach (var member in (JObject)expect["ready"] ?? new JObject())
+        {
+            if (!JToken.DeepEquals(((Ready)got).Json[member.Key], member.Value)) throw new Missed("ready." + member.Key + " is " + ((Ready)got).Json[member.Key]);
+        }
+    }
+
+    void Keep(Answer a)
+    {
+        lock (gate)
+        {
+            if (outcomes.ContainsKey(a.Sequence)) twice = "frame " + a.Sequence + " has two outcomes";
+            outcomes[a.Sequence] = new Outcome
+            {
+                Status = a.Status, Code = a.Problem == null ? null : a.Problem.Code, Field = a.Problem == null ? null : a.Problem.Field,
+                Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
+                Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
+                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact,
+                ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
+            };
+            order.Add(a.Sequence);
+            Monitor.PulseAll(gate);
+        }
+    }
+
+    void Frame(JObject step, JObject expect)
+    {
+        var map = Pattern((JObject)step["pressure"], 1);
+        client.DeadlineUs = (uint?)step["deadline_us"] ?? 0;
+        int attempts = (int?)step["attempts"] ?? 1;
+        while (true)
+        {
+            clockUs = (ulong?)step["client_time_us"] ?? 0;
+            ulong before = PapillaClient.Now();
+            uint sequence;
+            try
+            {
+                sequence = step["window"] == null ? client.Send(map) : SendWindow(map, step["window"].Select(v => (int)v).ToArray());
+            }
+            catch (PapillaException error)
+            {
+                Check(expect, new Outcome { Status = Status.Error, Code = error.Problem.Code });
+                return;
+            }
+            ulong after = PapillaClient.Now();
+            var outcome = Until("the outcome", () => Of(sequence), patienceMs);
+            if (outcome.Status == Status.Lost && --attempts > 0) continue;
+            if (outcome.Status != Status.Error && outcome.Status != Status.Lost)
+            {
+                bool isRight = clockUs != 0 ? outcome.ClientTimeUs == clockUs : outcome.ClientTimeUs >= before && outcome.ClientTimeUs <= after;
+                if (!isRight) throw new Missed("client time " + outcome.ClientTimeUs);
+            }
+            Check(expect, outcome);
+            return;
+        }
+    }
+
+    uint SendWindow(float[] map, int[] w)
+    {
+        var samples = new float[w[2] * w[3]];
+        for (int y = 0; y < w[3]; y++) for (int x = 0; x < w[2]; x++) samples[y * w[2] + x] = map[((w[1] + y) * 224 + w[0] + x) % map.Length];
+        return client.Send(samples, w[0], w[1], w[2], w[3]);
+    }
+
+    void Check(JObject expect, Outcome got)
+    {
+        Same("status (" + got.Code + ")", got.Status.ToString().ToLowerInvariant(), (string)expect["status"] ?? "ok");
+        if (expect["code"] != null) Same("code", got.Code, (string)expect["code"]);
+        if (expect["field"] != null && got.Field != null) Same("field", got.Field, (string)expect["field"]);
+        if (got.Status != Status.Ok) return;
+        if (got.InferUs + got.QueueUs > got.TotalUs) throw new Missed(got.InferUs + " + " + got.QueueUs + " us are more than " + got.TotalUs);
+        if (expect["kind"] != null) Same("kind", got.IsRate ? "sa1_rate" : "sed", (string)expect["kind"]);
+        if (expect["flags"] != null)
+        {
+            var flags = new List<string>();
+            if (got.OutOfRange) flags.Add("out_of_range");
+            if (got.NoContact) flags.Add("no_contact");
+            Same("flags", string.Join(",", flags), string.Join(",", expect["flags"].Select(f => (string)f)));
+        }
+        if (expect["tier"] != null && got.Window != null) Same("tier", tiers[got.TierNumber], (string)expect["tier"]);
+        if (expect["window"] != null) Same("window", string.Join(",", got.Window), string.Join(",", expect["window"]));
+        if ((bool?)expect["map"] == false && got.Window[2] * got.Window[3] != 0) throw new Missed("a map came");
+        All("summary", expect, got.Summary);
+        All("points", expect, got.Points);
+        All("actuators", expect, got.Actuators);
+        CheckMap(expect, got.Map);
+    }
+
+    static void CheckMap(JObject expect, float[] map)
+    {
+        foreach (var pixel in expect["pixels"] ?? new JArray())
+        {
+            Near("pixel " + pixel[0] + ", " + pixel[1], map[224 * (int)pixel[0] + (int)pixel[1]], (double)pixel[2], (double)pixel[3]);
+        }
+        if (expect["sum"] != null) Near("sum", map.Sum(v => (double)v), (double)expect["sum"][0], (double)expect["sum"][1]);
+        if (expect["max"] != null) Near("max", map.Max(), (double)expect["max"][0], (double)expect["max"][1]);
+    }
+
+    static void All(string what, JObject expect, float[] got)
+    {
+        if (expect[what] == null) return;
+        if (got == null || got.Length != expect[what].Count()) throw new Missed(what + " is missing");
+        for (int k = 0; k < got.Length; k++) Near(what + " " + k, got[k], (double)expect[what][k][0], (double)expect[what][k][1]);
+    }
+
+    static void Near(string what, double got, double due, double tolerance)
+    {
+        if (!(Math.Abs(got - due) <= tolerance)) throw new Missed(what + " is " + got + ", not " + due + " +- " + tolerance);
+    }
+
+    static void Same(string what, string got, string due)
+    {
+        if (got != due) throw new Missed(what + " is " + got + ", not " + due);
+    }
+
+    Outcome Of(uint sequence)
+    {
+        Outcome outcome;
+        return outcomes.TryGetValue(sequence, out outcome) ? outcome : null;
+    }
+
+    T Until<T>(string what, Func<T> look, int patience) where T : class
+    {
+        var watch = Stopwatch.StartNew();
+        lock (gate)
+        {
+            while (true)
+            {
+                var found = look();
+                if (twice != null) throw new Missed(twice);
+                if (found != null) return found;
+                int left = patience - (int)watch.ElapsedMilliseconds;
+                if (left <= 0) throw new Missed(what + ": not within " + patience + " ms");
+                Monitor.Wait(gate, left);
+            }
+        }
+    }
+
+    static void Steer(string what)
+    {
+        using (var web = new WebClient()) web.UploadString(Environment.GetEnvironmentVariable("PAPILLA_CONTROL") + "/" + what, "");
+    }
+
+    void Burst(JObject step, JObject expect)
+    {
+        int count = (int)step["count"], gapMs = (int?)step["gap_ms"] ?? 0, replaced = client.Replaced;
+        bool isPaused = (bool?)step["paused"] ?? false;
+        var sequences = new uint[count];
+        if (isPaused) Steer("pause");
+        for (int k = 1; k <= count; k++)
+        {
+            sequences[k - 1] = client.Send(Pattern((JObject)step["pressure"], (double)k / count));
+            Thread.Sleep(gapMs);
+        }
+        if (isPaused) Steer("resume");
+        Until("all outcomes", () => sequences.All(outcomes.ContainsKey) ? sequences : null, patienceMs);
+        foreach (uint one in sequences)
+        {
+            if (outcomes[one].Status != Status.Ok && outcomes[one].Status != Status.Superseded) throw new Missed("a frame was " + outcomes[one].Status);
+        }
+        var rendered = order.Where(one => outcomes[one].Status == Status.Ok).ToArray();
+        if (!rendered.SequenceEqual(rendered.OrderBy(one => one))) throw new Missed("answers came out of order");
+        Check((JObject)expect["newest"] ?? new JObject(), outcomes[sequences[count - 1]]);
+        int superseded = sequences.Count(one => outcomes[one].Status == Status.Superseded);
+        if (superseded < ((int?)expect["superseded"] ?? 0)) throw new Missed(superseded + " superseded");
+        if (client.Replaced - replaced < ((int?)expect["superseded_by_client"] ?? 0)) throw new Missed((client.Replaced - replaced) + " superseded by the client");
+    }
+
+    void Reconnect(double withinS)
+    {
+        lock (gate) reply = null;
+        Steer("restart");
+        Until("a new session", () => reply as Ready, (int)(1000 * withinS));
+    }
+
+    void Http(JObject step, JObject expect)
+    {
+        try
+        {
+            var map = PapillaHttp.Post(url, Pattern((JObject)step["pressure"], 1), (string)step["tier"]);
+            Check(expect, new Outcome { Status = Status.Ok, Map = map });
+        }
+        catch (PapillaException error)
+        {
+            Check(expect, new Outcome { Status = Status.Error, Code = error.Problem.Code, Field = error.Problem.Field });
+        }
+    }
+
+    void Rasterise(JObject step, JObject expect)
+    {
+        var g = step["vertices"]["gaussian_mm"].Select(v => (double)v).ToArray();
+        var values = new float[atlas.VertexCount];
+        for (int i = 0; i < values.Length; i++)
+        {
+            double d2 = 0;
+            for (int k = 0; k < 3; k++) d2 += Math.Pow(atlas.SkinMm[3 * i + k] - g[k], 2);
+            values[i] = (float)(g[4] * Math.Exp(-d2 / (2 * g[3] * g[3])));
+        }
+        var map = new float[Wire.MapLength];
+        atlas.PressureMap(values, map);
+        CheckMap(expect, map);
+    }
+
+    void Contacts(JObject step, JObject expect)
+    {
+        var map = new float[Wire.MapLength];
+        foreach (var c in step["contacts"])
+        {
+            atlas.AddContact((double)c["at_mm"][0], (double)c["at_mm"][1], (double)c["at_mm"][2], (double)c["force_n"], (double)c["radius_mm"], map);
+        }
+        CheckMap(expect, map);
+        if (expect["force_n"] != null) Near("force", atlas.ForceN(map), (double)expect["force_n"][0], (double)expect["force_n"][1]);
+    }
+
+    static float[] Pattern(JObject pattern, double part)
+    {
+        var map = new float[Wire.MapLength];
+        var gaussians = (pattern["gaussians"] ?? new JArray()).Select(g => g.Select(v => (double)v).ToArray()).ToArray();
+        var disc = pattern["disc"] == null ? null : pattern["disc"].Select(v => (double)v).ToArray();
+        for (int i = 0; i < map.Length; i++)
+        {
+            double u = i % 224 + 0.5, v = i / 224 + 0.5, p = 0;
+            foreach (var g in gaussians) p += g[3] * Math.Exp(-((u - g[0]) * (u - g[0]) + (v - g[1]) * (v - g[1])) / (2 * g[2] * g[2]));
+            if (disc != null && (u - disc[0]) * (u - disc[0]) + (v - disc[1]) * (v - disc[1]) <= disc[2] * disc[2]) p += disc[3];
+            map[i] = p < 1 ? 0 : (float)(p * part);
+        }
+        if (pattern["bad"] != null)
+        {
+            var value = pattern["bad"][2];
+            float bad = value.Type != JTokenType.String ? (float)value : (string)value == "nan" ? float.NaN : float.PositiveInfinity;
+            map[224 * (int)pattern["bad"][0] + (int)pattern["bad"][1]] = bad;
+        }
+        return map;
+    }
+}

@@ -1,0 +1,7 @@
+// Papilla's client for browsers: sessions, the atlas, pressure from penetration.
+
+export { Papilla, PapillaError } from './src/client.js';
+export { postPressure } from './src/http.js';
+export { Atlas } from './src/atlas.js';
+export { Foundation } from './src/foundation.js';
+export { Answer, MAP_LEN, SIDE_PX, SUMMARY } from './src/wire.js';

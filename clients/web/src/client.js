@@ -1,0 +1,432 @@
+// A session that keeps itself connected: docs/protocol.md, version 2.
+
+import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js';
+
+/** @typedef {import('./types.js').Hello} Hello */
+/** @typedef {import('./types.js').Ready} Ready */
+/** @typedef {import('./types.js').Problem} Problem */
+/** @typedef {import('./types.js').State} State */
+/** @typedef {import('./types.js').Options} Options */
+
+/** Attempts to connect are this far apart, with some chance in it. */
+const RETRY_MS = { least: 100, most: 250 };
+/** Frames that may be without an answer at once; the next one waits. */
+const OUTSTANDING_MAX = 1024;
+/** An attempt that has not come to a ready by then is given up. */
+const ATTEMPT_MS = 5000;
+/** How long a frame waits before the socket is looked at again, ms. */
+const DRAIN_MS = 1;
+/** Refusals of a hello that pass by themselves. */
+const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
+
+const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
+
+/** A refusal by the server, or a fault of the session. */
+export class PapillaError extends Error {
+  /** @param {Problem} problem */
+  constructor(problem) {
+    super(`${problem.code}: ${problem.message}`);
+    this.name = 'PapillaError';
+    this.code = problem.code;
+    this.problem = problem;
+  }
+}
+
+/**
+ * Address of the sessions of a server.
+ * @param {string} base http(s)://host[:port], or '' for the server of the page
+ * @param {string} [token]
+ */
+function sessionUrl(base, token) {
+  const url = new URL('v1/session', new URL(base || '/', globalThis.location?.href));
+  url.protocol = url.protocol.replace('http', 'ws');
+  if (token) url.searchParams.set('access_token', token);
+  return url.href;
+}
+
+/**
+ * A session. Frames are pressure maps (Pa); answers are maps of strain energy density (J/m3).
+ *
+ * The newest frame wins on this side too: while an earlier frame has not left the socket a frame waits, and
+ * a newer one takes its place (`replaced` counts). A lost connection is made anew by itself, with the terms of
+ * the last hello; a frame that waits then goes out first.
+ *
+ * `onanswer(answer)` is called exactly once for every frame, with `answer.status`: `ok`, `superseded` (by this client or the
+ * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke before the answer). `onready(ready)`,
+ * `onproblem(problem)` for refused hellos and faults of the session, `onstate(state, why)`.
+ */
+export class Papilla {
+  /** @type {(ready: Ready) => void} */ onready = () => {};
+  /** @type {(answer: Answer) => void} */ onanswer = () => {};
+  /** @type {(problem: Problem) => void} */ onproblem = () => {};
+  /** @type {(state: State, why: string) => void} */ onstate = () => {};
+
+  /** The terms as the server confirmed them; null while there is no session. @type {Ready | null} */
+  ready = null;
+  /** @type {State} */
+  state = 'closed';
+  /** Deadline of the frames to come, us; 0: the session's budget. */
+  deadlineUs = 0;
+  /** Frames that went out, and frames whose place a newer one took before they could. */
+  sent = 0;
+  replaced = 0;
+  /** The last answer; overwritten by the next. */
+  answer = new Answer();
+
+  #frame = new RequestFrame();
+  #options;
+  #url;
+  /** @type {Hello} */ #hello;
+  // Terms to go back to if a renewal is refused.
+  /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
+  /** @type {WebSocket | null} */ #socket = null;
+  #sequence = 0;
+  #waits = false;
+  #outstanding = new Uint32Array(OUTSTANDING_MAX);
+  #outstandingCount = 0;
+  #drainTimer = false;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ #timer;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
+  // Answers up to the hello of a renewal have the sections of before.
+  #termsFrom = 0;
+  /** @type {ReturnType<Answer['views']> | null} */ #views = null;
+  /** @type {ReturnType<Answer['views']> | null} */ #viewsBefore = null;
+  /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */ #promised = new Map();
+  #opened = false;
+  #drained = () => { this.#drainTimer = false; this.#flush(); };
+
+  /**
+   * @param {string} base http(s)://host[:port]; '' for the server of the page
+   * @param {Hello} [hello] what to ask for; see docs/protocol.md
+   * @param {Options} [options]
+   */
+  constructor(base = '', hello = {}, options = {}) {
+    this.#url = sessionUrl(base, options.token);
+    this.#hello = { ...hello };
+    this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
+  }
+
+  /**
+   * A session that is ready.
+   * @param {string} [base] @param {Hello} [hello] @param {Options} [options]
+   * @returns {Promise<Papilla>} rejected with a PapillaError where the hello is refused
+   */
+  static connect(base, hello, options) {
+    const papilla = new Papilla(base, hello, options);
+    return new Promise((resolve, reject) => {
+      papilla.onready = () => { papilla.onready = papilla.onproblem = () => {}; resolve(papilla); };
+      papilla.onproblem = (problem) => {
+        if (PASSING.has(problem.code)) return;
+        papilla.close();
+        reject(new PapillaError(problem));
+      };
+      papilla.open();
+    });
+  }
+
+  /** Connects, and again whenever the connection is lost, until `close`. */
+  open() {
+    this.#opened = true;
+    if (!this.#socket) this.#connect();
+  }
+
+  /** Ends the session. */
+  close() {
+    this.#opened = false;
+    this.#drop();
+    this.#loseAll(true);
+    this.#enter('closed', '');
+  }
+
+  /**
+   * New terms, in the open session: answered by `onready`, or by `onproblem` and the terms stay.
+   * @param {Hello} hello
+   */
+  renew(hello) {
+    // A frame that waits was encoded by the terms of before.
+    this.#supersede();
+    if (this.ready) this.#before = { hello: this.#hello, ready: this.ready, termsFrom: this.#termsFrom };
+    this.#hello = { ...hello };
+    this.#termsFrom = (this.#sequence + 1) >>> 0;
+    this.ready = null;
+    if (this.#socket?.readyState === WebSocket.OPEN) this.#greet(this.#socket);
+    else if (this.#opened && !this.#socket) this.#connect();
+  }
+
+  /**
+   * Sends a whole map (224 x 224, Pa, row-major); it may be overwritten afterwards.
+   * @param {Float32Array} pressurePa
+   * @returns {number} the frame's sequence, which its answer repeats
+   */
+  send(pressurePa) {
+    if (pressurePa.length !== MAP_LEN) throw refusal('wrong_length', `a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
+    if (!this.#options.crop) return this.#put(pressurePa, 0, SIDE_PX, 0, 0, SIDE_PX, SIDE_PX);
+    let top = 0;
+    let end = MAP_LEN - 1;
+    while (top < MAP_LEN && pressurePa[top] === 0) top++;
+    if (top === MAP_LEN) return this.#put(pressurePa, 0, 0, 0, 0, 0, 0);
+    while (pressurePa[end] === 0) end--;
+    const row = (top / SIDE_PX) | 0;
+    const last = (end / SIDE_PX) | 0;
+    let left = SIDE_PX;
+    let right = -1;
+    for (let y = row; y <= last; y++) {
+      const from = y * SIDE_PX;
+      for (let x = 0; x < left; x++) if (pressurePa[from + x] !== 0) { left = x; break; }
+      for (let x = SIDE_PX - 1; x > right; x--) if (pressurePa[from + x] !== 0) { right = x; break; }
+    }
+    return this.#put(pressurePa, row * SIDE_PX + left, SIDE_PX, left, row, right - left + 1, last - row + 1);
+  }
+
+  /**
+   * Sends a rectangle of the map; all other pixels are 0.
+   * @param {Float32Array} samplesPa width x height samples, Pa, row-major
+   * @param {number} column @param {number} row @param {number} width @param {number} height
+   * @returns {number} the frame's sequence
+   */
+  sendWindow(samplesPa, column, row, width, height) {
+    if (width * height > samplesPa.length || column + width > SIDE_PX || row + height > SIDE_PX || Math.min(column, row, width, height) < 0) {
+      throw refusal('wrong_shape', `${width} x ${height} samples at (${column}, ${row}) do not fit the map or the ${samplesPa.length} samples given`);
+    }
+    return this.#put(samplesPa, 0, width, column, row, width, height);
+  }
+
+  /**
+   * Sends a map and waits for its answer. For one map after the other; frames of a running scene go
+   * by `send` and `onanswer`.
+   * @param {Float32Array} pressurePa
+   * @returns {Promise<Answer>} rejected with a PapillaError where the server refuses the frame, or does
+   *   not render it (code `superseded`, `late`, `stale`, `lost`)
+   */
+  render(pressurePa) {
+    return new Promise((resolve, reject) => this.#promised.set(this.send(pressurePa), { resolve, reject }));
+  }
+
+  /**
+   * @param {Float32Array} values @param {number} first @param {number} stride
+   * @param {number} column @param {number} row @param {number} width @param {number} height
+   */
+  #put(values, first, stride, column, row, width, height) {
+    const timeUs = this.#options.clockUs();
+    const type = SAMPLE_TYPES.indexOf(this.#hello.sample_type ?? 'f32');
+    let scale = 0;
+    if (type >= 2) {
+      scale = this.#hello.pressure_scale_pa ?? greatest(values, first, stride, width, height) / (type === 2 ? 65535 : 255);
+      if (!(scale > 0)) scale = 1;
+    }
+    this.#supersede();
+    this.#sequence = (this.#sequence + 1) >>> 0;
+    this.#frame.encode(values, first, stride, column, row, width, height, type, scale);
+    this.#frame.stamp(this.#sequence, timeUs, this.deadlineUs);
+    this.#waits = true;
+    this.#flush();
+    return this.#sequence;
+  }
+
+  /** The frame that waits, if one does, is never sent. */
+  #supersede() {
+    if (!this.#waits) return;
+    this.#waits = false;
+    this.replaced++;
+    this.#settle(this.#sequence, 'superseded', null);
+  }
+
+  /** The outcome of a frame of which the server sent no binary answer. @param {number} sequence @param {Answer['status']} status @param {Problem | null} problem */
+  #settle(sequence, status, problem) {
+    const { answer } = this;
+    answer.sequence = sequence;
+    answer.status = status;
+    answer.problem = problem;
+    this.#tell();
+  }
+
+  #tell() {
+    const { answer } = this;
+    this.onanswer(answer);
+    const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
+    if (!promised) return;
+    this.#promised.delete(answer.sequence);
+    if (answer.status === 'ok') promised.resolve(answer);
+    else promised.reject(new PapillaError(answer.problem ?? missed(answer.status, answer.sequence)));
+  }
+
+  /** Takes the frame out of those without an answer; false if it is none of them. @param {number} sequence */
+  #answered(sequence) {
+    const list = this.#outstanding;
+    for (let k = 0; k < this.#outstandingCount; k++) {
+      if (list[k] !== sequence) continue;
+      list.copyWithin(k, k + 1, this.#outstandingCount--);
+      return true;
+    }
+    return false;
+  }
+
+  /** What went out on a lost connection is never answered. @param {boolean} alsoWaiting */
+  #loseAll(alsoWaiting) {
+    while (this.#outstandingCount > 0) {
+      const sequence = this.#outstanding[0];
+      this.#answered(sequence);
+      this.#settle(sequence, 'lost', null);
+    }
+    if (!alsoWaiting || !this.#waits) return;
+    this.#waits = false;
+    this.#settle(this.#sequence, 'lost', null);
+  }
+
+  #flush() {
+    const socket = this.#socket;
+    if (!this.#waits || !this.ready || !socket || socket.readyState !== WebSocket.OPEN) return;
+    if (this.#outstandingCount === OUTSTANDING_MAX) return;
+    if (socket.bufferedAmount > 0) {
+      if (!this.#drainTimer) {
+        this.#drainTimer = true;
+        setTimeout(this.#drained, DRAIN_MS);
+      }
+      return;
+    }
+    this.#waits = false;
+    this.sent++;
+    this.#outstanding[this.#outstandingCount++] = this.#sequence;
+    const { buffer, bytes } = this.#frame;
+    // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
+    socket.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
+  }
+
+  #connect() {
+    clearTimeout(this.#timer);
+    this.#enter('connecting', '');
+    const socket = new WebSocket(this.#url);
+    socket.binaryType = 'arraybuffer';
+    this.#socket = socket;
+    clearTimeout(this.#attempt);
+    this.#attempt = setTimeout(() => this.#lost(socket, `no session within ${ATTEMPT_MS} ms`), ATTEMPT_MS);
+    socket.onopen = () => this.#greet(socket);
+    socket.onmessage = (event) => {
+      if (typeof event.data === 'string') this.#text(event.data);
+      else this.#binary(event.data);
+    };
+    socket.onclose = (event) => this.#lost(socket, event.reason || 'the connection was lost');
+    // The reason is in the close event that follows.
+    socket.onerror = () => {};
+  }
+
+  /** @param {WebSocket} socket */
+  #greet(socket) {
+    socket.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
+  }
+
+  #drop() {
+    clearTimeout(this.#timer);
+    clearTimeout(this.#attempt);
+    const socket = this.#socket;
+    this.#socket = null;
+    this.ready = null;
+    this.#before = null;
+    if (!socket) return;
+    socket.onmessage = socket.onclose = null;
+    // Browsers complain of a socket that is closed while it connects.
+    if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
+    else socket.close();
+  }
+
+  /** @param {WebSocket} socket @param {string} why */
+  #lost(socket, why) {
+    if (socket !== this.#socket) return;
+    this.#drop();
+    this.#loseAll(!this.#opened);
+    if (!this.#opened) return;
+    this.#enter('waiting', why);
+    this.#timer = setTimeout(() => this.#connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
+  }
+
+  /** @param {State} state @param {string} why */
+  #enter(state, why) {
+    this.state = state;
+    this.onstate(state, why);
+  }
+
+  /** @param {string} text */
+  #text(text) {
+    const message = JSON.parse(text);
+    if (message.type === 'ready') this.#welcome(message);
+    else if (message.type === 'error') this.#problem(message);
+  }
+
+  /** @param {Ready} ready */
+  #welcome(ready) {
+    clearTimeout(this.#attempt);
+    this.#viewsBefore = this.#views;
+    this.#views = this.answer.views(ready.sections);
+    this.#before = null;
+    this.ready = ready;
+    this.#enter('ready', '');
+    this.onready(ready);
+    this.#flush();
+  }
+
+  /** @param {Problem} problem */
+  #problem(problem) {
+    const { sequence } = problem;
+    if (typeof sequence === 'number') {
+      if (this.#answered(sequence)) this.#settle(sequence, 'error', problem);
+      return;
+    }
+    if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
+    this.onproblem(problem);
+  }
+
+  /** A hello was refused: of a renewal the terms of before stand, at the start nothing does. @param {Problem} problem */
+  #refused(problem) {
+    if (this.#before) {
+      ({ hello: this.#hello, ready: this.ready, termsFrom: this.#termsFrom } = this.#before);
+      this.#before = null;
+      return;
+    }
+    this.#opened = false;
+    this.#drop();
+    this.#loseAll(true);
+    this.#enter('refused', problem.message);
+  }
+
+  /** @param {ArrayBuffer} data */
+  #binary(data) {
+    const { answer } = this;
+    try {
+      answer.readHeader(data);
+      const older = this.#viewsBefore !== null && ((answer.sequence - this.#termsFrom) | 0) < 0;
+      const views = older ? this.#viewsBefore : this.#views;
+      if (!older) this.#viewsBefore = null;
+      if (answer.status === 'ok' && views) answer.readBody(views, data.byteLength);
+    } catch (error) {
+      this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
+      return;
+    }
+    if (!this.#answered(answer.sequence)) return;
+    answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
+    answer.problem = null;
+    this.#flush();
+    this.#tell();
+  }
+}
+
+/** @param {string} code as the server's @param {string} message */
+const refusal = (code, message) => new PapillaError({ type: 'error', code, message, closes: false });
+
+/** @param {string} code @param {number} sequence @returns {Problem} */
+function missed(code, sequence) {
+  const message = code === 'superseded' ? 'a newer frame took its place' : `the frame was ${code}`;
+  return { type: 'error', code, message, sequence, closes: false };
+}
+
+/**
+ * @param {Float32Array} values @param {number} first @param {number} stride
+ * @param {number} width @param {number} height
+ */
+function greatest(values, first, stride, width, height) {
+  let most = 0;
+  for (let y = 0; y < height; y++) {
+    const from = first + y * stride;
+    for (let x = 0; x < width; x++) if (values[from + x] > most) most = values[from + x];
+  }
+  return most;
+}

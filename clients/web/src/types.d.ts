@@ -1,0 +1,96 @@
+// The texts of a session, as docs/protocol.md defines them.
+
+export type SampleType = 'f32' | 'f16' | 'u16' | 'u8';
+/** A place on the finger: pixels of the map, or mm in the finger's frame. */
+export type Place = { px: [number, number] } | { mm: [number, number, number] };
+
+export interface Relaxation {
+  tissue?: 'skin' | 'subcutaneous';
+  prony?: { g: number; tau_s: number }[];
+  moduli?: 'instantaneous' | 'long_term';
+}
+
+export interface Afferents {
+  e_ref_kpa?: number;
+  theta_kpa?: number;
+  k_s_hz_per_kpa?: number;
+  k_d_hz_s_per_kpa?: number;
+}
+
+export interface Actuators {
+  input: 'sed' | 'sa1_rate';
+  radius_mm?: number;
+  gain?: number;
+  threshold?: number;
+  max?: number;
+  actuators: { at: Place; radius_mm?: number; gain?: number; threshold?: number; max?: number }[];
+}
+
+/** What a client asks for; `type` and `version` are added by the client. */
+export interface Hello {
+  effects?: string[];
+  budget_us?: number | null;
+  tier?: string | null;
+  sample_type?: SampleType;
+  answer_sample_type?: SampleType;
+  pressure_scale_pa?: number | null;
+  atlas_hash?: string | null;
+  map?: boolean;
+  contact_pa?: number;
+  out_of_range?: 'refuse' | 'flag';
+  stale_after_us?: number | null;
+  contact_window?: { margin_px?: number };
+  points?: Place[];
+  actuators?: Actuators;
+  afferents?: Afferents;
+  relaxation?: Relaxation;
+}
+
+export interface Section {
+  name: 'summary' | 'points' | 'actuators' | 'map';
+  offset: number;
+  bytes: number;
+}
+
+export interface Ready {
+  type: 'ready';
+  version: 2;
+  session: number;
+  tier: string;
+  tier_number: number;
+  effects: string[];
+  session_effects: string[];
+  atlas_hash: string;
+  predicted_latency_us: number;
+  budget_us: number | null;
+  meets_budget: boolean | null;
+  width: number;
+  height: number;
+  sample_type: SampleType;
+  answer_sample_type: SampleType;
+  pressure_max_pa: number;
+  sed_scale_j_per_m3: number;
+  sections: Section[];
+}
+
+/** A refusal, of a hello or of a frame (then with its `sequence`). */
+export interface Problem {
+  type: 'error';
+  code: string;
+  message: string;
+  field?: string | null;
+  sequence?: number | null;
+  closes: boolean;
+}
+
+/** connecting | ready | waiting (for the next attempt) | refused (the hello; nothing is tried again) | closed */
+export type State = 'connecting' | 'ready' | 'waiting' | 'refused' | 'closed';
+
+export interface Options {
+  /** Bearer token, for a server that asks for one. */
+  token?: string;
+  /** Cut a full map to the rectangle of its non-zero pixels before sending (default true). */
+  crop?: boolean;
+  /** us of the client's clock, for the header (default: performance.now). */
+  clockUs?: () => number;
+}

@@ -1,0 +1,273 @@
+// The steps of docs/conformance.md by this client; runs in the page, which has nothing but the client and the server.
+
+import { Atlas, MAP_LEN, Papilla, PapillaError, SIDE_PX, postPressure } from '../papilla.js';
+
+/** @typedef {Record<string, any>} Step */
+/** @typedef {Record<string, any>} Outcome what an answer held, copied */
+
+const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact']]);
+
+const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
+
+/** @param {Step} pattern @param {number} [part] */
+function pressureMap(pattern, part = 1) {
+  const map = new Float32Array(MAP_LEN);
+  for (let i = 0; i < MAP_LEN; i++) {
+    const [u, v] = [(i % SIDE_PX) + 0.5, Math.floor(i / SIDE_PX) + 0.5];
+    let p = 0;
+    for (const [u0, v0, sigma, peak] of pattern.gaussians ?? []) p += peak * Math.exp(-((u - u0) ** 2 + (v - v0) ** 2) / (2 * sigma * sigma));
+    if (pattern.disc) {
+      const [u0, v0, radius, pressure] = pattern.disc;
+      if ((u - u0) ** 2 + (v - v0) ** 2 <= radius * radius) p += pressure;
+    }
+    map[i] = p < 1 ? 0 : p * part;
+  }
+  if (pattern.bad) {
+    const [row, column, value] = pattern.bad;
+    map[row * SIDE_PX + column] = value === 'nan' ? NaN : value === 'inf' ? Infinity : value;
+  }
+  return map;
+}
+
+/** @param {Float32Array} map @param {number[]} window */
+function cut(map, [column, row, width, height]) {
+  const samples = new Float32Array(width * height);
+  for (let y = 0; y < height; y++) {
+    for (let x = 0; x < width; x++) samples[y * width + x] = map[(row + y) * SIDE_PX + column + x] ?? 0;
+  }
+  return samples;
+}
+
+/** @param {string} what @param {unknown} found @param {unknown} due */
+function same(what, found, due) {
+  if (JSON.stringify(found) !== JSON.stringify(due)) throw new Error(`${what} is ${JSON.stringify(found)}, not ${JSON.stringify(due)}`);
+}
+
+/** @param {string} what @param {number} found @param {number[]} due */
+function near(what, found, [value, tolerance]) {
+  if (!(Math.abs(found - value) <= tolerance)) throw new Error(`${what} is ${found}, not ${value} +- ${tolerance}`);
+}
+
+/** @param {string} what @param {ArrayLike<number> | null} found @param {number[][]} due */
+function allNear(what, found, due) {
+  if (!found || found.length !== due.length) throw new Error(`${what}: ${found?.length} numbers, ${due.length} are due`);
+  due.forEach((pair, n) => near(`${what}[${n}]`, found[n], pair));
+}
+
+/** @param {Step} expect @param {Float32Array} map */
+function checkMap(expect, map) {
+  for (const [row, column, value, tolerance] of expect.pixels ?? []) near(`pixel (${row}, ${column})`, map[row * SIDE_PX + column], [value, tolerance]);
+  if (expect.sum) near('sum', map.reduce((sum, value) => sum + value, 0), expect.sum);
+  if (expect.max) near('max', map.reduce((most, value) => Math.max(most, value), 0), expect.max);
+}
+
+/** One case's session. */
+class Runner {
+  /** @type {Papilla | null} */ session = null;
+  /** @type {Map<number, Outcome>} */ outcomes = new Map();
+  /** @type {number[]} */ order = [];
+  /** @type {Map<number, string>} */ tiers = new Map();
+  clockUs = 0;
+
+  /** @param {string} url @param {string} control @param {Atlas} atlas @param {number} patienceMs */
+  constructor(url, control, atlas, patienceMs) {
+    Object.assign(this, { url, control, atlas, patienceMs });
+    this.url = url;
+    this.control = control;
+    this.atlas = atlas;
+    this.patienceMs = patienceMs;
+  }
+
+  now() {
+    return this.clockUs || Math.round((performance.timeOrigin + performance.now()) * 1000);
+  }
+
+  /** @template T @param {string} what @param {() => T | undefined | null | false} look @returns {Promise<T>} */
+  async until(what, look, patienceMs = this.patienceMs) {
+    const end = performance.now() + patienceMs;
+    for (;;) {
+      const found = look();
+      if (found) return found;
+      if (performance.now() > end) throw new Error(`${what}: not within ${patienceMs} ms`);
+      await wait(2);
+    }
+  }
+
+  /** @param {Step} step */
+  async hello({ hello, expect }) {
+    let reply = /** @type {any} */ (null);
+    const fresh = this.session === null || this.session.state === 'refused';
+    if (fresh) this.session = new Papilla(this.url, hello, { crop: false, clockUs: () => this.now() });
+    const session = /** @type {Papilla} */ (this.session);
+    session.onready = (ready) => { reply = ready; this.tiers.set(ready.tier_number, ready.tier); };
+    session.onproblem = (problem) => { reply = problem; };
+    session.onanswer = (answer) => this.keep(answer);
+    if (fresh) session.open();
+    else session.renew(hello);
+    await this.until('ready', () => reply);
+    if (expect.status === 'error') {
+      same('reply', reply.type, 'error');
+      for (const member of ['code', 'field']) if (expect[member]) same(member, reply[member], expect[member]);
+      return;
+    }
+    if (reply.type !== 'ready') throw new Error(`${reply.code}: ${reply.message}`);
+    for (const [member, due] of Object.entries(expect.ready ?? {})) same(`ready.${member}`, reply[member], due);
+  }
+
+  /** @param {import('../papilla.js').Answer} answer */
+  keep(answer) {
+    if (this.outcomes.has(answer.sequence)) throw new Error(`frame ${answer.sequence} has two outcomes`);
+    const { map, summary, points, actuators, ...rest } = answer;
+    const copy = (/** @type {Float32Array | null} */ values) => (values ? Float32Array.from(values) : null);
+    this.outcomes.set(answer.sequence, { ...rest, map: copy(map), summary: copy(summary), points: copy(points), actuators: copy(actuators) });
+    this.order.push(answer.sequence);
+  }
+
+  /** @param {Step} step */
+  async frame({ pressure, window, client_time_us: timeUs, deadline_us: deadlineUs, attempts = 1, expect }) {
+    const session = /** @type {Papilla} */ (this.session);
+    const map = pressureMap(pressure);
+    session.deadlineUs = deadlineUs ?? 0;
+    for (let attempt = 1; ; attempt++) {
+      if (timeUs) this.clockUs = timeUs;
+      const sentUs = this.now();
+      let sequence;
+      try {
+        sequence = window ? session.sendWindow(cut(map, window), window[0], window[1], window[2], window[3]) : session.send(map);
+      } catch (error) {
+        if (!(error instanceof PapillaError)) throw error;
+        this.check(expect, { status: 'error', problem: error.problem, map: new Float32Array(0) });
+        return;
+      } finally {
+        this.clockUs = 0;
+      }
+      const afterUs = this.now();
+      const outcome = await this.until('the outcome', () => this.outcomes.get(sequence));
+      if (outcome.status === 'lost' && attempt < attempts) continue;
+      if (['ok', 'late', 'stale', 'superseded'].includes(outcome.status)) {
+        if (timeUs) same('client time', outcome.clientTimeUs, timeUs);
+        else if (outcome.clientTimeUs < sentUs || outcome.clientTimeUs > afterUs) throw new Error(`client time ${outcome.clientTimeUs}, sent from ${sentUs} to ${afterUs}`);
+      }
+      this.check(expect, outcome);
+      return;
+    }
+  }
+
+  /** @param {Step} expect @param {Outcome} outcome */
+  check(expect, outcome) {
+    same(`status (${outcome.problem?.message ?? ''})`, outcome.status, expect.status ?? 'ok');
+    if (outcome.status === 'error') {
+      if (expect.code) same('code', outcome.problem.code, expect.code);
+      if (expect.field) same('field', outcome.problem.field, expect.field);
+    }
+    if (outcome.status !== 'ok') return;
+    if (outcome.inferUs + outcome.queueUs > outcome.totalUs) throw new Error(`${outcome.inferUs} + ${outcome.queueUs} us are more than ${outcome.totalUs}`);
+    if (expect.kind) same('kind', outcome.kind, expect.kind);
+    if (expect.flags) same('flags', FLAGS.filter(([, member]) => outcome[member]).map(([name]) => name), expect.flags);
+    if (expect.tier) same('tier', this.tiers.get(outcome.tierNumber), expect.tier);
+    if (expect.window) same('window', [outcome.column, outcome.row, outcome.width, outcome.height], expect.window);
+    if (expect.map === false) same('samples', outcome.width * outcome.height, 0);
+    for (const section of ['summary', 'points', 'actuators']) if (expect[section]) allNear(section, outcome[section], expect[section]);
+    checkMap(expect, outcome.map);
+  }
+
+  /** @param {string} what */
+  async steer(what) {
+    const response = await fetch(`${this.control}/${what}`, { method: 'POST' });
+    if (!response.ok) throw new Error(`the runner does not ${what}: HTTP ${response.status}`);
+  }
+
+  /** @param {Step} step */
+  async burst({ count, gap_ms: gapMs = 0, pressure, paused, expect }) {
+    const session = /** @type {Papilla} */ (this.session);
+    const { replaced } = session;
+    if (paused) await this.steer('pause');
+    /** @type {number[]} */
+    const sequences = [];
+    for (let k = 1; k <= count; k++) {
+      sequences.push(session.send(pressureMap(pressure, k / count)));
+      if (gapMs) await wait(gapMs);
+    }
+    if (paused) await this.steer('resume');
+    await this.until('all outcomes', () => sequences.every((sequence) => this.outcomes.has(sequence)));
+    const all = sequences.map((sequence) => /** @type {Outcome} */ (this.outcomes.get(sequence)));
+    const odd = all.find(({ status }) => status !== 'ok' && status !== 'superseded');
+    if (odd) throw new Error(`a frame of the burst was ${odd.status}`);
+    const rendered = this.order.filter((sequence) => sequences.includes(sequence) && this.outcomes.get(sequence)?.status === 'ok');
+    same('order', rendered, [...rendered].sort((a, b) => a - b));
+    this.check(expect.newest ?? {}, all[count - 1]);
+    const superseded = all.filter(({ status }) => status === 'superseded').length;
+    if (superseded < (expect.superseded ?? 0)) throw new Error(`${superseded} superseded, ${expect.superseded} are due`);
+    const own = session.replaced - replaced;
+    if (own < (expect.superseded_by_client ?? 0)) throw new Error(`${own} superseded by the client, ${expect.superseded_by_client} are due`);
+  }
+
+  /** @param {Step} step */
+  async reconnect({ within_s: withinS }) {
+    const session = /** @type {Papilla} */ (this.session);
+    const before = session.ready?.session;
+    let fresh = false;
+    session.onready = (ready) => { fresh = true; this.tiers.set(ready.tier_number, ready.tier); };
+    await this.steer('restart');
+    await this.until(`a session after ${before}`, () => fresh && session.ready, withinS * 1000);
+  }
+
+  /** @param {Step} step */
+  async http({ pressure, tier, expect }) {
+    let outcome;
+    try {
+      const { map, tier: rendered } = await postPressure(this.url, pressureMap(pressure), { tier });
+      if (expect.tier) same('tier', rendered, expect.tier);
+      outcome = { status: 'ok', map, inferUs: 0, queueUs: 0, totalUs: 0 };
+    } catch (error) {
+      if (!(error instanceof PapillaError)) throw error;
+      outcome = { status: 'error', problem: error.problem };
+    }
+    this.check({ ...expect, tier: undefined }, outcome);
+  }
+
+  /** @param {Step} step */
+  rasterise({ vertices, expect }) {
+    const [x, y, z, sigma, peak] = vertices.gaussian_mm;
+    const p = this.atlas.skin.positionsMm;
+    const values = Float32Array.from({ length: this.atlas.vertexCount }, (_, i) =>
+      peak * Math.exp(-((p[3 * i] - x) ** 2 + (p[3 * i + 1] - y) ** 2 + (p[3 * i + 2] - z) ** 2) / (2 * sigma * sigma)));
+    checkMap(expect, this.atlas.pressureMap(values, new Float32Array(MAP_LEN)));
+  }
+
+  /** @param {Step} step */
+  contacts({ contacts, expect }) {
+    const list = /** @type {Step[]} */ (contacts);
+    const map = new Float32Array(MAP_LEN);
+    this.atlas.contactMap(list.flatMap((c) => c.at_mm), list.map((c) => c.force_n), list.map((c) => c.radius_mm), map);
+    checkMap(expect, map);
+    if (expect.force_n) near('force', this.atlas.forceN(map), expect.force_n);
+  }
+}
+
+/**
+ * Runs all cases.
+ * @param {{url: string, control: string, file: Step, report: (line: string) => void}} options
+ * @returns {Promise<number>} how many failed
+ */
+export async function run({ url, control, file, report }) {
+  const atlas = await Atlas.load(url);
+  same('the atlas', atlas.hash, file.atlas_hash);
+  let failed = 0;
+  for (const { name, steps } of file.cases) {
+    const runner = new Runner(url, control, atlas, file.timeout_s * 1000);
+    let at = 0;
+    try {
+      for (const step of steps) {
+        at++;
+        await /** @type {any} */ (runner)[step.do](step);
+      }
+      report(`ok ${name}`);
+    } catch (error) {
+      failed++;
+      report(`FAIL ${name}: step ${at} (${steps[at - 1]?.do}): ${error instanceof Error ? error.message : error}`);
+    }
+    runner.session?.close();
+  }
+  return failed;
+}

@@ -1,0 +1,127 @@
+// The WebXR scene in headless Chromium, as the server serves it at /xr; once with the mouse, once in an emulated headset.
+// PAPILLA_URL: a server with --xr-dir dist. PAPILLA_SHOTS=DIR keeps screenshots.
+
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { after, before, test } from 'node:test';
+import { launch, serverUrl } from './browser.js';
+
+const PATIENCE_MS = 60000;
+/** @type {import('playwright-core').Browser} */
+let browser;
+
+before(async () => { browser = await launch(); });
+after(async () => browser?.close());
+
+/** The scene in a new page; what it complains of is collected. @param {string} [first] script to run before the page's own */
+async function openScene(first) {
+  const page = await browser.newPage({ viewport: { width: 960, height: 600 } });
+  page.setDefaultTimeout(PATIENCE_MS);
+  /** @type {string[]} */
+  const complaints = [];
+  page.on('console', (message) => { if (message.type() === 'error') complaints.push(message.text()); });
+  page.on('pageerror', (error) => complaints.push(String(error)));
+  if (first) await page.addInitScript({ content: first });
+  await page.goto(`${serverUrl()}/xr/?tier=half-space&budget_us=0`);
+  await page.waitForFunction(() => /** @type {any} */ (globalThis).papillaXr?.session.ready, undefined, { timeout: PATIENCE_MS });
+  return { page, complaints };
+}
+
+/** @param {import('playwright-core').Page} page */
+const figures = (page) => page.evaluate(() => {
+  const s = /** @type {any} */ (globalThis).papillaXr;
+  const { touched, deepestMm, texture, foundation } = s.finger;
+  return { touched: touched?.name ?? null, deepestMm, peakPa: foundation.peakPa, sedMax: s.sedMax, forceN: s.forceN, answers: s.answers, painted: Math.max(...texture.image.data), isPresenting: s.isPresenting };
+});
+
+/** Waits for the answer to a frame of this moment. @param {import('playwright-core').Page} page */
+async function nextAnswer(page) {
+  const { answers } = await figures(page);
+  await page.waitForFunction((past) => /** @type {any} */ (globalThis).papillaXr.answers > past + 3, answers, { timeout: PATIENCE_MS });
+}
+
+/** @param {import('playwright-core').Page} page @param {string} name */
+async function shot(page, name) {
+  if (process.env.PAPILLA_SHOTS) await page.screenshot({ path: `${process.env.PAPILLA_SHOTS}/${name}.png` });
+}
+
+/** Where an object's top is on the screen. @param {import('playwright-core').Page} page @param {string} name */
+const onScreen = (page, name) => page.evaluate((wanted) => {
+  const { objects, scene, renderer } = /** @type {any} */ (globalThis).papillaXr;
+  const { mesh } = objects.find((/** @type {any} */ o) => o.name === wanted);
+  const { camera } = scene.userData;
+  const at = mesh.position.clone();
+  at.y += 0.06;
+  at.project(camera);
+  return [((at.x + 1) / 2) * renderer.domElement.clientWidth, ((1 - at.y) / 2) * renderer.domElement.clientHeight];
+}, name);
+
+test('the mouse presses hard and soft objects, and SED is painted on the finger', async () => {
+  const { page, complaints } = await openScene();
+  /** @type {Record<string, Awaited<ReturnType<typeof figures>>>} */
+  const found = {};
+  for (const name of ['hard ball', 'soft ball', 'hard block', 'soft cushion', 'thin bar']) {
+    const [x, y] = await onScreen(page, name);
+    await page.mouse.move(x, y);
+    await page.mouse.down();
+    await page.waitForFunction((wanted) => {
+      const { finger } = /** @type {any} */ (globalThis).papillaXr;
+      return finger.touched?.name === wanted && finger.deepestMm > 0.3;
+    }, name, { timeout: PATIENCE_MS });
+    await page.waitForTimeout(1500);
+    await nextAnswer(page);
+    found[name] = await figures(page);
+    await shot(page, `xr-${name.replaceAll(' ', '-')}`);
+    await page.mouse.up();
+    await page.waitForFunction(() => /** @type {any} */ (globalThis).papillaXr.finger.touched === null, undefined, { timeout: PATIENCE_MS });
+  }
+  for (const [name, { sedMax, forceN, painted, peakPa }] of Object.entries(found)) {
+    assert.ok(sedMax > 1 && forceN > 0.001 && painted > 100 && peakPa > 500, `${name}: ${JSON.stringify(found[name])}`);
+  }
+  assert.ok(found['hard ball'].peakPa > 1.3 * found['soft ball'].peakPa, JSON.stringify(found));
+  assert.ok(found['hard block'].peakPa > 1.3 * found['soft cushion'].peakPa, JSON.stringify(found));
+  await nextAnswer(page);
+  assert.equal((await figures(page)).forceN, 0);
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test('in a headset the finger follows the controller, then the hand', async () => {
+  const iwer = await readFile(new URL('../node_modules/iwer/build/iwer.js', import.meta.url), 'utf8');
+  const { page, complaints } = await openScene(`${iwer}
+    globalThis.headset = new IWER.XRDevice(IWER.metaQuest3);
+    globalThis.headset.installRuntime({ forceInstall: true });`);
+  await page.waitForSelector('#enter:not([hidden])');
+  await page.click('#enter');
+  await page.waitForFunction(() => /** @type {any} */ (globalThis).papillaXr.isPresenting, undefined, { timeout: PATIENCE_MS });
+  // The place of the hard ball's top, a little inside; three's local-floor has its origin under the headset.
+  for (const way of ['controller', 'hand']) {
+    await page.evaluate((primary) => {
+      const { headset } = /** @type {any} */ (globalThis);
+      headset.position.set(0, 1.5, 0);
+      headset.primaryInputMode = primary;
+      for (const one of [headset.controllers.right, headset.hands.right]) {
+        one.position.set(-0.68, 1.4, -0.75);
+        one.quaternion.set(0, 0, 0, 1);
+      }
+    }, way);
+    await page.waitForFunction(() => /** @type {any} */ (globalThis).papillaXr.mesh.visible, undefined, { timeout: PATIENCE_MS });
+    // Down by 5 mm of the world at a time until the finger touches.
+    let now = await figures(page);
+    for (let y = 1.4; y > 0.9 && !(now.touched && now.deepestMm > 0.8); y -= 0.01) {
+      await page.evaluate(([height]) => {
+        const { headset } = /** @type {any} */ (globalThis);
+        for (const one of [headset.controllers.right, headset.hands.right]) one.position.set(-0.68, height, -0.75);
+      }, [y]);
+      await page.waitForTimeout(150);
+      now = await figures(page);
+    }
+    await nextAnswer(page);
+    now = await figures(page);
+    await shot(page, `xr-${way}`);
+    assert.equal(now.touched, 'hard ball', `${way}: ${JSON.stringify(now)}`);
+    assert.ok(now.isPresenting && now.sedMax > 1 && now.painted > 100, `${way}: ${JSON.stringify(now)}`);
+  }
+  assert.deepEqual(complaints, []);
+  await page.close();
+});

@@ -1,0 +1,19 @@
+// `npm run build`: the scene, and the client alone as one module, in dist/.
+
+import { copyFile, mkdir } from 'node:fs/promises';
+import { fileURLToPath } from 'node:url';
+import { build } from 'esbuild';
+
+const here = (/** @type {string} */ path) => fileURLToPath(new URL(path, import.meta.url));
+
+await mkdir(here('../dist'), { recursive: true });
+await build({
+  entryPoints: { scene: here('scene.js'), papilla: here('../papilla.js') },
+  outdir: here('../dist'),
+  bundle: true,
+  minify: true,
+  format: 'esm',
+  target: 'es2022',
+  legalComments: 'linked',
+});
+await copyFile(here('index.html'), here('../dist/index.html'));

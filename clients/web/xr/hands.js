@@ -1,0 +1,87 @@
+// What moves the finger: a tracked hand or a controller in VR, the mouse (or a touch) otherwise.
+
+import { Plane, Quaternion, Raycaster, Vector2, Vector3 } from 'three';
+
+/** Where the pad is in the finger's frame, mm: the point that a hand or the mouse moves. */
+const PAD_MM = new Vector3(9, 0, -6.4);
+const HOVER_MM = 5;
+const LOWER_MM_PER_S = 12;
+/** The finger's x (tip to base) is the hand's +z, its z (nail) the hand's +y. */
+const FRAME = new Quaternion(-0.5, -0.5, -0.5, 0.5);
+/** With the mouse the finger comes down a little steeply. */
+const TILT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.35);
+
+/** Puts the pad of the mesh to a place of the world. @param {import('three').Mesh} mesh @param {Vector3} place @param {Quaternion} turn */
+function place(mesh, place, turn) {
+  mesh.quaternion.copy(turn).multiply(FRAME);
+  mesh.position.copy(PAD_MM).multiply(mesh.scale).applyQuaternion(mesh.quaternion).negate().add(place);
+  mesh.updateMatrixWorld();
+}
+
+/** The mouse points at a place of an object or the table; pressed, the finger comes down there. */
+export class Pointer {
+  /** @param {HTMLCanvasElement} canvas @param {import('three').Camera} camera @param {import('./objects.js').Touchable[]} objects */
+  constructor(canvas, camera, objects) {
+    this.camera = camera;
+    this.meshes = objects.map(({ mesh }) => mesh);
+    this.depthMm = 1.2;
+    this.#listen(canvas);
+  }
+
+  #ray = new Raycaster();
+  #at = new Vector2(0, 0);
+  #place = new Vector3(0, 1.1, -0.75);
+  #table = new Plane(new Vector3(0, 1, 0), -0.9);
+  #isPressed = false;
+  #heightMm = HOVER_MM;
+
+  /** @param {HTMLCanvasElement} canvas */
+  #listen(canvas) {
+    const move = (/** @type {PointerEvent} */ event) => this.#at.set((2 * event.clientX) / canvas.clientWidth - 1, 1 - (2 * event.clientY) / canvas.clientHeight);
+    canvas.addEventListener('pointermove', move);
+    canvas.addEventListener('pointerdown', (event) => { move(event); this.#isPressed = true; canvas.setPointerCapture(event.pointerId); });
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { this.#isPressed = false; });
+    canvas.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.depthMm = Math.min(1.8, Math.max(0.2, this.depthMm - event.deltaY * 0.001));
+    }, { passive: false });
+  }
+
+  /** @param {import('three').Mesh} mesh @param {number} seconds since the last call */
+  move(mesh, seconds) {
+    this.#ray.setFromCamera(this.#at, this.camera);
+    const [hit] = this.#ray.intersectObjects(this.meshes);
+    if (hit) this.#place.copy(hit.point);
+    else this.#ray.ray.intersectPlane(this.#table, this.#place);
+    const goal = this.#isPressed ? -this.depthMm : HOVER_MM;
+    const step = LOWER_MM_PER_S * seconds;
+    this.#heightMm += Math.min(step, Math.max(-step, goal - this.#heightMm));
+    this.#place.y += this.#heightMm * mesh.scale.x;
+    place(mesh, this.#place, TILT);
+  }
+}
+
+/** The first tracked index finger, or else the first controller. */
+export class Hands {
+  /** @param {import('three').WebXRManager} xr @param {import('three').Object3D} scene */
+  constructor(xr, scene) {
+    this.hands = [1, 0].map((n) => xr.getHand(n));
+    this.controllers = [1, 0].map((n) => xr.getController(n));
+    for (const one of [...this.hands, ...this.controllers]) scene.add(one);
+  }
+
+  #place = new Vector3();
+  #turn = new Quaternion();
+
+  /** False where nothing is tracked. @param {import('three').Mesh} mesh */
+  move(mesh) {
+    const tip = this.hands.map((hand) => hand.joints['index-finger-tip']).find((joint) => joint?.visible);
+    const found = tip ?? this.controllers.find((controller) => controller.visible);
+    if (!found) return false;
+    found.updateMatrixWorld();
+    found.getWorldPosition(this.#place);
+    found.getWorldQuaternion(this.#turn);
+    place(mesh, this.#place, this.#turn);
+    return true;
+  }
+}
