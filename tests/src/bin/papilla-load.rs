@@ -23,6 +23,10 @@ fn main() -> ExitCode {
 
 fn run(options: &Options) -> anyhow::Result<u8> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    if options.floor {
+        let floor = runtime.block_on(load::floor(options.duration_s))?;
+        return print(options, &floor, 0);
+    }
     match &options.against {
         Some(against) => {
             let comparison = runtime.block_on(load::compare(options, against))?;

@@ -7,6 +7,7 @@
 
 mod compare;
 mod content;
+mod floor;
 mod options;
 mod pacer;
 mod post;
@@ -27,6 +28,7 @@ use tokio::{sync::mpsc, task::JoinHandle};
 
 pub use compare::{Comparison, Ratios, compare};
 pub use content::Content;
+pub use floor::{Floor, floor};
 pub use options::{Arrivals, Options, Speak};
 pub use report::{Percentiles, Report, Verification};
 pub use verify::TOLERANCE;

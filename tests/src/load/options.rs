@@ -25,6 +25,7 @@ Examples:
   papilla-load --against 127.0.0.1:7225         two services in turn, and how they compare
   papilla-load --speak oip --tier nano --sessions 8 --against 127.0.0.1:8000 --dataset data/heldout
                                                 beside any other Open Inference server
+  papilla-load --floor                          what the machine itself does
   papilla-load --allow-miss-percent 1 --json    for a script
 
 Exit codes:
@@ -95,6 +96,11 @@ pub struct Options {
     /// Seed of --arrivals poisson.
     #[arg(long, default_value = "0", value_name = "SEED")]
     pub seed: u64,
+
+    /// Load nothing; measure for --duration-s what this machine does without any service: how
+    /// late it wakes, and what the bytes of a frame cost over loopback.
+    #[arg(long, conflicts_with = "against")]
+    pub floor: bool,
 
     /// A second service, loaded in turn with the first.
     #[arg(long, value_name = "HOST:PORT")]

@@ -26,7 +26,7 @@ pub struct Percentiles {
 
 impl Percentiles {
     /// None without a time.
-    fn new(Times(histogram): &Times) -> Option<Self> {
+    pub(super) fn new(Times(histogram): &Times) -> Option<Self> {
         let at = |quantile| histogram.value_at_quantile(quantile);
         (!histogram.is_empty()).then(|| Self {
             count: histogram.len(),

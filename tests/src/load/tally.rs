@@ -24,7 +24,7 @@ impl Times {
         self.0.saturating_record(us);
     }
 
-    fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         // Both have the same bounds: there is nothing that does not fit.
         let _ = self.0.add(&other.0);
     }

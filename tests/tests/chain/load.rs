@@ -79,6 +79,16 @@ async fn maps_over_http_and_open_inference_are_the_engines_too() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_floor_is_measured_without_a_service() {
+    let floor = load::floor(0.4).await.unwrap();
+    let (sleeps, exchange) = (floor.sleeps_late_us, floor.exchange_us);
+    assert!(sleeps.count > 10 && exchange.count > 1, "{floor}");
+    assert!(exchange.p50 > 0 && exchange.p50 <= exchange.max, "{floor}");
+    let [one, two] = floor.sleeps_late_percent;
+    assert!((0.0..=100.0).contains(&two) && two <= one && one <= 100.0, "{floor}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn misses_are_counted_and_judged() {
     let models = models();
     let service = Service::on(models.path()).await;
