@@ -4,6 +4,8 @@ use std::{borrow::Cow, fs, io, path::Path};
 
 use sha2::{Digest, Sha256};
 
+use crate::{StartError, config::Config};
+
 /// The shipped models, cards, atlas and replay, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
@@ -24,8 +26,20 @@ pub(crate) struct Assets {
 }
 
 impl Assets {
+    /// The files that `config` names: its folder's, or else those built into the binary.
+    ///
+    /// # Errors
+    /// The folder cannot be read.
+    pub(crate) fn of(config: &Config) -> Result<Self, StartError> {
+        match &config.models {
+            Some(folder) => Self::from_folder(folder)
+                .map_err(|source| StartError::Folder { folder: folder.clone(), source }),
+            None => Ok(Self::embedded()),
+        }
+    }
+
     /// The files built into the binary.
-    pub(crate) fn embedded() -> Self {
+    fn embedded() -> Self {
         let files = MODELS.iter().map(|&(name, bytes)| (name.to_owned(), Cow::Borrowed(bytes)));
         Self { origin: "the binary".to_owned(), files: files.collect() }
     }
@@ -34,7 +48,7 @@ impl Assets {
     ///
     /// # Errors
     /// The folder or one of its files cannot be read.
-    pub(crate) fn from_folder(folder: &Path) -> io::Result<Self> {
+    fn from_folder(folder: &Path) -> io::Result<Self> {
         let mut files = Vec::new();
         for entry in fs::read_dir(folder)? {
             let path = entry?.path();

@@ -6,12 +6,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::{
-    StartError, assets::Assets, config::Config, gate::Gate, golden, models::Catalogue, speed, tls,
+    StartError, assets::Assets, config::Config, gate::Gate, golden, models::Catalogue, net, speed,
+    tls,
 };
 
 /// Bytes one connection, one session and one posted map can hold at most; see
 /// docs/operating.md.
-const PER_CONNECTION: usize = 128 * 1024 + 2 * 512 * 1024;
+const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
@@ -88,7 +89,8 @@ pub fn check(config: &Config) -> Report {
         Ok(gate) => report.good("tokens", gate.describe(), Value::Null),
         Err(error) => report.bad("tokens", 2, &error),
     }
-    match load(config) {
+    let assets = Assets::of(config);
+    match assets.and_then(|a| Catalogue::load(&a, config.default_tier.as_deref(), None)) {
         Ok(catalogue) => look_at_models(&mut report, config, &catalogue),
         Err(error) => report.bad("models", error.exit_code(), &error),
     }
@@ -103,15 +105,6 @@ pub fn check(config: &Config) -> Report {
     let detail = format!("clients can make it hold {} MiB at most, beside the models", bytes >> 20);
     report.good("memory", detail, json!({"clients_bytes_max": bytes}));
     report
-}
-
-fn load(config: &Config) -> Result<Catalogue, StartError> {
-    let assets = match &config.models {
-        Some(folder) => Assets::from_folder(folder)
-            .map_err(|source| StartError::Folder { folder: folder.clone(), source })?,
-        None => Assets::embedded(),
-    };
-    Catalogue::load(&assets, config.default_tier.as_deref(), None)
 }
 
 fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {

@@ -116,11 +116,7 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
 type Loaded = (Arc<Catalogue>, Arc<Metrics>, Pool);
 
 fn load(config: &Config) -> Result<Loaded, StartError> {
-    let assets = match &config.models {
-        Some(folder) => Assets::from_folder(folder)
-            .map_err(|source| StartError::Folder { folder: folder.clone(), source })?,
-        None => Assets::embedded(),
-    };
+    let assets = Assets::of(config)?;
     let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref(), None)?);
     // Before the threads start: they would take time from what is measured.
     speed::calibrate(&catalogue, config.calibration())?;

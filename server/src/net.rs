@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
-const BUFFER_MAX: usize = 128 * 1024;
+pub(crate) const BUFFER_MAX: usize = 128 * 1024;
 
 /// Pause after a failed accept: the usual cause, no free file descriptors, passes.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
@@ -38,7 +38,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 /// Room of the system for each direction of a connection, bytes: more than the largest frame (196 KiB).
 /// Linux begins with 128 KiB, so that a sender of f32 maps waits for room in the middle of a frame;
 /// about one in a hundred then came 20 ms late, when the delayed acknowledgement ran out.
-const SOCKET_BUFFER: u32 = 512 * 1024;
+pub(crate) const SOCKET_BUFFER: u32 = 512 * 1024;
 
 /// Connections that may wait to be accepted.
 const BACKLOG: u32 = 1024;

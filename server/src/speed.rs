@@ -151,11 +151,9 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
 
 fn runs(tier: &Tier, share: Duration) -> Result<Vec<Duration>, StartError> {
     let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
-    let mut session = tier.model.session().map_err(failed)?;
     let [mut pressure_pa, mut sed_j_per_m3] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
-    round_press(tier.pressure_max_pa, &mut pressure_pa);
     let begun = Instant::now();
-    session.infer(&pressure_pa, &mut sed_j_per_m3).map_err(failed)?;
+    let mut session = tier.warm_session(&mut pressure_pa, &mut sed_j_per_m3)?;
     let mut times = Vec::new();
     while times.len() < RUNS_MIN || (times.len() < RUNS_MAX && begun.elapsed() < share) {
         let start = Instant::now();

@@ -11,7 +11,7 @@ use axum::{
     extract::{MatchedPath, Request, State},
     http::{HeaderMap, HeaderValue, Method, StatusCode, header},
     middleware::Next,
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use papilla_proto::{ErrorCode, Problem};
 
@@ -24,8 +24,6 @@ use crate::{
     config::{Config, SettingError},
     http,
     metrics::Shed,
-    oip::OipProblem,
-    problem::HttpProblem,
     telemetry,
 };
 
@@ -156,7 +154,7 @@ pub(crate) async fn guard(
     let start = Instant::now();
     let route = request.extensions().get::<MatchedPath>();
     let route = route.and_then(|path| http::known_route(path.as_str())).unwrap_or("other");
-    let is_oip = http::is_oip(request.uri().path());
+    let uri = request.uri().clone();
     let span = telemetry::request_span(request.method(), route);
     let response = match app.gate.admit(&mut request, route) {
         Ok(Entry::Pass) => telemetry::within(&span, next.run(request)).await,
@@ -165,12 +163,7 @@ pub(crate) async fn guard(
             if problem.code == ErrorCode::RateLimited {
                 app.metrics.shed(Shed::Rate);
             }
-            app.metrics.error(problem.code);
-            if is_oip {
-                OipProblem(problem).into_response()
-            } else {
-                HttpProblem(problem).into_response()
-            }
+            http::refusal(&app, &uri, problem)
         }
     };
     telemetry::answered(&span, response.status());

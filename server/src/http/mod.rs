@@ -86,7 +86,7 @@ pub(crate) fn known_route(path: &str) -> Option<&'static str> {
 }
 
 /// Whether the path belongs to the Open Inference Protocol, whose errors look otherwise.
-pub(crate) fn is_oip(path: &str) -> bool {
+fn is_oip(path: &str) -> bool {
     path == "/v2" || path.starts_with("/v2/")
 }
 
@@ -120,15 +120,16 @@ pub(crate) fn router(app: Arc<App>, origins: &[String], xr_dir: Option<&Path>) -
 
 async fn not_found(State(app): Shared, uri: Uri) -> Response {
     let message = format!("there is nothing at {}", uri.path());
-    astray(&app, &uri, Problem::new(ErrorCode::NotFound, message))
+    refusal(&app, &uri, Problem::new(ErrorCode::NotFound, message))
 }
 
 async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Response {
     let message = format!("{} does not take {method}", uri.path());
-    astray(&app, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
+    refusal(&app, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
 }
 
-fn astray(app: &App, uri: &Uri, problem: Problem) -> Response {
+/// Counts a refusal that no handler made, in the words of the protocol of its path.
+pub(crate) fn refusal(app: &App, uri: &Uri, problem: Problem) -> Response {
     app.metrics.error(problem.code);
     if is_oip(uri.path()) {
         OipProblem(problem).into_response()

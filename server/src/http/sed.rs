@@ -29,16 +29,21 @@ use crate::{
 const POOL_PATIENCE: Duration = Duration::from_secs(60);
 
 pub(super) async fn post(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
-    match render(&app, &uri, &headers, body).await {
-        Ok(response) => {
-            app.metrics.of(Transport::Http).ok.inc();
-            Ok(response)
+    let result = render(&app, &uri, &headers, body).await;
+    count(&app, Transport::Http, &result);
+    result.or_else(|problem| refuse(&app, problem))
+}
+
+/// Counts what became of a posted map; late ones were counted where they were found late.
+pub(crate) fn count(app: &App, transport: Transport, result: &Result<Response, Problem>) {
+    let outcomes = app.metrics.of(transport);
+    match result {
+        Ok(_) => {
+            outcomes.ok.inc();
         }
-        Err(problem) => {
-            if problem.code != ErrorCode::Late {
-                app.metrics.of(Transport::Http).error.inc();
-            }
-            refuse(&app, problem)
+        Err(problem) if problem.code == ErrorCode::Late => {}
+        Err(_) => {
+            outcomes.error.inc();
         }
     }
 }

@@ -5,7 +5,7 @@ mod load;
 use std::sync::{Arc, atomic::AtomicUsize};
 
 use bytes::Bytes;
-use papilla_engine::{Ladder, Model, card::Index, ladder::Kind};
+use papilla_engine::{Ladder, Model, Session, card::Index, ladder::Kind};
 use papilla_proto::{
     ErrorCode, Problem,
     atlas::{Atlas, Patch, Raster},
@@ -18,7 +18,7 @@ use crate::{
     assets::Assets,
     effects,
     replay::Replay,
-    speed::{Overhead, Speed},
+    speed::{Overhead, Speed, round_press},
 };
 
 /// One way of getting a SED map: a model, and what is known of it.
@@ -48,6 +48,25 @@ pub(crate) struct Tier {
     pub(crate) sessions: Arc<AtomicUsize>,
     /// A reload found it gone: sessions that have it go on, nobody else gets it.
     pub(crate) retired: bool,
+}
+
+impl Tier {
+    /// A session that has rendered a round press: the memory that frames will use has been
+    /// touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold press and answer.
+    ///
+    /// # Errors
+    /// The tier does not run.
+    pub(crate) fn warm_session(
+        &self,
+        pressure_pa: &mut [f32],
+        sed_j_per_m3: &mut [f32],
+    ) -> Result<Box<dyn Session>, StartError> {
+        let failed = |source| StartError::Engine { tier: self.name.clone(), source };
+        let mut session = self.model.session().map_err(failed)?;
+        round_press(self.pressure_max_pa, pressure_pa);
+        session.infer(pressure_pa, sed_j_per_m3).map_err(failed)?;
+        Ok(session)
+    }
 }
 
 /// All there is to render with and to show.

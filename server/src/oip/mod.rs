@@ -27,7 +27,7 @@ use crate::{
     codec::{Input, Output},
     http::{
         Shared, body, json_answer,
-        sed::{label_times, through_pool},
+        sed::{count, label_times, through_pool},
     },
     metrics::Transport,
     pool::Job,
@@ -124,18 +124,9 @@ fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
 }
 
 pub(crate) async fn infer(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
-    match answer(&app, &uri, &headers, body).await {
-        Ok(response) => {
-            app.metrics.of(Transport::Oip).ok.inc();
-            Ok(response)
-        }
-        Err(problem) => {
-            if problem.code != ErrorCode::Late {
-                app.metrics.of(Transport::Oip).error.inc();
-            }
-            refuse(&app, problem)
-        }
-    }
+    let result = answer(&app, &uri, &headers, body).await;
+    count(&app, Transport::Oip, &result);
+    result.or_else(|problem| refuse(&app, problem))
 }
 
 async fn answer(

@@ -11,7 +11,7 @@ use std::sync::{
 use papilla_engine::Session;
 use papilla_proto::MAP_LEN;
 
-use crate::{StartError, models::Catalogue, speed::round_press};
+use crate::{StartError, models::Catalogue};
 
 /// New sessions, each with its tier's place.
 type Sessions = Vec<(usize, Box<dyn Session>)>;
@@ -84,10 +84,7 @@ impl Exchange {
         for _ in &self.inboxes {
             let mut sessions = Sessions::new();
             for (place, tier) in catalogue.tiers.iter().enumerate().filter(|(i, _)| fresh(*i)) {
-                let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
-                let mut session = tier.model.session().map_err(failed)?;
-                round_press(tier.pressure_max_pa, &mut pressure_pa);
-                session.infer(&pressure_pa, &mut sed_j_per_m3).map_err(failed)?;
+                let session = tier.warm_session(&mut pressure_pa, &mut sed_j_per_m3)?;
                 sessions.push((place, session));
             }
             all.push(sessions);

@@ -22,7 +22,6 @@ use crate::{
     metrics::Metrics,
     models::Catalogue,
     problem,
-    speed::round_press,
 };
 
 /// Everything a thread owns; nothing is allocated after `prepare`.
@@ -48,18 +47,11 @@ impl Worker {
             pressure_pa: vec![0.0; MAP_LEN],
             sed_j_per_m3: vec![0.0; MAP_LEN],
         };
-        for (index, tier) in catalogue.tiers.iter().enumerate() {
-            let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
-            worker.sessions.push(tier.model.session().map_err(failed)?);
-            worker.warm_up(index).map_err(failed)?;
+        for tier in &catalogue.tiers {
+            let session = tier.warm_session(&mut worker.pressure_pa, &mut worker.sed_j_per_m3)?;
+            worker.sessions.push(session);
         }
         Ok(worker)
-    }
-
-    /// Runs the tier on a round press: it touches the memory that frames will use.
-    fn warm_up(&mut self, index: usize) -> Result<(), papilla_engine::EngineError> {
-        round_press(self.catalogue.tiers[index].pressure_max_pa, &mut self.pressure_pa);
-        self.sessions[index].infer(&self.pressure_pa, &mut self.sed_j_per_m3)
     }
 
     /// Serves the queue until it is closed and empty.

@@ -98,9 +98,10 @@ impl Reloader {
     }
 
     fn replace(&self, running: &ArcSwap<Catalogue>) -> Result<Changes, ReloadError> {
-        let folder = self.config.models.as_ref().ok_or(ReloadError::Embedded)?;
-        let assets = Assets::from_folder(folder)
-            .map_err(|source| StartError::Folder { folder: folder.clone(), source })?;
+        if self.config.models.is_none() {
+            return Err(ReloadError::Embedded);
+        }
+        let assets = Assets::of(&self.config)?;
         let old = running.load_full();
         let new = Catalogue::load(&assets, self.config.default_tier.as_deref(), Some(&old))?;
         if new.atlas.hash() != old.atlas.hash() {

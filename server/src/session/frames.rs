@@ -211,12 +211,8 @@ impl Session {
         let metrics = Arc::clone(&line.app.metrics);
         let (mut bytes, scale) = match done.outcome {
             Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
-            Outcome::Map { .. } => {
-                metrics.late(Transport::Session, Stage::Sending);
-                let late = FrameStatus::Late;
-                return self.answer_short(line, &header, done.tier, late, done.received).await;
-            }
-            Outcome::Late(stage) => {
+            outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
+                let stage = if let Outcome::Late(stage) = outcome { stage } else { Stage::Sending };
                 metrics.late(Transport::Session, stage);
                 let late = FrameStatus::Late;
                 return self.answer_short(line, &header, done.tier, late, done.received).await;
