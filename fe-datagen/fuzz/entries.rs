@@ -11,7 +11,7 @@ use fe_datagen::{
 };
 
 /// A scene file: refused with words, or it can be written again and is the same scene.
-pub fn scene(data: &[u8]) {
+pub(crate) fn scene(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let path = Path::new("fuzz.toml");
     let scene = match Scene::parse(path, text.to_owned()) {
@@ -28,7 +28,7 @@ pub fn scene(data: &[u8]) {
 
 /// A mesh file: refused with words, or a mesh whose every index is inside and whose elements are
 /// measured or refused.
-pub fn msh(data: &[u8]) {
+pub(crate) fn msh(data: &[u8]) {
     let text = String::from_utf8_lossy(data);
     let mesh = match gmsh::read(&text) {
         Ok(mesh) => mesh,

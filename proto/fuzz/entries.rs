@@ -13,7 +13,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 /// A binary frame: what decodes encodes to the bytes that it came from, and its payload is taken
 /// or refused, never misread.
-pub fn frame(data: &[u8]) {
+pub(crate) fn frame(data: &[u8]) {
     let sequence = FrameHeader::peek_sequence(data);
     let header = match FrameHeader::decode(data) {
         Ok(header) => header,
@@ -70,7 +70,7 @@ fn check(range: PressureRange, map: &[f32]) {
 }
 
 /// The text of a session, either way: what is read can be said again and means the same.
-pub fn session(data: &[u8]) {
+pub(crate) fn session(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     says_the_same::<ClientMessage>(text);
     says_the_same::<ServerMessage>(text);
@@ -88,7 +88,7 @@ fn says_the_same<M: Serialize + DeserializeOwned + PartialEq + Debug>(text: &str
 
 /// Samples of every type, by any scale and into any window: decoding and encoding again gives
 /// the same units.
-pub fn samples(data: &[u8]) {
+pub(crate) fn samples(data: &[u8]) {
     let Some((head, payload)) = data.split_first_chunk::<13>() else { return };
     let sample_type = SampleType::ALL[usize::from(head[0] % 4)];
     let scale = f32::from_le_bytes([head[1], head[2], head[3], head[4]]);
@@ -116,7 +116,7 @@ pub fn samples(data: &[u8]) {
 }
 
 /// An atlas: what is taken keeps its own rules, and can be drawn and read.
-pub fn atlas(data: &[u8]) {
+pub(crate) fn atlas(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let atlas = match Atlas::from_json(text) {
         Ok(atlas) => atlas,

@@ -168,3 +168,6 @@ fn wrong_shape(rows: usize, columns: usize) -> Problem {
     );
     Problem::new(ErrorCode::WrongShape, message)
 }
+
+#[cfg(test)]
+mod tests;

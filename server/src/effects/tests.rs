@@ -5,10 +5,11 @@ use papilla_proto::{
     MAP_SIDE_PX, Summary,
     atlas::{Atlas, Patch, PatchVertices, Raster},
     effects::{
-        Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place,
+        Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place, PronyTerm,
         Relaxation as RelaxationParameters,
     },
 };
+use proptest::prelude::*;
 
 use super::*;
 use crate::{replay::Replay, speed::Overhead};
@@ -212,4 +213,45 @@ fn every_effect_has_a_cost() {
     assert!(costs.iter().all(|cost| cost.us.is_finite()), "{costs:?}");
     let window = costs.iter().find(|c| c.effect == RuntimeEffect::ContactWindow).unwrap();
     assert_eq!(catalogue.runtime.cost_us(&[window.effect]), window.us.ceil() as u64);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Whatever a hello asks for and whatever its clock does: refused, or all that is written is
+    /// numbers, and creep stays between its limits.
+    #[test]
+    fn no_parameter_and_no_clock_makes_an_answer_that_is_no_number(
+        prony in prop::collection::vec((1e-3_f64..0.6, -7.0_f64..7.0), 1..4),
+        rates in prop::collection::vec(-3.0_f32..40.0, 4),
+        gain in prop_oneof![0.0_f32..10.0, Just(f32::MAX)],
+        times_us in prop::collection::vec(any::<u64>(), 6),
+        pressure_pa in prop_oneof![Just(0.0_f32), 1e-40_f32..1e-30, 1.0_f32..5e5],
+    ) {
+        let terms = prony.iter().map(|&(g, power)| PronyTerm { g, tau_s: 10f64.powf(power) });
+        let prony = Some(terms.collect());
+        let [e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa] =
+            [0, 1, 2, 3].map(|i| 10f32.powf(rates[i]));
+        let wish = Hello {
+            relaxation: Some(RelaxationParameters { prony, ..Default::default() }),
+            afferents: Some(AfferentParameters {
+                e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa,
+            }),
+            points: Some(vec![Place::Px([100.5, 100.5])]),
+            actuators: Some(Layout { gain: Some(gain), ..display() }),
+            ..hello(&["relaxation", "afferents", "points", "actuators", "summary"])
+        };
+        let Ok(Some(mut effects)) = Effects::of(&wish, &catalogue()) else { return Ok(()) };
+        for time_us in times_us {
+            let mut map = vec![pressure_pa; MAP_LEN];
+            let peak_pa = effects.before(&mut map, time_us).unwrap();
+            prop_assert!((0.0..=100.1 * pressure_pa + 0.1).contains(&peak_pa), "{peak_pa}");
+            prop_assert!(map.iter().all(|p| p.is_finite() && *p >= 0.0));
+            let sed: Vec<f32> = map.iter().map(|p| p * p).collect();
+            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            effects.write(&map, &sed, 1.0, time_us, &mut bytes).unwrap();
+            let found = floats(&bytes[HEADER_LEN_V2..]);
+            prop_assert!(found.iter().all(|v| v.is_finite()), "{:?}", &found[..24]);
+        }
+    }
 }

@@ -360,8 +360,10 @@ async fn what_is_not_websocket_ends_the_session_with_the_code_for_it() {
     }
     // Lengths that no memory could hold, and messages that grow piece by piece.
     let huge = [&[last(opcode::BINARY), 0x80 | 127][..], &(1_u64 << 62).to_be_bytes(), &[0; 4]];
-    let piece =
-        [ws(opcode::BINARY, &[0; 60_000]), ws(opcode::CONTINUATION, &[0; 60_000]).repeat(20)];
+    let piece = [
+        ws(opcode::BINARY, &vec![0; 60_000]),
+        ws(opcode::CONTINUATION, &vec![0; 60_000]).repeat(20),
+    ];
     for bytes in [huge.concat(), piece.concat()] {
         let mut raw = Raw::open(service.address, &small_hello()).await;
         let _ = raw.stream.write_all(&bytes).await;
@@ -434,7 +436,7 @@ fn reconnects() -> u32 {
 
 /// Connects once and leaves in one of seven ways.
 async fn come_and_go(address: SocketAddr, n: u32) {
-    if n % 7 == 0 {
+    if n.is_multiple_of(7) {
         // Half a handshake.
         let mut stream = TcpStream::connect(address).await.unwrap();
         stream.write_all(&HANDSHAKE.as_bytes()[..40]).await.unwrap();

@@ -106,10 +106,33 @@ fn bytes_behind_the_json_are_the_map() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
     #[test]
     fn no_body_panics(text in "[\\[\\]{}\",:a-z0-9 .-]{0,200}", length in 0_usize..300) {
         let body = Bytes::from(text);
         let length = (length <= body.len()).then_some(length);
         prop_assert!(read(&body, length).is_err());
+    }
+
+    #[test]
+    fn maps_come_through_as_they_were(seed in any::<u64>(), depth in 0_usize..3) {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let map: Vec<f32> = (0..MAP_LEN).map(|_| random.f32() * 1e5).collect();
+        let bytes: Vec<u8> = map.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let rows: Vec<_> = map.chunks(224).map(<[f32]>::to_vec).collect();
+        let data = match depth {
+            0 => json!(map),
+            1 => json!(rows),
+            _ => json!([[rows]]),
+        };
+        let (_, found) = read_json(&input(&json!({"data": data}))).unwrap();
+        prop_assert!(found == bytes, "in digits");
+        let head = input(&json!({"parameters": {"binary_data_size": MAP_LEN * 4}})).to_string();
+        let body = Bytes::from([head.as_bytes(), &bytes].concat());
+        let (_, found) = read(&body, Some(head.len())).unwrap();
+        prop_assert!(found == bytes, "as bytes");
+        let short = random.usize(..body.len());
+        prop_assert!(read(&body.slice(..short), Some(head.len().min(short))).is_err());
     }
 }

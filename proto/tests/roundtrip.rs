@@ -1,0 +1,147 @@
+//! Messages and summaries with every member there is: what is written is read back.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+use papilla_proto::{
+    ClientMessage, Hello, Ready, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage, Summary,
+    effects::{
+        Actuator, ActuatorInput, Afferents, ContactWindow, Layout, Moduli, OutOfRange, Place,
+        PronyTerm, Relaxation, Section, SectionName, Tissue,
+    },
+};
+use proptest::prelude::*;
+
+fn number() -> impl Strategy<Value = f32> {
+    prop_oneof![Just(0.0), Just(-0.0), Just(1e-40), Just(f32::MAX), -1e6_f32..1e6]
+}
+
+fn place() -> impl Strategy<Value = Place> {
+    prop_oneof![
+        prop::array::uniform2(number()).prop_map(Place::Px),
+        prop::array::uniform3(number()).prop_map(Place::Mm),
+    ]
+}
+
+fn layout() -> impl Strategy<Value = Layout> {
+    let own = || prop::option::of(number());
+    let actuator = (place(), own(), own(), own())
+        .prop_map(|(at, radius_mm, gain, threshold)| Actuator { at, radius_mm, gain, threshold });
+    let input = prop::sample::select(vec![ActuatorInput::Sed, ActuatorInput::Sa1Rate]);
+    (prop::collection::vec(actuator, 0..4), input, own(), own(), number(), number()).prop_map(
+        |(actuators, input, radius_mm, gain, threshold, max)| Layout {
+            actuators,
+            input,
+            radius_mm,
+            gain,
+            threshold,
+            max,
+        },
+    )
+}
+
+fn relaxation() -> impl Strategy<Value = Relaxation> {
+    let term = (any::<f64>(), any::<f64>())
+        .prop_filter("JSON has no word for them", |(g, tau_s)| g.is_finite() && tau_s.is_finite());
+    let term = term.prop_map(|(g, tau_s)| PronyTerm { g, tau_s });
+    (
+        prop::option::of(prop::collection::vec(term, 0..7)),
+        prop::sample::select(vec![Tissue::Skin, Tissue::Subcutaneous]),
+        prop::sample::select(vec![Moduli::Instantaneous, Moduli::LongTerm]),
+    )
+        .prop_map(|(prony, tissue, moduli)| Relaxation { tissue, prony, moduli })
+}
+
+fn hello() -> impl Strategy<Value = Hello> {
+    let old = (
+        any::<u32>(),
+        prop::collection::vec(".{0,12}", 0..4),
+        any::<Option<u32>>(),
+        prop::option::of(".{0,20}"),
+        prop::sample::select(SampleType::ALL.to_vec()),
+        prop::option::of(number()),
+        prop::option::of("[0-9a-f]{64}"),
+    );
+    let new = (
+        prop::option::of(prop::sample::select(SampleType::ALL.to_vec())),
+        any::<Option<bool>>(),
+        prop::option::of(number()),
+        prop::option::of(prop::sample::select(vec![OutOfRange::Refuse, OutOfRange::Flag])),
+        any::<Option<u32>>(),
+        prop::option::of(any::<u16>().prop_map(|margin_px| ContactWindow { margin_px })),
+        prop::option::of(prop::collection::vec(place(), 0..5)),
+        prop::option::of(layout()),
+        prop::option::of(prop::array::uniform4(number())),
+        prop::option::of(relaxation()),
+    );
+    (old, new).prop_map(|(old, new)| Hello {
+        version: old.0,
+        effects: old.1,
+        budget_us: old.2,
+        tier: old.3,
+        sample_type: old.4,
+        pressure_scale_pa: old.5,
+        atlas_hash: old.6,
+        answer_sample_type: new.0,
+        map: new.1,
+        contact_pa: new.2,
+        out_of_range: new.3,
+        stale_after_us: new.4,
+        contact_window: new.5,
+        points: new.6,
+        actuators: new.7,
+        afferents: new.8.map(|[e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa]| {
+            Afferents { e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa }
+        }),
+        relaxation: new.9,
+    })
+}
+
+proptest! {
+    #[test]
+    fn hellos_with_every_member_come_back(hello in hello()) {
+        let message = ClientMessage::Hello(hello);
+        let text = serde_json::to_string(&message).unwrap();
+        prop_assert_eq!(serde_json::from_str::<ClientMessage>(&text).unwrap(), message);
+    }
+
+    #[test]
+    fn readies_come_back(
+        names in prop::collection::vec(".{0,12}", 3),
+        numbers in any::<(u64, u64, Option<u32>, Option<bool>, Option<u16>)>(),
+        scales in (number(), number()),
+        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=6)),
+        offset in any::<u32>(),
+    ) {
+        let section = Section { name: SectionName::Points, offset, bytes: 8 };
+        let message = ServerMessage::Ready(Ready {
+            version: 2,
+            session: numbers.0,
+            tier: names[0].clone(),
+            effects: vec![names[1].clone()],
+            atlas_hash: names[2].clone(),
+            predicted_latency_us: numbers.1,
+            budget_us: numbers.2,
+            meets_budget: numbers.3,
+            width: 224,
+            height: 224,
+            sample_type: SampleType::U8,
+            pressure_max_pa: scales.0,
+            sed_scale_j_per_m3: scales.1,
+            tier_number: numbers.4,
+            answer_sample_type: Some(SampleType::F16),
+            session_effects: effects,
+            sections: Some(vec![section]),
+        });
+        let text = serde_json::to_string(&message).unwrap();
+        prop_assert_eq!(serde_json::from_str::<ServerMessage>(&text).unwrap(), message);
+    }
+
+    #[test]
+    fn summaries_come_back_bit_for_bit(bytes in prop::collection::vec(any::<u8>(), 0..100)) {
+        match Summary::decode(&bytes) {
+            Some(summary) => prop_assert_eq!(&summary.encode()[..], &bytes[..SUMMARY_LEN]),
+            None => prop_assert!(bytes.len() < SUMMARY_LEN),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Every form of a map: what is written is read back, and no bytes make a panic.
+
+use papilla_proto::SampleType;
+use proptest::prelude::*;
+
+use super::*;
+
+/// Maps of all magnitudes that a pressure may have, zero, denormals and the greatest among them.
+fn any_map() -> impl Strategy<Value = Vec<f32>> {
+    let value = prop_oneof![
+        Just(0.0_f32),
+        Just(1e-40_f32),
+        Just(f32::MIN_POSITIVE),
+        1e-30_f32..1.0,
+        1.0_f32..1e5,
+        Just(f32::MAX),
+    ];
+    (prop::collection::vec(value, 1..40), any::<u64>()).prop_map(|(values, seed)| {
+        let mut random = fastrand::Rng::with_seed(seed);
+        (0..MAP_LEN).map(|_| values[random.usize(..values.len())]).collect()
+    })
+}
+
+fn written(output: Output, values: &[f32], value_max: f32) -> (BytesMut, f32) {
+    let mut bytes = BytesMut::new();
+    let map = Map { quantity: Quantity::Pressure, values, value_max, source: "test" };
+    let scale = encode(output, map, &mut bytes).unwrap();
+    (bytes, scale)
+}
+
+fn read(input: Input, bytes: &[u8]) -> Result<Vec<f32>, Problem> {
+    let mut map = vec![f32::NAN; MAP_LEN];
+    decode(input, bytes, &mut map).map(|()| map)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn exact_forms_come_back_bit_for_bit(map in any_map()) {
+        let raw = Input::Samples { sample_type: SampleType::F32, scale: 1.0 };
+        for (output, input) in [
+            (Output::Samples(SampleType::F32), raw),
+            (Output::Npy, Input::Npy),
+            (Output::Json, Input::Json),
+        ] {
+            let (bytes, _) = written(output, &map, 1.0);
+            let back = read(input, &bytes).unwrap();
+            let same = back.iter().zip(&map).all(|(a, b)| a.to_bits() == b.to_bits());
+            prop_assert!(same, "{output:?}");
+        }
+    }
+
+    #[test]
+    fn coarse_forms_come_back_within_half_a_unit(map in any_map(), value_max in 1e-3_f32..1e6) {
+        let map: Vec<f32> = map.iter().map(|v| v.min(1e6)).collect();
+        for sample_type in [SampleType::U16, SampleType::U8] {
+            let (bytes, scale) = written(Output::Samples(sample_type), &map, value_max);
+            let back = read(Input::Samples { sample_type, scale }, &bytes).unwrap();
+            for (a, b) in map.iter().zip(&back) {
+                prop_assert!((a - b).abs() <= sample_type.error_max(*a, scale), "{a} became {b}");
+            }
+        }
+        let (bytes, white) = written(Output::Png, &map, value_max);
+        let back = read(Input::Png { pressure_max_pa: white }, &bytes).unwrap();
+        let unit = white / 65_535.0;
+        for (a, b) in map.iter().zip(&back) {
+            prop_assert!((a - b).abs() <= SampleType::U16.error_max(*a, unit), "{a} became {b}");
+        }
+    }
+
+    #[test]
+    fn files_that_are_cut_or_changed_are_read_or_refused(
+        map in any_map(), cut in 0.0_f64..1.0, flips in prop::collection::vec(any::<u64>(), 0..4),
+    ) {
+        for (output, input) in [
+            (Output::Npy, Input::Npy),
+            (Output::Json, Input::Json),
+            (Output::Png, Input::Png { pressure_max_pa: 1e4 }),
+        ] {
+            let (mut bytes, _) = written(output, &map, 1.0);
+            for flip in &flips {
+                let at = (*flip / 8 % bytes.len() as u64) as usize;
+                bytes[at] ^= 1 << (flip % 8);
+            }
+            if let Err(problem) = read(input, &bytes) {
+                prop_assert!((400..500).contains(&problem.code.http_status()), "{problem}");
+            }
+            let short = (cut * (bytes.len() - 1) as f64) as usize;
+            // A PNG without its end is whole once all of its rows are there.
+            prop_assert!(read(input, &bytes[..short]).is_err() || output == Output::Png);
+        }
+    }
+}
