@@ -1,7 +1,7 @@
 // A finger that touches objects: penetration -> pressure (elastic foundation) -> the server -> SED, painted on the finger.
 
 import {
-  CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+  CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
 import { Atlas, Papilla, SUMMARY } from '../papilla.js';
 import { Finger } from './finger.js';
@@ -33,8 +33,9 @@ class Board {
     this.canvas.width = 512;
     this.canvas.height = 96;
     this.texture = new CanvasTexture(this.canvas);
+    this.texture.colorSpace = SRGBColorSpace;
     this.mesh = new Mesh(new PlaneGeometry(0.8, 0.15), new MeshBasicMaterial({ map: this.texture }));
-    this.mesh.position.set(0, 1.18, -1.4);
+    this.mesh.position.set(0, 1.08, -1.4);
   }
 
   /** @param {string} text */
