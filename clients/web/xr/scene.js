@@ -112,7 +112,7 @@ async function start() {
   let late = 0;
   const session = new Papilla('', hello);
   scene.userData.camera = camera;
-  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, isPresenting: false };
+  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, frames: 0, isPresenting: false };
   session.onstate = (now, why) => { element('state').textContent = why ? `${now}: ${why}` : now; };
   session.onready = (ready) => { element('state').textContent = `ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a map`; };
   session.onanswer = (answer) => {
@@ -153,6 +153,7 @@ async function start() {
       board.write(text);
     }
     renderer.render(scene, camera);
+    state.frames++;
   });
   await offerVr(renderer);
   return state;
