@@ -1,5 +1,8 @@
 // A session that keeps itself connected: docs/protocol.md, version 2.
 
+import { PapillaError, missed, refusal } from './error.js';
+import { Sequences } from './sequences.js';
+import { crop, greatest } from './window.js';
 import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js';
 
 /** @typedef {import('./types.js').Hello} Hello */
@@ -20,17 +23,6 @@ const DRAIN_MS = 1;
 const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
 
 const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
-
-/** A refusal by the server, or a fault of the session. */
-export class PapillaError extends Error {
-  /** @param {Problem} problem */
-  constructor(problem) {
-    super(`${problem.code}: ${problem.message}`);
-    this.name = 'PapillaError';
-    this.code = problem.code;
-    this.problem = problem;
-  }
-}
 
 /**
  * Address of the sessions of a server.
@@ -74,6 +66,7 @@ export class Papilla {
   answer = new Answer();
 
   #frame = new RequestFrame();
+  #rectangle = { column: 0, row: 0, width: 0, height: 0 };
   #options;
   #url;
   /** @type {Hello} */ #hello;
@@ -82,8 +75,7 @@ export class Papilla {
   /** @type {WebSocket | null} */ #socket = null;
   #sequence = 0;
   #waits = false;
-  #outstanding = new Uint32Array(OUTSTANDING_MAX);
-  #outstandingCount = 0;
+  #outstanding = new Sequences(OUTSTANDING_MAX);
   #drainTimer = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #timer;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
@@ -161,21 +153,8 @@ export class Papilla {
   send(pressurePa) {
     if (pressurePa.length !== MAP_LEN) throw refusal('wrong_length', `a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
     if (!this.#options.crop) return this.#put(pressurePa, 0, SIDE_PX, 0, 0, SIDE_PX, SIDE_PX);
-    let top = 0;
-    let end = MAP_LEN - 1;
-    while (top < MAP_LEN && pressurePa[top] === 0) top++;
-    if (top === MAP_LEN) return this.#put(pressurePa, 0, 0, 0, 0, 0, 0);
-    while (pressurePa[end] === 0) end--;
-    const row = (top / SIDE_PX) | 0;
-    const last = (end / SIDE_PX) | 0;
-    let left = SIDE_PX;
-    let right = -1;
-    for (let y = row; y <= last; y++) {
-      const from = y * SIDE_PX;
-      for (let x = 0; x < left; x++) if (pressurePa[from + x] !== 0) { left = x; break; }
-      for (let x = SIDE_PX - 1; x > right; x--) if (pressurePa[from + x] !== 0) { right = x; break; }
-    }
-    return this.#put(pressurePa, row * SIDE_PX + left, SIDE_PX, left, row, right - left + 1, last - row + 1);
+    const { column, row, width, height } = crop(pressurePa, this.#rectangle);
+    return this.#put(pressurePa, row * SIDE_PX + column, SIDE_PX, column, row, width, height);
   }
 
   /**
@@ -250,22 +229,11 @@ export class Papilla {
     else promised.reject(new PapillaError(answer.problem ?? missed(answer.status, answer.sequence)));
   }
 
-  /** Takes the frame out of those without an answer; false if it is none of them. @param {number} sequence */
-  #answered(sequence) {
-    const list = this.#outstanding;
-    for (let k = 0; k < this.#outstandingCount; k++) {
-      if (list[k] !== sequence) continue;
-      list.copyWithin(k, k + 1, this.#outstandingCount--);
-      return true;
-    }
-    return false;
-  }
-
   /** What went out on a lost connection is never answered. @param {boolean} alsoWaiting */
   #loseAll(alsoWaiting) {
-    while (this.#outstandingCount > 0) {
-      const sequence = this.#outstanding[0];
-      this.#answered(sequence);
+    while (this.#outstanding.count > 0) {
+      const sequence = this.#outstanding.first();
+      this.#outstanding.take(sequence);
       this.#settle(sequence, 'lost', null);
     }
     if (!alsoWaiting || !this.#waits) return;
@@ -276,7 +244,7 @@ export class Papilla {
   #flush() {
     const socket = this.#socket;
     if (!this.#waits || !this.ready || !socket || socket.readyState !== WebSocket.OPEN) return;
-    if (this.#outstandingCount === OUTSTANDING_MAX) return;
+    if (this.#outstanding.count === OUTSTANDING_MAX) return;
     if (socket.bufferedAmount > 0) {
       if (!this.#drainTimer) {
         this.#drainTimer = true;
@@ -286,7 +254,7 @@ export class Papilla {
     }
     this.#waits = false;
     this.sent++;
-    this.#outstanding[this.#outstandingCount++] = this.#sequence;
+    this.#outstanding.add(this.#sequence);
     const { buffer, bytes } = this.#frame;
     // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
     socket.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
@@ -368,7 +336,7 @@ export class Papilla {
   #problem(problem) {
     const { sequence } = problem;
     if (typeof sequence === 'number') {
-      if (this.#answered(sequence)) this.#settle(sequence, 'error', problem);
+      if (this.#outstanding.take(sequence)) this.#settle(sequence, 'error', problem);
       return;
     }
     if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
@@ -401,32 +369,10 @@ export class Papilla {
       this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
       return;
     }
-    if (!this.#answered(answer.sequence)) return;
+    if (!this.#outstanding.take(answer.sequence)) return;
     answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
     answer.problem = null;
     this.#flush();
     this.#tell();
   }
-}
-
-/** @param {string} code as the server's @param {string} message */
-const refusal = (code, message) => new PapillaError({ type: 'error', code, message, closes: false });
-
-/** @param {string} code @param {number} sequence @returns {Problem} */
-function missed(code, sequence) {
-  const message = code === 'superseded' ? 'a newer frame took its place' : `the frame was ${code}`;
-  return { type: 'error', code, message, sequence, closes: false };
-}
-
-/**
- * @param {Float32Array} values @param {number} first @param {number} stride
- * @param {number} width @param {number} height
- */
-function greatest(values, first, stride, width, height) {
-  let most = 0;
-  for (let y = 0; y < height; y++) {
-    const from = first + y * stride;
-    for (let x = 0; x < width; x++) if (values[from + x] > most) most = values[from + x];
-  }
-  return most;
 }

@@ -111,7 +111,7 @@ test('in a headset the finger follows the controller, then the hand', async () =
     // The pad over the hard ball, then down by a centimetre of the world at a time until it touches. A tracked hand's
     // fingertip is not where the hand is, so the way is measured from where the pad stands.
     let now = await figures(page);
-    for (let y = 1.25; y > 0.95 && !(now.touched && now.deepestMm > 0.8); y -= 0.01) {
+    for (let y = 1.13; y > 0.95 && !(now.touched && now.deepestMm > 0.8); y -= 0.01) {
       await page.evaluate((height) => {
         const { headset, papillaXr } = /** @type {any} */ (globalThis);
         const pad = papillaXr.mesh.localToWorld(papillaXr.mesh.position.clone().set(9, 0, -6.4));
