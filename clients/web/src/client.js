@@ -1,6 +1,7 @@
 // A session that keeps itself connected: docs/protocol.md, version 2.
 
 import { PapillaError, missed, refusal } from './error.js';
+import { Link } from './link.js';
 import { Sequences } from './sequences.js';
 import { crop, greatest } from './window.js';
 import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js';
@@ -11,12 +12,8 @@ import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js'
 /** @typedef {import('./types.js').State} State */
 /** @typedef {import('./types.js').Options} Options */
 
-/** Attempts to connect are this far apart, with some chance in it. */
-const RETRY_MS = { least: 100, most: 250 };
 /** Frames that may be without an answer at once; the next one waits. */
 const OUTSTANDING_MAX = 1024;
-/** An attempt that has not come to a ready by then is given up. */
-const ATTEMPT_MS = 5000;
 /** How long a frame waits before the socket is looked at again, ms. */
 const DRAIN_MS = 1;
 /** Refusals of a hello that pass by themselves. */
@@ -62,23 +59,22 @@ export class Papilla {
   /** Frames that went out, and frames whose place a newer one took before they could. */
   sent = 0;
   replaced = 0;
-  /** The last answer; overwritten by the next. */
+  /** The last answer of the server; overwritten by the next. */
   answer = new Answer();
 
+  // Of frames without an answer: the last answer must not change while it is being looked at.
+  #brief = new Answer();
   #frame = new RequestFrame();
   #rectangle = { column: 0, row: 0, width: 0, height: 0 };
   #options;
-  #url;
+  #link;
   /** @type {Hello} */ #hello;
   // Terms to go back to if a renewal is refused.
   /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
-  /** @type {WebSocket | null} */ #socket = null;
   #sequence = 0;
   #waits = false;
   #outstanding = new Sequences(OUTSTANDING_MAX);
   #drainTimer = false;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ #timer;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
   // Answers up to the hello of a renewal have the sections of before.
   #termsFrom = 0;
   /** @type {ReturnType<Answer['views']> | null} */ #views = null;
@@ -93,7 +89,13 @@ export class Papilla {
    * @param {Options} [options]
    */
   constructor(base = '', hello = {}, options = {}) {
-    this.#url = sessionUrl(base, options.token);
+    this.#link = new Link(sessionUrl(base, options.token), {
+      connecting: () => this.#enter('connecting', ''),
+      opened: () => this.#greet(),
+      text: (text) => this.#text(text),
+      binary: (data) => this.#binary(data),
+      lost: (why) => this.#lost(why),
+    });
     this.#hello = { ...hello };
     this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
@@ -119,15 +121,12 @@ export class Papilla {
   /** Connects, and again whenever the connection is lost, until `close`. */
   open() {
     this.#opened = true;
-    if (!this.#socket) this.#connect();
+    if (!this.#link.isBusy) this.#link.connect();
   }
 
   /** Ends the session. */
   close() {
-    this.#opened = false;
-    this.#drop();
-    this.#loseAll(true);
-    this.#enter('closed', '');
+    this.#end('closed', '');
   }
 
   /**
@@ -141,8 +140,8 @@ export class Papilla {
     this.#hello = { ...hello };
     this.#termsFrom = (this.#sequence + 1) >>> 0;
     this.ready = null;
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#greet(this.#socket);
-    else if (this.#opened && !this.#socket) this.#connect();
+    if (this.#link.isOpen) this.#greet();
+    else if (this.#opened && !this.#link.isBusy) this.#link.connect();
   }
 
   /**
@@ -212,15 +211,14 @@ export class Papilla {
 
   /** The outcome of a frame of which the server sent no binary answer. @param {number} sequence @param {Answer['status']} status @param {Problem | null} problem */
   #settle(sequence, status, problem) {
-    const { answer } = this;
-    answer.sequence = sequence;
-    answer.status = status;
-    answer.problem = problem;
-    this.#tell();
+    this.#brief.sequence = sequence;
+    this.#brief.status = status;
+    this.#brief.problem = problem;
+    this.#tell(this.#brief);
   }
 
-  #tell() {
-    const { answer } = this;
+  /** @param {Answer} answer */
+  #tell(answer) {
     this.onanswer(answer);
     const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
     if (!promised) return;
@@ -242,10 +240,9 @@ export class Papilla {
   }
 
   #flush() {
-    const socket = this.#socket;
-    if (!this.#waits || !this.ready || !socket || socket.readyState !== WebSocket.OPEN) return;
+    if (!this.#waits || !this.ready || !this.#link.isOpen) return;
     if (this.#outstanding.count === OUTSTANDING_MAX) return;
-    if (socket.bufferedAmount > 0) {
+    if (this.#link.bufferedBytes > 0) {
       if (!this.#drainTimer) {
         this.#drainTimer = true;
         setTimeout(this.#drained, DRAIN_MS);
@@ -257,54 +254,29 @@ export class Papilla {
     this.#outstanding.add(this.#sequence);
     const { buffer, bytes } = this.#frame;
     // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
-    socket.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
+    this.#link.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
   }
 
-  #connect() {
-    clearTimeout(this.#timer);
-    this.#enter('connecting', '');
-    const socket = new WebSocket(this.#url);
-    socket.binaryType = 'arraybuffer';
-    this.#socket = socket;
-    clearTimeout(this.#attempt);
-    this.#attempt = setTimeout(() => this.#lost(socket, `no session within ${ATTEMPT_MS} ms`), ATTEMPT_MS);
-    socket.onopen = () => this.#greet(socket);
-    socket.onmessage = (event) => {
-      if (typeof event.data === 'string') this.#text(event.data);
-      else this.#binary(event.data);
-    };
-    socket.onclose = (event) => this.#lost(socket, event.reason || 'the connection was lost');
-    // The reason is in the close event that follows.
-    socket.onerror = () => {};
+  #greet() {
+    this.#link.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
   }
 
-  /** @param {WebSocket} socket */
-  #greet(socket) {
-    socket.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
-  }
-
-  #drop() {
-    clearTimeout(this.#timer);
-    clearTimeout(this.#attempt);
-    const socket = this.#socket;
-    this.#socket = null;
+  /** @param {string} why */
+  #lost(why) {
     this.ready = null;
     this.#before = null;
-    if (!socket) return;
-    socket.onmessage = socket.onclose = null;
-    // Browsers complain of a socket that is closed while it connects.
-    if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
-    else socket.close();
+    this.#loseAll(false);
+    this.#enter('waiting', why);
   }
 
-  /** @param {WebSocket} socket @param {string} why */
-  #lost(socket, why) {
-    if (socket !== this.#socket) return;
-    this.#drop();
-    this.#loseAll(!this.#opened);
-    if (!this.#opened) return;
-    this.#enter('waiting', why);
-    this.#timer = setTimeout(() => this.#connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
+  /** Ends the connection for good: no frame will be answered. @param {State} state @param {string} why */
+  #end(state, why) {
+    this.#opened = false;
+    this.#link.drop();
+    this.ready = null;
+    this.#before = null;
+    this.#loseAll(true);
+    this.#enter(state, why);
   }
 
   /** @param {State} state @param {string} why */
@@ -322,7 +294,7 @@ export class Papilla {
 
   /** @param {Ready} ready */
   #welcome(ready) {
-    clearTimeout(this.#attempt);
+    this.#link.succeeded();
     this.#viewsBefore = this.#views;
     this.#views = this.answer.views(ready.sections);
     this.#before = null;
@@ -350,10 +322,7 @@ export class Papilla {
       this.#before = null;
       return;
     }
-    this.#opened = false;
-    this.#drop();
-    this.#loseAll(true);
-    this.#enter('refused', problem.message);
+    this.#end('refused', problem.message);
   }
 
   /** @param {ArrayBuffer} data */
@@ -373,6 +342,6 @@ export class Papilla {
     answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
     answer.problem = null;
     this.#flush();
-    this.#tell();
+    this.#tell(answer);
   }
 }
