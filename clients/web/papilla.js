@@ -1,6 +1,7 @@
 // Papilla's client for browsers: sessions, the atlas, pressure from penetration.
 
-export { Papilla, PapillaError } from './src/client.js';
+export { Papilla } from './src/client.js';
+export { PapillaError } from './src/error.js';
 export { postPressure } from './src/http.js';
 export { Atlas } from './src/atlas.js';
 export { Foundation } from './src/foundation.js';

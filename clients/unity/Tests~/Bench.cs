@@ -54,7 +54,7 @@ static class Bench
         for (int k = 0; k < 2000 && answered + missed < count + warm; k++) Thread.Sleep(1);
         client.Dispose();
         var sorted = latencies.Skip(warm).Take(answered - warm).OrderBy(v => v).ToArray();
-        Console.WriteLine("{{\"client\": \"unity{0}\", \"rate_hz\": {1}, \"frames\": {2}, \"missed\": {3}, \"p50_us\": {4}, \"p99_us\": {5}, \"max_us\": {6}, \"allocated_bytes_per_frame\": {7:0.0}, \"collections\": {8}}}",
+        Console.WriteLine("{{\"client\": \"unity{0}\", \"rate_hz\": {1}, \"frames\": {2}, \"missing\": {3}, \"p50_us\": {4}, \"p99_us\": {5}, \"max_us\": {6}, \"allocated_bytes_per_frame\": {7:0.0}, \"collections\": {8}}}",
             isFramework ? "-client-web-socket" : "", rateHz, sorted.Length, missed, sorted[sorted.Length / 2], sorted[(int)(0.99 * sorted.Length)], sorted[sorted.Length - 1], (double)(after - before) / count, collected);
         return 0;
     }

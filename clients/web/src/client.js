@@ -1,5 +1,9 @@
 // A session that keeps itself connected: docs/protocol.md, version 2.
 
+import { PapillaError, missed, refusal } from './error.js';
+import { Link } from './link.js';
+import { Sequences } from './sequences.js';
+import { crop, greatest } from './window.js';
 import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js';
 
 /** @typedef {import('./types.js').Hello} Hello */
@@ -8,29 +12,14 @@ import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js'
 /** @typedef {import('./types.js').State} State */
 /** @typedef {import('./types.js').Options} Options */
 
-/** Attempts to connect are this far apart, with some chance in it. */
-const RETRY_MS = { least: 100, most: 250 };
 /** Frames that may be without an answer at once; the next one waits. */
 const OUTSTANDING_MAX = 1024;
-/** An attempt that has not come to a ready by then is given up. */
-const ATTEMPT_MS = 5000;
 /** How long a frame waits before the socket is looked at again, ms. */
 const DRAIN_MS = 1;
 /** Refusals of a hello that pass by themselves. */
 const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
 
 const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
-
-/** A refusal by the server, or a fault of the session. */
-export class PapillaError extends Error {
-  /** @param {Problem} problem */
-  constructor(problem) {
-    super(`${problem.code}: ${problem.message}`);
-    this.name = 'PapillaError';
-    this.code = problem.code;
-    this.problem = problem;
-  }
-}
 
 /**
  * Address of the sessions of a server.
@@ -70,23 +59,22 @@ export class Papilla {
   /** Frames that went out, and frames whose place a newer one took before they could. */
   sent = 0;
   replaced = 0;
-  /** The last answer; overwritten by the next. */
+  /** The last answer of the server; overwritten by the next. */
   answer = new Answer();
 
+  // Of frames without an answer: the last answer must not change while it is being looked at.
+  #brief = new Answer();
   #frame = new RequestFrame();
+  #rectangle = { column: 0, row: 0, width: 0, height: 0 };
   #options;
-  #url;
+  #link;
   /** @type {Hello} */ #hello;
   // Terms to go back to if a renewal is refused.
   /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
-  /** @type {WebSocket | null} */ #socket = null;
   #sequence = 0;
   #waits = false;
-  #outstanding = new Uint32Array(OUTSTANDING_MAX);
-  #outstandingCount = 0;
+  #outstanding = new Sequences(OUTSTANDING_MAX);
   #drainTimer = false;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ #timer;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
   // Answers up to the hello of a renewal have the sections of before.
   #termsFrom = 0;
   /** @type {ReturnType<Answer['views']> | null} */ #views = null;
@@ -101,7 +89,13 @@ export class Papilla {
    * @param {Options} [options]
    */
   constructor(base = '', hello = {}, options = {}) {
-    this.#url = sessionUrl(base, options.token);
+    this.#link = new Link(sessionUrl(base, options.token), {
+      connecting: () => this.#enter('connecting', ''),
+      opened: () => this.#greet(),
+      text: (text) => this.#text(text),
+      binary: (data) => this.#binary(data),
+      lost: (why) => this.#lost(why),
+    });
     this.#hello = { ...hello };
     this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
@@ -127,15 +121,12 @@ export class Papilla {
   /** Connects, and again whenever the connection is lost, until `close`. */
   open() {
     this.#opened = true;
-    if (!this.#socket) this.#connect();
+    if (!this.#link.isBusy) this.#link.connect();
   }
 
   /** Ends the session. */
   close() {
-    this.#opened = false;
-    this.#drop();
-    this.#loseAll(true);
-    this.#enter('closed', '');
+    this.#end('closed', '');
   }
 
   /**
@@ -149,8 +140,8 @@ export class Papilla {
     this.#hello = { ...hello };
     this.#termsFrom = (this.#sequence + 1) >>> 0;
     this.ready = null;
-    if (this.#socket?.readyState === WebSocket.OPEN) this.#greet(this.#socket);
-    else if (this.#opened && !this.#socket) this.#connect();
+    if (this.#link.isOpen) this.#greet();
+    else if (this.#opened && !this.#link.isBusy) this.#link.connect();
   }
 
   /**
@@ -161,21 +152,8 @@ export class Papilla {
   send(pressurePa) {
     if (pressurePa.length !== MAP_LEN) throw refusal('wrong_length', `a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
     if (!this.#options.crop) return this.#put(pressurePa, 0, SIDE_PX, 0, 0, SIDE_PX, SIDE_PX);
-    let top = 0;
-    let end = MAP_LEN - 1;
-    while (top < MAP_LEN && pressurePa[top] === 0) top++;
-    if (top === MAP_LEN) return this.#put(pressurePa, 0, 0, 0, 0, 0, 0);
-    while (pressurePa[end] === 0) end--;
-    const row = (top / SIDE_PX) | 0;
-    const last = (end / SIDE_PX) | 0;
-    let left = SIDE_PX;
-    let right = -1;
-    for (let y = row; y <= last; y++) {
-      const from = y * SIDE_PX;
-      for (let x = 0; x < left; x++) if (pressurePa[from + x] !== 0) { left = x; break; }
-      for (let x = SIDE_PX - 1; x > right; x--) if (pressurePa[from + x] !== 0) { right = x; break; }
-    }
-    return this.#put(pressurePa, row * SIDE_PX + left, SIDE_PX, left, row, right - left + 1, last - row + 1);
+    const { column, row, width, height } = crop(pressurePa, this.#rectangle);
+    return this.#put(pressurePa, row * SIDE_PX + column, SIDE_PX, column, row, width, height);
   }
 
   /**
@@ -233,15 +211,14 @@ export class Papilla {
 
   /** The outcome of a frame of which the server sent no binary answer. @param {number} sequence @param {Answer['status']} status @param {Problem | null} problem */
   #settle(sequence, status, problem) {
-    const { answer } = this;
-    answer.sequence = sequence;
-    answer.status = status;
-    answer.problem = problem;
-    this.#tell();
+    this.#brief.sequence = sequence;
+    this.#brief.status = status;
+    this.#brief.problem = problem;
+    this.#tell(this.#brief);
   }
 
-  #tell() {
-    const { answer } = this;
+  /** @param {Answer} answer */
+  #tell(answer) {
     this.onanswer(answer);
     const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
     if (!promised) return;
@@ -250,22 +227,11 @@ export class Papilla {
     else promised.reject(new PapillaError(answer.problem ?? missed(answer.status, answer.sequence)));
   }
 
-  /** Takes the frame out of those without an answer; false if it is none of them. @param {number} sequence */
-  #answered(sequence) {
-    const list = this.#outstanding;
-    for (let k = 0; k < this.#outstandingCount; k++) {
-      if (list[k] !== sequence) continue;
-      list.copyWithin(k, k + 1, this.#outstandingCount--);
-      return true;
-    }
-    return false;
-  }
-
   /** What went out on a lost connection is never answered. @param {boolean} alsoWaiting */
   #loseAll(alsoWaiting) {
-    while (this.#outstandingCount > 0) {
-      const sequence = this.#outstanding[0];
-      this.#answered(sequence);
+    while (this.#outstanding.count > 0) {
+      const sequence = this.#outstanding.first();
+      this.#outstanding.take(sequence);
       this.#settle(sequence, 'lost', null);
     }
     if (!alsoWaiting || !this.#waits) return;
@@ -274,10 +240,9 @@ export class Papilla {
   }
 
   #flush() {
-    const socket = this.#socket;
-    if (!this.#waits || !this.ready || !socket || socket.readyState !== WebSocket.OPEN) return;
-    if (this.#outstandingCount === OUTSTANDING_MAX) return;
-    if (socket.bufferedAmount > 0) {
+    if (!this.#waits || !this.ready || !this.#link.isOpen) return;
+    if (this.#outstanding.count === OUTSTANDING_MAX) return;
+    if (this.#link.bufferedBytes > 0) {
       if (!this.#drainTimer) {
         this.#drainTimer = true;
         setTimeout(this.#drained, DRAIN_MS);
@@ -286,57 +251,32 @@ export class Papilla {
     }
     this.#waits = false;
     this.sent++;
-    this.#outstanding[this.#outstandingCount++] = this.#sequence;
+    this.#outstanding.add(this.#sequence);
     const { buffer, bytes } = this.#frame;
     // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
-    socket.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
+    this.#link.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
   }
 
-  #connect() {
-    clearTimeout(this.#timer);
-    this.#enter('connecting', '');
-    const socket = new WebSocket(this.#url);
-    socket.binaryType = 'arraybuffer';
-    this.#socket = socket;
-    clearTimeout(this.#attempt);
-    this.#attempt = setTimeout(() => this.#lost(socket, `no session within ${ATTEMPT_MS} ms`), ATTEMPT_MS);
-    socket.onopen = () => this.#greet(socket);
-    socket.onmessage = (event) => {
-      if (typeof event.data === 'string') this.#text(event.data);
-      else this.#binary(event.data);
-    };
-    socket.onclose = (event) => this.#lost(socket, event.reason || 'the connection was lost');
-    // The reason is in the close event that follows.
-    socket.onerror = () => {};
+  #greet() {
+    this.#link.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
   }
 
-  /** @param {WebSocket} socket */
-  #greet(socket) {
-    socket.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
-  }
-
-  #drop() {
-    clearTimeout(this.#timer);
-    clearTimeout(this.#attempt);
-    const socket = this.#socket;
-    this.#socket = null;
+  /** @param {string} why */
+  #lost(why) {
     this.ready = null;
     this.#before = null;
-    if (!socket) return;
-    socket.onmessage = socket.onclose = null;
-    // Browsers complain of a socket that is closed while it connects.
-    if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
-    else socket.close();
+    this.#loseAll(false);
+    this.#enter('waiting', why);
   }
 
-  /** @param {WebSocket} socket @param {string} why */
-  #lost(socket, why) {
-    if (socket !== this.#socket) return;
-    this.#drop();
-    this.#loseAll(!this.#opened);
-    if (!this.#opened) return;
-    this.#enter('waiting', why);
-    this.#timer = setTimeout(() => this.#connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
+  /** Ends the connection for good: no frame will be answered. @param {State} state @param {string} why */
+  #end(state, why) {
+    this.#opened = false;
+    this.#link.drop();
+    this.ready = null;
+    this.#before = null;
+    this.#loseAll(true);
+    this.#enter(state, why);
   }
 
   /** @param {State} state @param {string} why */
@@ -354,7 +294,7 @@ export class Papilla {
 
   /** @param {Ready} ready */
   #welcome(ready) {
-    clearTimeout(this.#attempt);
+    this.#link.succeeded();
     this.#viewsBefore = this.#views;
     this.#views = this.answer.views(ready.sections);
     this.#before = null;
@@ -368,7 +308,7 @@ export class Papilla {
   #problem(problem) {
     const { sequence } = problem;
     if (typeof sequence === 'number') {
-      if (this.#answered(sequence)) this.#settle(sequence, 'error', problem);
+      if (this.#outstanding.take(sequence)) this.#settle(sequence, 'error', problem);
       return;
     }
     if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
@@ -382,10 +322,7 @@ export class Papilla {
       this.#before = null;
       return;
     }
-    this.#opened = false;
-    this.#drop();
-    this.#loseAll(true);
-    this.#enter('refused', problem.message);
+    this.#end('refused', problem.message);
   }
 
   /** @param {ArrayBuffer} data */
@@ -401,32 +338,10 @@ export class Papilla {
       this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
       return;
     }
-    if (!this.#answered(answer.sequence)) return;
+    if (!this.#outstanding.take(answer.sequence)) return;
     answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
     answer.problem = null;
     this.#flush();
-    this.#tell();
+    this.#tell(answer);
   }
-}
-
-/** @param {string} code as the server's @param {string} message */
-const refusal = (code, message) => new PapillaError({ type: 'error', code, message, closes: false });
-
-/** @param {string} code @param {number} sequence @returns {Problem} */
-function missed(code, sequence) {
-  const message = code === 'superseded' ? 'a newer frame took its place' : `the frame was ${code}`;
-  return { type: 'error', code, message, sequence, closes: false };
-}
-
-/**
- * @param {Float32Array} values @param {number} first @param {number} stride
- * @param {number} width @param {number} height
- */
-function greatest(values, first, stride, width, height) {
-  let most = 0;
-  for (let y = 0; y < height; y++) {
-    const from = first + y * stride;
-    for (let x = 0; x < width; x++) if (values[from + x] > most) most = values[from + x];
-  }
-  return most;
 }

@@ -1,6 +1,6 @@
 // One map over HTTP, for tools that need no session.
 
-import { PapillaError } from './client.js';
+import { PapillaError } from './error.js';
 import { MAP_LEN } from './wire.js';
 
 /**

@@ -1,7 +1,7 @@
 // A finger that touches objects: penetration -> pressure (elastic foundation) -> the server -> SED, painted on the finger.
 
 import {
-  CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, Vector3, WebGLRenderer,
+  CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
 import { Atlas, Papilla, SUMMARY } from '../papilla.js';
 import { Finger } from './finger.js';
@@ -33,8 +33,9 @@ class Board {
     this.canvas.width = 512;
     this.canvas.height = 96;
     this.texture = new CanvasTexture(this.canvas);
+    this.texture.colorSpace = SRGBColorSpace;
     this.mesh = new Mesh(new PlaneGeometry(0.8, 0.15), new MeshBasicMaterial({ map: this.texture }));
-    this.mesh.position.set(0, 1.18, -1.4);
+    this.mesh.position.set(0, 1.08, -1.4);
   }
 
   /** @param {string} text */
@@ -111,7 +112,7 @@ async function start() {
   let late = 0;
   const session = new Papilla('', hello);
   scene.userData.camera = camera;
-  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, isPresenting: false };
+  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, frames: 0, isPresenting: false };
   session.onstate = (now, why) => { element('state').textContent = why ? `${now}: ${why}` : now; };
   session.onready = (ready) => { element('state').textContent = `ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a map`; };
   session.onanswer = (answer) => {
@@ -152,6 +153,7 @@ async function start() {
       board.write(text);
     }
     renderer.render(scene, camera);
+    state.frames++;
   });
   await offerVr(renderer);
   return state;

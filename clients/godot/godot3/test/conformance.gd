@@ -4,7 +4,7 @@ extends SceneTree
 const Papilla = preload("res://addons/papilla/papilla.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
-const Samples = preload("res://addons/papilla/samples.gd")
+const Patterns = preload("res://test/patterns.gd")
 
 var url = OS.get_environment("PAPILLA_URL")
 var atlas
@@ -142,7 +142,7 @@ func step_hello(step, expect):
 
 
 func step_frame(step, expect):
-	var map = pattern(step.pressure, 1.0)
+	var map = Patterns.pattern(step.pressure, 1.0)
 	client.deadline_us = int(step.get("deadline_us", 0))
 	for attempt in int(step.get("attempts", 1)):
 		client.time_us = int(step.get("client_time_us", 0))
@@ -150,7 +150,7 @@ func step_frame(step, expect):
 		var sequence
 		if step.has("window"):
 			var w = step.window
-			sequence = client.send_window(cut(map, w), int(w[0]), int(w[1]), int(w[2]), int(w[3]))
+			sequence = client.send_window(Patterns.cut(map, w), int(w[0]), int(w[1]), int(w[2]), int(w[3]))
 		else:
 			sequence = client.send(map)
 		var after = OS.get_ticks_usec()
@@ -219,7 +219,7 @@ func check_map(expect, map):
 
 
 func steer(what):
-	var answer = Http.fetch(OS.get_environment("PAPILLA_CONTROL"), what, HTTPClient.METHOD_POST, ["Content-Length: 0"])
+	var answer = Http.fetch(OS.get_environment("PAPILLA_CONTROL"), what, HTTPClient.METHOD_POST, ["Content-Length: 0"], PoolByteArray(), patience_ms)
 	if answer.status != 200:
 		fail("the runner does not " + what)
 
@@ -231,7 +231,7 @@ func step_burst(step, expect):
 	if paused:
 		steer("pause")
 	for k in int(step.count):
-		sequences.append(client.send(pattern(step.pressure, (k + 1) / float(step.count))))
+		sequences.append(client.send(Patterns.pattern(step.pressure, (k + 1) / float(step.count))))
 		client.poll()
 		OS.delay_msec(int(step.get("gap_ms", 0)))
 	if paused:
@@ -264,7 +264,7 @@ func step_reconnect(step, _expect):
 
 
 func step_http(step, expect):
-	var answer = Http.post_pressure(url, pattern(step.pressure, 1.0), step.tier)
+	var answer = Http.post_pressure(url, Patterns.pattern(step.pressure, 1.0), step.tier)
 	if answer.has("problem"):
 		check(expect, {"status": "error", "problem": answer.problem})
 		return
@@ -290,33 +290,3 @@ func step_contacts(step, expect):
 	check_map(expect, map)
 	if expect.has("force_n"):
 		near("force", atlas.force_n(map), expect.force_n[0], expect.force_n[1])
-
-
-func cut(map, w):
-	var samples = PoolRealArray()
-	for y in int(w[3]):
-		for x in int(w[2]):
-			samples.append(map[((int(w[1]) + y) * 224 + int(w[0]) + x) % map.size()])
-	return samples
-
-
-func pattern(what, part):
-	var map = Atlas.zeros()
-	for i in Samples.MAP_LEN:
-		var u = i % 224 + 0.5
-		var v = i / 224 + 0.5
-		var p = 0.0
-		for g in what.get("gaussians", []):
-			p += g[3] * exp(-((u - g[0]) * (u - g[0]) + (v - g[1]) * (v - g[1])) / (2 * g[2] * g[2]))
-		if what.has("disc"):
-			var d = what.disc
-			if (u - d[0]) * (u - d[0]) + (v - d[1]) * (v - d[1]) <= d[2] * d[2]:
-				p += d[3]
-		if p >= 1:
-			map[i] = p * part
-	if what.has("bad"):
-		var value = what.bad[2]
-		if typeof(value) == TYPE_STRING:
-			value = NAN if value == "nan" else INF
-		map[int(what.bad[0]) * 224 + int(what.bad[1])] = value
-	return map

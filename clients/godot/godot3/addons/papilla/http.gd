@@ -2,11 +2,10 @@
 extends Reference
 
 const Samples = preload("samples.gd")
-const PATIENCE_MS = 10000
 
 
-# {status, headers, body}; status 0 where no answer came.
-static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PoolByteArray()):
+# {status, headers, body}; status 0 where no answer came within `patience_ms`.
+static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PoolByteArray(), patience_ms = 10000):
 	var parts = url.split("://")
 	var host = parts[1].rstrip("/").split(":")
 	var is_tls = parts[0] == "https"
@@ -15,7 +14,7 @@ static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body 
 	http.set_blocking_mode(false)
 	http.read_chunk_size = 1 << 20
 	http.connect_to_host(host[0], port, is_tls)
-	var end = OS.get_ticks_msec() + PATIENCE_MS
+	var end = OS.get_ticks_msec() + patience_ms
 	var answer = {"status": 0, "headers": {}, "body": PoolByteArray()}
 	var is_asked = false
 	while OS.get_ticks_msec() < end:

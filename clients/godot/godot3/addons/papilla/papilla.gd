@@ -5,6 +5,7 @@
 # by itself.
 extends Node
 
+const Frame = preload("frame.gd")
 const Samples = preload("samples.gd")
 
 # An answer with a map; see `map_of`, `image_of`.
@@ -16,8 +17,6 @@ signal session_began(terms)
 # A hello was refused.
 signal refused(problem)
 
-const STATUS = ["ok", "superseded", "late", "error", "stale"]
-const HEADER_BYTES = 48
 const ATTEMPT_MS = 5000
 const RETRY_LEAST_MS = 100
 const RETRY_MOST_MS = 250
@@ -123,7 +122,8 @@ func send_window(samples_pa, column, row, width, height):
 	_replace_waiting()
 	_sequence = (_sequence + 1) & 0xffffffff
 	var stamp = time_us if time_us > 0 else OS.get_ticks_usec()
-	_waiting = _encode(samples_pa, column, row, width, height, stamp)
+	var type = _asked.get("sample_type", "f32")
+	_waiting = Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, stamp, deadline_us)
 	_waiting_sequence = _sequence
 	_flush()
 	return _sequence
@@ -131,28 +131,12 @@ func send_window(samples_pa, column, row, width, height):
 
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
 func map_of(answer):
-	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
-	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
-		return values
-	var map = PoolRealArray()
-	map.resize(Samples.MAP_LEN)
-	for i in Samples.MAP_LEN:
-		map[i] = 0.0
-	for y in answer.height:
-		for x in answer.width:
-			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]
-	return map
+	return Frame.map_of(answer)
 
 
 # The window of an answer as a picture for a texture, without a loop: f32 (red in J/m3), f16 or u8 (red 1 is 255 x answer.scale).
 func image_of(answer):
-	var formats = [Image.FORMAT_RF, Image.FORMAT_RH, -1, Image.FORMAT_R8]
-	var format = formats[answer.sample_type]
-	if format < 0 or answer.width == 0:
-		return null
-	var image = Image.new()
-	image.create_from_data(answer.width, answer.height, false, format, answer.samples)
-	return image
+	return Frame.image_of(answer)
 
 
 # Moves bytes; the node does so every frame. Call it oftener for answers between frames.
@@ -275,35 +259,6 @@ func _flush():
 		_lost()
 
 
-func _encode(values, column, row, width, height, stamp):
-	var type = Samples.TYPES.find(_asked.get("sample_type", "f32"))
-	var scale = 1.0
-	if type >= 2:
-		scale = _asked.get("pressure_scale_pa", 0.0)
-		if scale == null or scale <= 0:
-			var most = 0.0
-			for value in values:
-				most = max(most, value)
-			scale = most / (65535.0 if type == 2 else 255.0) if most > 0 else 1.0
-	var head = StreamPeerBuffer.new()
-	head.put_data("PPL1".to_ascii())
-	for byte in [2, 1, type, 0]:
-		head.put_u8(byte)
-	head.put_u32(_sequence)
-	head.put_u16(width)
-	head.put_u16(height)
-	head.put_u64(stamp)
-	head.put_u32(deadline_us)
-	head.put_float(scale)
-	head.put_u16(column)
-	head.put_u16(row)
-	head.put_u32(0)
-	head.put_u64(0)
-	var frame = head.data_array
-	frame.append_array(Samples.encode(values, type, scale))
-	return frame
-
-
 func _text(message):
 	if message.type == "ready":
 		_older_terms = _before.terms if _before != null else null
@@ -336,52 +291,21 @@ func _on_refusal(problem):
 
 
 func _binary(packet):
-	var head = StreamPeerBuffer.new()
-	head.data_array = packet.subarray(0, HEADER_BYTES - 1)
-	head.seek(4)
-	head.get_u8()
-	var answer = {"kind": "sa1_rate" if head.get_u8() == 3 else "sed", "sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
-	answer.sequence = head.get_u32()
+	if packet.size() < Frame.HEADER_BYTES:
+		push_error("an answer of %d bytes has no header" % packet.size())
+		return
+	var answer = Frame.read_header(packet)
 	if not _outstanding.has(answer.sequence):
 		return
 	_outstanding.erase(answer.sequence)
-	answer.width = head.get_u16()
-	answer.height = head.get_u16()
-	answer.client_time_us = head.get_u64()
-	answer.total_us = head.get_u32()
-	answer.scale = head.get_float()
-	answer.column = head.get_u16()
-	answer.row = head.get_u16()
-	answer.queue_us = head.get_u32()
-	answer.infer_us = head.get_u32()
-	answer.tier_number = head.get_u16()
-	var flags = head.get_u8()
-	answer.out_of_range = flags & 1 != 0
-	answer.no_contact = flags & 2 != 0
 	answer.round_trip_us = OS.get_ticks_usec() - answer.client_time_us
 	var is_older = _older_terms != null and answer.sequence < _terms_from
 	if answer.status == "ok":
-		_sections(answer, packet, _older_terms if is_older else terms)
+		Frame.read_sections(answer, packet, _older_terms.sections if is_older else terms.sections)
 	if not is_older:
 		_older_terms = null
 	_flush()
 	_tell(answer)
-
-
-func _sections(answer, packet, its_terms):
-	answer.samples = PoolByteArray()
-	var has_map = false
-	for section in its_terms.sections:
-		var from = int(section.offset)
-		if section.name == "map":
-			has_map = true
-			if from < packet.size():
-				answer.samples = packet.subarray(from, packet.size() - 1)
-		else:
-			answer[section.name] = Samples.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
-	if not has_map:
-		answer.width = 0
-		answer.height = 0
 
 
 func _tell(answer):

@@ -2,11 +2,10 @@
 extends RefCounted
 
 const Samples = preload("samples.gd")
-const PATIENCE_MS = 10000
 
 
-# {status, headers, body}; status 0 where no answer came.
-static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PackedByteArray()):
+# {status, headers, body}; status 0 where no answer came within `patience_ms`.
+static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PackedByteArray(), patience_ms = 10000):
 	var parts = url.split("://")
 	var host = parts[1].rstrip("/").split(":")
 	var is_tls = parts[0] == "https"
@@ -15,7 +14,7 @@ static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body 
 	http.blocking_mode_enabled = false
 	http.read_chunk_size = 1 << 20
 	http.connect_to_host(host[0], port, TLSOptions.client() if is_tls else null)
-	var end = Time.get_ticks_msec() + PATIENCE_MS
+	var end = Time.get_ticks_msec() + patience_ms
 	var answer = {"status": 0, "headers": {}, "body": PackedByteArray()}
 	var is_asked = false
 	while Time.get_ticks_msec() < end:

@@ -10,7 +10,7 @@ try {
   page.on('pageerror', (error) => console.error(error));
   const failed = await page.evaluate(async (given) => {
     // @ts-ignore: a path of the page
-    const { run } = await import('/client/test/conformance.js');
+    const { run } = await import('/client/tests/conformance.js');
     return run({ ...given, report: /** @type {any} */ (globalThis).report });
   }, { url: serverUrl(), control: process.env.PAPILLA_CONTROL ?? '', file: JSON.parse(readFileSync(process.env.PAPILLA_CONFORMANCE ?? '', 'utf8')) });
   process.exitCode = failed ? 1 : 0;

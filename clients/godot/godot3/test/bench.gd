@@ -1,0 +1,62 @@
+# Round trips of whole f32 maps, one JSON line: rate and duration from RATE_HZ and DURATION_S. From the instant at which a frame was
+# due to the answer in the user's hands; the node is polled without pause, as a thread of a game would.
+extends SceneTree
+
+const Papilla = preload("res://addons/papilla/papilla.gd")
+const Atlas = preload("res://addons/papilla/atlas.gd")
+const WARM = 50
+
+var due = {}
+var took = []
+var missing = 0
+
+
+func _init():
+	var rate_hz = float(OS.get_environment("RATE_HZ"))
+	var count = int(float(OS.get_environment("DURATION_S")) * rate_hz) + WARM
+	var client = Papilla.new()
+	client.url = OS.get_environment("PAPILLA_URL")
+	client.hello = {"tier": "half-space"}
+	client.connect("answered", self, "_on_answered")
+	client.open()
+	while client.terms == null:
+		client.poll()
+		OS.delay_msec(1)
+	var maps = []
+	for k in 8:
+		maps.append(_map(k * PI / 4))
+	var start = OS.get_ticks_usec() + 10000
+	var next = 0
+	while took.size() + missing < count:
+		var at = start + int(next * 1e6 / rate_hz)
+		var now = OS.get_ticks_usec()
+		if next < count and now >= at:
+			due[client._sequence + 1] = at
+			client.send(maps[next % maps.size()])
+			next += 1
+		elif next >= count or at - now > 300:
+			OS.delay_usec(100)
+		client.poll()
+	client.close()
+	client.free()
+	var sorted = took.slice(WARM, took.size() - 1)
+	sorted.sort()
+	print(JSON.print({"client": "godot3", "rate_hz": rate_hz, "frames": sorted.size(), "missing": missing,
+		"p50_us": sorted[sorted.size() / 2], "p99_us": sorted[int(0.99 * sorted.size())], "max_us": sorted[-1]}))
+	quit()
+
+
+func _on_answered(answer):
+	if answer.status != "ok":
+		missing += 1
+		return
+	took.append(OS.get_ticks_usec() - due[answer.sequence])
+
+
+func _map(angle):
+	var map = Atlas.zeros()
+	for i in map.size():
+		var u = i % 224 + 0.5 - 112 - 20 * cos(angle)
+		var v = i / 224 + 0.5 - 112 - 20 * sin(angle)
+		map[i] = 15000 * exp(-(u * u + v * v) / 288)
+	return map

@@ -1,0 +1,99 @@
+# Frames of the protocol, version 2: a header of 48 bytes, little-endian, and what follows.
+extends RefCounted
+
+const Samples = preload("samples.gd")
+const STATUS = ["ok", "superseded", "late", "error", "stale"]
+const HEADER_BYTES = 48
+
+
+# A request. `scale`: Pa per unit of u16 and u8; null or 0: so that the greatest pressure is the greatest unit.
+static func encode(values, column, row, width, height, type_name, scale, sequence, time_us, deadline_us):
+	var type = Samples.TYPES.find(type_name)
+	if type >= 2:
+		if scale == null or scale <= 0:
+			var most = 0.0
+			for value in values:
+				most = max(most, value)
+			scale = most / (65535.0 if type == 2 else 255.0) if most > 0 else 1.0
+	if type < 2:
+		scale = 1.0
+	var head = StreamPeerBuffer.new()
+	head.put_data("PPL1".to_ascii_buffer())
+	for byte in [2, 1, type, 0]:
+		head.put_u8(byte)
+	head.put_u32(sequence)
+	head.put_u16(width)
+	head.put_u16(height)
+	head.put_u64(time_us)
+	head.put_u32(deadline_us)
+	head.put_float(scale)
+	head.put_u16(column)
+	head.put_u16(row)
+	head.put_u32(0)
+	head.put_u64(0)
+	var frame = head.data_array
+	frame.append_array(Samples.encode(values, type, scale))
+	return frame
+
+
+# What the header of an answer says.
+static func read_header(packet):
+	var head = StreamPeerBuffer.new()
+	head.data_array = packet.slice(0, HEADER_BYTES)
+	head.seek(4)
+	head.get_u8()
+	var answer = {"kind": "sa1_rate" if head.get_u8() == 3 else "sed", "sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
+	answer.sequence = head.get_u32()
+	answer.width = head.get_u16()
+	answer.height = head.get_u16()
+	answer.client_time_us = head.get_u64()
+	answer.total_us = head.get_u32()
+	answer.scale = head.get_float()
+	answer.column = head.get_u16()
+	answer.row = head.get_u16()
+	answer.queue_us = head.get_u32()
+	answer.infer_us = head.get_u32()
+	answer.tier_number = head.get_u16()
+	var flags = head.get_u8()
+	answer.out_of_range = flags & 1 != 0
+	answer.no_contact = flags & 2 != 0
+	return answer
+
+
+# What follows the header, by the `sections` of the session's ready.
+static func read_sections(answer, packet, sections):
+	answer.samples = PackedByteArray()
+	var has_map = false
+	for section in sections:
+		var from = int(section.offset)
+		if section.name == "map":
+			has_map = true
+			if from < packet.size():
+				answer.samples = packet.slice(from, packet.size())
+		else:
+			answer[section.name] = packet.slice(from, from + int(section.bytes)).to_float32_array()
+	if not has_map:
+		answer.width = 0
+		answer.height = 0
+
+
+# The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
+static func map_of(answer):
+	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
+	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
+		return values
+	var map = PackedFloat32Array()
+	map.resize(Samples.MAP_LEN)
+	for y in answer.height:
+		for x in answer.width:
+			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]
+	return map
+
+
+# The window of an answer as a picture for a texture, without a loop: f32 (red in J/m3), f16 or u8 (red 1 is 255 x answer.scale).
+static func image_of(answer):
+	var formats = [Image.FORMAT_RF, Image.FORMAT_RH, -1, Image.FORMAT_R8]
+	var format = formats[answer.sample_type]
+	if format < 0 or answer.width == 0:
+		return null
+	return Image.create_from_data(answer.width, answer.height, false, format, answer.samples)

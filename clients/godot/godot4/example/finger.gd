@@ -1,0 +1,36 @@
+# A press of half a newton circles the pad; the SED map is shown as a picture. Replace `_contacts` by those of your game.
+extends Control
+
+const Atlas = preload("res://addons/papilla/atlas.gd")
+const Http = preload("res://addons/papilla/http.gd")
+# J/m3 shown as full red.
+const SED_OF_WHITE = 300.0
+
+var maps = 0
+var _atlas
+var _presses = []
+
+@onready var papilla = $Papilla
+@onready var picture = $Picture
+
+
+func _ready():
+	_atlas = Atlas.new(Http.atlas_text(papilla.url, papilla.token))
+	# Contact maps take tens of ms in GDScript: made once here, a few places on the way round.
+	for k in 12:
+		_presses.append(_atlas.contact_map(_contacts(TAU * k / 12)))
+	papilla.map_received.connect(_on_map)
+	picture.modulate = Color(1 / SED_OF_WHITE, 1, 1)
+
+
+func _contacts(angle):
+	return [{"at_mm": [10 + 2 * cos(angle), 2 * sin(angle), -6.5], "force_n": 0.5, "radius_mm": 2.5}]
+
+
+func _process(_delta):
+	papilla.send(_presses[Time.get_ticks_msec() / 80 % _presses.size()])
+
+
+func _on_map(answer):
+	maps += 1
+	picture.texture = ImageTexture.create_from_image(papilla.image_of(answer))

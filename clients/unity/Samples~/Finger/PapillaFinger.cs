@@ -1,0 +1,66 @@
+using System.Threading;
+using Papilla;
+using UnityEngine;
+
+/// <summary>
+/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A press of half a newton
+/// circles the pad; a game fills <c>pressurePa</c> from its own contacts.
+/// </summary>
+[RequireComponent(typeof(MeshFilter), typeof(MeshRenderer))]
+public sealed class PapillaFinger : MonoBehaviour
+{
+    const float MetresPerMm = 0.001f;
+
+    [SerializeField] string address = "http://127.0.0.1:7224";
+    [SerializeField] string tier = "nano";
+    [SerializeField] float sedOfWhite = 300;
+
+    readonly float[] pressurePa = new float[Wire.MapLength];
+    Papilla.Atlas atlas;
+    PapillaClient client;
+    Mesh mesh;
+    float[] sed;
+    Color32[] colours;
+    Thread loading;
+    volatile Papilla.Atlas loaded;
+
+    void Start()
+    {
+        client = new PapillaClient(address, new Hello { Tier = tier }).Open();
+        // HTTP waits: not on the main thread.
+        loading = new Thread(() => loaded = PapillaHttp.LoadAtlas(address)) { IsBackground = true };
+        loading.Start();
+    }
+
+    void Update()
+    {
+        if (atlas == null && loaded != null) Build(loaded);
+        if (atlas == null) return;
+        System.Array.Clear(pressurePa, 0, pressurePa.Length);
+        atlas.AddContact(10 + 2 * Mathf.Cos(Time.time), 2 * Mathf.Sin(Time.time), -6.5, 0.5, 2.5, pressurePa);
+        client.Send(pressurePa);
+        Answer answer;
+        if (!client.TryTake(out answer)) return;
+        atlas.AtVertices(answer.Map, sed);
+        for (int i = 0; i < sed.Length; i++) colours[i] = Color32.Lerp(new Color32(219, 168, 143, 255), new Color32(120, 0, 60, 255), sed[i] / sedOfWhite);
+        mesh.colors32 = colours;
+    }
+
+    void Build(Papilla.Atlas from)
+    {
+        atlas = from;
+        sed = new float[atlas.VertexCount];
+        colours = new Color32[atlas.VertexCount];
+        var vertices = new Vector3[atlas.VertexCount];
+        // The finger's frame is right-handed, Unity's is not: y changes its sign, and with it the triangles turn.
+        for (int i = 0; i < vertices.Length; i++) vertices[i] = MetresPerMm * new Vector3(atlas.SkinMm[3 * i], -atlas.SkinMm[3 * i + 1], atlas.SkinMm[3 * i + 2]);
+        mesh = new Mesh { vertices = vertices, triangles = atlas.Triangles };
+        mesh.RecalculateNormals();
+        GetComponent<MeshFilter>().sharedMesh = mesh;
+    }
+
+    void OnDestroy()
+    {
+        if (client != null) client.Dispose();
+    }
+}

@@ -1,0 +1,81 @@
+using System;
+using System.Collections.Generic;
+using System.Linq;
+using Newtonsoft.Json.Linq;
+using Papilla;
+
+/// <content>What is expected, and the patterns.</content>
+sealed partial class Run
+{
+    void Check(JObject expect, Outcome got)
+    {
+        Same("status (" + got.Code + ")", got.Status.ToString().ToLowerInvariant(), (string)expect["status"] ?? "ok");
+        if (expect["code"] != null) Same("code", got.Code, (string)expect["code"]);
+        if (expect["field"] != null && got.Field != null) Same("field", got.Field, (string)expect["field"]);
+        if (got.Status != Status.Ok) return;
+        if (got.InferUs + got.QueueUs > got.TotalUs) throw new Missed(got.InferUs + " + " + got.QueueUs + " us are more than " + got.TotalUs);
+        if (expect["kind"] != null) Same("kind", got.IsRate ? "sa1_rate" : "sed", (string)expect["kind"]);
+        if (expect["flags"] != null)
+        {
+            var flags = new List<string>();
+            if (got.OutOfRange) flags.Add("out_of_range");
+            if (got.NoContact) flags.Add("no_contact");
+            Same("flags", string.Join(",", flags), string.Join(",", expect["flags"].Select(f => (string)f)));
+        }
+        if (expect["tier"] != null && got.Window != null) Same("tier", tiers[got.TierNumber], (string)expect["tier"]);
+        if (expect["window"] != null) Same("window", string.Join(",", got.Window), string.Join(",", expect["window"]));
+        if ((bool?)expect["map"] == false && got.Window[2] * got.Window[3] != 0) throw new Missed("a map came");
+        All("summary", expect, got.Summary);
+        All("points", expect, got.Points);
+        All("actuators", expect, got.Actuators);
+        CheckMap(expect, got.Map);
+    }
+
+    static void CheckMap(JObject expect, float[] map)
+    {
+        foreach (var pixel in expect["pixels"] ?? new JArray())
+        {
+            Near("pixel " + pixel[0] + ", " + pixel[1], map[224 * (int)pixel[0] + (int)pixel[1]], (double)pixel[2], (double)pixel[3]);
+        }
+        if (expect["sum"] != null) Near("sum", map.Sum(v => (double)v), (double)expect["sum"][0], (double)expect["sum"][1]);
+        if (expect["max"] != null) Near("max", map.Max(), (double)expect["max"][0], (double)expect["max"][1]);
+    }
+
+    static void All(string what, JObject expect, float[] got)
+    {
+        if (expect[what] == null) return;
+        if (got == null || got.Length != expect[what].Count()) throw new Missed(what + " is missing");
+        for (int k = 0; k < got.Length; k++) Near(what + " " + k, got[k], (double)expect[what][k][0], (double)expect[what][k][1]);
+    }
+
+    static void Near(string what, double got, double due, double tolerance)
+    {
+        if (!(Math.Abs(got - due) <= tolerance)) throw new Missed(what + " is " + got + ", not " + due + " +- " + tolerance);
+    }
+
+    static void Same(string what, string got, string due)
+    {
+        if (got != due) throw new Missed(what + " is " + got + ", not " + due);
+    }
+
+    static float[] Pattern(JObject pattern, double part)
+    {
+        var map = new float[Wire.MapLength];
+        var gaussians = (pattern["gaussians"] ?? new JArray()).Select(g => g.Select(v => (double)v).ToArray()).ToArray();
+        var disc = pattern["disc"] == null ? null : pattern["disc"].Select(v => (double)v).ToArray();
+        for (int i = 0; i < map.Length; i++)
+        {
+            double u = i % 224 + 0.5, v = i / 224 + 0.5, p = 0;
+            foreach (var g in gaussians) p += g[3] * Math.Exp(-((u - g[0]) * (u - g[0]) + (v - g[1]) * (v - g[1])) / (2 * g[2] * g[2]));
+            if (disc != null && (u - disc[0]) * (u - disc[0]) + (v - disc[1]) * (v - disc[1]) <= disc[2] * disc[2]) p += disc[3];
+            map[i] = p < 1 ? 0 : (float)(p * part);
+        }
+        if (pattern["bad"] != null)
+        {
+            var value = pattern["bad"][2];
+            float bad = value.Type != JTokenType.String ? (float)value : (string)value == "nan" ? float.NaN : float.PositiveInfinity;
+            map[224 * (int)pattern["bad"][0] + (int)pattern["bad"][1]] = bad;
+        }
+        return map;
+    }
+}

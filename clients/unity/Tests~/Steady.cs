@@ -1,0 +1,39 @@
+using System;
+using System.Threading;
+using Papilla;
+
+/// <summary>Frames and answers allocate nothing: 900 frames, one after the other, and the heap is what it was.</summary>
+static class Steady
+{
+    const int Warm = 100, Frames = 900;
+
+    static int Main()
+    {
+        var pressurePa = new float[Wire.MapLength];
+        for (int k = 0; k < 5000; k++) pressurePa[20000 + k] = 3000;
+        long before = 0;
+        int collections = 0;
+        using (var client = new PapillaClient(Environment.GetEnvironmentVariable("PAPILLA_URL"), new Hello { Tier = "half-space" }).Open())
+        {
+            client.WaitReady(20000);
+            for (int k = 0; k < Warm + Frames; k++)
+            {
+                if (k == Warm)
+                {
+                    GC.Collect();
+                    before = GC.GetTotalMemory(true);
+                    collections = GC.CollectionCount(0);
+                }
+                uint sequence = client.Send(pressurePa);
+                Answer answer = null;
+                while (!client.TryTake(out answer)) Thread.Sleep(0);
+                if (answer.Sequence != sequence || answer.Status != Status.Ok) throw new Exception("frame " + sequence + ": " + answer.Status);
+            }
+            long grown = GC.GetTotalMemory(false) - before;
+            int collected = GC.CollectionCount(0) - collections;
+            Console.WriteLine("{0} bytes in {1} frames, {2} collections", grown, Frames, collected);
+            // The heap is counted by blocks of some KiB; one object a frame would be 20 KiB.
+            return collected == 0 && grown < 8192 ? 0 : 1;
+        }
+    }
+}

@@ -1,0 +1,93 @@
+// A WebSocket that is made anew whenever it is lost.
+
+/** Attempts to connect are this far apart, with some chance in it. */
+const RETRY_MS = { least: 100, most: 250 };
+/** An attempt that has not come to a session by then is given up. */
+const ATTEMPT_MS = 5000;
+
+/**
+ * What happens to a link. `connecting` and `lost` may be told many times.
+ * @typedef {object} Ends
+ * @property {() => void} connecting
+ * @property {() => void} opened
+ * @property {(text: string) => void} text
+ * @property {(data: ArrayBuffer) => void} binary
+ * @property {(why: string) => void} lost
+ */
+
+export class Link {
+  /** @param {string} url @param {Ends} ends */
+  constructor(url, ends) {
+    this.#url = url;
+    this.#ends = ends;
+  }
+
+  #url;
+  #ends;
+  /** @type {WebSocket | null} */ #socket = null;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ #retry;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
+
+  get isOpen() {
+    return this.#socket !== null && this.#socket.readyState === WebSocket.OPEN;
+  }
+
+  /** Whether there is a connection, or an attempt at one. */
+  get isBusy() {
+    return this.#socket !== null;
+  }
+
+  /** Bytes that have not left yet. */
+  get bufferedBytes() {
+    return this.#socket?.bufferedAmount ?? 0;
+  }
+
+  /** @param {string | ArrayBuffer | Uint8Array<ArrayBuffer>} message */
+  send(message) {
+    this.#socket?.send(message);
+  }
+
+  /** The attempt has come to a session. */
+  succeeded() {
+    clearTimeout(this.#attempt);
+  }
+
+  connect() {
+    this.drop();
+    this.#ends.connecting();
+    const socket = new WebSocket(this.#url);
+    socket.binaryType = 'arraybuffer';
+    this.#socket = socket;
+    this.#attempt = setTimeout(() => this.#lose(socket, `no session within ${ATTEMPT_MS} ms`), ATTEMPT_MS);
+    socket.onopen = () => this.#ends.opened();
+    socket.onmessage = (event) => {
+      if (typeof event.data === 'string') this.#ends.text(event.data);
+      else this.#ends.binary(event.data);
+    };
+    socket.onclose = (event) => this.#lose(socket, event.reason || 'the connection was lost');
+    // The reason is in the close event that follows.
+    socket.onerror = () => {};
+  }
+
+  /** Ends the connection, and tries no other. */
+  drop() {
+    clearTimeout(this.#retry);
+    clearTimeout(this.#attempt);
+    const socket = this.#socket;
+    this.#socket = null;
+    if (!socket) return;
+    socket.onmessage = socket.onclose = null;
+    // Browsers complain of a socket that is closed while it connects.
+    if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
+    else socket.close();
+  }
+
+  /** @param {WebSocket} socket @param {string} why */
+  #lose(socket, why) {
+    if (socket !== this.#socket) return;
+    this.drop();
+    // Before the owner is told: it may drop the link for good.
+    this.#retry = setTimeout(() => this.connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
+    this.#ends.lost(why);
+  }
+}

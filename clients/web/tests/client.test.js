@@ -1,0 +1,48 @@
+// The parts of the client that need no server, and the first code of docs/clients/web.md as it is written.
+// PAPILLA_URL: a server with --xr-dir dist.
+
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { test } from 'node:test';
+import { measure } from '../foundation/measure.js';
+import { toHalf } from '../src/wire.js';
+import { launch, openPage } from './browser.js';
+
+const page = await readFile(new URL('../../../docs/clients/web.md', import.meta.url), 'utf8');
+
+test('f16 rounds to the nearest, ties to even, and clamps', () => {
+  for (const [value, bits] of [[0, 0], [1, 0x3c00], [65504, 0x7bff], [1e9, 0x7bff], [-1, 0xbc00], [2 ** -24, 1], [2 ** -25, 0],
+    [1.5 * 2 ** -24, 2], [1 + 2 ** -11, 0x3c00], [1 + 3 * 2 ** -11, 0x3c02], [2047.5 * 2 ** -25, 0x400], [Infinity, 0x7bff]]) {
+    assert.equal(toHalf(value), bits, String(value));
+  }
+  assert.equal(toHalf(NaN) & 0x7e00, 0x7e00);
+});
+
+test('the foundation is off the FE presses by what its page says, with the constants that fit', () => {
+  const [fitted, winkler] = measure();
+  for (const { law, stiffness } of [fitted, winkler]) assert.ok(Math.abs(stiffness / law.stiffness - 1) < 1e-3, `${stiffness}`);
+  const percent = (/** @type {number} */ value) => `${(100 * value).toFixed(1)} %`;
+  for (const set of ['s1', 'broad', 'heldout', 'deep']) {
+    const [ours, other] = [fitted, winkler].map(({ rows }) => /** @type {typeof fitted.rows[0]} */ (rows.find(({ of }) => of === set)));
+    const line = page.split('\n').find((one) => one.startsWith(`| \`${set}\``));
+    const due = [String(ours.states), ...[ours.l2_median, ours.l2_p95, ours.sum_median, other.l2_median, other.sum_median].map(percent)];
+    assert.deepEqual(line?.split('|').slice(2, -1).map((cell) => cell.trim()), due, set);
+  }
+});
+
+test('the first code of the page makes a SED map', async () => {
+  const block = page.match(/```html\n<script type="module">\n([\s\S]*?)<\/script>\n```/);
+  assert.ok(block, 'docs/clients/web.md has no script');
+  assert.ok(block[1].trim().split('\n').length <= 10);
+  const browser = await launch();
+  try {
+    const tab = await openPage(browser);
+    const said = tab.waitForEvent('console', { timeout: 60000 });
+    await tab.addScriptTag({ type: 'module', content: block[1] });
+    const text = (await said).text();
+    const sed = Number(text.match(/^SED up to ([0-9.]+) J\/m3$/)?.[1]);
+    assert.ok(sed > 1 && sed < 1e5, text);
+  } finally {
+    await browser.close();
+  }
+});
