@@ -1,6 +1,4 @@
 // Runs the conformance script with the C++ client (docs/conformance.md).
-#include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -8,137 +6,9 @@
 #include <set>
 #include <sstream>
 
-#include <papilla/papilla.hpp>
-
-using namespace papilla;
-using json::Value;
+#include "checks.hpp"
 
 namespace {
-
-struct Nonconformity {
-  std::string what;
-};
-
-void must(bool good, const std::string& what) {
-  if (!good) throw Nonconformity{what};
-}
-
-std::string environment(const char* name) {
-  const char* const value = std::getenv(name);
-  must(value != nullptr, std::string(name) + " is not set");
-  return value;
-}
-
-void control(const std::string& action) {
-  const HttpAnswer answer = http(environment("PAPILLA_CONTROL"), "POST", "/" + action);
-  must(answer.status == 200, "the control refuses " + action + ": " + answer.problem.message);
-}
-
-void sleep_ms(double ms) {
-  std::this_thread::sleep_for(std::chrono::microseconds(static_cast<long long>(1000 * ms)));
-}
-
-std::vector<float> pressure(const Value& pattern, double share = 1.0) {
-  std::vector<float> map(map_len);
-  for (std::size_t i = 0; i < map_len; ++i) {
-    const double u = double(i % side_px) + 0.5, v = double(i / side_px) + 0.5;
-    double sum = 0.0;
-    const auto squared = [&](const Value& of) {
-      return (u - of[0].number) * (u - of[0].number) + (v - of[1].number) * (v - of[1].number);
-    };
-    for (const Value& g : pattern["gaussians"].items) {
-      sum += g[3].number * std::exp(-squared(g) / (2.0 * g[2].number * g[2].number));
-    }
-    const Value& disc = pattern["disc"];
-    if (!disc.is_null() && squared(disc) <= disc[2].number * disc[2].number) sum += disc[3].number;
-    map[i] = static_cast<float>(sum < 1.0 ? 0.0 : share * sum);
-  }
-  if (const Value& bad = pattern["bad"]; !bad.is_null()) {
-    float& sample = map[bad[0].whole() * side_px + bad[1].whole()];
-    sample = bad[2].string == "nan"   ? std::nanf("")
-             : bad[2].string == "inf" ? HUGE_VALF
-                                      : static_cast<float>(bad[2].number);
-  }
-  return map;
-}
-
-void near(const std::string& what, double found, const Value& due, std::size_t at = 0) {
-  const double off = std::abs(found - due[at].number);
-  must(off <= due[at + 1].number, what + " is " + std::to_string(found) + ", " +
-                                      std::to_string(due[at].number) + " is due");
-}
-
-template <class List>
-void check_list(const char* what, const List& found, const Value& due) {
-  must(found.size() == due.size(), std::string(what) + ": another number of values");
-  for (std::size_t i = 0; i < due.size(); ++i) near(what + std::to_string(i), found[i], due[i]);
-}
-
-template <class At>
-void check_map(const Value& expect, const At& at) {
-  double sum = 0.0, top = 0.0;
-  for (int row = 0; row < side_px; ++row) {
-    for (int column = 0; column < side_px; ++column) {
-      sum += at(row, column);
-      top = std::max<double>(top, at(row, column));
-    }
-  }
-  for (const Value& pixel : expect["pixels"].items) {
-    near("pixel", at(int(pixel[0].number), int(pixel[1].number)), pixel, 2);
-  }
-  if (expect.has("sum")) near("sum", sum, expect["sum"]);
-  if (expect.has("max")) near("max", top, expect["max"]);
-}
-
-void check_problem(const Value& expect, const Problem& problem) {
-  must(problem.code == expect["code"].string, "the code is " + problem.code + ": " + problem.message);
-  must(!expect.has("field") || problem.field == expect["field"].string, "the field is " + problem.field);
-}
-
-const char* name_of(Status status) {
-  constexpr const char* names[] = {"ok", "superseded", "late", "error", "stale", "lost"};
-  return names[static_cast<int>(status)];
-}
-
-std::string due_status(const Value& expect) {
-  return expect.has("status") ? expect["status"].string : "ok";
-}
-
-void check_answer(const Value& expect, const Answer& answer) {
-  const std::string status = name_of(answer.status);
-  must(status == due_status(expect), "the status is " + status + " " + answer.problem.message);
-  if (answer.status == Status::error) check_problem(expect, answer.problem);
-  if (answer.status != Status::ok) return;
-  if (expect.has("kind")) {
-    must((answer.kind == Kind::sed) == (expect["kind"].string == "sed"), "another kind");
-  }
-  if (expect.has("tier")) must(answer.tier == expect["tier"].string, "the tier is " + answer.tier);
-  if (expect.has("flags")) {
-    std::uint8_t flags = 0;
-    for (const Value& flag : expect["flags"].items) {
-      flags |= flag.string == "out_of_range" ? out_of_range : no_contact;
-    }
-    must(answer.flags == flags, "the flags are " + std::to_string(answer.flags));
-  }
-  must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole");
-  if (expect.has("map")) {
-    must(!answer.has_map, "the answer carries a map");
-  } else {
-    must(answer.has_map, "the answer carries no map");
-    check_map(expect, [&](int row, int column) { return answer.at(row, column); });
-  }
-  if (const Value& due = expect["window"]; !due.is_null()) {
-    const Window& w = answer.window;
-    must(w.column == due[0].number && w.row == due[1].number && w.width == due[2].number &&
-             w.height == due[3].number, "another window");
-  }
-  if (expect.has("summary")) {
-    must(answer.has_summary, "there is no summary");
-    check_list("summary", answer.summary, expect["summary"]);
-  }
-  if (expect.has("points")) check_list("points", answer.points, expect["points"]);
-  if (expect.has("actuators")) check_list("actuators", answer.actuators, expect["actuators"]);
-}
 
 /// Members of an object without its braces.
 std::string members(const Value& hello) {

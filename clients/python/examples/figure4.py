@@ -44,7 +44,7 @@ for row, press, predicted in zip(axes, presses, predictions, strict=True):
         axis.set_xticks([])
         axis.set_yticks([])
         figure.colorbar(image, ax=axis, shrink=0.8)
-    row[0].set_ylabel(press.name.replace(": ", "\n"), fontsize=8)
+    row[0].set_xlabel(press.name, fontsize=8)
     row[2].set_xlabel(f"relative L2 {100 * error(predicted, truth):.1f} %", fontsize=8)
     row[3].plot(1e-3 * truth[line], color="black", label="FE")
     row[3].plot(1e-3 * predicted[line], color="tab:orange", linestyle="--", label=tier)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
 import time
 from concurrent.futures import Future
 from types import TracebackType
@@ -21,31 +20,11 @@ from . import wire
 from .answer import Answer, FrameProblem
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
+from .link import Frame, dial
 from .wire import Window
 
-_SOCKET_BYTES: Final = 512 * 1024
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
-
-
-class _Frame:
-    """A frame on its way, and who waits for its outcome."""
-
-    __slots__ = ("client_time_us", "message", "outcome", "ready", "sequence")
-
-    def __init__(self, sequence: int, client_time_us: int, message: bytes) -> None:
-        self.sequence = sequence
-        self.client_time_us = client_time_us
-        self.message = message
-        self.outcome: Future[Answer] = Future()
-        self.ready: dict[str, Any] = {}
-
-    def end(self, status: str, by_client: bool = False, problem: FrameProblem | None = None) -> None:
-        self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem))
-
-    def give(self, answer: Answer) -> None:
-        if not self.outcome.done():
-            self.outcome.set_result(answer)
 
 
 class AsyncSession:
@@ -71,8 +50,8 @@ class AsyncSession:
         self._socket: ClientConnection | None = None
         self._tiers: dict[int, str] = {}
         self._sequence = 0
-        self._waiting: _Frame | None = None
-        self._sent: dict[int, _Frame] = {}
+        self._waiting: Frame | None = None
+        self._sent: dict[int, Frame] = {}
         self._wake = asyncio.Event()
         self._connected = asyncio.Event()
         self._terms: asyncio.Future[dict[str, Any]] | None = None
@@ -157,7 +136,7 @@ class AsyncSession:
         window: Window | None,
         client_time_us: int | None,
         deadline_us: int,
-    ) -> _Frame:
+    ) -> Frame:
         if self._closed:
             raise Closed("the session is closed")
         if self._fault is not None:
@@ -172,9 +151,9 @@ class AsyncSession:
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         kind = self.ready["sample_type"]
         message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
-        return _Frame(self._sequence, time_us, message)
+        return Frame(self._sequence, time_us, message)
 
-    def hand_over(self, frame: _Frame) -> None:
+    def hand_over(self, frame: Frame) -> None:
         if self._closed or self._fault is not None:
             return self._lose(frame)
         old, self._waiting = self._waiting, frame
@@ -192,7 +171,7 @@ class AsyncSession:
         host, port = parts.hostname or "127.0.0.1", parts.port or (443 if secure else 80)
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
         try:
-            raw = await _dial(host, port)
+            raw = await dial(host, port)
             ws = f"{'wss' if secure else 'ws'}://{parts.netloc}/v1/session"
             self._socket = await connect(
                 ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None
@@ -293,25 +272,6 @@ class AsyncSession:
                         self._lose(frame)
 
     @staticmethod
-    def _lose(frame: _Frame | None) -> None:
+    def _lose(frame: Frame | None) -> None:
         if frame is not None:
             frame.end("lost")
-
-
-async def _dial(host: str, port: int) -> socket.socket:
-    """A connection with room for a whole frame each way; the room must be named before."""
-    loop = asyncio.get_running_loop()
-    last: OSError = OSError(f"{host} has no address")
-    for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
-        raw = socket.socket(family, kind, proto)
-        try:
-            raw.setblocking(False)
-            raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SOCKET_BYTES)
-            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
-            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            await loop.sock_connect(raw, address)
-            return raw
-        except OSError as error:
-            raw.close()
-            last = error
-    raise last

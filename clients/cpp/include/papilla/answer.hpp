@@ -1,0 +1,88 @@
+// What becomes of a frame, and what a session agreed to.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "json.hpp"
+#include "wire.hpp"
+
+namespace papilla {
+
+/// An error of the service's; `code` is one of docs/protocol.md's.
+struct Problem {
+  std::string code;
+  std::string message;
+  std::string field;
+};
+
+/// The sixteen numbers of a summary, by name; formulas in docs/protocol.md.
+enum SummaryMember : std::size_t {
+  force_n, contact_area_mm2, pressure_max_pa, pressure_u_px, pressure_v_px, sed_max_j_per_m3,
+  sed_max_u_px, sed_max_v_px, sed_integral_uj_per_m, sed_u_px, sed_v_px, sed_uu_px2, sed_uv_px2,
+  sed_vv_px2, sed_mean_j_per_m3, sa1_rate_hz
+};
+
+/// The outcome of one frame.
+struct Answer {
+  std::uint32_t sequence = 0;
+  Status status = Status::lost;
+  bool by_client = false;             ///< superseded here: the frame never left
+  Problem problem;                    ///< with status error
+  Kind kind = Kind::sed;
+  std::uint8_t flags = 0;             ///< out_of_range, no_contact
+  std::string tier;
+  Window window{0, 0, 0, 0};          ///< of `values`
+  std::uint64_t client_time_us = 0;
+  std::uint32_t total_us = 0;         ///< in the server, of which
+  std::uint32_t queue_us = 0;         ///< waiting for a thread
+  std::uint32_t infer_us = 0;         ///< in the network
+  bool has_map = false;
+  std::vector<float> values;          ///< the window's samples, J/m3 (or Hz), row by row
+  bool has_summary = false;
+  std::array<float, 16> summary{};    ///< see SummaryMember
+  std::vector<float> points;
+  std::vector<float> actuators;
+
+  /// Value at a pixel of the map; 0 outside of the window.
+  float at(int row, int column) const {
+    const int r = row - window.row, c = column - window.column;
+    const bool inside = has_map && r >= 0 && c >= 0 && r < window.height && c < window.width;
+    return inside ? values[std::size_t(r) * window.width + std::size_t(c)] : 0.0F;
+  }
+  float max() const {
+    float top = 0.0F;
+    for (const float value : values) top = value > top ? value : top;
+    return has_map ? top : 0.0F;
+  }
+};
+
+/// What the service agreed to.
+struct Terms {
+  struct Section {
+    std::size_t offset = 0;
+    std::size_t bytes = 0;
+    bool there = false;
+  };
+  json::Value ready;                  ///< as it came
+  SampleType sample_type = SampleType::f32;
+  std::string tier;
+  std::uint64_t tier_number = 0;
+  float pressure_max_pa = 0.0F;
+  std::string atlas_hash;
+  Section summary, points, actuators, map;
+};
+
+/// The bytes of a frame, with room before them for a transport's own header.
+struct Outgoing {
+  static constexpr std::size_t headroom = 16;
+  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(headroom + header_bytes + 4 * map_len);
+  std::size_t size = 0;               ///< without the headroom
+  std::uint32_t sequence = 0;
+  std::uint64_t client_time_us = 0;
+  std::uint8_t* data() { return bytes.data() + headroom; }
+};
+
+}  // namespace papilla

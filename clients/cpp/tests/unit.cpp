@@ -1,0 +1,96 @@
+// Parts that a session against the service exercises only in its good cases.
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include <papilla/papilla.hpp>
+#include <papilla/pieces.hpp>
+
+static int failures = 0;
+#define CHECK(what) \
+  if (!(what)) ++failures, std::printf("%s:%d: %s\n", __FILE__, __LINE__, #what)
+
+static void pieces() {
+  papilla::Pieces pieces;
+  const std::string text(70000, 'a');
+  CHECK(!pieces.add(text.data(), 65536, false));
+  CHECK(pieces.add(text.data(), 4464, true) && pieces.message().size() == 70000);
+  CHECK(pieces.add("xyz", 3, true) && pieces.message().size() == 3);
+  CHECK(!pieces.add("half", 4, false));
+  pieces.reset();
+  CHECK(pieces.add("new", 3, true) && pieces.message().size() == 3);
+  for (int i = 0; i < 20; ++i) CHECK(!pieces.add(text.data(), text.size(), false));
+  CHECK(!pieces.add(text.data(), text.size(), true));
+  CHECK(pieces.add("ok", 2, true) && pieces.message().size() == 2);
+}
+
+static void halves() {
+  // Every half that is a number comes back, and what lies between two goes to the nearer.
+  for (std::uint32_t half = 0; half < 0x10000; ++half) {
+    const auto bits = static_cast<std::uint16_t>(half);
+    if ((bits & 0x7c00) == 0x7c00) continue;
+    CHECK(papilla::to_half(papilla::from_half(bits)) == bits);
+    if ((bits & 0x7fff) < 0x7bff) {
+      const float low = papilla::from_half(bits), high = papilla::from_half(static_cast<std::uint16_t>(bits + 1));
+      CHECK(papilla::to_half(0.75F * low + 0.25F * high) == bits);
+      CHECK((papilla::to_half(0.5F * low + 0.5F * high) & 1) == 0);
+    }
+  }
+  CHECK(papilla::to_half(1e9F) == 0x7bff && papilla::to_half(-65519.0F) == 0xfbff);
+  CHECK(std::isnan(papilla::from_half(papilla::to_half(std::nanf("")))));
+}
+
+static void json() {
+  using papilla::json::parse;
+  papilla::json::Value value;
+  CHECK(parse(R"( {"a": [1, -2.5e3, true, null, "x\"\u00e9\ud83d\ude00\n"], "b": {}} )", value));
+  CHECK(value["a"][1].number == -2500.0 && value["a"][2].boolean && value["a"][3].is_null());
+  CHECK(value["a"][4].string == "x\"\xc3\xa9\xf0\x9f\x98\x80\n" && !value.has("c") && value["c"]["d"].is_null());
+  for (const char* bad : {"", "{", "[1,", "{\"a\" 1}", "tru", "\"a", "[1] 2", "1..2", "\"\\ud800\"", "-", "[1,]"}) {
+    CHECK(!parse(bad, value));
+  }
+  CHECK(!parse(std::string(100000, '['), value));
+}
+
+static void messages() {
+  // Whatever comes, the core neither crashes nor takes it for an answer.
+  papilla::Core core;
+  int outcomes = 0;
+  core.on_outcome = [&](const papilla::Answer&) { ++outcomes; };
+  CHECK(core.text("no json") == papilla::Core::Heard::broken);
+  CHECK(core.text(R"({"type": "ready", "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
+        papilla::Core::Heard::ready);
+  const std::vector<float> map(papilla::map_len, 1.0F);
+  const std::uint32_t sequence = core.send(map.data(), {}, 7);
+  papilla::Outgoing* const frame = core.take();
+  CHECK(frame && frame->size == 48 + 4 * papilla::map_len && core.in_flight() == 1);
+  std::vector<std::uint8_t> answer(frame->data(), frame->data() + frame->size);
+  answer[5] = 2;
+  CHECK(core.binary(answer.data(), 47) == papilla::Core::Heard::broken);
+  CHECK(core.binary(answer.data(), answer.size() - 1) == papilla::Core::Heard::broken && outcomes == 0);
+  core.send(map.data(), {}, 8);
+  core.send(map.data(), {}, 9);
+  CHECK(outcomes == 1 && core.superseded_by_client() == 1);
+  core.lost();
+  CHECK(core.in_flight() == 0 && core.waiting() && !core.can_take());
+  core.end();
+  CHECK(!core.waiting() && sequence == 1);
+}
+
+static void proofs() {
+  // RFC 6455, 1.3.
+  const auto digest = papilla::detail::sha1("dGhlIHNhbXBsZSBub25jZQ==258EAFA5-E914-47DA-95CA-C5AB0DC85B11");
+  CHECK(papilla::detail::base64(digest.data(), digest.size()) == "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");
+  CHECK(papilla::net::Address::of("http://[::1]:80/x").host == "::1");
+  CHECK(papilla::net::Address::of("lab.example").port == "7224");
+}
+
+int main() {
+  pieces();
+  halves();
+  json();
+  messages();
+  proofs();
+  std::printf(failures ? "%d checks failed\n" : "all checks passed\n", failures);
+  return failures ? 1 : 0;
+}

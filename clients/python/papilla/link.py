@@ -1,0 +1,51 @@
+"""Parts of a session: its connection, and a frame on its way."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from concurrent.futures import Future
+from typing import Any, Final
+
+from .answer import Answer, FrameProblem
+
+_SOCKET_BYTES: Final = 512 * 1024
+
+
+class Frame:
+    """A frame on its way, and who waits for its outcome."""
+
+    __slots__ = ("client_time_us", "message", "outcome", "ready", "sequence")
+
+    def __init__(self, sequence: int, client_time_us: int, message: bytes) -> None:
+        self.sequence = sequence
+        self.client_time_us = client_time_us
+        self.message = message
+        self.outcome: Future[Answer] = Future()
+        self.ready: dict[str, Any] = {}
+
+    def end(self, status: str, by_client: bool = False, problem: FrameProblem | None = None) -> None:
+        self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem))
+
+    def give(self, answer: Answer) -> None:
+        if not self.outcome.done():
+            self.outcome.set_result(answer)
+
+
+async def dial(host: str, port: int) -> socket.socket:
+    """A connection with room for a whole frame each way; the room must be named before."""
+    loop = asyncio.get_running_loop()
+    last: OSError = OSError(f"{host} has no address")
+    for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+        raw = socket.socket(family, kind, proto)
+        try:
+            raw.setblocking(False)
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SOCKET_BYTES)
+            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _SOCKET_BYTES)
+            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            await loop.sock_connect(raw, address)
+            return raw
+        except OSError as error:
+            raw.close()
+            last = error
+    raise last

@@ -1,0 +1,17 @@
+using System.IO;
+using UnrealBuildTool;
+
+public class Papilla : ModuleRules
+{
+    public Papilla(ReadOnlyTargetRules Target) : base(Target)
+    {
+        PCHUsage = PCHUsageMode.UseExplicitOrSharedPCHs;
+        CppStandard = CppStandardVersion.Cpp20;
+        PublicDependencyModuleNames.AddRange(new[] { "Core", "CoreUObject", "Engine" });
+        PrivateDependencyModuleNames.AddRange(new[] { "HTTP", "WebSockets" });
+        // The C++ client's headers: copied into the plugin, or beside it as in the repository.
+        string Copied = Path.Combine(PluginDirectory, "Source", "ThirdParty", "include");
+        string Beside = Path.Combine(PluginDirectory, "..", "..", "cpp", "include");
+        PublicIncludePaths.Add(Directory.Exists(Copied) ? Copied : Path.GetFullPath(Beside));
+    }
+}

@@ -1,0 +1,219 @@
+#include "PapillaComponent.h"
+
+#include "HttpModule.h"
+#include "IWebSocket.h"
+#include "Interfaces/IHttpRequest.h"
+#include "Interfaces/IHttpResponse.h"
+#include "Modules/ModuleManager.h"
+#include "WebSocketsModule.h"
+
+namespace
+{
+constexpr double RetrySeconds = 0.15;
+
+FString ToFString(const std::string& Text)
+{
+    return FString(UTF8_TO_TCHAR(Text.c_str()));
+}
+
+std::string ToUtf8(const FString& Text)
+{
+    return std::string(TCHAR_TO_UTF8(*Text));
+}
+
+uint64 NowUs()
+{
+    return static_cast<uint64>(FPlatformTime::Seconds() * 1e6);
+}
+}  // namespace
+
+UPapillaComponent::UPapillaComponent()
+{
+    PrimaryComponentTick.bCanEverTick = true;
+}
+
+void UPapillaComponent::BeginPlay()
+{
+    Super::BeginPlay();
+    Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
+    Core = MakeUnique<papilla::Core>(ToUtf8(Hello));
+    Core->on_outcome = [this](const papilla::Answer& Outcome)
+    {
+        if (Outcome.status != papilla::Status::ok) return;
+        Answer = Outcome;
+        bHasAnswer = true;
+        OnAnswer.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
+    };
+    FetchAtlas();
+    Connect();
+}
+
+void UPapillaComponent::EndPlay(const EEndPlayReason::Type Reason)
+{
+    if (Core) Core->on_outcome = nullptr;
+    if (Socket)
+    {
+        Socket->OnConnected().Clear();
+        Socket->OnConnectionError().Clear();
+        Socket->OnClosed().Clear();
+        Socket->OnMessage().Clear();
+        Socket->OnBinaryMessage().Clear();
+        Socket->Close();
+        Socket.Reset();
+    }
+    Super::EndPlay(Reason);
+}
+
+void UPapillaComponent::Connect()
+{
+    FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
+    Socket = Module.CreateWebSocket(TEXT("ws://") + Server + TEXT("/v1/session"), FString());
+    TWeakObjectPtr<UPapillaComponent> Weak(this);
+    Socket->OnConnected().AddLambda([Weak]()
+    {
+        if (UPapillaComponent* Self = Weak.Get()) Self->Socket->Send(ToFString(Self->Core->hello()));
+    });
+    Socket->OnConnectionError().AddLambda([Weak](const FString& Error)
+    {
+        if (UPapillaComponent* Self = Weak.Get())
+        {
+            Self->OnRefused.Broadcast(FString(), Error);
+            Self->Broke();
+        }
+    });
+    Socket->OnClosed().AddLambda([Weak](int32, const FString&, bool)
+    {
+        if (UPapillaComponent* Self = Weak.Get()) Self->Broke();
+    });
+    Socket->OnMessage().AddLambda([Weak](const FString& Message)
+    {
+        if (UPapillaComponent* Self = Weak.Get()) Self->HandleText(Message);
+    });
+    Socket->OnBinaryMessage().AddLambda([Weak](const void* Data, SIZE_T Size, bool bIsLast)
+    {
+        if (UPapillaComponent* Self = Weak.Get()) Self->HandlePiece(Data, Size, bIsLast);
+    });
+    Socket->Connect();
+}
+
+void UPapillaComponent::Broke()
+{
+    Core->lost();
+    Pieces.reset();
+    // A new socket at the next tick after that: not from within the old one's call.
+    RetryAt = FPlatformTime::Seconds() + RetrySeconds;
+}
+
+void UPapillaComponent::HandleText(const FString& Message)
+{
+    switch (Core->text(ToUtf8(Message)))
+    {
+    case papilla::Core::Heard::ready:
+        OnReady.Broadcast();
+        Pump();
+        break;
+    case papilla::Core::Heard::refused:
+        OnRefused.Broadcast(ToFString(Core->refusal().code), ToFString(Core->refusal().message));
+        break;
+    case papilla::Core::Heard::broken:
+        Socket->Close();
+        break;
+    case papilla::Core::Heard::nothing:
+        Pump();
+        break;
+    }
+}
+
+void UPapillaComponent::HandlePiece(const void* Data, SIZE_T Size, bool bIsLast)
+{
+    // Unreal hands over 64 KiB at a time: a frame of f32 comes in four pieces.
+    if (!Pieces.add(Data, Size, bIsLast)) return;
+    if (Core->binary(Pieces.message().data(), Pieces.message().size()) == papilla::Core::Heard::broken)
+    {
+        Socket->Close();
+        return;
+    }
+    Pump();
+}
+
+void UPapillaComponent::Pump()
+{
+    while (Socket && Core->in_flight() < static_cast<size_t>(MaxInFlight))
+    {
+        papilla::Outgoing* const Frame = Core->take();
+        if (!Frame) return;
+        Socket->Send(Frame->data(), Frame->size, true);
+    }
+}
+
+void UPapillaComponent::TickComponent(float DeltaTime, ELevelTick Tick, FActorComponentTickFunction* Function)
+{
+    Super::TickComponent(DeltaTime, Tick, Function);
+    if (!Core) return;
+    if (RetryAt > 0.0 && FPlatformTime::Seconds() >= RetryAt)
+    {
+        RetryAt = 0.0;
+        if (!bHasAtlas) FetchAtlas();
+        Connect();
+    }
+    Pump();
+}
+
+int32 UPapillaComponent::SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs)
+{
+    if (!Core) return 0;
+    const int32 Sequence = static_cast<int32>(Core->send(PressurePa, Window, NowUs(), DeadlineUs));
+    Pump();
+    return Sequence;
+}
+
+int32 UPapillaComponent::SendPressure(const TArray<float>& PressurePa)
+{
+    if (PressurePa.IsEmpty()) return SendWindow(nullptr, {});
+    if (PressurePa.Num() != static_cast<int32>(papilla::map_len))
+    {
+        OnRefused.Broadcast(TEXT("wrong_length"), TEXT("a pressure map has 224 x 224 samples"));
+        return 0;
+    }
+    return SendWindow(PressurePa.GetData(), {});
+}
+
+int32 UPapillaComponent::SendContacts(const TArray<FPapillaContact>& Contacts)
+{
+    if (!bHasAtlas) return 0;
+    Points.clear();
+    for (const FPapillaContact& Contact : Contacts)
+    {
+        Points.push_back({{Contact.AtMm.X, Contact.AtMm.Y, Contact.AtMm.Z}, Contact.ForceN, Contact.RadiusMm});
+    }
+    Atlas.contacts(Points.data(), Points.size(), Drawn.GetData());
+    return SendWindow(Drawn.GetData(), {});
+}
+
+bool UPapillaComponent::GetSed(TArray<float>& SedJPerM3) const
+{
+    SedJPerM3.SetNumZeroed(static_cast<int32>(papilla::map_len));
+    if (!bHasAnswer) return false;
+    for (int32 Row = 0; Row < papilla::side_px; ++Row)
+    {
+        for (int32 Column = 0; Column < papilla::side_px; ++Column)
+        {
+            SedJPerM3[Row * papilla::side_px + Column] = Answer.at(Row, Column);
+        }
+    }
+    return true;
+}
+
+void UPapillaComponent::FetchAtlas()
+{
+    const auto Request = FHttpModule::Get().CreateRequest();
+    Request->SetURL(TEXT("http://") + Server + TEXT("/v1/atlas"));
+    TWeakObjectPtr<UPapillaComponent> Weak(this);
+    Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)
+    {
+        UPapillaComponent* Self = Weak.Get();
+        if (!Self || !bGood || !Response || Response->GetResponseCode() != 200 || Self->bHasAtlas) return;
+        Self->bHasAtlas = Self->Atlas.parse(ToUtf8(Response->GetContentAsString()));
+    });
+    Request->ProcessRequest();
+}

@@ -1,0 +1,112 @@
+// A session with a Papilla service, as a component. All protocol logic is in papilla/core.hpp.
+#pragma once
+
+#include "Components/ActorComponent.h"
+#include "CoreMinimal.h"
+
+#include <papilla/atlas.hpp>
+#include <papilla/core.hpp>
+#include <papilla/pieces.hpp>
+
+#include "PapillaComponent.generated.h"
+
+class IWebSocket;
+
+/** A contact point: a place on or near the undeformed skin in the finger's frame, a force, a radius. */
+USTRUCT(BlueprintType)
+struct FPapillaContact
+{
+    GENERATED_BODY()
+
+    /** mm; x from the tip to the base, y lateral, z towards the nail. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    FVector AtMm = FVector::ZeroVector;
+
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    double ForceN = 0.0;
+
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    double RadiusMm = 2.5;
+};
+
+DECLARE_DYNAMIC_MULTICAST_DELEGATE(FPapillaReady);
+DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaRefused, const FString&, Code, const FString&, Message);
+DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaAnswer, int32, Sequence, float, SedMaxJPerM3);
+
+/**
+ * Sends pressure maps (Pa) and gives the newest strain energy density map (J/m3), 224 x 224 each.
+ * The latest frame wins: sending never blocks or queues. Reconnects by itself. Game thread only.
+ */
+UCLASS(ClassGroup = (Haptics), meta = (BlueprintSpawnableComponent))
+class PAPILLA_API UPapillaComponent : public UActorComponent
+{
+    GENERATED_BODY()
+
+public:
+    UPapillaComponent();
+
+    /** Host and port of the service. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    FString Server = TEXT("127.0.0.1:7224");
+
+    /** Members of the protocol's hello, as JSON without braces: "tier": "small", "effects": ["summary"]. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
+    FString Hello = TEXT("\"budget_us\": 11000");
+
+    /** Frames that may be on their way at once. IWebSocket queues without bound, so this bounds it. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "1", ClampMax = "8"))
+    int32 MaxInFlight = 2;
+
+    /** A session is open. */
+    UPROPERTY(BlueprintAssignable, Category = "Papilla")
+    FPapillaReady OnReady;
+
+    /** The hello was refused, or the service cannot be reached. */
+    UPROPERTY(BlueprintAssignable, Category = "Papilla")
+    FPapillaRefused OnRefused;
+
+    /** A map came; GetSed reads it. */
+    UPROPERTY(BlueprintAssignable, Category = "Papilla")
+    FPapillaAnswer OnAnswer;
+
+    /** Sends a whole map, row by row, Pa; an empty one is no contact. Returns the frame's sequence. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    int32 SendPressure(const TArray<float>& PressurePa);
+
+    /** Sends the pressure of contact points; nothing before the atlas has come (a moment after BeginPlay). */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    int32 SendContacts(const TArray<FPapillaContact>& Contacts);
+
+    /** The newest map, 224 x 224, J/m3; false if none came yet. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    bool GetSed(TArray<float>& SedJPerM3) const;
+
+    /** The newest answer with all it carries: summary, points, actuators, times. */
+    const papilla::Answer& Newest() const { return Answer; }
+
+    /** Sends a window of the map: its samples, Pa, row by row. */
+    int32 SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs = 0);
+
+    virtual void BeginPlay() override;
+    virtual void EndPlay(const EEndPlayReason::Type Reason) override;
+    virtual void TickComponent(float DeltaTime, ELevelTick Tick, FActorComponentTickFunction* Function) override;
+
+private:
+    void Connect();
+    void Broke();
+    void HandleText(const FString& Message);
+    void HandlePiece(const void* Data, SIZE_T Size, bool bIsLast);
+    void Pump();
+    void FetchAtlas();
+
+    TUniquePtr<papilla::Core> Core;
+    TSharedPtr<IWebSocket> Socket;
+    papilla::Pieces Pieces;
+    papilla::Answer Answer;
+    papilla::Atlas Atlas;
+    TArray<float> Drawn;
+    std::vector<papilla::Contact> Points;
+    bool bHasAtlas = false;
+    bool bHasAnswer = false;
+    double RetryAt = 0.0;
+};
