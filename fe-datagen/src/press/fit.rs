@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 /// Most of the contact force's normal part that may act along the skin. It is 0 in the limit of
 /// fine meshes, at most .16 in random presses of the coarse fingertip whose faces are as wide
-/// as some of the indenters, .35 on one half of a wedge and .97 where a row of nodes slipped.
+/// as some of the indenters, .35 on one half of a wedge and .73 where a row of nodes slipped.
 const ASIDE_MAX: f64 = 0.5;
 /// Cosine of the angle between a node's undeformed faces and their mean beyond which the skin has
 /// an edge of its own there: an indenter may push it in any direction between.
