@@ -8,7 +8,10 @@ use fe_datagen::stability::{self, CASES};
 use std::process::Command;
 
 /// Case and variant of promises that are known to be broken; docs/stability.md says why.
-const KNOWN: &[(&str, &str)] = &[("incompressible", "")];
+const KNOWN: &[(&str, &str)] = &[
+    ("incompressible", "press, Hex8, nu 0.49999"),
+    ("incompressible", "press, Quad4, nu 0.49999"),
+];
 
 #[test]
 fn every_hard_case_keeps_its_promise() {
@@ -25,9 +28,8 @@ fn every_hard_case_keeps_its_promise() {
         report.lines.iter().filter(|l| !l.kept && !known(l)).map(|l| l.text()).collect();
     assert!(broken.is_empty(), "promises broken:\n{}", broken.join("\n"));
     // What has been mended comes off the list.
-    for (case, _) in KNOWN {
-        let mended = report.lines.iter().filter(|l| l.case == *case).all(|l| l.kept);
-        assert!(!mended, "{case} keeps its promise now: take it off the list");
+    for line in report.lines.iter().filter(known) {
+        assert!(!line.kept, "{} keeps its promise now: take it off the list", line.text());
     }
     for case in CASES {
         assert!(report.lines.iter().any(|l| l.case == case.name), "{} is missing", case.name);
