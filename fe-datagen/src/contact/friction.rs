@@ -1,4 +1,4 @@
-//! Coulomb friction of a contact node, as an augmented Lagrangian.
+//! Coulomb friction of a contact point, as an augmented Lagrangian.
 //!
 //! Within a step the bound `s = mu lambda_n` is that of the last multiplier update, so the
 //! tangential traction has a potential: with the slip `g` since the last equilibrium, in
@@ -12,20 +12,20 @@
 
 use crate::mesh::surface::norm;
 
-/// Tangential state of every contact node during a step.
+/// Tangential state of every contact point during a step.
 #[derive(Clone, Debug, Default)]
 pub struct FrictionTrial {
     /// Coefficient of friction.
     pub coefficient: f64,
-    /// One entry a contact node.
-    pub nodes: Vec<FrictionNode>,
+    /// One entry a contact point.
+    pub points: Vec<FrictionPoint>,
     /// Energy turned into heat so far, mJ.
     pub heat_mj: f64,
 }
 
-/// Tangential state of one contact node.
+/// Tangential state of one contact point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrictionNode {
+pub struct FrictionPoint {
     /// Traction of the skin on the indenter, MPa per undeformed area.
     pub traction_mpa: [f64; 3],
     /// Largest traction, MPa.
@@ -36,43 +36,43 @@ pub struct FrictionNode {
     pub anchor_mm: [f64; 3],
 }
 
-/// Energy, force and tangent of friction at one node.
+/// Energy, force and tangent of friction at one point.
 #[derive(Clone, Copy, Debug)]
-pub struct NodeFriction {
+pub struct PointFriction {
     /// Potential, mJ.
     pub energy_mj: f64,
-    /// Its derivative by the node's position, N.
+    /// Its derivative by the point's place, N.
     pub force_n: [f64; 3],
     /// Second derivative, N/mm.
     pub stiffness: [[f64; 3]; 3],
     /// Traction cut to the bound, MPa.
     pub traction_mpa: [f64; 3],
-    /// Whether the node slips.
+    /// Whether the point slips.
     pub slips: bool,
 }
 
-impl NodeFriction {
-    /// Friction of a node at `relative_mm` (position less the indenter's
+impl PointFriction {
+    /// Friction of a point at `relative_mm` (position less the indenter's
     /// displacement); `None` where nothing presses.
     #[must_use]
     pub fn new(
-        node: &FrictionNode,
+        point: &FrictionPoint,
         relative_mm: [f64; 3],
         area: f64,
         penalty: f64,
     ) -> Option<Self> {
-        let s = node.bound_mpa;
+        let s = point.bound_mpa;
         if !(s > 0.0) {
             return None;
         }
-        let n = node.normal;
+        let n = point.normal;
         let tangential = |v: [f64; 3]| -> [f64; 3] {
             let along: f64 = (0..3).map(|i| v[i] * n[i]).sum();
             std::array::from_fn(|i| v[i] - along * n[i])
         };
-        let g = tangential(std::array::from_fn(|i| relative_mm[i] - node.anchor_mm[i]));
+        let g = tangential(std::array::from_fn(|i| relative_mm[i] - point.anchor_mm[i]));
         // A multiplier kept from another normal is turned into this plane.
-        let kept = tangential(node.traction_mpa);
+        let kept = tangential(point.traction_mpa);
         let q: [f64; 3] = std::array::from_fn(|i| kept[i] + penalty * g[i]);
         let size = norm(q);
         let plane = |i: usize, j: usize| f64::from(u8::from(i == j)) - n[i] * n[j];
@@ -113,8 +113,8 @@ mod tests {
             bound in 0.001f64..0.05,
         ) {
             let normal = [0.6, 0.0, 0.8];
-            let node = FrictionNode { traction_mpa: kept, bound_mpa: bound, normal, anchor_mm: [0.001, -0.002, 0.0] };
-            let at = |p: [f64; 3]| NodeFriction::new(&node, p, 0.3, 2.0).unwrap();
+            let point = FrictionPoint { traction_mpa: kept, bound_mpa: bound, normal, anchor_mm: [0.001, -0.002, 0.0] };
+            let at = |p: [f64; 3]| PointFriction::new(&point, p, 0.3, 2.0).unwrap();
             let found = at(x);
             let h = 1e-6;
             for i in 0..3 {
@@ -134,6 +134,6 @@ mod tests {
 
     #[test]
     fn nothing_presses_nothing_rubs() {
-        assert!(NodeFriction::new(&FrictionNode::default(), [1.0; 3], 1.0, 1.0).is_none());
+        assert!(PointFriction::new(&FrictionPoint::default(), [1.0; 3], 1.0, 1.0).is_none());
     }
 }

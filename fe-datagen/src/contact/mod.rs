@@ -1,30 +1,32 @@
 //! Contact of the skin with a rigid indenter; friction is in [`friction`].
 //!
-//! Augmented Lagrangian at the nodes of the contact surface with their share
-//! of the area, `integral N_a dA`, as weight: one multiplier a node is what the
-//! displacement space can control, so pressure does not oscillate.
-//! The potential, per undeformed area,
+//! Augmented Lagrangian at points of the contact surface ([`ContactRule`]) with their
+//! share of the area as weight. The potential, per undeformed area,
 //!
 //! `1/(2 eps) (t^2 - lambda^2)`,  `t = max(0, lambda - eps gap)`,
 //!
-//! has the traction `t` along the indenter's normal as its derivative and a
-//! symmetric tangent on the node's own diagonal block.
+//! has the traction `t` along the indenter's normal as its derivative by the point's
+//! place and a symmetric tangent.
 
 pub mod friction;
+pub mod points;
 
-pub use friction::{FrictionNode, FrictionTrial, NodeFriction};
+pub use friction::{FrictionPoint, FrictionTrial, PointFriction};
+pub use points::{ContactPoints, ContactRule, Support};
 
 use crate::indenter::Distance;
 use crate::mesh::Surface;
 use std::collections::BTreeMap;
 
-/// Nodes that may touch, with their share of the undeformed area.
+/// Nodes that may touch, with their share of the undeformed area, `integral N_a dA`.
 #[derive(Clone, Debug)]
 pub struct ContactSurface {
     /// Mesh nodes, sorted.
     pub nodes: Vec<u32>,
     /// Nodal area, mm2.
     pub area_mm2: Vec<f64>,
+    at_nodes: ContactPoints,
+    in_faces: ContactPoints,
 }
 
 impl ContactSurface {
@@ -41,28 +43,48 @@ impl ContactSurface {
             .map(|n| (n, area[n as usize]))
             .filter(|&(_, a)| a > 0.0)
             .collect();
-        Self { nodes: by_node.keys().copied().collect(), area_mm2: by_node.into_values().collect() }
+        let nodes: Vec<_> = by_node.keys().copied().collect();
+        let area_mm2: Vec<_> = by_node.into_values().collect();
+        let at_nodes = ContactPoints::nodes(&nodes, &area_mm2);
+        let in_faces = ContactPoints::faces(surface, positions, &nodes);
+        Self { nodes, area_mm2, at_nodes, in_faces }
+    }
+
+    /// Distance of neighbours, mm: the side of the square of a node's mean area.
+    #[must_use]
+    pub fn spacing_mm(&self) -> f64 {
+        let mean_area = self.area_mm2.iter().sum::<f64>() / self.area_mm2.len().max(1) as f64;
+        mean_area.sqrt()
+    }
+
+    /// Where contact is found.
+    #[must_use]
+    pub const fn points(&self, rule: ContactRule) -> &ContactPoints {
+        match rule {
+            ContactRule::Nodes => &self.at_nodes,
+            ContactRule::Faces => &self.in_faces,
+        }
     }
 }
 
-/// Energy, force and tangent of one contact node.
+/// Energy, force and tangent of one contact point.
 #[derive(Clone, Copy, Debug)]
-pub struct NodeContact {
+pub struct PointContact {
     /// Augmented potential, mJ.
     pub energy_mj: f64,
     /// Nominal normal traction, MPa per undeformed area; zero when apart.
     pub traction_mpa: f64,
-    /// Derivative of the potential by the node's position, N.
+    /// Derivative of the potential by the point's place, N.
     pub force_n: [f64; 3],
     /// Second derivative, N/mm.
     pub stiffness: [[f64; 3]; 3],
-    /// What the indenter's curvature takes from it, N/mm: a node on a convex edge
+    /// What the indenter's curvature takes from it, N/mm: a point on a convex edge
     /// is pushed off it. `None` on a flat or hollow side.
     pub curvature: Option<[[f64; 3]; 3]>,
 }
 
-impl NodeContact {
-    /// Contact of one node; `None` when it is apart and its multiplier is zero.
+impl PointContact {
+    /// Contact of one point; `None` when it is apart and its multiplier is zero.
     #[must_use]
     pub fn new(d: &Distance, area: f64, multiplier_mpa: f64, penalty: f64) -> Option<Self> {
         let t = multiplier_mpa - penalty * d.gap_mm;

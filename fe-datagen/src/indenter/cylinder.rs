@@ -49,6 +49,10 @@ impl SignedDistance for Cylinder {
         let half = 0.5 * self.length_mm;
         disc_reach_mm(direction, 1, self.radius_mm, [-half, half], self.end_radius_mm)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        2.0 * self.radius_mm
+    }
 }
 
 #[cfg(test)]

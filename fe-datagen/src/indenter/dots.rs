@@ -102,6 +102,10 @@ impl SignedDistance for Dots {
             - direction[2] * radius_mm;
         dots.max(plate.reach_mm(direction) + direction[2] * below)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.base_mm
+    }
 }
 
 #[cfg(test)]

@@ -108,6 +108,10 @@ impl SignedDistance for Grating {
         let hull = self.bar(base.half_mm[0], -2.0 * middle);
         hull.reach_mm(direction) + direction[2] * middle
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.ridge_mm
+    }
 }
 
 #[cfg(test)]

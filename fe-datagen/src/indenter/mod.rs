@@ -60,6 +60,11 @@ pub trait SignedDistance: Send + Sync {
     /// local origin (its support function); infinite where it has no end.
     fn reach_mm(&self, direction: [f64; 3]) -> f64;
 
+    /// Width of its narrowest part that can press, mm; infinite where that is not known.
+    fn narrowest_mm(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// A distance that is certainly free around `p`, mm; negative inside. The gap,
     /// unless that is approximate.
     fn clearance_mm(&self, p: [f64; 3]) -> f64 {

@@ -94,6 +94,10 @@ impl SignedDistance for Placed {
     fn clearance_mm(&self, p: [f64; 3]) -> f64 {
         self.placement.clearance_mm(self.part.as_ref(), p)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.part.narrowest_mm()
+    }
 }
 
 #[cfg(test)]

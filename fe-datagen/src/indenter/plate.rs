@@ -92,6 +92,10 @@ impl SignedDistance for RoundedPlate {
         let r = self.edge_radius_mm;
         (0..3).map(|i| (self.half_mm[i] - r) * direction[i].abs()).sum::<f64>() + r
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        2.0 * self.half_mm[0].min(self.half_mm[1])
+    }
 }
 
 #[cfg(test)]

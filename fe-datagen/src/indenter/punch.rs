@@ -48,6 +48,10 @@ impl SignedDistance for Punch {
         let heights = [-self.height_mm, 0.0];
         disc_reach_mm(direction, 2, self.radius_mm, heights, self.rim_radius_mm)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        2.0 * self.radius_mm
+    }
 }
 
 #[cfg(test)]

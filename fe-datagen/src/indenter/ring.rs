@@ -59,6 +59,10 @@ impl SignedDistance for Ring {
         let heights = [-self.height_mm, 0.0];
         disc_reach_mm(direction, 2, self.outer_radius_mm, heights, self.rim_radius_mm)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.outer_radius_mm - self.inner_radius_mm
+    }
 }
 
 #[cfg(test)]

@@ -48,6 +48,10 @@ impl SignedDistance for Sphere {
     fn reach_mm(&self, _direction: [f64; 3]) -> f64 {
         self.radius_mm
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        2.0 * self.radius_mm
+    }
 }
 
 #[cfg(test)]

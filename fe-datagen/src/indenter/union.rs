@@ -118,6 +118,10 @@ impl SignedDistance for AnyOf {
     fn clearance_mm(&self, p: [f64; 3]) -> f64 {
         self.parts.iter().map(|part| part.clearance_mm(p)).fold(f64::INFINITY, f64::min)
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.parts.iter().map(Placed::narrowest_mm).fold(f64::INFINITY, f64::min)
+    }
 }
 
 #[cfg(test)]

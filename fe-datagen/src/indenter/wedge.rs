@@ -156,6 +156,10 @@ impl SignedDistance for Wedge {
         let corner = |c: [f64; 2]| direction[0].abs() * c[0] + direction[2] * c[1];
         corner(a).max(corner(b)) + direction[1].abs() * (0.5 * self.length_mm - r) + r
     }
+
+    fn narrowest_mm(&self) -> f64 {
+        self.tip_width_mm
+    }
 }
 
 #[cfg(test)]

@@ -218,18 +218,31 @@ impl Structure {
         }
     }
 
-    /// Adds a symmetric 3 x 3 block on a node's diagonal.
-    pub fn add_node(&self, matrix: &mut SymmetricMatrix, node: u32, block: &[[f64; 3]; 3]) {
-        for j in 0..3 {
-            let column = self.equations.of_dof[3 * node as usize + j];
-            if column == Equations::FIXED {
-                continue;
-            }
-            for i in j..3 {
-                let row = self.equations.of_dof[3 * node as usize + i];
-                if row != Equations::FIXED {
-                    let at = entry(&self.column_start, &self.row, row as usize, column as usize);
-                    matrix.values[at] += block[i][j];
+    /// Adds a symmetric 3 x 3 block between the nodes of a point with shape functions
+    /// `values`, `N_a N_b block`; they have to be of one element.
+    pub fn add_point(
+        &self,
+        matrix: &mut SymmetricMatrix,
+        nodes: &[u32],
+        values: &[f64],
+        block: &[[f64; 3]; 3],
+    ) {
+        let equation = |node: u32, i: usize| self.equations.of_dof[3 * node as usize + i];
+        for (&b, vb) in nodes.iter().zip(values) {
+            for j in 0..3 {
+                let column = equation(b, j);
+                if column == Equations::FIXED {
+                    continue;
+                }
+                for (&a, va) in nodes.iter().zip(values) {
+                    for i in 0..3 {
+                        let row = equation(a, i);
+                        if row != Equations::FIXED && row >= column {
+                            let (row, column) = (row as usize, column as usize);
+                            let at = entry(&self.column_start, &self.row, row, column);
+                            matrix.values[at] += va * vb * block[i][j];
+                        }
+                    }
                 }
             }
         }

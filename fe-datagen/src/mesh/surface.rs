@@ -103,6 +103,23 @@ impl FaceKind {
         *gradient = slope.map(|d| [d[0], d[1]]);
     }
 
+    /// Points at which an indenter is felt within the face, and their weights: they see what
+    /// its shape functions can follow.
+    #[must_use]
+    pub fn contact_points(self) -> Vec<([f64; 2], f64)> {
+        const AT: f64 = 0.577_350_269_189_625_8;
+        match self {
+            Self::Line2 => [-AT, AT].map(|x| ([x, 0.0], 1.0)).to_vec(),
+            Self::Quad4 => {
+                [[-AT, -AT], [AT, -AT], [-AT, AT], [AT, AT]].map(|xi| (xi, 1.0)).to_vec()
+            }
+            Self::Tri3 => [[2.0, 0.5], [0.5, 2.0], [0.5, 0.5]]
+                .map(|xi| (xi.map(|v| v / 3.0), 1.0 / 6.0))
+                .to_vec(),
+            Self::Line3 | Self::Quad8 | Self::Quad9 | Self::Tri6 => self.quadrature(),
+        }
+    }
+
     /// Gauss points and weights of the face.
     #[must_use]
     pub fn quadrature(self) -> Vec<([f64; 2], f64)> {

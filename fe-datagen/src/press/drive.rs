@@ -2,6 +2,7 @@
 
 use super::body::{Body, PressError};
 use super::record::{IncrementRecord, Pose};
+use crate::contact::ContactRule;
 use crate::indenter::{
     IndenterError, Placement, Plate, RoundedPlate, SignedDistance, first_touch_travel,
 };
@@ -25,6 +26,8 @@ pub struct Approach {
     pub offset_mm: [f64; 2],
     /// Coulomb coefficient; 0 is no friction.
     pub friction: f64,
+    /// Where on the skin it is felt; `None` leaves that to its width and the mesh.
+    pub contact: Option<ContactRule>,
 }
 
 impl Approach {
@@ -33,7 +36,14 @@ impl Approach {
     pub fn plate(pose: Pose) -> Self {
         let plate = RoundedPlate::from(&Plate::default());
         let top_mm = plate.half_mm[2];
-        Self { shape: Arc::new(plate), top_mm, pose, offset_mm: [0.0; 2], friction: 0.0 }
+        Self {
+            shape: Arc::new(plate),
+            top_mm,
+            pose,
+            offset_mm: [0.0; 2],
+            friction: 0.0,
+            contact: None,
+        }
     }
 }
 
@@ -84,6 +94,9 @@ const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
 /// Part of a face's width that may be in the indenter before a node touches: a ball as wide
 /// as four faces has a sixteenth, a knife comes to a half.
 const UNSEEN_MAX: f64 = 0.4;
+/// Least width of an indenter that nodes lead, in distances of nodes: rows of them slip off a
+/// narrower one.
+const LED_BY_NODES_MIN: f64 = 2.5;
 /// How closely a prescribed force is met.
 const FORCE_TOLERANCE: f64 = 1e-4;
 /// Equilibria tried for one prescribed force.
@@ -111,8 +124,9 @@ impl Body {
                 first[i] - approach.top_mm * normal[i] + a * x[i] + b * y[i]
             }),
         };
-        let nodes = self.problem.mesh.surfaces[&self.contact].nodes();
-        let points: Vec<_> = nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect();
+        let contact =
+            approach.contact.unwrap_or_else(|| self.contact_rule(approach, LED_BY_NODES_MIN));
+        let points = self.contact_points_mm(contact);
         let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)?;
         // A plate's face is there already, to rounding.
         if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
@@ -133,7 +147,30 @@ impl Body {
                 points.iter().map(|p| (p.time_s / end, offset(p.depth_mm, p.shift_mm))).collect()
             }
         };
-        Ok(MovingIndenter { shape: approach.shape.clone(), start, path })
+        Ok(MovingIndenter { shape: approach.shape.clone(), start, path, contact })
+    }
+
+    /// Where on the skin an indenter is to be felt: within faces if it is narrower than `wide`
+    /// distances of nodes; at nodes if it is not, or so narrow that faces would lose it too.
+    fn contact_rule(&self, approach: &Approach, wide: f64) -> ContactRule {
+        let Some(contact) = &self.problem.contact else { return ContactRule::Nodes };
+        let spacings = approach.shape.narrowest_mm() / contact.spacing_mm();
+        if (1.0..wide).contains(&spacings) { ContactRule::Faces } else { ContactRule::Nodes }
+    }
+
+    /// Undeformed points of the skin that can touch, mm.
+    fn contact_points_mm(&self, rule: ContactRule) -> Vec<[f64; 3]> {
+        let at = &self.problem.mesh.nodes;
+        match &self.problem.contact {
+            Some(c) if rule == ContactRule::Faces => {
+                c.points(rule).iter().map(|(support, _)| support.of(|n| at[n])).collect()
+            }
+            _ => self.problem.mesh.surfaces[&self.contact]
+                .nodes()
+                .iter()
+                .map(|&n| at[n as usize])
+                .collect(),
+        }
     }
 
     /// Refuses an indenter of which, at first touch of a node, a face's middle or an edge's is
@@ -171,7 +208,9 @@ impl Body {
     /// Presses, keeps something of each stored state (`keep` is told its number and may be
     /// told again), and takes the press again on a finer path as long as energy and work
     /// part by more than `energy_vs_work_max`: the states are the same there, the work
-    /// integral is better. States before an error are kept.
+    /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
+    /// off the indenter, and energy with them: it is pressed again, felt within faces, if
+    /// it is wide enough for that. States before an error are kept.
     ///
     /// # Errors
     /// As [`Self::press`], beside what was kept.
@@ -183,18 +222,35 @@ impl Body {
         energy_vs_work_max: f64,
         keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
     ) -> (Vec<T>, Result<(), PressError>) {
-        let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
-        for refinement in REFINEMENTS {
-            kept.clear();
-            let mut balanced = true;
-            pressed = self.press(solver, approach, drive, refinement, &mut |s, record, report| {
-                balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
-                kept.push(keep(kept.len(), s, record, report));
-            });
-            if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
-                break;
+        let mut press = |approach: &Approach| {
+            let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
+            let mut balanced = false;
+            for refinement in REFINEMENTS {
+                kept.clear();
+                balanced = true;
+                pressed = self.press(solver, approach, drive, refinement, &mut |s, record, r| {
+                    balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
+                    kept.push(keep(kept.len(), s, record, r));
+                });
+                if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
+                    break;
+                }
             }
+            (balanced, kept, pressed)
+        };
+        let (balanced, kept, pressed) = press(approach);
+        let slips = match &pressed {
+            Ok(()) => !balanced && matches!(drive, Drive::Depths(_)),
+            Err(error) => matches!(error, PressError::Solve { .. } | PressError::Slipped { .. }),
+        };
+        let wide = [LED_BY_NODES_MIN, f64::INFINITY].map(|w| self.contact_rule(approach, w));
+        if !slips || approach.contact.is_some() || wide != [ContactRule::Nodes, ContactRule::Faces]
+        {
+            return (kept, pressed);
         }
+        tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
+        let within_faces = Approach { contact: Some(ContactRule::Faces), ..approach.clone() };
+        let (_, kept, pressed) = press(&within_faces);
         (kept, pressed)
     }
 

@@ -32,7 +32,7 @@ impl Body {
         let smooth = smooth_nodes(surface, &self.problem.mesh.nodes);
         let (mut pressing_n, mut touched_mm2, mut touching) = (0.0, 0.0, 0u32);
         let mut aside_n = [0.0; 3];
-        for ((&n, &area_mm2), &traction) in
+        for ((&n, &area_mm2), traction) in
             contact.nodes.iter().zip(&contact.area_mm2).zip(solver.traction_mpa())
         {
             let n = n as usize;

@@ -40,6 +40,7 @@ impl Setup {
             pose: scene.motion.pose(),
             offset_mm: scene.motion.offset_mm,
             friction: plan.friction,
+            contact: None,
         };
         let body = body(scene, &plan)?;
         let drive = drive(&scene.motion);

@@ -50,6 +50,7 @@ impl Body {
 
 #[cfg(test)]
 mod tests {
+    use crate::contact::ContactRule;
     use crate::press::record::IncrementRecord;
     use crate::press::setup::Setup;
     use crate::scene::Scene;
@@ -78,10 +79,23 @@ mod tests {
         Scene::read(Path::new(&path)).unwrap()
     }
 
+    /// At nodes, and within faces under a bar 1.5 mm wide.
     #[test]
     fn shear_traction_carries_the_tangential_force() {
         let rubbing = "effects = [\"finite_strain\", \"friction\"]\nfriction.coefficient = 0.4";
-        let Setup { body, approach, drive, .. } = Setup::new(&scene(rubbing)).unwrap();
+        let ball = scene(rubbing);
+        let mut bar = ball.clone();
+        bar.indenter =
+            toml::from_str("shape = \"plate\"\nsize_mm = [1.5, 4.0]\nedge_radius_mm = 0.5")
+                .unwrap();
+        for (scene, rule) in [(ball, ContactRule::Nodes), (bar, ContactRule::Faces)] {
+            shear_carries_the_drag(&scene, rule);
+        }
+    }
+
+    fn shear_carries_the_drag(scene: &Scene, rule: ContactRule) {
+        let Setup { body, approach, drive, .. } = Setup::new(scene).unwrap();
+        assert_eq!(body.indenter(&approach, &drive).unwrap().contact, rule);
         let mut solver = body.solver(Options::default()).unwrap();
         body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
         let surface = &body.problem.mesh.surfaces[&body.contact];

@@ -132,6 +132,7 @@ impl Prepared {
             pose: press.pose,
             offset_mm: press.offset_mm,
             friction: self.friction,
+            contact: None,
         };
         let mut part = Part {
             record: Record {

@@ -3,6 +3,7 @@
 use super::evaluate::Balance;
 use super::problem::Problem;
 use super::stepping::Solver;
+use crate::contact::{ContactRule, Support};
 use crate::indenter::Distance;
 use crate::linear::Equations;
 
@@ -21,8 +22,20 @@ impl<'a> Solver<'a> {
 
     /// Nominal traction of each contact node, MPa per undeformed area.
     #[must_use]
-    pub fn traction_mpa(&self) -> &[f64] {
-        &self.newton.current.traction_mpa
+    pub fn traction_mpa(&self) -> Vec<f64> {
+        let found = self.newton.current.traction_mpa.iter().map(|&t| [t]);
+        self.at_contact_nodes(found.collect()).into_iter().map(|[t]| t).collect()
+    }
+
+    /// What contact points carry, as tractions of the contact nodes with the same force.
+    fn at_contact_nodes<const N: usize>(&self, found: Vec<[f64; N]>) -> Vec<[f64; N]> {
+        let rule = self.loading.contact();
+        match &self.newton.problem.contact {
+            Some(c) if rule == ContactRule::Faces => {
+                c.points(rule).to_nodes(&found, &c.nodes, &c.area_mm2)
+            }
+            _ => found,
+        }
     }
 
     /// Contact force along a straight path, N.
@@ -70,7 +83,11 @@ impl<'a> Solver<'a> {
     /// undeformed area; empty without friction.
     #[must_use]
     pub fn shear_traction_mpa(&self) -> Vec<[f64; 3]> {
-        self.newton.current.friction.iter().map(|t| t.map(|v| -v)).collect()
+        let found = &self.newton.current.friction;
+        if found.is_empty() {
+            return Vec::new();
+        }
+        self.at_contact_nodes(found.iter().map(|t| t.map(|v| -v)).collect())
     }
 
     /// Forces of indenter and supports, and the integral of true pressure.
@@ -101,9 +118,8 @@ impl<'a> Solver<'a> {
         surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
         let mut pressure = vec![0.0; x.len()];
         if let Some(contact) = &problem.contact {
-            for ((&n, &area), &t) in
-                contact.nodes.iter().zip(&contact.area_mm2).zip(&self.newton.current.traction_mpa)
-            {
+            let traction = self.traction_mpa();
+            for ((&n, &area), t) in contact.nodes.iter().zip(&contact.area_mm2).zip(traction) {
                 pressure[n as usize] = t * area / deformed[n as usize];
             }
         }
@@ -118,16 +134,10 @@ impl<'a> Solver<'a> {
         surface: &crate::mesh::Surface,
         pressure: &[f64],
     ) -> [f64; 3] {
-        let Some(indenter) = &self.loading.indenter else { return [0.0; 3] };
         let x = self.deformed();
-        let mut traction = vec![[0.0; 3]; x.len()];
-        for n in surface.nodes() {
-            let n = n as usize;
-            if pressure[n] > 0.0 {
-                let normal = indenter.distance(self.state.fraction, x[n]).normal;
-                traction[n] = normal.map(|v| v * pressure[n]);
-            }
-        }
+        let push = self.push_directions(surface, &x);
+        let traction: Vec<[f64; 3]> =
+            push.iter().zip(pressure).map(|(d, p)| d.map(|v| v * p)).collect();
         let mut total = [0.0; 3];
         let rule = surface.kind.quadrature();
         surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
@@ -139,6 +149,39 @@ impl<'a> Solver<'a> {
             }
         });
         total
+    }
+
+    /// Direction in which the indenter pushes, at every mesh node of the surface that it
+    /// presses: its normal, or the mean of its normals at contact points around, weighted
+    /// by their forces (shorter than 1 where these differ).
+    fn push_directions(&self, surface: &crate::mesh::Surface, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let mut push = vec![[0.0; 3]; x.len()];
+        let (Some(contact), Some(_)) = (&self.newton.problem.contact, &self.loading.indenter)
+        else {
+            return push;
+        };
+        let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
+        let rule = self.loading.contact();
+        if rule == ContactRule::Nodes {
+            for n in surface.nodes() {
+                push[n as usize] = normal(x[n as usize]);
+            }
+            return push;
+        }
+        let points = contact.points(rule);
+        let of_point = |(support, t): (Support<'_>, f64)| {
+            let [nx, ny, nz] = normal(support.of(|n| x[n])).map(|v| v * t);
+            [t, nx, ny, nz]
+        };
+        let tractions = self.newton.current.traction_mpa.iter().copied();
+        let found: Vec<_> = points.iter().map(|(s, _)| s).zip(tractions).map(of_point).collect();
+        let nodal = points.to_nodes(&found, &contact.nodes, &contact.area_mm2);
+        for (&n, [t, v @ ..]) in contact.nodes.iter().zip(nodal) {
+            if t > 0.0 {
+                push[n as usize] = v.map(|v| v / t);
+            }
+        }
+        push
     }
 
     /// Deformed node positions, mm.

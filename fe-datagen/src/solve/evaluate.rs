@@ -3,7 +3,7 @@
 use super::StepError;
 use super::loading::Loading;
 use super::problem::Problem;
-use crate::contact::{FrictionTrial, NodeContact, NodeFriction};
+use crate::contact::{FrictionTrial, PointContact, PointFriction, Support};
 use crate::element::Memory;
 use crate::linear::SymmetricMatrix;
 
@@ -12,6 +12,8 @@ use crate::linear::SymmetricMatrix;
 pub(crate) struct Evaluation {
     /// Elastic energy, mJ; of a body with memory the potential of the step.
     pub stored_mj: f64,
+    /// Energy in the penalty that stands for contact where there are no multipliers, mJ.
+    pub contact_mj: f64,
     /// Potential that equilibrium minimises, mJ.
     pub potential_mj: f64,
     /// Internal + contact - external force at every degree of freedom, N.
@@ -20,15 +22,15 @@ pub(crate) struct Evaluation {
     pub residual_norm: f64,
     /// Norm of contact, dead and support forces: what the residual is small against.
     pub reference_norm: f64,
-    /// Nominal traction of each contact node, MPa.
+    /// Nominal traction of each contact point, MPa.
     pub traction_mpa: Vec<f64>,
-    /// Tangential traction of each contact node on the indenter, MPa; empty
+    /// Tangential traction of each contact point on the indenter, MPa; empty
     /// without friction.
     pub friction: Vec<[f64; 3]>,
-    /// What convex edges take from the tangent at contact nodes, N/mm; filled with a
+    /// What convex edges take from the tangent at contact points, N/mm; filled with a
     /// tangent only.
-    pub curvature: Vec<(u32, [[f64; 3]; 3])>,
-    /// Largest |gap| over nodes in contact, mm.
+    pub curvature: Vec<(usize, [[f64; 3]; 3])>,
+    /// Largest |gap| over points in contact, mm.
     pub gap_error_mm: f64,
     /// Smallest `J`.
     pub j_min: f64,
@@ -65,7 +67,7 @@ pub(crate) fn evaluate_body(
     }
     out.residual_n.clear();
     out.residual_n.resize(3 * problem.mesh.nodes.len(), 0.0);
-    out.stored_mj = 0.0;
+    (out.stored_mj, out.contact_mj) = (0.0, 0.0);
     out.j_min = f64::INFINITY;
     elements(problem, trial, tangent.as_deref_mut(), out)?;
     out.potential_mj = out.stored_mj;
@@ -156,32 +158,33 @@ fn contact(
     out.normal_force_n = [0.0; 3];
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
     let placement = indenter.placement(trial.load_fraction);
+    let points = surface.points(loading.contact());
     let mut square = 0.0;
-    for ((&node, &area), &multiplier) in
-        surface.nodes.iter().zip(&surface.area_mm2).zip(trial.multipliers_mpa)
-    {
-        let n = node as usize;
-        let x = std::array::from_fn(|i| problem.mesh.nodes[n][i] + trial.u[n][i]);
+    for (at, ((support, area), &last)) in points.iter().zip(trial.multipliers_mpa).enumerate() {
+        let multiplier = if indenter.contact.has_multipliers() { last } else { 0.0 };
+        let x = support.of(|n| trial.place(problem, n));
         let d = placement.distance(indenter.shape.as_ref(), x);
-        let Some(c) = NodeContact::new(&d, area, multiplier, trial.penalty) else {
+        let Some(c) = PointContact::new(&d, area, multiplier, trial.penalty) else {
             out.traction_mpa.push(0.0);
             continue;
         };
         out.traction_mpa.push(c.traction_mpa);
         out.potential_mj += c.energy_mj;
+        if !indenter.contact.has_multipliers() {
+            out.contact_mj += c.energy_mj;
+        }
         if c.traction_mpa > 0.0 {
             out.gap_error_mm = out.gap_error_mm.max(d.gap_mm.abs());
         }
-        square += out.add_contact_force(n, c.force_n);
+        square += out.add_contact_force(support, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.structure.add_node(t, node, &c.stiffness);
-            out.curvature.extend(c.curvature.map(|k| (node, k)));
+            problem.structure.add_point(t, support.nodes, support.values, &c.stiffness);
+            out.curvature.extend(c.curvature.map(|k| (at, k)));
         }
     }
     out.normal_force_n = out.contact_force_n;
     if let Some(friction) = trial.friction {
-        let offset = indenter.offset_mm(trial.load_fraction);
-        square += add_friction(problem, trial, friction, offset, tangent, out);
+        square += add_friction(problem, loading, trial, friction, tangent, out);
     }
     square
 }
@@ -189,37 +192,45 @@ fn contact(
 /// Adds friction; returns the square of its force norm.
 fn add_friction(
     problem: &Problem,
+    loading: &Loading,
     trial: &Trial<'_>,
     friction: &FrictionTrial,
-    offset: [f64; 3],
     mut tangent: Option<&mut SymmetricMatrix>,
     out: &mut Evaluation,
 ) -> f64 {
-    let Some(surface) = &problem.contact else { return 0.0 };
+    let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
+    let offset = indenter.offset_mm(trial.load_fraction);
     let mut square = 0.0;
-    for ((&node, &area), state) in surface.nodes.iter().zip(&surface.area_mm2).zip(&friction.nodes)
-    {
-        let n = node as usize;
-        let relative =
-            std::array::from_fn(|i| problem.mesh.nodes[n][i] + trial.u[n][i] - offset[i]);
-        let found = NodeFriction::new(state, relative, area, trial.penalty);
+    for ((support, area), state) in surface.points(loading.contact()).iter().zip(&friction.points) {
+        let x = support.of(|n| trial.place(problem, n));
+        let relative = std::array::from_fn(|i| x[i] - offset[i]);
+        let found = PointFriction::new(state, relative, area, trial.penalty);
         out.friction.push(found.map_or([0.0; 3], |f| f.traction_mpa));
         let Some(f) = found else { continue };
         out.potential_mj += f.energy_mj;
-        square += out.add_contact_force(n, f.force_n);
+        square += out.add_contact_force(support, f.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.structure.add_node(t, node, &f.stiffness);
+            problem.structure.add_point(t, support.nodes, support.values, &f.stiffness);
         }
     }
     square
 }
 
+impl Trial<'_> {
+    /// Deformed place of a mesh node, mm.
+    fn place(&self, problem: &Problem, node: usize) -> [f64; 3] {
+        std::array::from_fn(|i| problem.mesh.nodes[node][i] + self.u[node][i])
+    }
+}
+
 impl Evaluation {
-    /// Adds the derivative of a contact potential at a node; returns its square.
-    fn add_contact_force(&mut self, node: usize, force_n: [f64; 3]) -> f64 {
+    /// Adds the derivative of a contact potential at a point; returns its square.
+    fn add_contact_force(&mut self, support: Support<'_>, force_n: [f64; 3]) -> f64 {
         let mut square = 0.0;
         for i in 0..3 {
-            self.residual_n[3 * node + i] += force_n[i];
+            for (&n, v) in support.nodes.iter().zip(support.values) {
+                self.residual_n[3 * n as usize + i] += v * force_n[i];
+            }
             self.contact_force_n[i] -= force_n[i];
             square += force_n[i] * force_n[i];
         }

@@ -1,5 +1,6 @@
 //! What acts on a body: dead forces, prescribed displacements, a moving indenter.
 
+use crate::contact::ContactRule;
 use crate::indenter::{Distance, Placement, SignedDistance};
 use crate::mesh::surface::norm;
 use std::sync::Arc;
@@ -14,13 +15,15 @@ pub struct MovingIndenter {
     /// Its displacement, mm, at rising load fractions; linear in between and
     /// from no displacement at fraction 0.
     pub path: Vec<(f64, [f64; 3])>,
+    /// Where on the skin it is felt.
+    pub contact: ContactRule,
 }
 
 impl MovingIndenter {
-    /// An indenter that moves straight by `travel_mm` over the whole load.
+    /// An indenter that moves straight by `travel_mm` over the whole load and is felt at nodes.
     #[must_use]
     pub fn straight(shape: Arc<dyn SignedDistance>, start: Placement, travel_mm: [f64; 3]) -> Self {
-        Self { shape, start, path: vec![(1.0, travel_mm)] }
+        Self { shape, start, path: vec![(1.0, travel_mm)], contact: ContactRule::Nodes }
     }
 
     /// Displacement at load fraction `t`, mm.
@@ -77,4 +80,12 @@ pub struct Loading {
     pub duration_s: f64,
     /// Coulomb coefficient between skin and indenter; 0 is no friction.
     pub friction: f64,
+}
+
+impl Loading {
+    /// Where on the skin contact is found.
+    #[must_use]
+    pub fn contact(&self) -> ContactRule {
+        self.indenter.as_ref().map_or(ContactRule::Nodes, |m| m.contact)
+    }
 }

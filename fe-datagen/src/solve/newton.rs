@@ -8,7 +8,7 @@ use super::evaluate::{Evaluation, Trial, evaluate_body};
 use super::loading::Loading;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
-use crate::contact::FrictionTrial;
+use crate::contact::{ContactRule, FrictionTrial, Support};
 use crate::element::Memory;
 use crate::linear::{
     CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
@@ -133,7 +133,7 @@ impl<'a> Newton<'a> {
         Ok(Self {
             problem,
             options,
-            penalty: options.penalty_mpa_per_mm.unwrap_or_else(|| problem.penalty_mpa_per_mm()),
+            penalty: 0.0,
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
             factorizer: Factorizer::new(&problem.structure)?,
@@ -149,8 +149,11 @@ impl<'a> Newton<'a> {
         })
     }
 
-    /// Forgets the factor, so that a new press does not depend on the last one.
-    pub(super) fn forget(&mut self) {
+    /// Forgets the factor, so that a new press does not depend on the last one, and gets ready
+    /// for contact of this kind.
+    pub(super) fn forget(&mut self, rule: ContactRule) {
+        let of_rule = || self.problem.penalty_mpa_per_mm(rule);
+        self.penalty = self.options.penalty_mpa_per_mm.unwrap_or_else(of_rule);
         self.stale = true;
         self.condition = f64::NAN;
         self.effort = Effort::default();
@@ -187,7 +190,7 @@ impl<'a> Newton<'a> {
             self.assemble(fixed, u)?;
             let forcing = Self::forcing(norm, previous, tolerance * reference);
             previous = norm;
-            self.solve_step(forcing);
+            self.solve_step(fixed.loading, forcing);
             match self.line_search(fixed, u) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
@@ -248,9 +251,9 @@ impl<'a> Newton<'a> {
 
     /// Solves `tangent * step = right`; where the tangent is indefinite, a nearby one
     /// that is not, if there is one.
-    fn solve_step(&mut self, tolerance: f64) {
+    fn solve_step(&mut self, loading: &Loading, tolerance: f64) {
         if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
-            self.factorize();
+            self.factorize(loading);
         }
         let mut fresh = false;
         loop {
@@ -275,7 +278,7 @@ impl<'a> Newton<'a> {
             self.effort.solve_s += clock.elapsed().as_secs_f64();
             self.effort.cg_iterations += found.iterations;
             self.stale = found.iterations > self.options.refactor_after_cg;
-            if found.negative_curvature && self.convexify() {
+            if found.negative_curvature && self.convexify(loading) {
                 continue;
             }
             let usable = found.relative_residual <= tolerance
@@ -283,7 +286,7 @@ impl<'a> Newton<'a> {
             if usable || fresh {
                 return;
             }
-            self.factorize();
+            self.factorize(loading);
             fresh = true;
         }
     }
@@ -291,20 +294,23 @@ impl<'a> Newton<'a> {
     /// Gives back to the tangent what convex edges of the indenter take from it, which is
     /// what mostly makes it indefinite: a direction downhill then costs no more than
     /// any other. `false` if that has been done or there is nothing to give back.
-    fn convexify(&mut self) -> bool {
+    fn convexify(&mut self, loading: &Loading) -> bool {
         let any = !self.current.curvature.is_empty();
-        for (node, k) in self.current.curvature.drain(..) {
-            self.problem.structure.add_node(&mut self.tangent, node, &k);
+        let Some(surface) = &self.problem.contact else { return any };
+        let points = surface.points(loading.contact());
+        for (point, k) in self.current.curvature.drain(..) {
+            let Support { nodes, values } = points.support(point);
+            self.problem.structure.add_point(&mut self.tangent, nodes, values, &k);
         }
         any
     }
 
-    fn factorize(&mut self) {
+    fn factorize(&mut self, loading: &Loading) {
         let clock = Instant::now();
         self.effort.factorizations += 1;
         let structure = &self.problem.structure;
         let mut definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
-        if !definite && self.convexify() {
+        if !definite && self.convexify(loading) {
             definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
         }
         if let Some(condition) = self.factorizer.condition_at_least(structure) {

@@ -6,7 +6,7 @@ use super::problem::Problem;
 use crate::contact::FrictionTrial;
 use crate::mesh::surface::norm;
 
-/// Sets bound and tangent plane of every node from its normal multiplier and its
+/// Sets bound and tangent plane of every point from its normal multiplier and its
 /// place at `u`. The bound goes the share `relax` of its way: large coefficients
 /// couple pressure and drag so strongly that whole steps swing past the answer.
 pub(super) fn bound(
@@ -20,20 +20,20 @@ pub(super) fn bound(
 ) {
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
     let coefficient = friction.coefficient;
-    for ((node, &n), &pressure) in
-        friction.nodes.iter_mut().zip(&surface.nodes).zip(multipliers_mpa)
+    let points = surface.points(loading.contact());
+    for ((point, (support, _)), &pressure) in
+        friction.points.iter_mut().zip(points.iter()).zip(multipliers_mpa)
     {
-        let n = n as usize;
-        let x = std::array::from_fn(|k| problem.mesh.nodes[n][k] + u[n][k]);
-        node.bound_mpa += relax * (coefficient * pressure - node.bound_mpa);
-        node.normal = indenter.distance(fraction, x).normal;
+        let x = support.of(|n| std::array::from_fn(|k| problem.mesh.nodes[n][k] + u[n][k]));
+        point.bound_mpa += relax * (coefficient * pressure - point.bound_mpa);
+        point.normal = indenter.distance(fraction, x).normal;
     }
 }
 
 /// Takes the tractions of an equilibrium as multipliers.
 pub(super) fn update(friction: &mut FrictionTrial, found: &Evaluation) {
-    for (node, &t) in friction.nodes.iter_mut().zip(&found.friction) {
-        node.traction_mpa = t;
+    for (point, &t) in friction.points.iter_mut().zip(&found.friction) {
+        point.traction_mpa = t;
     }
 }
 
@@ -41,17 +41,18 @@ pub(super) fn update(friction: &mut FrictionTrial, found: &Evaluation) {
 /// over the largest bound.
 pub(super) fn change(friction: &FrictionTrial, found: &Evaluation) -> f64 {
     let (mut worst, mut scale) = (0.0f64, 0.0f64);
-    for ((node, t), pressure) in friction.nodes.iter().zip(&found.friction).zip(&found.traction_mpa)
+    for ((point, t), pressure) in
+        friction.points.iter().zip(&found.friction).zip(&found.traction_mpa)
     {
         let bound = friction.coefficient * pressure;
-        let moved = norm(std::array::from_fn(|i| t[i] - node.traction_mpa[i]));
-        worst = worst.max(moved).max((bound - node.bound_mpa).abs());
+        let moved = norm(std::array::from_fn(|i| t[i] - point.traction_mpa[i]));
+        worst = worst.max(moved).max((bound - point.bound_mpa).abs());
         scale = scale.max(bound);
     }
     if worst == 0.0 { 0.0 } else { worst / scale }
 }
 
-/// Adds the heat of the step, traction times slip, and sets every node's place
+/// Adds the heat of the step, traction times slip, and sets every point's place
 /// relative to the indenter, from which slip of the next step counts.
 pub(super) fn anchor(
     problem: &Problem,
@@ -62,12 +63,13 @@ pub(super) fn anchor(
 ) {
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
     let offset = indenter.offset_mm(fraction);
-    let FrictionTrial { nodes, heat_mj, .. } = friction;
-    for ((node, &n), area) in nodes.iter_mut().zip(&surface.nodes).zip(&surface.area_mm2) {
-        let (x, u) = (problem.mesh.nodes[n as usize], u[n as usize]);
-        let place: [f64; 3] = std::array::from_fn(|i| x[i] + u[i] - offset[i]);
-        let t = node.traction_mpa;
-        *heat_mj += area * (0..3).map(|i| t[i] * (place[i] - node.anchor_mm[i])).sum::<f64>();
-        node.anchor_mm = place;
+    let FrictionTrial { points, heat_mj, .. } = friction;
+    for (point, (support, area)) in points.iter_mut().zip(surface.points(loading.contact()).iter())
+    {
+        let x = support.of(|n| std::array::from_fn(|i| problem.mesh.nodes[n][i] + u[n][i]));
+        let place: [f64; 3] = std::array::from_fn(|i| x[i] - offset[i]);
+        let t = point.traction_mpa;
+        *heat_mj += area * (0..3).map(|i| t[i] * (place[i] - point.anchor_mm[i])).sum::<f64>();
+        point.anchor_mm = place;
     }
 }

@@ -7,7 +7,7 @@ use super::problem::Problem;
 use super::rubbing;
 use super::work::Work;
 use super::{Options, SolveError, StepError};
-use crate::contact::{FrictionNode, FrictionTrial};
+use crate::contact::{FrictionPoint, FrictionTrial};
 use crate::element::Memory;
 
 /// Least share of its way that the friction bound goes in one update.
@@ -37,7 +37,7 @@ pub(super) struct State {
     multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
     pub memory: Vec<f64>,
-    /// Tangential contact; no nodes without friction.
+    /// Tangential contact; no points without friction.
     friction: FrictionTrial,
 }
 
@@ -56,7 +56,7 @@ pub struct StepReport {
     pub load_fraction: f64,
     /// Out-of-balance force over the reference norm.
     pub residual_relative: f64,
-    /// Largest |gap| of a node in contact, mm.
+    /// Largest |gap| of a point in contact, mm.
     pub gap_error_mm: f64,
     /// Energy that can be got back, mJ.
     pub stored_mj: f64,
@@ -96,19 +96,20 @@ impl<'a> Solver<'a> {
     /// Puts the body at rest and takes a new loading.
     pub fn start(&mut self, loading: Loading) {
         let problem = self.newton.problem;
-        let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes.len());
         self.loading = loading;
+        let rule = self.loading.contact();
+        let contact_points = problem.contact.as_ref().map_or(0, |c| c.points(rule).len());
         self.state = State {
             fraction: 0.0,
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
-            multipliers: vec![0.0; contact_nodes],
+            multipliers: vec![0.0; contact_points],
             memory: vec![0.0; problem.memory.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
         };
         if self.loading.friction > 0.0 {
             self.state.friction = FrictionTrial {
                 coefficient: self.loading.friction,
-                nodes: vec![FrictionNode::default(); contact_nodes],
+                points: vec![FrictionPoint::default(); contact_points],
                 heat_mj: 0.0,
             };
             let State { u, friction, .. } = &mut self.state;
@@ -117,7 +118,7 @@ impl<'a> Solver<'a> {
         self.before = None;
         self.work = Work::default();
         self.pace = self.first_pace();
-        self.newton.forget();
+        self.newton.forget(rule);
     }
 
     /// Forgets how the last equilibria followed each other, because the load is
@@ -211,7 +212,7 @@ impl<'a> Solver<'a> {
             load_fraction: *fraction,
             multipliers,
             memory: Memory { history: memory, dt_s: 0.0 },
-            friction: (!friction.nodes.is_empty()).then_some(friction),
+            friction: (!friction.points.is_empty()).then_some(friction),
         };
         // It was in equilibrium: nothing in it is inverted.
         if let Err(error) = self.newton.evaluate(fixed, u) {
@@ -238,7 +239,7 @@ impl<'a> Solver<'a> {
             load_fraction: self.state.fraction,
             residual_relative: e.residual_norm / e.reference_norm.max(self.least_force_n()),
             gap_error_mm: e.gap_error_mm,
-            stored_mj: energy.stored_mj,
+            stored_mj: energy.stored_mj + e.contact_mj,
             dissipated_mj: energy.dissipated_mj + self.state.friction.heat_mj,
             j_min: e.j_min,
             j_min_at: e.j_min_at,
@@ -342,7 +343,7 @@ impl<'a> Solver<'a> {
     fn augmented(&mut self, fraction: f64, trial: &mut State) -> Result<(), StepError> {
         let options = self.newton.options;
         let dt_s = self.seconds(fraction);
-        let rubs = !trial.friction.nodes.is_empty();
+        let rubs = !trial.friction.points.is_empty();
         let problem = self.newton.problem;
         let bound = |relax: f64, trial: &mut State| {
             let State { u, multipliers, friction, .. } = trial;
@@ -351,8 +352,12 @@ impl<'a> Solver<'a> {
         bound(1.0, trial);
         let (mut relax, mut last_change) = (1.0f64, f64::INFINITY);
         let updates = if rubs { options.friction_updates_max } else { options.augmentations_max };
+        let by_penalty = !self.loading.contact().has_multipliers();
         // The first equilibrium only serves to update the multipliers.
-        let mut tolerance = 1e-3f64.max(options.residual_tolerance);
+        let mut tolerance = match by_penalty && !rubs {
+            true => options.residual_tolerance,
+            false => 1e-3f64.max(options.residual_tolerance),
+        };
         for update in 0..=updates {
             let (multipliers, u) = (&trial.multipliers, &mut trial.u);
             let fixed = Fixed {
@@ -365,10 +370,11 @@ impl<'a> Solver<'a> {
             self.newton.equilibrate(tolerance, fixed, u)?;
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
-            if e.gap_error_mm <= options.gap_tolerance_mm && !exact {
+            let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;
+            if closes(e.gap_error_mm) && !exact {
                 self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
             }
-            let closed = self.newton.current.gap_error_mm <= options.gap_tolerance_mm;
+            let closed = closes(self.newton.current.gap_error_mm);
             let change = rubbing::change(&trial.friction, &self.newton.current);
             if closed && change <= options.friction_tolerance {
                 return Ok(());
@@ -387,7 +393,7 @@ impl<'a> Solver<'a> {
             }
         }
         let gap_mm = self.newton.current.gap_error_mm;
-        Err(if rubs && gap_mm <= options.gap_tolerance_mm {
+        Err(if rubs && (by_penalty || gap_mm <= options.gap_tolerance_mm) {
             StepError::Friction { updates, change: last_change }
         } else {
             StepError::Contact { augmentations: updates, gap_mm }

@@ -1,4 +1,4 @@
-//! Wedges sharper than anything on the mesh.
+//! Edges and wedges sharper than the mesh.
 
 use super::lab::{press, press_body, scene, solve, tight};
 use super::{Line, Suite};
@@ -57,6 +57,45 @@ fn block(tip_mm: f64, aside_mm: f64, depth_mm: f64) -> String {
     )
 }
 
+/// A block under the edge of a ruler 2 mm thick that lies across its faces.
+fn ruler(elements: u32) -> String {
+    format!(
+        "[geometry]
+        kind = \"block\"
+        size_mm = [12.0, 12.0]
+        elements = [{elements}, {elements}]
+        layers = [{{ tissue = \"dermis\", thickness_mm = 4.0, elements = {} }}]
+        [indenter]
+        shape = \"plate\"
+        size_mm = [2.0, 8.0]
+        edge_radius_mm = 0.9
+        [motion]
+        depth_mm = 1.4
+        increments = 4
+        pitch_deg = 10.0
+        roll_deg = 5.0
+        yaw_deg = 35.0",
+        elements / 2
+    )
+}
+
+/// On faces 1 mm wide contact is within them from the start, on those of 0.75 mm after rows of
+/// nodes have slipped off the edge.
+fn across_faces() -> Result<Vec<Line>, CaseError> {
+    let pressed =
+        |n| -> Result<_, CaseError> { Ok(press(&scene(&ruler(n))?, Options::default())?) };
+    let fine = pressed(32)?;
+    let source = "faces of 0.375 mm, contact at nodes";
+    let mut lines = Vec::new();
+    for (elements, width_mm) in [(12, "1"), (16, "0.75")] {
+        let wide = pressed(elements)?;
+        let force = Check::relative("force", wide.force_n(), fine.force_n(), 0.25, source);
+        lines
+            .push(wide.line(format!("block, edge of 2 mm on faces of {width_mm} mm"), vec![force]));
+    }
+    Ok(lines)
+}
+
 /// The row of nodes under the middle of [`block`], led down as far as a wedge presses it: all that
 /// so sharp a wedge can do. Its energy, mJ.
 fn row_led_down(body: &Body, depth_mm: f64) -> Result<f64, CaseError> {
@@ -101,7 +140,7 @@ fn refusal(variant: &str, refused: Result<(), PressError>) -> Line {
 }
 
 pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
-    let mut lines = Vec::new();
+    let mut lines = across_faces()?;
     let density = if suite.long { "medium" } else { "coarse" };
     for tip in [0.05, 0.005] {
         let variant = format!("section, {density}, tip {tip} mm");

@@ -104,6 +104,7 @@ fn corner_first(body: &Body, drive: &Drive) -> Result<Line, CaseError> {
         offset_mm: [3.0, 3.0 * side],
         pose: pose(15.0, 10.0 * side),
         friction: 0.0,
+        contact: None,
     };
     let [left, right] = [1.0, -1.0].map(|side| press_body(body, &aside(side), drive, tight()));
     let (left, right) = (left?, right?);

@@ -7,10 +7,10 @@ use crate::element::{Elastic, ElementKind, Inverted, Memory};
 use crate::material::kinematics::Mat3;
 use crate::material::{ElasticConstants, Kinematics, MaterialError, NeoHookean};
 use crate::mesh::block::{BlockLattice, build, even};
-use crate::mesh::{Block, Mesh, Surface, Tissue};
+use crate::mesh::{Block, FaceKind, Mesh, Surface, Tissue};
 use crate::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use crate::solve::{Loading, Materials, Options, Problem, Solver, StepError, StepReport};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The same material for every tissue.
 pub(crate) fn uniform(e_mpa: f64, nu: f64) -> Result<Materials, MaterialError> {
@@ -63,8 +63,8 @@ pub(crate) fn cube(kind: ElementKind, cells: usize, map: impl Fn([f64; 3]) -> [f
     lattice(kind, [axis.clone(), axis.clone(), axis], map)
 }
 
-/// Cuts every hexahedron into six tetrahedra along its main diagonal. Mid-edge
-/// nodes join the node sets that hold both ends.
+/// Cuts every hexahedron into six tetrahedra along its main diagonal, and the faces of
+/// surfaces with them. Mid-edge nodes join the node sets that hold both ends.
 pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
     const PATHS: [[usize; 3]; 6] =
         [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
@@ -103,6 +103,7 @@ pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
             tissue.push(hexes.tissue[e]);
         }
     }
+    cut_surfaces(&mut mesh, &connectivity, kind, &middle);
     for set in mesh.node_sets.values_mut() {
         let both =
             |(a, b): &(u32, u32)| set.binary_search(a).is_ok() && set.binary_search(b).is_ok();
@@ -112,6 +113,37 @@ pub(crate) fn tetrahedra(mut mesh: Mesh, kind: ElementKind) -> Mesh {
     }
     mesh.blocks.push(Block { kind, connectivity, tissue });
     mesh
+}
+
+/// Cuts every quadrangle into the two triangles that tetrahedra have there.
+fn cut_surfaces(
+    mesh: &mut Mesh,
+    tetrahedra: &[u32],
+    kind: ElementKind,
+    middle: &HashMap<(u32, u32), u32>,
+) {
+    let key = |a: u32, b: u32| (a.min(b), a.max(b));
+    let edges: HashSet<_> = tetrahedra
+        .chunks_exact(kind.nodes())
+        .flat_map(|tet| TET10_EDGES.map(|[a, b]| key(tet[a], tet[b])))
+        .collect();
+    for surface in mesh.surfaces.values_mut() {
+        let mut connectivity = Vec::new();
+        for face in surface.faces() {
+            let [a, b, c, d] = [face[0], face[1], face[2], face[3]];
+            let halves = match edges.contains(&key(a, c)) {
+                true => [[a, b, c], [a, c, d]],
+                false => [[b, c, d], [b, d, a]],
+            };
+            for half in halves {
+                connectivity.extend(half);
+                if kind == ElementKind::Tet10 {
+                    connectivity.extend((0..3).map(|k| middle[&key(half[k], half[(k + 1) % 3])]));
+                }
+            }
+        }
+        *surface = Surface { kind: FaceKind::of(kind), connectivity };
+    }
 }
 
 /// Coordinates from 0: steps of `h` up to `fine`, then growing by `ratio` up to

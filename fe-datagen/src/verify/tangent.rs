@@ -2,6 +2,7 @@
 
 use super::bodies::{cube, largest, noise, uniform};
 use super::{CaseError, Check, Context};
+use crate::contact::ContactRule;
 use crate::element::{ElementKind, Memory};
 use crate::indenter::{Placement, Sphere};
 use crate::linear::Equations;
@@ -26,19 +27,25 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     ];
     let mut rows = Vec::new();
     for (kind, name, cells) in kinds {
-        let (error, touching) = error(kind, cells)?;
-        let quantity = format!("{name}, {touching} nodes in contact: largest relative error");
-        // Without contact the row would not show what it says, but where it is refused.
         let carries = FaceKind::of(kind).carries_contact();
-        let error = if carries && touching == 0 { f64::NAN } else { error };
-        rows.push(Check::vanishes(quantity, error, 1e-7, SOURCE));
+        for (rule, points) in [(ContactRule::Nodes, "nodes"), (ContactRule::Faces, "face points")] {
+            if rule == ContactRule::Faces && !carries {
+                continue;
+            }
+            let (error, touching) = error(kind, cells, rule)?;
+            let quantity =
+                format!("{name}, {touching} {points} in contact: largest relative error");
+            // Without contact the row would not show what it says, but where it is refused.
+            let error = if carries && touching == 0 { f64::NAN } else { error };
+            rows.push(Check::vanishes(quantity, error, 1e-7, SOURCE));
+        }
     }
     Ok(rows)
 }
 
 /// A sphere that dents the top of the cube near its middle; the top of a
 /// square, where it is a disc of the same radius.
-fn loading(kind: ElementKind) -> Loading {
+fn loading(kind: ElementKind, contact: ContactRule) -> Loading {
     let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let (origin_mm, travel_mm) = if kind.is_planar() {
         ([0.55, 2.4, 0.0], [0.0, -0.1, 0.0])
@@ -47,12 +54,12 @@ fn loading(kind: ElementKind) -> Loading {
     };
     let start = Placement { rotation, origin_mm };
     let shape = Arc::new(Sphere { radius_mm: 1.6 });
-    let indenter = MovingIndenter::straight(shape, start, travel_mm);
+    let indenter = MovingIndenter { contact, ..MovingIndenter::straight(shape, start, travel_mm) };
     Loading { indenter: Some(indenter), ..Loading::default() }
 }
 
-/// Largest error over the largest entry, and the number of nodes in contact.
-fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
+/// Largest error over the largest entry, and the number of points in contact.
+fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usize), CaseError> {
     let mesh = cube(kind, cells, |p| p);
     let mut fixed = vec![false; 3 * mesh.nodes.len()];
     let (bottom, top) = if kind.is_planar() { ("y_min", "y_max") } else { ("z_min", "z_max") };
@@ -61,7 +68,7 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
     }
     let touched = FaceKind::of(kind).carries_contact().then_some(top);
     let problem = Problem::new(mesh, uniform(1.0, 0.4)?, fixed, touched)?;
-    let contact = problem.contact.as_ref().map_or(0, |c| c.nodes.len());
+    let contact = problem.contact.as_ref().map_or(0, |c| c.points(rule).len());
     let multipliers: Vec<f64> = (0..contact as u64).map(|i| 0.05 + 0.02 * noise(900 + i)).collect();
     let size = 0.06 / cells as f64;
     let mut u: Vec<[f64; 3]> = (0..problem.mesh.nodes.len() as u64)
@@ -70,7 +77,7 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
             std::array::from_fn(|i| moves(i) * noise(3 * n + i as u64))
         })
         .collect();
-    let loading = loading(kind);
+    let loading = loading(kind, rule);
     let structure = &problem.structure;
     let equations = &structure.equations;
     let mut tangent = structure.zeros();
