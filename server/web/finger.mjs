@@ -4,7 +4,7 @@
 import { MAP_LEN, SIDE_PX } from './protocol.mjs';
 import { TABLES, TABLE_LEN } from './colour.mjs';
 import { computeNormals } from './atlas.mjs';
-import { fringeOf } from './raster.mjs';
+import { fringeOf } from './mask.mjs';
 import { indenterMesh } from './indenter.mjs';
 import { GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
 

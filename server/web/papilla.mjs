@@ -5,6 +5,7 @@ import { PressControl } from './control.mjs';
 import { FingerView } from './finger.mjs';
 import { LadderView, listTiers } from './ladder.mjs';
 import { LOG_DECADES, MapView } from './map.mjs';
+import { countDifferences } from './mask.mjs';
 import { Meters } from './meters.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, Session } from './protocol.mjs';
@@ -263,7 +264,7 @@ async function checkMasks(atlas) {
     const image = await createImageBitmap(await response.blob(), { colorSpaceConversion: 'none' });
     const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
     context.drawImage(image, 0, 0);
-    const differing = atlas[patch].raster.countMaskDifferences(context.getImageData(0, 0, image.width, image.height).data);
+    const differing = countDifferences(atlas[patch].raster.mask, context.getImageData(0, 0, image.width, image.height).data);
     if (differing > 0) words.push(`${differing} pixels of the ${patch} mask differ from the server's`);
   }
   byId('mask-check').textContent = words.length ? words.join(', ') : '(masks equal the server’s)';

@@ -1,14 +1,19 @@
 // Vertex values to 224 x 224 maps: the pixel -> (triangle, weights) table, built once from the
 // atlas by the server's own rule, so that both paint the same pixels: a pixel belongs to the patch
 // if its centre lies in a triangle, borders included, and to the lowest such triangle.
+// This file is clients/web/src/raster.js and server/web/raster.mjs: neither the package nor the page may
+// read beyond its folder, so both have it, and a test holds the two equal (tests/browser).
 
-import { MAP_LEN, SIDE_PX } from './protocol.mjs';
-
+const SIDE_PX = 224;
+const MAP_LEN = SIDE_PX * SIDE_PX;
 const STEPS_PER_PX = 2 ** 40;
 
 /** Linear interpolation of vertex values at pixel centres; pixels outside every triangle stay 0. */
 export class Raster {
-  /** `triangles`: flat vertex indices; `uvPx`: flat (u, v) per vertex, in pixels. */
+  /**
+   * @param {Uint32Array} triangles flat vertex indices
+   * @param {Float32Array} uvPx flat (u, v) per vertex, in pixels
+   */
   constructor(triangles, uvPx) {
     const owner = new Int32Array(MAP_LEN).fill(-1);
     const weight = new Float32Array(3 * MAP_LEN);
@@ -21,12 +26,15 @@ export class Raster {
     this.pixels = new Uint32Array(count);
     this.corners = new Uint32Array(3 * count);
     this.weights = new Float32Array(3 * count);
+    /** Triangle of each of these pixels. */
+    this.owners = new Uint32Array(count);
     /** 1 inside, 0 outside. */
     this.mask = new Uint8Array(MAP_LEN);
     for (let i = 0, n = 0; i < MAP_LEN; i++) {
       if (owner[i] < 0) continue;
       this.mask[i] = 1;
       this.pixels[n] = i;
+      this.owners[n] = owner[i] / 3;
       for (let k = 0; k < 3; k++) {
         this.corners[3 * n + k] = triangles[owner[i] + k];
         this.weights[3 * n + k] = weight[3 * i + k];
@@ -35,7 +43,10 @@ export class Raster {
     }
   }
 
-  /** Writes the map of `values` (one per vertex) into `out` (224 x 224, row-major). */
+  /**
+   * Writes the map of `values` (one per vertex) into `out` (224 x 224, row-major).
+   * @param {ArrayLike<number>} values @param {Float32Array} out
+   */
   rasterise(values, out) {
     const { pixels, corners, weights } = this;
     out.fill(0);
@@ -45,18 +56,13 @@ export class Raster {
         + weights[k + 2] * values[corners[k + 2]];
     }
   }
-
-  /** Number of pixels on which this mask and a grey image's RGBA bytes disagree. */
-  countMaskDifferences(rgba) {
-    let differing = 0;
-    for (let i = 0; i < MAP_LEN; i++) {
-      if ((this.mask[i] === 1) !== (rgba[4 * i] >= 128)) differing++;
-    }
-    return differing;
-  }
 }
 
-/** Gives triangle `t` every pixel without an owner whose centre lies in it, edges and corners included. */
+/**
+ * Gives triangle `t` every pixel without an owner whose centre lies in it, edges and corners included.
+ * @param {number} t @param {Uint32Array} triangles @param {Float32Array} uvPx
+ * @param {Int32Array} owner @param {Float32Array} weight
+ */
 function claim(t, triangles, uvPx, owner, weight) {
   const [a, b, c] = [2 * triangles[t], 2 * triangles[t + 1], 2 * triangles[t + 2]];
   const [au, av, bu, bv, cu, cv] = [uvPx[a], uvPx[a + 1], uvPx[b], uvPx[b + 1], uvPx[c], uvPx[c + 1]];
@@ -87,6 +93,7 @@ function claim(t, triangles, uvPx, owner, weight) {
  * Twice the area of a triangle, positive where the image (v runs down) shows it counter-clockwise.
  * The sign is exact: f32 pixel coordinates are multiples of 2^-40 px, their differences fit a double,
  * and where rounding of the two products could decide, the sum is done on integers.
+ * @param {number} au @param {number} av @param {number} bu @param {number} bv @param {number} cu @param {number} cv
  */
 function doubledArea(au, av, bu, bv, cu, cv) {
   const left = (bv - av) * (cu - au);
@@ -95,30 +102,4 @@ function doubledArea(au, av, bu, bv, cu, cv) {
   if (Math.abs(area) > 4 * Number.EPSILON * (Math.abs(left) + Math.abs(right))) return area;
   const [au2, av2, bu2, bv2, cu2, cv2] = [au, av, bu, bv, cu, cv].map((px) => BigInt(Math.round(px * STEPS_PER_PX)));
   return Number((bv2 - av2) * (cu2 - au2) - (bu2 - au2) * (cv2 - av2)) / STEPS_PER_PX ** 2;
-}
-
-/**
- * Pixels just outside the mask, each followed by a pixel inside beside it. A filter reads both at the
- * rim, and a 0 from outside would darken it.
- */
-export function fringeOf(mask) {
-  const pairs = [];
-  for (let row = 0; row < SIDE_PX; row++) {
-    for (let column = 0; column < SIDE_PX; column++) {
-      if (mask[row * SIDE_PX + column]) continue;
-      const inside = neighbourInside(mask, row, column);
-      if (inside >= 0) pairs.push(row * SIDE_PX + column, inside);
-    }
-  }
-  return Uint32Array.from(pairs);
-}
-
-/** A pixel of the mask beside (row, column), straight neighbours first; -1 if there is none. */
-function neighbourInside(mask, row, column) {
-  for (const [down, right] of [[0, 1], [0, -1], [1, 0], [-1, 0], [1, 1], [1, -1], [-1, 1], [-1, -1]]) {
-    const r = row + down;
-    const c = column + right;
-    if (r >= 0 && c >= 0 && r < SIDE_PX && c < SIDE_PX && mask[r * SIDE_PX + c]) return r * SIDE_PX + c;
-  }
-  return -1;
 }

@@ -1,11 +1,13 @@
 // The page's modules without a browser: what they must agree on with the server and with theory.
 
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
 import { test } from 'node:test';
 
 const web = new URL('../../server/web/', import.meta.url);
 const load = (name) => import(new URL(name, web));
 const { Raster } = await load('raster.mjs');
+const { countDifferences, fringeOf } = await load('mask.mjs');
 const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol.mjs');
 const { AutoRange, TABLES, digits, roundUp } = await load('colour.mjs');
 const { Atlas } = await load('atlas.mjs');
@@ -73,6 +75,29 @@ test('the raster decides exactly where rounding could not', () => {
     const raster = new Raster([0, 1, 2], [1.5 + shift, 1.5, 9.5 + shift, 9.5, 9.5 + shift, 1.5].map(Math.fround));
     assert.equal(raster.mask[centre], inside, `shifted by ${shift}`);
   }
+});
+
+test('page and client have one raster', async () => {
+  const [page, client] = await Promise.all(['raster.mjs', '../../clients/web/src/raster.js'].map((file) => readFile(new URL(file, web), 'utf8')));
+  assert.ok(page === client, 'server/web/raster.mjs and clients/web/src/raster.js differ: change both alike');
+});
+
+test('a mask has a fringe one pixel wide, and every pixel that differs is counted', () => {
+  const mask = new Uint8Array(MAP_LEN);
+  for (const [row, column] of [[5, 5], [5, 6], [0, 223]]) mask[row * 224 + column] = 1;
+  const pairs = [...fringeOf(mask)];
+  // Ten around the two, three in the corner.
+  assert.equal(pairs.length, 2 * 13);
+  for (let n = 0; n < pairs.length; n += 2) {
+    assert.deepEqual([mask[pairs[n]], mask[pairs[n + 1]]], [0, 1]);
+    const [down, right] = [Math.floor(pairs[n] / 224) - Math.floor(pairs[n + 1] / 224), pairs[n] % 224 - pairs[n + 1] % 224];
+    assert.ok(Math.max(Math.abs(down), Math.abs(right)) === 1, `${pairs[n]} beside ${pairs[n + 1]}`);
+  }
+  const rgba = Uint8ClampedArray.from({ length: 4 * MAP_LEN }, (_, i) => 255 * mask[Math.floor(i / 4)]);
+  assert.equal(countDifferences(mask, rgba), 0);
+  rgba[4 * (5 * 224 + 5)] = 0;
+  rgba[0] = 255;
+  assert.equal(countDifferences(mask, rgba), 2);
 });
 
 test('colour tables begin and end where the published maps do', () => {

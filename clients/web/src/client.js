@@ -1,10 +1,10 @@
 // A session that keeps itself connected: docs/protocol.md, version 2.
 
 import { PapillaError, missed, refusal } from './error.js';
-import { Link } from './link.js';
-import { Sequences } from './sequences.js';
-import { crop, greatest } from './window.js';
-import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js';
+import { Link, sessionUrl } from './link.js';
+import { Outbox } from './outbox.js';
+import { crop } from './window.js';
+import { Answer, MAP_LEN, SIDE_PX } from './wire.js';
 
 /** @typedef {import('./types.js').Hello} Hello */
 /** @typedef {import('./types.js').Ready} Ready */
@@ -12,26 +12,12 @@ import { Answer, MAP_LEN, RequestFrame, SAMPLE_TYPES, SIDE_PX } from './wire.js'
 /** @typedef {import('./types.js').State} State */
 /** @typedef {import('./types.js').Options} Options */
 
-/** Frames that may be without an answer at once; the next one waits. */
-const OUTSTANDING_MAX = 1024;
-/** How long a frame waits before the socket is looked at again, ms. */
-const DRAIN_MS = 1;
+/** What a hello asks for where it does not say: half the bytes of f32, SED within 0.01 %. */
+const DEFAULTS = Object.freeze(/** @type {Hello} */ ({ sample_type: 'u16' }));
 /** Refusals of a hello that pass by themselves. */
 const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
 
 const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 1000);
-
-/**
- * Address of the sessions of a server.
- * @param {string} base http(s)://host[:port], or '' for the server of the page
- * @param {string} [token]
- */
-function sessionUrl(base, token) {
-  const url = new URL('v1/session', new URL(base || '/', globalThis.location?.href));
-  url.protocol = url.protocol.replace('http', 'ws');
-  if (token) url.searchParams.set('access_token', token);
-  return url.href;
-}
 
 /**
  * A session. Frames are pressure maps (Pa); answers are maps of strain energy density (J/m3).
@@ -56,32 +42,24 @@ export class Papilla {
   state = 'closed';
   /** Deadline of the frames to come, us; 0: the session's budget. */
   deadlineUs = 0;
-  /** Frames that went out, and frames whose place a newer one took before they could. */
-  sent = 0;
-  replaced = 0;
   /** The last answer of the server; overwritten by the next. */
   answer = new Answer();
 
   // Of frames without an answer: the last answer must not change while it is being looked at.
   #brief = new Answer();
-  #frame = new RequestFrame();
   #rectangle = { column: 0, row: 0, width: 0, height: 0 };
   #options;
   #link;
   /** @type {Hello} */ #hello;
   // Terms to go back to if a renewal is refused.
   /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
-  #sequence = 0;
-  #waits = false;
-  #outstanding = new Sequences(OUTSTANDING_MAX);
-  #drainTimer = false;
+  #outbox = new Outbox(() => this.#flush(), (sequence, status) => this.#settle(sequence, status, null));
   // Answers up to the hello of a renewal have the sections of before.
   #termsFrom = 0;
   /** @type {ReturnType<Answer['views']> | null} */ #views = null;
   /** @type {ReturnType<Answer['views']> | null} */ #viewsBefore = null;
   /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */ #promised = new Map();
   #opened = false;
-  #drained = () => { this.#drainTimer = false; this.#flush(); };
 
   /**
    * @param {string} base http(s)://host[:port]; '' for the server of the page
@@ -96,7 +74,7 @@ export class Papilla {
       binary: (data) => this.#binary(data),
       lost: (why) => this.#lost(why),
     });
-    this.#hello = { ...hello };
+    this.#hello = { ...DEFAULTS, ...hello };
     this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
 
@@ -118,6 +96,16 @@ export class Papilla {
     });
   }
 
+  /** Frames that went out. */
+  get sent() {
+    return this.#outbox.sent;
+  }
+
+  /** Frames whose place a newer one took before they could go out. */
+  get replaced() {
+    return this.#outbox.replaced;
+  }
+
   /** Connects, and again whenever the connection is lost, until `close`. */
   open() {
     this.#opened = true;
@@ -135,10 +123,10 @@ export class Papilla {
    */
   renew(hello) {
     // A frame that waits was encoded by the terms of before.
-    this.#supersede();
+    this.#outbox.supersede();
     if (this.ready) this.#before = { hello: this.#hello, ready: this.ready, termsFrom: this.#termsFrom };
-    this.#hello = { ...hello };
-    this.#termsFrom = (this.#sequence + 1) >>> 0;
+    this.#hello = { ...DEFAULTS, ...hello };
+    this.#termsFrom = (this.#outbox.sequence + 1) >>> 0;
     this.ready = null;
     if (this.#link.isOpen) this.#greet();
     else if (this.#opened && !this.#link.isBusy) this.#link.connect();
@@ -148,6 +136,7 @@ export class Papilla {
    * Sends a whole map (224 x 224, Pa, row-major); it may be overwritten afterwards.
    * @param {Float32Array} pressurePa
    * @returns {number} the frame's sequence, which its answer repeats
+   * @throws {PapillaError} `wrong_length`; as u16 or u8 also `not_finite` and `negative_pressure`, which the server tells of f32 and f16
    */
   send(pressurePa) {
     if (pressurePa.length !== MAP_LEN) throw refusal('wrong_length', `a map has ${MAP_LEN} samples, this one ${pressurePa.length}`);
@@ -186,27 +175,9 @@ export class Papilla {
    */
   #put(values, first, stride, column, row, width, height) {
     const timeUs = this.#options.clockUs();
-    const type = SAMPLE_TYPES.indexOf(this.#hello.sample_type ?? 'f32');
-    let scale = 0;
-    if (type >= 2) {
-      scale = this.#hello.pressure_scale_pa ?? greatest(values, first, stride, width, height) / (type === 2 ? 65535 : 255);
-      if (!(scale > 0)) scale = 1;
-    }
-    this.#supersede();
-    this.#sequence = (this.#sequence + 1) >>> 0;
-    this.#frame.encode(values, first, stride, column, row, width, height, type, scale);
-    this.#frame.stamp(this.#sequence, timeUs, this.deadlineUs);
-    this.#waits = true;
+    this.#outbox.put(values, first, stride, column, row, width, height, this.#hello, timeUs, this.deadlineUs);
     this.#flush();
-    return this.#sequence;
-  }
-
-  /** The frame that waits, if one does, is never sent. */
-  #supersede() {
-    if (!this.#waits) return;
-    this.#waits = false;
-    this.replaced++;
-    this.#settle(this.#sequence, 'superseded', null);
+    return this.#outbox.sequence;
   }
 
   /** The outcome of a frame of which the server sent no binary answer. @param {number} sequence @param {Answer['status']} status @param {Problem | null} problem */
@@ -227,34 +198,8 @@ export class Papilla {
     else promised.reject(new PapillaError(answer.problem ?? missed(answer.status, answer.sequence)));
   }
 
-  /** What went out on a lost connection is never answered. @param {boolean} alsoWaiting */
-  #loseAll(alsoWaiting) {
-    while (this.#outstanding.count > 0) {
-      const sequence = this.#outstanding.first();
-      this.#outstanding.take(sequence);
-      this.#settle(sequence, 'lost', null);
-    }
-    if (!alsoWaiting || !this.#waits) return;
-    this.#waits = false;
-    this.#settle(this.#sequence, 'lost', null);
-  }
-
   #flush() {
-    if (!this.#waits || !this.ready || !this.#link.isOpen) return;
-    if (this.#outstanding.count === OUTSTANDING_MAX) return;
-    if (this.#link.bufferedBytes > 0) {
-      if (!this.#drainTimer) {
-        this.#drainTimer = true;
-        setTimeout(this.#drained, DRAIN_MS);
-      }
-      return;
-    }
-    this.#waits = false;
-    this.sent++;
-    this.#outstanding.add(this.#sequence);
-    const { buffer, bytes } = this.#frame;
-    // A view of the whole buffer is not needed, and a part of it is the one view a frame costs.
-    this.#link.send(bytes === buffer.byteLength ? buffer : new Uint8Array(buffer, 0, bytes));
+    if (this.ready) this.#outbox.flush(this.#link);
   }
 
   #greet() {
@@ -265,7 +210,7 @@ export class Papilla {
   #lost(why) {
     this.ready = null;
     this.#before = null;
-    this.#loseAll(false);
+    this.#outbox.lose(false);
     this.#enter('waiting', why);
   }
 
@@ -275,7 +220,7 @@ export class Papilla {
     this.#link.drop();
     this.ready = null;
     this.#before = null;
-    this.#loseAll(true);
+    this.#outbox.lose(true);
     this.#enter(state, why);
   }
 
@@ -308,7 +253,7 @@ export class Papilla {
   #problem(problem) {
     const { sequence } = problem;
     if (typeof sequence === 'number') {
-      if (this.#outstanding.take(sequence)) this.#settle(sequence, 'error', problem);
+      if (this.#outbox.take(sequence)) this.#settle(sequence, 'error', problem);
       return;
     }
     if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
@@ -338,7 +283,7 @@ export class Papilla {
       this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
       return;
     }
-    if (!this.#outstanding.take(answer.sequence)) return;
+    if (!this.#outbox.take(answer.sequence)) return;
     answer.roundTripUs = this.#options.clockUs() - answer.clientTimeUs;
     answer.problem = null;
     this.#flush();

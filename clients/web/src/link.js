@@ -6,6 +6,18 @@ const RETRY_MS = { least: 100, most: 250 };
 const ATTEMPT_MS = 5000;
 
 /**
+ * Address of the sessions of a server.
+ * @param {string} base http(s)://host[:port], or '' for the server of the page
+ * @param {string} [token]
+ */
+export function sessionUrl(base, token) {
+  const url = new URL('v1/session', new URL(base || '/', globalThis.location?.href));
+  url.protocol = url.protocol.replace('http', 'ws');
+  if (token) url.searchParams.set('access_token', token);
+  return url.href;
+}
+
+/**
  * What happens to a link. `connecting` and `lost` may be told many times.
  * @typedef {object} Ends
  * @property {() => void} connecting

@@ -1,5 +1,6 @@
 // Rectangles of a map.
 
+import { refusal } from './error.js';
 import { MAP_LEN, SIDE_PX } from './wire.js';
 
 /**
@@ -32,7 +33,8 @@ export function crop(map, into) {
 }
 
 /**
- * The greatest sample of a window; sample (x, y) is values[first + y * stride + x].
+ * The greatest sample of a window; sample (x, y) is values[first + y * stride + x]. What is no pressure is refused as the
+ * server would refuse it: as u16 or u8 it could not be told from one.
  * @param {Float32Array} values @param {number} first @param {number} stride
  * @param {number} width @param {number} height
  */
@@ -40,7 +42,17 @@ export function greatest(values, first, stride, width, height) {
   let most = 0;
   for (let y = 0; y < height; y++) {
     const from = first + y * stride;
-    for (let x = 0; x < width; x++) if (values[from + x] > most) most = values[from + x];
+    for (let x = 0; x < width; x++) {
+      const value = values[from + x];
+      if (!(value >= 0 && value < Infinity)) throw noPressure(value, x, y);
+      if (value > most) most = value;
+    }
   }
   return most;
+}
+
+/** @param {number} value @param {number} column @param {number} row */
+function noPressure(value, column, row) {
+  const code = Number.isFinite(value) ? 'negative_pressure' : 'not_finite';
+  return refusal(code, `row ${row}, column ${column} of the window is ${value} Pa; pressure is finite and not negative`);
 }

@@ -1,22 +1,27 @@
-// Round trips of whole f32 maps in headless Chromium, one JSON line.
+// Round trips of whole maps in headless Chromium, one JSON line.
 // From the instant at which a frame was due to the answer in the page's hands. Allocation is sampled in a run of its own, 10 s:
 // bytes of the JavaScript heap that functions of this client asked for.
 
 import { parseArgs } from 'node:util';
 import { launch, openPage, serverUrl } from './browser.js';
 
-const { values } = parseArgs({ options: { 'rate-hz': { type: 'string', default: '90' }, 'duration-s': { type: 'string', default: '60' } } });
+const { values } = parseArgs({ options: {
+  'rate-hz': { type: 'string', default: '90' },
+  'duration-s': { type: 'string', default: '60' },
+  'sample-type': { type: 'string', default: 'u16' },
+} });
 const rateHz = Number(values['rate-hz']);
+const sampleType = values['sample-type'];
 const SAMPLED_S = 10;
 
 const browser = await launch();
 const page = await openPage(browser);
 
 /** @param {number} durationS */
-const run = (durationS) => page.evaluate(async ([url, hz, seconds]) => {
+const run = (durationS) => page.evaluate(async ([url, hz, seconds, type]) => {
   // @ts-ignore: a path of the page
   const { MAP_LEN, Papilla } = await import('/client/papilla.js');
-  const session = await Papilla.connect(url, { tier: 'half-space' }, { crop: false });
+  const session = await Papilla.connect(url, { tier: 'half-space', sample_type: type }, { crop: false });
   const maps = Array.from({ length: 16 }, (_, k) => Float32Array.from({ length: MAP_LEN }, (_, i) => {
     const [u, v] = [(i % 224) + 0.5 - 112 - 20 * Math.cos(k * Math.PI / 8), Math.floor(i / 224) + 0.5 - 112 - 20 * Math.sin(k * Math.PI / 8)];
     return 15000 * Math.exp(-(u * u + v * v) / 288);
@@ -53,7 +58,7 @@ const run = (durationS) => page.evaluate(async ([url, hz, seconds]) => {
   const sorted = took.slice(warm, answered).sort();
   const at = (/** @type {number} */ part) => Math.round(sorted[Math.min(sorted.length - 1, Math.floor(part * sorted.length))]);
   return { frames: sorted.length, missing: missed, p50_us: at(0.5), p99_us: at(0.99), max_us: at(1) };
-}, /** @type {[string, number, number]} */ ([serverUrl(), rateHz, durationS]));
+}, /** @type {[string, number, number, any]} */ ([serverUrl(), rateHz, durationS, sampleType]));
 
 const measured = await run(Number(values['duration-s']));
 const devtools = await page.context().newCDPSession(page);
@@ -63,7 +68,7 @@ const { profile } = await devtools.send('HeapProfiler.stopSampling');
 await browser.close();
 
 /** @param {any} node @returns {number} */
-const ofClient = (node) => (node.callFrame.url.includes('/client/src/client.js') || node.callFrame.url.includes('/client/src/wire.js') ? node.selfSize : 0)
+const ofClient = (node) => (node.callFrame.url.includes('/client/src/') ? node.selfSize : 0)
   + node.children.reduce((/** @type {number} */ sum, /** @type {any} */ child) => sum + ofClient(child), 0);
 const allocated = ofClient(profile.head) / (sampled.frames + sampled.missing);
-console.log(JSON.stringify({ client: 'web', rate_hz: rateHz, ...measured, allocated_bytes_per_frame: Math.round(allocated) }));
+console.log(JSON.stringify({ client: sampleType === 'u16' ? 'web' : `web-${sampleType}`, rate_hz: rateHz, ...measured, allocated_bytes_per_frame: Math.round(allocated) }));

@@ -5,7 +5,8 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { test } from 'node:test';
 import { measure } from '../foundation/measure.js';
-import { toHalf } from '../src/wire.js';
+import { crop, greatest } from '../src/window.js';
+import { MAP_LEN, toHalf } from '../src/wire.js';
 import { launch, openPage } from './browser.js';
 
 const page = await readFile(new URL('../../../docs/clients/web.md', import.meta.url), 'utf8');
@@ -16,6 +17,18 @@ test('f16 rounds to the nearest, ties to even, and clamps', () => {
     assert.equal(toHalf(value), bits, String(value));
   }
   assert.equal(toHalf(NaN) & 0x7e00, 0x7e00);
+});
+
+test('what is no pressure is refused before it is rounded, and cropping leaves none out', () => {
+  for (const [value, code] of /** @type {[number, string][]} */ ([[NaN, 'not_finite'], [Infinity, 'not_finite'], [-Infinity, 'not_finite'], [-1e-30, 'negative_pressure']])) {
+    const map = new Float32Array(MAP_LEN);
+    map[3 * 224 + 5] = 1000;
+    map[7 * 224 + 9] = value;
+    const { column, row, width, height } = crop(map, { column: 0, row: 0, width: 0, height: 0 });
+    assert.deepEqual([column, row, width, height], [5, 3, 5, 5]);
+    assert.throws(() => greatest(map, row * 224 + column, 224, width, height), { code, message: /row 4, column 4/ });
+  }
+  assert.equal(greatest(Float32Array.of(0, -0, 3, 7, 2, 9), 0, 3, 2, 2), 7);
 });
 
 test('the foundation is off the FE presses by what its page says, with the constants that fit', () => {

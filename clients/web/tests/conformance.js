@@ -94,7 +94,9 @@ class Runner {
   }
 
   /** @param {Step} step */
-  async hello({ hello, expect }) {
+  async hello({ hello: wire, expect }) {
+    // What a case does not say is the protocol's default, not the client's.
+    const hello = { sample_type: 'f32', ...wire };
     let reply = /** @type {any} */ (null);
     const fresh = this.session === null || this.session.state === 'refused';
     if (fresh) this.session = new Papilla(this.url, hello, { crop: false, clockUs: () => this.now() });

@@ -13,7 +13,8 @@ use tokio_tungstenite::tungstenite::Message;
 
 use crate::support::{Answer, Service, bytes_of, frame, hello, ramp, raw_exchange};
 
-async fn impatient() -> Service {
+/// A service that waits for nobody longer than 3 s.
+pub(crate) async fn impatient() -> Service {
     Service::start_with(|config| {
         config.io_timeout_s = 1;
         config.idle_timeout_s = 3;

@@ -4,7 +4,8 @@ use papilla_proto::{MAP_LEN, SampleType};
 use serde_json::json;
 
 use crate::support::{
-    PRESSURE_MAX_PA, SED_MAX, Service, assert_rendered, bytes_of, floats_of, ramp,
+    PRESSURE_MAX_PA, SED_MAX, Service, assert_rendered, atlas_of_skin, bytes_of, floats_of, frame,
+    hello, model_folder_on, ramp,
 };
 
 fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
@@ -238,4 +239,34 @@ async fn more_requests_than_places_are_turned_away() {
     statuses.sort_unstable();
     assert_eq!((statuses[0], statuses[3]), (200, 503), "{statuses:?}");
     assert_eq!(service.post("/v1/sed", body).send().await.status, 200);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pressure_off_the_skin_is_on_no_finger() {
+    let atlas = atlas_of_skin(50.0, 150.0);
+    let service = Service::on(model_folder_on(&atlas), |_| ()).await.unwrap();
+    let inside = |i: &usize| (50..150).contains(&(i % 224)) && (50..150).contains(&(i / 224));
+    let masked: Vec<f32> =
+        ramp().into_iter().enumerate().map(|(i, p)| if inside(&i) { p } else { 0.0 }).collect();
+    let answer = service.post("/v1/sed", bytes_of(&ramp())).send().await;
+    assert_rendered(&masked, &floats_of(&answer.body), |_| 1e-2);
+    let mut socket = service.socket().await;
+    socket.open(hello(&json!({}))).await;
+    socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
+    assert_rendered(&masked, &floats_of(&socket.hear_frame().await.1), |_| 1e-2);
+    // A press beside the finger touches nothing, and asks no network.
+    let beside: Vec<f32> = (0..MAP_LEN).map(|i| if inside(&i) { 0.0 } else { 9000.0 }).collect();
+    let answer = service.post("/v1/sed", bytes_of(&beside)).send().await;
+    assert_eq!(answer.header("x-papilla-infer-us"), Some("0"));
+    assert!(floats_of(&answer.body).iter().all(|e| e.to_bits() == 0));
+    // What is no pressure is refused wherever it lies.
+    for (at, value, code) in [
+        (0, f32::NAN, "not_finite"),
+        (MAP_LEN - 1, -1.0, "negative_pressure"),
+        (223, 1e30, "out_of_range"),
+    ] {
+        let mut bad = masked.clone();
+        bad[at] = value;
+        service.post("/v1/sed", bytes_of(&bad)).send().await.assert_refused(422, code);
+    }
 }

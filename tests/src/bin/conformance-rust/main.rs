@@ -1,5 +1,6 @@
 //! Runs the conformance script with the Rust client (docs/conformance.md).
 
+mod burst;
 mod checks;
 mod run;
 

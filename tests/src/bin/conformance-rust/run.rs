@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{Answer, ClientError, Contact, Frame, Outcome, Session, Skin, atlas, sed};
+use papilla_client::{ClientError, Contact, Frame, Outcome, Session, Skin, atlas, sed};
 use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch};
 use papilla_tests::{
     conformance::pattern::{self, Pressure, Vertices},
@@ -21,17 +21,17 @@ use crate::checks::{check_answer, check_map, check_pair, check_problem};
 /// One case.
 pub(crate) struct Run {
     server: String,
-    patience: Duration,
+    pub(crate) patience: Duration,
     session: Option<Session>,
     /// For people.
     pub(crate) note: String,
 }
 
-fn member<T: DeserializeOwned>(step: &Value, name: &str) -> Result<T> {
+pub(crate) fn member<T: DeserializeOwned>(step: &Value, name: &str) -> Result<T> {
     serde_json::from_value(step[name].clone()).with_context(|| name.to_owned())
 }
 
-async fn control(action: &str) -> Result<()> {
+pub(crate) async fn control(action: &str) -> Result<()> {
     let address = env::var("PAPILLA_CONTROL").context("PAPILLA_CONTROL")?;
     let address = address.trim_start_matches("http://");
     let answer = Request::post(&format!("/{action}"), Vec::new()).send(address).await?;
@@ -60,7 +60,7 @@ impl Run {
         }
     }
 
-    fn session(&self) -> Result<&Session> {
+    pub(crate) fn session(&self) -> Result<&Session> {
         self.session.as_ref().context("no session is open")
     }
 
@@ -115,60 +115,6 @@ impl Run {
             return check_answer(&step["expect"], &answer);
         }
         bail!("no attempt")
-    }
-
-    async fn burst(&mut self, step: &Value) -> Result<()> {
-        let (session, expect) = (self.session()?, &step["expect"]);
-        let (count, pattern): (u32, Pressure) = (member(step, "count")?, member(step, "pressure")?);
-        let maps: Vec<_> =
-            (1..=count).map(|k| pattern.draw(f64::from(k) / f64::from(count), None)).collect();
-        let before = session.superseded_by_client();
-        let paused = step["paused"] == json!(true);
-        if paused {
-            control("pause").await?;
-        }
-        let (finished, mut finish) = tokio::sync::mpsc::unbounded_channel::<(u32, Answer)>();
-        for (number, map) in maps.iter().enumerate() {
-            let outcome = session.send(map)?;
-            let finished = finished.clone();
-            tokio::spawn(async move {
-                if let Ok(answer) = outcome.await {
-                    // Err: the case is over.
-                    let _ = finished.send((number as u32, answer));
-                }
-            });
-            let gap_ms = step["gap_ms"].as_u64().unwrap_or(0);
-            time::sleep(Duration::from_millis(gap_ms)).await;
-        }
-        if paused {
-            control("resume").await?;
-        }
-        let mut outcomes = Vec::new();
-        while outcomes.len() < maps.len() {
-            let next = time::timeout(self.patience, finish.recv()).await?;
-            outcomes.push(next.context("a frame without an outcome")?);
-        }
-        let by_client = |a: &Answer| a.outcome == (Outcome::Superseded { by_client: true });
-        let by_service = |a: &Answer| a.outcome == (Outcome::Superseded { by_client: false });
-        let here = outcomes.iter().filter(|(_, answer)| by_client(answer)).count() as u64;
-        let there = outcomes.iter().filter(|(_, answer)| by_service(answer)).count() as u64;
-        // Tasks wake in any order: the session's order is that of its sequences, and answers are
-        // compared by what they hold.
-        let good: Vec<_> = outcomes.iter().filter(|(_, answer)| answer.is_ok()).collect();
-        ensure!(good.len() as u64 + here + there == u64::from(count), "other outcomes: {good:?}");
-        let newest = outcomes.iter().find(|(number, _)| number + 1 == count);
-        let (_, newest) = newest.context("the newest has no outcome")?;
-        let mut sequences: Vec<u32> = outcomes.iter().map(|(_, answer)| answer.sequence).collect();
-        sequences.sort_unstable();
-        sequences.dedup();
-        ensure!(sequences.len() == maps.len(), "two outcomes of one frame");
-        ensure!(here == session.superseded_by_client() - before, "the client miscounts");
-        ensure!(here + there >= expect["superseded"].as_u64().unwrap_or(0), "{here} + {there}");
-        let due = expect["superseded_by_client"].as_u64().unwrap_or(0);
-        ensure!(here >= due, "the client replaced {here}");
-        check_answer(&expect["newest"], newest)?;
-        self.note = format!(" ({} ok, {here} replaced here, {there} by the service)", good.len());
-        Ok(())
     }
 
     async fn reconnect(&mut self, step: &Value) -> Result<()> {

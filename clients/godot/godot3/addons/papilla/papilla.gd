@@ -6,6 +6,7 @@
 extends Node
 
 const Frame = preload("frame.gd")
+const Link = preload("link.gd")
 const Samples = preload("samples.gd")
 
 # An answer with a map; see `map_of`, `image_of`.
@@ -20,9 +21,6 @@ signal refused(problem)
 const ATTEMPT_MS = 5000
 const RETRY_LEAST_MS = 100
 const RETRY_MOST_MS = 250
-# A frame has up to 200 768 bytes; Godot's buffers have 64 KiB unless they are asked for before connecting.
-const BUFFER_KB = 2048
-const BUFFER_PACKETS = 256
 const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_limited"]
 
 # Address of the server.
@@ -46,10 +44,8 @@ var time_us = 0
 var sent = 0
 var replaced = 0
 
-var _socket = null
+var _link = null
 var _open = false
-var _has_begun = false
-var _has_ended = false
 var _is_refused = false
 var _next_try_ms = 0
 var _gives_up_ms = 0
@@ -101,7 +97,7 @@ func renew(next):
 	_asked = next.duplicate(true)
 	_terms_from = _sequence + 1
 	terms = null
-	if _socket != null and _socket.get_connection_status() == NetworkedMultiplayerPeer.CONNECTION_CONNECTED:
+	if _link != null and _link.is_open():
 		_greet()
 	elif _is_refused:
 		_is_refused = false
@@ -144,84 +140,56 @@ func poll():
 	if not _open:
 		return
 	var now = OS.get_ticks_msec()
-	if _socket == null:
+	if _link == null:
 		if now >= _next_try_ms and not _is_refused:
 			_connect()
 		return
-	# What the socket tells while it polls is only noted: it must not be freed within its own signals.
-	_socket.poll()
-	if _has_begun:
-		_has_begun = false
-		# On by default too; said here because everything hangs on it.
-		_socket.get_peer(1).set_no_delay(true)
+	if _link.poll():
 		_greet()
 	_receive()
-	if _socket == null:
+	if _link == null:
 		return
-	if _has_ended or (terms == null and now > _gives_up_ms):
+	if _link.has_ended or (terms == null and now > _gives_up_ms):
 		_lost()
 		return
 	_flush()
 
 
 func _receive():
-	while _socket != null and not _has_ended:
-		var peer = _socket.get_peer(1)
-		if peer.get_available_packet_count() == 0:
+	while _link != null:
+		var message = _link.next()
+		if message == null:
 			return
-		var packet = peer.get_packet()
-		if peer.was_string_packet():
-			_text(JSON.parse(packet.get_string_from_utf8()).result)
+		if message is Dictionary:
+			_text(message)
 		else:
-			_binary(packet)
+			_binary(message)
 
 
 func _connect():
 	_drop()
-	_socket = WebSocketClient.new()
-	_socket.set_buffers(BUFFER_KB, BUFFER_PACKETS, BUFFER_KB, BUFFER_PACKETS)
-	_has_begun = false
-	_has_ended = false
-	_socket.connect("connection_established", self, "_on_begin")
-	_socket.connect("connection_closed", self, "_on_end")
-	_socket.connect("connection_error", self, "_on_end")
+	_link = Link.new()
 	_gives_up_ms = OS.get_ticks_msec() + ATTEMPT_MS
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.percent_encode()
-	if _socket.connect_to_url(address) != OK:
+	if not _link.open(url, token):
 		_lost()
-
-
-func _on_begin(_protocol):
-	_has_begun = true
-
-
-func _on_end(_was_clean = false):
-	_has_ended = true
 
 
 func _greet():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
 	message["version"] = 2
-	var peer = _socket.get_peer(1)
-	peer.set_write_mode(WebSocketPeer.WRITE_MODE_TEXT)
-	peer.put_packet(JSON.print(message).to_utf8())
+	_link.send_text(message)
 	_gives_up_ms = OS.get_ticks_msec() + ATTEMPT_MS
 
 
 func _drop():
 	terms = null
 	_before = null
-	if _socket == null:
+	if _link == null:
 		return
-	var old = _socket
-	_socket = null
-	for name in ["connection_established", "connection_closed", "connection_error"]:
-		for connection in old.get_signal_connection_list(name):
-			old.disconnect(name, connection.target, connection.method)
-	old.disconnect_from_host()
+	var old = _link
+	_link = null
+	old.close()
 
 
 func _lost():
@@ -253,9 +221,7 @@ func _flush():
 	_waiting = null
 	_outstanding.append(_waiting_sequence)
 	sent += 1
-	var peer = _socket.get_peer(1)
-	peer.set_write_mode(WebSocketPeer.WRITE_MODE_BINARY)
-	if peer.put_packet(frame) != OK:
+	if not _link.send_bytes(frame):
 		_lost()
 
 

@@ -6,6 +6,7 @@
 extends Node
 
 const Frame = preload("frame.gd")
+const Link = preload("link.gd")
 const Samples = preload("samples.gd")
 
 # An answer with a map; see `map_of`, `image_of`.
@@ -20,9 +21,6 @@ signal refused(problem)
 const ATTEMPT_MS = 5000
 const RETRY_LEAST_MS = 100
 const RETRY_MOST_MS = 250
-# A frame has up to 200 768 bytes; Godot's buffers have 64 KiB unless they are asked for before connecting.
-const BUFFER_BYTES = 1 << 21
-const BUFFER_PACKETS = 256
 const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_limited"]
 
 # Address of the server.
@@ -46,9 +44,8 @@ var time_us = 0
 var sent = 0
 var replaced = 0
 
-var _socket = null
+var _link = null
 var _open = false
-var _has_begun = false
 var _is_refused = false
 var _next_try_ms = 0
 var _gives_up_ms = 0
@@ -100,7 +97,7 @@ func renew(next):
 	_asked = next.duplicate(true)
 	_terms_from = _sequence + 1
 	terms = null
-	if _socket != null and _has_begun:
+	if _link != null and _link.is_open():
 		_greet()
 	elif _is_refused:
 		_is_refused = false
@@ -143,46 +140,37 @@ func poll():
 	if not _open:
 		return
 	var now = Time.get_ticks_msec()
-	if _socket == null:
+	if _link == null:
 		if now >= _next_try_ms and not _is_refused:
 			_connect()
 		return
-	_socket.poll()
-	var state = _socket.get_ready_state()
-	if state == WebSocketPeer.STATE_OPEN and not _has_begun:
-		_has_begun = true
-		_socket.set_no_delay(true)
+	if _link.poll():
 		_greet()
 	_receive()
-	if _socket == null:
+	if _link == null:
 		return
-	if state == WebSocketPeer.STATE_CLOSED or (terms == null and now > _gives_up_ms):
+	if _link.has_ended or (terms == null and now > _gives_up_ms):
 		_lost()
 		return
 	_flush()
 
 
 func _receive():
-	while _socket != null and _socket.get_available_packet_count() > 0:
-		var packet = _socket.get_packet()
-		if _socket.was_string_packet():
-			_text(JSON.parse_string(packet.get_string_from_utf8()))
+	while _link != null:
+		var message = _link.next()
+		if message == null:
+			return
+		if message is Dictionary:
+			_text(message)
 		else:
-			_binary(packet)
+			_binary(message)
 
 
 func _connect():
 	_drop()
-	_socket = WebSocketPeer.new()
-	_socket.inbound_buffer_size = BUFFER_BYTES
-	_socket.outbound_buffer_size = BUFFER_BYTES
-	_socket.max_queued_packets = BUFFER_PACKETS
-	_has_begun = false
+	_link = Link.new()
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.uri_encode()
-	if _socket.connect_to_url(address) != OK:
+	if not _link.open(url, token):
 		_lost()
 
 
@@ -190,30 +178,18 @@ func _greet():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
 	message["version"] = 2
-	_socket.send_text(JSON.stringify(_whole(message)))
+	_link.send_text(message)
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
-
-
-# Whole numbers as integers: Godot writes 10.0 for a float, and the server wants 10 where a count is due.
-static func _whole(value):
-	if value is Dictionary:
-		var members = {}
-		for key in value:
-			members[key] = _whole(value[key])
-		return members
-	if value is Array:
-		return value.map(_whole)
-	return int(value) if value is float and value == floor(value) else value
 
 
 func _drop():
 	terms = null
 	_before = null
-	if _socket == null:
+	if _link == null:
 		return
-	_socket.close()
-	_socket.poll()
-	_socket = null
+	var old = _link
+	_link = null
+	old.close()
 
 
 func _lost():
@@ -245,7 +221,7 @@ func _flush():
 	_waiting = null
 	_outstanding.append(_waiting_sequence)
 	sent += 1
-	if _socket.send(frame) != OK:
+	if not _link.send_bytes(frame):
 		_lost()
 
 
