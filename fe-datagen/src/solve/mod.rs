@@ -5,6 +5,7 @@ pub(crate) mod evaluate;
 mod free;
 mod loading;
 mod memory;
+mod mixed;
 mod newton;
 mod problem;
 mod rubbing;

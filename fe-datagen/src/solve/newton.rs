@@ -6,10 +6,11 @@
 
 use super::evaluate::{Evaluation, Trial, evaluate_body};
 use super::loading::Loading;
+use super::mixed;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
 use crate::contact::FrictionTrial;
-use crate::element::Memory;
+use crate::element::{Dilatation, Memory};
 use crate::linear::{
     CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
 };
@@ -93,9 +94,10 @@ pub(super) struct Fixed<'a> {
 }
 
 impl<'a> Fixed<'a> {
-    fn trial(&self, u: &'a [[f64; 3]], penalty: f64) -> Trial<'a> {
+    fn trial(&self, u: &'a [[f64; 3]], carried: &'a [Dilatation], penalty: f64) -> Trial<'a> {
         Trial {
             u,
+            carried,
             multipliers_mpa: self.multipliers,
             penalty,
             load_fraction: self.load_fraction,
@@ -123,6 +125,9 @@ pub(super) struct Newton<'a> {
     right: Vec<f64>,
     step: Vec<f64>,
     trial_u: Vec<[f64; 3]>,
+    /// Dilatations at the end of a full step, and of the one that is tried.
+    next: Vec<Dilatation>,
+    trial_carried: Vec<Dilatation>,
     pub current: Evaluation,
     trial: Evaluation,
 }
@@ -144,6 +149,8 @@ impl<'a> Newton<'a> {
             right: vec![0.0; n],
             step: vec![0.0; n],
             trial_u: Vec::new(),
+            next: Vec::new(),
+            trial_carried: Vec::new(),
             current: Evaluation::default(),
             trial: Evaluation::default(),
         })
@@ -156,15 +163,16 @@ impl<'a> Newton<'a> {
         self.effort = Effort::default();
     }
 
-    /// Brings `u` to equilibrium with everything else `fixed`, to a residual of
-    /// `tolerance` times the reference force.
+    /// Brings `u`, and the dilatations that elements carry along, if any, to equilibrium with
+    /// everything else `fixed`, to a residual of `tolerance` times the reference force.
     pub(super) fn equilibrate(
         &mut self,
         tolerance: f64,
         fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
+        carried: &mut [Dilatation],
     ) -> Result<(), StepError> {
-        self.evaluate(fixed, u)?;
+        self.evaluate(fixed, u, carried)?;
         let floor = self.rounding_force_n;
         let mut previous = f64::INFINITY;
         for iteration in 0..=self.options.newton_max {
@@ -184,11 +192,15 @@ impl<'a> Newton<'a> {
             if last {
                 break;
             }
-            self.assemble(fixed, u)?;
-            let forcing = Self::forcing(norm, previous, tolerance * reference);
+            self.assemble(fixed, u, carried)?;
+            let mut forcing = Self::forcing(norm, previous, tolerance * reference);
+            if !carried.is_empty() {
+                let share = self.current.mixed_norm / norm;
+                forcing = mixed::forcing(forcing, share, tolerance * reference / norm);
+            }
             previous = norm;
-            self.solve_step(forcing);
-            match self.line_search(fixed, u) {
+            self.solve_step(forcing, !carried.is_empty());
+            match self.line_search(fixed, u, carried) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
                 other => other?,
@@ -224,17 +236,27 @@ impl<'a> Newton<'a> {
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
-    pub(super) fn evaluate(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
+    pub(super) fn evaluate(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+    ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = fixed.trial(u, self.penalty);
+        let trial = fixed.trial(u, carried, self.penalty);
         let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
         result
     }
 
-    fn assemble(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
+    fn assemble(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+    ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = fixed.trial(u, self.penalty);
+        let trial = fixed.trial(u, carried, self.penalty);
         let tangent = Some(&mut self.tangent);
         let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
@@ -248,9 +270,12 @@ impl<'a> Newton<'a> {
 
     /// Solves `tangent * step = right`; where the tangent is indefinite, a nearby one
     /// that is not, if there is one.
-    fn solve_step(&mut self, tolerance: f64) {
+    fn solve_step(&mut self, tolerance: f64, mixed: bool) {
+        let mut cg_max = self.options.cg_max;
         if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
             self.factorize();
+        } else if mixed {
+            cg_max = cg_max.min(mixed::OLD_FACTOR_CG_MAX);
         }
         let mut fresh = false;
         loop {
@@ -269,7 +294,7 @@ impl<'a> Newton<'a> {
                 &self.right,
                 &mut self.step,
                 tolerance,
-                self.options.cg_max,
+                cg_max,
                 &mut self.cg,
             );
             self.effort.solve_s += clock.elapsed().as_secs_f64();
@@ -284,6 +309,7 @@ impl<'a> Newton<'a> {
                 return;
             }
             self.factorize();
+            cg_max = self.options.cg_max;
             fresh = true;
         }
     }
@@ -320,8 +346,14 @@ impl<'a> Newton<'a> {
         self.effort.factor_s += clock.elapsed().as_secs_f64();
     }
 
-    /// Backtracks along `step` until potential or residual falls.
-    fn line_search(&mut self, fixed: Fixed<'_>, u: &mut [[f64; 3]]) -> Result<(), StepError> {
+    /// Backtracks along `step` until potential or residual falls; with carried dilatations,
+    /// which go the same way, until the potential or the residual of both fields does.
+    fn line_search(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &mut [[f64; 3]],
+        carried: &mut [Dilatation],
+    ) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
         // can point uphill.
         let mut slope: f64 = -crate::linear::dot(&self.right, &self.step);
@@ -330,6 +362,11 @@ impl<'a> Newton<'a> {
             self.step.iter_mut().for_each(|s| *s = -*s);
         }
         let (energy, norm) = (self.current.potential_mj, self.current.residual_norm);
+        let mixed_norm = self.current.mixed_norm;
+        self.next.clear();
+        if !carried.is_empty() {
+            mixed::next_dilatations(self.problem, u, &self.step, &mut self.next);
+        }
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
             self.trial_u.clear();
@@ -342,17 +379,27 @@ impl<'a> Newton<'a> {
                     }
                 }
             }
+            self.trial_carried.clear();
+            for (c, n) in carried.iter().zip(&self.next) {
+                self.trial_carried.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
+            }
             let clock = Instant::now();
-            let trial = fixed.trial(&self.trial_u, self.penalty);
+            let trial = fixed.trial(&self.trial_u, &self.trial_carried, self.penalty);
             let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
             self.effort.assemble_s += clock.elapsed().as_secs_f64();
             if found.is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
-                if falls || self.trial.residual_norm < 0.5 * norm {
+                let smaller = if carried.is_empty() {
+                    self.trial.residual_norm < 0.5 * norm
+                } else {
+                    self.trial.mixed_norm <= (1.0 - 1e-4 * length) * mixed_norm
+                };
+                if falls || smaller {
                     if length < 1.0 {
                         tracing::trace!(length, energy, "newton step shortened");
                     }
                     u.copy_from_slice(&self.trial_u);
+                    carried.copy_from_slice(&self.trial_carried);
                     std::mem::swap(&mut self.current, &mut self.trial);
                     return Ok(());
                 }

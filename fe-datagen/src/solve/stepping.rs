@@ -2,13 +2,14 @@
 
 use super::loading::Loading;
 use super::memory::{self, EnergySplit};
+use super::mixed;
 use super::newton::{Effort, Fixed, Newton};
 use super::problem::Problem;
 use super::rubbing;
 use super::work::Work;
 use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionNode, FrictionTrial};
-use crate::element::Memory;
+use crate::element::{Dilatation, Memory};
 
 /// Least share of its way that the friction bound goes in one update.
 const RELAX_MIN: f64 = 0.1;
@@ -34,6 +35,8 @@ pub struct Solver<'a> {
 pub(super) struct State {
     pub fraction: f64,
     pub u: Vec<[f64; 3]>,
+    /// Dilatation of each element that is carried along; empty if none is.
+    pub carried: Vec<Dilatation>,
     multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
     pub memory: Vec<f64>,
@@ -101,6 +104,7 @@ impl<'a> Solver<'a> {
         self.state = State {
             fraction: 0.0,
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
+            carried: mixed::at_rest(problem),
             multipliers: vec![0.0; contact_nodes],
             memory: vec![0.0; problem.memory.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
@@ -205,7 +209,7 @@ impl<'a> Solver<'a> {
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
     fn settle(&mut self) {
-        let State { fraction, u, multipliers, memory, friction } = &self.state;
+        let State { fraction, u, carried, multipliers, memory, friction } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,
             load_fraction: *fraction,
@@ -214,7 +218,7 @@ impl<'a> Solver<'a> {
             friction: (!friction.nodes.is_empty()).then_some(friction),
         };
         // It was in equilibrium: nothing in it is inverted.
-        if let Err(error) = self.newton.evaluate(fixed, u) {
+        if let Err(error) = self.newton.evaluate(fixed, u, carried) {
             tracing::warn!(%error, "the last equilibrium cannot be evaluated");
         }
     }
@@ -323,6 +327,11 @@ impl<'a> Solver<'a> {
                     v[i] += ratio * (v[i] - w[i]);
                 }
             }
+            for (c, old) in trial.carried.iter_mut().zip(&before.carried) {
+                for r in 0..c.len() {
+                    c[r] += ratio * (c[r] - old[r]);
+                }
+            }
             for (l, m) in trial.multipliers.iter_mut().zip(&before.multipliers) {
                 *l = (*l + ratio * (*l - m)).max(0.0);
             }
@@ -354,7 +363,7 @@ impl<'a> Solver<'a> {
         // The first equilibrium only serves to update the multipliers.
         let mut tolerance = 1e-3f64.max(options.residual_tolerance);
         for update in 0..=updates {
-            let (multipliers, u) = (&trial.multipliers, &mut trial.u);
+            let (multipliers, u, carried) = (&trial.multipliers, &mut trial.u, &mut trial.carried);
             let fixed = Fixed {
                 loading: &self.loading,
                 load_fraction: fraction,
@@ -362,11 +371,11 @@ impl<'a> Solver<'a> {
                 memory: Memory { history: &trial.memory, dt_s },
                 friction: rubs.then_some(&trial.friction),
             };
-            self.newton.equilibrate(tolerance, fixed, u)?;
+            self.newton.equilibrate(tolerance, fixed, u, carried)?;
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
             if e.gap_error_mm <= options.gap_tolerance_mm && !exact {
-                self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
+                self.newton.equilibrate(options.residual_tolerance, fixed, u, carried)?;
             }
             let closed = self.newton.current.gap_error_mm <= options.gap_tolerance_mm;
             let change = rubbing::change(&trial.friction, &self.newton.current);

@@ -77,6 +77,7 @@ fn error(kind: ElementKind, cells: usize) -> Result<(f64, usize), CaseError> {
     let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
         let trial = Trial {
             u,
+            carried: &[],
             multipliers_mpa: &multipliers,
             penalty: 3.0,
             load_fraction: 1.0,
