@@ -109,19 +109,11 @@ pub fn evaluate<P: Points>(
     });
     let bulk = bulk_mpa;
     let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
-    for (a, f) in force.iter_mut().enumerate() {
-        *f = std::array::from_fn(|i| {
-            bulk * (0..m).map(|r| theta[r] * volume_gradient[r * n + a][i]).sum::<f64>()
-        });
-    }
+    set_volumetric(force, bulk, &theta, &volume_gradient[..m * n]);
     let held = carried.as_ref().map_or(theta, |c| c.theta_minus_1);
     let gap: Dilatation = std::array::from_fn(|r| held[r] - theta[r]);
     if let Some(c) = carried {
-        for (a, f) in c.lag_n.iter_mut().enumerate() {
-            *f = std::array::from_fn(|i| {
-                bulk * (0..m).map(|r| gap[r] * volume_gradient[r * n + a][i]).sum::<f64>()
-            });
-        }
+        set_volumetric(c.lag_n, bulk, &gap, &volume_gradient[..m * n]);
     }
     let mut gap_squared_mm3 = 0.0;
     let mut stiffness = stiffness;
@@ -148,6 +140,17 @@ pub fn evaluate<P: Points>(
 }
 
 pub(super) const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// `force[a] = K sum_r theta_r g_r[a]`.
+#[inline(always)]
+fn set_volumetric(force: &mut [[f64; 3]], bulk: f64, theta: &Dilatation, g: &[[f64; 3]]) {
+    let n = force.len();
+    let m = g.len() / n;
+    for (a, f) in force.iter_mut().enumerate() {
+        *f =
+            std::array::from_fn(|i| bulk * (0..m).map(|r| theta[r] * g[r * n + a][i]).sum::<f64>());
+    }
+}
 
 /// `weight (A + pressure d cof / dF)`.
 #[inline(always)]

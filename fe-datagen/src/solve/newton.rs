@@ -4,6 +4,7 @@
 //! preconditions conjugate gradients on the current tangent, and is renewed
 //! when that takes too many iterations.
 
+use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};
 use super::loading::Loading;
 use super::mixed;
@@ -15,73 +16,6 @@ use crate::linear::{
     CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
 };
 use std::time::Instant;
-
-/// Work and wall time spent, summed over a solve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Effort {
-    /// Newton iterations.
-    pub newton_iterations: u32,
-    /// Numeric factorizations.
-    pub factorizations: u32,
-    /// Factorizations of an indefinite tangent among them.
-    pub indefinite_factorizations: u32,
-    /// Conjugate-gradient iterations.
-    pub cg_iterations: u32,
-    /// Multiplier updates.
-    pub augmentations: u32,
-    /// Halved load steps.
-    pub cuts: u32,
-    /// Equilibria found.
-    pub steps: u32,
-    /// Halved Newton steps.
-    pub backtracks: u32,
-    /// Elements and contact, s.
-    pub assemble_s: f64,
-    /// Numeric factorization, s.
-    pub factor_s: f64,
-    /// Conjugate gradients and direct solves, s.
-    pub solve_s: f64,
-}
-
-impl Effort {
-    /// The sum with another reading.
-    #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
-        Self {
-            newton_iterations: self.newton_iterations + other.newton_iterations,
-            factorizations: self.factorizations + other.factorizations,
-            indefinite_factorizations: self.indefinite_factorizations
-                + other.indefinite_factorizations,
-            cg_iterations: self.cg_iterations + other.cg_iterations,
-            augmentations: self.augmentations + other.augmentations,
-            cuts: self.cuts + other.cuts,
-            steps: self.steps + other.steps,
-            backtracks: self.backtracks + other.backtracks,
-            assemble_s: self.assemble_s + other.assemble_s,
-            factor_s: self.factor_s + other.factor_s,
-            solve_s: self.solve_s + other.solve_s,
-        }
-    }
-
-    /// The difference to an earlier reading.
-    #[must_use]
-    pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            newton_iterations: self.newton_iterations - earlier.newton_iterations,
-            factorizations: self.factorizations - earlier.factorizations,
-            indefinite_factorizations: self.indefinite_factorizations
-                - earlier.indefinite_factorizations,
-            cg_iterations: self.cg_iterations - earlier.cg_iterations,
-            augmentations: self.augmentations - earlier.augmentations,
-            cuts: self.cuts - earlier.cuts,
-            steps: self.steps - earlier.steps,
-            backtracks: self.backtracks - earlier.backtracks,
-            assemble_s: self.assemble_s - earlier.assemble_s,
-            factor_s: self.factor_s - earlier.factor_s,
-            solve_s: self.solve_s - earlier.solve_s,
-        }
-    }
-}
 
 /// What stays fixed while an equilibrium is sought.
 #[derive(Clone, Copy)]
@@ -346,6 +280,24 @@ impl<'a> Newton<'a> {
         self.effort.factor_s += clock.elapsed().as_secs_f64();
     }
 
+    /// Sets the trial to `length` of the step from `u` and what is carried.
+    fn go(&mut self, u: &[[f64; 3]], carried: &[Dilatation], length: f64) {
+        self.trial_u.clear();
+        self.trial_u.extend_from_slice(u);
+        for (node, v) in self.trial_u.iter_mut().enumerate() {
+            for i in 0..3 {
+                let e = self.problem.structure.equations.of_dof[3 * node + i];
+                if e != Equations::FIXED {
+                    v[i] += length * self.step[e as usize];
+                }
+            }
+        }
+        self.trial_carried.clear();
+        for (c, n) in carried.iter().zip(&self.next) {
+            self.trial_carried.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
+        }
+    }
+
     /// Backtracks along `step` until potential or residual falls; with carried dilatations,
     /// which go the same way, until the potential or the residual of both fields does.
     fn line_search(
@@ -369,20 +321,7 @@ impl<'a> Newton<'a> {
         }
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
-            self.trial_u.clear();
-            self.trial_u.extend_from_slice(u);
-            for (node, v) in self.trial_u.iter_mut().enumerate() {
-                for i in 0..3 {
-                    let e = self.problem.structure.equations.of_dof[3 * node + i];
-                    if e != Equations::FIXED {
-                        v[i] += length * self.step[e as usize];
-                    }
-                }
-            }
-            self.trial_carried.clear();
-            for (c, n) in carried.iter().zip(&self.next) {
-                self.trial_carried.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
-            }
+            self.go(u, carried, length);
             let clock = Instant::now();
             let trial = fixed.trial(&self.trial_u, &self.trial_carried, self.penalty);
             let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);

@@ -1,9 +1,10 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
+use super::effort::Effort;
 use super::loading::Loading;
 use super::memory::{self, EnergySplit};
 use super::mixed;
-use super::newton::{Effort, Fixed, Newton};
+use super::newton::{Fixed, Newton};
 use super::problem::Problem;
 use super::rubbing;
 use super::work::Work;
@@ -254,17 +255,22 @@ impl<'a> Solver<'a> {
     /// One equilibrium at `next`, or the state as it was.
     fn try_step(&mut self, next: f64) -> Result<(), StepError> {
         let mut trial = self.predict(next);
-        match self.augmented(next, &mut trial) {
-            Ok(()) => {}
-            // The extrapolation may be what failed: once more from the last equilibrium.
-            Err(cause) if self.before.is_some() => {
-                tracing::debug!(next, %cause, "extrapolated start failed");
-                trial = self.state.clone();
-                self.prescribe(next, &mut trial.u);
-                self.augmented(next, &mut trial)?;
-            }
-            Err(e) => return Err(e),
+        let mut found = self.augmented(next, &mut trial);
+        // The extrapolation may be what failed: once more from the last equilibrium.
+        if let (Err(cause), Some(_)) = (&found, &self.before) {
+            tracing::debug!(next, %cause, "extrapolated start failed");
+            trial = self.unmoved(next);
+            found = self.augmented(next, &mut trial);
         }
+        // Or the dilatations: downhill on the potential alone, which is slower.
+        if let (Err(cause), true) = (&found, !self.state.carried.is_empty()) {
+            tracing::debug!(next, %cause, "carried dilatations failed");
+            trial = self.unmoved(next);
+            trial.carried.clear();
+            found = self.augmented(next, &mut trial);
+            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.carried);
+        }
+        found?;
         self.set_pace(next, &trial.u);
         let problem = self.newton.problem;
         let dt_s = self.seconds(next);
@@ -336,6 +342,13 @@ impl<'a> Solver<'a> {
                 *l = (*l + ratio * (*l - m)).max(0.0);
             }
         }
+        self.prescribe(next, &mut trial.u);
+        trial
+    }
+
+    /// The last equilibrium as it meets what is prescribed at `next`.
+    fn unmoved(&self, next: f64) -> State {
+        let mut trial = self.state.clone();
         self.prescribe(next, &mut trial.u);
         trial
     }
