@@ -10,6 +10,7 @@
 //! tangent are plain derivatives: symmetric, and consistent by construction.
 //! With a law of small strain `J - 1` is `tr H` and its second derivative vanishes.
 
+use super::carried::{Carried, Dilatation};
 use super::geometry::ElementGeometry;
 use super::solid::Points;
 use crate::material::kinematics::{cofactor_derivative, trace};
@@ -33,7 +34,10 @@ pub struct ElementState {
     /// Smallest volume ratio `J` at a quadrature point.
     pub j_min: f64,
     /// Coefficients of `theta - 1` in the dilatation basis.
-    pub theta_minus_1: [f64; 4],
+    pub theta_minus_1: Dilatation,
+    /// What a carried dilatation differs from it by, squared and integrated, mm3; 0
+    /// without one.
+    pub gap_squared_mm3: f64,
 }
 
 /// Displacement gradient at a point from nodal displacements.
@@ -61,7 +65,8 @@ const NODES_MAX: usize = 27;
 /// `bulk_mpa`; `points` gives the isochoric law of each quadrature point.
 ///
 /// Overwrites `force` (N, one per node) and, if given, the tangent `stiffness`
-/// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only).
+/// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only). With a dilatation
+/// carried along the tangent takes its pressure, see [`Carried`].
 ///
 /// # Errors
 /// [`Inverted`] where `J <= 0`; outputs are then meaningless.
@@ -71,6 +76,7 @@ pub fn evaluate<P: Points>(
     law: &P,
     bulk_mpa: f64,
     u: &[[f64; 3]],
+    carried: Option<Carried<'_>>,
     force: &mut [[f64; 3]],
     stiffness: Option<&mut [f64]>,
 ) -> Result<ElementState, Inverted> {
@@ -98,16 +104,18 @@ pub fn evaluate<P: Points>(
         }
         kinematics[q] = Some(k);
     }
-    let theta: [f64; 4] = std::array::from_fn(|r| {
+    let theta: Dilatation = std::array::from_fn(|r| {
         if r < m { (0..m).map(|c| geometry.inverse_gram[r * m + c] * b[c]).sum() } else { 0.0 }
     });
     let bulk = bulk_mpa;
     let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
-    for (a, f) in force.iter_mut().enumerate() {
-        *f = std::array::from_fn(|i| {
-            bulk * (0..m).map(|r| theta[r] * volume_gradient[r * n + a][i]).sum::<f64>()
-        });
+    set_volumetric(force, bulk, &theta, &volume_gradient[..m * n]);
+    let held = carried.as_ref().map_or(theta, |c| c.theta_minus_1);
+    let gap: Dilatation = std::array::from_fn(|r| held[r] - theta[r]);
+    if let Some(c) = carried {
+        set_volumetric(c.lag_n, bulk, &gap, &volume_gradient[..m * n]);
     }
+    let mut gap_squared_mm3 = 0.0;
     let mut stiffness = stiffness;
     if let Some(s) = stiffness.as_deref_mut() {
         volumetric_stiffness(s, bulk, geometry.inverse_gram, &volume_gradient[..m * n], n, m);
@@ -116,20 +124,33 @@ pub fn evaluate<P: Points>(
         let gradients = &geometry.gradients[q * n..(q + 1) * n];
         let weight = geometry.weights[q];
         let law = law.at(q);
+        let at_point = |c: &Dilatation| (0..m).map(|r| c[r] * geometry.basis[q][r]).sum::<f64>();
+        gap_squared_mm3 += weight * at_point(&gap).powi(2);
         energy += weight * law.energy(k);
         add_times(force, weight, &law.first_piola(k), gradients);
         if let Some(s) = stiffness.as_deref_mut() {
-            let pressure = bulk * (0..m).map(|r| theta[r] * geometry.basis[q][r]).sum::<f64>();
+            let pressure = bulk * at_point(&held);
             add_point_stiffness(s, &point_tangent(&law, k, pressure, weight), gradients);
         }
     }
     if let Some(s) = stiffness {
         by_nodes(s, n);
     }
-    Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta })
+    Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta, gap_squared_mm3 })
 }
 
-const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(super) const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// `force[a] = K sum_r theta_r g_r[a]`.
+#[inline(always)]
+fn set_volumetric(force: &mut [[f64; 3]], bulk: f64, theta: &Dilatation, g: &[[f64; 3]]) {
+    let n = force.len();
+    let m = g.len() / n;
+    for (a, f) in force.iter_mut().enumerate() {
+        *f =
+            std::array::from_fn(|i| bulk * (0..m).map(|r| theta[r] * g[r * n + a][i]).sum::<f64>());
+    }
+}
 
 /// `weight (A + pressure d cof / dF)`.
 #[inline(always)]

@@ -1,5 +1,6 @@
 //! Elements: reference shapes, undeformed geometry and the mean-dilatation kernel.
 
+pub mod carried;
 pub mod extrapolate;
 pub mod geometry;
 pub mod kernel;
@@ -7,6 +8,7 @@ pub mod reference;
 pub(crate) mod shape;
 pub mod solid;
 
+pub use carried::{Carried, Dilatation};
 pub use geometry::{BlockGeometry, ShapeError};
 pub use kernel::{ElementState, Inverted};
 pub use reference::ElementKind;

@@ -4,6 +4,7 @@
 //! Each combination is its own type, so an elastic body's elements run through code
 //! that has no memory in it.
 
+use super::carried::{Carried, Dilatation, next_dilatation};
 use super::geometry::ElementGeometry;
 use super::kernel::{ElementState, Inverted, evaluate};
 use crate::material::{Isochoric, Kinematics, Mat3, Prony, Relaxing, prony};
@@ -33,7 +34,31 @@ pub trait Solid: Send + Sync {
         memory: Memory<'_>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
+    ) -> Result<ElementState, Inverted> {
+        self.evaluate_with(geometry, u, memory, None, force, stiffness)
+    }
+
+    /// The same with a dilatation carried along.
+    ///
+    /// # Errors
+    /// [`Inverted`] where `J <= 0`.
+    fn evaluate_with(
+        &self,
+        geometry: ElementGeometry<'_>,
+        u: &[[f64; 3]],
+        memory: Memory<'_>,
+        carried: Option<Carried<'_>>,
+        force: &mut [[f64; 3]],
+        stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted>;
+
+    /// Dilatation after a step, see [`next_dilatation`].
+    fn next_dilatation(
+        &self,
+        geometry: ElementGeometry<'_>,
+        u: &[[f64; 3]],
+        step: &[[f64; 3]],
+    ) -> Dilatation;
 
     /// Energy density that can be got back, MPa, at a point with this history.
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64;
@@ -120,18 +145,28 @@ fn with_volumetric<L: Isochoric>(p: &Mat3, pressure: f64, k: &Kinematics) -> Mat
 }
 
 impl<L: Isochoric> Solid for Elastic<L> {
-    fn evaluate(
+    fn evaluate_with(
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
         _memory: Memory<'_>,
+        carried: Option<Carried<'_>>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
         vectorized(
             #[inline(always)]
-            || evaluate(geometry, &Same(self.law), self.bulk_mpa, u, force, stiffness),
+            || evaluate(geometry, &Same(self.law), self.bulk_mpa, u, carried, force, stiffness),
         )
+    }
+
+    fn next_dilatation(
+        &self,
+        geometry: ElementGeometry<'_>,
+        u: &[[f64; 3]],
+        step: &[[f64; 3]],
+    ) -> Dilatation {
+        next_dilatation(geometry, L::FINITE, u, step)
     }
 
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, _history: &[f64]) -> f64 {
@@ -194,19 +229,29 @@ impl<L: Isochoric> Viscoelastic<L> {
 }
 
 impl<L: Isochoric> Solid for Viscoelastic<L> {
-    fn evaluate(
+    fn evaluate_with(
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
         memory: Memory<'_>,
+        carried: Option<Carried<'_>>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
         let points = Remembering { solid: self, memory, len: self.history_len() };
         vectorized(
             #[inline(always)]
-            || evaluate(geometry, &points, self.bulk_mpa, u, force, stiffness),
+            || evaluate(geometry, &points, self.bulk_mpa, u, carried, force, stiffness),
         )
+    }
+
+    fn next_dilatation(
+        &self,
+        geometry: ElementGeometry<'_>,
+        u: &[[f64; 3]],
+        step: &[[f64; 3]],
+    ) -> Dilatation {
+        next_dilatation(geometry, L::FINITE, u, step)
     }
 
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64 {

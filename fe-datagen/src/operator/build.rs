@@ -98,6 +98,7 @@ fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, OperatorError> 
     let multipliers = vec![0.0; problem.contact.as_ref().map_or(0, |c| c.nodes.len())];
     let trial = Trial {
         u: &rest,
+        carried: &[],
         multipliers_mpa: &multipliers,
         penalty: 1.0,
         load_fraction: 0.0,

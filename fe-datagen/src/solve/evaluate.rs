@@ -2,9 +2,10 @@
 
 use super::StepError;
 use super::loading::Loading;
+use super::mixed::Lag;
 use super::problem::Problem;
 use crate::contact::{FrictionTrial, PointContact, PointFriction, Support};
-use crate::element::Memory;
+use crate::element::{Carried, Dilatation, Memory};
 use crate::linear::SymmetricMatrix;
 
 /// What an evaluation at one displacement found.
@@ -20,6 +21,8 @@ pub(crate) struct Evaluation {
     pub residual_n: Vec<f64>,
     /// Its norm over the unknowns.
     pub residual_norm: f64,
+    /// How far displacement and carried dilatations are from equilibrium, N; 0 without.
+    pub mixed_norm: f64,
     /// Norm of contact, dead and support forces: what the residual is small against.
     pub reference_norm: f64,
     /// Nominal traction of each contact point, MPa.
@@ -45,6 +48,8 @@ pub(crate) struct Evaluation {
 /// State that an evaluation reads.
 pub(crate) struct Trial<'a> {
     pub u: &'a [[f64; 3]],
+    /// Dilatation of each element, block by block; empty if none is carried along.
+    pub carried: &'a [Dilatation],
     pub multipliers_mpa: &'a [f64],
     pub penalty: f64,
     pub load_fraction: f64,
@@ -69,7 +74,8 @@ pub(crate) fn evaluate_body(
     out.residual_n.resize(3 * problem.mesh.nodes.len(), 0.0);
     (out.stored_mj, out.contact_mj) = (0.0, 0.0);
     out.j_min = f64::INFINITY;
-    elements(problem, trial, tangent.as_deref_mut(), out)?;
+    let mut lag = Lag::new(problem, trial.carried);
+    elements(problem, trial, tangent.as_deref_mut(), out, &mut lag)?;
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent, out);
     for (node, f) in loading.dead_n.iter().enumerate() {
@@ -80,6 +86,7 @@ pub(crate) fn evaluate_body(
             reference += force * force;
         }
     }
+    out.mixed_norm = lag.norm_n(problem, &out.residual_n);
     let mut norm = 0.0;
     for (r, &e) in out.residual_n.iter().zip(&problem.structure.equations.of_dof) {
         if e == crate::linear::Equations::FIXED {
@@ -102,7 +109,10 @@ fn elements(
     trial: &Trial<'_>,
     mut tangent: Option<&mut SymmetricMatrix>,
     out: &mut Evaluation,
+    lag: &mut Lag,
 ) -> Result<(), StepError> {
+    let mut carried = trial.carried.iter();
+    let mut lag_n = [[0.0; 3]; 27];
     let mut local = [[0.0; 3]; 27];
     let mut force = [[0.0; 3]; 27];
     let mut dense = Vec::new();
@@ -122,8 +132,13 @@ fn elements(
             let memory = problem.memory.as_ref().map_or(Memory::default(), |layout| {
                 layout.of(trial.memory.history, trial.memory.dt_s, b, e)
             });
+            let own = carried
+                .next()
+                .map(|&theta_minus_1| Carried { theta_minus_1, lag_n: &mut lag_n[..n] });
+            let carries = own.is_some();
+            let g = geometry.element(e);
             let state = material
-                .evaluate(geometry.element(e), &local[..n], memory, &mut force[..n], stiffness)
+                .evaluate_with(g, &local[..n], memory, own, &mut force[..n], stiffness)
                 .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
             out.stored_mj += state.energy_mj;
             if state.j_min < out.j_min {
@@ -133,6 +148,10 @@ fn elements(
                 for i in 0..3 {
                     out.residual_n[3 * node as usize + i] += f[i];
                 }
+            }
+            if carries {
+                let mu_mpa = material.shear_modulus_mpa();
+                lag.add(nodes, &lag_n, mu_mpa, g.weights, state.gap_squared_mm3);
             }
             if let Some(t) = tangent.as_deref_mut() {
                 problem.structure.add_element(t, b, e, &dense);

@@ -1,21 +1,23 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
 mod answers;
+mod effort;
 pub(crate) mod evaluate;
 mod free;
 mod loading;
 mod memory;
+mod mixed;
 mod newton;
 mod problem;
 mod rubbing;
 mod stepping;
 mod work;
 
+pub use effort::Effort;
 pub use evaluate::Balance;
 pub use free::{FreeMode, FreePart};
 pub use loading::{Loading, MovingIndenter};
 pub use memory::{EnergySplit, MemoryLayout};
-pub use newton::Effort;
 pub use problem::{Materials, Problem, ProblemError};
 pub use stepping::{Mark, Solver, StepReport};
 

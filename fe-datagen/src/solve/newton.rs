@@ -4,83 +4,18 @@
 //! preconditions conjugate gradients on the current tangent, and is renewed
 //! when that takes too many iterations.
 
+use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};
 use super::loading::Loading;
+use super::mixed;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
 use crate::contact::{ContactRule, FrictionTrial, Support};
-use crate::element::Memory;
+use crate::element::{Dilatation, Memory};
 use crate::linear::{
     CgWorkspace, Equations, Factor, Factorizer, SymmetricMatrix, conjugate_gradient,
 };
 use std::time::Instant;
-
-/// Work and wall time spent, summed over a solve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Effort {
-    /// Newton iterations.
-    pub newton_iterations: u32,
-    /// Numeric factorizations.
-    pub factorizations: u32,
-    /// Factorizations of an indefinite tangent among them.
-    pub indefinite_factorizations: u32,
-    /// Conjugate-gradient iterations.
-    pub cg_iterations: u32,
-    /// Multiplier updates.
-    pub augmentations: u32,
-    /// Halved load steps.
-    pub cuts: u32,
-    /// Equilibria found.
-    pub steps: u32,
-    /// Halved Newton steps.
-    pub backtracks: u32,
-    /// Elements and contact, s.
-    pub assemble_s: f64,
-    /// Numeric factorization, s.
-    pub factor_s: f64,
-    /// Conjugate gradients and direct solves, s.
-    pub solve_s: f64,
-}
-
-impl Effort {
-    /// The sum with another reading.
-    #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
-        Self {
-            newton_iterations: self.newton_iterations + other.newton_iterations,
-            factorizations: self.factorizations + other.factorizations,
-            indefinite_factorizations: self.indefinite_factorizations
-                + other.indefinite_factorizations,
-            cg_iterations: self.cg_iterations + other.cg_iterations,
-            augmentations: self.augmentations + other.augmentations,
-            cuts: self.cuts + other.cuts,
-            steps: self.steps + other.steps,
-            backtracks: self.backtracks + other.backtracks,
-            assemble_s: self.assemble_s + other.assemble_s,
-            factor_s: self.factor_s + other.factor_s,
-            solve_s: self.solve_s + other.solve_s,
-        }
-    }
-
-    /// The difference to an earlier reading.
-    #[must_use]
-    pub fn since(&self, earlier: &Self) -> Self {
-        Self {
-            newton_iterations: self.newton_iterations - earlier.newton_iterations,
-            factorizations: self.factorizations - earlier.factorizations,
-            indefinite_factorizations: self.indefinite_factorizations
-                - earlier.indefinite_factorizations,
-            cg_iterations: self.cg_iterations - earlier.cg_iterations,
-            augmentations: self.augmentations - earlier.augmentations,
-            cuts: self.cuts - earlier.cuts,
-            steps: self.steps - earlier.steps,
-            backtracks: self.backtracks - earlier.backtracks,
-            assemble_s: self.assemble_s - earlier.assemble_s,
-            factor_s: self.factor_s - earlier.factor_s,
-            solve_s: self.solve_s - earlier.solve_s,
-        }
-    }
-}
 
 /// What stays fixed while an equilibrium is sought.
 #[derive(Clone, Copy)]
@@ -93,9 +28,10 @@ pub(super) struct Fixed<'a> {
 }
 
 impl<'a> Fixed<'a> {
-    fn trial(&self, u: &'a [[f64; 3]], penalty: f64) -> Trial<'a> {
+    fn trial(&self, u: &'a [[f64; 3]], carried: &'a [Dilatation], penalty: f64) -> Trial<'a> {
         Trial {
             u,
+            carried,
             multipliers_mpa: self.multipliers,
             penalty,
             load_fraction: self.load_fraction,
@@ -123,6 +59,9 @@ pub(super) struct Newton<'a> {
     right: Vec<f64>,
     step: Vec<f64>,
     trial_u: Vec<[f64; 3]>,
+    /// Dilatations at the end of a full step, and of the one that is tried.
+    next: Vec<Dilatation>,
+    trial_carried: Vec<Dilatation>,
     pub current: Evaluation,
     trial: Evaluation,
 }
@@ -144,6 +83,8 @@ impl<'a> Newton<'a> {
             right: vec![0.0; n],
             step: vec![0.0; n],
             trial_u: Vec::new(),
+            next: Vec::new(),
+            trial_carried: Vec::new(),
             current: Evaluation::default(),
             trial: Evaluation::default(),
         })
@@ -159,15 +100,16 @@ impl<'a> Newton<'a> {
         self.effort = Effort::default();
     }
 
-    /// Brings `u` to equilibrium with everything else `fixed`, to a residual of
-    /// `tolerance` times the reference force.
+    /// Brings `u`, and the dilatations that elements carry along, if any, to equilibrium with
+    /// everything else `fixed`, to a residual of `tolerance` times the reference force.
     pub(super) fn equilibrate(
         &mut self,
         tolerance: f64,
         fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
+        carried: &mut [Dilatation],
     ) -> Result<(), StepError> {
-        self.evaluate(fixed, u)?;
+        self.evaluate(fixed, u, carried)?;
         let floor = self.rounding_force_n;
         let mut previous = f64::INFINITY;
         for iteration in 0..=self.options.newton_max {
@@ -187,11 +129,15 @@ impl<'a> Newton<'a> {
             if last {
                 break;
             }
-            self.assemble(fixed, u)?;
-            let forcing = Self::forcing(norm, previous, tolerance * reference);
+            self.assemble(fixed, u, carried)?;
+            let mut forcing = Self::forcing(norm, previous, tolerance * reference);
+            if !carried.is_empty() {
+                let share = self.current.mixed_norm / norm;
+                forcing = mixed::forcing(forcing, share, tolerance * reference / norm);
+            }
             previous = norm;
-            self.solve_step(fixed.loading, forcing);
-            match self.line_search(fixed, u) {
+            self.solve_step(fixed.loading, forcing, !carried.is_empty());
+            match self.line_search(fixed, u, carried) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
                 other => other?,
@@ -227,17 +173,27 @@ impl<'a> Newton<'a> {
     }
 
     /// Evaluates at `u` into `current`, without a tangent.
-    pub(super) fn evaluate(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
+    pub(super) fn evaluate(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+    ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = fixed.trial(u, self.penalty);
+        let trial = fixed.trial(u, carried, self.penalty);
         let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
         result
     }
 
-    fn assemble(&mut self, fixed: Fixed<'_>, u: &[[f64; 3]]) -> Result<(), StepError> {
+    fn assemble(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+    ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = fixed.trial(u, self.penalty);
+        let trial = fixed.trial(u, carried, self.penalty);
         let tangent = Some(&mut self.tangent);
         let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
@@ -251,9 +207,12 @@ impl<'a> Newton<'a> {
 
     /// Solves `tangent * step = right`; where the tangent is indefinite, a nearby one
     /// that is not, if there is one.
-    fn solve_step(&mut self, loading: &Loading, tolerance: f64) {
+    fn solve_step(&mut self, loading: &Loading, tolerance: f64, mixed: bool) {
+        let mut cg_max = self.options.cg_max;
         if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
             self.factorize(loading);
+        } else if mixed {
+            cg_max = cg_max.min(mixed::OLD_FACTOR_CG_MAX);
         }
         let mut fresh = false;
         loop {
@@ -272,7 +231,7 @@ impl<'a> Newton<'a> {
                 &self.right,
                 &mut self.step,
                 tolerance,
-                self.options.cg_max,
+                cg_max,
                 &mut self.cg,
             );
             self.effort.solve_s += clock.elapsed().as_secs_f64();
@@ -287,6 +246,7 @@ impl<'a> Newton<'a> {
                 return;
             }
             self.factorize(loading);
+            cg_max = self.options.cg_max;
             fresh = true;
         }
     }
@@ -326,8 +286,32 @@ impl<'a> Newton<'a> {
         self.effort.factor_s += clock.elapsed().as_secs_f64();
     }
 
-    /// Backtracks along `step` until potential or residual falls.
-    fn line_search(&mut self, fixed: Fixed<'_>, u: &mut [[f64; 3]]) -> Result<(), StepError> {
+    /// Sets the trial to `length` of the step from `u` and what is carried.
+    fn go(&mut self, u: &[[f64; 3]], carried: &[Dilatation], length: f64) {
+        self.trial_u.clear();
+        self.trial_u.extend_from_slice(u);
+        for (node, v) in self.trial_u.iter_mut().enumerate() {
+            for i in 0..3 {
+                let e = self.problem.structure.equations.of_dof[3 * node + i];
+                if e != Equations::FIXED {
+                    v[i] += length * self.step[e as usize];
+                }
+            }
+        }
+        self.trial_carried.clear();
+        for (c, n) in carried.iter().zip(&self.next) {
+            self.trial_carried.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
+        }
+    }
+
+    /// Backtracks along `step` until potential or residual falls; with carried dilatations,
+    /// which go the same way, until the potential or the residual of both fields does.
+    fn line_search(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &mut [[f64; 3]],
+        carried: &mut [Dilatation],
+    ) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
         // can point uphill.
         let mut slope: f64 = -crate::linear::dot(&self.right, &self.step);
@@ -336,29 +320,31 @@ impl<'a> Newton<'a> {
             self.step.iter_mut().for_each(|s| *s = -*s);
         }
         let (energy, norm) = (self.current.potential_mj, self.current.residual_norm);
+        let mixed_norm = self.current.mixed_norm;
+        self.next.clear();
+        if !carried.is_empty() {
+            mixed::next_dilatations(self.problem, u, &self.step, &mut self.next);
+        }
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
-            self.trial_u.clear();
-            self.trial_u.extend_from_slice(u);
-            for (node, v) in self.trial_u.iter_mut().enumerate() {
-                for i in 0..3 {
-                    let e = self.problem.structure.equations.of_dof[3 * node + i];
-                    if e != Equations::FIXED {
-                        v[i] += length * self.step[e as usize];
-                    }
-                }
-            }
+            self.go(u, carried, length);
             let clock = Instant::now();
-            let trial = fixed.trial(&self.trial_u, self.penalty);
+            let trial = fixed.trial(&self.trial_u, &self.trial_carried, self.penalty);
             let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
             self.effort.assemble_s += clock.elapsed().as_secs_f64();
             if found.is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
-                if falls || self.trial.residual_norm < 0.5 * norm {
+                let smaller = if carried.is_empty() {
+                    self.trial.residual_norm < 0.5 * norm
+                } else {
+                    self.trial.mixed_norm <= (1.0 - 1e-4 * length) * mixed_norm
+                };
+                if falls || smaller {
                     if length < 1.0 {
                         tracing::trace!(length, energy, "newton step shortened");
                     }
                     u.copy_from_slice(&self.trial_u);
+                    carried.copy_from_slice(&self.trial_carried);
                     std::mem::swap(&mut self.current, &mut self.trial);
                     return Ok(());
                 }

@@ -1,14 +1,16 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
+use super::effort::Effort;
 use super::loading::Loading;
 use super::memory::{self, EnergySplit};
-use super::newton::{Effort, Fixed, Newton};
+use super::mixed;
+use super::newton::{Fixed, Newton};
 use super::problem::Problem;
 use super::rubbing;
 use super::work::Work;
 use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionPoint, FrictionTrial};
-use crate::element::Memory;
+use crate::element::{Dilatation, Memory};
 
 /// Least share of its way that the friction bound goes in one update.
 const RELAX_MIN: f64 = 0.1;
@@ -34,6 +36,8 @@ pub struct Solver<'a> {
 pub(super) struct State {
     pub fraction: f64,
     pub u: Vec<[f64; 3]>,
+    /// Dilatation of each element that is carried along; empty if none is.
+    pub carried: Vec<Dilatation>,
     multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
     pub memory: Vec<f64>,
@@ -102,6 +106,7 @@ impl<'a> Solver<'a> {
         self.state = State {
             fraction: 0.0,
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
+            carried: mixed::at_rest(problem),
             multipliers: vec![0.0; contact_points],
             memory: vec![0.0; problem.memory.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
@@ -206,7 +211,7 @@ impl<'a> Solver<'a> {
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
     fn settle(&mut self) {
-        let State { fraction, u, multipliers, memory, friction } = &self.state;
+        let State { fraction, u, carried, multipliers, memory, friction } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,
             load_fraction: *fraction,
@@ -215,7 +220,7 @@ impl<'a> Solver<'a> {
             friction: (!friction.points.is_empty()).then_some(friction),
         };
         // It was in equilibrium: nothing in it is inverted.
-        if let Err(error) = self.newton.evaluate(fixed, u) {
+        if let Err(error) = self.newton.evaluate(fixed, u, carried) {
             tracing::warn!(%error, "the last equilibrium cannot be evaluated");
         }
     }
@@ -251,17 +256,22 @@ impl<'a> Solver<'a> {
     /// One equilibrium at `next`, or the state as it was.
     fn try_step(&mut self, next: f64) -> Result<(), StepError> {
         let mut trial = self.predict(next);
-        match self.augmented(next, &mut trial) {
-            Ok(()) => {}
-            // The extrapolation may be what failed: once more from the last equilibrium.
-            Err(cause) if self.before.is_some() => {
-                tracing::debug!(next, %cause, "extrapolated start failed");
-                trial = self.state.clone();
-                self.prescribe(next, &mut trial.u);
-                self.augmented(next, &mut trial)?;
-            }
-            Err(e) => return Err(e),
+        let mut found = self.augmented(next, &mut trial);
+        // The extrapolation may be what failed: once more from the last equilibrium.
+        if let (Err(cause), Some(_)) = (&found, &self.before) {
+            tracing::debug!(next, %cause, "extrapolated start failed");
+            trial = self.unmoved(next);
+            found = self.augmented(next, &mut trial);
         }
+        // Or the dilatations: downhill on the potential alone, which is slower.
+        if let (Err(cause), true) = (&found, !self.state.carried.is_empty()) {
+            tracing::debug!(next, %cause, "carried dilatations failed");
+            trial = self.unmoved(next);
+            trial.carried.clear();
+            found = self.augmented(next, &mut trial);
+            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.carried);
+        }
+        found?;
         self.set_pace(next, &trial.u);
         let problem = self.newton.problem;
         let dt_s = self.seconds(next);
@@ -324,10 +334,22 @@ impl<'a> Solver<'a> {
                     v[i] += ratio * (v[i] - w[i]);
                 }
             }
+            for (c, old) in trial.carried.iter_mut().zip(&before.carried) {
+                for r in 0..c.len() {
+                    c[r] += ratio * (c[r] - old[r]);
+                }
+            }
             for (l, m) in trial.multipliers.iter_mut().zip(&before.multipliers) {
                 *l = (*l + ratio * (*l - m)).max(0.0);
             }
         }
+        self.prescribe(next, &mut trial.u);
+        trial
+    }
+
+    /// The last equilibrium as it meets what is prescribed at `next`.
+    fn unmoved(&self, next: f64) -> State {
+        let mut trial = self.state.clone();
         self.prescribe(next, &mut trial.u);
         trial
     }
@@ -359,7 +381,7 @@ impl<'a> Solver<'a> {
             false => 1e-3f64.max(options.residual_tolerance),
         };
         for update in 0..=updates {
-            let (multipliers, u) = (&trial.multipliers, &mut trial.u);
+            let (multipliers, u, carried) = (&trial.multipliers, &mut trial.u, &mut trial.carried);
             let fixed = Fixed {
                 loading: &self.loading,
                 load_fraction: fraction,
@@ -367,12 +389,12 @@ impl<'a> Solver<'a> {
                 memory: Memory { history: &trial.memory, dt_s },
                 friction: rubs.then_some(&trial.friction),
             };
-            self.newton.equilibrate(tolerance, fixed, u)?;
+            self.newton.equilibrate(tolerance, fixed, u, carried)?;
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
             let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;
             if closes(e.gap_error_mm) && !exact {
-                self.newton.equilibrate(options.residual_tolerance, fixed, u)?;
+                self.newton.equilibrate(options.residual_tolerance, fixed, u, carried)?;
             }
             let closed = closes(self.newton.current.gap_error_mm);
             let change = rubbing::change(&trial.friction, &self.newton.current);

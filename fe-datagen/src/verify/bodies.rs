@@ -264,6 +264,7 @@ pub(crate) fn solve<'a>(
 pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
     let trial = Trial {
         u,
+        carried: &[],
         multipliers_mpa: &[],
         penalty: 1.0,
         load_fraction: 0.0,

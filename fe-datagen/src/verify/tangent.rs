@@ -84,6 +84,7 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
     let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
         let trial = Trial {
             u,
+            carried: &[],
             multipliers_mpa: &multipliers,
             penalty: 3.0,
             load_fraction: 1.0,
