@@ -48,6 +48,11 @@ impl<const N: usize> Recycler<N> {
         buffer.reserve(bytes);
         buffer
     }
+
+    /// [`claim`](Self::claim)s a buffer and gives it away; letting go of it brings it back.
+    pub(crate) fn lend(&mut self, bytes: usize) -> BytesMut {
+        self.claim(bytes).split_off(0)
+    }
 }
 
 #[cfg(test)]
