@@ -16,6 +16,9 @@ pub(crate) trait Sink: Send + Sync {
 
     /// Whether nobody is there for it.
     fn is_gone(&self) -> bool;
+
+    /// Takes the buffers of the slot, which is no more.
+    fn take_back(&self, recycler: &mut Recycler);
 }
 
 /// Somebody who waits for answers: as many as the channel has places are kept.
@@ -30,6 +33,9 @@ impl Sink for mpsc::Sender<Done> {
     fn is_gone(&self) -> bool {
         self.is_closed()
     }
+
+    /// They go with the slot.
+    fn take_back(&self, _recycler: &mut Recycler) {}
 }
 
 /// What an offer came to.
@@ -118,5 +124,12 @@ impl Slot {
     /// Whether nobody is there for the answer.
     pub(super) fn is_abandoned(&self) -> bool {
         self.sink.is_gone()
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.sink.take_back(&mut state.recycler);
     }
 }

@@ -93,25 +93,23 @@ pub(super) async fn agree(line: &mut Line, number: u64) -> Result<Terms, End> {
 
 /// One message; a problem is one the session survives.
 async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End> {
-    loop {
-        let text = match line.next(false).await? {
-            Event::Draining => return Err(drained()),
-            Event::Text(text) => text,
-            Event::Binary(..) => {
-                let message = "the first message is the JSON hello, in text";
-                return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
-            }
-        };
-        let hello = match serde_json::from_slice(&text) {
-            Ok(ClientMessage::Hello(hello)) => hello,
-            Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
-            Err(error) => {
-                let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
-                return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
-            }
-        };
-        return Ok(meet(&line.app, hello).await);
-    }
+    let text = match line.next(false).await? {
+        Event::Draining => return Err(drained()),
+        Event::Text(text) => text,
+        Event::Binary(..) => {
+            let message = "the first message is the JSON hello, in text";
+            return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
+        }
+    };
+    let hello = match serde_json::from_slice(&text) {
+        Ok(ClientMessage::Hello(hello)) => hello,
+        Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
+        Err(error) => {
+            let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
+            return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
+        }
+    };
+    Ok(meet(&line.app, hello).await)
 }
 
 /// New terms for an open session; frames that the server has accepted keep the old ones.

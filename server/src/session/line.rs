@@ -70,7 +70,7 @@ impl Line {
             Stream::Plain(stream) => Some(Arc::clone(stream)),
             Stream::Tls(_) => None,
         };
-        let reply = Arc::new(Reply::new(Outbox::new(writer), Arc::clone(&app.metrics)));
+        let reply = Arc::new(Reply::new(Outbox::new(writer), Arc::clone(&app)));
         let heard = TokioInstant::now();
         let alarm = Box::pin(sleep_until(heard + app.timeouts.idle / 3));
         Self { stream, inbound, reply, app, drain, heard, is_asked: false, alarm }
@@ -118,11 +118,14 @@ impl Line {
             Message::Text(text) if str::from_utf8(&text).is_ok() => Some(Event::Text(text)),
             Message::Text(_) => {
                 let message = "a text message is not UTF-8";
-                return Err(End::Refused(Problem::new(ErrorCode::BadJson, message), close::PROTOCOL));
+                return Err(End::Refused(
+                    Problem::new(ErrorCode::BadJson, message),
+                    close::PROTOCOL,
+                ));
             }
             Message::Binary(bytes) => Some(Event::Binary(bytes, received)),
             Message::Ping(payload) => {
-                self.reply.out.send(wire::frame(opcode::PONG, &payload));
+                self.reply.out.send(&wire::frame(opcode::PONG, &payload));
                 None
             }
             Message::Pong => None,
@@ -152,7 +155,7 @@ impl Line {
         }
         if silence >= idle / 3 && !self.is_asked {
             self.is_asked = true;
-            self.reply.out.send(wire::frame(opcode::PING, &[]));
+            self.reply.out.send(&wire::frame(opcode::PING, &[]));
         }
         let next = self.heard + if self.is_asked { idle } else { idle / 3 };
         self.alarm.as_mut().reset(next);
@@ -204,7 +207,7 @@ impl Line {
         };
         let mut payload = BytesMut::from(&code.to_be_bytes()[..]);
         payload.extend_from_slice(reason.as_bytes());
-        self.reply.out.send(wire::frame(opcode::CLOSE, &payload));
+        self.reply.out.send(&wire::frame(opcode::CLOSE, &payload));
         if self.flush().await.is_err() || matches!(end, End::Client(_)) {
             return;
         }

@@ -9,6 +9,7 @@ mod hello;
 mod line;
 mod outbox;
 mod reply;
+mod store;
 mod wire;
 
 use std::sync::Arc;
@@ -24,11 +25,12 @@ use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
 use tokio::sync::watch;
 use tungstenite::handshake::derive_accept_key;
 
+pub(crate) use self::store::Store;
 use self::{fresh::Freshness, line::Line};
 use crate::{
     app::{App, SessionPlace},
     gate::Guest,
-    pool::{Recycler, Slot},
+    pool::Slot,
     problem::{self, HttpProblem},
 };
 
@@ -102,6 +104,7 @@ async fn run(
         End::Refused(problem, _) => tracing::debug!(session = number, %problem, "session ended"),
     }
     line.part(&end).await;
+    line.inbound.end(&app.store);
     app.metrics.sessions_open.dec();
 }
 
@@ -110,12 +113,12 @@ async fn converse(line: &mut Line, number: u64) -> End {
         Ok(terms) => terms,
         Err(end) => return end,
     };
-    line.inbound.expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes());
+    line.inbound.expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &line.app.store);
     let reply = Arc::clone(&line.reply);
     let session = frames::Session {
         number,
         fresh: Freshness::new(terms.stale_after_us),
-        slot: Arc::new(Slot::new(Recycler::with_room(terms.answer_len_max()), reply)),
+        slot: Arc::new(Slot::new(line.app.store.answers(terms.answer_len_max()), reply)),
         terms,
     };
     frames::serve(line, session).await

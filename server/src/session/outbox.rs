@@ -44,8 +44,8 @@ impl Outbox {
     }
 
     /// Sends a message, now or as soon as there is room.
-    pub(super) fn send(&self, message: Bytes) {
-        self.put(&message, |from| message.slice(from..));
+    pub(super) fn send(&self, message: &Bytes) {
+        self.put(message, |from| message.slice(from..));
     }
 
     /// Sends a message that is copied only if there is no room for it.

@@ -19,9 +19,10 @@ use super::{
     wire::{self, OUT_HEAD_MAX, opcode},
 };
 use crate::{
+    app::App,
     codec::Output,
     metrics::{Metrics, Transport},
-    pool::{Done, FRONT, Outcome, Sink, Stage, is_past},
+    pool::{Done, FRONT, Outcome, Recycler, Sink, Stage, is_past},
 };
 
 /// The voice of a session.
@@ -33,16 +34,18 @@ pub(super) struct Reply {
     /// Whether the task waits for the last of them.
     is_awaited: AtomicBool,
     is_over: AtomicBool,
+    app: Arc<App>,
 }
 
 impl Reply {
-    pub(super) fn new(out: Outbox, metrics: Arc<Metrics>) -> Self {
+    pub(super) fn new(out: Outbox, app: Arc<App>) -> Self {
         Self {
             out,
-            metrics,
+            metrics: Arc::clone(&app.metrics),
             outstanding: AtomicUsize::new(0),
             is_awaited: AtomicBool::new(false),
             is_over: AtomicBool::new(false),
+            app,
         }
     }
 
@@ -72,7 +75,7 @@ impl Reply {
 
     pub(super) fn say(&self, message: &ServerMessage) {
         match serde_json::to_string(message) {
-            Ok(text) => self.out.send(wire::frame(opcode::TEXT, text.as_bytes())),
+            Ok(text) => self.out.send(&wire::frame(opcode::TEXT, text.as_bytes())),
             Err(error) => tracing::error!(%error, "a message cannot be encoded"),
         }
     }
@@ -146,7 +149,7 @@ impl Reply {
         bytes[FRONT - len..FRONT].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
         let head = head.encode();
         bytes[FRONT..FRONT + head.len()].copy_from_slice(&head);
-        self.out.send(bytes.freeze().slice(FRONT - len..));
+        self.out.send(&bytes.freeze().slice(FRONT - len..));
     }
 }
 
@@ -158,6 +161,10 @@ impl Sink for Reply {
 
     fn is_gone(&self) -> bool {
         self.is_over.load(Ordering::Acquire)
+    }
+
+    fn take_back(&self, recycler: &mut Recycler) {
+        self.app.store.keep_answers(recycler);
     }
 }
 

@@ -7,7 +7,7 @@ use std::mem;
 
 use bytes::{Buf, Bytes, BytesMut};
 
-use crate::pool::Recycler;
+use super::store::{Frames, Store};
 
 /// Largest message read, bytes. Five times a frame, so that a frame that is too long is read,
 /// refused and survived; beyond this the connection is closed.
@@ -69,7 +69,8 @@ impl Head {
     /// None: more bytes are needed.
     fn parse(bytes: &[u8]) -> Result<Option<Self>, Fault> {
         let &[first, second, ref rest @ ..] = bytes else { return Ok(None) };
-        let (is_last, opcode, short) = (first & 0x80 != 0, first & 0x0f, usize::from(second & 0x7f));
+        let (is_last, opcode, short) =
+            (first & 0x80 != 0, first & 0x0f, usize::from(second & 0x7f));
         if first & 0x70 != 0 {
             return Err(Fault::Protocol("a reserved bit is set"));
         }
@@ -104,8 +105,7 @@ impl Head {
 /// What has come and is not yet a message.
 #[derive(Debug, Default)]
 pub(super) struct Inbound {
-    /// One that is read into, one with a thread, one in the slot, one that gives way to it.
-    spare: Recycler<4>,
+    spare: Frames,
     /// Room that a frame of this session needs, bytes.
     room: usize,
     buffer: BytesMut,
@@ -124,9 +124,9 @@ impl Inbound {
     }
 
     /// Takes memory for frames of so many bytes, once for the whole session.
-    pub(super) fn expect(&mut self, frame_len: usize) {
+    pub(super) fn expect(&mut self, frame_len: usize, store: &Store) {
         self.room = HEAD_MAX + frame_len;
-        self.spare = Recycler::with_room(self.room);
+        self.spare = store.frames(self.room);
         let read = mem::take(&mut self.buffer);
         self.renew(&read);
     }
@@ -135,6 +135,12 @@ impl Inbound {
     fn renew(&mut self, read: &[u8]) {
         self.buffer = self.spare.lend(self.room.max(read.len()));
         self.buffer.extend_from_slice(read);
+    }
+
+    /// Gives its memory back.
+    pub(super) fn end(&mut self, store: &Store) {
+        self.buffer = BytesMut::new();
+        store.keep_frames(&mut self.spare);
     }
 
     /// Where to read to; there is always room.
@@ -228,7 +234,11 @@ fn message(kind: u8, payload: Bytes) -> Message {
 /// The code of a close frame, if it may be sent at all (section 7.4).
 fn close_code(payload: &[u8]) -> Result<Option<u16>, Fault> {
     let Some((code, reason)) = payload.split_first_chunk() else {
-        return if payload.is_empty() { Ok(None) } else { Err(Fault::Protocol("half a close code")) };
+        return if payload.is_empty() {
+            Ok(None)
+        } else {
+            Err(Fault::Protocol("half a close code"))
+        };
     };
     match u16::from_be_bytes(*code) {
         code @ (1000..=1003 | 1007..=1014 | 3000..=4999) if str::from_utf8(reason).is_ok() => {
@@ -277,5 +287,4 @@ pub(super) fn frame(opcode: u8, payload: &[u8]) -> Bytes {
 }
 
 #[cfg(test)]
-#[path = "wire_tests.rs"]
 mod tests;

@@ -9,7 +9,8 @@ use super::*;
 
 /// A client's frame as tungstenite writes it.
 fn written(opcode: OpCode, is_last: bool, mask: [u8; 4], payload: &[u8]) -> Vec<u8> {
-    let header = FrameHeader { is_final: is_last, opcode, mask: Some(mask), ..FrameHeader::default() };
+    let header =
+        FrameHeader { is_final: is_last, opcode, mask: Some(mask), ..FrameHeader::default() };
     let frame = Frame::from_payload(header, payload.to_vec().into());
     let mut bytes = Vec::new();
     frame.format(&mut bytes).unwrap();
@@ -58,7 +59,7 @@ fn what_the_library_writes_is_read_in_any_portions() {
         }
         let (early, late) = bytes.split_at(bytes.len() / 2);
         let mut found = heard(&mut inbound, early, portion).unwrap();
-        inbound.expect(1000);
+        inbound.expect(1000, &Store::new(1));
         found.extend(heard(&mut inbound, late, portion).unwrap());
         assert!(found == due, "in portions of {portion}");
         assert!(!inbound.is_amid());
@@ -68,7 +69,7 @@ fn what_the_library_writes_is_read_in_any_portions() {
 #[test]
 fn frames_of_a_session_use_the_same_memory_again() {
     let mut inbound = Inbound::new(&[]);
-    inbound.expect(1000);
+    inbound.expect(1000, &Store::new(1));
     let mut places = std::collections::HashSet::new();
     for n in 0..50_u8 {
         let frame = written(OpCode::Data(Data::Binary), true, [n; 4], &[n; 1000]);
@@ -111,7 +112,9 @@ fn close_codes_are_those_that_may_be_sent() {
         assert_eq!(close_code(payload), due);
     }
     // One byte, codes that are for programs alone, a reason that is not UTF-8.
-    for payload in [&[3][..], &[3, 237], &[3, 238], &[3, 247], &[0, 1], &[255, 255], &[3, 232, 0xff]] {
+    for payload in
+        [&[3][..], &[3, 237], &[3, 238], &[3, 247], &[0, 1], &[255, 255], &[3, 232, 0xff]]
+    {
         assert!(close_code(payload).is_err(), "{payload:?}");
     }
 }
