@@ -17,6 +17,7 @@ use crate::{
     pool::{Entrance, Pool},
     problem,
     reload::{Changes, ReloadError, Reloader},
+    session::Store,
 };
 
 /// The shared state.
@@ -31,6 +32,8 @@ pub(crate) struct App {
     pub(crate) timeouts: Timeouts,
     /// True once the server drains. Whoever must be waited for holds a receiver.
     pub(crate) drain: Arc<watch::Sender<bool>>,
+    /// Memory of sessions that are over.
+    pub(crate) store: Store,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
     next_session: AtomicU64,
@@ -55,6 +58,7 @@ impl App {
             entrance,
             timeouts: config.timeouts(),
             drain,
+            store: Store::new(config.max_sessions.get()),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),
             next_session: AtomicU64::new(1),

@@ -143,7 +143,7 @@ where
 }
 
 /// A stream whose writes give up when the other side makes no room for a while.
-struct Patient {
+pub(crate) struct Patient {
     stream: TcpStream,
     patience: Duration,
     /// Set while a write waits.
@@ -153,6 +153,11 @@ struct Patient {
 impl Patient {
     fn new(stream: TcpStream, patience: Duration) -> Self {
         Self { stream, patience, alarm: None }
+    }
+
+    /// The stream, for whoever watches the clock without help.
+    pub(crate) fn into_stream(self) -> TcpStream {
+        self.stream
     }
 
     /// Passes a write's outcome on, and watches the clock while there is none.

@@ -103,6 +103,15 @@ pub async fn open(server: &str, hello: &Hello) -> Result<(Ready, Sender, Receive
     opened.map_err(|_| SocketError::Silent(PATIENCE_S))?
 }
 
+/// The connection of an open session with nothing under way, for whoever speaks over it by themselves.
+///
+/// # Errors
+/// The connection is broken.
+pub fn into_stream(sender: Sender, receiver: Receiver) -> io::Result<std::net::TcpStream> {
+    let whole = sender.0.reunite(receiver.0).map_err(io::Error::other)?;
+    whole.into_inner().into_std()
+}
+
 /// A frame: header and samples.
 #[must_use]
 pub fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {

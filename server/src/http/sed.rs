@@ -13,7 +13,7 @@ use axum::{
 };
 use bytes::BytesMut;
 use papilla_proto::{ErrorCode, Problem};
-use tokio::time::timeout;
+use tokio::{sync::mpsc, time::timeout};
 
 use super::{Answer, Shared, answer, body, refuse};
 use crate::{
@@ -115,7 +115,8 @@ pub(crate) async fn through_pool(
 }
 
 async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
-    let (slot, mut answers) = Slot::new(Recycler::default());
+    let (sink, mut answers) = mpsc::channel(1);
+    let slot = Slot::new(Recycler::default(), Arc::new(sink));
     if app.entrance.submit(&Arc::new(slot), job).is_err() {
         return Err(problem::shutting_down());
     }

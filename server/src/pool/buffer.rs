@@ -20,15 +20,21 @@ impl<const N: usize> Default for Recycler<N> {
 }
 
 impl<const N: usize> Recycler<N> {
-    /// All buffers with room for `bytes`, so that no claim of as much needs memory later.
-    pub(crate) fn with_room(bytes: usize) -> Self {
-        let buffer = |_| {
-            let mut buffer = BytesMut::with_capacity(bytes);
-            // Splitting makes the count of owners, which takes memory too.
-            drop(buffer.split());
-            buffer
-        };
-        Self { buffers: std::array::from_fn(buffer), next: 0 }
+    /// Sees to it that all buffers that nobody holds have room for `bytes`, so that no claim of as
+    /// much needs memory later.
+    pub(crate) fn make_room(&mut self, bytes: usize) {
+        for buffer in &mut self.buffers {
+            if !buffer.try_reclaim(bytes) {
+                *buffer = BytesMut::with_capacity(bytes);
+                // Splitting makes the count of owners, which takes memory too.
+                drop(buffer.split());
+            }
+        }
+    }
+
+    /// Whether there is memory here that nobody holds.
+    pub(crate) fn has_room(&mut self) -> bool {
+        self.buffers.iter_mut().any(|buffer| buffer.try_reclaim(1))
     }
 
     /// An empty buffer with room for `bytes`; memory is taken from the system only if
@@ -47,6 +53,11 @@ impl<const N: usize> Recycler<N> {
         buffer.clear();
         buffer.reserve(bytes);
         buffer
+    }
+
+    /// [`claim`](Self::claim)s a buffer and gives it away; letting go of it brings it back.
+    pub(crate) fn lend(&mut self, bytes: usize) -> BytesMut {
+        self.claim(bytes).split_off(0)
     }
 }
 
@@ -86,7 +97,10 @@ mod tests {
 
     #[test]
     fn room_made_beforehand_is_what_is_claimed() {
-        let mut recycler = Recycler::<3>::with_room(1000);
+        let mut recycler = Recycler::<3>::default();
+        assert!(!recycler.has_room());
+        recycler.make_room(1000);
+        assert!(recycler.has_room());
         let places = recycler.buffers.each_ref().map(|buffer| buffer.as_ptr());
         let held: Vec<_> = (0..3)
             .map(|_| {

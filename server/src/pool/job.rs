@@ -90,10 +90,15 @@ pub(crate) struct Times {
     pub(crate) encode: Duration,
 }
 
+/// Room before the header of an answer for the framing of a session, bytes. A multiple of 16:
+/// sections begin at such.
+pub(crate) const FRONT: usize = 16;
+
 /// What became of a job.
 #[derive(Debug)]
 pub(crate) enum Outcome {
-    /// The map, encoded. Over a session 32 bytes are left free in front for the header.
+    /// The map, encoded. Over a session [`FRONT`] bytes and those of the header are left free
+    /// before it.
     Map {
         /// The encoded answer.
         bytes: BytesMut,

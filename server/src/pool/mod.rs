@@ -2,7 +2,7 @@
 //!
 //! tokio only moves bytes. A connection puts a [`Job`] into its [`Slot`] and the
 //! slot into the bounded [`Queue`](queue::Queue); a thread takes it from there, decodes,
-//! checks, infers, encodes, and hands the [`Done`] back through the slot's channel.
+//! checks, infers, encodes, and hands the [`Done`] to the slot's [`Sink`].
 
 mod buffer;
 mod exchange;
@@ -19,8 +19,8 @@ use std::{
 
 pub(crate) use buffer::Recycler;
 pub(crate) use exchange::Exchange;
-pub(crate) use job::{Done, Drawn, Frame, Job, Outcome, Stage, is_past};
-pub(crate) use slot::Slot;
+pub(crate) use job::{Done, Drawn, FRONT, Frame, Job, Outcome, Stage, is_past};
+pub(crate) use slot::{Sink, Slot};
 
 use self::{exchange::Inbox, queue::Queue, work::Worker};
 use crate::{StartError, metrics::Metrics, models::Catalogue};

@@ -2,16 +2,41 @@
 
 use std::{
     mem,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use tokio::sync::mpsc;
 
 use super::{Done, Job, buffer::Recycler};
 
-/// At most this many answers can wait for a connection: one of the job that
-/// runs, one of the job behind it, and room to be sure.
-const ANSWERS: usize = 4;
+/// Where answers go, from the thread that rendered and on it.
+pub(crate) trait Sink: Send + Sync {
+    /// Takes an answer; must not wait.
+    fn deliver(&self, done: Done);
+
+    /// Whether nobody is there for it.
+    fn is_gone(&self) -> bool;
+
+    /// Takes the buffers of the slot, which is no more.
+    fn take_back(&self, recycler: &mut Recycler);
+}
+
+/// Somebody who waits for answers: as many as the channel has places are kept.
+impl Sink for mpsc::Sender<Done> {
+    fn deliver(&self, done: Done) {
+        // Err: whoever waited is gone, or (never, with places for all) does not fetch them.
+        if let Err(mpsc::error::TrySendError::Full(_)) = self.try_send(done) {
+            tracing::error!("a client's answers are not fetched; one was dropped");
+        }
+    }
+
+    fn is_gone(&self) -> bool {
+        self.is_closed()
+    }
+
+    /// They go with the slot.
+    fn take_back(&self, _recycler: &mut Recycler) {}
+}
 
 /// What an offer came to.
 #[derive(Debug)]
@@ -31,10 +56,9 @@ pub(crate) enum Offer {
 /// A slot is in the queue or with a thread at most once, so a session never has
 /// two frames under way, answers keep the order of the frames, and the queue is
 /// bounded by the number of slots.
-#[derive(Debug)]
 pub(crate) struct Slot {
     state: Mutex<State>,
-    answers: mpsc::Sender<Done>,
+    sink: Arc<dyn Sink>,
 }
 
 #[derive(Debug)]
@@ -46,12 +70,10 @@ struct State {
 }
 
 impl Slot {
-    /// An empty slot, whose answers are written into the buffers of `recycler`, and the end they
-    /// come out of.
-    pub(crate) fn new(recycler: Recycler) -> (Self, mpsc::Receiver<Done>) {
-        let (answers, receiver) = mpsc::channel(ANSWERS);
+    /// An empty slot, whose answers are written into the buffers of `recycler` and go to `sink`.
+    pub(crate) fn new(recycler: Recycler, sink: Arc<dyn Sink>) -> Self {
         let state = State { waiting: None, scheduled: false, recycler };
-        (Self { state: Mutex::new(state), answers }, receiver)
+        Self { state: Mutex::new(state), sink }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -92,10 +114,7 @@ impl Slot {
     /// The thread is done; true if another job has come meanwhile and the slot
     /// must go into the queue again.
     pub(super) fn finish(&self, done: Done, recycler: Recycler) -> bool {
-        // Err: the client is gone, or (never, see ANSWERS) does not fetch its answers.
-        if let Err(mpsc::error::TrySendError::Full(_)) = self.answers.try_send(done) {
-            tracing::error!("a client's answers are not fetched; one was dropped");
-        }
+        self.sink.deliver(done);
         let mut state = self.state();
         state.recycler = recycler;
         state.scheduled = state.waiting.is_some();
@@ -104,6 +123,13 @@ impl Slot {
 
     /// Whether nobody is there for the answer.
     pub(super) fn is_abandoned(&self) -> bool {
-        self.answers.is_closed()
+        self.sink.is_gone()
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.sink.take_back(&mut state.recycler);
     }
 }

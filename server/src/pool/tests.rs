@@ -22,7 +22,7 @@ use serde_json::json;
 use tokio::sync::mpsc;
 
 use self::gated::{Act, Gate, Gated};
-use super::{Done, Entrance, Frame, Job, Outcome, Pool, Recycler, Slot, Stage};
+use super::{Done, Entrance, FRONT, Frame, Job, Outcome, Pool, Recycler, Slot, Stage};
 use crate::{
     codec::{Input, Output},
     effects::Shared,
@@ -116,8 +116,8 @@ fn job(sequence: u32, pressure_pa: f32, deadline: Option<Duration>) -> Job {
 }
 
 fn client() -> (Arc<Slot>, mpsc::Receiver<Done>) {
-    let (slot, answers) = Slot::new(Recycler::default());
-    (Arc::new(slot), answers)
+    let (sink, answers) = mpsc::channel(4);
+    (Arc::new(Slot::new(Recycler::default(), Arc::new(sink))), answers)
 }
 
 fn sequence(done: &Done) -> u32 {
@@ -196,7 +196,7 @@ fn a_panic_costs_one_frame_and_nothing_else() {
     bench.entrance.submit(&slot, job(2, 2.0, None)).unwrap();
     match wait(&mut answers).outcome {
         Outcome::Map { bytes, .. } => {
-            assert_eq!(bytes[HEADER_LEN..], 2f32.to_le_bytes().repeat(MAP_LEN));
+            assert_eq!(bytes[FRONT + HEADER_LEN..], 2f32.to_le_bytes().repeat(MAP_LEN));
         }
         other => panic!("{other:?}"),
     }

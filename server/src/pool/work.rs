@@ -11,7 +11,7 @@ use papilla_engine::Session;
 use papilla_proto::{ErrorCode, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside};
 
 use super::{
-    Done, Drawn, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
+    Done, Drawn, FRONT, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
     buffer::Recycler,
     exchange::Inbox,
     queue::{Next, Queue},
@@ -164,10 +164,10 @@ impl Worker {
         }
 
         let start = Instant::now();
-        let room = job.frame.as_ref().map_or(0, |frame| frame.header.header_len());
+        let room = job.frame.as_ref().map_or(0, |frame| FRONT + frame.header.header_len());
         let sed_max = tier.sed_max_j_per_m3;
         let (bytes, scale) = if let Some(effects) = &mut effects {
-            let buffer = recycler.claim(effects.size_hint());
+            let buffer = recycler.claim(FRONT + effects.size_hint());
             buffer.resize(room, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
             let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;

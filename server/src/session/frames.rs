@@ -5,22 +5,21 @@ use std::{
     time::{Duration, Instant},
 };
 
-use axum::extract::ws::Message;
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 use papilla_proto::{
-    ErrorCode, Extension, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
+    ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
 };
-use tokio::sync::mpsc;
 
 use super::{
-    End, Event, Line, drained,
+    End, drained,
     fresh::Freshness,
-    hello::{self, Terms, tier_number},
+    hello::{self, Terms},
+    line::{Event, Line},
 };
 use crate::{
     codec::{Input, Output},
     metrics::Transport,
-    pool::{Done, Frame, Job, Outcome, Recycler, Slot, Stage, is_past},
+    pool::{Frame, Job, Slot, Stage},
     problem,
 };
 
@@ -30,100 +29,69 @@ pub(super) struct Session {
     pub(super) terms: Terms,
     pub(super) fresh: Freshness,
     pub(super) slot: Arc<Slot>,
-    pub(super) answers: mpsc::Receiver<Done>,
-    /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
-    pub(super) outstanding: usize,
-    /// Buffers of answers that are a header alone.
-    pub(super) short_answers: Recycler,
-    /// Copies of frames: one with a thread, one in the slot, one to take its place.
-    pub(super) waiting: Recycler,
 }
 
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
 pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
     let mut draining = false;
     loop {
-        if draining && session.outstanding == 0 {
+        if draining && line.reply.is_settled() {
             return drained();
         }
-        let result = match line.next(Some(&mut session.answers), draining).await {
-            Err(end) => Err(end),
-            Ok(Event::Draining) => {
-                draining = true;
-                Ok(())
-            }
-            Ok(Event::Answer(done)) => session.answer(line, done).await,
-            Ok(Event::Message(Message::Binary(frame), received)) => {
-                session.take(line, frame, received, draining).await
-            }
-            Ok(Event::Message(Message::Text(text), _)) => session.renew(line, &text).await,
-            Ok(Event::Message(..)) => Ok(()),
-        };
-        if let Err(end) = result {
-            return end;
+        match line.next(draining).await {
+            Err(end) => return end,
+            Ok(Event::Draining) => draining = true,
+            Ok(Event::Binary(frame, received)) => session.take(line, &frame, received, draining),
+            Ok(Event::Text(text)) => session.renew(line, &text).await,
         }
     }
 }
 
 impl Session {
     /// Takes a hello for new terms, such as another tier.
-    async fn renew(&mut self, line: &mut Line, text: &str) -> Result<(), End> {
+    async fn renew(&mut self, line: &mut Line, text: &Bytes) {
         match hello::renew(&line.app, text, self.number).await {
             Ok((terms, ready)) => {
                 self.fresh = Freshness::new(terms.stale_after_us);
                 self.terms = terms;
-                line.say(&ServerMessage::Ready(ready)).await
+                line.reply.say(&ServerMessage::Ready(ready));
             }
-            Err(problem) => line.complain(problem, None).await,
+            Err(problem) => line.reply.complain(problem, None),
         }
     }
 
     /// Takes one frame: into the slot, or back with an error.
-    async fn take(
-        &mut self,
-        line: &mut Line,
-        frame: Bytes,
-        received: Instant,
-        draining: bool,
-    ) -> Result<(), End> {
-        let job = if draining { Err(problem::shutting_down()) } else { self.job(&frame, received) };
-        let mut job = match job {
+    fn take(&mut self, line: &Line, frame: &Bytes, received: Instant, draining: bool) {
+        let (reply, metrics) = (&line.reply, &line.app.metrics);
+        let job = if draining { Err(problem::shutting_down()) } else { self.job(frame, received) };
+        let job = match job {
             Ok(job) => job,
-            Err(problem) => {
-                line.app.metrics.of(Transport::Session).error.inc();
-                return line.complain(problem, FrameHeader::peek_sequence(&frame)).await;
-            }
+            Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
         };
-        let Some(Frame { header, .. }) = &job.frame else { return Ok(()) };
+        let Some(Frame { header, .. }) = &job.frame else { return };
         let header = *header;
         // In version 1 sequences mean nothing to the server.
         let is_new = header.extension.is_some();
         if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
-            line.app.metrics.of(Transport::Session).stale.inc();
-            return self.answer_short(line, &header, job.tier, FrameStatus::Stale, received).await;
+            metrics.of(Transport::Session).stale.inc();
+            return reply.short(&header, job.tier, FrameStatus::Stale, received);
         }
         if job.is_late() {
-            line.app.metrics.late(Transport::Session, Stage::Admission);
-            return self.answer_short(line, &header, job.tier, FrameStatus::Late, received).await;
+            metrics.late(Transport::Session, Stage::Admission);
+            return reply.short(&header, job.tier, FrameStatus::Late, received);
         }
-        // Held until a thread has decoded it, the reader's own memory would have to be replaced if
-        // the next frame came before that: an allocation costs more than this copy.
-        let copy = self.waiting.claim(job.payload.len());
-        copy.extend_from_slice(&job.payload);
-        job.payload = copy.split().freeze();
+        reply.owe();
         match line.app.entrance.submit(&self.slot, job) {
-            Ok(None) => {
-                self.outstanding += 1;
-                Ok(())
-            }
+            Ok(None) => {}
             Ok(Some(Job { frame: Some(Frame { header, .. }), received, tier, .. })) => {
-                line.app.metrics.of(Transport::Session).superseded.inc();
-                self.answer_short(line, &header, tier, FrameStatus::Superseded, received).await
+                metrics.of(Transport::Session).superseded.inc();
+                reply.short(&header, tier, FrameStatus::Superseded, received);
+                reply.settle();
             }
-            Ok(Some(Job { frame: None, .. })) => Ok(()),
+            Ok(Some(Job { frame: None, .. })) => reply.settle(),
             Err(_) => {
-                line.app.metrics.of(Transport::Session).error.inc();
-                line.complain(problem::shutting_down(), Some(header.sequence)).await
+                reply.refuse(problem::shutting_down(), Some(header.sequence));
+                reply.settle();
             }
         }
     }
@@ -198,83 +166,4 @@ impl Session {
         }
         Ok(())
     }
-
-    /// Sends what a thread made of a frame.
-    async fn answer(&mut self, line: &mut Line, done: Done) -> Result<(), End> {
-        self.outstanding = self.outstanding.saturating_sub(1);
-        let Some(mut header) = done.header else { return Ok(()) };
-        if let Some(extension) = &mut header.extension {
-            extension.queue_us = us(done.times.queue);
-            extension.infer_us = us(done.times.infer);
-            extension.flags = done.drawn.flags;
-        }
-        let metrics = Arc::clone(&line.app.metrics);
-        let (mut bytes, scale) = match done.outcome {
-            Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
-            outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
-                let stage = if let Outcome::Late(stage) = outcome { stage } else { Stage::Sending };
-                metrics.late(Transport::Session, stage);
-                let late = FrameStatus::Late;
-                return self.answer_short(line, &header, done.tier, late, done.received).await;
-            }
-            Outcome::Failed(problem) => {
-                metrics.of(Transport::Session).error.inc();
-                return line.complain(problem, Some(header.sequence)).await;
-            }
-        };
-        let total_us = us(done.received.elapsed());
-        let mut head = header.answer(FrameStatus::Ok, total_us, scale);
-        if header.extension.is_some() {
-            head = numbered(head.windowed(done.drawn.window), done.tier);
-            head.kind = done.drawn.kind;
-        }
-        if let Output::Samples(sample_type) = done.output {
-            head.sample_type = sample_type;
-        }
-        put_header(&mut bytes, &head);
-        // Counted before it is sent: whoever has the answer finds it in the metrics.
-        metrics.of(Transport::Session).ok.inc();
-        let timers = metrics.tier(done.tier);
-        let start = Instant::now();
-        line.send(Message::Binary(bytes.freeze())).await?;
-        timers.send.observe(start.elapsed());
-        timers.total.observe(done.received.elapsed());
-        Ok(())
-    }
-
-    /// Answers with a header alone.
-    async fn answer_short(
-        &mut self,
-        line: &mut Line,
-        header: &FrameHeader,
-        tier: usize,
-        status: FrameStatus,
-        received: Instant,
-    ) -> Result<(), End> {
-        let total_us = us(received.elapsed());
-        let head = numbered(header.answer(status, total_us, 1.0), tier);
-        let buffer = self.short_answers.claim(head.header_len());
-        buffer.resize(head.header_len(), 0);
-        let mut bytes = buffer.split();
-        put_header(&mut bytes, &head);
-        line.send(Message::Binary(bytes.freeze())).await
-    }
-}
-
-/// The header with the tier's number, where there is room for it.
-fn numbered(header: FrameHeader, tier: usize) -> FrameHeader {
-    let number = |extension| Extension { tier: tier_number(tier), ..extension };
-    FrameHeader { extension: header.extension.map(number), ..header }
-}
-
-/// Writes the header over the first bytes.
-fn put_header(bytes: &mut BytesMut, header: &FrameHeader) {
-    let head = header.encode();
-    if let Some(room) = bytes.get_mut(..head.len()) {
-        room.copy_from_slice(&head);
-    }
-}
-
-fn us(time: Duration) -> u32 {
-    u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
 }

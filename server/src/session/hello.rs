@@ -5,7 +5,6 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use axum::extract::ws::Message;
 use papilla_proto::{
     ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready,
     RuntimeEffect, SampleType, ServerMessage,
@@ -13,12 +12,16 @@ use papilla_proto::{
 };
 use tokio::{task::spawn_blocking, time::timeout};
 
-use super::{End, Event, Line, close, drained};
+use super::{
+    End, close, drained,
+    line::{Event, Line},
+};
 use crate::{
     app::App,
     codec::{Output, scale_of},
     effects::Effects,
     models::Tier,
+    pool::FRONT,
     problem,
 };
 
@@ -51,13 +54,14 @@ pub(super) struct Terms {
 }
 
 impl Terms {
-    /// Most bytes of an answer, its header included.
+    /// Most bytes of an answer, its heads included.
     pub(super) fn answer_len_max(&self) -> usize {
         let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
         let effects = self.effects.as_ref();
-        effects.map_or(plain, |effects| {
-            effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
-        })
+        FRONT
+            + effects.map_or(plain, |effects| {
+                effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
+            })
     }
 }
 
@@ -68,7 +72,7 @@ pub(super) async fn agree(line: &mut Line, number: u64) -> Result<Terms, End> {
         for _ in 0..ATTEMPTS {
             match attempt(line).await? {
                 Ok(agreed) => return Ok(agreed),
-                Err(problem) => line.complain(problem, None).await?,
+                Err(problem) => line.reply.complain(problem, None),
             }
         }
         let message = format!("{ATTEMPTS} messages and no hello that can be met");
@@ -83,32 +87,29 @@ pub(super) async fn agree(line: &mut Line, number: u64) -> Result<Terms, End> {
     };
     let ready = ready(&line.app, number, &terms);
     tracing::debug!(session = number, ?hello, tier = %ready.tier, "session ready");
-    line.say(&ServerMessage::Ready(ready)).await?;
+    line.reply.say(&ServerMessage::Ready(ready));
     Ok(terms)
 }
 
 /// One message; a problem is one the session survives.
 async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End> {
-    loop {
-        let text = match line.next(None, false).await? {
-            Event::Draining => return Err(drained()),
-            Event::Message(Message::Text(text), _) => text,
-            Event::Message(Message::Binary(_), _) => {
-                let message = "the first message is the JSON hello, in text";
-                return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
-            }
-            Event::Message(..) | Event::Answer(_) => continue,
-        };
-        let hello = match serde_json::from_str(&text) {
-            Ok(ClientMessage::Hello(hello)) => hello,
-            Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
-            Err(error) => {
-                let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
-                return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
-            }
-        };
-        return Ok(meet(&line.app, hello).await);
-    }
+    let text = match line.next(false).await? {
+        Event::Draining => return Err(drained()),
+        Event::Text(text) => text,
+        Event::Binary(..) => {
+            let message = "the first message is the JSON hello, in text";
+            return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
+        }
+    };
+    let hello = match serde_json::from_slice(&text) {
+        Ok(ClientMessage::Hello(hello)) => hello,
+        Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
+        Err(error) => {
+            let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
+            return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
+        }
+    };
+    Ok(meet(&line.app, hello).await)
 }
 
 /// New terms for an open session; frames that the server has accepted keep the old ones.
@@ -117,10 +118,10 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
 /// The text is no hello, or one that cannot be met; the old terms stand.
 pub(super) async fn renew(
     app: &Arc<App>,
-    text: &str,
+    text: &[u8],
     number: u64,
 ) -> Result<(Terms, Ready), Problem> {
-    let Ok(ClientMessage::Hello(hello)) = serde_json::from_str(text) else {
+    let Ok(ClientMessage::Hello(hello)) = serde_json::from_slice(text) else {
         let message = "binary frames are due once the session is ready, or a hello for new terms";
         return Err(Problem::new(ErrorCode::UnexpectedText, message));
     };

@@ -10,6 +10,9 @@ use clap::Parser;
 use papilla_tests::load::{self, Options};
 use serde::Serialize;
 
+/// Threads for what else may wait.
+const MORE_THREADS: usize = 64;
+
 fn main() -> ExitCode {
     let options = Options::parse();
     match run(&options) {
@@ -22,7 +25,11 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> anyhow::Result<u8> {
-    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        // A session hears on one of them for as long as it lasts.
+        .max_blocking_threads(MORE_THREADS + options.sessions.get())
+        .build()?;
     if options.floor {
         let floor = runtime.block_on(load::floor(options.duration_s))?;
         return print(options, &floor, 0);

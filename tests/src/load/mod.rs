@@ -2,8 +2,9 @@
 //!
 //! Every time is counted from the instant at which a frame was **meant** to leave, so that
 //! a server that stalls the sender does not hide the wait of the frames that queued behind
-//! (coordinated omission). One thread keeps the beat of all sessions; the delay between
-//! the intended instant and the actual sending is reported beside the rest.
+//! (coordinated omission). The delay between the intended instant and the actual sending is
+//! reported beside the rest. A session has a thread that keeps its beat and sends, and one that
+//! hears; clients of HTTP share one thread that keeps the beat.
 
 mod compare;
 mod content;
@@ -15,8 +16,10 @@ mod report;
 mod session;
 mod tally;
 mod verify;
+mod wire;
 
 use std::{
+    io,
     path::PathBuf,
     sync::Arc,
     thread,
@@ -24,7 +27,10 @@ use std::{
 };
 
 use papilla_proto::{Hello, SampleError, SampleType, atlas::AtlasError};
-use tokio::{sync::mpsc, task::JoinHandle};
+use tokio::{
+    sync::mpsc,
+    task::{JoinHandle, spawn_blocking},
+};
 
 pub use compare::{Comparison, Ratios, compare};
 pub use content::Content;
@@ -79,7 +85,7 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
         /// What the system says.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// The model for --verify cannot be run.
     #[error(transparent)]
@@ -87,6 +93,9 @@ pub enum LoadError {
     /// Over HTTP nobody says which tier renders, and samples are float32.
     #[error("--speak http and --speak oip need --tier, and --sample-type f32")]
     NoTier,
+    /// A connection cannot be used.
+    #[error("a connection cannot be used: {0}")]
+    Connection(#[from] io::Error),
     /// A task of the generator's own died.
     #[error("a task of the load generator died: {0}")]
     Task(String),
@@ -183,10 +192,7 @@ impl Target {
         });
         let (mut beats, mut tasks) = (Vec::new(), Vec::new());
         for (session, client) in open.into_iter().enumerate() {
-            // Unbounded, but never more than the frames of the plan: the beat must not wait.
-            let (beat, beaten) = mpsc::unbounded_channel();
-            beats.push(beat);
-            tasks.push(client.start(shared.clone(), session, beaten));
+            tasks.push(client.start(shared.clone(), session, &mut beats));
         }
         let plan = shared.plan.clone();
         let pacer = thread::spawn(move || plan.keep(&beats));
@@ -201,7 +207,7 @@ impl Target {
 
 /// A client that is connected.
 enum Client {
-    Session(socket::Sender, socket::Receiver),
+    Session(wire::Mouth, wire::Hearer),
     Post(post::Post),
 }
 
@@ -210,7 +216,8 @@ impl Opening {
         Ok(match self {
             Self::Session(hello) => {
                 let (_, sender, receiver) = socket::open(server, hello).await?;
-                Client::Session(sender, receiver)
+                let (mouth, hearer) = wire::halves(socket::into_stream(sender, receiver)?)?;
+                Client::Session(mouth, hearer)
             }
             Self::Post(letter) => Client::Post(letter.connect().await?),
         })
@@ -218,17 +225,23 @@ impl Opening {
 }
 
 impl Client {
+    /// Begins; a client that does not keep its beat by itself puts its end of one into `beats`.
     fn start(
         self,
         shared: Arc<session::Shared>,
         session: usize,
-        beat: mpsc::UnboundedReceiver<u32>,
+        beats: &mut Vec<mpsc::UnboundedSender<u32>>,
     ) -> JoinHandle<Tally> {
         match self {
-            Self::Session(sender, receiver) => {
-                tokio::spawn(session::run(shared, session, sender, receiver, beat))
+            Self::Session(mouth, hearer) => {
+                spawn_blocking(move || session::run(&shared, session, mouth, hearer))
             }
-            Self::Post(post) => tokio::spawn(post::run(shared, session, post, beat)),
+            Self::Post(post) => {
+                // Unbounded, but never more than the frames of the plan: the beat must not wait.
+                let (beat, beaten) = mpsc::unbounded_channel();
+                beats.push(beat);
+                tokio::spawn(post::run(shared, session, post, beaten))
+            }
         }
     }
 }

@@ -27,7 +27,7 @@ use super::{
     tally::Tally,
     tally::Times,
 };
-use crate::{dial::dial, http::HttpError, socket::Heard};
+use crate::{dial::dial, http::HttpError};
 
 /// What is said to the service.
 #[derive(Clone, Debug)]
@@ -105,7 +105,7 @@ pub(super) async fn run(
     while let Some(mut number) = beat.recv().await {
         while let Ok(newer) = beat.try_recv() {
             let header = header(&shared, number).answer(FrameStatus::Superseded, 0, 1.0);
-            ear.take(Instant::now(), &Heard::Frame(header, Bytes::new()));
+            ear.frame(Instant::now(), &header, &[]);
             number = newer;
         }
         if number >= shared.plan.warmup {
@@ -115,7 +115,7 @@ pub(super) async fn run(
         let samples = &shared.encoded.payloads[shared.encoded.index(session, number)];
         match timeout(shared.drain, post.exchange(samples)).await {
             Ok(Ok(answer)) => {
-                ear.take(Instant::now(), &Heard::Frame(answer.header(header), answer.samples));
+                ear.frame(Instant::now(), &answer.header(header), &answer.samples);
             }
             Ok(Err(reason)) => ear.refused(number, &reason),
             // Lost; what comes on this connection from now on belongs to no request.

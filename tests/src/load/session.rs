@@ -1,17 +1,23 @@
-//! One session under load: a task that sends, a task that hears.
+//! One session under load: a thread that sends, a thread that hears.
 
 use std::{
     sync::Arc,
+    thread,
     time::{Duration, Instant},
 };
 
-use papilla_proto::{FrameHeader, FrameStatus, Window};
-use tokio::{sync::mpsc::UnboundedReceiver, time::timeout_at};
+use papilla_proto::{FrameHeader, FrameStatus, SessionError, Window};
 
 use super::{
-    TOLERANCE, content::Encoded, pacer::Plan, tally::Tally, tally::Times, verify::Reference,
+    TOLERANCE,
+    content::Encoded,
+    pacer::Plan,
+    tally::Tally,
+    tally::Times,
+    verify::Reference,
+    wire::{Hearer, Mouth, Said},
 };
-use crate::socket::{Heard, Receiver, Sender, SocketError, frame};
+use crate::socket::SocketError;
 
 /// What all sessions share.
 #[derive(Debug)]
@@ -27,39 +33,40 @@ pub(super) struct Shared {
     pub(super) drain: Duration,
 }
 
-/// Runs one session to its end.
-pub(super) async fn run(
-    shared: Arc<Shared>,
-    session: usize,
-    sender: Sender,
-    receiver: Receiver,
-    beat: UnboundedReceiver<u32>,
-) -> Tally {
-    let sending = tokio::spawn(send(Arc::clone(&shared), session, sender, beat));
-    let mut ear = Ear::new(&shared, session);
-    ear.listen(receiver).await;
-    let mut tally = ear.tally();
-    match sending.await {
-        Ok((mut sender, send_delay)) => {
-            tally.send_delay = send_delay;
-            sender.close().await;
+/// Runs one session to its end: hears here, sends on a thread beside.
+pub(super) fn run(shared: &Shared, session: usize, mouth: Mouth, mut hearer: Hearer) -> Tally {
+    let mut ear = Ear::new(shared, session);
+    let sent = thread::scope(|scope| {
+        let sending = scope.spawn(|| send(shared, session, mouth));
+        ear.listen(&mut hearer);
+        if ear.outstanding > 0 {
+            // The other thread may wait for a server that reads no more.
+            hearer.end();
         }
-        Err(error) => tally.ended.push(format!("session {session}: {error}")),
+        sending.join()
+    });
+    let mut tally = ear.tally();
+    match sent {
+        Ok((mut mouth, delay)) => {
+            mouth.close();
+            tally.send_delay = delay;
+        }
+        Err(_) => tally.ended.push(format!("session {session}: the sending thread panicked")),
     }
     tally
 }
 
-/// Sends each frame when its time has come.
-async fn send(
-    shared: Arc<Shared>,
-    session: usize,
-    mut sender: Sender,
-    mut beat: UnboundedReceiver<u32>,
-) -> (Sender, Times) {
-    let Shared { plan, encoded, .. } = shared.as_ref();
+/// Sends each frame when its time has come; the timers of an async runtime are good to a
+/// millisecond only.
+fn send(shared: &Shared, session: usize, mut mouth: Mouth) -> (Mouth, Times) {
+    let Shared { plan, encoded, .. } = shared;
     let mut delay = Times::default();
-    while let Some(number) = beat.recv().await {
+    for number in 0..plan.frames {
         let intended = plan.intended(session, number);
+        let wait = intended.saturating_duration_since(Instant::now());
+        if !wait.is_zero() {
+            thread::sleep(wait);
+        }
         // Comes back with the answer: the listener counts from it.
         let time_us = plan.start.elapsed().as_micros() as u64;
         let mut header =
@@ -67,17 +74,15 @@ async fn send(
         if shared.version > 1 {
             header = header.windowed(Window::WHOLE);
         }
-        let payload = &encoded.payloads[encoded.index(session, number)];
-        let message = frame(&header, payload);
         if number >= plan.warmup {
             delay.record(intended.elapsed());
         }
         // Err: the listener hears of it too, and says why.
-        if sender.send(message).await.is_err() {
+        if mouth.send(&header, &encoded.payloads[encoded.index(session, number)]).is_err() {
             break;
         }
     }
-    (sender, delay)
+    (mouth, delay)
 }
 
 /// Hears the answers of one session.
@@ -112,15 +117,16 @@ impl<'a> Ear<'a> {
     }
 
     /// Until every frame is answered, the session ends, or nothing comes any more.
-    async fn listen(&mut self, mut receiver: Receiver) {
+    fn listen(&mut self, hearer: &mut Hearer) {
         let Shared { plan, drain, .. } = self.shared;
         let last = plan.intended(self.session, plan.frames - 1) + *drain;
         while self.outstanding > 0 {
-            match timeout_at(last.into(), receiver.hear()).await {
-                Ok(Ok(heard)) => self.take(Instant::now(), &heard),
-                Ok(Err(error)) => return self.end(&error),
+            match hearer.hear(last) {
+                Ok(Some((now, Said::Frame(header, payload)))) => self.frame(now, &header, payload),
+                Ok(Some((_, Said::Error(error)))) => self.error(&error),
+                Err(error) => return self.end(&error),
                 // What is outstanding is lost.
-                Err(_) => return,
+                Ok(None) => return,
             }
         }
     }
@@ -129,21 +135,17 @@ impl<'a> Ear<'a> {
         self.tally.ended.push(format!("session {}: {error}", self.session));
     }
 
-    pub(super) fn take(&mut self, now: Instant, heard: &Heard) {
-        match heard {
-            Heard::Frame(header, payload) => self.frame(now, header, payload),
-            Heard::Error(error) => {
-                if error.sequence.is_none_or(|number| self.settle(number)) {
-                    *self.tally.errors.entry(error.code.to_string()).or_default() += 1;
-                }
-                if error.closes {
-                    self.tally.ended.push(format!("session {}: {}", self.session, error.message));
-                }
-            }
+    fn error(&mut self, error: &SessionError) {
+        if error.sequence.is_none_or(|number| self.settle(number)) {
+            *self.tally.errors.entry(error.code.to_string()).or_default() += 1;
+        }
+        if error.closes {
+            self.tally.ended.push(format!("session {}: {}", self.session, error.message));
         }
     }
 
-    fn frame(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
+    /// Takes an answer.
+    pub(super) fn frame(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
         let number = header.sequence;
         let counts = self.settle(number);
         if header.status == FrameStatus::Ok {

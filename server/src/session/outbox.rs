@@ -1,0 +1,116 @@
+//! What a session sends, whoever sends it: the task of the connection or the thread that rendered.
+
+use std::{
+    collections::VecDeque,
+    io,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use bytes::Bytes;
+use tokio::{net::TcpStream, sync::Notify};
+
+/// Room for messages that the system has no room for. The task reads nothing while one is left, so
+/// there are never more than the task's own last words and two answers of threads.
+const LEFT: usize = 8;
+
+/// The way out of a session. Whole messages go in; they leave in that order.
+///
+/// Whoever sends writes at once what the system takes, without waiting: an answer then costs no
+/// wake-up of the task. What is left is the task's to write.
+#[derive(Debug)]
+pub(super) struct Outbox {
+    /// None: only the task can write (TLS).
+    stream: Option<Arc<TcpStream>>,
+    state: Mutex<State>,
+    /// Told when the task has something to do.
+    pub(super) call: Notify,
+}
+
+#[derive(Debug)]
+struct State {
+    left: VecDeque<Bytes>,
+    broken: Option<String>,
+}
+
+impl Outbox {
+    pub(super) fn new(stream: Option<Arc<TcpStream>>) -> Self {
+        let state = State { left: VecDeque::with_capacity(LEFT), broken: None };
+        Self { stream, state: Mutex::new(state), call: Notify::new() }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change below leaves the state whole, so a poisoned lock is usable.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sends a message, now or as soon as there is room.
+    pub(super) fn send(&self, message: &Bytes) {
+        self.put(message, |from| message.slice(from..));
+    }
+
+    /// Sends a message that is copied only if there is no room for it.
+    pub(super) fn send_copy(&self, message: &[u8]) {
+        self.put(message, |from| Bytes::copy_from_slice(&message[from..]));
+    }
+
+    fn put(&self, message: &[u8], rest: impl FnOnce(usize) -> Bytes) {
+        let mut state = self.state();
+        if state.broken.is_some() {
+            return;
+        }
+        let mut written = 0;
+        if let Some(stream) = self.stream.as_ref().filter(|_| state.left.is_empty()) {
+            match write(stream, message) {
+                Ok(n) => written = n,
+                Err(error) => state.broken = Some(error.to_string()),
+            }
+        }
+        if state.broken.is_none() && written < message.len() {
+            state.left.push_back(rest(written));
+        }
+        let is_done = state.left.is_empty() && state.broken.is_none();
+        drop(state);
+        if !is_done {
+            self.call.notify_one();
+        }
+    }
+
+    /// Writes what is left as far as there is room; true once nothing is left.
+    ///
+    /// # Errors
+    /// The connection is broken, in words.
+    pub(super) fn go_on(&self) -> Result<bool, String> {
+        let mut state = self.state();
+        if let Some(error) = &state.broken {
+            return Err(error.clone());
+        }
+        let Some(stream) = &self.stream else { return Ok(state.left.is_empty()) };
+        while let Some(mut message) = state.left.pop_front() {
+            let written = write(stream, &message).map_err(|error| error.to_string())?;
+            if written < message.len() {
+                state.left.push_front(message.split_off(written));
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// The next message that is left, for a task that writes by itself.
+    pub(super) fn take(&self) -> Option<Bytes> {
+        self.state().left.pop_front()
+    }
+}
+
+/// Writes as much as there is room for.
+fn write(stream: &TcpStream, bytes: &[u8]) -> io::Result<usize> {
+    let mut written = 0;
+    while written < bytes.len() {
+        match stream.try_write(&bytes[written..]) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(n) => written += n,
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(written)
+}
