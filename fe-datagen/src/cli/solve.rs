@@ -1,6 +1,7 @@
 //! `solve`: one scene, with everything that can be looked at.
 
 use super::{CHECKS_FAILED, print};
+use crate::contact::ContactRule;
 use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
 use crate::output::map_image::{MapView, Quantity, white_of};
 use crate::output::npz::NpzBuilder;
@@ -57,6 +58,8 @@ struct Increment {
     stored_energy_mj: f64,
     /// Share of the volume beyond the calibrated stretches of its law.
     outside_calibration: f64,
+    /// Where on the skin the indenter was felt.
+    contact: ContactRule,
     checks: Checks,
     /// Block of the mesh and element in it where J is smallest.
     j_min_at: [usize; 2],
@@ -184,6 +187,7 @@ fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Incremen
         sed_epidermis_j_per_m3_max: max(&record.sed_epidermis_mpa),
         stored_energy_mj: report.stored_mj,
         outside_calibration: record.outside_calibration,
+        contact: record.contact,
         checks: record.checks,
         j_min_at: report.j_min_at,
         condition_at_least: Some(report.condition_at_least).filter(|c| c.is_finite()),
@@ -294,6 +298,9 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
+        if i.contact == ContactRule::Faces {
+            text += "         contact within faces: the indenter is too narrow for their nodes\n";
+        }
         if i.outside_calibration > 0.0 {
             let percent = 100.0 * i.outside_calibration;
             text += &format!("         {percent:.2} % of the volume beyond calibrated stretches\n");

@@ -1,5 +1,6 @@
 //! Records and an atlas for tests of the file formats; no physics in them.
 
+use crate::contact::ContactRule;
 use crate::press::record::{Checks, IncrementRecord, Pose};
 use papilla_proto::atlas::{Atlas, PatchVertices};
 
@@ -24,6 +25,7 @@ pub(crate) fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> In
         sed_epidermis_mpa: field(0.003),
         shear_mpa: Vec::new(),
         outside_calibration: 0.0,
+        contact: ContactRule::Nodes,
         checks: Checks {
             residual_relative: 1e-9,
             contact_force_vs_pressure_integral: 1e-4,

@@ -327,6 +327,7 @@ impl Body {
             sed_epidermis_mpa,
             shear_mpa,
             outside_calibration: self.outside_calibration(solver),
+            contact: solver.contact_rule(),
             checks: Checks {
                 residual_relative: report.residual_relative,
                 contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),

@@ -3,12 +3,8 @@
 use super::body::{Body, PressError};
 use super::record::{IncrementRecord, Pose};
 use crate::contact::ContactRule;
-use crate::indenter::{
-    IndenterError, Placement, Plate, RoundedPlate, SignedDistance, first_touch_travel,
-};
-use crate::mesh::Mesh;
-use crate::mesh::surface::norm;
-use crate::solve::{Effort, Loading, MovingIndenter, Solver, StepReport};
+use crate::indenter::{Plate, RoundedPlate, SignedDistance};
+use crate::solve::{Effort, Loading, Solver, StepReport};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -86,174 +82,14 @@ impl DrivePoint {
 /// Called with the solver at each stored equilibrium.
 pub type Visit<'a> = &'a mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport);
 
-/// How often the path between stored states is made finer for the work integral.
-const REFINEMENTS: [u32; 3] = [1, 2, 4];
-
 /// Farthest that a prescribed force is looked for, mm.
-const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
-/// Part of a face's width that may be in the indenter before a node touches: a ball as wide
-/// as four faces has a sixteenth, a knife comes to a half.
-const UNSEEN_MAX: f64 = 0.4;
-/// Least width of an indenter that nodes lead, in distances of nodes: rows of them slip off a
-/// narrower one.
-const LED_BY_NODES_MIN: f64 = 2.5;
+pub(super) const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
 /// How closely a prescribed force is met.
 const FORCE_TOLERANCE: f64 = 1e-4;
 /// Equilibria tried for one prescribed force.
 const FORCE_TRIES_MAX: u32 = 60;
 
 impl Body {
-    /// The indenter at first touch, on its way.
-    ///
-    /// # Errors
-    /// [`PressError::Indenter`] if it never touches.
-    pub fn indenter(
-        &self,
-        approach: &Approach,
-        drive: &Drive,
-    ) -> Result<MovingIndenter, PressError> {
-        let rotation = self.rotation(approach.pose);
-        let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
-        let (x, y, normal) = (axis(0), axis(1), axis(2));
-        let along = |p: &[f64; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
-        let first = first_touch(&self.problem.mesh, &self.contact, along);
-        let [a, b] = approach.offset_mm;
-        let mut start = Placement {
-            rotation,
-            origin_mm: std::array::from_fn(|i| {
-                first[i] - approach.top_mm * normal[i] + a * x[i] + b * y[i]
-            }),
-        };
-        let contact =
-            approach.contact.unwrap_or_else(|| self.contact_rule(approach, LED_BY_NODES_MIN));
-        let points = self.contact_points_mm(contact);
-        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)?;
-        // A plate's face is there already, to rounding.
-        if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
-            for i in 0..3 {
-                start.origin_mm[i] += travel * normal[i];
-            }
-        }
-        self.sees(approach.shape.as_ref(), &start)?;
-        let offset = |depth: f64, shift: [f64; 2]| -> [f64; 3] {
-            std::array::from_fn(|i| depth * normal[i] + shift[0] * x[i] + shift[1] * y[i])
-        };
-        let straight = |travel: f64| vec![(1.0, normal.map(|v| v * travel))];
-        let path = match drive {
-            Drive::Depths(depths) => straight(depths.last().copied().unwrap_or(0.0)),
-            Drive::Forces(_) => straight(FORCE_TRAVEL_MAX_MM),
-            Drive::Path(points) => {
-                let end = points.last().map_or(1.0, |p| p.time_s);
-                points.iter().map(|p| (p.time_s / end, offset(p.depth_mm, p.shift_mm))).collect()
-            }
-        };
-        Ok(MovingIndenter { shape: approach.shape.clone(), start, path, contact })
-    }
-
-    /// Where on the skin an indenter is to be felt: within faces if it is narrower than `wide`
-    /// distances of nodes; at nodes if it is not, or so narrow that faces would lose it too.
-    fn contact_rule(&self, approach: &Approach, wide: f64) -> ContactRule {
-        let Some(contact) = &self.problem.contact else { return ContactRule::Nodes };
-        let spacings = approach.shape.narrowest_mm() / contact.spacing_mm();
-        if (1.0..wide).contains(&spacings) { ContactRule::Faces } else { ContactRule::Nodes }
-    }
-
-    /// Undeformed points of the skin that can touch, mm.
-    fn contact_points_mm(&self, rule: ContactRule) -> Vec<[f64; 3]> {
-        let at = &self.problem.mesh.nodes;
-        match &self.problem.contact {
-            Some(c) if rule == ContactRule::Faces => {
-                c.points(rule).iter().map(|(support, _)| support.of(|n| at[n])).collect()
-            }
-            _ => self.problem.mesh.surfaces[&self.contact]
-                .nodes()
-                .iter()
-                .map(|&n| at[n as usize])
-                .collect(),
-        }
-    }
-
-    /// Refuses an indenter of which, at first touch of a node, a face's middle or an edge's is
-    /// already deep inside: contact is at nodes and would never see what fits between.
-    fn sees(&self, shape: &dyn SignedDistance, start: &Placement) -> Result<(), IndenterError> {
-        let mesh = &self.problem.mesh;
-        let surface = &mesh.surfaces[&self.contact];
-        let corners = surface.kind.corners();
-        let at = |n: u32| mesh.nodes[n as usize];
-        let mut worst = (0.0, 1.0);
-        let mut look = |p: [f64; 3], width: f64| {
-            let inside = -start.clearance_mm(shape, p);
-            if inside / width > worst.0 / worst.1 {
-                worst = (inside, width);
-            }
-        };
-        for face in surface.faces() {
-            let mut longest = 0.0f64;
-            for k in 0..corners {
-                let (a, b) = (at(face[k]), at(face[(k + 1) % corners]));
-                let length = norm(std::array::from_fn(|i| a[i] - b[i]));
-                look(std::array::from_fn(|i| 0.5 * (a[i] + b[i])), length);
-                longest = longest.max(length);
-            }
-            let corner = |i: usize| face[..corners].iter().map(move |&n| at(n)[i]);
-            look(std::array::from_fn(|i| corner(i).sum::<f64>() / corners as f64), longest);
-        }
-        let (by_mm, face_mm) = worst;
-        if by_mm > UNSEEN_MAX * face_mm {
-            return Err(IndenterError::FinerThanMesh { by_mm, face_mm });
-        }
-        Ok(())
-    }
-
-    /// Presses, keeps something of each stored state (`keep` is told its number and may be
-    /// told again), and takes the press again on a finer path as long as energy and work
-    /// part by more than `energy_vs_work_max`: the states are the same there, the work
-    /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
-    /// off the indenter, and energy with them: it is pressed again, felt within faces, if
-    /// it is wide enough for that. States before an error are kept.
-    ///
-    /// # Errors
-    /// As [`Self::press`], beside what was kept.
-    pub fn press_balanced<T>(
-        &self,
-        solver: &mut Solver<'_>,
-        approach: &Approach,
-        drive: &Drive,
-        energy_vs_work_max: f64,
-        keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
-    ) -> (Vec<T>, Result<(), PressError>) {
-        let mut press = |approach: &Approach| {
-            let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
-            let mut balanced = false;
-            for refinement in REFINEMENTS {
-                kept.clear();
-                balanced = true;
-                pressed = self.press(solver, approach, drive, refinement, &mut |s, record, r| {
-                    balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
-                    kept.push(keep(kept.len(), s, record, r));
-                });
-                if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
-                    break;
-                }
-            }
-            (balanced, kept, pressed)
-        };
-        let (balanced, kept, pressed) = press(approach);
-        let slips = match &pressed {
-            Ok(()) => !balanced && matches!(drive, Drive::Depths(_)),
-            Err(error) => matches!(error, PressError::Solve { .. } | PressError::Slipped { .. }),
-        };
-        let wide = [LED_BY_NODES_MIN, f64::INFINITY].map(|w| self.contact_rule(approach, w));
-        if !slips || approach.contact.is_some() || wide != [ContactRule::Nodes, ContactRule::Faces]
-        {
-            return (kept, pressed);
-        }
-        tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
-        let within_faces = Approach { contact: Some(ContactRule::Faces), ..approach.clone() };
-        let (_, kept, pressed) = press(&within_faces);
-        (kept, pressed)
-    }
-
     /// Presses and calls `visit` with the solver at each stored equilibrium and
     /// its record. There are more equilibria than stored depths, for the work integral;
     /// `refinement` 2 halves their distance, and so on. The stored states do
@@ -450,17 +286,4 @@ fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
     }
     path.pop();
     path
-}
-
-/// Skin point with the smallest `along`; where several tie (a flat plate on a
-/// symmetric finger), their mean, so that a mirrored pose touches at the mirror
-/// image.
-fn first_touch(mesh: &Mesh, contact: &str, along: impl Fn(&[f64; 3]) -> f64) -> [f64; 3] {
-    let nodes = mesh.surfaces[contact].nodes();
-    let points: Vec<_> = nodes.iter().map(|&n| mesh.nodes[n as usize]).collect();
-    let least = points.iter().map(&along).fold(f64::INFINITY, f64::min);
-    let scale = points.iter().map(|p| norm(*p)).fold(0.0, f64::max);
-    let touching: Vec<_> = points.iter().filter(|p| along(p) <= least + 1e-12 * scale).collect();
-    let count = touching.len() as f64;
-    std::array::from_fn(|i| touching.iter().map(|p| p[i]).sum::<f64>() / count)
 }

@@ -1,5 +1,6 @@
 //! One press: a body, an indenter on its way, and what is recorded.
 
+mod balanced;
 pub mod body;
 pub mod drive;
 pub mod fields;
@@ -10,6 +11,7 @@ pub mod section;
 pub mod setup;
 mod skin;
 pub mod study;
+mod touch;
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! What one press hands to those who store it: checks, pose and vertex values.
 
+use crate::contact::ContactRule;
 use serde::{Deserialize, Serialize};
 
 /// Self-checks of one equilibrium; dimensionless unless the name says otherwise.
@@ -52,6 +53,8 @@ pub struct IncrementRecord {
     /// Share of the volume that has left the stretches to which its law was fitted;
     /// 0 for laws that hold anywhere.
     pub outside_calibration: f64,
+    /// Where on the skin the indenter was felt.
+    pub contact: ContactRule,
     /// Self-checks of this equilibrium.
     pub checks: Checks,
     /// Wall time of this increment, s.

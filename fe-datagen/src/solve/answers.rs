@@ -20,6 +20,12 @@ impl<'a> Solver<'a> {
         self.newton.problem
     }
 
+    /// Where on the skin contact is found.
+    #[must_use]
+    pub fn contact_rule(&self) -> ContactRule {
+        self.loading.contact()
+    }
+
     /// Nominal traction of each contact node, MPa per undeformed area.
     #[must_use]
     pub fn traction_mpa(&self) -> Vec<f64> {
@@ -29,7 +35,7 @@ impl<'a> Solver<'a> {
 
     /// What contact points carry, as tractions of the contact nodes with the same force.
     fn at_contact_nodes<const N: usize>(&self, found: Vec<[f64; N]>) -> Vec<[f64; N]> {
-        let rule = self.loading.contact();
+        let rule = self.contact_rule();
         match &self.newton.problem.contact {
             Some(c) if rule == ContactRule::Faces => {
                 c.points(rule).to_nodes(&found, &c.nodes, &c.area_mm2)
@@ -161,7 +167,7 @@ impl<'a> Solver<'a> {
             return push;
         };
         let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
-        let rule = self.loading.contact();
+        let rule = self.contact_rule();
         if rule == ContactRule::Nodes {
             for n in surface.nodes() {
                 push[n as usize] = normal(x[n as usize]);

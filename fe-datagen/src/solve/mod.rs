@@ -1,6 +1,7 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
 mod answers;
+mod augmented;
 mod effort;
 pub(crate) mod evaluate;
 mod free;

@@ -12,9 +12,6 @@ use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionPoint, FrictionTrial};
 use crate::element::{Dilatation, Memory};
 
-/// Least share of its way that the friction bound goes in one update.
-const RELAX_MIN: f64 = 0.1;
-
 /// Least load fraction of a time step: what relaxes within it has relaxed at its end, and
 /// its history is exact for what changes linearly.
 const PACE_MIN: f64 = 1e-9;
@@ -38,11 +35,11 @@ pub(super) struct State {
     pub u: Vec<[f64; 3]>,
     /// Dilatation of each element that is carried along; empty if none is.
     pub carried: Vec<Dilatation>,
-    multipliers: Vec<f64>,
+    pub multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
     pub memory: Vec<f64>,
     /// Tangential contact; no points without friction.
-    friction: FrictionTrial,
+    pub friction: FrictionTrial,
 }
 
 /// A place to go back to, see [`Solver::mark`].
@@ -320,7 +317,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Time from the last equilibrium to `next`, s.
-    fn seconds(&self, next: f64) -> f64 {
+    pub(super) fn seconds(&self, next: f64) -> f64 {
         (next - self.state.fraction) * self.loading.duration_s
     }
 
@@ -358,67 +355,5 @@ impl<'a> Solver<'a> {
         for &(dof, value) in &self.loading.prescribed_mm {
             u[dof / 3][dof % 3] = fraction * value;
         }
-    }
-
-    /// Equilibrium with contact multipliers updated until gaps close and, with
-    /// friction, tangential tractions settle.
-    fn augmented(&mut self, fraction: f64, trial: &mut State) -> Result<(), StepError> {
-        let options = self.newton.options;
-        let dt_s = self.seconds(fraction);
-        let rubs = !trial.friction.points.is_empty();
-        let problem = self.newton.problem;
-        let bound = |relax: f64, trial: &mut State| {
-            let State { u, multipliers, friction, .. } = trial;
-            rubbing::bound(problem, &self.loading, fraction, u, multipliers, relax, friction);
-        };
-        bound(1.0, trial);
-        let (mut relax, mut last_change) = (1.0f64, f64::INFINITY);
-        let updates = if rubs { options.friction_updates_max } else { options.augmentations_max };
-        let by_penalty = !self.loading.contact().has_multipliers();
-        // The first equilibrium only serves to update the multipliers.
-        let mut tolerance = match by_penalty && !rubs {
-            true => options.residual_tolerance,
-            false => 1e-3f64.max(options.residual_tolerance),
-        };
-        for update in 0..=updates {
-            let (multipliers, u, carried) = (&trial.multipliers, &mut trial.u, &mut trial.carried);
-            let fixed = Fixed {
-                loading: &self.loading,
-                load_fraction: fraction,
-                multipliers,
-                memory: Memory { history: &trial.memory, dt_s },
-                friction: rubs.then_some(&trial.friction),
-            };
-            self.newton.equilibrate(tolerance, fixed, u, carried)?;
-            let e = &self.newton.current;
-            let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
-            let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;
-            if closes(e.gap_error_mm) && !exact {
-                self.newton.equilibrate(options.residual_tolerance, fixed, u, carried)?;
-            }
-            let closed = closes(self.newton.current.gap_error_mm);
-            let change = rubbing::change(&trial.friction, &self.newton.current);
-            if closed && change <= options.friction_tolerance {
-                return Ok(());
-            }
-            if update < updates {
-                tolerance = options.residual_tolerance;
-                let e = &self.newton.current;
-                trial.multipliers.copy_from_slice(&e.traction_mpa);
-                rubbing::update(&mut trial.friction, e);
-                if change > 0.9 * last_change {
-                    relax = (0.5 * relax).max(RELAX_MIN);
-                }
-                last_change = change;
-                bound(relax, trial);
-                self.newton.effort.augmentations += 1;
-            }
-        }
-        let gap_mm = self.newton.current.gap_error_mm;
-        Err(if rubs && (by_penalty || gap_mm <= options.gap_tolerance_mm) {
-            StepError::Friction { updates, change: last_change }
-        } else {
-            StepError::Contact { augmentations: updates, gap_mm }
-        })
     }
 }

@@ -1,0 +1,59 @@
+//! A press whose energy balances: taken again where its path was too coarse or its nodes slipped.
+
+use super::body::{Body, PressError};
+use super::drive::{Approach, Drive};
+use super::record::IncrementRecord;
+use crate::contact::ContactRule;
+use crate::solve::{Solver, StepReport};
+
+/// How often the path between stored states is made finer for the work integral.
+const REFINEMENTS: [u32; 3] = [1, 2, 4];
+
+impl Body {
+    /// Presses, keeps something of each stored state (`keep` is told its number and may be
+    /// told again), and takes the press again on a finer path as long as energy and work
+    /// part by more than `energy_vs_work_max`: the states are the same there, the work
+    /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
+    /// off the indenter, and energy with them: it is pressed again, felt within faces, if
+    /// it is wide enough for that. States before an error are kept.
+    ///
+    /// # Errors
+    /// As [`Self::press`], beside what was kept.
+    pub fn press_balanced<T>(
+        &self,
+        solver: &mut Solver<'_>,
+        approach: &Approach,
+        drive: &Drive,
+        energy_vs_work_max: f64,
+        keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
+    ) -> (Vec<T>, Result<(), PressError>) {
+        let mut press = |approach: &Approach| {
+            let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
+            let mut balanced = false;
+            for refinement in REFINEMENTS {
+                kept.clear();
+                balanced = true;
+                pressed = self.press(solver, approach, drive, refinement, &mut |s, record, r| {
+                    balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
+                    kept.push(keep(kept.len(), s, record, r));
+                });
+                if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
+                    break;
+                }
+            }
+            (balanced, kept, pressed)
+        };
+        let (balanced, kept, pressed) = press(approach);
+        let slips = match &pressed {
+            Ok(()) => !balanced && matches!(drive, Drive::Depths(_)),
+            Err(error) => matches!(error, PressError::Solve { .. } | PressError::Slipped { .. }),
+        };
+        if !(slips && self.could_be_felt_within_faces(approach)) {
+            return (kept, pressed);
+        }
+        tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
+        let within_faces = Approach { contact: Some(ContactRule::Faces), ..approach.clone() };
+        let (_, kept, pressed) = press(&within_faces);
+        (kept, pressed)
+    }
+}
