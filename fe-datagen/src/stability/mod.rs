@@ -118,9 +118,10 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "sharp-wedge",
-        promise: "An edge of 2 mm across faces of 1 and .75 mm keeps its hold: it balances, to the \
-                  force of a finer mesh. Wedges with tips of .05 and .005 mm balance, or are refused with the depth that \
-                  was not reached; one that fits between nodes is refused before anything is solved.",
+        promise: "An edge of 2 mm across faces of 1 and .73 mm keeps its hold: it balances, to the \
+                  force of a finer mesh. Wedges with tips of .05 and .005 mm balance, or are \
+                  refused with the depth that was not reached; one that fits between nodes is \
+                  refused before anything is solved.",
         run: edges::run,
     },
     Case {
