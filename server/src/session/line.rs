@@ -207,7 +207,7 @@ impl Line {
         };
         let mut payload = BytesMut::from(&code.to_be_bytes()[..]);
         payload.extend_from_slice(reason.as_bytes());
-        self.reply.out.send(&wire::frame(opcode::CLOSE, &payload));
+        self.reply.out.send_last(&wire::frame(opcode::CLOSE, &payload));
         if self.flush().await.is_err() || matches!(end, End::Client(_)) {
             return;
         }

@@ -30,11 +30,14 @@ pub(super) struct Outbox {
 struct State {
     left: VecDeque<Bytes>,
     broken: Option<String>,
+    /// The last message is in: nothing may follow it.
+    is_closed: bool,
 }
 
 impl Outbox {
     pub(super) fn new(stream: Option<Arc<TcpStream>>) -> Self {
-        let state = State { left: VecDeque::with_capacity(LEFT), broken: None };
+        let left = VecDeque::with_capacity(LEFT);
+        let state = State { left, broken: None, is_closed: false };
         Self { stream, state: Mutex::new(state), call: Notify::new() }
     }
 
@@ -45,19 +48,26 @@ impl Outbox {
 
     /// Sends a message, now or as soon as there is room.
     pub(super) fn send(&self, message: &Bytes) {
-        self.put(message, |from| message.slice(from..));
+        self.put(message, false, |from| message.slice(from..));
+    }
+
+    /// Sends the message that closes the session. An answer that a thread has ready later is
+    /// dropped: a client must hear nothing after the close (RFC 6455, section 5.5.1).
+    pub(super) fn send_last(&self, message: &Bytes) {
+        self.put(message, true, |from| message.slice(from..));
     }
 
     /// Sends a message that is copied only if there is no room for it.
     pub(super) fn send_copy(&self, message: &[u8]) {
-        self.put(message, |from| Bytes::copy_from_slice(&message[from..]));
+        self.put(message, false, |from| Bytes::copy_from_slice(&message[from..]));
     }
 
-    fn put(&self, message: &[u8], rest: impl FnOnce(usize) -> Bytes) {
+    fn put(&self, message: &[u8], is_last: bool, rest: impl FnOnce(usize) -> Bytes) {
         let mut state = self.state();
-        if state.broken.is_some() {
+        if state.broken.is_some() || state.is_closed {
             return;
         }
+        state.is_closed = is_last;
         let mut written = 0;
         if let Some(stream) = self.stream.as_ref().filter(|_| state.left.is_empty()) {
             match write(stream, message) {
@@ -113,4 +123,21 @@ fn write(stream: &TcpStream, bytes: &[u8]) -> io::Result<usize> {
         }
     }
     Ok(written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_follows_the_close() {
+        let out = Outbox::new(None);
+        out.send(&Bytes::from_static(b"map"));
+        out.send_last(&Bytes::from_static(b"close"));
+        out.send(&Bytes::from_static(b"pong"));
+        out.send_copy(b"late map");
+        out.send_last(&Bytes::from_static(b"close again"));
+        let sent: Vec<_> = std::iter::from_fn(|| out.take()).collect();
+        assert_eq!(sent, ["map", "close"]);
+    }
 }
