@@ -72,6 +72,8 @@ function makeWorld() {
   const camera = new PerspectiveCamera(50, 1, 0.05, 20);
   camera.position.set(0, 1.55, 0.75);
   camera.lookAt(0, 1.25, -0.9);
+  // The mouse may point before anything is drawn, and only drawing would bring this up to date.
+  camera.updateMatrixWorld();
   const scene = new Scene();
   scene.background = new Color(0x20242a);
   scene.add(new HemisphereLight(0xffffff, 0x556070, 2));
