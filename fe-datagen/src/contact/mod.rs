@@ -21,10 +21,6 @@ use std::collections::BTreeMap;
 /// Nodes that may touch, with their share of the undeformed area, `integral N_a dA`.
 #[derive(Clone, Debug)]
 pub struct ContactSurface {
-    /// Mesh nodes, sorted.
-    pub nodes: Vec<u32>,
-    /// Nodal area, mm2.
-    pub area_mm2: Vec<f64>,
     at_nodes: ContactPoints,
     in_faces: ContactPoints,
 }
@@ -43,17 +39,29 @@ impl ContactSurface {
             .map(|n| (n, area[n as usize]))
             .filter(|&(_, a)| a > 0.0)
             .collect();
-        let nodes: Vec<_> = by_node.keys().copied().collect();
-        let area_mm2: Vec<_> = by_node.into_values().collect();
-        let at_nodes = ContactPoints::nodes(&nodes, &area_mm2);
-        let in_faces = ContactPoints::faces(surface, positions, &nodes);
-        Self { nodes, area_mm2, at_nodes, in_faces }
+        let (nodes, area_mm2) = by_node.into_iter().unzip();
+        let at_nodes = ContactPoints::nodes(nodes, area_mm2);
+        let in_faces = ContactPoints::faces(surface, positions, &at_nodes.node);
+        Self { at_nodes, in_faces }
+    }
+
+    /// Mesh nodes, sorted.
+    #[must_use]
+    pub fn nodes(&self) -> &[u32] {
+        &self.at_nodes.node
+    }
+
+    /// Nodal area, mm2.
+    #[must_use]
+    pub fn area_mm2(&self) -> &[f64] {
+        &self.at_nodes.area_mm2
     }
 
     /// Distance of neighbours, mm: the side of the square of a node's mean area.
     #[must_use]
     pub fn spacing_mm(&self) -> f64 {
-        let mean_area = self.area_mm2.iter().sum::<f64>() / self.area_mm2.len().max(1) as f64;
+        let area = self.area_mm2();
+        let mean_area = area.iter().sum::<f64>() / area.len().max(1) as f64;
         mean_area.sqrt()
     }
 

@@ -2,7 +2,6 @@
 
 use crate::mesh::Surface;
 use crate::mesh::surface::norm;
-use std::collections::BTreeMap;
 
 /// Where on the skin contact is looked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -31,7 +30,7 @@ impl ContactRule {
 pub struct ContactPoints {
     /// End of each point's entries in `node` and `value`.
     end: Vec<u32>,
-    node: Vec<u32>,
+    pub(super) node: Vec<u32>,
     value: Vec<f64>,
     /// Share of the undeformed area, mm2.
     pub area_mm2: Vec<f64>,
@@ -63,12 +62,12 @@ impl Support<'_> {
 
 impl ContactPoints {
     /// One point a node.
-    pub(super) fn nodes(nodes: &[u32], area_mm2: &[f64]) -> Self {
+    pub(super) fn nodes(nodes: Vec<u32>, area_mm2: Vec<f64>) -> Self {
         Self {
             end: (1..=nodes.len() as u32).collect(),
-            node: nodes.to_vec(),
             value: vec![1.0; nodes.len()],
-            area_mm2: area_mm2.to_vec(),
+            node: nodes,
+            area_mm2,
         }
     }
 
@@ -121,11 +120,10 @@ impl ContactPoints {
         nodes: &[u32],
         area_mm2: &[f64],
     ) -> Vec<[f64; N]> {
-        let index: BTreeMap<u32, usize> = nodes.iter().zip(0..).map(|(&n, i)| (n, i)).collect();
         let mut nodal = vec![[0.0; N]; nodes.len()];
         for ((support, area), t) in self.iter().zip(traction) {
             for (n, v) in support.nodes.iter().zip(support.values) {
-                let Some(&at) = index.get(n) else { continue };
+                let Ok(at) = nodes.binary_search(n) else { continue };
                 for i in 0..N {
                     nodal[at][i] += v * (area / area_mm2[at]) * t[i];
                 }
@@ -184,7 +182,7 @@ mod tests {
 
     #[test]
     fn a_point_at_a_node_is_the_node() {
-        let points = ContactPoints::nodes(&[3, 7], &[0.5, 0.25]);
+        let points = ContactPoints::nodes(vec![3, 7], vec![0.5, 0.25]);
         let [x, y, z] = points.support(1).of(|n| [n as f64, 0.1, -2.0]);
         assert_eq!([x.to_bits(), y.to_bits(), z.to_bits()], [7.0, 0.1, -2.0].map(f64::to_bits));
         let traction = [[0.3], [0.7]];

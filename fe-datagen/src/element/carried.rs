@@ -129,8 +129,8 @@ mod tests {
                 let here = at(solid.as_ref(), g, &u, t);
                 let [ahead, behind] =
                     [H, -H].map(|s| at(solid.as_ref(), g, &plus(&u, s, &d), t).total_n);
-                let now = solid.next_dilatation(g, &u, &none);
-                let after = solid.next_dilatation(g, &u, &d);
+                let now = next_dilatation(g, solid.is_finite_strain(), &u, &none);
+                let after = next_dilatation(g, solid.is_finite_strain(), &u, &d);
                 let moved = std::array::from_fn(|r| t[r] + after[r] - now[r]);
                 let pushed = at(solid.as_ref(), g, &u, moved).lag_n;
                 let n = kind.nodes();
@@ -160,8 +160,8 @@ mod tests {
     ) {
         let [ahead, behind] = [H, -H].map(|s| at(solid.as_ref(), g, &plus(u, s, d), [0.0; 4]).own);
         let none = vec![[0.0; 3]; u.len()];
-        let now = solid.next_dilatation(g, u, &none);
-        let after = solid.next_dilatation(g, u, d);
+        let now = next_dilatation(g, solid.is_finite_strain(), u, &none);
+        let after = next_dilatation(g, solid.is_finite_strain(), u, d);
         let found: Vec<f64> = (0..4).map(|r| after[r] - now[r]).collect();
         let expected: Vec<f64> = (0..4).map(|r| (ahead[r] - behind[r]) / (2.0 * H)).collect();
         close(&found, &expected, what);

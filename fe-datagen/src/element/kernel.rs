@@ -111,11 +111,16 @@ pub fn evaluate<P: Points>(
     let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
     set_volumetric(force, bulk, &theta, &volume_gradient[..m * n]);
     let held = carried.as_ref().map_or(theta, |c| c.theta_minus_1);
-    let gap: Dilatation = std::array::from_fn(|r| held[r] - theta[r]);
-    if let Some(c) = carried {
-        set_volumetric(c.lag_n, bulk, &gap, &volume_gradient[..m * n]);
-    }
+    let at_point =
+        |c: &Dilatation, q: usize| -> f64 { (0..m).map(|r| c[r] * geometry.basis[q][r]).sum() };
     let mut gap_squared_mm3 = 0.0;
+    if let Some(c) = carried {
+        let gap: Dilatation = std::array::from_fn(|r| held[r] - theta[r]);
+        set_volumetric(c.lag_n, bulk, &gap, &volume_gradient[..m * n]);
+        for (q, weight) in geometry.weights.iter().enumerate() {
+            gap_squared_mm3 += weight * at_point(&gap, q).powi(2);
+        }
+    }
     let mut stiffness = stiffness;
     if let Some(s) = stiffness.as_deref_mut() {
         volumetric_stiffness(s, bulk, geometry.inverse_gram, &volume_gradient[..m * n], n, m);
@@ -124,12 +129,10 @@ pub fn evaluate<P: Points>(
         let gradients = &geometry.gradients[q * n..(q + 1) * n];
         let weight = geometry.weights[q];
         let law = law.at(q);
-        let at_point = |c: &Dilatation| (0..m).map(|r| c[r] * geometry.basis[q][r]).sum::<f64>();
-        gap_squared_mm3 += weight * at_point(&gap).powi(2);
         energy += weight * law.energy(k);
         add_times(force, weight, &law.first_piola(k), gradients);
         if let Some(s) = stiffness.as_deref_mut() {
-            let pressure = bulk * at_point(&held);
+            let pressure = bulk * at_point(&held, q);
             add_point_stiffness(s, &point_tangent(&law, k, pressure, weight), gradients);
         }
     }

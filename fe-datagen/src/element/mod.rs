@@ -8,7 +8,7 @@ pub mod reference;
 pub(crate) mod shape;
 pub mod solid;
 
-pub use carried::{Carried, Dilatation};
+pub use carried::{Carried, Dilatation, next_dilatation};
 pub use geometry::{BlockGeometry, ShapeError};
 pub use kernel::{ElementState, Inverted};
 pub use reference::ElementKind;

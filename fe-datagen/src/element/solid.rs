@@ -4,7 +4,7 @@
 //! Each combination is its own type, so an elastic body's elements run through code
 //! that has no memory in it.
 
-use super::carried::{Carried, Dilatation, next_dilatation};
+use super::carried::Carried;
 use super::geometry::ElementGeometry;
 use super::kernel::{ElementState, Inverted, evaluate};
 use crate::material::{Isochoric, Kinematics, Mat3, Prony, Relaxing, prony};
@@ -51,14 +51,6 @@ pub trait Solid: Send + Sync {
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted>;
-
-    /// Dilatation after a step, see [`next_dilatation`].
-    fn next_dilatation(
-        &self,
-        geometry: ElementGeometry<'_>,
-        u: &[[f64; 3]],
-        step: &[[f64; 3]],
-    ) -> Dilatation;
 
     /// Energy density that can be got back, MPa, at a point with this history.
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64;
@@ -160,15 +152,6 @@ impl<L: Isochoric> Solid for Elastic<L> {
         )
     }
 
-    fn next_dilatation(
-        &self,
-        geometry: ElementGeometry<'_>,
-        u: &[[f64; 3]],
-        step: &[[f64; 3]],
-    ) -> Dilatation {
-        next_dilatation(geometry, L::FINITE, u, step)
-    }
-
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, _history: &[f64]) -> f64 {
         self.law.energy(k) + 0.5 * self.bulk_mpa * theta_minus_1 * theta_minus_1
     }
@@ -243,15 +226,6 @@ impl<L: Isochoric> Solid for Viscoelastic<L> {
             #[inline(always)]
             || evaluate(geometry, &points, self.bulk_mpa, u, carried, force, stiffness),
         )
-    }
-
-    fn next_dilatation(
-        &self,
-        geometry: ElementGeometry<'_>,
-        u: &[[f64; 3]],
-        step: &[[f64; 3]],
-    ) -> Dilatation {
-        next_dilatation(geometry, L::FINITE, u, step)
     }
 
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64 {

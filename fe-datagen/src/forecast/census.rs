@@ -42,7 +42,7 @@ impl Census {
     #[must_use]
     pub fn new(scene: &Scene, setup: &Setup) -> Self {
         let problem = &setup.body.problem;
-        let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes.len());
+        let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes().len());
         let mut census = Self {
             unknowns: problem.structure.equations.count,
             tangent_entries: problem.structure.row.len(),

@@ -95,7 +95,7 @@ pub(super) fn loads(problem: &Problem, surface: &Surface, nodes: &[u32]) -> Vec<
 fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, OperatorError> {
     let mut tangent = problem.structure.zeros();
     let rest = vec![[0.0; 3]; problem.mesh.nodes.len()];
-    let multipliers = vec![0.0; problem.contact.as_ref().map_or(0, |c| c.nodes.len())];
+    let multipliers = vec![0.0; problem.contact.as_ref().map_or(0, |c| c.nodes().len())];
     let trial = Trial {
         u: &rest,
         carried: &[],

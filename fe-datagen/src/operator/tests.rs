@@ -123,7 +123,7 @@ fn press(body: &Body, depth_mm: f64) -> (IncrementRecord, Vec<f64>) {
     body.press(&mut solver, &approach, &drive, 1, keep).unwrap();
     let contact = body.problem.contact.as_ref().unwrap();
     let of_node: HashMap<u32, f64> =
-        contact.nodes.iter().copied().zip(solver.traction_mpa().iter().copied()).collect();
+        contact.nodes().iter().copied().zip(solver.traction_mpa().iter().copied()).collect();
     let skin = &body.patch.as_ref().unwrap().patch.skin;
     (last.unwrap(), skin.iter().map(|n| of_node.get(n).copied().unwrap_or(0.0)).collect())
 }

@@ -33,7 +33,7 @@ impl Body {
         let (mut pressing_n, mut touched_mm2, mut touching) = (0.0, 0.0, 0u32);
         let mut aside_n = [0.0; 3];
         for ((&n, &area_mm2), traction) in
-            contact.nodes.iter().zip(&contact.area_mm2).zip(solver.traction_mpa())
+            contact.nodes().iter().zip(contact.area_mm2()).zip(solver.traction_mpa())
         {
             let n = n as usize;
             if !(traction > 0.0) {

@@ -18,7 +18,7 @@ impl Body {
         let surface = &self.problem.mesh.surfaces[&self.contact];
         surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
         let mut shear = vec![[0.0; 3]; x.len()];
-        for ((&n, &area), t) in contact.nodes.iter().zip(&contact.area_mm2).zip(nominal) {
+        for ((&n, &area), t) in contact.nodes().iter().zip(contact.area_mm2()).zip(nominal) {
             shear[n as usize] = t.map(|v| v * area / deformed[n as usize]);
         }
         nodes.iter().map(|&n| shear[n as usize]).collect()

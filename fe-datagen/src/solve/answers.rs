@@ -38,7 +38,7 @@ impl<'a> Solver<'a> {
         let rule = self.contact_rule();
         match &self.newton.problem.contact {
             Some(c) if rule == ContactRule::Faces => {
-                c.points(rule).to_nodes(&found, &c.nodes, &c.area_mm2)
+                c.points(rule).to_nodes(&found, c.nodes(), c.area_mm2())
             }
             _ => found,
         }
@@ -125,7 +125,7 @@ impl<'a> Solver<'a> {
         let mut pressure = vec![0.0; x.len()];
         if let Some(contact) = &problem.contact {
             let traction = self.traction_mpa();
-            for ((&n, &area), t) in contact.nodes.iter().zip(&contact.area_mm2).zip(traction) {
+            for ((&n, &area), t) in contact.nodes().iter().zip(contact.area_mm2()).zip(traction) {
                 pressure[n as usize] = t * area / deformed[n as usize];
             }
         }
@@ -141,7 +141,7 @@ impl<'a> Solver<'a> {
         pressure: &[f64],
     ) -> [f64; 3] {
         let x = self.deformed();
-        let push = self.push_directions(surface, &x);
+        let push = self.push_directions(surface, pressure, &x);
         let traction: Vec<[f64; 3]> =
             push.iter().zip(pressure).map(|(d, p)| d.map(|v| v * p)).collect();
         let mut total = [0.0; 3];
@@ -160,7 +160,12 @@ impl<'a> Solver<'a> {
     /// Direction in which the indenter pushes, at every mesh node of the surface that it
     /// presses: its normal, or the mean of its normals at contact points around, weighted
     /// by their forces (shorter than 1 where these differ).
-    fn push_directions(&self, surface: &crate::mesh::Surface, x: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    fn push_directions(
+        &self,
+        surface: &crate::mesh::Surface,
+        pressure: &[f64],
+        x: &[[f64; 3]],
+    ) -> Vec<[f64; 3]> {
         let mut push = vec![[0.0; 3]; x.len()];
         let (Some(contact), Some(_)) = (&self.newton.problem.contact, &self.loading.indenter)
         else {
@@ -169,8 +174,10 @@ impl<'a> Solver<'a> {
         let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
         let rule = self.contact_rule();
         if rule == ContactRule::Nodes {
-            for n in surface.nodes() {
-                push[n as usize] = normal(x[n as usize]);
+            for n in surface.nodes().into_iter().map(|n| n as usize) {
+                if pressure[n] > 0.0 {
+                    push[n] = normal(x[n]);
+                }
             }
             return push;
         }
@@ -181,8 +188,8 @@ impl<'a> Solver<'a> {
         };
         let tractions = self.newton.current.traction_mpa.iter().copied();
         let found: Vec<_> = points.iter().map(|(s, _)| s).zip(tractions).map(of_point).collect();
-        let nodal = points.to_nodes(&found, &contact.nodes, &contact.area_mm2);
-        for (&n, [t, v @ ..]) in contact.nodes.iter().zip(nodal) {
+        let nodal = points.to_nodes(&found, contact.nodes(), contact.area_mm2());
+        for (&n, [t, v @ ..]) in contact.nodes().iter().zip(nodal) {
             if t > 0.0 {
                 push[n as usize] = v.map(|v| v / t);
             }

@@ -177,10 +177,11 @@ fn contact(
     out.normal_force_n = [0.0; 3];
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
     let placement = indenter.placement(trial.load_fraction);
-    let points = surface.points(loading.contact());
+    let points = surface.points(indenter.contact);
+    let has_multipliers = indenter.contact.has_multipliers();
     let mut square = 0.0;
     for (at, ((support, area), &last)) in points.iter().zip(trial.multipliers_mpa).enumerate() {
-        let multiplier = if indenter.contact.has_multipliers() { last } else { 0.0 };
+        let multiplier = if has_multipliers { last } else { 0.0 };
         let x = support.of(|n| trial.place(problem, n));
         let d = placement.distance(indenter.shape.as_ref(), x);
         let Some(c) = PointContact::new(&d, area, multiplier, trial.penalty) else {
@@ -189,7 +190,7 @@ fn contact(
         };
         out.traction_mpa.push(c.traction_mpa);
         out.potential_mj += c.energy_mj;
-        if !indenter.contact.has_multipliers() {
+        if !has_multipliers {
             out.contact_mj += c.energy_mj;
         }
         if c.traction_mpa > 0.0 {
@@ -220,7 +221,7 @@ fn add_friction(
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return 0.0 };
     let offset = indenter.offset_mm(trial.load_fraction);
     let mut square = 0.0;
-    for ((support, area), state) in surface.points(loading.contact()).iter().zip(&friction.points) {
+    for ((support, area), state) in surface.points(indenter.contact).iter().zip(&friction.points) {
         let x = support.of(|n| trial.place(problem, n));
         let relative = std::array::from_fn(|i| x[i] - offset[i]);
         let found = PointFriction::new(state, relative, area, trial.penalty);

@@ -20,10 +20,20 @@ pub struct MovingIndenter {
 }
 
 impl MovingIndenter {
-    /// An indenter that moves straight by `travel_mm` over the whole load and is felt at nodes.
+    /// An indenter that moves along `path` and is felt at nodes.
+    #[must_use]
+    pub fn along(
+        shape: Arc<dyn SignedDistance>,
+        start: Placement,
+        path: Vec<(f64, [f64; 3])>,
+    ) -> Self {
+        Self { shape, start, path, contact: ContactRule::Nodes }
+    }
+
+    /// One that moves straight by `travel_mm` over the whole load.
     #[must_use]
     pub fn straight(shape: Arc<dyn SignedDistance>, start: Placement, travel_mm: [f64; 3]) -> Self {
-        Self { shape, start, path: vec![(1.0, travel_mm)], contact: ContactRule::Nodes }
+        Self::along(shape, start, vec![(1.0, travel_mm)])
     }
 
     /// Displacement at load fraction `t`, mm.

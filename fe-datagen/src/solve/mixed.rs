@@ -9,7 +9,7 @@
 //! to stop.
 
 use super::problem::Problem;
-use crate::element::Dilatation;
+use crate::element::{Dilatation, next_dilatation};
 use crate::linear::Equations;
 
 /// Ratio of bulk to shear modulus beyond which dilatations are carried along: nu = .495. Below,
@@ -102,7 +102,8 @@ pub(super) fn next_dilatations(
             }
             let material = &problem.materials[block.tissue[e].index()];
             let g = geometry.element(e);
-            out.push(material.next_dilatation(g, &local[..n], &change[..n]));
+            let finite = material.is_finite_strain();
+            out.push(next_dilatation(g, finite, &local[..n], &change[..n]));
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::bodies::{hold, internal_force, lattice, prescribe, solve, uniform};
 use super::{CaseError, Check, Context};
-use crate::contact::ContactRule;
 use crate::element::ElementKind;
 use crate::indenter::{Placement, RoundedPlate};
 use crate::mesh::Mesh;
@@ -39,8 +38,7 @@ pub(crate) fn drag(friction: f64, drag_mm: f64) -> (Loading, Options) {
     let middle = 0.5 * SIDE_MM;
     let start = Placement { rotation, origin_mm: [middle, middle, HEIGHT_MM + plate.half_mm[2]] };
     let path = vec![(0.5, [0.0, 0.0, -DEPTH_MM]), (1.0, [drag_mm, 0.0, -DEPTH_MM])];
-    let indenter =
-        MovingIndenter { shape: Arc::new(plate), start, path, contact: ContactRule::Nodes };
+    let indenter = MovingIndenter::along(Arc::new(plate), start, path);
     let loading = Loading { indenter: Some(indenter), friction, ..Loading::default() };
     let options = Options {
         gap_tolerance_mm: 1e-7,

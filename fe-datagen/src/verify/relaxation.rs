@@ -2,7 +2,6 @@
 
 use super::bodies::{hold, lattice, solve};
 use super::{CaseError, Check, Context};
-use crate::contact::ContactRule;
 use crate::element::{ElementKind, Viscoelastic};
 use crate::indenter::{Placement, RoundedPlate};
 use crate::material::spec::PronySpec;
@@ -55,8 +54,7 @@ fn relaxation() -> Result<Vec<Check>, CaseError> {
     let start = Placement { rotation, origin_mm: [0.5, 0.5, HEIGHT_MM + plate.half_mm[2]] };
     let down = [0.0, 0.0, -DEPTH_MM];
     let path = vec![(RAMP_S / END_S, down), (1.0, down)];
-    let indenter =
-        MovingIndenter { shape: Arc::new(plate), start, path, contact: ContactRule::Nodes };
+    let indenter = MovingIndenter::along(Arc::new(plate), start, path);
     let options = Options {
         gap_tolerance_mm: 1e-9 * DEPTH_MM,
         residual_tolerance: 1e-10,

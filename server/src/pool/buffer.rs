@@ -2,8 +2,8 @@
 
 use bytes::BytesMut;
 
-/// Buffers in turn. Three are enough for answers: one may still be on its way out, one behind it
-/// in the channel, while the next is filled.
+/// Buffers in turn. Three are enough for answers: one may still be on its way out, one behind it,
+/// while the next is filled.
 ///
 /// A buffer is handed out by splitting it off; when whoever sent it lets go,
 /// the memory can be claimed again.

@@ -21,14 +21,13 @@ use super::{
 use crate::{
     app::App,
     codec::Output,
-    metrics::{Metrics, Transport},
+    metrics::Transport,
     pool::{Done, FRONT, Outcome, Recycler, Sink, Stage, is_past},
 };
 
 /// The voice of a session.
 pub(super) struct Reply {
     pub(super) out: Outbox,
-    pub(super) metrics: Arc<Metrics>,
     /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
     outstanding: AtomicUsize,
     /// Whether the task waits for the last of them.
@@ -41,7 +40,6 @@ impl Reply {
     pub(super) fn new(out: Outbox, app: Arc<App>) -> Self {
         Self {
             out,
-            metrics: Arc::clone(&app.metrics),
             outstanding: AtomicUsize::new(0),
             is_awaited: AtomicBool::new(false),
             is_over: AtomicBool::new(false),
@@ -82,13 +80,13 @@ impl Reply {
 
     /// Tells the client of an error the session survives.
     pub(super) fn complain(&self, problem: Problem, sequence: Option<u32>) {
-        self.metrics.error(problem.code);
+        self.app.metrics.error(problem.code);
         self.say(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
     }
 
     /// Refuses a frame.
     pub(super) fn refuse(&self, problem: Problem, sequence: Option<u32>) {
-        self.metrics.of(Transport::Session).error.inc();
+        self.app.metrics.of(Transport::Session).error.inc();
         self.complain(problem, sequence);
     }
 
@@ -121,7 +119,7 @@ impl Reply {
             Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
             outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
                 let stage = if let Outcome::Late(stage) = outcome { stage } else { Stage::Sending };
-                self.metrics.late(Transport::Session, stage);
+                self.app.metrics.late(Transport::Session, stage);
                 return self.short(&header, done.tier, FrameStatus::Late, done.received);
             }
             Outcome::Failed(problem) => return self.refuse(problem, Some(header.sequence)),
@@ -135,8 +133,8 @@ impl Reply {
             head.sample_type = sample_type;
         }
         // Counted before it is sent: whoever has the answer finds it in the metrics.
-        self.metrics.of(Transport::Session).ok.inc();
-        let timers = self.metrics.tier(done.tier);
+        self.app.metrics.of(Transport::Session).ok.inc();
+        let timers = self.app.metrics.tier(done.tier);
         let start = Instant::now();
         self.send(bytes, &head);
         timers.send.observe(start.elapsed());

@@ -2,7 +2,6 @@
 
 use super::ours::{Cards, laws, sed_mpa};
 use super::{Check, Context, SOURCE};
-use crate::contact::ContactRule;
 use crate::export::deck::{BODY, ELEMENTS, INDENTER};
 use crate::export::{Deck, ElementTypes, Press, Quantity, RigidIndenter, StepControl};
 use crate::indenter::SignedDistance;
@@ -152,8 +151,7 @@ impl Pressing<'_> {
         let begun_s = processor::thread_s();
         let problem = Problem::new(self.mesh, laws(&self.cards)?, self.fixed, Some(self.contact))?;
         let RigidIndenter { start, path, .. } = self.indenter;
-        let indenter =
-            MovingIndenter { shape: self.shape, start, path, contact: ContactRule::Nodes };
+        let indenter = MovingIndenter::along(self.shape, start, path);
         let mut solver = Solver::new(&problem, Options::default())?;
         solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
         for step in 1..=self.steps {
