@@ -4,6 +4,7 @@
 //! `models/NAME.onnx` in this engine on presses that no training saw.
 
 use crate::{EngineError, MODEL_FORMAT, ModelInfo};
+use papilla_proto::Pattern;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -26,6 +27,10 @@ pub struct Card {
     pub network: Value,
     /// Least and greatest pressure of the training data, Pa.
     pub pressure_range_pa: [f32; 2],
+    /// Roughest and heaviest map of the training data: what is beyond is flagged. Absent from
+    /// models that were fitted to no maps, and until `model-export patterns` has looked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pattern_max: Option<Pattern>,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
     /// SHA-256 of the dataset it was trained on, of several that of their hashes one after
@@ -126,6 +131,12 @@ impl Card {
         let text = serde_json::to_string_pretty(self)
             .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
         Ok(text + "\n")
+    }
+
+    /// SHA-256 of each dataset the model was trained on, as [`ModelInfo::datasets`].
+    #[must_use]
+    pub fn datasets(&self) -> Vec<&str> {
+        crate::info::datasets(&self.dataset_sha256, &self.training)
     }
 
     fn require_format(&self) -> Result<(), EngineError> {

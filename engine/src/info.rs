@@ -86,12 +86,16 @@ impl ModelInfo {
     /// if [`dataset_sha256`](Self::dataset_sha256) follows from that, else this one alone.
     #[must_use]
     pub fn datasets(&self) -> Vec<&str> {
-        let own = self.dataset_sha256.as_str();
-        let listed = self.training.get("datasets").and_then(Value::as_array);
-        let parts: Vec<&str> = listed.into_iter().flatten().filter_map(Value::as_str).collect();
-        let joined = hex(&Sha256::digest(parts.concat()));
-        if parts.len() > 1 && joined == own { parts } else { vec![own] }
+        datasets(&self.dataset_sha256, &self.training)
     }
+}
+
+/// What `training` lists as `datasets` if `own` follows from that, else `own` alone.
+pub(crate) fn datasets<'a>(own: &'a str, training: &'a Value) -> Vec<&'a str> {
+    let listed = training.get("datasets").and_then(Value::as_array);
+    let parts: Vec<&str> = listed.into_iter().flatten().filter_map(Value::as_str).collect();
+    let joined = hex(&Sha256::digest(parts.concat()));
+    if parts.len() > 1 && joined == own { parts } else { vec![own] }
 }
 
 /// Floating-point initialisers, also those stored in 16 bits, but for maps (masks,

@@ -4,6 +4,7 @@ mod check;
 mod evaluate;
 mod index;
 mod ladder;
+mod patterns;
 
 use clap::{Parser, Subcommand};
 use model_export::{ExportError, read, read_text, table};
@@ -31,6 +32,7 @@ A new model, from the trainer's file to the service:
   model-export check    models/s1-base8.onnx --atlas models/atlas.json
   model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures/s1-base8
   model-export index    models --default s1-base8
+  model-export patterns models --dataset data/s1
   model-export table    models/*.json
 All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/accuracy-vs-time";
@@ -76,6 +78,13 @@ enum Command {
     /// Every NAME.onnx there must have its card NAME.json and the atlas of atlas.json.
     #[command(after_long_help = EXIT_CODES)]
     Index(index::Options),
+    /// Note in the cards how rough and how heavy the maps of the training were.
+    ///
+    /// The server flags maps beyond that as `unfamiliar`: no press makes them, and what a model
+    /// answers then may mean nothing. Cards of models that were not trained on the datasets given,
+    /// or on others beside them, are left as they are; so are those of physics, fitted to no maps.
+    #[command(after_long_help = EXIT_CODES)]
+    Patterns(patterns::Options),
     /// Measure the ladder: error against time of every model and of FE itself.
     ///
     /// Every model of the index is run on all held-out sets (held-out presses, held-out shapes,
@@ -100,6 +109,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Evaluate(options) => evaluate::run(options, json),
         Command::Table { cards } => print_table(cards, json),
         Command::Index(options) => index::run(options, json),
+        Command::Patterns(options) => patterns::run(options, json),
         Command::Ladder(options) => ladder::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

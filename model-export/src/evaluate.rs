@@ -92,6 +92,7 @@ impl Evaluation {
             effects: info.effects.clone(),
             network: info.network.clone(),
             pressure_range_pa: [0.0, info.pressure_max_pa],
+            pattern_max: None,
             sed_max_j_per_m3: info.sed_max_j_per_m3,
             dataset_sha256: info.dataset_sha256.clone(),
             training: info.training.clone(),

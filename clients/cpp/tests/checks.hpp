@@ -113,7 +113,8 @@ inline void check_answer(const Value& expect, const Answer& answer) {
   if (expect.has("flags")) {
     std::uint8_t flags = 0;
     for (const Value& flag : expect["flags"].items) {
-      flags |= flag.string == "out_of_range" ? out_of_range : no_contact;
+      const std::string& name = flag.string;
+      flags |= name == "out_of_range" ? out_of_range : name == "no_contact" ? no_contact : unfamiliar;
     }
     must(answer.flags == flags, "the flags are " + std::to_string(answer.flags));
   }

@@ -57,7 +57,7 @@ class Answer:
     kind: str = "sed"
     """`sed` (J/m3) or, with the effect `afferents`, `sa1_rate` (Hz)."""
     flags: frozenset[str] = field(default_factory=frozenset)
-    """Of `out_of_range` and `no_contact`."""
+    """Of `out_of_range`, `no_contact` and `unfamiliar` (rougher or heavier than any map of the training)."""
     tier: str = ""
     window: Window = wire.WHOLE
     """Column, row, width and height of `values`."""

@@ -75,6 +75,10 @@ def encode(
     return head + samples
 
 
+FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar"}
+"""Bits of an answer's flags."""
+
+
 def decode(message: bytes) -> Header:
     """Reads an answer's header.
 
@@ -88,7 +92,7 @@ def decode(message: bytes) -> Header:
         raise ValueError("not an answer of version 2 of the protocol")
     if status >= len(STATUSES):
         raise ValueError(f"an answer with status {status}")
-    names = {name for bit, name in ((1, "out_of_range"), (2, "no_contact")) if flags & bit}
+    names = {name for bit, name in FLAGS.items() if flags & bit}
     return Header(
         KINDS[kind], _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
         client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names),

@@ -24,6 +24,8 @@ namespace Papilla
         public readonly float[] Actuators = new float[1024];
         public int PointCount, ActuatorCount;
         public bool HasSummary, OutOfRange, NoContact;
+        /// <summary>The map is rougher or heavier than any the tier was trained on: its answer may mean nothing.</summary>
+        public bool Unfamiliar;
         public ulong ClientTimeUs;
         public long RoundTripUs;
         public uint TotalUs, QueueUs, InferUs;
@@ -45,6 +47,7 @@ namespace Papilla
                 TierNumber = *(ushort*)(m + 44);
                 OutOfRange = (m[46] & Wire.FlagOutOfRange) != 0;
                 NoContact = (m[46] & Wire.FlagNoContact) != 0;
+                Unfamiliar = (m[46] & Wire.FlagUnfamiliar) != 0;
                 if (Status != Status.Ok) return;
                 Clear();
                 HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);

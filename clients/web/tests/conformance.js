@@ -5,7 +5,7 @@ import { Atlas, MAP_LEN, Papilla, PapillaError, SIDE_PX, postPressure } from '..
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
 
-const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact']]);
+const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar']]);
 
 const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 

@@ -8,6 +8,8 @@ pub mod flags {
     pub const OUT_OF_RANGE: u8 = 1;
     /// Nothing touches the finger: the map is zero and no network was asked.
     pub const NO_CONTACT: u8 = 2;
+    /// Rougher or heavier than any map the tier was trained on ([`crate::pattern`]).
+    pub const UNFAMILIAR: u8 = 4;
 }
 
 /// What version 2 adds to a header.

@@ -1,6 +1,5 @@
 //! The effects together: what is asked for is there, where it is said to be, and nothing else.
 
-use bytes::Bytes;
 use papilla_proto::{
     MAP_SIDE_PX, Summary,
     atlas::{Atlas, Patch, PatchVertices, Raster},
@@ -12,7 +11,6 @@ use papilla_proto::{
 use proptest::prelude::*;
 
 use super::*;
-use crate::{replay::Replay, speed::Overhead};
 
 /// A plane patch, 0.1 mm a pixel, from pixel 20 to 200 both ways: x = 0.1 v, y = -0.1 u, z = -0.5.
 fn plane_atlas() -> Atlas {
@@ -30,20 +28,7 @@ pub(super) fn plane() -> Geometry {
 }
 
 fn catalogue() -> Catalogue {
-    let atlas = plane_atlas();
-    Catalogue {
-        tiers: Vec::new(),
-        default: 0,
-        atlas_json: Bytes::new(),
-        skin: Raster::new(&atlas, Patch::Skin),
-        interface: Raster::new(&atlas, Patch::Interface),
-        atlas,
-        replay: Replay::default(),
-        ladder: None,
-        judged_on: None,
-        overhead: Overhead::default(),
-        runtime: Shared::default(),
-    }
+    Catalogue::bare(plane_atlas(), Vec::new())
 }
 
 fn hello(effects: &[&str]) -> Hello {

@@ -10,11 +10,12 @@ use papilla_proto::{ErrorCode, Problem};
 use tower_http::cors::CorsLayer;
 
 /// Headers of an answer that a page may read.
-const EXPOSED: [&str; 8] = [
+const EXPOSED: [&str; 9] = [
     "x-papilla-tier",
     "x-papilla-queue-us",
     "x-papilla-infer-us",
     "x-papilla-total-us",
+    "x-papilla-flags",
     "x-sed-max-j-per-m3",
     "x-pressure-max-pa",
     "inference-header-content-length",

@@ -58,6 +58,7 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
         "effects": tier.effects,
         "atlas_hash": tier.atlas_hash,
         "pressure_max_pa": tier.pressure_max_pa,
+        "pattern_max": tier.pattern_max,
         "sed_max_j_per_m3": tier.sed_max_j_per_m3,
         "relative_l2_median": tier.relative_l2_median,
         "predicted_latency_us": catalogue.predicted_latency_us(index),

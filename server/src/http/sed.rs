@@ -1,6 +1,7 @@
 //! `POST /v1/sed`: one pressure map in, one SED map out.
 
 use std::{
+    mem,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -12,7 +13,7 @@ use axum::{
     response::Response,
 };
 use bytes::BytesMut;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, flags};
 use tokio::{sync::mpsc, time::timeout};
 
 use super::{Answer, Shared, answer, body, refuse};
@@ -69,9 +70,13 @@ async fn render(
     let job = Job { tier, payload, input, output, frame: None, received, deadline };
     // Held until the answer is there: it bounds the queue.
     let _place = app.admit_request()?;
-    let rendered = through_pool(app, job, Transport::Http).await?;
-    let mut response = answer(output.content_type(), rendered.bytes.freeze());
-    label(&mut response, &catalogue.tiers[tier].name, output, rendered.scale, rendered.times);
+    let mut rendered = through_pool(app, job, Transport::Http).await?;
+    let mut response = answer(output.content_type(), mem::take(&mut rendered.bytes).freeze());
+    let headers = response.headers_mut();
+    label(headers, &catalogue.tiers[tier].name, &rendered);
+    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&rendered.scale.to_string())) {
+        headers.insert("x-sed-max-j-per-m3", white);
+    }
     Ok(response)
 }
 
@@ -81,6 +86,8 @@ pub(crate) struct Rendered {
     pub(crate) scale: f32,
     /// In the queue, in the network, from receipt until now.
     pub(crate) times: [Duration; 3],
+    /// Bits of [`papilla_proto::flags`].
+    pub(crate) flags: u8,
 }
 
 /// Renders one posted map. The caller holds a place, which bounds the queue.
@@ -109,7 +116,7 @@ pub(crate) async fn through_pool(
             app.metrics.tier(done.tier).total.observe(total);
             let times = [done.times.queue, done.times.infer, total];
             telemetry::rendered(&app.catalogue().tiers[done.tier].name, times);
-            Ok(Rendered { bytes, scale, times })
+            Ok(Rendered { bytes, scale, times, flags: done.drawn.flags })
         }
     }
 }
@@ -127,23 +134,20 @@ async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
     }
 }
 
-/// What a client may want to know beside the map.
-fn label(response: &mut Response, tier: &str, output: Output, scale: f32, times: [Duration; 3]) {
-    let headers = response.headers_mut();
-    label_times(headers, tier, times);
-    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
-        headers.insert("x-sed-max-j-per-m3", white);
-    }
-}
-
-/// Tier and times of an answer.
-pub(crate) fn label_times(headers: &mut HeaderMap, tier: &str, times: [Duration; 3]) {
+/// What a client may want to know beside the map: tier, times, and what is special about it.
+pub(crate) fn label(headers: &mut HeaderMap, tier: &str, rendered: &Rendered) {
     if let Ok(tier) = HeaderValue::from_str(tier) {
         headers.insert("x-papilla-tier", tier);
     }
     let names = ["x-papilla-queue-us", "x-papilla-infer-us", "x-papilla-total-us"];
-    for (name, time) in names.into_iter().zip(times) {
+    for (name, time) in names.into_iter().zip(rendered.times) {
         let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
         headers.insert(HeaderName::from_static(name), HeaderValue::from(us));
+    }
+    // Over HTTP pressure out of range is refused.
+    for (bit, name) in [(flags::NO_CONTACT, "no_contact"), (flags::UNFAMILIAR, "unfamiliar")] {
+        if rendered.flags & bit != 0 {
+            headers.append("x-papilla-flags", HeaderValue::from_static(name));
+        }
     }
 }

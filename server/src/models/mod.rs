@@ -7,7 +7,7 @@ use std::sync::{Arc, atomic::AtomicUsize};
 use bytes::Bytes;
 use papilla_engine::{Ladder, Model, Session, card::Index, ladder::Kind};
 use papilla_proto::{
-    ErrorCode, Problem,
+    ErrorCode, Pattern, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
 };
 use serde_json::Value;
@@ -34,6 +34,8 @@ pub(crate) struct Tier {
     pub(crate) atlas_hash: String,
     /// Greatest pressure it was trained on, Pa.
     pub(crate) pressure_max_pa: f32,
+    /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
+    pub(crate) pattern_max: Option<Pattern>,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
     /// What it is.
@@ -81,6 +83,8 @@ pub(crate) struct Catalogue {
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
     pub(crate) skin: Raster,
+    /// The pixels of `skin`.
+    pub(crate) skin_mask: PixelMask,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
     /// All rungs as shipped, FE included; none if the folder has no `ladder.json`.
@@ -93,6 +97,26 @@ pub(crate) struct Catalogue {
 }
 
 impl Catalogue {
+    /// These tiers on this atlas, and nothing else.
+    #[cfg(test)]
+    pub(crate) fn bare(atlas: Atlas, tiers: Vec<Tier>) -> Self {
+        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
+        Self {
+            tiers,
+            default: 0,
+            atlas_json: Bytes::new(),
+            skin_mask: PixelMask::from(skin.mask()),
+            skin,
+            interface,
+            atlas,
+            replay: Replay::default(),
+            ladder: None,
+            judged_on: None,
+            overhead: Overhead::default(),
+            runtime: effects::Shared::default(),
+        }
+    }
+
     /// Loads and checks everything. A tier whose file is that of `running` is not loaded again:
     /// the two share the model, its times and its count of sessions.
     ///
@@ -162,6 +186,7 @@ impl Catalogue {
             default,
             atlas,
             atlas_json,
+            skin_mask: PixelMask::from(skin.mask()),
             skin,
             interface,
             replay,

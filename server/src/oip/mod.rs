@@ -7,7 +7,10 @@
 mod request;
 mod response;
 
-use std::time::{Duration, Instant};
+use std::{
+    mem,
+    time::{Duration, Instant},
+};
 
 use axum::{
     body::Body,
@@ -27,7 +30,7 @@ use crate::{
     codec::{Input, Output},
     http::{
         Shared, body, json_answer,
-        sed::{count, label_times, through_pool},
+        sed::{count, label, through_pool},
     },
     metrics::Transport,
     pool::Job,
@@ -153,11 +156,10 @@ async fn answer(
         received,
         deadline,
     };
-    let rendered = through_pool(app, job, Transport::Oip).await?;
+    let mut rendered = through_pool(app, job, Transport::Oip).await?;
     let catalogue = app.catalogue();
     let name = catalogue.tiers[tier].name.clone();
-    let times = rendered.times;
-    let tensor = Tensor { model: name.clone(), wish, sed: rendered.bytes.freeze() };
+    let tensor = Tensor { model: name.clone(), wish, sed: mem::take(&mut rendered.bytes).freeze() };
     let mut response = if tensor.wish.is_binary_wanted {
         tensor.binary()?
     } else {
@@ -165,7 +167,7 @@ async fn answer(
         let text = spawn_blocking(move || tensor.json()).await;
         text.map_err(|error| problem::internal("the answer was not written", &error))??
     };
-    label_times(response.headers_mut(), &name, times);
+    label(response.headers_mut(), &name, &rendered);
     Ok(response)
 }
 

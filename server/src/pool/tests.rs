@@ -16,7 +16,7 @@ use bytes::Bytes;
 use papilla_engine::{ModelInfo, ladder::Kind};
 use papilla_proto::{
     ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType,
-    atlas::{Atlas, Patch, PatchVertices, Raster},
+    atlas::{Atlas, PatchVertices},
 };
 use serde_json::json;
 use tokio::sync::mpsc;
@@ -25,11 +25,9 @@ use self::gated::{Act, Gate, Gated};
 use super::{Done, Entrance, FRONT, Frame, Job, Outcome, Pool, Recycler, Slot, Stage};
 use crate::{
     codec::{Input, Output},
-    effects::Shared,
     metrics::Metrics,
     models::{Catalogue, Tier},
-    replay::Replay,
-    speed::{Overhead, Speed},
+    speed::Speed,
 };
 
 /// A pool of one thread and the handles of its gate.
@@ -67,6 +65,7 @@ fn bench() -> Bench {
         effects: Vec::new(),
         atlas_hash: String::new(),
         pressure_max_pa: 100.0,
+        pattern_max: None,
         sed_max_j_per_m3: 100.0,
         kind: Kind::Network,
         relative_l2_median: 0.1,
@@ -81,19 +80,7 @@ fn bench() -> Bench {
         uv_px: vec![[0.0, 0.0], [0.0, 224.0], [224.0, 224.0], [224.0, 0.0]],
     };
     let atlas = Atlas::new(0.1, vec![[0, 1, 2], [0, 2, 3]], patch.clone(), patch).unwrap();
-    let catalogue = Arc::new(Catalogue {
-        tiers: vec![tier],
-        default: 0,
-        atlas_json: Bytes::new(),
-        skin: Raster::new(&atlas, Patch::Skin),
-        interface: Raster::new(&atlas, Patch::Interface),
-        atlas,
-        replay: Replay::default(),
-        ladder: None,
-        judged_on: None,
-        overhead: Overhead::default(),
-        runtime: Shared::default(),
-    });
+    let catalogue = Arc::new(Catalogue::bare(atlas, vec![tier]));
     let metrics = Metrics::new();
     metrics.name_tiers(&catalogue);
     let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();

@@ -8,7 +8,9 @@ use std::{
 };
 
 use papilla_engine::Session;
-use papilla_proto::{ErrorCode, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside};
+use papilla_proto::{
+    ErrorCode, MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside,
+};
 
 use super::{
     Done, Drawn, FRONT, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
@@ -145,6 +147,10 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         drawn.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        if let (false, Some(trained)) = (summary.is_zero(), tier.pattern_max) {
+            let is_beyond = Pattern::of(&self.pressure_pa).is_beyond(trained);
+            drawn.flags |= if is_beyond { flags::UNFAMILIAR } else { 0 };
+        }
         let decoded = Instant::now();
         times.decode = decoded - start;
 
@@ -207,7 +213,7 @@ impl Worker {
             takes_more: job.frame.as_ref().is_some_and(|frame| frame.takes_more),
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
-        let summary = keep_inside(&mut self.pressure_pa, self.catalogue.skin.mask());
+        let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);
         Ok((summary, range))
     }
 }

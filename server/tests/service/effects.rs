@@ -189,6 +189,28 @@ async fn pressure_beyond_the_range_is_flagged_where_that_is_asked_for() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_map_that_no_press_makes_is_rendered_and_flagged() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_2(&json!({}))).await;
+    // Squares of `side_px`, as high as what the test models' card knows.
+    let board = |side_px: usize| -> Vec<f32> {
+        let is_on = |i: usize| (i / 224 / side_px + i % 224 / side_px).is_multiple_of(2);
+        (0..MAP_LEN).map(|i| if is_on(i) { PRESSURE_MAX_PA } else { 0.0 }).collect()
+    };
+    for (sequence, (side_px, due)) in [(1, flags::UNFAMILIAR), (8, 0)].into_iter().enumerate() {
+        socket.send(whole(sequence as u32, &board(side_px))).await;
+        let (header, extension, _) = socket.hear_2().await;
+        assert_eq!((header.status, extension.flags), (FrameStatus::Ok, due), "{side_px} px");
+        let name = (due > 0).then_some("unfamiliar");
+        let answer = service.post("/v1/sed", bytes_of(&board(side_px))).send().await;
+        assert_eq!((answer.status, answer.header("x-papilla-flags")), (200, name), "{side_px} px");
+    }
+    let nothing = service.post("/v1/sed", bytes_of(&vec![0.0; MAP_LEN])).send().await;
+    assert_eq!(nothing.header("x-papilla-flags"), Some("no_contact"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_session_can_ask_for_less_than_a_map() {
     let service = Service::start().await;
     let mut socket = service.socket().await;

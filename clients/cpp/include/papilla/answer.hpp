@@ -32,7 +32,7 @@ struct Answer {
   bool by_client = false;             ///< superseded here: the frame never left
   Problem problem;                    ///< with status error
   Kind kind = Kind::sed;
-  std::uint8_t flags = 0;             ///< out_of_range, no_contact
+  std::uint8_t flags = 0;             ///< out_of_range, no_contact, unfamiliar
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`
   std::uint64_t client_time_us = 0;

@@ -22,7 +22,7 @@ enum class Status : std::uint8_t { ok = 0, superseded = 1, late = 2, error = 3, 
 enum class Kind : std::uint8_t { pressure = 1, sed = 2, sa1_rate = 3 };
 
 /// Flags of an answer.
-enum : std::uint8_t { out_of_range = 1, no_contact = 2 };
+enum : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4 };
 
 /// A rectangle of the map, pixels; the default is all of it.
 struct Window {

@@ -183,7 +183,7 @@ func check(expect, outcome):
 		same("kind", outcome.kind, expect.kind)
 	if expect.has("flags"):
 		var flags = []
-		for flag in ["out_of_range", "no_contact"]:
+		for flag in ["out_of_range", "no_contact", "unfamiliar"]:
 			if outcome[flag]:
 				flags.append(flag)
 		same("flags", str(flags), str(expect.flags))

@@ -57,6 +57,7 @@ static func read_header(packet):
 	var flags = head.get_u8()
 	answer.out_of_range = flags & 1 != 0
 	answer.no_contact = flags & 2 != 0
+	answer.unfamiliar = flags & 4 != 0
 	return answer
 
 

@@ -1,0 +1,150 @@
+//! How pressure lies on a map: what tells a map that no press makes, though every pressure in it
+//! is an ordinary one.
+//!
+//! A network answers a checkerboard as readily as a press, and its answer means nothing. Two
+//! numbers tell such maps from presses: skin that is pressed by a thing shares its load smoothly
+//! among neighbours, and no press carries much more than the hardest one a model has seen.
+
+use serde::{Deserialize, Serialize};
+
+use crate::MAP_SIDE_PX;
+
+/// Room above the greatest trained pattern, as a factor: quantisation and another raster of the
+/// same press move both numbers by less.
+pub const PATTERN_HEADROOM: f32 = 1.05;
+
+/// Samples looked at together; the side of a map is a multiple.
+const LANES: usize = 16;
+
+/// Two numbers of a pressure map.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pattern {
+    /// Squared steps between neighbours (in rows and in columns) over four times the squared
+    /// pressures: 0 is flat, 1 a checkerboard of single pixels.
+    pub roughness: f32,
+    /// Sum of the pressures, MPa px: near the force, in another unit.
+    pub load_mpa_px: f32,
+}
+
+impl Pattern {
+    /// The pattern of a map (224 x 224, finite, not negative, Pa). Pressures whose squares an f32
+    /// cannot hold are as none.
+    #[must_use]
+    pub fn of(map_pa: &[f32]) -> Self {
+        // Lanes of f32 along a row, f64 over the rows: in vectors, and exact enough for 1e-4.
+        let (mut steps, mut squares, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let rows = map_pa.as_chunks::<MAP_SIDE_PX>().0;
+        for (y, row) in rows.iter().enumerate() {
+            let below = rows.get(y + 1).unwrap_or(row);
+            // The last pixel has no neighbour to its right: it is its own.
+            let mut right = *row;
+            right.copy_within(1.., 0);
+            right[MAP_SIDE_PX - 1] = row[MAP_SIDE_PX - 1];
+            let mut lanes = [[0.0_f32; LANES]; 3];
+            let [row, below, right] = [row, below, &right].map(|row| row.as_chunks::<LANES>().0);
+            for ((p, below), right) in row.iter().zip(below).zip(right) {
+                for i in 0..LANES {
+                    let (down, across) = (below[i] - p[i], right[i] - p[i]);
+                    lanes[0][i] += down * down + across * across;
+                    lanes[1][i] += p[i] * p[i];
+                    lanes[2][i] += p[i];
+                }
+            }
+            let [a, b, c] = lanes.map(|lanes| f64::from(lanes.iter().sum::<f32>()));
+            (steps, squares, sum) = (steps + a, squares + b, sum + c);
+        }
+        let roughness = if squares > 0.0 { steps / (4.0 * squares) } else { 0.0 };
+        Self { roughness: roughness as f32, load_mpa_px: (1e-6 * sum) as f32 }
+    }
+
+    /// The greater of each.
+    #[must_use]
+    pub fn max(self, other: Self) -> Self {
+        Self {
+            roughness: self.roughness.max(other.roughness),
+            load_mpa_px: self.load_mpa_px.max(other.load_mpa_px),
+        }
+    }
+
+    /// Whether a map with this pattern is unlike all whose greatest is `trained`.
+    #[must_use]
+    pub fn is_beyond(self, trained: Self) -> bool {
+        self.roughness > PATTERN_HEADROOM * trained.roughness
+            || self.load_mpa_px > PATTERN_HEADROOM * trained.load_mpa_px
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::MAP_LEN;
+
+    fn drawn(at: impl Fn(usize, usize) -> f32) -> Vec<f32> {
+        (0..MAP_LEN).map(|i| at(i / MAP_SIDE_PX, i % MAP_SIDE_PX)).collect()
+    }
+
+    /// As the formulas say, in f64, one pixel after another.
+    fn by_the_formula(map_pa: &[f32]) -> (f64, f64) {
+        let at = |y: usize, x: usize| f64::from(map_pa[y * MAP_SIDE_PX + x]);
+        let (mut steps, mut squares, mut sum) = (0.0, 0.0, 0.0);
+        for y in 0..MAP_SIDE_PX {
+            for x in 0..MAP_SIDE_PX {
+                let next =
+                    |y: usize, x: usize| (y < MAP_SIDE_PX && x < MAP_SIDE_PX).then(|| at(y, x));
+                for neighbour in [next(y + 1, x), next(y, x + 1)].into_iter().flatten() {
+                    steps += (neighbour - at(y, x)).powi(2);
+                }
+                (squares, sum) = (squares + at(y, x).powi(2), sum + at(y, x));
+            }
+        }
+        (steps / (4.0 * squares), 1e-6 * sum)
+    }
+
+    #[test]
+    fn a_flat_map_is_smooth_and_a_checkerboard_is_as_rough_as_can_be() {
+        let flat = Pattern::of(&drawn(|_, _| 2e4));
+        assert_eq!(flat.roughness.to_bits(), 0.0_f32.to_bits());
+        assert!((flat.load_mpa_px / (2e-2 * MAP_LEN as f32) - 1.0).abs() < 1e-5, "{flat:?}");
+        let board = Pattern::of(&drawn(|y, x| if (x + y) % 2 == 0 { 1e4 } else { 0.0 }));
+        // 1, less the steps that the rim does not have.
+        let due = (2.0 * 224.0 * 223.0) / (4.0 * 0.5 * 224.0 * 224.0);
+        assert!((board.roughness - due).abs() < 1e-5, "{board:?}");
+    }
+
+    #[test]
+    fn nothing_and_next_to_nothing_have_no_pattern() {
+        for pressure_pa in [0.0, -0.0, 1e-40] {
+            let pattern =
+                Pattern::of(&drawn(|y, x| if (x + y) % 2 == 0 { pressure_pa } else { 0.0 }));
+            assert!(!pattern.is_beyond(Pattern { roughness: 1e-3, load_mpa_px: 1e-3 }));
+        }
+    }
+
+    #[test]
+    fn either_number_tells() {
+        let trained = Pattern { roughness: 0.1, load_mpa_px: 50.0 };
+        for (roughness, load_mpa_px, is_beyond) in
+            [(0.1, 50.0, false), (0.104, 52.0, false), (0.106, 1.0, true), (0.01, 53.0, true)]
+        {
+            assert_eq!(Pattern { roughness, load_mpa_px }.is_beyond(trained), is_beyond);
+        }
+        let both = Pattern { roughness: 0.2, load_mpa_px: 1.0 }.max(trained);
+        assert_eq!(both, Pattern { roughness: 0.2, load_mpa_px: 50.0 });
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn lanes_do_what_the_formulas_say(seed: u64, peak_pa in 1e-3f32..1e6) {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let map: Vec<f32> = (0..MAP_LEN).map(|_| peak_pa * random.f32().powi(3)).collect();
+            let (roughness, load) = by_the_formula(&map);
+            let found = Pattern::of(&map);
+            prop_assert!((f64::from(found.roughness) / roughness - 1.0).abs() < 1e-4);
+            prop_assert!((f64::from(found.load_mpa_px) / load - 1.0).abs() < 1e-4);
+        }
+    }
+}
