@@ -14,6 +14,7 @@ mod pacer;
 mod post;
 mod report;
 mod session;
+mod steal;
 mod tally;
 mod verify;
 mod wire;
@@ -194,6 +195,7 @@ impl Target {
         for (session, client) in open.into_iter().enumerate() {
             tasks.push(client.start(shared.clone(), session, &mut beats));
         }
+        let before = steal::Ticks::now();
         let plan = shared.plan.clone();
         let pacer = thread::spawn(move || plan.keep(&beats));
         let mut total = Tally::default();
@@ -201,6 +203,7 @@ impl Target {
             total.add(&task.await.map_err(|error| LoadError::Task(error.to_string()))?);
         }
         pacer.join().map_err(|_| LoadError::Task("the pacer".to_owned()))?;
+        total.processor = steal::Ticks::now().since(before);
         Ok(total)
     }
 }

@@ -122,6 +122,9 @@ pub struct Report {
     pub age_us: Option<Percentiles>,
     /// From the intended instant to the sending, us: the generator's own part.
     pub send_delay_us: Option<Percentiles>,
+    /// Share of all cores' time that the host of this virtual machine withheld, percent; none
+    /// where the system does not tell.
+    pub stolen_percent: Option<f64>,
     /// Comparison with the engine's own answers, if asked for.
     pub verification: Option<Verification>,
     /// Why sessions ended before their time.
@@ -171,6 +174,7 @@ impl Report {
             overhead_us: Percentiles::new(&t.overhead),
             age_us: Percentiles::new(&t.age),
             send_delay_us: Percentiles::new(&t.send_delay),
+            stolen_percent: t.processor.stolen_percent(),
             verification,
             ended: t.ended.clone(),
             allow_miss_percent: options.allow_miss_percent,
@@ -274,6 +278,9 @@ impl fmt::Display for Report {
                 write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
             }
             writeln!(f)?;
+        }
+        if let Some(percent) = self.stolen_percent {
+            writeln!(f, "the host withheld {percent:.2} % of this machine's processor time")?;
         }
         if let Some(v) = &self.verification {
             writeln!(

@@ -4,6 +4,8 @@ use std::{collections::BTreeMap, time::Duration};
 
 use hdrhistogram::Histogram;
 
+use super::steal::Ticks;
+
 /// Longest time told apart, us; longer ones count as this.
 const LONGEST_US: u64 = 3_600_000_000;
 
@@ -67,6 +69,8 @@ pub(super) struct Tally {
     pub(super) verified: u64,
     pub(super) wrong: u64,
     pub(super) difference_max: f64,
+    /// Processor time of the machine meanwhile.
+    pub(super) processor: Ticks,
     /// Why sessions ended before their time.
     pub(super) ended: Vec<String>,
 }
@@ -84,6 +88,8 @@ impl Tally {
             (&mut self.unexpected, other.unexpected),
             (&mut self.in_time, other.in_time),
             (&mut self.verified, other.verified),
+            (&mut self.processor.all, other.processor.all),
+            (&mut self.processor.stolen, other.processor.stolen),
             (&mut self.wrong, other.wrong),
         ] {
             *sum += part;
