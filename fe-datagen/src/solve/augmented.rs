@@ -3,7 +3,8 @@
 use super::StepError;
 use super::newton::Fixed;
 use super::rubbing;
-use super::stepping::{Solver, State};
+use super::state::State;
+use super::stepping::Solver;
 use crate::element::Memory;
 
 /// Least share of its way that the friction bound goes in one update.

@@ -9,8 +9,10 @@ mod loading;
 mod memory;
 mod mixed;
 mod newton;
+mod pace;
 mod problem;
 mod rubbing;
+mod state;
 mod stepping;
 mod work;
 
@@ -20,7 +22,8 @@ pub use free::{FreeMode, FreePart};
 pub use loading::{Loading, MovingIndenter};
 pub use memory::{EnergySplit, MemoryLayout};
 pub use problem::{Materials, Problem, ProblemError};
-pub use stepping::{Mark, Solver, StepReport};
+pub use state::{Mark, StepReport};
+pub use stepping::Solver;
 
 use crate::linear::FactorError;
 

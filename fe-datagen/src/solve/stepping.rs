@@ -7,14 +7,11 @@ use super::mixed;
 use super::newton::{Fixed, Newton};
 use super::problem::Problem;
 use super::rubbing;
+use super::state::{Mark, State, StepReport};
 use super::work::Work;
 use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionPoint, FrictionTrial};
-use crate::element::{Dilatation, Memory};
-
-/// Least load fraction of a time step: what relaxes within it has relaxed at its end, and
-/// its history is exact for what changes linearly.
-const PACE_MIN: f64 = 1e-9;
+use crate::element::Memory;
 
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
@@ -22,56 +19,10 @@ pub struct Solver<'a> {
     pub(super) loading: Loading,
     pub(super) state: State,
     /// Equilibrium before the last, for extrapolation.
-    before: Option<State>,
+    pub(super) before: Option<State>,
     pub(super) work: Work,
     /// Load fraction that a time step may take; `None` for bodies without memory.
-    pace: Option<f64>,
-}
-
-/// An equilibrium, or the start of the search for one.
-#[derive(Clone, Debug, Default)]
-pub(super) struct State {
-    pub fraction: f64,
-    pub u: Vec<[f64; 3]>,
-    /// Dilatation of each element that is carried along; empty if none is.
-    pub carried: Vec<Dilatation>,
-    pub multipliers: Vec<f64>,
-    /// History of materials with memory; empty if there are none.
-    pub memory: Vec<f64>,
-    /// Tangential contact; no points without friction.
-    pub friction: FrictionTrial,
-}
-
-/// A place to go back to, see [`Solver::mark`].
-#[derive(Clone)]
-pub struct Mark {
-    state: State,
-    before: Option<State>,
-    work: Work,
-}
-
-/// One equilibrium.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct StepReport {
-    /// Load fraction.
-    pub load_fraction: f64,
-    /// Out-of-balance force over the reference norm.
-    pub residual_relative: f64,
-    /// Largest |gap| of a point in contact, mm.
-    pub gap_error_mm: f64,
-    /// Energy that can be got back, mJ.
-    pub stored_mj: f64,
-    /// Energy that materials with memory and friction have turned into heat, mJ.
-    pub dissipated_mj: f64,
-    /// Smallest `J`.
-    pub j_min: f64,
-    /// Block of the mesh and element in it where it is.
-    pub j_min_at: [usize; 2],
-    /// The tangent's condition number is at least this, by the diagonal of its last
-    /// Cholesky factor; not a number if there has been none.
-    pub condition_at_least: f64,
-    /// Work since the last report.
-    pub effort: Effort,
+    pub(super) pace: Option<f64>,
 }
 
 impl<'a> Solver<'a> {
@@ -283,77 +234,5 @@ impl<'a> Solver<'a> {
             self.work.add(indenter, next, self.newton.current.contact_force_n);
         }
         Ok(())
-    }
-
-    /// Half the shortest relaxation time, as a load fraction.
-    fn first_pace(&self) -> Option<f64> {
-        let problem = self.newton.problem;
-        problem.memory.as_ref()?;
-        let shortest = problem.materials.iter().filter_map(|m| m.shortest_time_s());
-        Some(0.5 * shortest.fold(f64::INFINITY, f64::min) / self.loading.duration_s)
-    }
-
-    /// `step`, no longer than time integration allows.
-    fn paced(&self, step: f64) -> f64 {
-        self.pace.map_or(step, |p| step.min(p.max(PACE_MIN)))
-    }
-
-    /// Sets the next time step by how far linear extrapolation missed this one:
-    /// the recursion of a Prony series is exact for what changes linearly.
-    fn set_pace(&mut self, next: f64, u: &[[f64; 3]]) {
-        let (Some(pace), Some(before)) = (&mut self.pace, &self.before) else { return };
-        let step = next - self.state.fraction;
-        let ratio = step / (self.state.fraction - before.fraction);
-        let (mut miss, mut size) = (0.0f64, 0.0f64);
-        for ((new, last), old) in u.iter().zip(&self.state.u).zip(&before.u) {
-            for i in 0..3 {
-                let predicted = last[i] + ratio * (last[i] - old[i]);
-                miss = miss.max((new[i] - predicted).abs());
-                size = size.max(new[i].abs());
-            }
-        }
-        let wanted = (self.newton.options.time_error * size / miss.max(f64::MIN_POSITIVE)).sqrt();
-        *pace = step * wanted.clamp(0.3, 2.0);
-    }
-
-    /// Time from the last equilibrium to `next`, s.
-    pub(super) fn seconds(&self, next: f64) -> f64 {
-        (next - self.state.fraction) * self.loading.duration_s
-    }
-
-    /// Extrapolates the last two equilibria.
-    fn predict(&self, next: f64) -> State {
-        let mut trial = self.state.clone();
-        if let Some(before) = &self.before {
-            let ratio = (next - self.state.fraction) / (self.state.fraction - before.fraction);
-            for (v, w) in trial.u.iter_mut().zip(&before.u) {
-                for i in 0..3 {
-                    v[i] += ratio * (v[i] - w[i]);
-                }
-            }
-            for (c, old) in trial.carried.iter_mut().zip(&before.carried) {
-                for r in 0..c.len() {
-                    c[r] += ratio * (c[r] - old[r]);
-                }
-            }
-            for (l, m) in trial.multipliers.iter_mut().zip(&before.multipliers) {
-                *l = (*l + ratio * (*l - m)).max(0.0);
-            }
-        }
-        self.prescribe(next, &mut trial.u);
-        trial
-    }
-
-    /// The last equilibrium as it meets what is prescribed at `next`.
-    fn unmoved(&self, next: f64) -> State {
-        let mut trial = self.state.clone();
-        self.prescribe(next, &mut trial.u);
-        trial
-    }
-
-    fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
-        for &(dof, value) in &self.loading.prescribed_mm {
-            u[dof / 3][dof % 3] = fraction * value;
-        }
     }
 }

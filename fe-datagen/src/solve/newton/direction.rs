@@ -1,0 +1,117 @@
+//! The direction of a Newton step: the tangent and the linear system with it.
+//!
+//! A factorization costs as much as some thirty solves, so an older f32 factor
+//! preconditions conjugate gradients on the current tangent, and is renewed
+//! when that takes too many iterations.
+
+use super::{Fixed, Newton};
+use crate::contact::Support;
+use crate::element::Dilatation;
+use crate::linear::{Equations, Factor, conjugate_gradient};
+use crate::solve::StepError;
+use crate::solve::evaluate::evaluate_body;
+use crate::solve::loading::Loading;
+use crate::solve::mixed;
+use std::time::Instant;
+
+impl Newton<'_> {
+    pub(super) fn assemble(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+    ) -> Result<(), StepError> {
+        let clock = Instant::now();
+        let trial = fixed.trial(u, carried, self.penalty);
+        let tangent = Some(&mut self.tangent);
+        let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
+        self.effort.assemble_s += clock.elapsed().as_secs_f64();
+        for (dof, &e) in self.problem.structure.equations.of_dof.iter().enumerate() {
+            if e != Equations::FIXED {
+                self.right[e as usize] = -self.current.residual_n[dof];
+            }
+        }
+        result
+    }
+
+    /// Solves `tangent * step = right`; where the tangent is indefinite, a nearby one
+    /// that is not, if there is one.
+    pub(super) fn solve_step(&mut self, loading: &Loading, tolerance: f64, mixed: bool) {
+        let mut cg_max = self.options.cg_max;
+        if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
+            self.factorize(loading);
+        } else if mixed {
+            cg_max = cg_max.min(mixed::OLD_FACTOR_CG_MAX);
+        }
+        let mut fresh = false;
+        loop {
+            if self.factorizer.held() == Some(Factor::Indefinite) {
+                let clock = Instant::now();
+                self.step.copy_from_slice(&self.right);
+                self.factorizer.solve(&self.problem.structure, &mut self.step);
+                self.effort.solve_s += clock.elapsed().as_secs_f64();
+                return;
+            }
+            let clock = Instant::now();
+            let found = conjugate_gradient(
+                &self.problem.structure,
+                &self.tangent,
+                &mut self.factorizer,
+                &self.right,
+                &mut self.step,
+                tolerance,
+                cg_max,
+                &mut self.cg,
+            );
+            self.effort.solve_s += clock.elapsed().as_secs_f64();
+            self.effort.cg_iterations += found.iterations;
+            self.stale = found.iterations > self.options.refactor_after_cg;
+            if found.negative_curvature && self.convexify(loading) {
+                continue;
+            }
+            let usable = found.relative_residual <= tolerance
+                || (found.negative_curvature && found.iterations > 0);
+            if usable || fresh {
+                return;
+            }
+            self.factorize(loading);
+            cg_max = self.options.cg_max;
+            fresh = true;
+        }
+    }
+
+    /// Gives back to the tangent what convex edges of the indenter take from it, which is
+    /// what mostly makes it indefinite: a direction downhill then costs no more than
+    /// any other. `false` if that has been done or there is nothing to give back.
+    fn convexify(&mut self, loading: &Loading) -> bool {
+        let any = !self.current.curvature.is_empty();
+        let Some(surface) = &self.problem.contact else { return any };
+        let points = surface.points(loading.contact());
+        for (point, k) in self.current.curvature.drain(..) {
+            let Support { nodes, values } = points.support(point);
+            self.problem.structure.add_point(&mut self.tangent, nodes, values, &k);
+        }
+        any
+    }
+
+    fn factorize(&mut self, loading: &Loading) {
+        let clock = Instant::now();
+        self.effort.factorizations += 1;
+        let structure = &self.problem.structure;
+        let mut definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
+        if !definite && self.convexify(loading) {
+            definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
+        }
+        if let Some(condition) = self.factorizer.condition_at_least(structure) {
+            self.condition = condition;
+            tracing::trace!(condition, "tangent factorized");
+        }
+        if !definite {
+            tracing::debug!("tangent not positive definite: L B L^T");
+            self.effort.indefinite_factorizations += 1;
+            self.factorizer.indefinite(structure, &self.tangent);
+        }
+        self.stale = false;
+        self.effort.factor_s += clock.elapsed().as_secs_f64();
+    }
+}
