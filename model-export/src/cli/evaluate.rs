@@ -1,6 +1,6 @@
 //! `model-export evaluate`.
 
-use super::{load_model, print_json};
+use super::{load_card, load_model, print_json};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_export::dataset::Dataset;
 use model_export::evaluate::{self, Evaluation, Subject};
@@ -57,8 +57,11 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         difference = evaluation.other_engine_difference_max;
         agree(difference, info, &other.info().backend, options.tolerance)?;
     }
-    let card = evaluation.card(info, difference);
+    let mut card = evaluation.card(info, difference);
     if let Some(path) = &options.out {
+        // The pattern is the data's, not the model's: one that was noted for them still holds.
+        let noted = load_card(path).ok().filter(|old| old.dataset_sha256 == card.dataset_sha256);
+        card.pattern_max = noted.and_then(|old| old.pattern_max);
         write(path, card.to_json()?.as_bytes())?;
     }
     let pictures = draw_pictures(options, &subject, &dataset, &evaluation)?;

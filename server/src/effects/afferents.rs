@@ -42,15 +42,9 @@ impl Afferents {
         Ok(Self { of, sigma_kpa, last_us: None, rate_hz })
     }
 
-    /// Stress at this SED, kPa.
-    fn sigma_kpa(&self, sed_j_per_m3: f32) -> f32 {
-        // J/m3 are Pa; kPa x Pa = 1e-3 kPa^2.
-        (2e-3 * self.of.e_ref_kpa * sed_j_per_m3).sqrt()
-    }
-
     /// The steady rate at the greatest SED that a tier knows, Hz; 1 at least.
     pub(super) fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
-        let above_kpa = self.sigma_kpa(sed_max_j_per_m3) - self.of.theta_kpa;
+        let above_kpa = sigma_kpa(self.of.e_ref_kpa, sed_max_j_per_m3) - self.of.theta_kpa;
         (self.of.k_s_hz_per_kpa * above_kpa).max(1.0)
     }
 
@@ -63,14 +57,13 @@ impl Afferents {
             0 => 0.0,
             us => self.of.k_d_hz_s_per_kpa / (us as f64 * 1e-6) as f32,
         };
-        let factor = 2e-3 * self.of.e_ref_kpa;
-        let (theta, k_s) = (self.of.theta_kpa, self.of.k_s_hz_per_kpa);
+        let (e_ref, theta, k_s) = (self.of.e_ref_kpa, self.of.theta_kpa, self.of.k_s_hz_per_kpa);
         let maps = self.rate_hz.iter_mut().zip(&mut self.sigma_kpa).zip(sed_j_per_m3);
-        for ((rate_hz, sigma_kpa), sed) in maps {
-            let now_kpa = (factor * sed).sqrt();
-            *rate_hz =
-                k_s * (now_kpa - theta).max(0.0) + k_d_hz_per_kpa * (now_kpa - *sigma_kpa).max(0.0);
-            *sigma_kpa = now_kpa;
+        for ((rate_hz, before_kpa), sed) in maps {
+            let now_kpa = sigma_kpa(e_ref, *sed);
+            *rate_hz = k_s * (now_kpa - theta).max(0.0)
+                + k_d_hz_per_kpa * (now_kpa - *before_kpa).max(0.0);
+            *before_kpa = now_kpa;
         }
     }
 
@@ -78,6 +71,12 @@ impl Afferents {
     pub(super) fn rate_hz(&self) -> &[f32] {
         &self.rate_hz
     }
+}
+
+/// Stress at this SED, kPa.
+fn sigma_kpa(e_ref_kpa: f32, sed_j_per_m3: f32) -> f32 {
+    // J/m3 are Pa; kPa x Pa = 1e-3 kPa^2.
+    (2e-3 * e_ref_kpa * sed_j_per_m3).sqrt()
 }
 
 #[cfg(test)]

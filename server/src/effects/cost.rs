@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bytes::BytesMut;
 use papilla_proto::{
-    HEADER_LEN_V2, Hello, MAP_LEN, RuntimeEffect,
+    HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
     effects::{Actuator, ActuatorInput, Layout, Place},
 };
 use serde::Serialize;
@@ -48,7 +48,7 @@ fn hello(effect: RuntimeEffect, catalogue: &Catalogue) -> Hello {
     let indices = catalogue.interface.indices();
     let place = |i: usize| {
         let index = indices[i * indices.len() / PLACES] as usize;
-        Place::Px([(index % 224) as f32 + 0.5, (index / 224) as f32 + 0.5])
+        Place::Px([index % MAP_SIDE_PX, index / MAP_SIDE_PX].map(|px| px as f32 + 0.5))
     };
     let places = || (0..PLACES).filter(|_| !indices.is_empty()).map(place);
     let mut hello = Hello {

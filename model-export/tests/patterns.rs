@@ -1,0 +1,91 @@
+//! What the cards note of the maps that models were trained on, and which maps that tells.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+mod bench;
+
+use bench::{Bench, DEPTHS, press, read_card};
+use model_export::dataset::Dataset;
+use papilla_engine::card::Index;
+use papilla_engine::{MAP_LEN, MAP_SIDE_PX, ladder::Kind};
+use papilla_proto::Pattern;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
+}
+
+#[test]
+fn a_card_notes_the_roughest_and_heaviest_map() {
+    let bench = Bench::new();
+    let evaluate = ["evaluate", "models/tiny.onnx", "data", "--out", "models/tiny.json"];
+    let note = ["patterns", "models", "--dataset", "data"];
+    bench.done(&evaluate);
+    bench.done(&["index", "models", "--default", "tiny"]);
+    assert_eq!(read_card(&bench.path("models/tiny.json")).pattern_max, None);
+    assert!(bench.done(&note).contains("tiny: roughness up to"));
+    let noted = read_card(&bench.path("models/tiny.json")).pattern_max.unwrap();
+    let maps = [0.9, 1.0].into_iter().flat_map(|force| DEPTHS.map(|depth| press(force * depth)));
+    let due = maps.map(|map| Pattern::of(&map)).reduce(Pattern::max).unwrap();
+    assert!((noted.roughness / due.roughness - 1.0).abs() < 1e-4, "{noted:?} {due:?}");
+    assert!((noted.load_mpa_px / due.load_mpa_px - 1.0).abs() < 1e-4, "{noted:?} {due:?}");
+    // Measured anew on the same data, the model keeps it.
+    bench.done(&evaluate);
+    assert_eq!(read_card(&bench.path("models/tiny.json")).pattern_max, Some(noted));
+
+    // Other data tell nothing of this model.
+    let card = fs::read_to_string(bench.path("models/tiny.json")).unwrap();
+    let hash = read_card(&bench.path("models/tiny.json")).dataset_sha256;
+    fs::write(bench.path("models/tiny.json"), card.replace(&hash, &"0".repeat(64))).unwrap();
+    assert!(bench.refused(1, &note).contains("trained on these datasets alone"));
+}
+
+/// Maps that no press makes, 10 kPa where they are not 0.
+fn odd_maps(skin: &[bool]) -> Vec<(String, Vec<f32>)> {
+    let drawn = |at: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
+        let pixel =
+            |i: usize| if skin[i] { 1e4 * at(i / MAP_SIDE_PX, i % MAP_SIDE_PX) } else { 0.0 };
+        (0..MAP_LEN).map(pixel).collect()
+    };
+    let board = |side_px: usize| {
+        drawn(&|y, x| f32::from(u8::from((y / side_px + x / side_px).is_multiple_of(2))))
+    };
+    let mut maps: Vec<(String, Vec<f32>)> =
+        [1, 2, 4, 8, 16, 32].map(|px| (format!("checkerboard of {px} px"), board(px))).into();
+    let hash = |y: usize, x: usize| ((y * 7919 + x * 104_729) % 1009) as f32 / 1008.0;
+    maps.push(("noise".to_owned(), drawn(&hash)));
+    maps.push(("all skin alike".to_owned(), drawn(&|_, _| 1.0)));
+    maps
+}
+
+#[test]
+fn shipped_networks_tell_odd_maps_from_held_out_presses() {
+    let dataset = Dataset::open(&root().join("data/heldout")).unwrap();
+    let mut presses = Vec::new();
+    for press in dataset.every_press() {
+        let shard = dataset.load(press).unwrap();
+        for row in shard.pressure_pa.rows() {
+            let mut map = vec![0.0; MAP_LEN];
+            dataset.skin.rasterise(&row.to_vec(), &mut map).unwrap();
+            presses.push(Pattern::of(&map));
+        }
+    }
+    let odd = odd_maps(dataset.skin.mask());
+    let index = fs::read_to_string(root().join("models/index.json")).unwrap();
+    for name in Index::from_json(&index).unwrap().models {
+        let card = read_card(&root().join(format!("models/{name}.json")));
+        let of_maps = matches!(Kind::of_network(&card.network), Kind::Network | Kind::S1Network);
+        assert_eq!(card.pattern_max.is_some(), of_maps, "{name}");
+        let Some(trained) = card.pattern_max else { continue };
+        for (what, map) in &odd {
+            assert!(Pattern::of(map).is_beyond(trained), "{name}: {what}");
+        }
+        // Edges and gratings are rougher than all that plates alone have taught.
+        if card.datasets().len() > 1 {
+            let flagged = presses.iter().filter(|pattern| pattern.is_beyond(trained)).count();
+            assert_eq!((flagged, presses.len()), (0, 192), "{name}");
+        }
+    }
+}
