@@ -29,7 +29,8 @@ struct Row {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let seen = options.datasets.iter().map(|path| look(path)).collect::<Result<Vec<_>, _>>()?;
+    let seen =
+        options.datasets.iter().map(|path| look(path, json)).collect::<Result<Vec<_>, _>>()?;
     let index = Index::from_json(&read_text(&options.folder.join("index.json"))?)?;
     let mut rows = Vec::new();
     for name in &index.models {
@@ -70,10 +71,10 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 }
 
 /// Hash and greatest pattern of a dataset.
-fn look(folder: &Path) -> anyhow::Result<(String, Pattern)> {
+fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, Pattern)> {
     let dataset = Dataset::open(folder)?;
     let presses = dataset.every_press();
-    let bar = ProgressBar::new(presses.len() as u64).with_message(folder.display().to_string());
+    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(presses.len() as u64) };
     let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut greatest = Pattern::default();
     for press in presses {
