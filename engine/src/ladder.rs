@@ -89,6 +89,12 @@ impl Kind {
             _ => Self::Network,
         }
     }
+
+    /// Whether it was trained, ours or the published one.
+    #[must_use]
+    pub const fn is_network(self) -> bool {
+        matches!(self, Self::Network | Self::S1Network)
+    }
 }
 
 /// One way of getting a SED map.

@@ -7,6 +7,7 @@ mod ladder;
 mod patterns;
 
 use clap::{Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
 use model_export::{ExportError, read, read_text, table};
 use papilla_engine::{Backend, Card, Model};
 use serde::Serialize;
@@ -146,6 +147,13 @@ fn load_model(
 ) -> Result<Arc<dyn Model>, ExportError> {
     let refused = |source| ExportError::Engine { path: path.to_owned(), source };
     papilla_engine::load_with(backend, &read(path)?, card).map_err(refused)
+}
+
+/// How far a command has come: on stderr, only where that is a terminal, and not beside JSON.
+fn bar(hidden: bool, count: usize, what: &str) -> anyhow::Result<ProgressBar> {
+    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(count as u64) };
+    let template = format!("{{bar:32}} {{pos}}/{{len}} {what}, {{per_sec}}, {{eta}} left {{msg}}");
+    Ok(bar.with_style(ProgressStyle::with_template(&template)?))
 }
 
 fn print_json(value: &impl Serialize) -> anyhow::Result<()> {

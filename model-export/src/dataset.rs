@@ -198,6 +198,47 @@ impl Dataset {
     }
 }
 
+impl Dataset {
+    /// Draws the pressure of a sample of `press` on the skin, Pa; 224 x 224.
+    ///
+    /// # Errors
+    /// [`ExportError::Atlas`].
+    pub fn draw_pressure(
+        &self,
+        press: &Press,
+        shard: &Shard,
+        index: usize,
+        map: &mut [f32],
+    ) -> Result<(), ExportError> {
+        self.draw(press, &self.skin, &shard.pressure_pa.row(index).to_vec(), map)
+    }
+
+    /// Draws its SED on the interface, J/m3.
+    ///
+    /// # Errors
+    /// [`ExportError::Atlas`].
+    pub fn draw_sed(
+        &self,
+        press: &Press,
+        shard: &Shard,
+        index: usize,
+        map: &mut [f32],
+    ) -> Result<(), ExportError> {
+        self.draw(press, &self.interface, &shard.sed_j_per_m3.row(index).to_vec(), map)
+    }
+
+    fn draw(
+        &self,
+        press: &Press,
+        raster: &Raster,
+        values: &[f32],
+        map: &mut [f32],
+    ) -> Result<(), ExportError> {
+        let refused = |source| ExportError::Atlas { path: self.shard_path(press), source };
+        raster.rasterise(values, map).map_err(refused)
+    }
+}
+
 type Npz = NpzReader<Cursor<Vec<u8>>>;
 
 pub(crate) fn read_array<T: ReadableElement, D: ndarray::Dimension>(

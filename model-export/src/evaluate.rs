@@ -1,7 +1,7 @@
 //! Runs a model over a split of a dataset in the engine that will serve it.
 
 use crate::ExportError;
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Press, Shard};
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::reference::relative_difference;
 use papilla_engine::card::{Card, Latency, Metrics};
@@ -51,6 +51,20 @@ impl Default for Maps {
         let [pressure_pa, truth_j_per_m3, predicted_j_per_m3] =
             std::array::from_fn(|_| vec![0.0; MAP_LEN]);
         Self { pressure_pa, truth_j_per_m3, predicted_j_per_m3 }
+    }
+}
+
+impl Maps {
+    /// Takes pressure and truth of a sample.
+    fn draw(
+        &mut self,
+        dataset: &Dataset,
+        press: &Press,
+        shard: &Shard,
+        index: usize,
+    ) -> Result<(), ExportError> {
+        dataset.draw_pressure(press, shard, index, &mut self.pressure_pa)?;
+        dataset.draw_sed(press, shard, index, &mut self.truth_j_per_m3)
     }
 }
 
@@ -137,7 +151,7 @@ pub fn run(
         let path = dataset.shard_path(press);
         let shard = dataset.load(press)?;
         for index in 0..press.samples {
-            draw(dataset, &shard, index, &mut maps, &path)?;
+            maps.draw(dataset, press, &shard, index)?;
             let infer_ms = bench.infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;
             if let Some(second) = &mut second {
                 let mut answer = vec![0.0; MAP_LEN];
@@ -195,7 +209,7 @@ pub fn maps_of(
     let mut maps = Maps::default();
     for press in dataset.presses(split)?.into_iter().filter(|press| press.id == sample.press) {
         let shard = dataset.load(press)?;
-        draw(dataset, &shard, sample.index, &mut maps, &dataset.shard_path(press))?;
+        maps.draw(dataset, press, &shard, sample.index)?;
         Bench::new(subject.model, subject.path)?
             .infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;
     }
@@ -223,25 +237,6 @@ pub fn require_same_atlas(what: &str, found: &str, expected: &str) -> Result<(),
         expected: expected.to_owned(),
         found: found.to_owned(),
     })
-}
-
-fn draw(
-    dataset: &Dataset,
-    shard: &crate::dataset::Shard,
-    index: usize,
-    maps: &mut Maps,
-    path: &Path,
-) -> Result<(), ExportError> {
-    for (raster, values, map) in [
-        (&dataset.skin, &shard.pressure_pa, &mut maps.pressure_pa),
-        (&dataset.interface, &shard.sed_j_per_m3, &mut maps.truth_j_per_m3),
-    ] {
-        let row: Vec<f32> = values.row(index).iter().copied().collect();
-        raster
-            .rasterise(&row, map)
-            .map_err(|source| ExportError::Atlas { path: path.to_owned(), source })?;
-    }
-    Ok(())
 }
 
 /// One engine with its clock.

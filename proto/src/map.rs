@@ -183,8 +183,8 @@ pub fn keep_inside(map_pa: &mut [f32], mask: &PixelMask) -> MapSummary {
     MapSummary { peak_pa: peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak }) }
 }
 
-/// Samples looked at together; [`MAP_LEN`] is a multiple.
-const LANES: usize = 16;
+/// Samples looked at together; [`MAP_SIDE_PX`] is a multiple.
+pub(crate) const LANES: usize = 16;
 
 /// Checks a pressure map, Pa: length, finite, not negative, not above
 /// `pressure_max_pa` x [`PRESSURE_HEADROOM`].

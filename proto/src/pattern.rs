@@ -7,14 +7,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::MAP_SIDE_PX;
+use crate::{MAP_SIDE_PX, map::LANES};
 
 /// Room above the greatest trained pattern, as a factor: quantisation and another raster of the
 /// same press move both numbers by less.
 pub const PATTERN_HEADROOM: f32 = 1.05;
-
-/// Samples looked at together; the side of a map is a multiple.
-const LANES: usize = 16;
 
 /// Two numbers of a pressure map.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]

@@ -2,6 +2,7 @@
 
 use super::ExportError;
 use crate::element::{Elastic, Solid};
+use crate::linear::eigen;
 use crate::material::{LinearElastic, MaterialError, MaterialSpec, NeoHookean, Ogden, OgdenTerm};
 use crate::scene::effects::{Law, Plan};
 use std::fmt::Write;
@@ -208,32 +209,9 @@ impl MaterialCard {
     }
 }
 
-/// Eigenvalues of a symmetric matrix (xx, yy, zz, xy, xz, yz), by Jacobi's rotations.
+/// Eigenvalues of a symmetric matrix (xx, yy, zz, xy, xz, yz).
 fn principal(v: &[f64; 6]) -> [f64; 3] {
-    let mut a = [[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]];
-    // Quadratic convergence: six sweeps are more than enough for three rows.
-    for _ in 0..6 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
-            let s = t * c;
-            let old = a;
-            for k in 0..3 {
-                a[k][p] = c * old[k][p] - s * old[k][q];
-                a[k][q] = s * old[k][p] + c * old[k][q];
-            }
-            let old = a;
-            for k in 0..3 {
-                a[p][k] = c * old[p][k] - s * old[q][k];
-                a[q][k] = s * old[p][k] + c * old[q][k];
-            }
-        }
-    }
-    [a[0][0], a[1][1], a[2][2]]
+    eigen([[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]]).0
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 mod cg;
 mod direct;
+mod eigen;
 mod factor;
 mod ordering;
 mod structure;
@@ -13,6 +14,7 @@ mod structure;
 pub(crate) use cg::dot;
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
 pub use direct::Direct;
+pub(crate) use eigen::eigen;
 pub use factor::{Factor, FactorError, Factorizer};
 pub use ordering::OrderingError;
 pub use structure::{Elimination, Equations, Structure, StructureError, SymmetricMatrix};

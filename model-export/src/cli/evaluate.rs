@@ -1,7 +1,6 @@
 //! `model-export evaluate`.
 
-use super::{load_card, load_model, print_json};
-use indicatif::{ProgressBar, ProgressStyle};
+use super::{bar, load_card, load_model, print_json};
 use model_export::dataset::Dataset;
 use model_export::evaluate::{self, Evaluation, Subject};
 use model_export::reference::{Recorded, TOLERANCE};
@@ -139,11 +138,7 @@ fn measure(
     json: bool,
 ) -> anyhow::Result<Evaluation> {
     let count: usize = dataset.presses(&options.split)?.iter().map(|press| press.samples).sum();
-    // Drawn on stderr, and only where that is a terminal.
-    let bar = if json { ProgressBar::hidden() } else { ProgressBar::new(count as u64) };
-    bar.set_style(ProgressStyle::with_template(
-        "{bar:32} {pos}/{len} samples, {per_sec}, {eta} left",
-    )?);
+    let bar = bar(json, count, "samples")?;
     let evaluation = evaluate::run(subject, other, dataset, &options.split, || bar.inc(1));
     bar.finish_and_clear();
     Ok(evaluation?)

@@ -1,7 +1,7 @@
 //! `model-export ladder`, and the hidden command that weighs one model in a fresh process.
 
-use super::print_json;
-use indicatif::{ProgressBar, ProgressStyle};
+use super::{bar, print_json};
+use indicatif::ProgressBar;
 use model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
 use model_export::{ExportError, read, read_text, write};
 use papilla_engine::{Ladder, MAP_LEN};
@@ -47,7 +47,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
             Ladder::from_json(&read_text(path)?).map_err(refused)?
         }
         None => {
-            let bar = Bar::new(json)?;
+            let bar = Bar(bar(json, 0, "samples")?);
             let ladder = ladder::measure(&task, &bar, &footprint)?;
             bar.0.finish_and_clear();
             ladder
@@ -96,18 +96,7 @@ fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>>
     Ok(files.into_iter().map(|(path, _)| path).collect())
 }
 
-/// Drawn on stderr, and only where that is a terminal.
 struct Bar(ProgressBar);
-
-impl Bar {
-    fn new(hidden: bool) -> anyhow::Result<Self> {
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
-        bar.set_style(ProgressStyle::with_template(
-            "{bar:32} {pos}/{len} samples, {eta} left, {msg}",
-        )?);
-        Ok(Self(bar))
-    }
-}
 
 impl Progress for Bar {
     fn total(&self, steps: u64) {

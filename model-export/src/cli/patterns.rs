@@ -1,10 +1,9 @@
 //! `model-export patterns`.
 
-use super::{load_card, print_json};
+use super::{bar, load_card, print_json};
 use anyhow::bail;
-use indicatif::ProgressBar;
 use model_export::dataset::Dataset;
-use model_export::{ExportError, read_text, write};
+use model_export::{read_text, write};
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, ladder::Kind};
 use papilla_proto::Pattern;
@@ -37,14 +36,11 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         let path = options.folder.join(format!("{name}.json"));
         let mut card = load_card(&path)?;
         let of = |hash: &str| seen.iter().find(|(own, _)| own == hash).map(|(_, pattern)| *pattern);
-        let pattern_max = match Kind::of_network(&card.network) {
-            Kind::Network | Kind::S1Network => {
-                card.datasets().into_iter().map(of).collect::<Option<Vec<_>>>()
-            }
-            Kind::ClosedForm | Kind::Operator | Kind::Fe => None,
+        let pattern_max = if Kind::of_network(&card.network).is_network() {
+            card.datasets().into_iter().map(of).reduce(|a, b| Some(a?.max(b?))).flatten()
+        } else {
+            None
         };
-        let pattern_max =
-            pattern_max.map(|all| all.into_iter().fold(Pattern::default(), Pattern::max));
         if pattern_max.is_some() {
             card.pattern_max = pattern_max;
             write(&path, card.to_json()?.as_bytes())?;
@@ -74,16 +70,13 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, Pattern)> {
     let dataset = Dataset::open(folder)?;
     let presses = dataset.every_press();
-    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(presses.len() as u64) };
+    let bar = bar(hidden, presses.len(), "presses")?;
     let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut greatest = Pattern::default();
     for press in presses {
         let shard = dataset.load(press)?;
         for index in 0..press.samples {
-            let values = shard.pressure_pa.row(index).to_vec();
-            let path = dataset.shard_path(press);
-            let refused = |source| ExportError::Atlas { path, source };
-            dataset.skin.rasterise(&values, &mut pressure_pa).map_err(refused)?;
+            dataset.draw_pressure(press, &shard, index, &mut pressure_pa)?;
             greatest = greatest.max(Pattern::of(&pressure_pa));
         }
         bar.inc(1);

@@ -10,6 +10,9 @@ pub mod flags {
     pub const NO_CONTACT: u8 = 2;
     /// Rougher or heavier than any map the tier was trained on ([`crate::pattern`]).
     pub const UNFAMILIAR: u8 = 4;
+    /// All of them by name.
+    pub const NAMED: [(u8, &str); 3] =
+        [(OUT_OF_RANGE, "out_of_range"), (NO_CONTACT, "no_contact"), (UNFAMILIAR, "unfamiliar")];
 }
 
 /// What version 2 adds to a header.

@@ -1,7 +1,6 @@
 //! `POST /v1/sed`: one pressure map in, one SED map out.
 
 use std::{
-    mem,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -70,11 +69,11 @@ async fn render(
     let job = Job { tier, payload, input, output, frame: None, received, deadline };
     // Held until the answer is there: it bounds the queue.
     let _place = app.admit_request()?;
-    let mut rendered = through_pool(app, job, Transport::Http).await?;
-    let mut response = answer(output.content_type(), mem::take(&mut rendered.bytes).freeze());
+    let Rendered { bytes, scale, fared } = through_pool(app, job, Transport::Http).await?;
+    let mut response = answer(output.content_type(), bytes.freeze());
     let headers = response.headers_mut();
-    label(headers, &catalogue.tiers[tier].name, &rendered);
-    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&rendered.scale.to_string())) {
+    fared.label(headers, &catalogue.tiers[tier].name);
+    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
         headers.insert("x-sed-max-j-per-m3", white);
     }
     Ok(response)
@@ -84,10 +83,16 @@ async fn render(
 pub(crate) struct Rendered {
     pub(crate) bytes: BytesMut,
     pub(crate) scale: f32,
+    pub(crate) fared: Fared,
+}
+
+/// What a client may want to know beside the map.
+#[derive(Clone, Copy)]
+pub(crate) struct Fared {
     /// In the queue, in the network, from receipt until now.
-    pub(crate) times: [Duration; 3],
+    times: [Duration; 3],
     /// Bits of [`papilla_proto::flags`].
-    pub(crate) flags: u8,
+    flags: u8,
 }
 
 /// Renders one posted map. The caller holds a place, which bounds the queue.
@@ -116,7 +121,7 @@ pub(crate) async fn through_pool(
             app.metrics.tier(done.tier).total.observe(total);
             let times = [done.times.queue, done.times.infer, total];
             telemetry::rendered(&app.catalogue().tiers[done.tier].name, times);
-            Ok(Rendered { bytes, scale, times, flags: done.drawn.flags })
+            Ok(Rendered { bytes, scale, fared: Fared { times, flags: done.drawn.flags } })
         }
     }
 }
@@ -134,19 +139,18 @@ async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
     }
 }
 
-/// What a client may want to know beside the map: tier, times, and what is special about it.
-pub(crate) fn label(headers: &mut HeaderMap, tier: &str, rendered: &Rendered) {
-    if let Ok(tier) = HeaderValue::from_str(tier) {
-        headers.insert("x-papilla-tier", tier);
-    }
-    let names = ["x-papilla-queue-us", "x-papilla-infer-us", "x-papilla-total-us"];
-    for (name, time) in names.into_iter().zip(rendered.times) {
-        let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
-        headers.insert(HeaderName::from_static(name), HeaderValue::from(us));
-    }
-    // Over HTTP pressure out of range is refused.
-    for (bit, name) in [(flags::NO_CONTACT, "no_contact"), (flags::UNFAMILIAR, "unfamiliar")] {
-        if rendered.flags & bit != 0 {
+impl Fared {
+    /// Says it in headers, with the tier that rendered.
+    pub(crate) fn label(self, headers: &mut HeaderMap, tier: &str) {
+        if let Ok(tier) = HeaderValue::from_str(tier) {
+            headers.insert("x-papilla-tier", tier);
+        }
+        let names = ["x-papilla-queue-us", "x-papilla-infer-us", "x-papilla-total-us"];
+        for (name, time) in names.into_iter().zip(self.times) {
+            let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+            headers.insert(HeaderName::from_static(name), HeaderValue::from(us));
+        }
+        for (_, name) in flags::NAMED.into_iter().filter(|(bit, _)| self.flags & bit != 0) {
             headers.append("x-papilla-flags", HeaderValue::from_static(name));
         }
     }

@@ -7,10 +7,7 @@
 mod request;
 mod response;
 
-use std::{
-    mem,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use axum::{
     body::Body,
@@ -30,7 +27,7 @@ use crate::{
     codec::{Input, Output},
     http::{
         Shared, body, json_answer,
-        sed::{count, label, through_pool},
+        sed::{Rendered, count, through_pool},
     },
     metrics::Transport,
     pool::Job,
@@ -156,10 +153,10 @@ async fn answer(
         received,
         deadline,
     };
-    let mut rendered = through_pool(app, job, Transport::Oip).await?;
+    let Rendered { bytes, fared, .. } = through_pool(app, job, Transport::Oip).await?;
     let catalogue = app.catalogue();
     let name = catalogue.tiers[tier].name.clone();
-    let tensor = Tensor { model: name.clone(), wish, sed: mem::take(&mut rendered.bytes).freeze() };
+    let tensor = Tensor { model: name.clone(), wish, sed: bytes.freeze() };
     let mut response = if tensor.wish.is_binary_wanted {
         tensor.binary()?
     } else {
@@ -167,7 +164,7 @@ async fn answer(
         let text = spawn_blocking(move || tensor.json()).await;
         text.map_err(|error| problem::internal("the answer was not written", &error))??
     };
-    label(response.headers_mut(), &name, &rendered);
+    fared.label(response.headers_mut(), &name);
     Ok(response)
 }
 

@@ -147,10 +147,9 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         drawn.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        if let (false, Some(trained)) = (summary.is_zero(), tier.pattern_max) {
-            let is_beyond = Pattern::of(&self.pressure_pa).is_beyond(trained);
-            drawn.flags |= if is_beyond { flags::UNFAMILIAR } else { 0 };
-        }
+        let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
+        let is_unfamiliar = !summary.is_zero() && tier.pattern_max.is_some_and(is_beyond);
+        drawn.flags |= if is_unfamiliar { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 

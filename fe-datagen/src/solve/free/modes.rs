@@ -5,6 +5,7 @@
 //! null space of the forms' Gram matrix.
 
 use super::middle;
+use crate::linear::eigen;
 use crate::mesh::Mesh;
 use std::fmt;
 
@@ -114,37 +115,6 @@ fn reduced(mut rows: Vec<[f64; 6]>) -> Vec<[f64; 6]> {
     }
     let clean = |v: f64| if v.abs() < 1e-9 { 0.0 } else { v };
     rows.into_iter().map(|r| r.map(clean)).collect()
-}
-
-/// Eigenvalues and eigenvectors (rows) of a symmetric 6 x 6 matrix by Jacobi's method.
-fn eigen(mut a: [[f64; 6]; 6]) -> ([f64; 6], [[f64; 6]; 6]) {
-    let mut v = [[0.0; 6]; 6];
-    for i in 0..6 {
-        v[i][i] = 1.0;
-    }
-    // Converges quadratically; ten sweeps are plenty for six columns.
-    for _ in 0..30 {
-        for p in 0..6 {
-            for q in p + 1..6 {
-                if a[p][q] == 0.0 {
-                    continue;
-                }
-                let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let t = tau.signum() / (tau.abs() + tau.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
-                let s = t * c;
-                for k in 0..6 {
-                    (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
-                }
-                for k in 0..6 {
-                    (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-                    (v[p][k], v[q][k]) = (c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]);
-                }
-                (a[p][q], a[q][p]) = (0.0, 0.0);
-            }
-        }
-    }
-    (std::array::from_fn(|i| a[i][i]), v)
 }
 
 #[cfg(test)]

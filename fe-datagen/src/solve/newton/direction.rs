@@ -9,7 +9,6 @@ use crate::contact::Support;
 use crate::element::Dilatation;
 use crate::linear::{Equations, Factor, conjugate_gradient};
 use crate::solve::StepError;
-use crate::solve::evaluate::evaluate_body;
 use crate::solve::loading::Loading;
 use crate::solve::mixed;
 use std::time::Instant;
@@ -21,11 +20,7 @@ impl Newton<'_> {
         u: &[[f64; 3]],
         carried: &[Dilatation],
     ) -> Result<(), StepError> {
-        let clock = Instant::now();
-        let trial = fixed.trial(u, carried, self.penalty);
-        let tangent = Some(&mut self.tangent);
-        let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
-        self.effort.assemble_s += clock.elapsed().as_secs_f64();
+        let result = self.evaluate_with(fixed, u, carried, true);
         for (dof, &e) in self.problem.structure.equations.of_dof.iter().enumerate() {
             if e != Equations::FIXED {
                 self.right[e as usize] = -self.current.residual_n[dof];

@@ -176,9 +176,21 @@ impl<'a> Newton<'a> {
         u: &[[f64; 3]],
         carried: &[Dilatation],
     ) -> Result<(), StepError> {
+        self.evaluate_with(fixed, u, carried, false)
+    }
+
+    /// Evaluates at `u` into `current`, with the tangent if it is wanted.
+    fn evaluate_with(
+        &mut self,
+        fixed: Fixed<'_>,
+        u: &[[f64; 3]],
+        carried: &[Dilatation],
+        with_tangent: bool,
+    ) -> Result<(), StepError> {
         let clock = Instant::now();
         let trial = fixed.trial(u, carried, self.penalty);
-        let result = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.current);
+        let tangent = with_tangent.then_some(&mut self.tangent);
+        let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();
         result
     }

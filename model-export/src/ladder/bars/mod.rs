@@ -109,7 +109,7 @@ fn fast_rung_beats_the_baseline(models: &[Measured]) -> Bar {
 
 /// The network of least median error on held-out presses, or on another set without those.
 fn best(models: &[Measured], set: &str) -> Option<usize> {
-    let is_network = |m: &Measured| matches!(m.rung.kind, Kind::Network | Kind::S1Network);
+    let is_network = |m: &Measured| m.rung.kind.is_network();
     (0..models.len())
         .filter(|&i| is_network(&models[i]) && median(&models[i].rung, set).is_some())
         .min_by(|&a, &b| {
@@ -241,7 +241,7 @@ fn regenerates(models: &[Measured]) -> Bar {
         |m: &Measured, key: &str| m.info.training.get(key).and_then(serde_json::Value::as_f64);
     let silent: Vec<&str> = models
         .iter()
-        .filter(|m| matches!(m.rung.kind, Kind::Network | Kind::S1Network))
+        .filter(|m| m.rung.kind.is_network())
         .filter(|m| number(m, "seed").is_none() || number(m, "seconds").is_none())
         .map(|m| m.rung.name.as_str())
         .collect();

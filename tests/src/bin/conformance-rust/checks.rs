@@ -1,6 +1,6 @@
 //! What a step found against what it was to find.
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use papilla_client::{Answer, Outcome};
 use papilla_proto::{FrameKind, MAP_SIDE_PX, Problem, flags};
 use serde_json::{Value, json};
@@ -77,10 +77,10 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
     }
     if let Some(due) = expect["flags"].as_array() {
         let bit = |name: &Value| {
-            let known = [("out_of_range", flags::OUT_OF_RANGE), ("no_contact", flags::NO_CONTACT)];
-            known.iter().find(|(known, _)| name == known).map_or(flags::UNFAMILIAR, |(_, bit)| *bit)
+            let known = flags::NAMED.into_iter().find(|(_, known)| name == known);
+            known.map(|(bit, _)| bit).with_context(|| format!("no flag {name}"))
         };
-        let due = due.iter().fold(0, |all, name| all | bit(name));
+        let due = due.iter().try_fold(0, |all, name| anyhow::Ok(all | bit(name)?))?;
         ensure!(answer.flags == due, "the flags are {}, {due} is due", answer.flags);
     }
     if let Some(due) = expect.get("window") {
