@@ -8,7 +8,7 @@
 
 mod assemble;
 mod error;
-mod progress;
+pub(crate) mod progress;
 mod report;
 mod run;
 mod sampling;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// A bar for `total` presses of which `reused` were done by an earlier run.
 /// Hidden when `visible` is false or standard error is no terminal.
-pub(super) fn bar(total: usize, reused: usize, visible: bool) -> ProgressBar {
+pub(crate) fn bar(total: usize, reused: usize, visible: bool) -> ProgressBar {
     let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(total as u64), target);
     // indicatif's own rate looks back some 15 s, less than one press takes.

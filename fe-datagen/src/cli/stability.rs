@@ -19,7 +19,7 @@ use std::process::ExitCode;
 #[command(
     after_help = "Exit code 3 if any case breaks its promise. docs/stability.md is the report.\n\
                   Examples: fe-datagen stability --case snap-through\n          \
-                  fe-datagen stability --scenes 10000 --seed 5 --threads 2 --out out/stability"
+                  fe-datagen stability --scenes 10000 --seed 5 --threads 2 --out data/scenes"
 )]
 pub(super) struct Args {
     /// Run only this case; may be given several times.
@@ -65,7 +65,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
             let spec = CampaignSpec::read(&args.campaign)?;
-            let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
+            let (seed, threads, progress) = (args.seed, args.threads, !args.json);
+            let options = ScenesOptions { count, seed, threads, progress };
             let report = scenes::run(&spec, out, &options)?;
             if let Some(path) = &args.markdown {
                 write(path, &report.markdown())?;

@@ -4,28 +4,29 @@
 //! cut off goes on with the scenes that have none, and a longer run with the same seed goes
 //! on from a shorter one.
 
+mod queue;
 mod record;
 mod report;
+mod share;
+mod table;
 
 pub use report::{Ending, SceneRecord, ScenesReport};
+pub use table::Row;
 
-use super::panic_text;
-use crate::campaign::{CampaignError, CampaignSpec, Press, presses};
-use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
+use crate::campaign::{CampaignError, CampaignSpec, Press, presses, progress};
 use crate::mesh::fingertip::Density;
 use crate::output::OutputError;
-use crate::press::body::{Body, PressError};
-use crate::press::drive::{Approach, Drive};
+use crate::press::body::PressError;
 use crate::press::setup::Setup;
-use crate::processor;
-use crate::solve::{Options, Solver};
+use queue::Queue;
 use record::Record;
 use report::count;
+use std::collections::HashMap;
 use std::num::NonZero;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::AtomicUsize;
+use std::thread::ScopedJoinHandle;
 
 /// How many scenes, and how.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +37,8 @@ pub struct ScenesOptions {
     pub seed: u64,
     /// Scenes solved at a time.
     pub threads: NonZero<usize>,
+    /// Show a progress bar on standard error (if it is a terminal).
+    pub progress: bool,
 }
 
 /// Why no scenes could be solved.
@@ -65,6 +68,39 @@ pub enum ScenesError {
     Busy(PathBuf),
 }
 
+/// The campaign whose presses are the scenes.
+fn drawn(spec: &CampaignSpec, count: NonZero<usize>, seed: u64) -> CampaignSpec {
+    let (presses, density) = (count.get(), Density::Coarse);
+    CampaignSpec { presses, seed, density, ..spec.clone() }
+}
+
+/// What the record says its scenes are.
+fn drawn_from(spec: &CampaignSpec) -> String {
+    format!("{}, seed {}", spec.name, spec.seed)
+}
+
+/// The scenes: presses to their deepest states.
+fn scenes(spec: &CampaignSpec) -> Vec<Press> {
+    let deepest = |p: Press| {
+        let depths_mm = p.depths_mm.last().copied().into_iter().collect();
+        Press { depths_mm, ..p }
+    };
+    presses(spec).into_iter().map(deepest).collect()
+}
+
+/// Splits the scenes into those that the record has, with what it says, and the others.
+fn split(all: Vec<Press>, known: Vec<SceneRecord>) -> (Vec<SceneRecord>, Vec<Press>) {
+    let mut known: HashMap<_, _> = known.into_iter().map(|k| (k.press.id, k)).collect();
+    let (mut reused, mut todo) = (Vec::new(), Vec::new());
+    for press in all {
+        match known.remove(&press.id).filter(|k| k.press == press) {
+            Some(record) => reused.push(record),
+            None => todo.push(press),
+        }
+    }
+    (reused, todo)
+}
+
 /// Draws and presses scenes, each to its deepest state, on the coarse finger.
 ///
 /// # Errors
@@ -74,105 +110,60 @@ pub fn run(
     folder: &Path,
     options: &ScenesOptions,
 ) -> Result<ScenesReport, ScenesError> {
-    let mut spec = spec.clone();
-    spec.presses = options.count.get();
-    spec.seed = options.seed;
-    spec.density = Density::Coarse;
+    let spec = drawn(spec, options.count, options.seed);
     spec.validate()?;
-    let drawn_from = format!("{}, seed {}", spec.name, spec.seed);
-    let (record, known) = Record::open(folder, &drawn_from)?;
-    let candidates = spec.candidates();
-    let mut shapes = Vec::new();
-    for candidate in &candidates {
-        let shape = candidate.indenter.build(&spec.folder).map_err(PressError::from)?;
-        shapes.push((shape, candidate.indenter.top_mm()));
-    }
-    let Setup { body, approach, .. } = Setup::new(&spec.scene(&candidates[0]))?;
-    let deepest = |mut p: Press| {
-        p.depths_mm = p.depths_mm.last().copied().into_iter().collect();
-        p
+    let (record, known) = Record::open(folder, &drawn_from(&spec))?;
+    let (mut records, todo) = split(scenes(&spec), known);
+    let reused = records.len();
+    let Setup { body, approach, .. } = Setup::new(&spec.scene(&spec.candidates()[0]))?;
+    let bar = progress::bar(options.count.get(), reused, options.progress);
+    let queue = Queue {
+        body: &body,
+        approaches: queue::approaches(&spec, &approach)?,
+        todo: &todo,
+        next: AtomicUsize::new(0),
+        record: &record,
+        bar: &bar,
     };
-    let all: Vec<_> = presses(&spec).into_iter().map(deepest).collect();
-    let is_known = |p: &Press| known.iter().any(|k| k.press == *p);
-    let reused: Vec<_> = all.iter().filter(|p| is_known(p)).map(|p| p.id).collect();
-    let todo: Vec<_> = all.iter().filter(|p| reused.binary_search(&p.id).is_err()).collect();
-    let next = AtomicUsize::new(0);
-    let failed = Mutex::new(None);
-    let work = || -> Result<Vec<SceneRecord>, ScenesError> {
-        let mut solver = body.solver(Options::default())?;
-        let mut done = Vec::new();
-        while let Some(&press) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (shape, top_mm) = shapes[press.candidate].clone();
-            let (pose, offset_mm) = (press.pose, press.offset_mm);
-            let approach = Approach { shape, top_mm, pose, offset_mm, ..approach.clone() };
-            let found = solve(&body, &mut solver, &approach, press);
-            if matches!(found.ending, Ending::Panicked(_)) {
-                // It may be in any state.
-                solver = body.solver(Options::default())?;
-            }
-            record.add(&found)?;
-            done.push(found);
-        }
-        Ok(done)
-    };
-    let mut records: Vec<_> =
-        known.into_iter().filter(|k| reused.binary_search(&k.press.id).is_ok()).collect();
-    std::thread::scope(|scope| {
+    let solved = std::thread::scope(|scope| {
         // Room for the recursion of sparse factorizations; not touched if not needed.
-        let spawn = || std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, work);
-        let threads: Vec<_> = (0..options.threads.get()).map(|_| spawn()).collect();
-        for thread in threads {
-            let outcome = match thread {
-                Ok(handle) => handle.join().ok(),
-                Err(source) => {
-                    Some(Err(OutputError::io("start a thread for", folder)(source).into()))
-                }
-            };
-            match outcome {
-                Some(Ok(done)) => records.extend(done),
-                Some(Err(error)) => *failed.lock().unwrap_or_else(|p| p.into_inner()) = Some(error),
-                None => {}
-            }
-        }
+        let room = || std::thread::Builder::new().stack_size(16 << 20);
+        let start = |_| room().spawn_scoped(scope, || queue.work());
+        let threads: Vec<_> = (0..options.threads.get()).map(start).collect();
+        let end = |thread: std::io::Result<ScopedJoinHandle<'_, _>>| {
+            let thread = thread.map_err(OutputError::io("start a thread for", folder))?;
+            thread.join().unwrap_or_else(|panic| resume_unwind(panic))
+        };
+        threads.into_iter().map(end).collect::<Result<Vec<_>, ScenesError>>()
     });
-    match failed.into_inner().unwrap_or_else(|p| p.into_inner()) {
-        Some(error) => Err(error),
-        None => Ok(count(drawn_from, records, reused.len())),
-    }
+    bar.finish_and_clear();
+    records.extend(solved?.into_iter().flatten());
+    Ok(count(drawn_from(&spec), records, reused))
 }
 
-fn solve(body: &Body, solver: &mut Solver<'_>, approach: &Approach, press: &Press) -> SceneRecord {
-    let began_s = processor::thread_s();
-    let drive = Drive::Depths(press.depths_mm.clone());
-    let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
-    let (mut iterations, mut cuts, mut j_min) = (0, 0, None);
-    let solved = catch_unwind(AssertUnwindSafe(|| {
-        body.press_balanced(solver, approach, &drive, BALANCE_RELATIVE_MAX, &mut |_, _, r, s| {
-            (fault(r, vertices), r.checks.j_min, s.effort)
-        })
-    }));
-    let ending = match solved {
-        Err(panic) => Ending::Panicked(panic_text(panic.as_ref()).into()),
-        Ok((kept, pressed)) => {
-            for (_, j, effort) in &kept {
-                (iterations, cuts) = (effort.newton_iterations, effort.cuts);
-                j_min = Some(*j);
-            }
-            let missed = kept.into_iter().find_map(|(fault, ..)| fault);
-            match (pressed, missed) {
-                (Err(error), _) => Ending::Refused(error.to_string()),
-                (Ok(()), Some(fault)) => Ending::Unbalanced(fault),
-                (Ok(()), None) => Ending::Balanced,
-            }
-        }
-    };
-    let seconds = processor::thread_s() - began_s;
-    SceneRecord {
-        press: press.clone(),
-        ending,
-        newton_iterations: iterations,
-        cuts,
-        j_min,
-        seconds,
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Neither the record nor the report that the repository holds is edited by hand, and the
+    /// campaign still draws those scenes.
+    #[test]
+    fn the_committed_report_is_of_the_committed_record() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let copy = tempfile::tempdir().unwrap();
+        std::fs::copy(root.join("data/scenes/scenes.jsonl"), copy.path().join("scenes.jsonl"))
+            .unwrap();
+        let spec = CampaignSpec::read(&root.join("campaigns/broad.toml")).unwrap();
+        let seed = 5;
+        let (_, known) =
+            Record::open(copy.path(), &drawn_from(&drawn(&spec, NonZero::<usize>::MIN, seed)))
+                .unwrap();
+        let spec = drawn(&spec, NonZero::new(known.len()).unwrap(), seed);
+        let (records, todo) = split(scenes(&spec), known);
+        assert_eq!(todo, [], "drawn differently, or not in the record");
+        let report = count(drawn_from(&spec), records, 0);
+        let told = std::fs::read_to_string(root.join("docs/stability-scenes.md")).unwrap();
+        assert_eq!(told, report.markdown());
+        assert!(report.passed());
     }
 }

@@ -95,8 +95,9 @@ def table(rows: list[dict[str, Any]]) -> str:
 def _plot(path: Path, network: str, rows: list[dict[str, Any]]) -> None:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogFormatter
 
-    figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(8.4, 4.6), layout="constrained")
     FigureCanvasSVG(figure)
     axes = figure.add_subplot()
     for k, jury in enumerate(dict.fromkeys(row["judged_on"] for row in rows)):
@@ -112,7 +113,10 @@ def _plot(path: Path, network: str, rows: list[dict[str, Any]]) -> None:
         ylabel="relative L2, %",
     )
     axes.grid(visible=True, which="both", alpha=0.25)
-    axes.legend(fontsize="small")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(LogFormatter())
+        axis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.5)))
+    figure.legend(fontsize="small", loc="outside right upper")
     picture = io.BytesIO()
     figure.savefig(picture, format="svg", metadata={"Date": None})
     write_atomic(path, picture.getvalue())

@@ -1,5 +1,6 @@
 //! What became of the scenes.
 
+use super::{Row, share, table};
 use crate::campaign::Press;
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Write as _};
@@ -52,14 +53,10 @@ pub struct ScenesReport {
     pub refused: Vec<(usize, String)>,
     /// Panics.
     pub panicked: Vec<(usize, String)>,
-    /// Scenes with a halved load step.
-    pub with_cuts: usize,
-    /// Most Newton iterations of a scene.
-    pub newton_iterations_max: u32,
-    /// Smallest `J` of a scene.
-    pub j_min: Option<f64>,
-    /// Mean processor time of a scene, s.
-    pub seconds_per_scene: f64,
+    /// Upper bound of the share of all such scenes that does not balance, at 95 % confidence.
+    pub failing_at_most: f64,
+    /// How hard they were.
+    pub indenters: Vec<Row>,
 }
 
 /// Share of the scenes that have to converge.
@@ -85,21 +82,22 @@ impl ScenesReport {
             "# Random scenes\n\nWritten by `fe-datagen stability --scenes {} --seed ... --markdown \
              docs/stability-scenes.md` ([stability.md](stability.md)): {}.\n\n\
              | | scenes |\n|---|---|\n| converged, every balance kept | {} |\n| converged, a balance missed | {} |\n\
-             | refused with a typed error | {} |\n| panicked | {} |\n| with cut load steps | {} |\n\n\
-             At most {} Newton iterations a scene, smallest J {:.4}, {:.2} s of processor time a scene. The bar (99.9 % \
-             converge, each of them balances, no panic) is {}.\n",
+             | refused with a typed error | {} |\n| panicked | {} |\n\n\
+             The bar (99.9 % converge, each of them balances, no panic) is {}. Of all scenes drawn like \
+             these, at most {:.3} % do not balance, at 95 % confidence (Clopper and Pearson's bound, which \
+             takes the scenes for independent).\n\n\
+             Iterations are those of the path that was kept, seconds of processor time those of every path taken: where work and \
+             energy part, a press is taken again on a finer one.\n\n",
             self.scenes,
             self.drawn_from,
             self.balanced,
             self.unbalanced.len(),
             self.refused.len(),
             self.panicked.len(),
-            self.with_cuts,
-            self.newton_iterations_max,
-            self.j_min.unwrap_or(f64::NAN),
-            self.seconds_per_scene,
             if self.passed() { "met by these" } else { "**not met by these**" },
+            100.0 * self.failing_at_most,
         );
+        out += &table::markdown(&self.indenters);
         let lists = [&self.unbalanced, &self.refused, &self.panicked];
         if lists.iter().any(|l| !l.is_empty()) {
             out += "\n| scene | what |\n|---|---|\n";
@@ -116,7 +114,7 @@ impl fmt::Display for ScenesReport {
         writeln!(
             f,
             "{}: {} scenes ({} from an earlier run), {} converged and balanced, {} out of balance, {} typed \
-             errors, {} panics; {} with cut steps, at most {} Newton iterations, least J {:.4}; {:.2} s of processor time a scene",
+             errors, {} panics: at most {:.3} % of all such scenes do not balance, at 95 % confidence",
             self.drawn_from,
             self.scenes,
             self.reused,
@@ -124,11 +122,24 @@ impl fmt::Display for ScenesReport {
             self.unbalanced.len(),
             self.refused.len(),
             self.panicked.len(),
-            self.with_cuts,
-            self.newton_iterations_max,
-            self.j_min.unwrap_or(f64::NAN),
-            self.seconds_per_scene,
+            100.0 * self.failing_at_most,
         )?;
+        for r in &self.indenters {
+            writeln!(
+                f,
+                "  {:<16} {:>5} scenes, {} balanced, {} with cut steps, {} iterations (at most {}), least J {:.3}, \
+                 {:.2} s (at most {:.1})",
+                r.indenter,
+                r.scenes,
+                r.balanced,
+                r.with_cuts,
+                r.newton_iterations_median,
+                r.newton_iterations_max,
+                r.j_min.unwrap_or(f64::NAN),
+                r.seconds_per_scene,
+                r.seconds_max,
+            )?;
+        }
         for (what, list) in [
             ("out of balance", &self.unbalanced),
             ("typed error", &self.refused),
@@ -153,10 +164,8 @@ pub(super) fn count(drawn_from: String, records: Vec<SceneRecord>, reused: usize
         unbalanced: Vec::new(),
         refused: Vec::new(),
         panicked: Vec::new(),
-        with_cuts: records.iter().filter(|r| r.cuts > 0).count(),
-        newton_iterations_max: records.iter().map(|r| r.newton_iterations).max().unwrap_or(0),
-        j_min: records.iter().filter_map(|r| r.j_min).reduce(f64::min),
-        seconds_per_scene: records.iter().map(|r| r.seconds).sum::<f64>() / scenes.max(1) as f64,
+        failing_at_most: 1.0,
+        indenters: table::rows(&records),
     };
     for SceneRecord { press, ending, .. } in records {
         match ending {
@@ -169,6 +178,7 @@ pub(super) fn count(drawn_from: String, records: Vec<SceneRecord>, reused: usize
     for list in [&mut report.unbalanced, &mut report.refused, &mut report.panicked] {
         list.sort_by_key(|(scene, _)| *scene);
     }
+    report.failing_at_most = share::failing_at_most(scenes - report.balanced, scenes);
     report
 }
 
