@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use crate::element::{Elastic, Solid};
-use crate::linear::eigen;
+use crate::material::eigen::symmetric;
 use crate::material::{LinearElastic, MaterialError, MaterialSpec, NeoHookean, Ogden, OgdenTerm};
 use crate::scene::effects::{Law, Plan};
 use std::fmt::Write;
@@ -211,7 +211,7 @@ impl MaterialCard {
 
 /// Eigenvalues of a symmetric matrix (xx, yy, zz, xy, xz, yz).
 fn principal(v: &[f64; 6]) -> [f64; 3] {
-    eigen([[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]]).0
+    symmetric(&[[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]]).0
 }
 
 #[cfg(test)]

@@ -124,20 +124,12 @@ impl fmt::Display for ScenesReport {
             self.panicked.len(),
             100.0 * self.failing_at_most,
         )?;
-        for r in &self.indenters {
+        for row in &self.indenters {
+            let [name, scenes, balanced, cut, median, most, j_min, mean_s, max_s] = row.cells();
             writeln!(
                 f,
-                "  {:<16} {:>5} scenes, {} balanced, {} with cut steps, {} iterations (at most {}), least J {:.3}, \
-                 {:.2} s (at most {:.1})",
-                r.indenter,
-                r.scenes,
-                r.balanced,
-                r.with_cuts,
-                r.newton_iterations_median,
-                r.newton_iterations_max,
-                r.j_min.unwrap_or(f64::NAN),
-                r.seconds_per_scene,
-                r.seconds_max,
+                "  {name:<16} {scenes:>5} scenes, {balanced} balanced, {cut} with cut steps, {median} iterations \
+                 (at most {most}), least J {j_min}, {mean_s} s (at most {max_s})"
             )?;
         }
         for (what, list) in [

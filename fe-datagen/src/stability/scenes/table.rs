@@ -54,26 +54,31 @@ fn row(records: &[&SceneRecord]) -> Option<Row> {
     })
 }
 
+impl Row {
+    /// Its values as they are printed.
+    pub(super) fn cells(&self) -> [String; 9] {
+        [
+            self.indenter.clone(),
+            self.scenes.to_string(),
+            self.balanced.to_string(),
+            self.with_cuts.to_string(),
+            self.newton_iterations_median.to_string(),
+            self.newton_iterations_max.to_string(),
+            format!("{:.3}", self.j_min.unwrap_or(f64::NAN)),
+            format!("{:.2}", self.seconds_per_scene),
+            format!("{:.1}", self.seconds_max),
+        ]
+    }
+}
+
 /// The rows as a table of docs/stability-scenes.md.
 pub(super) fn markdown(rows: &[Row]) -> String {
     let mut out = String::from(
         "| indenter | scenes | balanced | with cuts | iterations, median | most | smallest J | s a scene | slowest |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
-    for r in rows {
-        let _ = writeln!(
-            out,
-            "| {} | {} | {} | {} | {} | {} | {:.3} | {:.2} | {:.1} |",
-            r.indenter,
-            r.scenes,
-            r.balanced,
-            r.with_cuts,
-            r.newton_iterations_median,
-            r.newton_iterations_max,
-            r.j_min.unwrap_or(f64::NAN),
-            r.seconds_per_scene,
-            r.seconds_max,
-        );
+    for row in rows {
+        let _ = writeln!(out, "| {} |", row.cells().join(" | "));
     }
     out
 }
