@@ -7,14 +7,17 @@
 mod cg;
 mod direct;
 mod eigen;
+mod equations;
 mod factor;
 mod ordering;
+mod pattern;
 mod structure;
 
 pub(crate) use cg::dot;
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
 pub use direct::Direct;
 pub(crate) use eigen::eigen;
+pub use equations::Equations;
 pub use factor::{Factor, FactorError, Factorizer};
-pub use ordering::OrderingError;
-pub use structure::{Elimination, Equations, Structure, StructureError, SymmetricMatrix};
+pub use ordering::{Elimination, OrderingError};
+pub use structure::{Structure, StructureError, SymmetricMatrix};

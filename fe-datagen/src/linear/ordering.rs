@@ -1,16 +1,12 @@
-//! Fill-reducing ordering by METIS nested dissection.
+//! Orders of elimination.
 //!
-//! On 3-D hexahedral meshes it needs less than half the factor entries of
-//! approximate minimum degree. The graph is that of the nodes, not of the
+//! The usual one is METIS' nested dissection: on 3-D hexahedral meshes it needs less than half
+//! the factor entries of approximate minimum degree. The graph is that of the nodes, not of the
 //! degrees of freedom: a third of the size and supernodes for free.
 
+use super::Equations;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
-
-/// METIS draws from one generator for the whole process (`srand`/`rand`), so
-/// two threads that order at once would take numbers from each other and get
-/// orders, and with them last bits, that differ from run to run.
-static METIS: Mutex<()> = Mutex::new(());
 
 /// METIS could not order a graph.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -23,13 +19,65 @@ pub enum OrderingError {
     Metis(i32),
 }
 
+/// In which order unknowns are eliminated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Elimination {
+    /// METIS' nested dissection of the nodes: the least fill.
+    #[default]
+    NestedDissection,
+    /// Reverse Cuthill-McKee of the nodes: the least bandwidth.
+    CuthillMckee,
+    /// As the mesh numbers its nodes.
+    Natural,
+}
+
+/// Order of the nodes with unknowns, expanded to equations.
+pub(super) fn elimination_order(
+    neighbours: &[BTreeSet<u32>],
+    equations: &Equations,
+    elimination: Elimination,
+) -> Result<Vec<usize>, OrderingError> {
+    let unknowns = |node: usize| {
+        equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
+    };
+    let mut compact = vec![u32::MAX; neighbours.len()];
+    let mut kept = Vec::new();
+    for node in 0..neighbours.len() {
+        if unknowns(node).next().is_some() {
+            compact[node] = kept.len() as u32;
+            kept.push(node);
+        }
+    }
+    let graph: Vec<BTreeSet<u32>> = kept
+        .iter()
+        .map(|&node| {
+            neighbours[node]
+                .iter()
+                .map(|&b| compact[b as usize])
+                .filter(|&b| b != u32::MAX)
+                .collect()
+        })
+        .collect();
+    let order = match elimination {
+        Elimination::NestedDissection => nested_dissection(&graph)?,
+        Elimination::CuthillMckee => cuthill_mckee(&graph),
+        Elimination::Natural => (0..graph.len() as u32).collect(),
+    };
+    Ok(order.iter().flat_map(|&v| unknowns(kept[v as usize]).map(|&e| e as usize)).collect())
+}
+
+/// METIS draws from one generator for the whole process (`srand`/`rand`), so
+/// two threads that order at once would take numbers from each other and get
+/// orders, and with them last bits, that differ from run to run.
+static METIS: Mutex<()> = Mutex::new(());
+
 /// Order in which to eliminate the vertices: `order[k]` is the vertex that
 /// comes `k`-th. Deterministic: METIS' random seed is fixed, and one thread at
 /// a time orders.
 ///
 /// # Errors
 /// [`OrderingError`] if METIS refuses the graph.
-pub(super) fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>, OrderingError> {
+fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>, OrderingError> {
     let entries: usize = neighbours.iter().map(BTreeSet::len).sum();
     let too_large = |_| OrderingError::TooLarge(entries.max(neighbours.len()));
     let mut n = i32::try_from(neighbours.len()).map_err(too_large)?;
@@ -59,7 +107,7 @@ pub(super) fn nested_dissection(neighbours: &[BTreeSet<u32>]) -> Result<Vec<u32>
 
 /// Reverse Cuthill-McKee: breadth first from a vertex with few neighbours, those with few
 /// first, and the whole turned round.
-pub(super) fn cuthill_mckee(neighbours: &[BTreeSet<u32>]) -> Vec<u32> {
+fn cuthill_mckee(neighbours: &[BTreeSet<u32>]) -> Vec<u32> {
     let degree = |v: &u32| neighbours[*v as usize].len();
     let mut starts: Vec<u32> = (0..neighbours.len() as u32).collect();
     starts.sort_by_key(degree);

@@ -1,6 +1,8 @@
-//! Equation numbers, sparsity pattern and element scatter maps of a mesh.
+//! A mesh's matrix: its pattern and symbolic factor, sums and products on them.
 
-use super::ordering::{OrderingError, cuthill_mckee, nested_dissection};
+use super::Equations;
+use super::ordering::{Elimination, OrderingError, elimination_order};
+use super::pattern::{entry, node_graph, pattern, scatter_maps};
 use crate::mesh::Mesh;
 use faer::Side;
 use faer::perm::PermRef;
@@ -9,39 +11,6 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use std::collections::BTreeSet;
-
-/// Which degrees of freedom are unknown.
-#[derive(Clone, Debug)]
-pub struct Equations {
-    /// Equation of each degree of freedom `3 node + component`; [`Self::FIXED`] if prescribed.
-    pub of_dof: Vec<u32>,
-    /// Number of unknowns.
-    pub count: usize,
-}
-
-impl Equations {
-    /// Mark of a prescribed degree of freedom.
-    pub const FIXED: u32 = u32::MAX;
-
-    /// Numbers the degrees of freedom for which `fixed` is false.
-    #[must_use]
-    pub fn new(fixed: &[bool]) -> Self {
-        let mut count = 0;
-        let of_dof = fixed
-            .iter()
-            .map(|&f| {
-                if f {
-                    Self::FIXED
-                } else {
-                    count += 1;
-                    count - 1
-                }
-            })
-            .collect();
-        Self { of_dof, count: count as usize }
-    }
-}
 
 /// Why a system's structure could not be built.
 #[derive(Debug, thiserror::Error)]
@@ -76,18 +45,6 @@ pub struct Structure {
 pub struct SymmetricMatrix {
     /// One value per entry of the lower triangle.
     pub values: Vec<f64>,
-}
-
-/// In which order unknowns are eliminated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Elimination {
-    /// METIS' nested dissection of the nodes: the least fill.
-    #[default]
-    NestedDissection,
-    /// Reverse Cuthill-McKee of the nodes: the least bandwidth.
-    CuthillMckee,
-    /// As the mesh numbers its nodes.
-    Natural,
 }
 
 impl Structure {
@@ -219,7 +176,10 @@ impl Structure {
     }
 
     /// Adds a symmetric 3 x 3 block between the nodes of a point with shape functions
-    /// `values`, `N_a N_b block`; they have to be of one element.
+    /// `values`, `N_a N_b block`.
+    ///
+    /// # Panics
+    /// If the nodes are not all of one element.
     pub fn add_point(
         &self,
         matrix: &mut SymmetricMatrix,
@@ -287,120 +247,4 @@ impl Structure {
         }
         super::dot(&y, &y).sqrt()
     }
-}
-
-/// Neighbours of every node through elements, itself left out.
-fn node_graph(mesh: &Mesh) -> Vec<BTreeSet<u32>> {
-    let mut graph = vec![BTreeSet::new(); mesh.nodes.len()];
-    for block in &mesh.blocks {
-        for e in 0..block.len() {
-            let nodes = block.element(e);
-            for &a in nodes {
-                graph[a as usize].extend(nodes.iter().copied().filter(|&b| b != a));
-            }
-        }
-    }
-    graph
-}
-
-/// Lower triangle of the pattern, by columns.
-fn pattern(neighbours: &[BTreeSet<u32>], equations: &Equations) -> (Vec<usize>, Vec<usize>) {
-    let mut start = vec![0];
-    let mut row = Vec::new();
-    for node in 0..neighbours.len() {
-        for i in 0..3 {
-            let column = equations.of_dof[3 * node + i];
-            if column == Equations::FIXED {
-                continue;
-            }
-            let first = row.len();
-            for &b in neighbours[node].iter().chain(std::iter::once(&(node as u32))) {
-                row.extend(
-                    equations.of_dof[3 * b as usize..3 * b as usize + 3]
-                        .iter()
-                        .filter(|&&r| r != Equations::FIXED && r >= column)
-                        .map(|&r| r as usize),
-                );
-            }
-            row[first..].sort_unstable();
-            start.push(row.len());
-        }
-    }
-    (start, row)
-}
-
-/// Order of the nodes with unknowns, expanded to equations.
-fn elimination_order(
-    neighbours: &[BTreeSet<u32>],
-    equations: &Equations,
-    elimination: Elimination,
-) -> Result<Vec<usize>, OrderingError> {
-    let unknowns = |node: usize| {
-        equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
-    };
-    let mut compact = vec![u32::MAX; neighbours.len()];
-    let mut kept = Vec::new();
-    for node in 0..neighbours.len() {
-        if unknowns(node).next().is_some() {
-            compact[node] = kept.len() as u32;
-            kept.push(node);
-        }
-    }
-    let graph: Vec<BTreeSet<u32>> = kept
-        .iter()
-        .map(|&node| {
-            neighbours[node]
-                .iter()
-                .map(|&b| compact[b as usize])
-                .filter(|&b| b != u32::MAX)
-                .collect()
-        })
-        .collect();
-    let order = match elimination {
-        Elimination::NestedDissection => nested_dissection(&graph)?,
-        Elimination::CuthillMckee => cuthill_mckee(&graph),
-        Elimination::Natural => (0..graph.len() as u32).collect(),
-    };
-    Ok(order.iter().flat_map(|&v| unknowns(kept[v as usize]).map(|&e| e as usize)).collect())
-}
-
-fn entry(column_start: &[usize], row: &[usize], r: usize, c: usize) -> usize {
-    let (r, c) = (r.max(c), r.min(c));
-    let first = column_start[c];
-    let found = row[first..column_start[c + 1]].binary_search(&r);
-    debug_assert!(found.is_ok(), "entry ({r}, {c}) is not in the pattern");
-    first + found.unwrap_or(0)
-}
-
-fn scatter_maps(
-    mesh: &Mesh,
-    equations: &Equations,
-    column_start: &[usize],
-    row: &[usize],
-) -> Vec<Vec<u32>> {
-    mesh.blocks
-        .iter()
-        .map(|block| {
-            let size = 3 * block.kind.nodes();
-            let mut map = Vec::with_capacity(block.len() * size * (size + 1) / 2);
-            for e in 0..block.len() {
-                let of: Vec<u32> = block
-                    .element(e)
-                    .iter()
-                    .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
-                    .map(|d| equations.of_dof[d])
-                    .collect();
-                for p in 0..size {
-                    for q in p..size {
-                        map.push(if of[p] == Equations::FIXED || of[q] == Equations::FIXED {
-                            Equations::FIXED
-                        } else {
-                            entry(column_start, row, of[p] as usize, of[q] as usize) as u32
-                        });
-                    }
-                }
-            }
-            map
-        })
-        .collect()
 }

@@ -1,0 +1,182 @@
+//! Shapes that no finger has: refused, with the field to blame.
+
+use super::FingertipShape;
+
+/// Why a shape was refused.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum FingertipShapeError {
+    /// A length is not positive, or absurd.
+    #[error(
+        "geometry.shape.{field} = {value} mm has to be above 0 and at most {LENGTH_MAX_MM}{}",
+        if *value > LENGTH_MAX_MM { ": lengths are in mm, was um meant?" } else { "" }
+    )]
+    NotPositive {
+        /// Field name in the scene.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A whole finger smaller than a grain.
+    #[error(
+        "geometry.shape.{field} = {value} mm is not believed of a finger, {LENGTH_MIN_MM} mm is the least: \
+         lengths are in mm, was m meant?"
+    )]
+    TooSmall {
+        /// Field name in the scene.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The bone comes through the skin.
+    #[error(
+        "the bone is only {gap_mm:.3} mm below the skin at x = {x_mm:.2}, y = {y_mm:.2}, z = {z_mm:.2} mm; \
+         make it thinner or the finger thicker ({GAP_MIN_MM} mm is the least)"
+    )]
+    BoneTooClose {
+        /// Gap along the normal.
+        gap_mm: f64,
+        /// Skin point.
+        x_mm: f64,
+        /// Skin point.
+        y_mm: f64,
+        /// Skin point.
+        z_mm: f64,
+    },
+    /// A solid bone's cortex fills the bone.
+    #[error(
+        "geometry.shape.bone_cortex_mm = {cortex_mm} leaves no marrow cavity: an elastic bone's cortex may take \
+         {most_mm:.3} mm of this bone at most; make the cortex thinner, the bone thicker or rigid"
+    )]
+    CortexTooThick {
+        /// Thickness asked for.
+        cortex_mm: f64,
+        /// Most that the bone's sizes allow.
+        most_mm: f64,
+    },
+    /// A solid nail has no element.
+    #[error(
+        "geometry.shape.nail_mm: the nail plate covers no whole face of the skin; make it larger, the mesh \
+         denser or the nail rigid"
+    )]
+    NailTooSmall,
+    /// Lengths contradict each other.
+    #[error("geometry.shape: {0}")]
+    Inconsistent(&'static str),
+}
+
+impl FingertipShapeError {
+    /// The field of a scene that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> String {
+        let name = match self {
+            Self::NotPositive { field, .. } | Self::TooSmall { field, .. } => *field,
+            Self::CortexTooThick { .. } => "bone_cortex_mm",
+            Self::NailTooSmall => "nail_mm",
+            Self::BoneTooClose { .. } => return "geometry.shape".into(),
+            Self::Inconsistent(rule) => rule.split(' ').find(|w| w.contains('_')).unwrap_or(""),
+        };
+        format!("geometry.shape.{name}")
+    }
+}
+
+/// Beyond it a length in mm must have been meant in another unit.
+const LENGTH_MAX_MM: f64 = 100.0;
+/// A finger below it must have been meant in another unit.
+const LENGTH_MIN_MM: f64 = 1.0;
+/// Least gap between skin and bone, mm.
+pub(super) const GAP_MIN_MM: f64 = 0.3;
+/// Share of the bone's least half size that its cortex may take: what is left
+/// keeps the cavity's elements from degenerating.
+const CORTEX_SHARE_MAX: f64 = 0.8;
+
+impl FingertipShape {
+    /// Checks every length.
+    ///
+    /// # Errors
+    /// Names the first field that is not positive, or the contradiction.
+    pub fn validate(&self) -> Result<(), FingertipShapeError> {
+        let positive = [
+            ("length_mm", self.length_mm),
+            ("width_mm", self.width_mm),
+            ("height_mm", self.height_mm),
+            ("cap_length_mm", self.cap_length_mm),
+            ("cap_exponent", self.cap_exponent),
+            ("epidermis_mm", self.epidermis_mm),
+            ("dermis_mm", self.dermis_mm),
+            ("bone_tip_mm", self.bone_tip_mm),
+            ("bone_cap_mm", self.bone_cap_mm),
+            ("bone_tuft_mm[0]", self.bone_tuft_mm[0]),
+            ("bone_tuft_mm[1]", self.bone_tuft_mm[1]),
+            ("bone_waist_mm[0]", self.bone_waist_mm[0]),
+            ("bone_waist_mm[1]", self.bone_waist_mm[1]),
+            ("bone_base_mm[0]", self.bone_base_mm[0]),
+            ("bone_base_mm[1]", self.bone_base_mm[1]),
+            ("nail_mm[0]", self.nail_mm[0]),
+            ("nail_mm[1]", self.nail_mm[1]),
+            ("nail_tip_mm", self.nail_tip_mm),
+            ("nail_thickness_mm", self.nail_thickness_mm),
+            ("bone_cortex_mm", self.bone_cortex_mm),
+        ];
+        for (field, value) in positive {
+            if !(value > 0.0 && value <= LENGTH_MAX_MM) {
+                return Err(FingertipShapeError::NotPositive { field, value });
+            }
+        }
+        for (field, value) in &positive[..3] {
+            if *value < LENGTH_MIN_MM {
+                return Err(FingertipShapeError::TooSmall { field, value: *value });
+            }
+        }
+        if !(self.cap_length_mm < self.length_mm) {
+            return Err(FingertipShapeError::Inconsistent("cap_length_mm must be below length_mm"));
+        }
+        if !(self.bone_tip_mm + self.bone_cap_mm < self.length_mm) {
+            return Err(FingertipShapeError::Inconsistent(
+                "bone_tip_mm and bone_cap_mm put the bone's end beyond the base plane",
+            ));
+        }
+        if !(self.bone_waist_at > 0.0 && self.bone_waist_at < 1.0) {
+            return Err(FingertipShapeError::Inconsistent("bone_waist_at must be in (0, 1)"));
+        }
+        if !(self.bone_offset_mm.abs() < self.height_mm) {
+            return Err(FingertipShapeError::Inconsistent(
+                "bone_offset_mm must be within height_mm of the axis",
+            ));
+        }
+        if !(self.crease_depth_mm >= 0.0 && self.crease_depth_mm < 0.5 * self.height_mm) {
+            return Err(FingertipShapeError::Inconsistent(
+                "crease_depth_mm must be in [0, height_mm / 2)",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Checks that a solid bone's cortex leaves a marrow cavity. Not part of
+    /// [`FingertipShape::validate`]: a rigid bone may be as thin as it likes.
+    ///
+    /// # Errors
+    /// [`FingertipShapeError::CortexTooThick`] says how thick it may be.
+    pub fn validate_cortex(&self) -> Result<(), FingertipShapeError> {
+        let sizes = [self.bone_tuft_mm, self.bone_waist_mm, self.bone_base_mm];
+        let least = sizes.as_flattened().iter().map(|v| 0.5 * v).fold(self.bone_cap_mm, f64::min);
+        let (cortex_mm, most_mm) = (self.bone_cortex_mm, CORTEX_SHARE_MAX * least);
+        if cortex_mm <= most_mm {
+            Ok(())
+        } else {
+            Err(FingertipShapeError::CortexTooThick { cortex_mm, most_mm })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cortex_without_a_cavity_is_refused() {
+        let shape = FingertipShape { bone_tuft_mm: [7.5, 1.5], ..Default::default() };
+        assert!(shape.validate().is_ok(), "a rigid bone may be thin");
+        let e = shape.validate_cortex().unwrap_err();
+        assert!(e.to_string().contains("bone_cortex_mm = 0.75") && e.to_string().contains("0.600"));
+    }
+}
