@@ -298,7 +298,7 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
-        if i.contact == ContactRule::Faces {
+        if i.contact.is_within_faces() {
             text += "         contact within faces: the indenter is too narrow for their nodes\n";
         }
         if i.outside_calibration > 0.0 {

@@ -23,6 +23,7 @@ use std::collections::BTreeMap;
 pub struct ContactSurface {
     at_nodes: ContactPoints,
     in_faces: ContactPoints,
+    in_faces_finely: ContactPoints,
 }
 
 impl ContactSurface {
@@ -41,8 +42,10 @@ impl ContactSurface {
             .collect();
         let (nodes, area_mm2) = by_node.into_iter().unzip();
         let at_nodes = ContactPoints::nodes(nodes, area_mm2);
-        let in_faces = ContactPoints::faces(surface, positions, &at_nodes.node);
-        Self { at_nodes, in_faces }
+        let within = |rule: &[_]| ContactPoints::faces(surface, rule, positions, &at_nodes.node);
+        let in_faces = within(&surface.kind.contact_points());
+        let in_faces_finely = within(&surface.kind.quadrature());
+        Self { at_nodes, in_faces, in_faces_finely }
     }
 
     /// Mesh nodes, sorted.
@@ -71,6 +74,7 @@ impl ContactSurface {
         match rule {
             ContactRule::Nodes => &self.at_nodes,
             ContactRule::Faces => &self.in_faces,
+            ContactRule::FacesFinely => &self.in_faces_finely,
         }
     }
 }

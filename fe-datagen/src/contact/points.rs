@@ -15,6 +15,9 @@ pub enum ContactRule {
     /// and slides on to the next without a jump. These are more points than the displacement
     /// space can control, so that multipliers would not settle: a stiff penalty takes their place.
     Faces,
+    /// As [`Self::Faces`], at more points on flat faces, three by three: a rounded edge that
+    /// lies along the rows of the fewer points can still jump from one to the next.
+    FacesFinely,
 }
 
 impl ContactRule {
@@ -22,6 +25,12 @@ impl ContactRule {
     #[must_use]
     pub const fn has_multipliers(self) -> bool {
         matches!(self, Self::Nodes)
+    }
+
+    /// Whether it is the faces that feel, not their nodes.
+    #[must_use]
+    pub const fn is_within_faces(self) -> bool {
+        matches!(self, Self::Faces | Self::FacesFinely)
     }
 }
 
@@ -71,11 +80,16 @@ impl ContactPoints {
         }
     }
 
-    /// The Gauss points of the faces that have one of the sorted `nodes`.
-    pub(super) fn faces(surface: &Surface, positions: &[[f64; 3]], nodes: &[u32]) -> Self {
+    /// The points of `rule`, places and weights on a face, of the faces that have one of the
+    /// sorted `nodes`.
+    pub(super) fn faces(
+        surface: &Surface,
+        rule: &[([f64; 2], f64)],
+        positions: &[[f64; 3]],
+        nodes: &[u32],
+    ) -> Self {
         let mut points = Self::default();
-        let rule = surface.kind.contact_points();
-        surface.integrate(&rule, &|n| positions[n as usize], &mut |face, value, area| {
+        surface.integrate(rule, &|n| positions[n as usize], &mut |face, value, area| {
             if face.iter().any(|n| nodes.binary_search(n).is_ok()) {
                 points.node.extend(face);
                 points.value.extend(value);
@@ -150,16 +164,20 @@ mod tests {
     #[test]
     fn face_points_carry_the_area_and_what_is_linear() {
         let (surface, at) = surface();
-        let points = ContactPoints::faces(&surface, &at, &surface.nodes());
-        assert_eq!(points.len(), 16);
         let mut nodal = vec![0.0; at.len()];
         surface.add_nodal_areas(&|n| at[n as usize], &mut nodal);
-        let (found, due) = (points.area_mm2.iter().sum::<f64>(), nodal.iter().sum::<f64>());
-        assert!((found / due - 1.0).abs() < 1e-3, "{found} against {due}");
-        for (support, _) in points.iter() {
-            let [x, y, _] = support.of(|n| at[n]);
-            let [sum, linear, _] = support.of(|n| [1.0, 2.0 * at[n][0] - at[n][1], 0.0]);
-            assert!((sum - 1.0).abs() < 1e-14 && (linear - (2.0 * x - y)).abs() < 1e-13);
+        for (rule, count) in
+            [(surface.kind.contact_points(), 4 * 4), (surface.kind.quadrature(), 4 * 9)]
+        {
+            let points = ContactPoints::faces(&surface, &rule, &at, &surface.nodes());
+            assert_eq!(points.len(), count);
+            let (found, due) = (points.area_mm2.iter().sum::<f64>(), nodal.iter().sum::<f64>());
+            assert!((found / due - 1.0).abs() < 1e-3, "{found} against {due}");
+            for (support, _) in points.iter() {
+                let [x, y, _] = support.of(|n| at[n]);
+                let [sum, linear, _] = support.of(|n| [1.0, 2.0 * at[n][0] - at[n][1], 0.0]);
+                assert!((sum - 1.0).abs() < 1e-14 && (linear - (2.0 * x - y)).abs() < 1e-13);
+            }
         }
     }
 
@@ -167,7 +185,8 @@ mod tests {
     fn nodes_carry_the_force_of_the_points() {
         let (surface, at) = surface();
         let nodes = surface.nodes();
-        let points = ContactPoints::faces(&surface, &at, &nodes);
+        let rule = surface.kind.contact_points();
+        let points = ContactPoints::faces(&surface, &rule, &at, &nodes);
         let mut area = vec![0.0; at.len()];
         surface.add_nodal_areas(&|n| at[n as usize], &mut area);
         let traction: Vec<[f64; 2]> =

@@ -15,7 +15,8 @@ impl Body {
     /// part by more than `energy_vs_work_max`: the states are the same there, the work
     /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
     /// off the indenter, and energy with them: it is pressed again, felt within faces, if
-    /// it is wide enough for that. States before an error are kept.
+    /// it is wide enough for that; and at more points of them, if energy is lost there too.
+    /// States before an error are kept.
     ///
     /// # Errors
     /// As [`Self::press`], beside what was kept.
@@ -41,19 +42,22 @@ impl Body {
                     break;
                 }
             }
-            (balanced, kept, pressed)
+            let loses = pressed.is_ok() && !balanced && matches!(drive, Drive::Depths(_));
+            (loses, kept, pressed)
         };
-        let (balanced, kept, pressed) = press(approach);
-        let slips = match &pressed {
-            Ok(()) => !balanced && matches!(drive, Drive::Depths(_)),
-            Err(error) => matches!(error, PressError::Solve { .. } | PressError::Slipped { .. }),
-        };
-        if !(slips && self.could_be_felt_within_faces(approach)) {
-            return (kept, pressed);
+        let felt = |rule| Approach { contact: Some(rule), ..approach.clone() };
+        let mut taken = approach.clone();
+        let (mut loses, mut kept, mut pressed) = press(&taken);
+        let stopped = matches!(pressed, Err(PressError::Solve { .. } | PressError::Slipped { .. }));
+        if (loses || stopped) && self.could_be_felt_within_faces(approach) {
+            tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
+            taken = felt(ContactRule::Faces);
+            (loses, kept, pressed) = press(&taken);
         }
-        tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
-        let within_faces = Approach { contact: Some(ContactRule::Faces), ..approach.clone() };
-        let (_, kept, pressed) = press(&within_faces);
+        if loses && self.could_be_felt_more_finely(&taken) {
+            tracing::info!("it jumps within faces: pressed again, felt at more of their points");
+            (_, kept, pressed) = press(&felt(ContactRule::FacesFinely));
+        }
         (kept, pressed)
     }
 }

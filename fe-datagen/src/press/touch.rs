@@ -2,7 +2,7 @@
 
 use super::body::{Body, PressError};
 use super::drive::{Approach, Drive, FORCE_TRAVEL_MAX_MM};
-use crate::contact::ContactRule;
+use crate::contact::{ContactRule, ContactSurface};
 use crate::indenter::{IndenterError, Placement, SignedDistance, first_touch_travel};
 use crate::mesh::Mesh;
 use crate::mesh::surface::norm;
@@ -78,6 +78,16 @@ impl Body {
         approach.contact.is_none() && spacings >= LED_BY_NODES_MIN && spacings.is_finite()
     }
 
+    /// Whether an indenter that is felt within faces could be felt at more points of them:
+    /// quadratic faces have them already.
+    pub(super) fn could_be_felt_more_finely(&self, approach: &Approach) -> bool {
+        let more = |c: &ContactSurface| {
+            c.points(ContactRule::FacesFinely).len() > c.points(ContactRule::Faces).len()
+        };
+        self.contact_rule(approach) == ContactRule::Faces
+            && self.problem.contact.as_ref().is_some_and(more)
+    }
+
     /// Width of an indenter over the distance of the skin's nodes.
     fn spacings(&self, approach: &Approach) -> f64 {
         let contact = self.problem.contact.as_ref();
@@ -88,7 +98,7 @@ impl Body {
     fn contact_points_mm(&self, rule: ContactRule) -> Vec<[f64; 3]> {
         let at = &self.problem.mesh.nodes;
         match &self.problem.contact {
-            Some(c) if rule == ContactRule::Faces => {
+            Some(c) if rule.is_within_faces() => {
                 c.points(rule).iter().map(|(support, _)| support.of(|n| at[n])).collect()
             }
             _ => self.problem.mesh.surfaces[&self.contact]

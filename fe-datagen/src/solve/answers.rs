@@ -37,7 +37,7 @@ impl<'a> Solver<'a> {
     fn at_contact_nodes<const N: usize>(&self, found: Vec<[f64; N]>) -> Vec<[f64; N]> {
         let rule = self.contact_rule();
         match &self.newton.problem.contact {
-            Some(c) if rule == ContactRule::Faces => {
+            Some(c) if rule.is_within_faces() => {
                 c.points(rule).to_nodes(&found, c.nodes(), c.area_mm2())
             }
             _ => found,
@@ -173,7 +173,7 @@ impl<'a> Solver<'a> {
         };
         let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
         let rule = self.contact_rule();
-        if rule == ContactRule::Nodes {
+        if !rule.is_within_faces() {
             for n in surface.nodes().into_iter().map(|n| n as usize) {
                 if pressure[n] > 0.0 {
                     push[n] = normal(x[n]);
