@@ -24,7 +24,7 @@ impl ContactRule {
     /// Whether multipliers close the gap that a penalty leaves.
     #[must_use]
     pub const fn has_multipliers(self) -> bool {
-        matches!(self, Self::Nodes)
+        !self.is_within_faces()
     }
 
     /// Whether it is the faces that feel, not their nodes.

@@ -11,7 +11,7 @@ use crate::indenter::IndenterSpec;
 use crate::mesh::fingertip::{Density, Order, Parts};
 use crate::mesh::surface::norm;
 use crate::scene::{Plan, TissueTable};
-use crate::solve::Options;
+use crate::solve::{Options, Solver, StepReport};
 use std::path::Path;
 
 const BONE: Parts = Parts { bone: true, nail: false };
@@ -117,6 +117,20 @@ fn coarse_finger() -> Body {
     Body::fingertip(&shape, materials, density, Order::Linear, parts).unwrap()
 }
 
+/// The state at a depth of a coarse finger, found fit for a dataset.
+fn fit_at(approach: &Approach, depth_mm: f64) -> IncrementRecord {
+    let body = coarse_finger();
+    let mut solver = body.solver(Options::default()).unwrap();
+    let drive = Drive::Depths(vec![depth_mm]);
+    let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.clone();
+    let (kept, pressed) =
+        body.press_balanced(&mut solver, approach, &drive, BALANCE_RELATIVE_MAX, keep);
+    pressed.unwrap();
+    let found = kept.last().unwrap();
+    assert_eq!(fault(found, found.pressure_mpa.len()), None);
+    found.clone()
+}
+
 #[test]
 fn what_nodes_cannot_lead_is_felt_within_faces() {
     let body = coarse_finger();
@@ -138,21 +152,9 @@ fn what_nodes_cannot_lead_is_felt_within_faces() {
 /// elements above: half the force of a finer mesh, 15 % of the work lost, J down to 0.27.
 #[test]
 fn an_edge_across_coarse_faces_keeps_its_hold() {
-    let body = coarse_finger();
     let pose = Pose { pitch_deg: 31.118, roll_deg: -10.127, yaw_deg: -89.113 };
     let approach = approach(RULER, pose, [-0.160, 1.228]);
-    let mut solver = body.solver(Options::default()).unwrap();
-    let drive = Drive::Depths(vec![1.403]);
-    let (kept, pressed) = body.press_balanced(
-        &mut solver,
-        &approach,
-        &drive,
-        BALANCE_RELATIVE_MAX,
-        &mut |_, _, r, _| r.clone(),
-    );
-    pressed.unwrap();
-    let found = kept.last().unwrap();
-    assert_eq!(fault(found, found.pressure_mpa.len()), None);
+    let found = fit_at(&approach, 1.403);
     assert!(found.checks.j_min > 0.7, "{:?}", found.checks);
 }
 
@@ -161,22 +163,9 @@ fn an_edge_across_coarse_faces_keeps_its_hold() {
 /// and on quadratic elements it glides.
 #[test]
 fn ridges_along_rows_of_points_do_not_let_the_skin_jump() {
-    let body = coarse_finger();
     let grating = "shape = \"grating\"\nridges = 6\nridge_mm = 2.0\ngroove_mm = 2.0\nheight_mm = 1.5\n\
                    edge_radius_mm = 0.7\nlength_mm = 24.0";
     let pose = Pose { pitch_deg: 31.352, roll_deg: 15.619, yaw_deg: 49.695 };
     let approach = approach(grating, pose, [0.138, 0.0]);
-    let mut solver = body.solver(Options::default()).unwrap();
-    let drive = Drive::Depths(vec![1.208]);
-    let (kept, pressed) = body.press_balanced(
-        &mut solver,
-        &approach,
-        &drive,
-        BALANCE_RELATIVE_MAX,
-        &mut |_, _, r, _| r.clone(),
-    );
-    pressed.unwrap();
-    let found = kept.last().unwrap();
-    assert_eq!(found.contact, ContactRule::FacesFinely);
-    assert_eq!(fault(found, found.pressure_mpa.len()), None);
+    assert_eq!(fit_at(&approach, 1.208).contact, ContactRule::FacesFinely);
 }
