@@ -1,11 +1,21 @@
 //! `fe-datagen` command line.
 
 use std::process::ExitCode;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::{Layer as _, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
 fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
-        .with_writer(std::io::stderr)
-        .init();
+    let filter = match std::env::var("RUST_LOG") {
+        Ok(text) => match text.parse() {
+            Ok(filter) => filter,
+            Err(error) => {
+                eprintln!("error: RUST_LOG is '{text}', which is not a filter: {error}");
+                return ExitCode::from(2);
+            }
+        },
+        Err(_) => Targets::new().with_default(LevelFilter::ERROR),
+    };
+    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
+    tracing_subscriber::registry().with(log).init();
     fe_datagen::cli::run()
 }

@@ -4,12 +4,11 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
-use fe_datagen::stability::{self, CASES};
+use fe_datagen::stability::{self, CASES, Extent};
 use std::process::Command;
 
-#[test]
-fn every_hard_case_keeps_its_promise() {
-    let report = stability::run(false, &|_| true, &mut |case, lines| {
+fn assert_kept(extent: Extent) {
+    let report = stability::run(extent, &|_| true, &mut |case, lines| {
         for line in lines.into_iter().flatten() {
             println!("{}", line.text());
         }
@@ -22,6 +21,17 @@ fn every_hard_case_keeps_its_promise() {
     for case in CASES {
         assert!(report.lines.iter().any(|l| l.case == case.name), "{} is missing", case.name);
     }
+}
+
+#[test]
+fn every_hard_case_keeps_its_promise() {
+    assert_kept(Extent::Quick);
+}
+
+#[test]
+#[ignore = "long: ./test --all"]
+fn every_variant_of_every_hard_case_keeps_its_promise() {
+    assert_kept(Extent::Usual);
 }
 
 /// A block 1 mm thick that is to be squeezed to nothing: no mesh of eight elements does that.

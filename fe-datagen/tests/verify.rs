@@ -14,7 +14,7 @@ fn every_quick_row_is_within_tolerance() {
     });
     let failed: Vec<_> = report.rows.iter().filter(|r| !r.check.pass).map(|r| r.line()).collect();
     assert!(report.passed(), "past tolerance:\n{}", failed.join("\n"));
-    for case in CASES {
+    for case in CASES.iter().filter(|c| c.quick) {
         assert!(report.rows.iter().any(|r| r.case == case.name), "{} is missing", case.name);
     }
 }

@@ -6,7 +6,12 @@ use std::{future::Future, io, time::Duration};
 
 use axum::http::{Method, StatusCode};
 use tracing::{Instrument, Span, field::Empty};
-use tracing_subscriber::{EnvFilter, Layer, layer::SubscriberExt, util::SubscriberInitExt};
+use tracing_subscriber::{
+    Layer,
+    filter::{LevelFilter, Targets},
+    layer::SubscriberExt,
+    util::SubscriberInitExt,
+};
 
 use crate::config::{Config, SettingError};
 
@@ -28,8 +33,11 @@ impl Telemetry {
     pub fn start(config: &Config) -> Result<Self, SettingError> {
         let refuse = |reason| SettingError { field: "log", reason };
         // Spans are asked for by their layer alone, whatever the log's filter lets through.
-        let filter = EnvFilter::try_new(format!("{},{SPANS}=off", config.log))
-            .map_err(|error| refuse(format!("'{}' is no filter: {error}", config.log)))?;
+        let filter: Targets = config
+            .log
+            .parse()
+            .map_err(|error| refuse(format!("'{}' is not a filter: {error}", config.log)))?;
+        let filter = filter.with_target(SPANS, LevelFilter::OFF);
         let log = tracing_subscriber::fmt::layer().with_writer(io::stderr).with_filter(filter);
         let registry = tracing_subscriber::registry().with(log);
         let taken = |error: tracing_subscriber::util::TryInitError| refuse(error.to_string());

@@ -4,7 +4,7 @@ use super::{CHECKS_FAILED, print};
 use crate::campaign::CampaignSpec;
 use crate::output::atomic;
 use crate::stability::scenes::{self, ScenesOptions};
-use crate::stability::{self, CASES};
+use crate::stability::{self, CASES, Extent};
 use anyhow::Context as _;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -28,8 +28,11 @@ pub(super) struct Args {
     /// List the cases with their promises.
     #[arg(long)]
     list: bool,
-    /// Finer meshes and more problems.
+    /// Only the cheapest variants of each case, as `./test` runs them.
     #[arg(long)]
+    quick: bool,
+    /// Finer meshes and more problems.
+    #[arg(long, conflicts_with = "quick")]
     long: bool,
     /// Print the lines as JSON.
     #[arg(long)]
@@ -83,8 +86,13 @@ fn suite(args: &Args) -> anyhow::Result<ExitCode> {
     super::refuse_unknown(&args.cases, &names)?;
     let wanted =
         |c: &stability::Case| args.cases.is_empty() || args.cases.iter().any(|n| n == c.name);
+    let extent = match (args.quick, args.long) {
+        (true, _) => Extent::Quick,
+        (_, true) => Extent::Long,
+        _ => Extent::Usual,
+    };
     let bar = super::progress("cases", CASES.iter().filter(|c| wanted(c)).count());
-    let report = stability::run(args.long, &wanted, &mut |_, lines| {
+    let report = stability::run(extent, &wanted, &mut |_, lines| {
         let Some(lines) = lines else { return };
         bar.suspend(|| {
             for line in lines.iter().filter(|_| !args.json) {

@@ -128,7 +128,7 @@ fn eliminated(seed: u64, elimination: Elimination) -> Result<Setup, CaseError> {
 }
 
 pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
-    let seeds: Vec<u64> = (0..if suite.long { 60 } else { 6 }).collect();
+    let seeds: Vec<u64> = (0..if suite.long() { 60 } else { 6 }).collect();
     let mut lines = Vec::new();
     let mut alone = Vec::new();
     for &seed in &seeds {

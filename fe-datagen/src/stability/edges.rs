@@ -142,9 +142,10 @@ fn refusal(variant: &str, refused: Result<(), PressError>) -> Line {
 }
 
 pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
-    let mut lines = across_faces()?;
-    let density = if suite.long { "medium" } else { "coarse" };
-    for tip in [0.05, 0.005] {
+    let mut lines = if suite.quick() { Vec::new() } else { across_faces()? };
+    let density = if suite.long() { "medium" } else { "coarse" };
+    let tips = if suite.quick() { &[0.005][..] } else { &[0.05, 0.005] };
+    for &tip in tips {
         let variant = format!("section, {density}, tip {tip} mm");
         lines.push(match press(&scene(&section(density, tip, 1.0))?, Options::default()) {
             Ok(pressed) => {

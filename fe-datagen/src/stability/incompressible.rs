@@ -11,8 +11,8 @@ use crate::verify::{CaseError, Check};
 const RATIOS: [f64; 4] = [0.49, 0.499, 0.4999, 0.49999];
 
 pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
-    let (linear, quadratic) = if suite.long { (64, 32) } else { (32, 16) };
-    let (solid, cube) = if suite.long { (12, 6) } else { (8, 4) };
+    let (linear, quadratic) = if suite.long() { (64, 32) } else { (32, 16) };
+    let (solid, cube) = if suite.long() { (12, 6) } else { (8, 4) };
     let mut lines = Vec::new();
     for nu in RATIOS {
         let found = cook_mm(ElementKind::Quad4, linear, nu);

@@ -31,19 +31,40 @@ pub use report::Report;
 
 use crate::press::body::{Body, PressError};
 use crate::verify::CaseError;
+use serde::Serialize;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
+/// How much of the suite to run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Extent {
+    /// Every case, by its cheapest variants that can still break the promise: for a test run.
+    Quick,
+    /// Every variant.
+    #[default]
+    Usual,
+    /// Finer meshes and more random problems.
+    Long,
+}
+
 /// How much to run, and what several cases share.
 pub(crate) struct Suite {
-    /// Finer meshes and more of them.
-    long: bool,
+    extent: Extent,
     /// The coarse fingertip, meshed when first asked for.
     finger: OnceCell<Body>,
 }
 
 impl Suite {
+    fn quick(&self) -> bool {
+        self.extent == Extent::Quick
+    }
+
+    fn long(&self) -> bool {
+        self.extent == Extent::Long
+    }
+
     fn finger(&self) -> Result<&Body, PressError> {
         if let Some(body) = self.finger.get() {
             return Ok(body);
@@ -198,12 +219,12 @@ pub const CASES: &[Case] = &[
 /// Runs the cases that `wanted` accepts; `visit` is told of each before (`None`) and
 /// after (`Some(lines)`).
 pub fn run(
-    long: bool,
+    extent: Extent,
     wanted: &dyn Fn(&Case) -> bool,
     visit: &mut dyn FnMut(&Case, Option<&[Line]>),
 ) -> Report {
-    let suite = Suite { long, finger: OnceCell::new() };
-    let mut report = Report { long, lines: Vec::new() };
+    let suite = Suite { extent, finger: OnceCell::new() };
+    let mut report = Report { extent, lines: Vec::new() };
     for case in CASES.iter().filter(|c| wanted(c)) {
         visit(case, None);
         let before = report.lines.len();

@@ -44,10 +44,15 @@ fn incremented(
 pub(super) fn one_increment(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     let body = suite.finger()?;
     let mut lines = Vec::new();
-    for pitch in [0.0, 30.0] {
+    let (pitches, increments, source) = if suite.quick() {
+        (&[30.0][..], 4, "four increments")
+    } else {
+        (&[0.0, 30.0][..], 10, "ten increments")
+    };
+    for &pitch in pitches {
         let once = incremented(body, pose(pitch, 0.0), 2.0, 1)?;
-        let often = incremented(body, pose(pitch, 0.0), 2.0, 10)?;
-        let checks = once.same_as(&often, 1e-5, "ten increments");
+        let often = incremented(body, pose(pitch, 0.0), 2.0, increments)?;
+        let checks = once.same_as(&often, 1e-5, source);
         // Energy against work needs the way between: one increment has none.
         lines.push(crate::stability::Line::converged(
             format!("2 mm at once, pitch {pitch}"),
@@ -69,6 +74,9 @@ pub(super) fn deep(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     let approach = Approach::plate(Pose::default());
     let drive = Drive::Depths(vec![1.0, 2.0, 3.0]);
     let linear = press_body(suite.finger()?, &approach, &drive, Options::default())?;
+    if suite.quick() {
+        return Ok(vec![linear.line("3 mm, Hex8", Vec::new())]);
+    }
     let plan = Plan::usual();
     let materials = solids(&TissueTable::default(), &plan)?;
     let shape = FingertipShape::default();
@@ -82,9 +90,14 @@ pub(super) fn deep(suite: &Suite) -> Result<Vec<Line>, CaseError> {
 
 pub(super) fn tilt(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     let body = suite.finger()?;
-    let drive = Drive::Depths(vec![0.5, 1.0]);
+    let (depths, pitches) = if suite.quick() {
+        (vec![0.3], &[60.0][..])
+    } else {
+        (vec![0.5, 1.0], &[0.0, 30.0, 60.0, 80.0][..])
+    };
+    let drive = Drive::Depths(depths);
     let mut lines = Vec::new();
-    for pitch in [0.0, 30.0, 60.0, 80.0] {
+    for &pitch in pitches {
         let options = Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-7, ..tight() };
         let pressed = press_body(body, &Approach::plate(pose(pitch, 0.0)), &drive, options)?;
         let side = pressed.record.force_n[1] / pressed.force_n();

@@ -1,7 +1,7 @@
 //! The table of all lines.
 
 use super::line::{comparison, first_line};
-use super::{CASES, End, Line};
+use super::{CASES, End, Extent, Line};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -11,8 +11,8 @@ const INTRODUCTION: &str = include_str!("introduction.md");
 /// Every line of one run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
-    /// Whether finer meshes and more of them were run.
-    pub long: bool,
+    /// How much was run.
+    pub extent: Extent,
     /// Lines in the order of the cases.
     pub lines: Vec<Line>,
 }

@@ -14,17 +14,13 @@ const DEPTH_MM: f64 = 1.0;
 /// Largest differences accepted: force, pressure, SED of both sides.
 type Accepted = [f64; 4];
 
-pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
-    let pairs: &[(Density, Density, Accepted)] = if context.quick {
-        &[(Density::Coarse, Density::Medium, [0.03, 0.25, 0.25, 0.35])]
-    } else {
-        &[
-            (Density::Coarse, Density::Medium, [0.03, 0.25, 0.25, 0.35]),
-            (Density::Medium, Density::Fine, [0.02, 0.12, 0.12, 0.15]),
-        ]
-    };
+pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
+    let pairs: [(Density, Density, Accepted); 2] = [
+        (Density::Coarse, Density::Medium, [0.03, 0.25, 0.25, 0.35]),
+        (Density::Medium, Density::Fine, [0.02, 0.12, 0.12, 0.15]),
+    ];
     let mut rows = Vec::new();
-    for &(coarse, fine, accepted) in pairs {
+    for (coarse, fine, accepted) in pairs {
         rows.extend(compare(coarse, fine, accepted)?);
     }
     Ok(rows)

@@ -12,7 +12,7 @@ const DEPTH_MM: f64 = 1.0;
 
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
     let finger = Body::usual(Density::Coarse)?;
-    let many = if context.quick { 20 } else { 100 };
+    let many = if context.quick { 4 } else { 100 };
     let (once, often) = (press(&finger, 1)?, press(&finger, many)?);
     let row = |what: &str, a: &[f64], b: &[f64]| {
         let quantity = format!("1 against {many} steps to 1 mm: {what}, relative L2");

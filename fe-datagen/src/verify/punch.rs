@@ -18,7 +18,7 @@ const DEPTH_MM: f64 = 0.01;
 /// a part of an element all round, and its force lower by as much. That error falls
 /// with the element and not with its square, hence the tolerance of half an element.
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
-    let per_radius = if context.quick { 8.0 } else { 16.0 };
+    let per_radius = if context.quick { 6.0 } else { 16.0 };
     let exact = 2.0 * RADIUS_MM * E_MPA / (1.0 - NU * NU) * DEPTH_MM;
     let force = force_n(RADIUS_MM / per_radius)?;
     let quantity = format!("Hex8, {per_radius} elements a radius: force of a flat punch, N");

@@ -27,8 +27,8 @@ cargo run --release -p fe-datagen -- verify --markdown docs/verification.md
 ```
 
 which solves every problem below with the solver that presses fingers and exits with code 3 if a row is past its
-tolerance. `--quick` runs smaller meshes (part of `./test`), `--only NAME` one case, `--json` prints the rows for a
-program. *Difference* is relative where the reference is a nonzero value in mm, N or MPa; absolute for orders; the
+tolerance. `--quick` runs smaller meshes and leaves out `density` and `solid-parts` (part of `./test`), `--only NAME` one
+case, `--json` prints the rows for a program. *Difference* is relative where the reference is a nonzero value in mm, N or MPa; absolute for orders; the
 distance from the band for accepted bands (tolerance 0). Units: mm, N, MPa.
 
 ";

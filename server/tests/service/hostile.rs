@@ -1,6 +1,6 @@
 //! Clients that are broken, slow or malicious.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use papilla_proto::{MAP_LEN, SampleType};
 use serde_json::json;
@@ -50,9 +50,8 @@ async fn slow_clients_are_dropped() {
     let service = impatient().await;
     // A head that never ends, and one that never begins.
     for start in ["GET /healthz HTTP/1.1\r\nhost", ""] {
-        let since = Instant::now();
-        raw_exchange(service.address, start.as_bytes()).await;
-        assert!(since.elapsed() < Duration::from_secs(20));
+        let closed = raw_exchange(service.address, start.as_bytes());
+        timeout(Duration::from_secs(120), closed).await.expect("the connection is still open");
     }
     // A body that never ends.
     let head = "POST /v1/sed HTTP/1.1\r\nhost: t\r\nconnection: close\r\ncontent-length: 200704\r\n\r\n1234";

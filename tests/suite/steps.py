@@ -1,0 +1,269 @@
+"""The parts of the suite: `./test --fast`, `./test` and, beside it, `./test --all`.
+
+Commands run from the repository's root with TARGET (cargo's target folder), BIN (what the tests
+build) and PAPILLA_SERVER set. One build serves all of them, with what is optional turned on.
+"""
+
+import os
+import shutil
+import subprocess
+
+from schedule import Step
+
+# Turned on in the build that the tests share: traces, and the examples of docs/clients/rust.md.
+FEATURES = "--features papilla-server/otlp,papilla-client/guide"
+# Debian's packages, by the program or file that shows that they are there.
+PACKAGES = {
+    "ccx": "calculix-ccx",
+    "chromium": "chromium",
+    "godot3-server": "godot3-server",
+    "mcs": "mono-mcs",
+    "mono": "mono-runtime",
+    "unshare": "util-linux",
+    "ip": "iproute2",
+    "/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll": "libnewtonsoft-json5.0-cil "
+    "libmono-system-numerics4.0-cil libmono-system-runtime4.0-cil",
+}
+AS_ROOT = 'as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; };'
+
+
+def packages_missing() -> str:
+    """Debian packages that are not here yet, in one line."""
+    here = {name: shutil.which(name) or os.path.exists(name) for name in PACKAGES}
+    return " ".join(package for name, package in PACKAGES.items() if not here[name])
+
+
+def install_packages() -> str:
+    missing = packages_missing()
+    if not missing:
+        return "echo 'nothing to install'"
+    options = "-y -qq --no-install-recommends"
+    return f"{AS_ROOT} as_root apt-get update -qq; as_root apt-get install {options} {missing}"
+
+
+def no_godot4() -> str | None:
+    if os.environ.get("GODOT4") or shutil.which("godot4") or shutil.which("godot"):
+        return None
+    return "no Godot 4 here: set GODOT4 to its program"
+
+
+def no_program(name: str, cure: str):
+    return lambda: None if shutil.which(name) else f"{name} is not here: {cure}"
+
+
+def no_nightly() -> str | None:
+    command = ["rustup", "run", "nightly", "rustc", "--version"]
+    if shutil.which("rustup") and subprocess.run(command, capture_output=True, check=False).returncode == 0:
+        return None
+    return "no nightly compiler here: rustup toolchain install nightly"
+
+
+def fast() -> list[Step]:
+    """Rust alone."""
+    return [
+        Step("format", "rustfmt", "cargo fmt --all --check"),
+        Step(
+            "build",
+            "everything that the tests run, once",
+            f"cargo build --workspace --all-targets {FEATURES}",
+            after=("format",),
+            installs="crates (35 MB)",
+        ),
+        Step(
+            "rust",
+            "unit, property, differential and end-to-end tests",
+            f"cargo test --workspace --all-targets {FEATURES} -q",
+            after=("build",),
+            tests_min=800,
+        ),
+        Step(
+            "doc",
+            "examples in the crates' documentation",
+            f"cargo test --workspace --doc {FEATURES} -q -- --skip docs/clients",
+            after=("rust",),
+            tests_min=1,
+        ),
+        Step(
+            "data",
+            "the committed datasets and models are whole",
+            'for m in data/*/manifest.json; do "$BIN/fe-datagen" dataset verify "$(dirname "$m")"; done\n'
+            'for m in models/*.onnx; do "$BIN/model-export" check "$m" --atlas models/atlas.json; done',
+            after=("build",),
+        ),
+        Step(
+            "lint",
+            "clippy, warnings are errors",
+            "cargo clippy --workspace --all-targets -- -D warnings",
+            after=("doc",),
+        ),
+    ]
+
+
+def installs() -> list[Step]:
+    """What the other parts need; these run beside the build."""
+    return [
+        Step(
+            "packages",
+            "Debian packages: CalculiX, Chromium, Godot 3, Mono",
+            install_packages(),
+            installs=f"apt: {packages_missing() or 'nothing'}",
+        ),
+        Step(
+            "python",
+            "Python environments for the trainer, the clients and third-party clients",
+            "tests/suite/environment trainer model-export/trainer/requirements.txt\n"
+            "tests/suite/environment interop tests/interop/requirements.txt\n"
+            "tests/suite/environment clients clients/python/requirements.txt ./clients/python",
+            installs="pip: torch with the CUDA libraries that it does not start without (2.4 GB)",
+        ),
+        Step(
+            "node",
+            "npm packages of the page, the web client and the glTF test",
+            "for d in tests/browser clients/web tests/gltf; do\n"
+            '  (cd "$d" && npm ci --no-audit --no-fund --silent)\ndone',
+            installs="npm: 60 MB",
+        ),
+    ]
+
+
+def full() -> list[Step]:
+    """The trainer, the clients, third-party programs and the page."""
+    client = "clients/test"
+    return [
+        Step(
+            "trainer",
+            "the trainer's style and tests",
+            "cd model-export/trainer\n"
+            '"$TARGET/venv-trainer/bin/python" -m ruff check .\n'
+            '"$TARGET/venv-trainer/bin/python" -m pytest -q -p no:cacheprovider',
+            after=("python",),
+            tests_min=80,
+        ),
+        Step(
+            "interop",
+            "tritonclient and Prometheus' parser against the service",
+            "tests/interop/run",
+            after=("build", "python"),
+            tests_min=5,
+        ),
+        Step("client-python", "the Python client", f"{client} python", ("build", "python"), 30),
+        Step("client-cpp", "the C++ client", f"{client} cpp", ("build",), 27),
+        Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 27),
+        Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 30),
+        Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 54),
+        Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 27),
+        Step(
+            "client-godot4",
+            "the Godot 4 add-on",
+            f"{client} godot4",
+            ("build", "packages"),
+            27,
+            missing=no_godot4,
+        ),
+        Step("client-gltf", "the atlas as glTF", f"{client} gltf", ("build", "node"), 1),
+        Step(
+            "docs-clients",
+            "the clients' pages as written",
+            "clients/docs-test",
+            ("client-rust", "client-python", "client-cpp"),
+        ),
+        Step(
+            "calculix",
+            "the same presses in CalculiX",
+            f"cargo test --workspace --test calculix {FEATURES} -q -- --ignored",
+            after=("doc", "packages"),
+            tests_min=1,
+        ),
+        Step(
+            "page",
+            "the page in headless Chromium",
+            "clients/conformance/run --only-serve page npm --prefix tests/browser test --silent",
+            after=("build", "node", "packages"),
+            tests_min=30,
+        ),
+    ]
+
+
+def long() -> list[Step]:
+    """The long forms, beside `full`."""
+    return [
+        Step(
+            "release",
+            "what `cargo run --release` builds, and a look at all it would serve",
+            'cargo build --release && "$TARGET/release/papilla-server" check',
+            after=("lint",),
+        ),
+        Step(
+            "rust-long",
+            "tests marked long, every variant of every hard case among them",
+            f"cargo test --workspace --all-targets {FEATURES} -q -- --ignored --skip started_by"
+            " --skip calculix_agrees",
+            after=("doc",),
+            tests_min=3,
+        ),
+        Step("verify", "every verification row", '"$BIN/fe-datagen" verify', after=("rust-long",)),
+        Step(
+            "stability-long",
+            "hard cases on finer meshes",
+            '"$BIN/fe-datagen" stability --long',
+            after=("verify",),
+        ),
+        Step(
+            "calculix-long",
+            "every press in CalculiX",
+            '"$BIN/fe-datagen" witness',
+            after=("stability-long",),
+        ),
+        Step(
+            "onnxruntime",
+            "the engine's answers in ONNX Runtime",
+            'ORT_DYLIB_PATH=$(ls "$TARGET"/venv-trainer/lib/python3*/site-packages/onnxruntime/capi/'
+            "libonnxruntime.so.*)\n"
+            "export ORT_DYLIB_PATH\n"
+            f"cargo test --workspace --test infer {FEATURES},papilla-engine/ort -q",
+            after=("stability-long", "python"),
+            tests_min=10,
+        ),
+        Step(
+            "sanitizers",
+            "the C++ client under the thread, address and undefined-behaviour sanitizers",
+            "clients/test cpp-sanitizers",
+            after=("client-cpp",),
+            tests_min=54,
+        ),
+        Step(
+            "deny",
+            "licences, sources, duplicates and advisories of all crates",
+            "tests/suite/deny",
+            after=("lint",),
+        ),
+        Step(
+            "mutations",
+            "the short form fails for each of ten mutations",
+            "tests/mutations/run",
+            after=("calculix-long",),
+        ),
+        Step(
+            "reconnects",
+            "10 000 reconnects",
+            f"PAPILLA_RECONNECTS=10000 cargo test --workspace --test service {FEATURES} -q -- clients_come",
+            after=("rust-long",),
+            tests_min=1,
+        ),
+        Step(
+            "fuzz",
+            "every reader of outside bytes, ten minutes",
+            "tests/fuzz/run",
+            after=("mutations",),
+            missing=no_nightly,
+        ),
+    ]
+
+
+def extent(name: str) -> list[Step]:
+    """All steps of `fast`, `full` or `all`, in the order in which they are started."""
+    build, *checks = fast()[1:]
+    if name == "fast":
+        return fast()
+    steps = [fast()[0], build, *installs(), *checks, *full()]
+    return steps + long() if name == "all" else steps
