@@ -30,7 +30,7 @@ MUTATIONS = [
         "fe-datagen/src/material/neo_hookean.rs",
         "+ c29 * g[b][a]",
         "- c29 * g[b][a]",
-        rust("--lib", "material::"),
+        rust("--test verify"),
     ),
     Mutation(
         "SED from the wrong side of the interface",
@@ -66,14 +66,14 @@ MUTATIONS = [
         "proto/src/window.rs",
         "let start = row * MAP_SIDE_PX;",
         "let start = (row + 1).min(MAP_SIDE_PX - 1) * MAP_SIDE_PX;",
-        rust("--lib", "window"),
+        "cargo test -p papilla-proto -q window",
     ),
     Mutation(
         "u16 samples with the scale of u8",
         "proto/src/sample.rs",
         "*value = f32::from(u16::from_le_bytes([b[0], b[1]])) * scale;",
         "*value = f32::from(u16::from_le_bytes([b[0], b[1]])) * scale * 257.0;",
-        rust("--lib", "sample"),
+        "cargo test -p papilla-proto -q sample",
     ),
     Mutation(
         "a sparse map that drops each row's last term",
@@ -81,6 +81,13 @@ MUTATIONS = [
         "let degree = rows().map(Iterator::count).max().unwrap_or(0);",
         "let degree = rows().map(Iterator::count).max().unwrap_or(0).max(2) - 1;",
         rust("--lib", "sparse"),
+    ),
+    Mutation(
+        "a debugging macro left in the code",
+        "proto/src/window.rs",
+        "let start = row * MAP_SIDE_PX;",
+        "let start = dbg!(row * MAP_SIDE_PX);",
+        "cargo build -p papilla-proto",
     ),
     Mutation(
         "a loss that forgets the far field",

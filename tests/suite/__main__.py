@@ -76,7 +76,7 @@ def environment() -> dict[str, str]:
         "CARGO_TERM_COLOR": "never",
         "NO_COLOR": "1",
         "PYTHONUNBUFFERED": "1",
-    }
+    } | steps.lints()
 
 
 def main() -> int:

@@ -18,7 +18,7 @@ const BONE: Parts = Parts { bone: true, nail: false };
 const NAIL: Parts = Parts { bone: false, nail: true };
 const BOTH: Parts = Parts { bone: true, nail: true };
 
-/// A coarse finger pressed 1 mm by a level plate.
+/// A coarse finger pressed .5 mm by a level plate.
 fn press(parts: Parts, table: &TissueTable, shape: &FingertipShape) -> Vec<IncrementRecord> {
     let solve = || -> Result<_, PressError> {
         let plan = Plan { parts, ..Plan::usual() };
@@ -26,7 +26,7 @@ fn press(parts: Parts, table: &TissueTable, shape: &FingertipShape) -> Vec<Incre
         let body = Body::fingertip(shape, materials, Density::Coarse, Order::Linear, parts)?;
         let mut solver = body.solver(Options::default())?;
         let mut records = Vec::new();
-        let drive = Drive::Depths(vec![0.25, 0.5, 1.0]);
+        let drive = Drive::Depths(vec![0.25, 0.5]);
         let approach = Approach::plate(Pose::default());
         body.press(&mut solver, &approach, &drive, 2, &mut |_, r, _| records.push(r.clone()))?;
         Ok(records)
@@ -189,7 +189,7 @@ fn energy_lost_within_faces_is_felt_at_more_points() {
     let body = coarse_finger();
     let approach = approach(RULER, Pose::default(), [0.0; 2]);
     let mut solver = body.solver(Options::default()).unwrap();
-    let drive = Drive::Depths(vec![0.1]);
+    let drive = Drive::Depths(vec![0.05]);
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.contact;
     let (kept, pressed) = body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
     pressed.unwrap();
