@@ -57,7 +57,7 @@ async fn come_and_go(address: SocketAddr, n: u32) {
     }
 }
 
-/// `PAPILLA_RECONNECTS=10000 cargo test --release -p papilla-server clients_come_and_go`
+/// `PAPILLA_RECONNECTS=10000 cargo test -p papilla-server clients_come_and_go`
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread")]
 async fn clients_come_and_go_and_nothing_of_them_stays() {
