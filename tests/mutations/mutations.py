@@ -92,8 +92,8 @@ MUTATIONS = [
     Mutation(
         "a loss that forgets the far field",
         "model-export/trainer/papilla_trainer/losses.py",
-        "far_weight: float) -> Tensor:",
-        "far_weight: float = 0.0) -> Tensor:\n    far_weight = 0.0",
+        "whole + far_weight * distant",
+        "whole",
         TRAINER.format(tests="tests/test_face.py tests/test_metrics.py"),
     ),
     Mutation(
@@ -101,7 +101,9 @@ MUTATIONS = [
         "clients/python/papilla/wire.py",
         "(column, row, width, height),\n        client_time_us, total_us",
         "(row, column, width, height),\n        client_time_us, total_us",
-        "clients/test python",
+        # As clients/test runs it, but on this checkout's package.
+        "PYTHONPATH=clients/python clients/conformance/run python "
+        '"$TARGET/venv-clients/bin/python" -m papilla.conformance',
     ),
     Mutation(
         "the page's raster with two corners of each triangle exchanged",

@@ -1,10 +1,5 @@
-//! Times inference of models, one line a model: median and least milliseconds a map.
-//!
-//! ```sh
-//! cargo run --release -p papilla-engine --example latency -- models/*.onnx
-//! ```
-//!
-//! Two builds are compared by running their `latency` in turn: `tests/against-build` does that.
+//! Times inference of models, one line a model: name, median and least milliseconds, runs.
+//! `tests/builds/run` compiles it beside two commits.
 
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
 use std::{
@@ -14,7 +9,7 @@ use std::{
 };
 
 /// Time spent on each model.
-const BUDGET: Duration = Duration::from_millis(1500);
+const BUDGET: Duration = Duration::from_millis(1000);
 /// Fewest maps a model is timed with.
 const RUNS_MIN: usize = 9;
 
@@ -43,12 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         times_ms.sort_by(f64::total_cmp);
         let name = Path::new(&file).file_stem().unwrap_or_default().to_string_lossy();
-        println!(
-            "{name} {:.4} {:.4} {}",
-            times_ms[times_ms.len() / 2],
-            times_ms[0],
-            times_ms.len()
-        );
+        println!("{name} {:.4} {:.4} {}", times_ms[times_ms.len() / 2], times_ms[0], times_ms.len());
     }
     Ok(())
 }
