@@ -87,10 +87,14 @@ def record(outcomes: list[Outcome], root: Path, belongs: dict[str, str]) -> None
     when = datetime.now(timezone.utc).strftime("%Y-%m-%d")
     for o in outcomes:
         rows[o.step.name] = entry(o) | {"date": when, "commit": commit, "on": processor()}
-    rows = {name: rows[name] for name in belongs if name in rows}
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(rows, indent=1) + "\n")
-    (root / PAGE).write_text(INTRODUCTION + "".join(row(rows[n], belongs[n]) for n in rows))
+    path.write_text(json.dumps({n: rows[n] for n in belongs if n in rows}, indent=1) + "\n")
+    lines = [row(rows[n], of) if n in rows else never(n, of) for n, of in belongs.items()]
+    (root / PAGE).write_text(INTRODUCTION + "".join(lines))
+
+
+def never(name: str, of: str) -> str:
+    return f"| `{name}` | {of} | never | | | | | | |\n"
 
 
 def row(entry: dict, of: str) -> str:

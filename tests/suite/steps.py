@@ -25,6 +25,8 @@ def lints() -> dict[str, str]:
 
 # Turned on in the build that the tests share: traces, and the examples of docs/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
+# Tests that solve for seconds: verification, hard cases, presses of whole fingers.
+SOLVES = ["every_quick_row", "every_hard_case", "press::tests", "rungs_are_solved_once"]
 # Debian's packages, by the program or file that shows that they are there.
 PACKAGES = {
     "ccx": "calculix-ccx",
@@ -84,10 +86,11 @@ def fast() -> list[Step]:
         ),
         Step(
             "rust",
-            "unit, property, differential and end-to-end tests",
-            f"cargo test --workspace --all-targets {FEATURES} -q",
+            "unit, property, differential and end-to-end tests but for the longest solves",
+            f"cargo test --workspace --all-targets {FEATURES} -q -- "
+            + " ".join(f"--skip {name}" for name in SOLVES),
             after=("build",),
-            tests_min=760,
+            tests_min=740,
         ),
         Step(
             "doc",
@@ -137,6 +140,14 @@ def full() -> list[Step]:
     """The trainer, the clients, third-party programs and the page."""
     client = "clients/test"
     return [
+        Step(
+            "solves",
+            "verification rows, hard cases and presses of whole fingers, in their short forms",
+            f"cargo test --workspace --lib --test stability --test verify {FEATURES} -q -- "
+            + " ".join(SOLVES),
+            after=("build",),
+            tests_min=10,
+        ),
         Step(
             "trainer",
             "the trainer's style and tests",
