@@ -2,8 +2,8 @@
 
 import os
 import re
+import signal
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -20,6 +20,8 @@ COUNTS = [
 ]
 # A note that a step is still at work, for logs that nobody would otherwise see move.
 STILL_S = 60.0
+# A step that takes longer hangs; the slowest machine known takes a sixth of it for the slowest step.
+LIMIT_S = 3000.0
 # Of a failed step's output, the part that is printed; the log has the rest.
 TAIL_LINES = 150
 
@@ -34,9 +36,9 @@ class Step:
     after: tuple[str, ...] = ()
     # Fewest tests that have to be counted in the output; fewer is a failure.
     tests_min: int = 0
-    # What is installed, in words; and the processor seconds that all of it took where measured.
+    # What is installed, in words, with what it took where it was measured.
     installs: str = ""
-    usual_s: float = 0.0
+    limit_s: float = LIMIT_S
     # Why the step cannot run here, or None.
     missing: Callable[[], str | None] = lambda: None
 
@@ -133,12 +135,17 @@ class Run:
                 stdin=subprocess.DEVNULL,
                 stdout=out,
                 stderr=subprocess.STDOUT,
+                start_new_session=True,
             )
             done = threading.Event()
 
             def still() -> None:
                 while not done.wait(STILL_S):
-                    self.say(f"still {step.name}: {time.monotonic() - start:.0f} s")
+                    took_s = time.monotonic() - start
+                    self.say(f"still {step.name}: {took_s:.0f} s")
+                    if took_s > step.limit_s:
+                        self.say(f"{step.name}: killed, it took more than {step.limit_s:.0f} s")
+                        os.killpg(child.pid, signal.SIGKILL)
 
             threading.Thread(target=still, daemon=True).start()
             _, status, usage = os.wait4(child.pid, 0)
@@ -160,7 +167,3 @@ class Run:
         with self.lock:
             print(f"[{time.monotonic() - self.begun:5.0f} s] {text}", flush=True)
 
-
-def terminal() -> bool:
-    """Whether somebody watches."""
-    return sys.stdout.isatty()
