@@ -8,13 +8,15 @@
 //! ```
 //!
 //! **Invariant:** tokio only moves bytes; decoding, inference and encoding run on the pool's
-//! own threads. **Invariant:** every queue is bounded and every wait is timed.
+//! own threads. It does so on threads of the service's own (`runtime`), so that whoever
+//! starts and drains it is not starved by clients. **Invariant:** every queue is bounded and every wait is timed.
 //! **Invariant:** a frame that was accepted is answered exactly once.
 //!
 //! [`start`] runs the whole service inside a process; the binary does little more.
 
 mod app;
 mod assets;
+mod bucket;
 mod check;
 mod codec;
 mod config;
@@ -35,12 +37,13 @@ mod pool;
 mod problem;
 mod reload;
 mod replay;
+mod runtime;
 mod session;
 mod speed;
 mod telemetry;
 mod tls;
 
-use std::{net::SocketAddr, sync::Arc, time::Duration};
+use std::{net::SocketAddr, sync::Arc, thread, time::Duration};
 
 pub use check::{Finding, Report, check};
 pub use config::{Cli, Command, Config, ConfigError, SettingError};
@@ -54,7 +57,7 @@ use tokio::{
 
 use crate::{
     app::App, assets::Assets, gate::Gate, metrics::Metrics, models::Catalogue, net::Line,
-    pool::Pool,
+    pool::Pool, runtime::IoRuntime,
 };
 
 /// A running service.
@@ -68,8 +71,14 @@ pub struct Server {
     drain: Arc<watch::Sender<bool>>,
     drain_timeout: Duration,
     accepting: JoinHandle<()>,
+    app: Arc<App>,
     pool: Option<Pool>,
+    /// Dropped last: it cuts off what is left of connections.
+    _io: IoRuntime,
 }
+
+/// Longest wait for the job that a thread has in hand, once the drain is over.
+const LAST_JOB: Duration = Duration::from_secs(1);
 
 /// Starts the service: loads the models, measures them on this machine, warms every thread,
 /// binds, accepts.
@@ -86,7 +95,11 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
     let (catalogue, metrics, pool) =
         spawn_blocking(move || load(&loading)).await.map_err(|_| StartError::WorkerPanicked)??;
     let bind = |source| StartError::Bind { address: config.bind, source };
-    let listener = net::listen(config.bind).map_err(bind)?;
+    let io = IoRuntime::start().map_err(StartError::Thread)?;
+    let listener = {
+        let _within = io.enter();
+        net::listen(config.bind).map_err(bind)?
+    };
     let address = listener.local_addr().map_err(bind)?;
     let drain = Arc::new(watch::Sender::new(false));
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
@@ -99,8 +112,8 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
         })?;
     }
     let router = http::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref());
-    let line = Line { router, app, tls };
-    let accepting = tokio::spawn(net::serve(listener, line, config.max_connections.get()));
+    let line = Line { router, app: Arc::clone(&app), tls };
+    let accepting = io.spawn(net::serve(listener, line, config.max_connections.get()));
     Ok(Server {
         address,
         tiers,
@@ -109,7 +122,9 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
         drain,
         drain_timeout: config.drain_timeout(),
         accepting,
+        app,
         pool: Some(pool),
+        _io: io,
     })
 }
 
@@ -153,8 +168,17 @@ impl Server {
         self.threads
     }
 
+    /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
+    pub fn reload(&self) {
+        let app = Arc::clone(&self.app);
+        // The log has the outcome.
+        thread::spawn(move || drop(app.reload()));
+    }
+
     /// Ends the service: takes nothing new, answers every accepted frame, tells
     /// every session, and waits for all of them and for the threads.
+    ///
+    /// Waits on the runtime of the caller, which no client can keep busy.
     ///
     /// # Errors
     /// Not done within the configured time; what was left is cut off.
@@ -170,8 +194,8 @@ impl Server {
         };
         let result = timeout(self.drain_timeout, all).await;
         if let Some(mut pool) = self.pool.take() {
-            // Nobody waits for more than the job a thread has in hand.
-            let _ = spawn_blocking(move || pool.stop()).await;
+            // Err: the job takes too long; the thread is left to it.
+            let _ = timeout(LAST_JOB, spawn_blocking(move || pool.stop())).await;
         }
         result.map_err(|_| DrainError { seconds: self.drain_timeout.as_secs() })
     }

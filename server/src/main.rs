@@ -1,5 +1,7 @@
 //! The Papilla service; see `--help`.
 
+mod signals;
+
 use std::{
     env,
     io::{self, Write},
@@ -10,10 +12,14 @@ use papilla_server::{
     Cli, Command, Config, ConfigError, Server, SettingError, StartError, Telemetry,
 };
 use serde_json::json;
-use tokio::signal::unix::{SignalKind, signal};
+
+use self::signals::{Request, Signals};
 
 /// Exit code of a drain that took too long.
 const DRAIN_TIMED_OUT: u8 = 5;
+
+/// Exit code of a start that a signal ended, as shells have it for Ctrl-C.
+const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     match run() {
@@ -44,13 +50,13 @@ fn run() -> anyhow::Result<ExitCode> {
     match cli.command {
         Some(Command::Check) => check(config),
         None => {
-            // The runtime only moves bytes: two threads keep one slow turn from stopping all
-            // sessions.
-            let runtime = tokio::runtime::Builder::new_multi_thread()
-                .worker_threads(2)
-                .enable_all()
-                .build()?;
-            runtime.block_on(serve(config))
+            // The service moves bytes on threads of its own. This one waits for signals and
+            // watches over the drain: no client can keep it busy.
+            let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+            let result = runtime.block_on(serve(config));
+            // What still loads or renders is not waited for.
+            runtime.shutdown_background();
+            result
         }
     }
 }
@@ -66,13 +72,15 @@ fn check(config: &Config) -> anyhow::Result<ExitCode> {
 }
 
 async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let server = papilla_server::start(config).await?;
+    let mut signals = Signals::listen()?;
+    let server = tokio::select! {
+        server = papilla_server::start(config) => server?,
+        () = signals.end() => return Ok(ExitCode::from(INTERRUPTED)),
+    };
     announce(&server, config)?;
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = interrupt.recv() => {}
+    while signals.next().await == Request::Reload {
+        tracing::info!("SIGHUP: the models are loaded anew");
+        server.reload();
     }
     tracing::info!("draining; a second signal ends at once");
     tokio::select! {
@@ -83,8 +91,7 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
                 Ok(ExitCode::from(DRAIN_TIMED_OUT))
             }
         },
-        _ = terminate.recv() => Ok(ExitCode::from(DRAIN_TIMED_OUT)),
-        _ = interrupt.recv() => Ok(ExitCode::from(DRAIN_TIMED_OUT)),
+        () = signals.end() => Ok(ExitCode::from(DRAIN_TIMED_OUT)),
     }
 }
 

@@ -31,7 +31,8 @@ Examples:
   curl --data-binary @pressure.raw http://127.0.0.1:7224/v1/sed -o sed.raw
 
 The start line goes to stdout, the log to stderr. SIGTERM or Ctrl-C drains: frames already
-accepted are answered, then the process ends. A second signal ends it at once.
+accepted are answered, then the process ends. A second signal ends it at once. SIGHUP loads the
+models anew.
 
 Exit codes:
   0  drained and ended; with `check`: everything is in order
@@ -39,7 +40,8 @@ Exit codes:
   2  wrong usage, or a setting that cannot be used
   3  the models are missing or unusable
   4  the address cannot be bound
-  5  the drain took longer than --drain-timeout-s";
+  5  the drain took longer than --drain-timeout-s, or a second signal ended it
+  130  a signal ended the start";
 
 /// Papilla service: pressure maps in, strain energy density maps out, in time.
 #[derive(Debug, Clone, Parser)]

@@ -5,10 +5,12 @@ use std::{
     net::{IpAddr, Ipv6Addr},
     num::NonZeroU32,
     sync::{Arc, Mutex, PoisonError},
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use papilla_proto::{ErrorCode, Problem};
+
+use crate::bucket::{Bucket, Rate};
 
 /// Beyond so many buckets the full ones are thrown away: their clients have been silent.
 const BUCKETS_MAX: usize = 4096;
@@ -32,26 +34,19 @@ impl Key {
     }
 }
 
-/// A bucket, kept as the time at which it is full again: so it fills by itself.
-type FullAt = Instant;
-
 /// All buckets.
 pub(super) struct Rates {
     per_s: u32,
-    /// Time in which one request's worth flows back.
-    refill: Duration,
-    /// Time in which an empty bucket fills.
-    depth: Duration,
-    buckets: Mutex<HashMap<Key, FullAt>>,
+    rate: Rate,
+    buckets: Mutex<HashMap<Key, Bucket>>,
 }
 
 impl Rates {
     /// None if any rate is allowed.
     pub(super) fn new(per_s: u32, burst: Option<NonZeroU32>) -> Option<Self> {
-        let rate = NonZeroU32::new(per_s)?;
-        let refill = Duration::from_secs(1) / rate.get();
-        let depth = refill * burst.unwrap_or(rate).get();
-        Some(Self { per_s, refill, depth, buckets: Mutex::default() })
+        let per_s = NonZeroU32::new(per_s)?;
+        let rate = Rate::new(per_s.get(), burst.unwrap_or(per_s).get());
+        Some(Self { per_s: per_s.get(), rate, buckets: Mutex::default() })
     }
 
     /// Takes one request's worth from the client's bucket.
@@ -65,23 +60,24 @@ impl Rates {
     fn check_at(&self, key: &Key, now: Instant) -> Result<(), Problem> {
         let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
         if buckets.len() >= BUCKETS_MAX {
-            buckets.retain(|_, full_at| *full_at > now);
+            buckets.retain(|_, bucket| !bucket.is_full(now));
         }
-        let full_at = buckets.get(key).map_or(now, |full_at| (*full_at).max(now));
-        let next = full_at + self.refill;
-        if let Some(wait) = next.checked_duration_since(now + self.depth).filter(|w| !w.is_zero()) {
+        let mut bucket = buckets.get(key).copied().unwrap_or_else(|| Bucket::full(now));
+        bucket.take(self.rate, now).map_err(|wait| {
             let (per_s, wait_ms) = (self.per_s, wait.as_millis() + 1);
             let message =
                 format!("more than {per_s} requests a second; the next is taken in {wait_ms} ms");
-            return Err(Problem::new(ErrorCode::RateLimited, message));
-        }
-        buckets.insert(key.clone(), next);
+            Problem::new(ErrorCode::RateLimited, message)
+        })?;
+        buckets.insert(key.clone(), bucket);
         Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     fn key(text: &str) -> Key {

@@ -42,6 +42,7 @@ pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
             Err(end) => return end,
             Ok(Event::Draining) => draining = true,
             Ok(Event::Binary(frame, received)) => session.take(line, &frame, received, draining),
+            Ok(Event::Text(_)) if draining => line.reply.complain(problem::shutting_down(), None),
             Ok(Event::Text(text)) => session.renew(line, &text).await,
         }
     }

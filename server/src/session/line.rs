@@ -15,14 +15,15 @@ use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     net::TcpStream,
     sync::watch,
-    time::{Instant as TokioInstant, Sleep, sleep_until, timeout},
+    time::{Instant as TokioInstant, Sleep, sleep, sleep_until, timeout},
 };
 
 use super::{
     End, close,
+    limits::Limits,
     outbox::Outbox,
     reply::Reply,
-    wire::{self, Fault, Inbound, MESSAGE_MAX, Message, opcode},
+    wire::{self, Fault, Inbound, MESSAGE_MAX, Message, Received, opcode},
 };
 use crate::{
     app::{App, begun},
@@ -41,6 +42,9 @@ pub(super) struct Line {
     is_asked: bool,
     /// Goes off when it may be time to ask, or to give up.
     alarm: Pin<Box<Sleep>>,
+    limits: Limits,
+    /// Goes off when the next turn begins.
+    pause: Pin<Box<Sleep>>,
 }
 
 enum Stream {
@@ -73,29 +77,44 @@ impl Line {
         let reply = Arc::new(Reply::new(Outbox::new(writer), Arc::clone(&app)));
         let heard = TokioInstant::now();
         let alarm = Box::pin(sleep_until(heard + app.timeouts.idle / 3));
-        Self { stream, inbound, reply, app, drain, heard, is_asked: false, alarm }
+        let (limits, pause) = (Limits::new(heard.into_std()), Box::pin(sleep_until(heard)));
+        Self { stream, inbound, reply, app, drain, heard, is_asked: false, alarm, limits, pause }
     }
 
     /// The next event. A silent client is pinged after a third of the idle time,
     /// and given up after all of it.
+    ///
+    /// **Invariant:** between two waits, no more than a turn's worth of frames and bytes is worked
+    /// off ([`Limits`]), so that one client's flood does not hold a thread up for others.
     pub(super) async fn next(&mut self, draining: bool) -> Result<Event, End> {
         loop {
             self.flush().await?;
-            match self.inbound.next() {
-                Ok(Some(message)) => {
-                    (self.heard, self.is_asked) = (TokioInstant::now(), false);
-                    if let Some(event) = self.hear(message)? {
-                        return Ok(event);
+            if !draining && *self.drain.borrow() {
+                return Ok(Event::Draining);
+            }
+            let resume_at = self.limits.resume_at(Instant::now());
+            if resume_at.is_none() {
+                match self.inbound.next() {
+                    Ok(Some(received)) => {
+                        self.limits.on_frame();
+                        if let Received::Message(message) = received
+                            && let Some(event) = self.hear(message)?
+                        {
+                            return Ok(event);
+                        }
+                        continue;
                     }
-                    continue;
+                    Ok(None) => {}
+                    Err(Fault::Protocol(what)) => return Err(End::Garbled(what.to_owned())),
+                    Err(Fault::TooLarge) => {
+                        let message = format!("a message is larger than {MESSAGE_MAX} bytes");
+                        let problem = Problem::new(ErrorCode::TooLarge, message);
+                        return Err(End::Refused(problem, close::TOO_BIG));
+                    }
                 }
-                Ok(None) => {}
-                Err(Fault::Protocol(what)) => return Err(End::Garbled(what.to_owned())),
-                Err(Fault::TooLarge) => {
-                    let message = format!("a message is larger than {MESSAGE_MAX} bytes");
-                    let problem = Problem::new(ErrorCode::TooLarge, message);
-                    return Err(End::Refused(problem, close::TOO_BIG));
-                }
+            }
+            if let Some(resume_at) = resume_at {
+                self.pause.as_mut().reset(resume_at.into());
             }
             tokio::select! {
                 biased;
@@ -105,17 +124,24 @@ impl Line {
                     }
                 }
                 () = begun(&mut self.drain), if !draining => return Ok(Event::Draining),
-                read = self.stream.read(self.inbound.room()) => self.came(read)?,
                 () = &mut self.alarm => self.look()?,
+                () = &mut self.pause, if resume_at.is_some() => {}
+                read = self.stream.read(self.inbound.room()), if resume_at.is_none() => {
+                    self.came(read)?;
+                }
             }
         }
     }
 
     /// What a message means; none: it is dealt with.
-    fn hear(&self, message: Message) -> Result<Option<Event>, End> {
+    fn hear(&mut self, message: Message) -> Result<Option<Event>, End> {
         let received = Instant::now();
+        (self.heard, self.is_asked) = (received.into(), false);
         Ok(match message {
-            Message::Text(text) if str::from_utf8(&text).is_ok() => Some(Event::Text(text)),
+            Message::Text(text) if str::from_utf8(&text).is_ok() => {
+                self.limits.on_text(received);
+                Some(Event::Text(text))
+            }
             Message::Text(_) => {
                 let message = "a text message is not UTF-8";
                 return Err(End::Refused(
@@ -125,22 +151,33 @@ impl Line {
             }
             Message::Binary(bytes) => Some(Event::Binary(bytes, received)),
             Message::Ping(payload) => {
+                self.count_control(received)?;
                 self.reply.out.send(&wire::frame(opcode::PONG, &payload));
                 None
             }
-            Message::Pong => None,
+            Message::Pong => {
+                self.count_control(received)?;
+                None
+            }
             Message::Close(code) => return Err(End::Client(code)),
         })
     }
 
+    fn count_control(&mut self, now: Instant) -> Result<(), End> {
+        self.limits.on_control(now).map_err(|problem| End::Refused(problem, close::POLICY))
+    }
+
     /// What a read means.
-    fn came(&self, read: io::Result<usize>) -> Result<(), End> {
+    fn came(&mut self, read: io::Result<usize>) -> Result<(), End> {
         match read {
             Ok(0) if self.inbound.is_amid() => {
                 Err(End::Garbled("the connection ended in the middle of a message".to_owned()))
             }
             Ok(0) => Err(End::Garbled("the connection ended without a close".to_owned())),
-            Ok(_) => Ok(()),
+            Ok(bytes) => {
+                self.limits.on_read(bytes);
+                Ok(())
+            }
             Err(error) => Err(End::Garbled(error.to_string())),
         }
     }
@@ -217,6 +254,7 @@ impl Line {
         let farewell = async {
             while let Ok(1..) = self.stream.read(&mut unread).await {
                 unread.clear();
+                sleep(FAREWELL_PAUSE).await;
             }
         };
         // Err: the client does not close.
@@ -224,9 +262,11 @@ impl Line {
     }
 }
 
-/// Longest wait for the client's own close, and room to read until then, bytes.
+/// Longest wait for the client's own close; room to read until then, bytes, and the pause between
+/// two reads: a client that goes on sending is listened to at 8 MB/s.
 const FAREWELL: Duration = Duration::from_secs(1);
 const FAREWELL_ROOM: usize = 16 * 1024;
+const FAREWELL_PAUSE: Duration = Duration::from_millis(2);
 
 impl Stream {
     /// Reads some bytes behind those of `buffer`; nothing is lost if it is dropped while it waits.

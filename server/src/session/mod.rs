@@ -6,6 +6,7 @@
 mod frames;
 mod fresh;
 mod hello;
+mod limits;
 mod line;
 mod outbox;
 mod reply;

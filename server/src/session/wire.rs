@@ -3,7 +3,7 @@
 //! Bytes are read straight into a buffer of the session, freed of their mask while the rest of the
 //! frame is still on its way, and handed on without a copy. Nothing here waits or reads by itself.
 
-use std::mem;
+use std::{mem, ops::Range};
 
 use bytes::{Buf, Bytes, BytesMut};
 
@@ -102,6 +102,14 @@ impl Head {
     }
 }
 
+/// What a whole frame of the client's has brought.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Received {
+    Message(Message),
+    /// A piece of a message that goes on.
+    Piece,
+}
+
 /// What has come and is not yet a message.
 #[derive(Debug, Default)]
 pub(super) struct Inbound {
@@ -109,6 +117,8 @@ pub(super) struct Inbound {
     /// Room that a frame of this session needs, bytes.
     room: usize,
     buffer: BytesMut,
+    /// Bytes at the front of the buffer that are dealt with.
+    taken: usize,
     /// The head of the frame that is on its way, and how much of its payload is unmasked.
     head: Option<Head>,
     unmasked: usize,
@@ -128,13 +138,14 @@ impl Inbound {
         self.room = HEAD_MAX + frame_len;
         self.spare = store.frames(self.room);
         let read = mem::take(&mut self.buffer);
-        self.renew(&read);
+        self.renew(&read[self.taken..]);
     }
 
     /// Goes on in a buffer that nobody holds, with `read` at its start.
     fn renew(&mut self, read: &[u8]) {
         self.buffer = self.spare.lend(self.room.max(read.len()));
         self.buffer.extend_from_slice(read);
+        self.taken = 0;
     }
 
     /// Gives its memory back.
@@ -145,39 +156,50 @@ impl Inbound {
 
     /// Where to read to; there is always room.
     pub(super) fn room(&mut self) -> &mut BytesMut {
+        if self.taken == self.buffer.len() {
+            self.buffer.clear();
+            self.taken = 0;
+        }
         if self.buffer.capacity() == self.buffer.len() {
-            self.buffer.reserve(STEP);
+            if self.taken > 0 {
+                // Less than a frame, once for a whole buffer of them.
+                self.buffer.copy_within(self.taken.., 0);
+                self.buffer.truncate(self.buffer.len() - self.taken);
+                self.taken = 0;
+            } else {
+                self.buffer.reserve(STEP);
+            }
         }
         &mut self.buffer
     }
 
     /// Whether a message has begun and not ended.
     pub(super) fn is_amid(&self) -> bool {
-        !self.buffer.is_empty() || self.in_pieces.is_some()
+        self.taken < self.buffer.len() || self.in_pieces.is_some()
     }
 
-    /// The next message, if all of it has come.
-    pub(super) fn next(&mut self) -> Result<Option<Message>, Fault> {
-        loop {
-            let head = match self.head {
-                Some(head) => head,
-                None => match Head::parse(&self.buffer)? {
-                    Some(head) => *self.head.insert(self.check(head)?),
-                    None => return Ok(None),
-                },
-            };
-            let end = self.buffer.len().min(head.len + head.payload_len);
-            let done = self.unmasked;
-            unmask(&mut self.buffer[head.len + done..end], head.mask, done);
-            self.unmasked = end - head.len;
-            if self.unmasked < head.payload_len {
-                return Ok(None);
-            }
-            (self.head, self.unmasked) = (None, 0);
-            if let Some(message) = self.complete(head)? {
-                return Ok(Some(message));
-            }
+    /// What the next frame brings, if all of it has come. It takes time for that frame alone,
+    /// however many lie behind it.
+    pub(super) fn next(&mut self) -> Result<Option<Received>, Fault> {
+        let head = match self.head {
+            Some(head) => head,
+            None => match Head::parse(&self.buffer[self.taken..])? {
+                Some(head) => *self.head.insert(self.check(head)?),
+                None => return Ok(None),
+            },
+        };
+        let start = self.taken + head.len;
+        let end = self.buffer.len().min(start + head.payload_len);
+        let done = self.unmasked;
+        unmask(&mut self.buffer[start + done..end], head.mask, done);
+        self.unmasked = end - start;
+        if self.unmasked < head.payload_len {
+            return Ok(None);
         }
+        (self.head, self.unmasked) = (None, 0);
+        let payload = start..end;
+        let message = self.complete(head, payload)?;
+        Ok(Some(message.map_or(Received::Piece, Received::Message)))
     }
 
     /// Whether a frame may come now.
@@ -194,19 +216,14 @@ impl Inbound {
         }
     }
 
-    /// Takes a frame that has all come off the buffer; none: a piece of a message.
-    fn complete(&mut self, head: Head) -> Result<Option<Message>, Fault> {
-        let (start, end) = (head.len, head.len + head.payload_len);
-        let is_whole = head.is_last && matches!(head.opcode, opcode::TEXT | opcode::BINARY);
-        if is_whole {
-            let mut frame = mem::take(&mut self.buffer);
-            self.renew(&frame[end..]);
-            frame.truncate(end);
-            frame.advance(start);
-            return Ok(Some(message(head.opcode, frame.freeze())));
+    /// Takes a frame that has all come; none: a piece of a message.
+    fn complete(&mut self, head: Head, payload: Range<usize>) -> Result<Option<Message>, Fault> {
+        if head.is_last && matches!(head.opcode, opcode::TEXT | opcode::BINARY) {
+            return Ok(Some(message(head.opcode, self.hand_over(payload))));
         }
-        let payload = &self.buffer[start..end];
-        let found = match head.opcode {
+        self.taken = payload.end;
+        let payload = &self.buffer[payload];
+        Ok(match head.opcode {
             opcode::CLOSE => Some(Message::Close(close_code(payload)?)),
             opcode::PING => Some(Message::Ping(Bytes::copy_from_slice(payload))),
             opcode::PONG => Some(Message::Pong),
@@ -218,12 +235,23 @@ impl Inbound {
                     message(kind, mem::take(&mut self.pieces).freeze())
                 })
             }
-        };
-        // Moved to the front, so that the buffer keeps its room; it is little.
-        let rest = self.buffer.len() - end;
-        self.buffer.copy_within(end.., 0);
-        self.buffer.truncate(rest);
-        Ok(found)
+        })
+    }
+
+    /// The payload in a buffer of its own. The shorter one is copied of the payload and what lies
+    /// behind it, so that a buffer full of short frames is read in one pass.
+    fn hand_over(&mut self, payload: Range<usize>) -> Bytes {
+        if self.buffer.len() - payload.end > payload.len() {
+            let mut own = self.spare.lend(self.room.max(payload.len()));
+            own.extend_from_slice(&self.buffer[payload.clone()]);
+            self.taken = payload.end;
+            return own.freeze();
+        }
+        let mut frame = mem::take(&mut self.buffer);
+        self.renew(&frame[payload.end..]);
+        frame.truncate(payload.end);
+        frame.advance(payload.start);
+        frame.freeze()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Connections that are slow, half there, out of order or many: each ends in time with a word
 //! where there is one, and nobody else notices.
 
+mod flood;
 mod half;
 mod many;
 mod messages;

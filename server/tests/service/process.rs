@@ -1,10 +1,6 @@
 //! The binary itself: settings, `check`, signals.
 
-use std::{
-    net::TcpListener,
-    process::{Command, Output},
-    time::Duration,
-};
+use std::{net::TcpListener, process::Output, time::Duration};
 
 use papilla_proto::{FrameStatus, SampleType};
 use serde_json::{Value, json};
@@ -115,8 +111,7 @@ async fn sigterm_answers_what_was_accepted_and_ends() {
     // The answer to what comes after a frame says that the frame was taken.
     socket.send("?").await;
     socket.hear_refusal("unexpected_text").await;
-    let pid = running.child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    running.signal("TERM");
     let (header, _) = socket.hear_frame().await;
     assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
     socket.hear_end("shutting_down", 1001).await;

@@ -23,8 +23,10 @@ fn heard(inbound: &mut Inbound, bytes: &[u8], portion: usize) -> Result<Vec<Mess
     for part in bytes.chunks(portion) {
         inbound.room();
         inbound.buffer.extend_from_slice(part);
-        while let Some(message) = inbound.next()? {
-            messages.push(message);
+        while let Some(received) = inbound.next()? {
+            if let Received::Message(message) = received {
+                messages.push(message);
+            }
         }
     }
     Ok(messages)
