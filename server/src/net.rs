@@ -3,6 +3,8 @@
 //! axum's own `serve` sets neither TCP_NODELAY nor a time for the request's head, and does
 //! not bound the number of connections; so hyper is driven here.
 
+mod places;
+
 use std::{
     io,
     net::SocketAddr,
@@ -18,12 +20,14 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::{TcpListener, TcpSocket, TcpStream},
-    sync::{OwnedSemaphorePermit, Semaphore, watch},
+    sync::watch,
     time::{Sleep, sleep, timeout},
 };
 use tokio_rustls::TlsAcceptor;
 use tower::ServiceExt;
 
+pub(crate) use self::places::Standing;
+use self::places::{Place, Places};
 use crate::{
     app::{App, begun},
     gate::Peer,
@@ -65,18 +69,18 @@ pub(crate) struct Line {
 
 /// Accepts until the drain begins.
 pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
-    let places = Arc::new(Semaphore::new(places));
+    let places = Places::new(places, line.app.gate.asks_for_tokens());
     let mut drain = line.app.drain.subscribe();
     loop {
         let accepted = async {
-            let place = Arc::clone(&places).acquire_owned().await;
-            (place, listener.accept().await)
+            let permit = places.free().await;
+            (permit, listener.accept().await)
         };
-        let (place, stream, peer) = tokio::select! {
+        let (permit, stream, peer) = tokio::select! {
             biased;
             () = begun(&mut drain) => return,
-            (place, accepted) = accepted => match (place, accepted) {
-                (Ok(place), Ok((stream, peer))) => (place, stream, peer),
+            (permit, accepted) = accepted => match (permit, accepted) {
+                (Ok(permit), Ok((stream, peer))) => (permit, stream, peer),
                 (Err(_), _) => return,
                 (_, Err(error)) => {
                     tracing::warn!(%error, "a connection cannot be accepted");
@@ -88,34 +92,48 @@ pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "TCP_NODELAY cannot be set");
         }
+        let place = places.take(permit, peer.ip());
         tokio::spawn(connection(stream, Peer(peer.ip()), line.clone(), place));
     }
 }
 
-async fn connection(stream: TcpStream, peer: Peer, line: Line, _place: OwnedSemaphorePermit) {
+async fn connection(stream: TcpStream, peer: Peer, line: Line, place: Place) {
     line.app.metrics.connections_open.inc();
     // Taken before anything is read: from here on the drain waits for this connection.
     let drain = line.app.drain.subscribe();
     let patience = line.app.timeouts.io;
     let stream = Patient::new(stream, patience);
-    match &line.tls {
-        None => converse(stream, peer, &line, drain).await,
-        Some(tls) => match timeout(patience, tls.accept(stream)).await {
-            Ok(Ok(stream)) => converse(stream, peer, &line, drain).await,
-            Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
-            Err(_) => tracing::debug!("TLS handshake took too long"),
-        },
+    let standing = &place.standing;
+    let serving = async {
+        match &line.tls {
+            None => converse(stream, peer, standing, &line, drain).await,
+            Some(tls) => match timeout(patience, tls.accept(stream)).await {
+                Ok(Ok(stream)) => converse(stream, peer, standing, &line, drain).await,
+                Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
+                Err(_) => tracing::debug!("TLS handshake took too long"),
+            },
+        }
+    };
+    tokio::select! {
+        () = serving => {}
+        () = standing.evicted() => tracing::debug!("a connection without a token gave way"),
     }
     line.app.metrics.connections_open.dec();
 }
 
-async fn converse<S>(stream: S, peer: Peer, line: &Line, mut drain: watch::Receiver<bool>)
-where
+async fn converse<S>(
+    stream: S,
+    peer: Peer,
+    standing: &Arc<Standing>,
+    line: &Line,
+    mut drain: watch::Receiver<bool>,
+) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let router = line.router.clone();
+    let (router, standing) = (line.router.clone(), Arc::clone(standing));
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer);
+        request.extensions_mut().insert(Arc::clone(&standing));
         router.clone().oneshot(request)
     });
     let connection = http1::Builder::new()

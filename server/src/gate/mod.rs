@@ -16,6 +16,7 @@ use axum::{
 use papilla_proto::{ErrorCode, Problem};
 
 pub(crate) use origin::cors;
+pub(crate) use rate::network_of;
 pub(crate) use tokens::{Holder, Tokens};
 
 use self::rate::{Key, Rates};
@@ -24,6 +25,7 @@ use crate::{
     config::{Config, SettingError},
     http,
     metrics::Shed,
+    net::Standing,
     telemetry,
 };
 
@@ -90,6 +92,11 @@ impl Gate {
         })
     }
 
+    /// Whether tokens are asked for.
+    pub(crate) fn asks_for_tokens(&self) -> bool {
+        self.tokens.is_some()
+    }
+
     /// Who is let in, in words.
     pub(crate) fn describe(&self) -> String {
         match (&self.tokens, self.is_local) {
@@ -109,6 +116,9 @@ impl Gate {
             (Some(tokens), Some(shown)) => tokens.holder(shown),
             _ => None,
         };
+        if let (Some(_), Some(standing)) = (&holder, request.extensions().get::<Arc<Standing>>()) {
+            standing.on_token();
+        }
         let key = match (&holder, peer) {
             (Some(holder), _) => Some(Key::Token(Arc::clone(&holder.name))),
             (None, Some(address)) => Some(Key::of_address(address)),

@@ -25,12 +25,16 @@ pub(super) enum Key {
 }
 
 impl Key {
-    /// One client has a whole /64 of IPv6 to itself.
     pub(super) fn of_address(address: IpAddr) -> Self {
-        Self::Address(match address {
-            IpAddr::V4(_) => address,
-            IpAddr::V6(v6) => IpAddr::V6(Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64)),
-        })
+        Self::Address(network_of(address))
+    }
+}
+
+/// The address that stands for a client: one has a whole /64 of IPv6 to itself.
+pub(crate) fn network_of(address: IpAddr) -> IpAddr {
+    match address {
+        IpAddr::V4(_) => address,
+        IpAddr::V6(v6) => IpAddr::V6(Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64)),
     }
 }
 

@@ -1,18 +1,34 @@
 //! Who is let in: tokens, origins, rates, places.
 
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::{
+    num::{NonZeroU32, NonZeroUsize},
+    time::Duration,
+};
 
-use papilla_server::StartError;
+use papilla_server::{Config, StartError};
 use serde_json::json;
 use tempfile::TempDir;
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::TcpStream,
+    time::timeout,
+};
 
 use crate::support::{Service, Socket, bytes_of, hello, model_folder, ramp, write};
+
+/// Longest wait for what comes at once; only a hang takes longer.
+const HANG: Duration = Duration::from_secs(60);
 
 const LAB: &str = "lab-0123456789abcdef";
 const ROOT: &str = "root-0123456789abcdef";
 
 /// A service with two tokens; the folder holds them.
 async fn guarded() -> (Service, TempDir) {
+    guarded_with(|_| ()).await
+}
+
+/// The same, with changes to the configuration.
+async fn guarded_with(change: impl FnOnce(&mut Config)) -> (Service, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
         "[[token]]\nname = \"lab\"\ntoken = \"{LAB}\"\nmax_sessions = 1\n[[token]]\nname = \
@@ -20,7 +36,11 @@ async fn guarded() -> (Service, TempDir) {
     );
     write(folder.path(), "tokens.toml", text.as_bytes());
     let path = folder.path().join("tokens.toml");
-    (Service::start_with(|config| config.tokens = Some(path)).await, folder)
+    let service = Service::start_with(|config| {
+        config.tokens = Some(path);
+        change(config);
+    });
+    (service.await, folder)
 }
 
 fn bearer(token: &str) -> String {
@@ -184,4 +204,50 @@ async fn a_service_that_strangers_reach_asks_for_tokens_or_is_told_not_to() {
     assert!(open.await.is_ok());
     let missing = Service::on(model_folder(), |c| c.tokens = Some("/no/such/tokens".into())).await;
     assert!(missing.err().unwrap().to_string().contains("/no/such/tokens"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_holder_of_a_token_gets_in_beside_any_number_of_slow_strangers() {
+    let (service, _tokens) = guarded_with(|config| {
+        config.max_connections = NonZeroUsize::new(64).unwrap();
+        // Nobody is dropped for being slow while this lasts.
+        config.io_timeout_s = 600;
+    })
+    .await;
+    let mut strangers = Vec::new();
+    for _ in 0..600 {
+        let mut stranger = TcpStream::connect(service.address).await.unwrap();
+        let _ = stranger.write_all(b"GET /healthz HTTP/1.1\r\nhost").await;
+        strangers.push(stranger);
+    }
+    let mut holder = TcpStream::connect(service.address).await.unwrap();
+    holder.write_all(&tiers_asked_by_lab(&service)).await.unwrap();
+    let mut start = [0; 12];
+    timeout(HANG, holder.read_exact(&mut start)).await.expect("no answer").unwrap();
+    assert_eq!(&start, b"HTTP/1.1 200");
+}
+
+/// A request that shows a token.
+fn tiers_asked_by_lab(service: &Service) -> Vec<u8> {
+    let address = service.address;
+    let head = format!("GET /v1/tiers HTTP/1.1\r\nhost: {address}\r\n");
+    format!("{head}authorization: Bearer {LAB}\r\n\r\n").into_bytes()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_that_has_shown_a_token_does_not_count_as_a_strangers() {
+    let (service, _tokens) = guarded_with(|config| {
+        config.max_connections = NonZeroUsize::new(32).unwrap();
+    })
+    .await;
+    // Two at a time are what one address may have without a token.
+    let mut holders = Vec::new();
+    for n in 0..20 {
+        let mut holder = TcpStream::connect(service.address).await.unwrap();
+        holder.write_all(&tiers_asked_by_lab(&service)).await.unwrap();
+        let mut start = [0; 12];
+        timeout(HANG, holder.read_exact(&mut start)).await.expect("no answer").unwrap();
+        assert_eq!(&start, b"HTTP/1.1 200", "connection {n}");
+        holders.push(holder);
+    }
 }

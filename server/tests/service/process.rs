@@ -1,15 +1,22 @@
 //! The binary itself: settings, `check`, signals.
 
-use std::{net::TcpListener, process::Output, time::Duration};
+use std::{
+    net::TcpListener,
+    process::{Output, Stdio},
+    time::Duration,
+};
 
 use papilla_proto::{FrameStatus, SampleType};
 use serde_json::{Value, json};
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 
 use crate::support::{
-    Heard, Running, Socket, add_model_of_gain, atlas, frame, hello, model_folder, papilla, ramp,
-    write,
+    Heard, Running, Socket, add_model_of_gain, atlas, frame, hello, metric_at, model_folder,
+    papilla, ramp, signal, write,
 };
+
+/// Longest wait for what comes within seconds; only a hang takes longer.
+const HANG: Duration = Duration::from_secs(60);
 
 fn run(args: &[&str]) -> (Option<i32>, String, String) {
     let Output { status, stdout, stderr } = papilla(args).output().unwrap();
@@ -124,4 +131,42 @@ async fn sigterm_answers_what_was_accepted_and_ends() {
         }
     };
     assert_eq!(status.code(), Some(0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sighup_loads_the_models_anew_and_does_not_end_the_service() {
+    let models = model_folder();
+    let mut running = Running::start(models.path());
+    let reloads = r#"papilla_reloads_total{outcome="ok"}"#;
+    let before = metric_at(running.address, reloads).await;
+    running.signal("HUP");
+    let reloaded = async {
+        while metric_at(running.address, reloads).await < before + 0.5 {
+            assert!(running.child.try_wait().unwrap().is_none(), "SIGHUP ended it");
+            sleep(Duration::from_millis(20)).await;
+        }
+    };
+    timeout(HANG, reloaded).await.expect("nothing is loaded anew");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_signal_ends_a_start_at_once() {
+    let models = model_folder();
+    // A minute for each of two runs would do; the signal comes long before.
+    let mut child = papilla(&["--bind", "127.0.0.1:0", "--calibration-ms", "3600000"])
+        .args(["--models", models.path().to_str().unwrap(), "--log", "error"])
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Long enough for the signal to be listened for; before that it kills, which ends it too.
+    sleep(Duration::from_millis(300)).await;
+    signal(&child, "INT");
+    let ended = async {
+        while child.try_wait().unwrap().is_none() {
+            sleep(Duration::from_millis(20)).await;
+        }
+    };
+    let is_ended = timeout(HANG, ended).await.is_ok();
+    let _ = child.kill();
+    assert!(is_ended, "Ctrl-C does not end the start");
 }

@@ -49,9 +49,14 @@ impl Running {
 impl Running {
     /// Sends a signal by its name, as `TERM`.
     pub(crate) fn signal(&self, name: &str) {
-        let (signal, pid) = (format!("-{name}"), self.child.id().to_string());
-        assert!(Command::new("kill").args([signal, pid]).status().unwrap().success());
+        signal(&self.child, name);
     }
+}
+
+/// Sends a process a signal by its name, as `TERM`.
+pub(crate) fn signal(child: &Child, name: &str) {
+    let (signal, pid) = (format!("-{name}"), child.id().to_string());
+    assert!(Command::new("kill").args([signal, pid]).status().unwrap().success());
 }
 
 impl Drop for Running {

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-pub(crate) use binary::{Running, papilla};
+pub(crate) use binary::{Running, papilla, signal};
 pub(crate) use http::{Answer, Request, raw_exchange};
 pub(crate) use socket::{Heard, Socket, frame, hello};
 
