@@ -83,7 +83,11 @@ class Run:
 
     def lane(self) -> None:
         while (step := self.next_step()) is not None:
-            outcome = self.run_step(step)
+            try:
+                outcome = self.run_step(step)
+            except Exception as error:  # The other lane may wait for this step.
+                self.say(f"FAIL  {step.name}: {error!r}")
+                outcome = Outcome(step, "failed", repr(error))
             with self.lock:
                 self.outcomes[step.name] = outcome
                 self.lock.notify_all()

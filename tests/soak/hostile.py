@@ -1,0 +1,313 @@
+"""Clients that send without a pause, beside a session that is judged.
+
+Each kind of flood runs from four processes beside one session of 90 Hz and a balancer that asks for
+/healthz; before it, four idle sessions stand in their place. A kind is sound if the judged session's
+p99 is at most twice that beside idle sessions plus 5 ms, no frame is lost, and every /healthz comes
+within 100 ms.
+"""
+
+import json
+import multiprocessing
+import socket
+import ssl
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from service import RELEASE, ROOT  # noqa: E402
+
+HOST, PORT = "127.0.0.1", 7323
+CLIENTS = 4
+RATE_HZ = 90
+HANDSHAKE = (
+    f"GET /v1/session HTTP/1.1\r\nHost: {HOST}:{PORT}\r\nConnection: upgrade\r\nUpgrade: websocket\r\n"
+    "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+).encode()
+HEADER = struct.Struct("<4sBBBBIHHQIfHHIIHBB")
+CONTINUATION, TEXT, BINARY, PING, PONG, FINAL = 0, 1, 2, 9, 10, 0x80
+
+
+def frame_of(first: int, payload: bytes = b"") -> bytes:
+    """A WebSocket frame as clients send it, under a mask of zeros."""
+    n = len(payload)
+    if n <= 125:
+        length = bytes([0x80 | n])
+    elif n <= 65535:
+        length = bytes([0x80 | 126]) + struct.pack(">H", n)
+    else:
+        length = bytes([0x80 | 127]) + struct.pack(">Q", n)
+    return bytes([first]) + length + bytes(4) + payload
+
+
+def hello(**members: object) -> bytes:
+    text = json.dumps({"type": "hello", "version": 2, "tier": "nano", "sample_type": "u8", **members})
+    return frame_of(FINAL | TEXT, text.encode())
+
+
+def pressure(sequence: int, side: int) -> bytes:
+    """A frame of version 2 of the protocol whose window of SIDE x SIDE pixels is under 5 kPa."""
+    time_us, at = time.monotonic_ns() // 1000, (224 - side) // 2
+    head = HEADER.pack(b"PPL1", 2, 1, 3, 0, sequence, side, side, time_us, 0, 50.0, at, at, 0, 0, 0, 0, 0)
+    return frame_of(FINAL | BINARY, head + bytes([100]) * (side * side))
+
+
+def connect(context: ssl.SSLContext | None) -> socket.socket:
+    stream = socket.create_connection((HOST, PORT), timeout=30)
+    stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return context.wrap_socket(stream, server_hostname="localhost") if context else stream
+
+
+def trusting(certificate: str | None) -> ssl.SSLContext | None:
+    return ssl.create_default_context(cafile=certificate) if certificate else None
+
+
+# Kinds of floods: what is sent once after the handshake, and again and again.
+FLOODS = {
+    "windows": (hello(), b"".join(pressure(n, 4) for n in range(1, 1000))),
+    "pings": (hello(), frame_of(FINAL | PING) * 8192),
+    "pings before the hello": (b"", frame_of(FINAL | PING) * 8192),
+    "pongs": (hello(), frame_of(FINAL | PONG) * 8192),
+    "pongs before the hello": (b"", frame_of(FINAL | PONG) * 8192),
+    "hellos of 1 MB": (hello(), hello(effects=["x" * 1_000_000])),
+    "pieces of nothing": (frame_of(BINARY), frame_of(CONTINUATION) * 8192),
+    "whole maps": (hello(), b"".join(pressure(n, 128) for n in range(1, 40))),
+}
+# Whole requests, one behind the other on one connection.
+REQUESTS = {
+    "/v1/atlas.obj": "GET /v1/atlas.obj HTTP/1.1\r\nHost: {host}\r\n\r\n",
+    "/v1/presses/0/sed": "GET /v1/presses/0/sed HTTP/1.1\r\nHost: {host}\r\nAccept: application/json\r\n\r\n",
+}
+IDLE = "idle"
+
+
+def flood(kind: str, certificate: str | None, stop: multiprocessing.Event, sent: multiprocessing.Value) -> None:
+    """One client of a kind; turned away, it comes again."""
+    while not stop.is_set():
+        try:
+            stream = connect(trusting(certificate))
+            if kind in REQUESTS:
+                opening, block = b"", REQUESTS[kind].format(host=f"{HOST}:{PORT}").encode() * 64
+            else:
+                opening, block = (hello(), b"") if kind == IDLE else FLOODS[kind]
+                opening = HANDSHAKE + opening
+            stream.sendall(opening)
+            stream.setblocking(False)
+            pour(stream, block, stop, sent)
+        except OSError:
+            time.sleep(0.01)
+
+
+def pour(stream: socket.socket, block: bytes, stop: multiprocessing.Event, sent: multiprocessing.Value) -> None:
+    """Sends as fast as it is taken, and reads what comes back, until the server ends it."""
+    waits = (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError)
+    # TLS wants the very bytes again that it could not write.
+    left = memoryview(block)
+    while not stop.is_set():
+        is_waiting = True
+        try:
+            if block:
+                n = stream.send(left)
+                sent.value += n
+                left = left[n:] or memoryview(block)
+                is_waiting = False
+        except waits:
+            pass
+        try:
+            while stream.recv(1 << 18):
+                is_waiting = False
+                if stop.is_set():
+                    return
+                break
+            else:
+                return
+        except waits:
+            pass
+        if is_waiting:
+            time.sleep(0.001)
+
+
+def read_message(stream: socket.socket, buffer: bytearray) -> tuple[int, bytes]:
+    def need(n: int) -> None:
+        while len(buffer) < n:
+            read = stream.recv(1 << 18)
+            if not read:
+                raise ConnectionError("the judged session was closed")
+            buffer.extend(read)
+
+    need(2)
+    start, n = 2, buffer[1]
+    if n == 126:
+        need(4)
+        start, n = 4, struct.unpack(">H", buffer[2:4])[0]
+    elif n == 127:
+        need(10)
+        start, n = 10, struct.unpack(">Q", buffer[2:10])[0]
+    need(start + n)
+    kind, payload = buffer[0] & 15, bytes(buffer[start : start + n])
+    del buffer[: start + n]
+    return kind, payload
+
+
+def judged(certificate: str | None, seconds: float, out: multiprocessing.Queue) -> None:
+    """A session of 90 Hz: times of its round trips, s."""
+    stream, buffer = connect(trusting(certificate)), bytearray()
+    stream.sendall(HANDSHAKE)
+    while b"\r\n\r\n" not in buffer:
+        buffer.extend(stream.recv(4096))
+    del buffer[: buffer.index(b"\r\n\r\n") + 4]
+    stream.sendall(hello())
+    read_message(stream, buffer)
+    trips, lost, begun = [], 0, time.monotonic()
+    for n in range(int(seconds * RATE_HZ)):
+        time.sleep(max(0.0, begun + n / RATE_HZ - time.monotonic()))
+        message = pressure(n + 1, 128)
+        start = time.monotonic()
+        stream.sendall(message)
+        while True:
+            kind, payload = read_message(stream, buffer)
+            if kind in (BINARY, TEXT):
+                break
+        trips.append(time.monotonic() - start)
+        # Status ok, and its own sequence; a text is an error.
+        lost += kind == TEXT or payload[7] != 0 or struct.unpack("<I", payload[8:12])[0] != n + 1
+    out.put((trips, lost))
+
+
+def health(certificate: str | None, stop: multiprocessing.Event, out: multiprocessing.Queue) -> None:
+    """A balancer: times of /healthz, each on a connection of its own, s."""
+    times = []
+    while not stop.is_set():
+        start = time.monotonic()
+        stream = connect(trusting(certificate))
+        stream.sendall(f"GET /healthz HTTP/1.1\r\nHost: {HOST}:{PORT}\r\nConnection: close\r\n\r\n".encode())
+        answer = b""
+        while read := stream.recv(4096):
+            answer += read
+        stream.close()
+        times.append(time.monotonic() - start if b" 200 " in answer[:20] else float("inf"))
+        time.sleep(0.1)
+    out.put(times)
+
+
+def beside(kind: str, certificate: str | None, seconds: float) -> dict:
+    stop, sent = multiprocessing.Event(), multiprocessing.Value("q", 0)
+    floods = [multiprocessing.Process(target=flood, args=(kind, certificate, stop, sent)) for _ in range(CLIENTS)]
+    found, times = multiprocessing.Queue(), multiprocessing.Queue()
+    others = [
+        multiprocessing.Process(target=judged, args=(certificate, seconds, found)),
+        multiprocessing.Process(target=health, args=(certificate, stop, times)),
+    ]
+    for process in floods:
+        process.start()
+    time.sleep(0.5)
+    for process in others:
+        process.start()
+    try:
+        trips, lost = found.get(timeout=seconds + 120)
+    finally:
+        stop.set()
+    healths = times.get(timeout=120)
+    for process in floods + others:
+        process.join(timeout=10)
+        process.kill()
+    trips.sort()
+    at = lambda share: round(1000 * trips[min(len(trips) - 1, int(share * len(trips)))], 2)  # noqa: E731
+    return {
+        "kind": kind,
+        "frames": len(trips),
+        "lost": lost,
+        "p50_ms": at(0.5),
+        "p99_ms": at(0.99),
+        "max_ms": round(1000 * trips[-1], 2),
+        "health_max_ms": round(1000 * max(healths), 2),
+        "sent_mb_per_s": round(sent.value / 1e6 / seconds, 2),
+    }
+
+
+def certificate_in(folder: str) -> list[str]:
+    """Arguments that make the service speak TLS with a fresh certificate; empty without openssl."""
+    key, certificate = f"{folder}/key.pem", f"{folder}/cert.pem"
+    command = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+    command += ["-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate]
+    try:
+        subprocess.run(command, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        return []
+    return ["--tls-cert", certificate, "--tls-key", key]
+
+
+def serve(arguments: list[str], certificate: str | None) -> subprocess.Popen:
+    command = [RELEASE / "papilla-server", "--bind", f"{HOST}:{PORT}", "--log", "error", *arguments]
+    service = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+    end = time.monotonic() + 60
+    while time.monotonic() < end and service.poll() is None:
+        try:
+            stream = connect(trusting(certificate))
+            stream.sendall(f"GET /readyz HTTP/1.1\r\nHost: {HOST}:{PORT}\r\nConnection: close\r\n\r\n".encode())
+            if b" 200 " in stream.recv(64):
+                return service
+        except OSError:
+            pass
+        time.sleep(0.1)
+    service.kill()
+    sys.exit("papilla-server does not get ready")
+
+
+def terminate_under(kind: str, certificate: str | None, service: subprocess.Popen) -> float:
+    """Seconds from SIGTERM to the end of the service, beside floods of a kind."""
+    stop, sent = multiprocessing.Event(), multiprocessing.Value("q", 0)
+    floods = [multiprocessing.Process(target=flood, args=(kind, certificate, stop, sent)) for _ in range(CLIENTS)]
+    for process in floods:
+        process.start()
+    time.sleep(1)
+    start = time.monotonic()
+    service.terminate()
+    try:
+        service.wait(timeout=60)
+    except subprocess.TimeoutExpired:
+        service.kill()
+    took = time.monotonic() - start
+    stop.set()
+    for process in floods:
+        process.join(timeout=10)
+        process.kill()
+    return took
+
+
+def run(minutes: float) -> dict:
+    """All kinds in turn, plain and over TLS; `sound` says whether every one held."""
+    rows, ends, notes = [], [], []
+    kinds = [*FLOODS, *REQUESTS]
+    with tempfile.TemporaryDirectory() as folder:
+        tls = certificate_in(folder)
+        if not tls:
+            notes.append("TLS left out: there is no openssl to make a certificate")
+        for transport in ["plain", "tls"][: 2 if tls else 1]:
+            arguments = tls if transport == "tls" else []
+            certificate = arguments[1] if arguments else None
+            seconds = max(3.0, 60 * minutes / (2 if tls else 1) / (2 * len(kinds)))
+            service = serve(arguments, certificate)
+            try:
+                for kind in kinds:
+                    idle = beside(IDLE, certificate, seconds)
+                    row = {"transport": transport, **beside(kind, certificate, seconds)}
+                    row["idle_p99_ms"] = idle["p99_ms"]
+                    row["sound"] = (
+                        row["lost"] == 0
+                        and row["p99_ms"] <= 2 * idle["p99_ms"] + 5
+                        and row["health_max_ms"] <= 100
+                    )
+                    rows.append(row)
+                    print(row, file=sys.stderr)
+                took = terminate_under("windows", certificate, service)
+                ends.append({"transport": transport, "end_s": round(took, 2), "exit_code": service.returncode})
+            finally:
+                service.kill()
+                service.wait()
+    # 15 s is the drain's own limit.
+    sound = all(row["sound"] for row in rows) and all(end["end_s"] <= 17 and end["exit_code"] == 0 for end in ends)
+    return {"rows": rows, "ends": ends, "notes": notes, "sound": sound}
