@@ -26,7 +26,7 @@ def lints() -> dict[str, str]:
     return {"RUSTC_WORKSPACE_WRAPPER": driver, "CLIPPY_ARGS": "-D__CLIPPY_HACKERY__warnings"}
 
 
-# Turned on in the build that the tests share: traces, and the examples of docs/clients/rust.md.
+# Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
 # Tests that solve for seconds: verification, hard cases, presses of whole fingers.
 SOLVES = ["every_quick_row", "every_hard_case", "press::tests", "rungs_are_solved_once"]
