@@ -6,8 +6,8 @@
 In every tracked Markdown file each relative link leads to a file or folder of the repository and
 each anchor to a heading. Hand-written files keep to LINE_MAX columns outside of tables, code and
 links, and to WORDS_MAX words together. Reports (docs/reports) are written by commands: of them
-only links are looked at. A word is anything between blanks that holds a letter or a digit, tables
-included, fenced code and the targets of links left out. --words prints each file's share.
+only links are looked at. A word is anything between blanks that holds a letter; tables count, fenced
+code, comments and the targets of links do not. --words prints each file's share.
 Exit code 1 if a rule is broken.
 """
 
@@ -23,7 +23,7 @@ LINE_MAX = 100
 WORDS_MAX = 22_000
 # Files that a command writes.
 GENERATED = re.compile(r"docs/reports/")
-# Heads of such files: their links are looked at where they end up.
+# Heads of such files; they are looked at where they end up.
 HEADS = re.compile(r".*/(introduction|head)\.md$")
 FENCE = re.compile(r"^\s*(```+|~~~+)")
 LINK = re.compile(r"\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)")
@@ -96,7 +96,7 @@ def words(text: str) -> int:
     shown = "\n".join(line for _, line in prose(text))
     shown = re.sub(r"<!--.*?-->", "", shown, flags=re.DOTALL)
     shown = re.sub(r"\]\([^)]*\)", "]", shown)
-    return sum(1 for word in shown.split() if re.search(r"\w", word))
+    return sum(1 for word in shown.split() if re.search(r"[^\W\d_]", word))
 
 
 def main() -> int:
@@ -107,7 +107,9 @@ def main() -> int:
     for name in files:
         path = ROOT / name
         text = path.read_text()
-        rules = [] if HEADS.match(name) else list(broken_links(path, text))
+        if HEADS.match(name):
+            continue
+        rules = list(broken_links(path, text))
         if not GENERATED.match(name):
             rules += long_lines(text)
             counts[name] = words(text)
