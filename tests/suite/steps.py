@@ -77,6 +77,14 @@ def fast() -> list[Step]:
     return [
         Step("format", "rustfmt", "cargo fmt --all --check"),
         Step(
+            "documents",
+            "links, lines and words of the documents, the picture of the crates",
+            "python3 tests/suite/documents_test.py\n"
+            "python3 tests/suite/documents.py\n"
+            "python3 tests/suite/crates.py",
+            tests_min=7,
+        ),
+        Step(
             "build",
             "everything that the tests run, with clippy; its warnings are errors",
             f"cargo build --workspace --all-targets {FEATURES}",
@@ -284,8 +292,8 @@ def long() -> list[Step]:
 
 def extent(name: str) -> list[Step]:
     """All steps of `fast`, `full` or `all`, in the order in which they are started."""
-    build, *checks = fast()[1:]
+    form, documents, build, *checks = fast()
     if name == "fast":
         return fast()
-    steps = [fast()[0], build, *installs(), *checks, *full()]
+    steps = [form, documents, build, *installs(), *checks, *full()]
     return steps + long() if name == "all" else steps
