@@ -52,7 +52,8 @@ fn complete(example: &mut Table, whole: &Table) {
 
 #[test]
 fn every_example_in_the_documentation_is_a_scene() {
-    let read = |name: &str| std::fs::read_to_string(root().join("docs/reference").join(name)).unwrap();
+    let read =
+        |name: &str| std::fs::read_to_string(root().join("docs/reference").join(name)).unwrap();
     let text = read("scenes.md") + &read("indenters.md");
     let rest: Table = toml::from_str(REST).unwrap();
     let mut seen = 0;
