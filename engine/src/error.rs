@@ -71,7 +71,7 @@ pub enum EngineError {
     },
     /// An operator that no model needs, or that could make any amount of data of little.
     #[error(
-        "node '{node}' of the model is of the kind '{kind}': {reason}; docs/models.md lists what is taken"
+        "node '{node}' of the model is of the kind '{kind}': {reason}; docs/reference/models.md lists what is taken"
     )]
     Operator {
         /// Name of the node.

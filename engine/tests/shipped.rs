@@ -185,7 +185,7 @@ fn what_the_card_does_not_know_is_flagged() {
     });
 }
 
-/// What quantised pressure costs in SED: `docs/hard-cases.md` states these bounds.
+/// What quantised pressure costs in SED: `docs/concepts/stability.md` states these bounds.
 #[test]
 fn quantised_pressure_changes_sed_within_the_stated_bounds() {
     let [_, interface] = masks();

@@ -1,4 +1,4 @@
-//! The scenes in `scenes/`, the examples in docs/scenes.md and the JSON schema are
+//! The scenes in `scenes/`, the examples in docs/reference/scenes.md and the JSON schema are
 //! those that this program reads.
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
@@ -52,7 +52,8 @@ fn complete(example: &mut Table, whole: &Table) {
 
 #[test]
 fn every_example_in_the_documentation_is_a_scene() {
-    let read = |name: &str| std::fs::read_to_string(root().join("docs").join(name)).unwrap();
+    let read =
+        |name: &str| std::fs::read_to_string(root().join("docs/reference").join(name)).unwrap();
     let text = read("scenes.md") + &read("indenters.md");
     let rest: Table = toml::from_str(REST).unwrap();
     let mut seen = 0;
@@ -70,9 +71,9 @@ fn every_example_in_the_documentation_is_a_scene() {
 
 #[test]
 fn the_committed_schema_is_up_to_date() {
-    let path = root().join("docs/scene.schema.json");
+    let path = root().join("docs/reference/scene.schema.json");
     let committed = std::fs::read_to_string(&path).unwrap();
     let now = serde_json::to_string_pretty(&schema()).unwrap() + "\n";
-    let cure = "fe-datagen schema scene > docs/scene.schema.json";
+    let cure = "fe-datagen schema scene > docs/reference/scene.schema.json";
     assert!(committed == now, "{} is out of date: {cure}", path.display());
 }

@@ -31,12 +31,12 @@ will serve it, on presses that no training saw, and writes its card.";
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
   model-export check    models/s1-base8.onnx --atlas models/atlas.json
-  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/pictures/s1-base8
+  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/reports/pictures/s1-base8
   model-export index    models --default s1-base8
   model-export patterns models --dataset data/s1
   model-export table    models/*.json
 All models and the solver itself, error against time:
-  model-export ladder   --data data --models models --fe out/rungs --out docs/accuracy-vs-time";
+  model-export ladder   --data data --models models --fe out/rungs --out docs/reports/accuracy-vs-time";
 
 /// Parsed command line.
 #[derive(Debug, Parser)]

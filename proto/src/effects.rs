@@ -183,14 +183,14 @@ impl Default for Afferents {
     }
 }
 
-/// A tissue whose relaxation is known (`docs/physics.md`).
+/// A tissue whose relaxation is known (`docs/concepts/physics.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tissue {
     /// Skin, where SED is read.
     Skin,
     /// The tissue below it. It takes most of the strain: with its constants the filter follows a
-    /// layered finger best (`docs/physics.md`).
+    /// layered finger best (`docs/concepts/physics.md`).
     #[default]
     Subcutaneous,
 }

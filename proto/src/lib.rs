@@ -17,7 +17,7 @@
 //! | [`message`] | the JSON messages of a session |
 //! | [`error`] | error codes and their HTTP status |
 //!
-//! The protocol in prose, with examples: `docs/protocol.md`.
+//! The protocol in prose, with examples: `docs/reference/protocol.md`.
 
 pub mod atlas;
 pub mod effects;

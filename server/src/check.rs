@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Bytes one connection, one session and one posted map can hold at most; see
-/// docs/operating.md.
+/// docs/guides/operating.md.
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;

@@ -15,7 +15,7 @@ import sys
 
 import numpy as np
 
-SERIES = {  # g, tau in s: docs/physics.md
+SERIES = {  # g, tau in s: docs/concepts/physics.md
     "skin": [(0.2566, 0.3834), (0.2225, 4.6731)],
     "subcutaneous": [(0.0864, 0.2136), (0.2136, 8.854)],
 }

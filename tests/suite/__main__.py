@@ -16,7 +16,7 @@ EPILOG = """\
 Installs what the parts need beyond the Rust toolchain, Python 3.11, Node 20 and gcc, and says so
 first. Parts run two at a time; the output of each goes to target/test-logs. The last line counts
 parts that passed, failed and were skipped, with the reason of each skip above it.
-docs/testing.md says what each part is for.
+docs/guides/testing.md says what each part is for.
 
 exit codes: 0 no part failed, 1 a part failed, 2 wrong usage
 examples:   ./test --fast

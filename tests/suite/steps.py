@@ -26,7 +26,7 @@ def lints() -> dict[str, str]:
     return {"RUSTC_WORKSPACE_WRAPPER": driver, "CLIPPY_ARGS": "-D__CLIPPY_HACKERY__warnings"}
 
 
-# Turned on in the build that the tests share: traces, and the examples of docs/clients/rust.md.
+# Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
 # Tests that solve for seconds: verification, hard cases, presses of whole fingers.
 SOLVES = ["every_quick_row", "every_hard_case", "press::tests", "rungs_are_solved_once"]
@@ -76,6 +76,14 @@ def fast() -> list[Step]:
     """Rust alone."""
     return [
         Step("format", "rustfmt", "cargo fmt --all --check"),
+        Step(
+            "documents",
+            "links, lines and words of the documents, the picture of the crates",
+            "python3 tests/suite/documents_test.py\n"
+            "python3 tests/suite/documents.py\n"
+            "python3 tests/suite/crates.py",
+            tests_min=7,
+        ),
         Step(
             "build",
             "everything that the tests run, with clippy; its warnings are errors",
@@ -284,8 +292,8 @@ def long() -> list[Step]:
 
 def extent(name: str) -> list[Step]:
     """All steps of `fast`, `full` or `all`, in the order in which they are started."""
-    build, *checks = fast()[1:]
+    form, documents, build, *checks = fast()
     if name == "fast":
         return fast()
-    steps = [fast()[0], build, *installs(), *checks, *full()]
+    steps = [form, documents, build, *installs(), *checks, *full()]
     return steps + long() if name == "all" else steps

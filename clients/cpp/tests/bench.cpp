@@ -1,4 +1,4 @@
-// Round trips of the C++ client at a steady rate, as one line of JSON (docs/clients/README.md).
+// Round trips of the C++ client at a steady rate, as one line of JSON (docs/reports/clients.md).
 //   bench [--rate-hz 90] [--duration-s 60]     PAPILLA_URL names the service
 #include <algorithm>
 #include <atomic>

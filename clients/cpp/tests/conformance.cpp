@@ -1,4 +1,4 @@
-// Runs the conformance script with the C++ client (docs/conformance.md).
+// Runs the conformance script with the C++ client (docs/reference/conformance.md).
 #include <cstdio>
 #include <fstream>
 #include <map>

@@ -33,7 +33,7 @@ class AsyncSession:
     `async with AsyncSession(tier="small") as session: (await session.render(pressure_pa)).sed`
 
     The arguments after `url` and `token` are the members of the protocol's hello
-    (docs/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
+    (docs/reference/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
     so on. When the connection breaks, the session opens another by itself.
     """
 

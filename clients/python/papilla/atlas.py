@@ -25,7 +25,7 @@ class Contact(NamedTuple):
 class Atlas:
     """The skin's part of the atlas, and tables made of it once (some 0.1 s).
 
-    Formulas: docs/atlas.md, 'Helpers of the clients'.
+    Formulas: docs/reference/atlas.md, 'Helpers of the clients'.
     """
 
     def __init__(self, file: dict[str, Any]) -> None:

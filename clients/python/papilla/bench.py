@@ -1,4 +1,4 @@
-"""Round trips at a steady rate, as one line of JSON: `python -m papilla.bench` (docs/clients/README.md).
+"""Round trips at a steady rate, as one line of JSON: `python -m papilla.bench` (docs/reports/clients.md).
 
 `PAPILLA_URL` names the service.
 """

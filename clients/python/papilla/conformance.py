@@ -1,4 +1,4 @@
-"""Runs the conformance script with this client (docs/conformance.md): `python -m papilla.conformance`.
+"""Runs the conformance script with this client (docs/reference/conformance.md): `python -m papilla.conformance`.
 
 Sessions are driven through `Session`, which drives `AsyncSession`.
 """

@@ -1,4 +1,4 @@
-"""Frames of version 2 of the protocol (docs/protocol.md)."""
+"""Frames of version 2 of the protocol (docs/reference/protocol.md)."""
 
 from __future__ import annotations
 

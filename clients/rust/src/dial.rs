@@ -5,7 +5,7 @@ use std::io;
 use tokio::net::{TcpSocket, TcpStream, lookup_host};
 
 /// Room of the system for each direction, bytes: more than the largest frame. With less a
-/// sender waits for room in the middle of a frame (docs/latency.md).
+/// sender waits for room in the middle of a frame (docs/concepts/real-time.md).
 const SOCKET_BUFFER: u32 = 512 * 1024;
 
 /// Connects to `server` (host and port): room for a whole frame, `TCP_NODELAY` set.

@@ -10,7 +10,7 @@
 //! | [`Skin`] | pressure maps from values at vertices or from contact points |
 //!
 //! The protocol itself is the crate `papilla-proto`, whose types this one hands through.
-#![cfg_attr(feature = "guide", doc = include_str!("../../../docs/clients/rust.md"))]
+#![cfg_attr(feature = "guide", doc = include_str!("../../../docs/reference/clients/rust.md"))]
 
 mod answer;
 mod dial;

@@ -1,4 +1,4 @@
-//! Pressure maps from what an engine has (docs/atlas.md, 'Helpers of the clients').
+//! Pressure maps from what an engine has (docs/reference/atlas.md, 'Helpers of the clients').
 
 use papilla_proto::{
     MAP_LEN,

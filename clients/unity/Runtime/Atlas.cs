@@ -62,7 +62,7 @@ namespace Papilla
 
         /// <summary>
         /// Adds a contact point of a physics engine to a map, as the pressure of Hertz's contact of that force and radius around the nearest
-        /// point of the skin (docs/atlas.md). A point more than 5 mm off the skin adds nothing; the map is not cleared before.
+        /// point of the skin (docs/reference/atlas.md). A point more than 5 mm off the skin adds nothing; the map is not cleared before.
         /// </summary>
         public void AddContact(double xMm, double yMm, double zMm, double forceN, double radiusMm, float[] map)
         {

@@ -4,7 +4,7 @@ namespace Papilla
 {
     /// <summary>
     /// Pressure from penetration: every vertex of the undeformed skin has a spring of its own,
-    /// <c>p = Stiffness max(0, d - Relief d_max)^Exponent</c>. Constants and their errors against FE: docs/clients/web.md.
+    /// <c>p = Stiffness max(0, d - Relief d_max)^Exponent</c>. Constants and their errors against FE: docs/reference/clients/web.md.
     /// </summary>
     public sealed class Foundation
     {

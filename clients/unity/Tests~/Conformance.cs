@@ -8,7 +8,7 @@ using System.Threading;
 using Newtonsoft.Json.Linq;
 using Papilla;
 
-/// <summary>The steps of docs/conformance.md by this client. --transport client-web-socket: with the framework's WebSocket.</summary>
+/// <summary>The steps of docs/reference/conformance.md by this client. --transport client-web-socket: with the framework's WebSocket.</summary>
 static class Conformance
 {
     static int Main(string[] arguments)

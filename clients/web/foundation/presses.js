@@ -44,7 +44,7 @@ function rotation(press) {
 
 /**
  * Distance of every vertex from the indenter when it has gone `depthMm` beyond its first touch: as
- * docs/indenters.md says, from the skin point that a flat plate in that pose would touch first.
+ * docs/reference/indenters.md says, from the skin point that a flat plate in that pose would touch first.
  * @param {Float32Array} positionsMm @param {any} press @param {any} shape
  * @returns {(depthMm: number, out: Float32Array) => void}
  */

@@ -1,5 +1,5 @@
 // Signed distances of the indenters of the committed datasets, in their own frames, mm; negative inside. They press towards
-// +z. Dimensions and names are those of docs/indenters.md.
+// +z. Dimensions and names are those of docs/reference/indenters.md.
 
 const THICKNESS_MM = 4;
 

@@ -69,7 +69,7 @@ export class Atlas {
 
   /**
    * Contact points of a physics engine to a map, each as the pressure of Hertz's contact of that force and radius around the
-   * nearest point of the skin (docs/atlas.md, 'Helpers of the clients'). A point more than 5 mm off the skin adds nothing.
+   * nearest point of the skin (docs/reference/atlas.md, 'Helpers of the clients'). A point more than 5 mm off the skin adds nothing.
    * @param {ArrayLike<number>} positionsMm x, y, z of each point, in the finger's frame
    * @param {ArrayLike<number>} forcesN normal force of each
    * @param {ArrayLike<number>} radiiMm radius of each contact; 2 to 3 for a light touch of a flat object

@@ -1,4 +1,4 @@
-// A session that keeps itself connected: docs/protocol.md, version 2.
+// A session that keeps itself connected: docs/reference/protocol.md, version 2.
 
 import { PapillaError, missed, refusal } from './error.js';
 import { Link, sessionUrl } from './link.js';
@@ -63,7 +63,7 @@ export class Papilla {
 
   /**
    * @param {string} base http(s)://host[:port]; '' for the server of the page
-   * @param {Hello} [hello] what to ask for; see docs/protocol.md
+   * @param {Hello} [hello] what to ask for; see docs/reference/protocol.md
    * @param {Options} [options]
    */
   constructor(base = '', hello = {}, options = {}) {

@@ -1,4 +1,4 @@
-// The texts of a session, as docs/protocol.md defines them.
+// The texts of a session, as docs/reference/protocol.md defines them.
 
 export type SampleType = 'f32' | 'f16' | 'u16' | 'u8';
 /** A place on the finger: pixels of the map, or mm in the finger's frame. */

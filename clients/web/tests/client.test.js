@@ -1,4 +1,4 @@
-// The parts of the client that need no server, and the first code of docs/clients/web.md as it is written.
+// The parts of the client that need no server, and the first code of docs/reference/clients/web.md as it is written.
 // PAPILLA_URL: a server with --xr-dir dist.
 
 import assert from 'node:assert/strict';
@@ -9,7 +9,7 @@ import { crop, greatest } from '../src/window.js';
 import { MAP_LEN, toHalf } from '../src/wire.js';
 import { launch, openPage } from './browser.js';
 
-const page = await readFile(new URL('../../../docs/clients/web.md', import.meta.url), 'utf8');
+const page = await readFile(new URL('../../../docs/reference/clients/web.md', import.meta.url), 'utf8');
 
 test('f16 rounds to the nearest, ties to even, and clamps', () => {
   for (const [value, bits] of [[0, 0], [1, 0x3c00], [65504, 0x7bff], [1e9, 0x7bff], [-1, 0xbc00], [2 ** -24, 1], [2 ** -25, 0],
@@ -45,7 +45,7 @@ test('the foundation is off the FE presses by what its page says, with the const
 
 test('the first code of the page makes a SED map', async () => {
   const block = page.match(/```html\n<script type="module">\n([\s\S]*?)<\/script>\n```/);
-  assert.ok(block, 'docs/clients/web.md has no script');
+  assert.ok(block, 'docs/reference/clients/web.md has no script');
   assert.ok(block[1].trim().split('\n').length <= 10);
   const browser = await launch();
   try {

@@ -1,4 +1,4 @@
-// The steps of docs/conformance.md by this client; runs in the page, which has nothing but the client and the server.
+// The steps of docs/reference/conformance.md by this client; runs in the page, which has nothing but the client and the server.
 
 import { Atlas, MAP_LEN, Papilla, PapillaError, SIDE_PX, postPressure } from '../papilla.js';
 

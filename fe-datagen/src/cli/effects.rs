@@ -18,7 +18,7 @@ use std::process::ExitCode;
 #[command(after_help = "Solves the scene once for every effect: try a coarse mesh first.\n\
                         Example: fe-datagen effects scenes/flat-press.toml --out out/effects")]
 pub(super) struct Args {
-    /// Scene file (see scenes/ and docs/scenes.md).
+    /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
     /// Folder for table and plot.
     #[arg(long)]

@@ -16,7 +16,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen explain scenes/flat-press.toml")]
 pub(super) struct Args {
-    /// Scene file (see scenes/ and docs/scenes.md).
+    /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
     /// Print as JSON.
     #[arg(long)]

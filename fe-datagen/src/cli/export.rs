@@ -15,7 +15,7 @@ use std::process::ExitCode;
 #[command(after_help = "Run it with `ccx -i FILE` without the ending.\n\
                   Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp")]
 pub(super) struct Args {
-    /// Scene file (see scenes/ and docs/scenes.md).
+    /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
     /// Format of the deck.
     #[arg(long, value_enum)]

@@ -20,7 +20,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen generate campaigns/s1.toml --out out/s1")]
 pub(super) struct Args {
-    /// Campaign file (see campaigns/ and docs/dataset.md).
+    /// Campaign file (see campaigns/ and docs/reference/dataset.md).
     campaign: PathBuf,
     /// Folder of the dataset.
     #[arg(long)]

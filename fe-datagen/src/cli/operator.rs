@@ -16,7 +16,7 @@ use std::process::ExitCode;
 /// vertex_weight [V, M], which average them to the vertices, g [V, 6, V] and
 /// area_mm2 [V]) and a card (operator.json: atlas hash,
 /// materials, checks, seconds). One factorization, V right-hand sides; layers on, rigid
-/// bone and nail. See docs/operator.md.
+/// bone and nail. See docs/concepts/networks.md.
 #[derive(clap::Args)]
 #[command(
     after_help = "SED of face f, J/m3: sum_k (sum_j face_g[f, k, j] p_j)^2 with p in Pa; a vertex has its faces' mean.\n\

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// strain. Reference: linear elements on the fine mesh at finite strain; its own error
 /// is told by quadratic elements on the fine mesh (--check). All fields are read at the
 /// vertices of the medium atlas; times are processor seconds, the path to a state
-/// included. Writes rungs.json and one npz a rung; see docs/fe-rungs.md.
+/// included. Writes rungs.json and one npz a rung; see docs/reports/fe-rungs.md.
 ///
 /// Can be killed at any moment and started again: every press of every rung is one
 /// file in DIR/parts.
@@ -24,7 +24,7 @@ use std::process::ExitCode;
                         Example: fe-datagen rungs campaigns/heldout.toml --presses 3 --out out/rungs"
 )]
 pub(super) struct Args {
-    /// Campaign file (see campaigns/ and docs/dataset.md).
+    /// Campaign file (see campaigns/ and docs/reference/dataset.md).
     campaign: PathBuf,
     /// Held-out presses to solve, spread over the campaign's indenters.
     #[arg(long)]

@@ -4,9 +4,9 @@ use crate::scene::schema;
 use std::process::ExitCode;
 
 /// Print the JSON schema of a file that this program reads, for editors and other
-/// programs. docs/scene.schema.json is its output.
+/// programs. docs/reference/scene.schema.json is its output.
 #[derive(clap::Args)]
-#[command(after_help = "Example: fe-datagen schema scene > docs/scene.schema.json")]
+#[command(after_help = "Example: fe-datagen schema scene > docs/reference/scene.schema.json")]
 pub(super) struct Args {
     /// Kind of file.
     #[arg(value_enum)]

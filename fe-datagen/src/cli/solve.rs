@@ -30,7 +30,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press")]
 pub(super) struct Args {
-    /// Scene file (see scenes/ and docs/scenes.md).
+    /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
     /// Folder for the results.
     #[arg(long)]

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// presses random scenes of a campaign's distribution instead.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit code 3 if any case breaks its promise. docs/stability.md is the report.\n\
+    after_help = "Exit code 3 if any case breaks its promise. docs/reports/stability.md is the report.\n\
                   Examples: fe-datagen stability --case snap-through\n          \
                   fe-datagen stability --scenes 10000 --seed 5 --threads 2 --out data/scenes"
 )]

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 /// from, how far apart they are and how far they may be.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit code 3 if any row is past its tolerance. docs/verification.md says what each row \
+    after_help = "Exit code 3 if any row is past its tolerance. docs/reports/verification.md says what each row \
                         shows.\nExample: fe-datagen verify --only hertz --only cook"
 )]
 pub(super) struct Args {

@@ -7,7 +7,7 @@
 //! DIR/shards/press-00000.npz  vertex values of all samples of one press
 //! ```
 //!
-//! The format in prose: `docs/dataset.md`.
+//! The format in prose: `docs/reference/dataset.md`.
 
 mod error;
 mod images;

@@ -5,7 +5,7 @@ use crate::mesh::{FaceKind, Mesh, Surface};
 use std::collections::HashMap;
 
 /// Which CalculiX types stand for our hexahedra and quadrilaterals. None is an
-/// equal near nu = 0.5: docs/calculix.md says what each choice does there.
+/// equal near nu = 0.5: docs/reference/calculix.md says what each choice does there.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ElementTypes {
     /// For `Hex8`.

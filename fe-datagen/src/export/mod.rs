@@ -3,7 +3,7 @@
 //! [`Deck`] is plain data and knows no scene; [`Deck::to_text`] writes what
 //! CalculiX 2.20 reads, [`SceneDeck`] makes one of a scene, [`Ccx`] runs it and [`Dat`] reads what it prints. The
 //! cases that compare both codes are in [`witness`]. What to know of CalculiX
-//! stands in docs/calculix.md.
+//! stands in docs/reference/calculix.md.
 
 mod dat;
 mod deck;

@@ -1,7 +1,7 @@
 //! How much iteration a press takes.
 //!
 //! The numbers were counted in twelve presses of fingertip and block, coarse and
-//! medium, with each effect on and off (docs/scenes.md, 'What a scene costs');
+//! medium, with each effect on and off (docs/reference/scenes.md, 'What a scene costs');
 //! the number of equilibria follows from the stored states.
 
 use crate::press::drive::{Drive, DrivePoint};

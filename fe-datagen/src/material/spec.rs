@@ -169,7 +169,7 @@ impl PronySpec {
     }
 
     /// Chen, Shuai & Zhu, Table 2, first set. `tau_1 = .2136` repeats `g_2` digit for
-    /// digit, surely a misprint; kept (docs/physics.md).
+    /// digit, surely a misprint; kept (docs/concepts/physics.md).
     #[must_use]
     pub fn subcutaneous() -> Self {
         Self { share: vec![0.0864, 0.2136], time_s: vec![0.2136, 8.854], moduli: Moduli::default() }

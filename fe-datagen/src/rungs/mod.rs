@@ -3,7 +3,7 @@
 //!
 //! Every field is read at the vertices of one atlas ([`Ladder::atlas`]), whatever mesh it
 //! was solved on, and every state has its price in processor seconds. In prose:
-//! `docs/fe-rungs.md`.
+//! `docs/reports/fe-rungs.md`.
 
 mod assemble;
 mod error;

@@ -121,7 +121,7 @@ impl SceneError {
 fn cure(message: &str) -> String {
     let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
     if let (Some(missing), true) = (quoted.first(), message.starts_with("missing field")) {
-        return format!(": add it (docs/scenes.md has `{missing}` with its unit)");
+        return format!(": add it (docs/reference/scenes.md has `{missing}` with its unit)");
     }
     if message.starts_with("unknown field") {
         let meant =

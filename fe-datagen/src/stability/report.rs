@@ -5,7 +5,7 @@ use super::{CASES, End, Extent, Line};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Head of docs/stability.md up to the table.
+/// Head of docs/reports/stability.md up to the table.
 const INTRODUCTION: &str = include_str!("introduction.md");
 
 /// Every line of one run.
@@ -44,7 +44,7 @@ impl Report {
         self.lines.iter().filter(move |l| l.case == case)
     }
 
-    /// docs/stability.md: a section a case.
+    /// docs/reports/stability.md: a section a case.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = String::from(INTRODUCTION);

@@ -162,7 +162,7 @@ mod tests {
         let (records, todo) = split(scenes(&spec), known);
         assert_eq!(todo, [], "drawn differently, or not in the record");
         let report = count(drawn_from(&spec), records, 0);
-        let told = std::fs::read_to_string(root.join("docs/stability-scenes.md")).unwrap();
+        let told = std::fs::read_to_string(root.join("docs/reports/stability-scenes.md")).unwrap();
         assert_eq!(told, report.markdown());
         assert!(report.passed());
     }

@@ -17,13 +17,13 @@ pub struct Row {
     pub seconds: f64,
 }
 
-/// Head of docs/verification.md.
+/// Head of docs/reports/verification.md.
 const INTRODUCTION: &str = "# Verification
 
 Written by
 
 ```sh
-cargo run --release -p fe-datagen -- verify --markdown docs/verification.md
+cargo run --release -p fe-datagen -- verify --markdown docs/reports/verification.md
 ```
 
 which solves every problem below with the solver that presses fingers and exits with code 3 if a row is past its
@@ -115,7 +115,7 @@ impl Report {
         format!("{} rows, {failed} past tolerance, {seconds:.0} s", self.rows.len())
     }
 
-    /// The table for docs/verification.md, a section a case.
+    /// The table for docs/reports/verification.md, a section a case.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = String::from(INTRODUCTION);

@@ -23,7 +23,7 @@ pub(crate) struct Options {
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
     fe: Vec<PathBuf>,
     /// Writes STEM.md, STEM.svg, STEM-zone.svg and STEM.json.
-    #[arg(long, default_value = "docs/accuracy-vs-time", value_name = "STEM")]
+    #[arg(long, default_value = "docs/reports/accuracy-vs-time", value_name = "STEM")]
     out: PathBuf,
     /// 16 samples of each set and short timings; does not touch MODELS/ladder.json.
     #[arg(long)]

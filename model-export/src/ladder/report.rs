@@ -128,9 +128,9 @@ fn zone(text: &mut String, stem: &str) {
         text,
         "## The zone toward the nail base\n\n![The zone on the atlas]({stem}-zone.svg)\n\n\
          The interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the default\n\
-         fingertip ends at 14 mm, so this is 2 mm to either side of that edge, over the nail's matrix and its fold. Presses on the pad rarely\n\
-         touch the skin here but load it through the tissue. S1 reports that its network misses this spread; one that sees 2 to 3 mm around a pixel\n\
-         has to.\n",
+         fingertip ends at 14 mm, so this is 2 mm to either side of that edge, over the nail's matrix and its fold. Contact on the pad\n\
+         rarely touches the skin here but loads it through the tissue. The U-Net paper reports that its network misses this\n\
+         spread; one that sees 2 to 3 mm around a pixel has to.\n",
         NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }
@@ -153,7 +153,7 @@ pub(super) fn kind(kind: Kind) -> &'static str {
         Kind::ClosedForm => "closed form",
         Kind::Operator => "operator",
         Kind::Network => "network",
-        Kind::S1Network => "S1's network",
+        Kind::S1Network => "published U-Net",
         Kind::Fe => "finite elements",
     }
 }

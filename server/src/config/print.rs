@@ -41,7 +41,7 @@ impl Cli {
 
 fn print(settings: &Config, origins: &[(String, Origin)]) -> String {
     let Ok(Value::Table(table)) = Value::try_from(settings) else { return String::new() };
-    let mut text = String::from("# Settings of papilla-server; see docs/operating.md.\n");
+    let mut text = String::from("# Settings of papilla-server; see docs/reference/settings.md.\n");
     for (field, origin) in origins {
         let from = match origin {
             Origin::Default => "default",

@@ -1,4 +1,4 @@
-//! The formulas of docs/protocol.md and docs/atlas.md on the finger, in f64 and in their plainest
+//! The formulas of docs/reference/protocol.md and docs/reference/atlas.md on the finger, in f64 and in their plainest
 //! form. They share nothing with the server, which is compared with them.
 
 use papilla_proto::{

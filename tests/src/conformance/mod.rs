@@ -1,4 +1,4 @@
-//! What the conformance script expects (`proto/conformance.json`, docs/conformance.md).
+//! What the conformance script expects (`proto/conformance.json`, docs/reference/conformance.md).
 //!
 //! Maps come from the engine, everything else from the formulas of the documentation
 //! (`finger`): nothing here asks the server, which is one of the things that are tested.

@@ -1,4 +1,4 @@
-//! The inputs of the cases, by their formulas (docs/conformance.md).
+//! The inputs of the cases, by their formulas (docs/reference/conformance.md).
 
 use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
 use serde::Deserialize;

@@ -201,6 +201,6 @@ fn crept(of: &Relaxation, sent: &[(f64, Vec<f32>)]) -> Result<Vec<f32>, String> 
             *felt += share * rise;
         }
     }
-    // What is left of a press below 0.1 Pa is nothing (docs/physics.md).
+    // What is left of a press below 0.1 Pa is nothing (docs/concepts/physics.md).
     Ok(felt_pa.into_iter().map(|p| if p < 0.1 { 0.0 } else { p as f32 }).collect())
 }

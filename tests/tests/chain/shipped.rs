@@ -29,7 +29,7 @@ pub(crate) fn folder(name: &str) -> PathBuf {
     assert!(
         there,
         "{name}/ is missing or empty in the repository: models/ and data/s1/ ship with it; \
-         docs/dataset.md and docs/training.md say how they are made"
+         docs/reference/dataset.md and docs/guides/training.md say how they are made"
     );
     path
 }

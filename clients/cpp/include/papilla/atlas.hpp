@@ -1,5 +1,5 @@
 // The atlas: which point of the finger each pixel is, and pressure maps from what engines have.
-// Formulas: docs/atlas.md, 'Helpers of the clients'.
+// Formulas: docs/reference/atlas.md, 'Helpers of the clients'.
 #pragma once
 
 #include <algorithm>

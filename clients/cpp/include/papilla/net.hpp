@@ -73,7 +73,7 @@ struct Address {
 class Socket {
  public:
   /// Room of the system for each direction, bytes: more than the largest frame. With less a
-  /// sender waits for room in the middle of a frame (docs/latency.md).
+  /// sender waits for room in the middle of a frame (docs/concepts/real-time.md).
   static constexpr int room_bytes = 512 * 1024;
 
   Socket() = default;

@@ -1,4 +1,4 @@
-// Frames of version 2 of the protocol (docs/protocol.md): headers and samples. No allocation.
+// Frames of version 2 of the protocol (docs/reference/protocol.md): headers and samples. No allocation.
 #pragma once
 
 #include <algorithm>

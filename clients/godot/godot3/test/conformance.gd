@@ -1,4 +1,4 @@
-# The steps of docs/conformance.md by this client: godot3-server --path . -s test/conformance.gd
+# The steps of docs/reference/conformance.md by this client: godot3-server --path . -s test/conformance.gd
 extends SceneTree
 
 const Papilla = preload("res://addons/papilla/papilla.gd")

@@ -1,4 +1,4 @@
-# The pressure patterns of docs/conformance.md.
+# The pressure patterns of docs/reference/conformance.md.
 extends RefCounted
 
 const Atlas = preload("res://addons/papilla/atlas.gd")

@@ -11,7 +11,7 @@ use crate::verify::CaseError;
 const SCENE: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"quadratic\"\n\
                      [motion]\ndepth_mm = 1.0\npitch_deg = 20.0\n";
 /// The 0.5 % and 2 % of the other cases do not hold on a mesh this coarse, with one
-/// quadratic element through each layer: docs/calculix.md.
+/// quadratic element through each layer: docs/reference/calculix.md.
 const TOLERANCE: Tolerance = Tolerance { force: 5e-2, displacement: 8e-2, sed: 2e-1 };
 
 pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {

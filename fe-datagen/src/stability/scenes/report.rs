@@ -75,12 +75,12 @@ impl ScenesReport {
 }
 
 impl ScenesReport {
-    /// docs/stability-scenes.md.
+    /// docs/reports/stability-scenes.md.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = format!(
             "# Random scenes\n\nWritten by `fe-datagen stability --scenes {} --seed ... --markdown \
-             docs/stability-scenes.md` ([stability.md](stability.md)): {}.\n\n\
+             docs/reports/stability-scenes.md` ([stability.md](stability.md)): {}.\n\n\
              | | scenes |\n|---|---|\n| converged, every balance kept | {} |\n| converged, a balance missed | {} |\n\
              | refused with a typed error | {} |\n| panicked | {} |\n\n\
              The bar (99.9 % converge, each of them balances, no panic) is {}. Of all scenes drawn like \

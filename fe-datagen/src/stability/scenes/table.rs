@@ -71,7 +71,7 @@ impl Row {
     }
 }
 
-/// The rows as a table of docs/stability-scenes.md.
+/// The rows as a table of docs/reports/stability-scenes.md.
 pub(super) fn markdown(rows: &[Row]) -> String {
     let mut out = String::from(
         "| indenter | scenes | balanced | with cuts | iterations, median | most | smallest J | s a scene | slowest |\n\

@@ -1,4 +1,4 @@
-//! Runs the conformance script with the Rust client (docs/conformance.md).
+//! Runs the conformance script with the Rust client (docs/reference/conformance.md).
 
 mod burst;
 mod checks;

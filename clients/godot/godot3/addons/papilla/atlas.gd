@@ -1,4 +1,4 @@
-# The atlas: which point of the finger each pixel of a map is, and how to fill a map (docs/atlas.md).
+# The atlas: which point of the finger each pixel of a map is, and how to fill a map (docs/reference/atlas.md).
 extends Reference
 
 const Samples = preload("samples.gd")

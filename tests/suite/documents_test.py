@@ -1,0 +1,58 @@
+"""What the checks of the documents find, and what they leave alone: python3 tests/suite/documents_test.py."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import crates
+import documents
+
+
+class Links(unittest.TestCase):
+    def faults(self, text: str) -> list[str]:
+        with tempfile.TemporaryDirectory() as folder:
+            there = Path(folder) / "there.md"
+            there.write_text("# Here & there\n\n```sh\n# no heading\n```\n\n## A `b` (c)\n\n## A `b` (c)\n")
+            page = Path(folder) / "page.md"
+            page.write_text(text)
+            return list(documents.broken_links(page, text))
+
+    def test_links_that_lead_somewhere(self) -> None:
+        good = "# Top\n[a](there.md) [b](there.md#here--there) [c](there.md#a-b-c-1) [d](#top) [e](https://x.y/z)\n"
+        self.assertEqual(self.faults(good), [])
+
+    def test_links_that_lead_nowhere_are_named_with_their_line(self) -> None:
+        bad = "# Top\n[a](gone.md)\n![b\nc](gone.svg)\n[d](there.md#no-heading) [e](#bottom)\n"
+        found = self.faults(bad)
+        self.assertEqual([fault.split(":")[0] for fault in found], ["2", "3", "5", "5"])
+
+    def test_links_in_code_are_none(self) -> None:
+        self.assertEqual(self.faults("`[a](gone.md)`\n\n```text\n[b](gone.md)\n```\n"), [])
+
+
+class Lines(unittest.TestCase):
+    def test_prose_is_measured_tables_code_and_addresses_are_not(self) -> None:
+        long = "x" * (documents.LINE_MAX + 1)
+        left_alone = f"| {long} |\n```\n{long}\n```\n[a]({long})\n"
+        self.assertEqual(list(documents.long_lines(left_alone)), [])
+        self.assertEqual(len(list(documents.long_lines(long))), 1)
+
+    def test_words_of_tables_count_those_of_code_do_not(self) -> None:
+        text = "One two, 3 %.\n\n| four | 5 |\n|---|---|\n\n```sh\nnot these\n```\n[six](not/this.md) <!-- nor this -->\n"
+        self.assertEqual(documents.words(text), 4)
+
+
+class Crates(unittest.TestCase):
+    def test_a_circle_is_found(self) -> None:
+        self.assertEqual(crates.circle({"a": {"b"}, "b": set()}), [])
+        self.assertIn("a", crates.circle({"a": {"b"}, "b": {"a"}}))
+
+    def test_a_longer_way_takes_the_place_of_an_arrow(self) -> None:
+        arrows = {"a": {"b", "c"}, "b": {"c"}, "c": set()}
+        self.assertEqual(crates.direct(arrows), {"a": {"b"}, "b": {"c"}, "c": set()})
+
+
+if __name__ == "__main__":
+    done = unittest.main(exit=False, verbosity=0).result
+    print(f"checks: {done.testsRun - len(done.failures) - len(done.errors)}")
+    raise SystemExit(not done.wasSuccessful())
