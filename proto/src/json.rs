@@ -5,11 +5,10 @@ use std::fmt;
 use serde::de::DeserializeOwned;
 use serde_path_to_error::Track;
 
+use crate::{ErrorCode, Problem, error::shortened};
+
 /// Longest name or text that [`read_bounded`] takes, bytes as they stand in the JSON.
 pub const TEXT_BYTES_MAX: usize = 1024;
-
-/// Longest piece of the input that an error repeats, characters.
-const ECHO_MAX: usize = 100;
 
 /// Why a text is not the JSON that is due.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -43,6 +42,16 @@ impl From<serde_json::Error> for JsonError {
         let place = format!(" at line {line} column {column}");
         let reason = in_plain_words(text.strip_suffix(&place).unwrap_or(&text));
         Self { member: None, reason, place: (line > 0).then_some((line, column)) }
+    }
+}
+
+impl From<JsonError> for Problem {
+    fn from(error: JsonError) -> Self {
+        let problem = Self::new(ErrorCode::BadJson, error.to_string());
+        match error.member {
+            Some(member) => problem.at(member),
+            None => problem,
+        }
     }
 }
 
@@ -82,7 +91,7 @@ pub(crate) fn read_with<'de, T>(
     let value = result.map_err(|error| {
         let path = track.path().to_string();
         // A single point stands for the whole.
-        let member = (path != ".").then(|| cut(&path));
+        let member = (path != ".").then(|| shortened(&path));
         JsonError { member, ..JsonError::from(error) }
     })?;
     deserializer.end()?;
@@ -130,7 +139,7 @@ fn text_len(text: &[u8]) -> usize {
 fn in_plain_words(text: &str) -> String {
     let wrong = ["invalid type: ", "invalid value: ", "invalid length "];
     let Some(prefix) = wrong.into_iter().find(|prefix| text.starts_with(prefix)) else {
-        return cut(text);
+        return shortened(text);
     };
     // What was found may hold anything; what is due holds no comma before this one.
     match text[prefix.len()..].rsplit_once(", expected ") {
@@ -138,7 +147,7 @@ fn in_plain_words(text: &str) -> String {
             format!("a list of {length} where {} is due", due(wanted))
         }
         Some((what, wanted)) => format!("{} where {} is due", found(what), due(wanted)),
-        None => cut(text),
+        None => shortened(text),
     }
 }
 
@@ -150,11 +159,11 @@ fn found(what: &str) -> String {
         Some(("floating", rest)) => {
             format!("the number {}", rest.trim_start_matches("point ").trim_matches('`'))
         }
-        Some(("string", text)) => format!("the text {}", cut(text)),
+        Some(("string", text)) => format!("the text {}", shortened(text)),
         _ => match what {
             "sequence" => "a list".to_owned(),
             "map" => "an object".to_owned(),
-            other => cut(other),
+            other => shortened(other),
         },
     }
 }
@@ -186,16 +195,8 @@ fn due(wanted: &str) -> String {
             Some(("an", of)) if of.starts_with("array of length ") => {
                 format!("a list of {}", of.trim_start_matches("array of length "))
             }
-            _ => cut(other),
+            _ => shortened(other),
         },
-    }
-}
-
-/// At most [`ECHO_MAX`] characters of what may be of any length.
-fn cut(text: &str) -> String {
-    match text.char_indices().nth(ECHO_MAX) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
     }
 }
 

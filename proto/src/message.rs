@@ -11,6 +11,10 @@ use crate::{
     json::{self, JsonError},
 };
 
+/// Longest text of a client that is read, bytes: five times a display of the most actuators that
+/// the service takes.
+pub const CLIENT_MESSAGE_BYTES_MAX: usize = 512 << 10;
+
 /// What a client says in text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -42,8 +46,8 @@ impl MessageError {
 }
 
 impl ClientMessage {
-    /// Reads the text of a message. Members may come in any order, no text in it is longer than
-    /// [`TEXT_BYTES_MAX`](json::TEXT_BYTES_MAX).
+    /// Reads the text of a message, [`CLIENT_MESSAGE_BYTES_MAX`] at most. Its members may come in
+    /// any order; no text in it is longer than [`TEXT_BYTES_MAX`](json::TEXT_BYTES_MAX).
     ///
     /// # Errors
     /// What is wrong with it, with the member and its place.
@@ -51,6 +55,11 @@ impl ClientMessage {
         #[derive(Deserialize)]
         struct Kind {
             r#type: String,
+        }
+        if text.len() > CLIENT_MESSAGE_BYTES_MAX {
+            let length = text.len();
+            let reason = format!("{length} bytes; {CLIENT_MESSAGE_BYTES_MAX} at most are read");
+            return Err(MessageError::Unknown(JsonError { member: None, reason, place: None }));
         }
         let kind: Kind = json::read_bounded(text).map_err(MessageError::Unknown)?;
         if kind.r#type != "hello" {

@@ -6,8 +6,8 @@ use std::sync::{
 };
 
 use papilla_proto::{
-    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready,
-    RuntimeEffect, SampleType, ServerMessage,
+    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, MessageError, PROTOCOL_VERSIONS,
+    Problem, Ready, RuntimeEffect, SampleType, ServerMessage,
     effects::{OutOfRange, Section, SectionName},
 };
 use tokio::{task::spawn_blocking, time::timeout};
@@ -101,29 +101,36 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
             return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
         }
     };
-    let hello = match serde_json::from_slice(&text) {
-        Ok(ClientMessage::Hello(hello)) => hello,
-        Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
-        Err(error) => {
-            let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
-            return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
+    match ClientMessage::from_json(&text) {
+        Ok(ClientMessage::Hello(hello)) => Ok(meet(&line.app, hello).await),
+        Ok(_) => Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
+        Err(MessageError::Hello(error)) => Ok(Err(error.into())),
+        Err(MessageError::Unknown(error)) => {
+            let mut problem = Problem::from(error);
+            problem.message.push_str("; {\"type\":\"hello\",\"version\":1,…} is due");
+            Ok(Err(problem))
         }
-    };
-    Ok(meet(&line.app, hello).await)
+    }
 }
 
 /// New terms for an open session; frames that the server has accepted keep the old ones.
 ///
 /// # Errors
-/// The text is no hello, or one that cannot be met; the old terms stand.
+/// The text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
 pub(super) async fn renew(
     app: &Arc<App>,
     text: &[u8],
     number: u64,
 ) -> Result<(Terms, Ready), Problem> {
-    let Ok(ClientMessage::Hello(hello)) = serde_json::from_slice(text) else {
-        let message = "binary frames are due once the session is ready, or a hello for new terms";
-        return Err(Problem::new(ErrorCode::UnexpectedText, message));
+    const DUE: &str = "binary frames are due once the session is ready, or a hello for new terms";
+    let hello = match ClientMessage::from_json(text) {
+        Ok(ClientMessage::Hello(hello)) => hello,
+        Ok(_) => return Err(Problem::new(ErrorCode::UnexpectedText, DUE)),
+        Err(MessageError::Hello(error)) => return Err(error.into()),
+        Err(MessageError::Unknown(error)) => {
+            let message = format!("{DUE}, and this is neither: {error}");
+            return Err(Problem::new(ErrorCode::UnexpectedText, message));
+        }
     };
     let (terms, _) = meet(app, hello).await?;
     let ready = ready(app, number, &terms);
