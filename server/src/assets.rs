@@ -1,5 +1,6 @@
 //! Files the service is made of: embedded in the binary, or read from a folder.
 
+mod apart;
 mod folder;
 
 use std::borrow::Cow;
