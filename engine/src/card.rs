@@ -4,7 +4,7 @@
 //! `models/NAME.onnx` in this engine on presses that no training saw.
 
 use crate::{EngineError, MODEL_FORMAT, ModelInfo};
-use papilla_proto::Pattern;
+use papilla_proto::{Pattern, json};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -117,7 +117,7 @@ impl Card {
     /// [`EngineError::BadCard`] if it is not JSON of this shape,
     /// [`EngineError::UnsupportedFormat`] if its format is another.
     pub fn from_json(text: &str) -> Result<Self, EngineError> {
-        let card: Self = serde_json::from_str(text)
+        let card: Self = json::read(text.as_bytes())
             .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
         card.require_format()?;
         Ok(card)
@@ -191,15 +191,15 @@ impl Index {
     /// Reads the index.
     ///
     /// # Errors
-    /// [`EngineError::BadCard`] if it is not JSON of this shape, lists nothing, or names a
+    /// [`EngineError::BadIndex`] if it is not JSON of this shape, lists nothing, or names a
     /// default that is not in the list.
     pub fn from_json(text: &str) -> Result<Self, EngineError> {
-        let index: Self = serde_json::from_str(text)
-            .map_err(|error| EngineError::BadCard { reason: format!("index.json: {error}") })?;
+        let index: Self = json::read(text.as_bytes())
+            .map_err(|error| EngineError::BadIndex { reason: error.to_string() })?;
         if index.models.contains(&index.default) {
             return Ok(index);
         }
-        let reason = format!("index.json: the default '{}' is not in 'models'", index.default);
-        Err(EngineError::BadCard { reason })
+        let reason = format!("the default '{}' is not in 'models'", index.default);
+        Err(EngineError::BadIndex { reason })
     }
 }

@@ -101,6 +101,18 @@ pub enum EngineError {
         /// What the reader met.
         reason: String,
     },
+    /// The index of the models cannot be read.
+    #[error("the list of models is unreadable: {reason}; `model-export index` writes it")]
+    BadIndex {
+        /// What the reader met.
+        reason: String,
+    },
+    /// The ladder cannot be read.
+    #[error("the ladder is unreadable: {reason}; measure it again with `model-export ladder`")]
+    BadLadder {
+        /// What the reader met.
+        reason: String,
+    },
     /// The card belongs to another model.
     #[error(
         "card and model disagree on {field}: card '{card}', model '{model}'; they are not of one export"

@@ -5,6 +5,7 @@
 
 use crate::card::{Metrics, Similarity, Spread};
 use crate::{EngineError, MODEL_FORMAT};
+use papilla_proto::json;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -222,11 +223,11 @@ impl Ladder {
     /// Reads a ladder.
     ///
     /// # Errors
-    /// [`EngineError::BadCard`] if it is not JSON of this shape,
+    /// [`EngineError::BadLadder`] if it is not JSON of this shape,
     /// [`EngineError::UnsupportedFormat`] if its format is another.
     pub fn from_json(text: &str) -> Result<Self, EngineError> {
-        let ladder: Self = serde_json::from_str(text)
-            .map_err(|error| EngineError::BadCard { reason: format!("ladder: {error}") })?;
+        let ladder: Self = json::read(text.as_bytes())
+            .map_err(|error| EngineError::BadLadder { reason: error.to_string() })?;
         if ladder.format == MODEL_FORMAT {
             return Ok(ladder);
         }
@@ -236,10 +237,10 @@ impl Ladder {
     /// Text of a ladder, indented, with a final newline.
     ///
     /// # Errors
-    /// [`EngineError::BadCard`] if the serialiser fails (out of memory apart, it does not).
+    /// [`EngineError::BadLadder`] if the serialiser fails (out of memory apart, it does not).
     pub fn to_json(&self) -> Result<String, EngineError> {
         let text = serde_json::to_string_pretty(self)
-            .map_err(|error| EngineError::BadCard { reason: error.to_string() })?;
+            .map_err(|error| EngineError::BadLadder { reason: error.to_string() })?;
         Ok(text + "\n")
     }
 

@@ -25,6 +25,7 @@
 
 pub mod card;
 mod error;
+mod guard;
 mod info;
 pub mod ladder;
 mod onnx;

@@ -19,7 +19,7 @@ const DEPTH_MAX: usize = 8;
 pub(crate) fn decode(onnx: &[u8]) -> Result<ModelProto, EngineError> {
     let not_onnx = |reason: String| EngineError::NotOnnx { bytes: onnx.len(), reason };
     let mut reader = onnx;
-    let proto = crate::tract_backend::guarded("decode the model", || {
+    let proto = crate::guard::guarded("decode the model", || {
         tract_onnx::onnx().proto_model_for_read(&mut reader)
     })
     .map_err(|error| match error {

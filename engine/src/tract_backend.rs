@@ -1,11 +1,9 @@
 //! tract, the backend that is always there.
 
 use crate::{
-    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
-    check_output, sparse,
+    EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps, check_output,
+    guard::guarded, sparse,
 };
-use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
@@ -103,33 +101,4 @@ impl Session for TractSession {
         }
         check_output(sed_j_per_m3)
     }
-}
-
-/// Runs tract's code and turns its errors and panics into ours.
-///
-/// tract reports most bad models as errors but asserts here and there (shape
-/// arithmetic, indexing), and a service must not fall to a model file.
-pub(crate) fn guarded<T>(
-    action: &'static str,
-    work: impl FnOnce() -> TractResult<T>,
-) -> Result<T, EngineError> {
-    let backend = Backend::Tract;
-    // Whatever `work` was changing is dropped or rebuilt by the callers on failure.
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(Ok(value)) => Ok(value),
-        Ok(Err(error)) => {
-            Err(EngineError::Backend { backend, action, reason: format!("{error:#}") })
-        }
-        Err(panic) => {
-            Err(EngineError::Panicked { backend, action, reason: panic_text(panic.as_ref()) })
-        }
-    }
-}
-
-fn panic_text(panic: &(dyn Any + Send)) -> String {
-    panic
-        .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned())
-        .or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no message".to_owned())
 }

@@ -265,7 +265,11 @@ fn cards_and_indices_are_checked_when_read() {
     assert!(matches!(Card::from_json(&text[..80]), Err(EngineError::BadCard { .. })));
     let index = Index::from_json(r#"{"default":"a","models":["a","b"]}"#).unwrap();
     assert_eq!(index.models, ["a", "b"]);
-    assert!(Index::from_json(r#"{"default":"c","models":["a","b"]}"#).is_err());
+    for bad in [r#"{"default":"c","models":["a","b"]}"#, "{}", r#"{"default":1,"models":[]}"#] {
+        let error = Index::from_json(bad).unwrap_err();
+        assert!(matches!(error, EngineError::BadIndex { .. }), "{error}");
+        assert!(!error.to_string().contains("card"), "{error}");
+    }
 }
 
 fn card_of(info: &ModelInfo) -> Card {

@@ -15,6 +15,7 @@
 //! | [`effects`] | what a session can ask for beside the map |
 //! | [`summary`] | a map in sixteen numbers |
 //! | [`message`] | the JSON messages of a session |
+//! | [`json`] | reading JSON from outside, and why it is refused |
 //! | [`error`] | error codes and their HTTP status |
 //!
 //! The protocol in prose, with examples: `docs/reference/protocol.md`.
@@ -23,6 +24,7 @@ pub mod atlas;
 pub mod effects;
 pub mod error;
 pub mod frame;
+pub mod json;
 pub mod map;
 pub mod message;
 pub mod pattern;
@@ -39,7 +41,7 @@ pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
     keep_inside,
 };
-pub use message::{ClientMessage, Hello, Ready, ServerMessage, SessionError};
+pub use message::{ClientMessage, Hello, MessageError, Ready, ServerMessage, SessionError};
 pub use pattern::Pattern;
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};

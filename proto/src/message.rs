@@ -1,11 +1,19 @@
 //! The JSON messages of a session: the client's hello, the server's ready and errors.
 
+mod tagged;
+
 use serde::{Deserialize, Serialize};
 
+use self::tagged::WithoutType;
 use crate::{
     ErrorCode, Problem, RuntimeEffect, SampleType,
     effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
+    json::{self, JsonError},
 };
+
+/// Longest text of a client that is read, bytes: five times a display of the most actuators that
+/// the service takes.
+pub const CLIENT_MESSAGE_BYTES_MAX: usize = 512 << 10;
 
 /// What a client says in text.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -14,6 +22,55 @@ use crate::{
 pub enum ClientMessage {
     /// Opens the session; must be the first message. Later ones set new terms.
     Hello(Hello),
+}
+
+/// Why a text is no message of a client.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum MessageError {
+    /// It is not JSON, or its `type` is not that of a message.
+    #[error("{0}")]
+    Unknown(JsonError),
+    /// It is a hello, but a member is misspelt, missing or of a wrong type.
+    #[error("{0}")]
+    Hello(JsonError),
+}
+
+impl MessageError {
+    /// What is wrong, and where.
+    #[must_use]
+    pub fn json(&self) -> &JsonError {
+        match self {
+            Self::Unknown(error) | Self::Hello(error) => error,
+        }
+    }
+}
+
+impl ClientMessage {
+    /// Reads the text of a message, [`CLIENT_MESSAGE_BYTES_MAX`] at most. Its members may come in
+    /// any order; no text in it is longer than [`TEXT_BYTES_MAX`](json::TEXT_BYTES_MAX).
+    ///
+    /// # Errors
+    /// What is wrong with it, with the member and its place.
+    pub fn from_json(text: &[u8]) -> Result<Self, MessageError> {
+        #[derive(Deserialize)]
+        struct Kind {
+            r#type: String,
+        }
+        if text.len() > CLIENT_MESSAGE_BYTES_MAX {
+            let length = text.len();
+            let reason = format!("{length} bytes; {CLIENT_MESSAGE_BYTES_MAX} at most are read");
+            return Err(MessageError::Unknown(JsonError { member: None, reason, place: None }));
+        }
+        let kind: Kind = json::read_bounded(text).map_err(MessageError::Unknown)?;
+        if kind.r#type != "hello" {
+            let reason = format!("'{}' is no message of a client; 'hello' is", kind.r#type);
+            let member = Some("type".to_owned());
+            return Err(MessageError::Unknown(JsonError { member, reason, place: None }));
+        }
+        json::read_with(text, |deserializer| Hello::deserialize(WithoutType(deserializer)))
+            .map(Self::Hello)
+            .map_err(MessageError::Hello)
+    }
 }
 
 /// Opens a session: what the client wants and how it will send it.
@@ -209,84 +266,4 @@ impl SessionError {
 }
 
 #[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-    use serde_json::json;
-
-    use super::*;
-
-    #[test]
-    fn the_smallest_hello_is_enough() {
-        let hello: ClientMessage =
-            serde_json::from_value(json!({"type": "hello", "version": 1})).unwrap();
-        assert_eq!(hello, ClientMessage::Hello(Hello::default()));
-    }
-
-    #[test]
-    fn a_hello_of_version_1_keeps_its_form() {
-        let json = serde_json::to_value(Hello::default()).unwrap();
-        let names: Vec<_> = json.as_object().unwrap().keys().cloned().collect();
-        let due = ["atlas_hash", "budget_us", "effects", "pressure_scale_pa", "sample_type"];
-        assert_eq!(names, [&due[..], &["tier", "version"]].concat());
-        assert_eq!(Hello::default().member_of_version_2(), None);
-        let hello = Hello { map: Some(false), ..Hello::default() };
-        assert_eq!(hello.member_of_version_2(), Some("map"));
-    }
-
-    #[test]
-    fn misspelt_and_mistyped_members_are_refused() {
-        for bad in [
-            json!({"type": "hello", "version": 1, "teir": "x"}),
-            json!({"type": "hello"}),
-            json!({"type": "helo", "version": 1}),
-            json!({"version": 1}),
-            json!({"type": "hello", "version": 1, "sample_type": "f64"}),
-            json!({"type": "hello", "version": 1, "budget_us": -1}),
-            json!({"type": "hello", "version": 1, "budget_us": 1.5}),
-            json!({"type": "hello", "version": "1"}),
-            json!([]),
-        ] {
-            assert!(serde_json::from_value::<ClientMessage>(bad.clone()).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn an_error_says_whether_the_session_goes_on() {
-        let problem = Problem::new(ErrorCode::WrongLength, "short").at("payload");
-        let message = ServerMessage::Error(SessionError::new(problem, Some(4), false));
-        assert_eq!(
-            serde_json::to_value(&message).unwrap(),
-            json!({"type": "error", "code": "wrong_length", "message": "short",
-                   "field": "payload", "sequence": 4, "closes": false})
-        );
-    }
-
-    proptest! {
-        #[test]
-        fn hellos_come_back(
-            effects in prop::collection::vec("[a-z_]{1,12}", 0..4),
-            budget_us in any::<Option<u32>>(),
-            tier in prop::option::of(".{0,20}"),
-            kind in 0u8..4,
-            scale in prop::option::of(1e-6f32..1e6),
-        ) {
-            let hello = ClientMessage::Hello(Hello {
-                version: 1,
-                effects,
-                budget_us,
-                tier,
-                sample_type: SampleType::from_wire(kind).unwrap(),
-                pressure_scale_pa: scale,
-                ..Hello::default()
-            });
-            let text = serde_json::to_string(&hello).unwrap();
-            prop_assert_eq!(serde_json::from_str::<ClientMessage>(&text).unwrap(), hello);
-        }
-
-        #[test]
-        fn text_of_any_kind_does_not_panic(text in ".{0,200}") {
-            let _ = serde_json::from_str::<ClientMessage>(&text);
-            let _ = serde_json::from_str::<ServerMessage>(&text);
-        }
-    }
-}
+mod tests;

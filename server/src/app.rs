@@ -16,14 +16,14 @@ use crate::{
     models::Catalogue,
     pool::{Entrance, Pool},
     problem,
-    reload::{Changes, ReloadError, Reloader},
+    reload::{Changes, ReloadError, Reloader, Turn},
     session::Store,
 };
 
 /// The shared state.
 pub(crate) struct App {
     catalogue: ArcSwap<Catalogue>,
-    reloader: Reloader,
+    pub(crate) reloader: Reloader,
     pub(crate) gate: Gate,
     /// Largest body of a request, bytes.
     pub(crate) body_max: usize,
@@ -71,12 +71,12 @@ impl App {
         self.catalogue.load_full()
     }
 
-    /// Loads the models anew; takes seconds.
+    /// Loads the models anew; takes seconds, and ends early when the drain begins.
     ///
     /// # Errors
     /// They cannot be served; nothing has changed then.
-    pub(crate) fn reload(&self) -> Result<Changes, ReloadError> {
-        self.reloader.reload(&self.catalogue)
+    pub(crate) fn reload(&self, turn: Turn) -> Result<Changes, ReloadError> {
+        self.reloader.reload(turn, &self.catalogue, &|| self.is_draining())
     }
 
     /// Whether new work is refused.

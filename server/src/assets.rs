@@ -1,6 +1,9 @@
 //! Files the service is made of: embedded in the binary, or read from a folder.
 
-use std::{borrow::Cow, fs, io, path::Path};
+mod apart;
+mod folder;
+
+use std::borrow::Cow;
 
 use sha2::{Digest, Sha256};
 
@@ -17,47 +20,68 @@ pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Files by name.
+type Files = Vec<(String, Cow<'static, [u8]>)>;
+
 /// The files of a model folder by name.
 #[derive(Debug)]
 pub(crate) struct Assets {
     /// Where they are from, for messages.
     pub(crate) origin: String,
-    files: Vec<(String, Cow<'static, [u8]>)>,
+    /// What to do if one is missing.
+    advice: &'static str,
+    files: Files,
 }
 
 impl Assets {
     /// The files that `config` names: its folder's, or else those built into the binary.
     ///
     /// # Errors
-    /// The folder cannot be read.
+    /// The folder or one of its files cannot be read.
     pub(crate) fn of(config: &Config) -> Result<Self, StartError> {
-        match &config.models {
-            Some(folder) => Self::from_folder(folder)
-                .map_err(|source| StartError::Folder { folder: folder.clone(), source }),
-            None => Ok(Self::embedded()),
-        }
+        // Never stopped, so there always are some.
+        Self::of_unless(config, &|| false).map(|assets| assets.unwrap_or_else(Self::embedded))
+    }
+
+    /// The same, given up once it is to stop: None then.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub(crate) fn of_unless(
+        config: &Config,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, StartError> {
+        let Some(folder) = &config.models else { return Ok(Some(Self::embedded())) };
+        let files = folder::read(folder, is_to_stop)?;
+        Ok(files.map(|files| Self {
+            origin: folder.display().to_string(),
+            advice: "a folder of models holds index.json, atlas.json, and NAME.onnx and NAME.json \
+                     of every model in the index",
+            files,
+        }))
     }
 
     /// The files built into the binary.
     fn embedded() -> Self {
         let files = MODELS.iter().map(|&(name, bytes)| (name.to_owned(), Cow::Borrowed(bytes)));
-        Self { origin: "the binary".to_owned(), files: files.collect() }
+        Self {
+            origin: "the binary".to_owned(),
+            advice: "build with the shipped files in models/, or name a folder of models with \
+                     --models DIR",
+            files: files.collect(),
+        }
     }
 
-    /// The `.onnx` and `.json` files of `folder`.
+    /// The bytes of the file called `name`.
     ///
     /// # Errors
-    /// The folder or one of its files cannot be read.
-    fn from_folder(folder: &Path) -> io::Result<Self> {
-        let mut files = Vec::new();
-        for entry in fs::read_dir(folder)? {
-            let path = entry?.path();
-            let wanted = path.extension().is_some_and(|e| e == "onnx" || e == "json");
-            if let (true, Some(name)) = (wanted, path.file_name().and_then(|n| n.to_str())) {
-                files.push((name.to_owned(), Cow::Owned(fs::read(&path)?)));
-            }
-        }
-        Ok(Self { origin: folder.display().to_string(), files })
+    /// There is none.
+    pub(crate) fn require(&self, name: &str) -> Result<&[u8], StartError> {
+        self.get(name).ok_or_else(|| StartError::Missing {
+            file: name.to_owned(),
+            origin: self.origin.clone(),
+            advice: self.advice,
+        })
     }
 
     /// The bytes of the file called `name`.

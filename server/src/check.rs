@@ -10,10 +10,11 @@ use crate::{
     tls,
 };
 
-/// Bytes one connection, one session and one posted map can hold at most; see
+/// Bytes one connection, one session, its effects and one posted map can hold at most; see
 /// docs/guides/operating.md.
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
+const PER_EFFECTS: usize = 20 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
 /// What was found, in the order it was looked at.
@@ -163,6 +164,6 @@ fn memory_bound(config: &Config) -> usize {
     let requests =
         config.max_requests.get() * (3 * config.max_body_bytes + PER_REQUEST_BEYOND_BODY);
     config.max_connections.get() * (PER_CONNECTION + config.max_body_bytes)
-        + config.max_sessions.get() * PER_SESSION
+        + config.max_sessions.get() * (PER_SESSION + PER_EFFECTS)
         + requests
 }

@@ -12,15 +12,14 @@ pub enum StartError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// A file of the model folder is missing.
-    #[error(
-        "{origin} holds no {file}; build with the shipped files in models/, or name a folder of \
-         models with --models DIR"
-    )]
+    #[error("{origin} holds no {file}; {advice}")]
     Missing {
         /// The file.
         file: String,
         /// Where it was looked for.
         origin: String,
+        /// What to do about it.
+        advice: &'static str,
     },
     /// A file of the model folder is damaged or at odds with another.
     #[error("{file} from {origin} is unusable: {reason}")]

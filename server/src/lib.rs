@@ -43,7 +43,7 @@ mod speed;
 mod telemetry;
 mod tls;
 
-use std::{net::SocketAddr, sync::Arc, thread, time::Duration};
+use std::{net::SocketAddr, sync::Arc, time::Duration};
 
 pub use check::{Finding, Report, check};
 pub use config::{Cli, Command, Config, ConfigError, SettingError};
@@ -74,7 +74,7 @@ pub struct Server {
     app: Arc<App>,
     pool: Option<Pool>,
     /// Dropped last: it cuts off what is left of connections.
-    _io: IoRuntime,
+    io: IoRuntime,
 }
 
 /// Longest wait for the job that a thread has in hand, once the drain is over.
@@ -124,7 +124,7 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
         accepting,
         app,
         pool: Some(pool),
-        _io: io,
+        io,
     })
 }
 
@@ -170,9 +170,7 @@ impl Server {
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
-        let app = Arc::clone(&self.app);
-        // The log has the outcome.
-        thread::spawn(move || drop(app.reload()));
+        self.io.spawn(reload::once(Arc::clone(&self.app)));
     }
 
     /// Ends the service: takes nothing new, answers every accepted frame, tells

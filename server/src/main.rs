@@ -29,7 +29,8 @@ fn main() -> ExitCode {
             if let Some(ConfigError::Usage(usage)) = error.downcast_ref() {
                 usage.exit();
             }
-            eprintln!("papilla-server: {error:#}");
+            // Without its sources: our errors say them themselves.
+            eprintln!("papilla-server: {error}");
             let of_start = error.downcast_ref::<StartError>().map(StartError::exit_code);
             let is_setting = error.is::<ConfigError>() || error.is::<SettingError>();
             ExitCode::from(of_start.unwrap_or(if is_setting { 2 } else { 1 }))

@@ -1,5 +1,6 @@
 //! A few FE presses shipped with the models, so that a visitor sees the error.
 
+use papilla_proto::json;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -30,8 +31,8 @@ impl Replay {
     ///
     /// # Errors
     /// It is not the JSON that is due, or a press does not fit the atlas.
-    pub(crate) fn parse(json: &[u8], vertex_count: usize) -> Result<Self, String> {
-        let replay: Self = serde_json::from_slice(json).map_err(|e| e.to_string())?;
+    pub(crate) fn parse(text: &[u8], vertex_count: usize) -> Result<Self, String> {
+        let replay: Self = json::read(text).map_err(|e| e.to_string())?;
         for (index, press) in replay.presses.iter().enumerate() {
             for (what, values) in
                 [("pressure_pa", &press.pressure_pa), ("sed_j_per_m3", &press.sed_j_per_m3)]

@@ -65,7 +65,7 @@ fn the_front_is_what_nothing_beats() {
 
 #[test]
 fn what_is_no_ladder_is_refused() {
-    assert!(matches!(Ladder::from_json("{}"), Err(EngineError::BadCard { .. })));
+    assert!(matches!(Ladder::from_json("{}"), Err(EngineError::BadLadder { .. })));
     let other = Ladder { format: 2, ..Ladder::default() }.to_json().unwrap();
     assert!(matches!(
         Ladder::from_json(&other),

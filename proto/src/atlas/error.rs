@@ -1,6 +1,7 @@
 //! What can be wrong with an atlas, or with a buffer handed to it.
 
 use super::Patch;
+use crate::json::JsonError;
 use thiserror::Error;
 
 /// Why an atlas, or the use of one, is refused.
@@ -8,8 +9,8 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum AtlasError {
     /// The text is not JSON, or not JSON of this shape.
-    #[error("the atlas is not readable JSON of the expected shape: {0}")]
-    Json(#[source] serde_json::Error),
+    #[error("the atlas cannot be read: {0}")]
+    Json(JsonError),
     /// A version of the format that this code does not know.
     #[error("atlas format version {found} is not supported (this build reads {expected})")]
     Version {

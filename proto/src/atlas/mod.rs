@@ -31,7 +31,7 @@ pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
-use crate::MAP_SIDE_PX;
+use crate::{MAP_SIDE_PX, json};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -139,7 +139,7 @@ impl Atlas {
     /// [`AtlasError::Json`] when the text is not an atlas file; else as
     /// [`Atlas::validate`], a wrong hash included.
     pub fn from_json(text: &str) -> Result<Self, AtlasError> {
-        let file: AtlasFile = serde_json::from_str(text).map_err(AtlasError::Json)?;
+        let file: AtlasFile = json::read(text.as_bytes()).map_err(AtlasError::Json)?;
         Self::try_from(file)
     }
 
@@ -149,7 +149,7 @@ impl Atlas {
     /// # Errors
     /// [`AtlasError::Json`] if the serialiser fails (out of memory apart, it does not).
     pub fn to_json(&self) -> Result<String, AtlasError> {
-        serde_json::to_string(&self.file).map_err(AtlasError::Json)
+        serde_json::to_string(&self.file).map_err(|error| AtlasError::Json(error.into()))
     }
 
     /// Checks everything again: version, size, scale, counts, indices, finite numbers,

@@ -1,17 +1,55 @@
 //! Maps as JSON: the easiest to write, the slowest to read.
 
-use std::io::{self, Write};
+use std::{
+    fmt,
+    io::{self, Write},
+};
 
-use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem};
-use serde::{Deserialize, Serialize};
+use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, json};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{SeqAccess, Visitor},
+};
 
 use super::{Map, Quantity};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PressureMap {
-    /// In 64 bits: what overflows 32 is then infinite, and refused with its place.
-    pressure_pa: Vec<f64>,
+    pressure_pa: Samples,
+}
+
+/// Numbers of a list; no more are kept than a map has.
+#[derive(Default)]
+struct Samples {
+    kept: Vec<f32>,
+    count: usize,
+}
+
+impl<'de> Deserialize<'de> for Samples {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_seq(Self::default())
+    }
+}
+
+impl<'de> Visitor<'de> for Samples {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list of numbers")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(mut self, mut list: A) -> Result<Self, A::Error> {
+        self.kept.reserve_exact(MAP_LEN);
+        while let Some(value) = list.next_element::<f64>()? {
+            self.count += 1;
+            if self.count <= MAP_LEN {
+                // What overflows becomes infinite, and is refused with its place.
+                self.kept.push(value as f32);
+            }
+        }
+        Ok(self)
+    }
 }
 
 /// Only what a reader needs: a pressure map reads back as it is.
@@ -24,18 +62,17 @@ enum AnyMap<'a> {
 
 /// Decodes `{"pressure_pa": [50176 numbers]}`, row-major, Pa.
 pub(super) fn decode(bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Problem> {
-    let map: PressureMap = serde_json::from_slice(bytes).map_err(|error| {
-        let message = format!("{error}; {{\"pressure_pa\": [50176 numbers]}} is due");
-        Problem::new(ErrorCode::BadJson, message)
+    let map: PressureMap = json::read_bounded(bytes).map_err(|error| {
+        let mut problem = Problem::from(error);
+        problem.message.push_str("; {\"pressure_pa\": [50176 numbers]} is due");
+        problem
     })?;
-    let samples = map.pressure_pa.len();
-    if samples != pressure_pa.len() {
-        let message = format!("the map has {samples} samples, 224 x 224 = {MAP_LEN} are needed");
+    let Samples { kept, count } = map.pressure_pa;
+    if count != pressure_pa.len() {
+        let message = format!("the map has {count} samples, 224 x 224 = {MAP_LEN} are needed");
         return Err(Problem::new(ErrorCode::WrongLength, message).at("pressure_pa"));
     }
-    for (sample, value) in pressure_pa.iter_mut().zip(map.pressure_pa) {
-        *sample = value as f32;
-    }
+    pressure_pa.copy_from_slice(&kept);
     Ok(())
 }
 

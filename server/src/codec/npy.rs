@@ -3,7 +3,7 @@
 //! Format: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>
 
 use bytes::{BufMut, BytesMut};
-use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem};
+use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, error::shortened};
 
 use super::wrong_shape;
 
@@ -11,6 +11,9 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// Length of the header that [`encode`] writes, magic included: a multiple of 64.
 pub(super) const HEADER_LEN: usize = 128;
+
+/// Most axes of an array, as of numpy itself.
+const AXES_MAX: usize = 64;
 
 /// What the header says.
 #[derive(Debug, PartialEq)]
@@ -42,7 +45,8 @@ fn split(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Problem> {
         .split_at_checked(len)
         .ok_or_else(|| bad("the .npy file is cut short in its header"))?;
     let header = std::str::from_utf8(header).map_err(|_| bad("the .npy header is not text"))?;
-    let header = parse(header).ok_or_else(|| bad(format!("unreadable .npy header: {header}")))?;
+    let header = parse(header)
+        .ok_or_else(|| bad(format!("unreadable .npy header: {}", shortened(header))))?;
     Ok((header, data))
 }
 
@@ -64,8 +68,10 @@ fn parse(header: &str) -> Option<Header<'_>> {
         .split(',')
         .map(str::trim)
         .filter(|size| !size.is_empty())
+        .take(AXES_MAX + 1)
         .map(|size| size.parse().ok())
-        .collect::<Option<_>>()?;
+        .collect::<Option<Vec<_>>>()
+        .filter(|shape| shape.len() <= AXES_MAX)?;
     Some(Header { descr, fortran_order, shape })
 }
 
@@ -87,7 +93,8 @@ pub(super) fn decode(bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Proble
         "<f8" => fill(pressure_pa, data, |b: [u8; 8]| f64::from_le_bytes(b) as f32),
         ">f8" => fill(pressure_pa, data, |b: [u8; 8]| f64::from_be_bytes(b) as f32),
         other => {
-            let message = format!("the array's type is '{other}'; '<f4' or '<f8' is due");
+            let message =
+                format!("the array's type is '{}'; '<f4' or '<f8' is due", shortened(other));
             return Err(Problem::new(ErrorCode::WrongType, message).at("descr"));
         }
     }?;

@@ -35,8 +35,15 @@ pub(super) fn decode(
         (ColorType::Grayscale, BitDepth::Eight) => SampleType::U8,
         (ColorType::Grayscale, BitDepth::Sixteen) => SampleType::U16,
         (colour, depth) => {
-            let message =
-                format!("the PNG is {colour:?} of {depth:?} bits; 8- or 16-bit gray is due");
+            let colour = match colour {
+                ColorType::Grayscale => "gray",
+                ColorType::GrayscaleAlpha => "gray with alpha",
+                ColorType::Rgb => "RGB",
+                ColorType::Rgba => "RGBA",
+                ColorType::Indexed => "of indexed colours",
+            };
+            let bits = depth as u8;
+            let message = format!("the PNG is {colour} of {bits} bits; 8- or 16-bit gray is due");
             return Err(Problem::new(ErrorCode::WrongType, message));
         }
     };

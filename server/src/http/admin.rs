@@ -19,8 +19,12 @@ pub(super) async fn reload(State(app): Shared, Extension(guest): Extension<Guest
     if app.is_draining() {
         return refuse(&app, problem::shutting_down());
     }
+    let turn = match app.reloader.try_begin() {
+        Ok(turn) => turn,
+        Err(error) => return refuse(&app, error.into()),
+    };
     let reloading = Arc::clone(&app);
-    match spawn_blocking(move || reloading.reload()).await {
+    match spawn_blocking(move || reloading.reload(turn)).await {
         Ok(Ok(changes)) => Ok(json_answer(&changes)),
         Ok(Err(error)) => refuse(&app, error.into()),
         Err(error) => refuse(&app, problem::internal("the reload broke off", &error)),

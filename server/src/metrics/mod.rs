@@ -51,7 +51,7 @@ pub(crate) enum Transport {
 }
 
 /// What became of a reload.
-const RELOADS: [&str; 2] = ["refused", "ok"];
+const RELOADS: [&str; 3] = ["ok", "refused", "busy"];
 
 type Stages = Family<StageLabels, Histogram, fn() -> Histogram>;
 type Requests = Family<RequestLabels, Histogram, fn() -> Histogram>;
@@ -217,10 +217,18 @@ impl Metrics {
         self.shed.get_or_create(&ShedLabels { reason: shed.word() }).inc();
     }
 
-    /// Counts a reload.
+    /// Counts a reload that was done, or changed nothing.
     pub(crate) fn reload(&self, is_ok: bool) {
-        let outcome = Word(RELOADS[usize::from(is_ok)]);
-        self.reloads.get_or_create(&ReloadLabels { outcome }).inc();
+        self.count_reload(RELOADS[usize::from(!is_ok)]);
+    }
+
+    /// Counts a reload that came while another was under way.
+    pub(crate) fn reload_busy(&self) {
+        self.count_reload(RELOADS[2]);
+    }
+
+    fn count_reload(&self, outcome: &'static str) {
+        self.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) }).inc();
     }
 
     /// The counts of `transport`.

@@ -7,6 +7,7 @@ use papilla_engine::{
     ladder::{Kind, SET_NAMES},
 };
 use papilla_proto::atlas::Atlas;
+use serde_json::Value;
 
 use super::Tier;
 use crate::{assets::sha256_hex, speed::Speed};
@@ -63,14 +64,27 @@ pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(bytes).map_err(|error| error.to_string())
 }
 
+/// A card, and the same as it was shipped.
+pub(super) struct ReadCard {
+    card: Card,
+    shipped: Value,
+}
+
+impl ReadCard {
+    pub(super) fn parse(json: &[u8]) -> Result<Self, String> {
+        let json = text(json)?;
+        let card = Card::from_json(json).map_err(|error| error.to_string())?;
+        let shipped = serde_json::from_str(json).map_err(|error| error.to_string())?;
+        Ok(Self { card, shipped })
+    }
+}
+
 pub(super) fn load_tier(
     name: &str,
     onnx: &[u8],
-    card: &[u8],
+    ReadCard { card, shipped }: ReadCard,
     running: Option<&Tier>,
 ) -> Result<Tier, Box<dyn std::error::Error>> {
-    let json = text(card)?;
-    let card = Card::from_json(json)?;
     let same = running.filter(|tier| {
         let hash = &tier.model.info().onnx_sha256;
         *hash == card.onnx_sha256 && *hash == sha256_hex(onnx)
@@ -105,7 +119,7 @@ pub(super) fn load_tier(
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         relative_l2_median: card.metrics.relative_l2.median,
         relative_l2_p95: card.metrics.relative_l2.p95,
-        card: serde_json::from_str(json)?,
+        card: shipped,
         speed,
         retired: false,
         model,

@@ -12,7 +12,7 @@ use papilla_proto::{
 };
 use serde_json::Value;
 
-use self::load::{judge, load_ladder, load_tier, text};
+use self::load::{ReadCard, judge, load_ladder, load_tier, text};
 use crate::{
     StartError,
     assets::Assets,
@@ -128,11 +128,7 @@ impl Catalogue {
         running: Option<&Self>,
     ) -> Result<Self, StartError> {
         let origin = || assets.origin.clone();
-        let read = |name: &str| {
-            assets
-                .get(name)
-                .ok_or_else(|| StartError::Missing { file: name.to_owned(), origin: origin() })
-        };
+        let read = |name: &str| assets.require(name);
         let bad = |file: &str, error: &dyn std::fmt::Display| StartError::Unusable {
             file: file.to_owned(),
             origin: origin(),
@@ -147,11 +143,12 @@ impl Catalogue {
             .map_err(|e| bad("atlas.json", &e))?;
         let mut tiers = Vec::with_capacity(index.models.len());
         for name in &index.models {
-            let (onnx, card) = (format!("{name}.onnx"), format!("{name}.json"));
+            let (onnx, file) = (format!("{name}.onnx"), format!("{name}.json"));
+            let bytes = read(&onnx)?;
+            let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
             let running =
                 running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
-            let tier =
-                load_tier(name, read(&onnx)?, read(&card)?, running).map_err(|e| bad(&onnx, &e))?;
+            let tier = load_tier(name, bytes, card, running).map_err(|e| bad(&onnx, &e))?;
             if tier.atlas_hash != atlas.hash() {
                 let (model, ours) = (&tier.atlas_hash, atlas.hash());
                 return Err(bad(

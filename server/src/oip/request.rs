@@ -1,17 +1,21 @@
 //! What an inference request asks for.
+//!
+//! A body that is refused costs no more memory than one that is taken: of every list the members
+//! that matter are kept and the others are counted.
 
-use std::fmt;
+mod numbers;
+mod parameters;
 
 use axum::http::HeaderMap;
 use bytes::Bytes;
 use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
-use papilla_proto::{ErrorCode, MAP_LEN, Problem};
-use serde::{
-    Deserialize, Deserializer,
-    de::{Error, SeqAccess, Visitor},
-};
-use serde_json::{Map, Value};
+use papilla_proto::{ErrorCode, Problem, error::shortened, json};
+use serde::Deserialize;
 
+use self::{
+    numbers::{First, Numbers, Shape},
+    parameters::Parameters,
+};
 use super::{DATATYPE, SHAPE};
 
 /// Length of the JSON before the tensors' bytes; its presence says that there are any.
@@ -21,19 +25,19 @@ const HEAD_LEN: &str = "inference-header-content-length";
 struct Request {
     id: Option<String>,
     #[serde(default)]
-    parameters: Map<String, Value>,
-    inputs: Vec<InputTensor>,
+    parameters: Parameters,
+    inputs: First<InputTensor>,
     #[serde(default)]
-    outputs: Vec<OutputTensor>,
+    outputs: First<OutputTensor>,
 }
 
 #[derive(Deserialize)]
 struct InputTensor {
     name: String,
-    shape: Vec<usize>,
+    shape: Shape,
     datatype: String,
     #[serde(default)]
-    parameters: Map<String, Value>,
+    parameters: Parameters,
     data: Option<Numbers>,
 }
 
@@ -41,7 +45,7 @@ struct InputTensor {
 struct OutputTensor {
     name: String,
     #[serde(default)]
-    parameters: Map<String, Value>,
+    parameters: Parameters,
 }
 
 /// How the client wants its answer.
@@ -78,15 +82,17 @@ pub(super) fn head_len(headers: &HeaderMap, body_len: usize) -> Result<Option<us
 pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Problem> {
     let (head, blob) =
         (body.slice(..head_len.unwrap_or(body.len())), head_len.map(|n| body.slice(n..)));
-    let request: Request = serde_json::from_slice(&head)
-        .map_err(|error| Problem::new(ErrorCode::BadJson, error.to_string()))?;
+    let request: Request = json::read_bounded(&head)?;
     let is_binary_wanted = wants_binary(&request)?;
-    let [input] = <[InputTensor; 1]>::try_from(request.inputs).map_err(|inputs| {
-        let message = format!("{} inputs; the model has one, {INPUT_NAME}", inputs.len());
-        Problem::new(ErrorCode::WrongShape, message).at("inputs")
-    })?;
+    let input = match request.inputs {
+        First { first: Some(input), count: 1 } => input,
+        First { count, .. } => {
+            let message = format!("{count} inputs; the model has one, {INPUT_NAME}");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("inputs"));
+        }
+    };
     check_input(&input)?;
-    let binary_len = whole_number(&input.parameters, "binary_data_size")?;
+    let binary_len = input.parameters.binary_data_size.whole_number("binary_data_size")?;
     let payload = match (input.data, binary_len, blob) {
         (Some(numbers), None, None) => numbers.into_bytes()?,
         (Some(numbers), None, Some(blob)) if blob.is_empty() => numbers.into_bytes()?,
@@ -101,25 +107,27 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
             return Err(Problem::new(ErrorCode::WrongType, message).at("inputs"));
         }
     };
-    let timeout_us = whole_number(&request.parameters, "timeout")?.filter(|us| *us > 0);
+    let timeout_us = request.parameters.timeout.whole_number("timeout")?.filter(|us| *us > 0);
     Ok((Wish { id: request.id, is_binary_wanted, timeout_us }, payload))
 }
 
 fn check_input(input: &InputTensor) -> Result<(), Problem> {
     let InputTensor { name, shape, datatype, .. } = input;
     if name != INPUT_NAME {
+        let name = shortened(name);
         let message = format!("there is no input '{name}'; the model's is {INPUT_NAME}");
         return Err(Problem::new(ErrorCode::BadQuery, message).at("inputs"));
     }
     if datatype != DATATYPE {
+        let datatype = shortened(datatype);
         let message = format!("datatype {datatype} is not taken; {DATATYPE} is");
         return Err(Problem::new(ErrorCode::WrongType, message).at("datatype"));
     }
-    if *shape != SHAPE {
-        let message = format!("the shape is {shape:?}, {SHAPE:?} is due");
+    if !shape.is(SHAPE) {
+        let message = format!("the shape is {shape}, {SHAPE:?} is due");
         return Err(Problem::new(ErrorCode::WrongShape, message).at("shape"));
     }
-    if input.parameters.keys().any(|key| key.starts_with("shared_memory")) {
+    if input.parameters.has_shared_memory() {
         let message = "shared memory is not served";
         return Err(Problem::new(ErrorCode::WrongType, message).at("shared_memory_region"));
     }
@@ -128,113 +136,32 @@ fn check_input(input: &InputTensor) -> Result<(), Problem> {
 
 /// Whether the output is to come as bytes: as it says itself, or else as the request says.
 fn wants_binary(request: &Request) -> Result<bool, Problem> {
-    let of_all = boolean(&request.parameters, "binary_data_output")?.unwrap_or(false);
-    let output = match &request.outputs[..] {
-        [] => return Ok(of_all),
-        [output] => output,
-        more => {
-            let message = format!("{} outputs; the model has one, {OUTPUT_NAME}", more.len());
+    let of_all = request.parameters.binary_data_output.boolean("binary_data_output")?;
+    let of_all = of_all.unwrap_or(false);
+    let output = match &request.outputs {
+        First { count: 0, .. } => return Ok(of_all),
+        First { first: Some(output), count: 1 } => output,
+        First { count, .. } => {
+            let message = format!("{count} outputs; the model has one, {OUTPUT_NAME}");
             return Err(Problem::new(ErrorCode::WrongShape, message).at("outputs"));
         }
     };
     if output.name != OUTPUT_NAME {
-        let message = format!("there is no output '{}'; the model's is {OUTPUT_NAME}", output.name);
+        let name = shortened(&output.name);
+        let message = format!("there is no output '{name}'; the model's is {OUTPUT_NAME}");
         return Err(Problem::new(ErrorCode::BadQuery, message).at("outputs"));
     }
-    for unserved in ["classification", "shared_memory_region"] {
-        if output.parameters.contains_key(unserved) {
+    let of_output = &output.parameters;
+    for (unserved, is_asked) in [
+        ("classification", of_output.classification.is_there()),
+        ("shared_memory_region", of_output.has_shared_memory()),
+    ] {
+        if is_asked {
             let message = format!("{unserved} is not served");
             return Err(Problem::new(ErrorCode::WrongType, message).at(unserved));
         }
     }
-    Ok(boolean(&output.parameters, "binary_data")?.unwrap_or(of_all))
-}
-
-fn whole_number(parameters: &Map<String, Value>, key: &str) -> Result<Option<u64>, Problem> {
-    let Some(value) = parameters.get(key) else { return Ok(None) };
-    value.as_u64().map(Some).ok_or_else(|| {
-        let message = format!("{value} is not a whole number");
-        Problem::new(ErrorCode::BadQuery, message).at(key)
-    })
-}
-
-fn boolean(parameters: &Map<String, Value>, key: &str) -> Result<Option<bool>, Problem> {
-    let Some(value) = parameters.get(key) else { return Ok(None) };
-    value.as_bool().map(Some).ok_or_else(|| {
-        Problem::new(ErrorCode::BadQuery, format!("{value} is not true or false")).at(key)
-    })
-}
-
-/// Numbers in lists of any depth, row by row, as f32; no more are kept than a map has.
-#[derive(Debug, Default)]
-struct Numbers {
-    bytes: Vec<u8>,
-    count: usize,
-}
-
-impl Numbers {
-    fn push(&mut self, value: f64) {
-        self.count += 1;
-        if self.count <= MAP_LEN {
-            // What overflows becomes infinite, and is refused with its place.
-            self.bytes.extend_from_slice(&(value as f32).to_le_bytes());
-        }
-    }
-
-    fn into_bytes(self) -> Result<Bytes, Problem> {
-        if self.count == MAP_LEN {
-            return Ok(self.bytes.into());
-        }
-        let message = format!("data has {} numbers, the shape {MAP_LEN}", self.count);
-        Err(Problem::new(ErrorCode::WrongLength, message).at("data"))
-    }
-}
-
-impl<'de> Deserialize<'de> for Numbers {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut numbers = Self { bytes: Vec::with_capacity(MAP_LEN * 4), count: 0 };
-        deserializer.deserialize_seq(Flatten(&mut numbers))?;
-        Ok(numbers)
-    }
-}
-
-/// Reads a number, or a list of what it reads, into the numbers.
-struct Flatten<'a>(&'a mut Numbers);
-
-impl<'de> serde::de::DeserializeSeed<'de> for Flatten<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Flatten<'_> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number or a list of numbers")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        while list.next_element_seed(Flatten(self.0))?.is_some() {}
-        Ok(())
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<(), E> {
-        self.0.push(value);
-        Ok(())
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<(), E> {
-        self.0.push(value as f64);
-        Ok(())
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<(), E> {
-        self.0.push(value as f64);
-        Ok(())
-    }
+    Ok(of_output.binary_data.boolean("binary_data")?.unwrap_or(of_all))
 }
 
 #[cfg(test)]

@@ -161,9 +161,12 @@ impl Worker {
         } else if job.deadline.is_some_and(|deadline| decoded + tier.speed.floor() >= deadline) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
-            self.sessions[job.tier]
-                .infer(&self.pressure_pa, &mut self.sed_j_per_m3)
-                .map_err(|error| problem::internal("the inference failed", &error))?;
+            self.sessions[job.tier].infer(&self.pressure_pa, &mut self.sed_j_per_m3).map_err(
+                |error| {
+                    let error = format_args!("{}.onnx: {error}", tier.name);
+                    problem::internal("the inference failed", &error)
+                },
+            )?;
             times.infer = decoded.elapsed();
             tier.speed.learn(times.infer);
         }

@@ -2,13 +2,14 @@
 
 mod watch;
 
-use std::sync::{Arc, Mutex, TryLockError, atomic::Ordering};
+use std::sync::{Arc, atomic::Ordering};
 
 use arc_swap::ArcSwap;
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
+use tokio::sync::{Mutex, OwnedMutexGuard};
 
-pub(crate) use watch::watch;
+pub(crate) use watch::{once, watch};
 
 use crate::{
     StartError,
@@ -27,8 +28,11 @@ pub(crate) struct Reloader {
     exchange: Exchange,
     metrics: Arc<Metrics>,
     /// One reload at a time.
-    turn: Mutex<()>,
+    turn: Arc<Mutex<()>>,
 }
+
+/// The turn of one reload; the next begins when it is dropped.
+pub(crate) struct Turn(#[expect(dead_code, reason = "held, not read")] OwnedMutexGuard<()>);
 
 /// What a reload changed, by tier names.
 #[derive(Debug, Default, Serialize)]
@@ -49,6 +53,8 @@ pub(crate) enum ReloadError {
     Embedded,
     #[error("another reload is under way")]
     Busy,
+    #[error("the server drains")]
+    Draining,
     #[error(transparent)]
     Load(#[from] StartError),
     #[error("tier {tier}: {source}")]
@@ -65,6 +71,7 @@ impl From<ReloadError> for Problem {
     fn from(error: ReloadError) -> Self {
         let code = match error {
             ReloadError::Busy => ErrorCode::Overloaded,
+            ReloadError::Draining => ErrorCode::ShuttingDown,
             _ => ErrorCode::BadModel,
         };
         Self::new(code, format!("{error}; the models that run were left as they are"))
@@ -73,7 +80,23 @@ impl From<ReloadError> for Problem {
 
 impl Reloader {
     pub(crate) fn new(config: &Config, exchange: Exchange, metrics: Arc<Metrics>) -> Self {
-        Self { config: config.clone(), exchange, metrics, turn: Mutex::new(()) }
+        Self { config: config.clone(), exchange, metrics, turn: Arc::default() }
+    }
+
+    /// The turn, if no reload is under way.
+    ///
+    /// # Errors
+    /// One is, which is counted.
+    pub(crate) fn try_begin(&self) -> Result<Turn, ReloadError> {
+        Arc::clone(&self.turn).try_lock_owned().map(Turn).map_err(|_| {
+            self.metrics.reload_busy();
+            ReloadError::Busy
+        })
+    }
+
+    /// The turn, once no reload is under way.
+    pub(crate) async fn begin(&self) -> Turn {
+        Turn(Arc::clone(&self.turn).lock_owned().await)
     }
 
     /// Loads the folder, checks every new model, hands the threads warm sessions of it and
@@ -81,14 +104,14 @@ impl Reloader {
     ///
     /// # Errors
     /// Anything that would keep the service from starting, a wrong golden answer, another
-    /// atlas; nothing has changed then.
-    pub(crate) fn reload(&self, running: &ArcSwap<Catalogue>) -> Result<Changes, ReloadError> {
-        let _turn = match self.turn.try_lock() {
-            Ok(turn) => turn,
-            Err(TryLockError::Poisoned(turn)) => turn.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err(ReloadError::Busy),
-        };
-        let result = self.replace(running);
+    /// atlas, or it is to stop; nothing has changed then.
+    pub(crate) fn reload(
+        &self,
+        _turn: Turn,
+        running: &ArcSwap<Catalogue>,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Changes, ReloadError> {
+        let result = self.replace(running, is_to_stop);
         self.metrics.reload(result.is_ok());
         match &result {
             Ok(changes) => tracing::info!(?changes, "models reloaded"),
@@ -97,11 +120,16 @@ impl Reloader {
         result
     }
 
-    fn replace(&self, running: &ArcSwap<Catalogue>) -> Result<Changes, ReloadError> {
+    fn replace(
+        &self,
+        running: &ArcSwap<Catalogue>,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Changes, ReloadError> {
         if self.config.models.is_none() {
             return Err(ReloadError::Embedded);
         }
-        let assets = Assets::of(&self.config)?;
+        let assets = Assets::of_unless(&self.config, is_to_stop)?.ok_or(ReloadError::Draining)?;
+        let go_on = || if is_to_stop() { Err(ReloadError::Draining) } else { Ok(()) };
         let old = running.load_full();
         let new = Catalogue::load(&assets, self.config.default_tier.as_deref(), Some(&old))?;
         if new.atlas.hash() != old.atlas.hash() {
@@ -110,6 +138,7 @@ impl Reloader {
         }
         for tier in new.tiers.iter().filter(|tier| is_new(tier, &old)) {
             let name = || tier.name.clone();
+            go_on()?;
             golden::check(&new, tier)
                 .map_err(|source| ReloadError::Golden { tier: name(), source })?;
             keeps_promises(tier, &old)?;
@@ -118,7 +147,9 @@ impl Reloader {
         if new.tiers.len() > TIERS_MAX {
             return Err(ReloadError::TooMany);
         }
+        go_on()?;
         speed::calibrate(&new, self.config.calibration())?;
+        go_on()?;
         let new = Arc::new(new);
         let fresh = |place: usize| is_new(&new.tiers[place], &old);
         let sessions = self.exchange.prepare(&new, fresh)?;

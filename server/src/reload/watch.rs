@@ -12,6 +12,7 @@ use tokio::{
     time::{Instant, timeout},
 };
 
+use super::Turn;
 use crate::app::{App, begun};
 
 /// A folder must be quiet for so long: files are copied one after the other.
@@ -59,12 +60,35 @@ async fn follow(app: Arc<App>, mut changes: mpsc::Receiver<()>, watcher: Recomme
         while first.elapsed() < PATIENCE
             && matches!(timeout(QUIET, changes.recv()).await, Ok(Some(())))
         {}
-        let app = Arc::clone(&app);
-        // What came of it is in the log and in the metrics.
-        let _ = spawn_blocking(move || app.reload()).await;
+        once(Arc::clone(&app)).await;
     }
     // It lives as long as the loop.
     drop(watcher);
+}
+
+/// Loads the models anew once it is its turn, unless the drain begins before. What came of it is in
+/// the log and in the metrics.
+pub(crate) async fn once(app: Arc<App>) {
+    if let Some(turn) = turn(&app).await {
+        // Err: it panicked, and the log says so.
+        let _ = spawn_blocking(move || app.reload(turn)).await;
+    }
+}
+
+/// The turn to reload: the one under way may have read the folder before it changed. None: the
+/// drain began.
+async fn turn(app: &App) -> Option<Turn> {
+    match app.reloader.try_begin() {
+        Ok(turn) => Some(turn),
+        Err(busy) => {
+            tracing::info!("{busy}; the folder is read again after it");
+            let mut drain = app.drain.subscribe();
+            tokio::select! {
+                () = begun(&mut drain) => None,
+                turn = app.reloader.begin() => Some(turn),
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use std::sync::{
 
 use bytes::Bytes;
 use papilla_proto::{
-    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready,
-    RuntimeEffect, SampleType, ServerMessage,
+    ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, MessageError, PROTOCOL_VERSIONS,
+    Problem, Ready, RuntimeEffect, SampleType, ServerMessage,
     effects::{OutOfRange, Section, SectionName},
+    json::JsonError,
 };
 use tokio::{task::spawn_blocking, time::timeout};
 
@@ -102,41 +103,51 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
             return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
         }
     };
-    let hello = match parse(&text).await {
-        Ok(ClientMessage::Hello(hello)) => hello,
-        Ok(_) => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
-        Err(error) => {
-            let message = format!("{error}; {{\"type\":\"hello\",\"version\":1,…}} is due");
-            return Ok(Err(Problem::new(ErrorCode::BadJson, message)));
+    match parse(&text).await {
+        Ok(ClientMessage::Hello(hello)) => Ok(meet(&line.app, hello).await),
+        Ok(_) => Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
+        Err(MessageError::Hello(error)) => Ok(Err(error.into())),
+        Err(MessageError::Unknown(error)) => {
+            let mut problem = Problem::from(error);
+            problem.message.push_str("; {\"type\":\"hello\",\"version\":1,…} is due");
+            Ok(Err(problem))
         }
-    };
-    Ok(meet(&line.app, hello).await)
+    }
 }
 
 /// Longest text parsed by a thread that moves bytes, bytes: some 50 us of work.
 const PARSED_INLINE_MAX: usize = 16 * 1024;
 
-async fn parse(text: &Bytes) -> serde_json::Result<ClientMessage> {
+async fn parse(text: &Bytes) -> Result<ClientMessage, MessageError> {
     if text.len() <= PARSED_INLINE_MAX {
-        return serde_json::from_slice(text);
+        return ClientMessage::from_json(text);
     }
     let text = text.clone();
-    let parsing = spawn_blocking(move || serde_json::from_slice(&text));
-    parsing.await.unwrap_or_else(|error| Err(serde::de::Error::custom(error)))
+    let parsing = spawn_blocking(move || ClientMessage::from_json(&text));
+    parsing.await.unwrap_or_else(|error| {
+        let reason = format!("it cannot be read: {error}");
+        Err(MessageError::Unknown(JsonError { member: None, reason, place: None }))
+    })
 }
 
 /// New terms for an open session; frames that the server has accepted keep the old ones.
 ///
 /// # Errors
-/// The text is no hello, or one that cannot be met; the old terms stand.
+/// The text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
 pub(super) async fn renew(
     app: &Arc<App>,
     text: &Bytes,
     number: u64,
 ) -> Result<(Terms, Ready), Problem> {
-    let Ok(ClientMessage::Hello(hello)) = parse(text).await else {
-        let message = "binary frames are due once the session is ready, or a hello for new terms";
-        return Err(Problem::new(ErrorCode::UnexpectedText, message));
+    const DUE: &str = "binary frames are due once the session is ready, or a hello for new terms";
+    let hello = match parse(text).await {
+        Ok(ClientMessage::Hello(hello)) => hello,
+        Ok(_) => return Err(Problem::new(ErrorCode::UnexpectedText, DUE)),
+        Err(MessageError::Hello(error)) => return Err(error.into()),
+        Err(MessageError::Unknown(error)) => {
+            let message = format!("{DUE}, and this is neither: {error}");
+            return Err(Problem::new(ErrorCode::UnexpectedText, message));
+        }
     };
     let (terms, _) = meet(app, hello).await?;
     let ready = ready(app, number, &terms);

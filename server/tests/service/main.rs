@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod binary;
+mod broken;
 mod clocks;
 mod drain;
 mod effects;
@@ -11,6 +12,8 @@ mod gate;
 mod hostile;
 mod information;
 mod ladder;
+mod memory;
+mod messages;
 mod network;
 mod oip;
 #[cfg(feature = "otlp")]

@@ -1,5 +1,7 @@
 //! Models that change while the service runs.
 
+mod folder;
+
 use std::{fs, path::Path, time::Duration};
 
 use papilla_proto::{FrameStatus, SampleType};
@@ -138,5 +140,39 @@ async fn a_watched_folder_is_read_when_it_changes() {
     let after = service.metric(ok).await;
     tokio::time::sleep(Duration::from_millis(2000)).await;
     assert!(service.metric(ok).await - after < 0.5, "it reads itself in circles");
+    service.server.drain().await.unwrap();
+}
+
+/// Waits until the service offers so many tiers.
+async fn until_tiers(service: &Service, count: usize) {
+    let waiting = async {
+        while names(&service.json("/v1/tiers").await).len() != count {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    let waited = tokio::time::timeout(Duration::from_secs(60), waiting).await;
+    waited.expect("the change of the folder was lost");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_change_during_a_manual_reload_is_not_lost() {
+    let service = Service::start_with(|config| {
+        config.watch_models = true;
+        // A new slow tier is measured for so long, after its files were read.
+        config.calibration_ms = 4000;
+    })
+    .await;
+    let folder = service.models.path();
+    add_model(folder, "third", atlas().hash(), 8, 0.1);
+    list(folder, "quick", &["quick", "slow", "third"]);
+    let manual = tokio::spawn(service.post("/v1/admin/reload", "").send());
+    // It has read the folder, and is at work for longer than the folder must be quiet.
+    tokio::time::sleep(Duration::from_millis(1000)).await;
+    assert!(!manual.is_finished());
+    add_model(folder, "fourth", atlas().hash(), 0, 0.1);
+    list(folder, "quick", &["quick", "slow", "third", "fourth"]);
+    assert_eq!(manual.await.unwrap().json()["added"], json!(["third"]));
+    until_tiers(&service, 4).await;
+    assert!(service.metric("papilla_reloads_total{outcome=\"busy\"}").await > 0.5);
     service.server.drain().await.unwrap();
 }

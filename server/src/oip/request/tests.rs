@@ -2,6 +2,9 @@ use axum::http::HeaderValue;
 use proptest::prelude::*;
 use serde_json::json;
 
+use papilla_proto::MAP_LEN;
+use serde_json::Value;
+
 use super::*;
 
 fn input(members: &Value) -> Value {

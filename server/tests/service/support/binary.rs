@@ -1,6 +1,7 @@
 //! The binary as a process of its own.
 
 use std::{
+    fs,
     io::{BufRead, BufReader},
     net::SocketAddr,
     path::Path,
@@ -8,6 +9,7 @@ use std::{
 };
 
 use serde_json::Value;
+use tempfile::NamedTempFile;
 
 /// The binary with these arguments.
 pub(crate) fn papilla(args: &[&str]) -> Command {
@@ -30,12 +32,17 @@ impl Running {
 
     /// The same, with more arguments.
     pub(crate) fn start_with(models: &Path, more: &[&str]) -> Self {
+        Self::spawn(models, &[&["--log", "error"], more].concat(), Stdio::inherit())
+    }
+
+    fn spawn(models: &Path, more: &[&str], stderr: Stdio) -> Self {
         let models = models.to_str().unwrap();
         let args = ["--models", models, "--bind", "127.0.0.1:0", "--json", "--threads", "1"];
         let mut child = papilla(&args)
-            .args(["--calibration-ms", "1", "--log", "error"])
+            .args(["--calibration-ms", "1"])
             .args(more)
             .stdout(Stdio::piped())
+            .stderr(stderr)
             .spawn()
             .unwrap();
         let mut line = String::new();
@@ -63,5 +70,25 @@ impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// A running binary whose log is kept.
+pub(crate) struct Logged {
+    pub(crate) running: Running,
+    log: NamedTempFile,
+}
+
+impl Logged {
+    /// Returns once it listens.
+    pub(crate) fn start(models: &Path, more: &[&str]) -> Self {
+        let log = NamedTempFile::new().unwrap();
+        let running = Running::spawn(models, more, log.reopen().unwrap().into());
+        Self { running, log }
+    }
+
+    /// What it has said on stderr so far.
+    pub(crate) fn log(&self) -> String {
+        fs::read_to_string(self.log.path()).unwrap()
     }
 }

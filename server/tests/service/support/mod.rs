@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-pub(crate) use binary::{Running, papilla, signal};
+pub(crate) use binary::{Logged, Running, papilla, signal};
 pub(crate) use http::{Answer, Request, raw_exchange};
 pub(crate) use socket::{Heard, Socket, frame, hello};
 
@@ -155,8 +155,20 @@ pub(crate) fn add_model_of_gain(
     error: f64,
     gain: f32,
 ) {
+    let onnx = onnx::model(gain, work, &metadata(name, atlas_hash, work));
+    add_file(folder, name, atlas_hash, work, error, &onnx);
+}
+
+/// A model that belongs to its card, and that the engine's backend panics over when it reads it.
+pub(crate) fn add_model_to_panic_over(folder: &Path, name: &str, atlas_hash: &str) {
+    let onnx = onnx::of_one_stride(&metadata(name, atlas_hash, 0));
+    add_file(folder, name, atlas_hash, 0, 0.2, &onnx);
+}
+
+/// What a model file says of itself.
+fn metadata(name: &str, atlas_hash: &str, work: usize) -> [(&'static str, String); 10] {
     let network = json!({"kind": "test", "base": work}).to_string();
-    let metadata = [
+    [
         ("papilla.format", "1".to_owned()),
         ("papilla.name", name.to_owned()),
         ("papilla.atlas_hash", atlas_hash.to_owned()),
@@ -167,11 +179,14 @@ pub(crate) fn add_model_of_gain(
         ("papilla.dataset_sha256", "0".repeat(64)),
         ("papilla.training", json!({"seed": 0}).to_string()),
         ("papilla.metrics", json!({}).to_string()),
-    ];
-    let onnx = onnx::model(gain, work, &metadata);
+    ]
+}
+
+/// Writes the file of a model, and a card that fits.
+fn add_file(folder: &Path, name: &str, atlas_hash: &str, work: usize, error: f64, onnx: &[u8]) {
     let spread = |median: f64| json!({"median": median, "p95": 2.0 * median});
     let card = json!({
-        "format": 1, "name": name, "onnx_sha256": hex(&Sha256::digest(&onnx)), "bytes": onnx.len(),
+        "format": 1, "name": name, "onnx_sha256": hex(&Sha256::digest(onnx)), "bytes": onnx.len(),
         "atlas_hash": atlas_hash, "effects": ["finite_strain", "layers"],
         "network": {"kind": "test", "base": work},
         "pressure_range_pa": [0.0, PRESSURE_MAX_PA],
@@ -183,7 +198,7 @@ pub(crate) fn add_model_of_gain(
         "latency_ms": {"backend": "tract", "threads": 1, "p50": 1.0, "p99": 2.0},
         "onnxruntime_difference_max": null
     });
-    write(folder, &format!("{name}.onnx"), &onnx);
+    write(folder, &format!("{name}.onnx"), onnx);
     write(folder, &format!("{name}.json"), card.to_string().as_bytes());
 }
 

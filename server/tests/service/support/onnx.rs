@@ -59,11 +59,13 @@ fn node(kind: &str, inputs: &[&str], output: &str) -> Message {
     inputs.text(2, output).text(3, output).text(4, kind)
 }
 
+/// An attribute: a list of whole numbers.
+fn ints(name: &str, values: &[u64]) -> Message {
+    let list = values.iter().fold(Message::default().text(1, name), |m, &v| m.int(8, v));
+    list.int(20, 7)
+}
+
 fn convolution(inputs: &[&str], output: &str) -> Message {
-    let ints = |name: &str, values: &[u64]| {
-        let list = values.iter().fold(Message::default().text(1, name), |m, &v| m.int(8, v));
-        list.int(20, 7)
-    };
     node("Conv", inputs, output)
         .message(5, &ints("kernel_shape", &[3, 3]))
         .message(5, &ints("pads", &[1, 1, 1, 1]))
@@ -81,7 +83,22 @@ pub(crate) fn model(gain: f32, work: usize, metadata: &[(&str, String)]) -> Vec<
     if work > 0 {
         graph = idle_work(graph, work);
     }
-    graph = graph.message(11, &map_info("pressure_pa")).message(12, &map_info("sed_j_per_m3"));
+    whole(graph, metadata)
+}
+
+/// A model with a transposed convolution over two axes that names the stride of one.
+pub(crate) fn of_one_stride(metadata: &[(&str, String)]) -> Vec<u8> {
+    let inputs = ["pressure_pa", "kernel"];
+    let convolution = node("ConvTranspose", &inputs, "sed_j_per_m3")
+        .message(5, &ints("kernel_shape", &[1, 1]))
+        .message(5, &ints("strides", &[1]));
+    let graph = Message::default().text(2, "test").message(1, &convolution);
+    whole(graph.message(5, &tensor("kernel", &[1, 1, 1, 1], &[1.0])), metadata)
+}
+
+/// The file of a graph that makes an SED map of a pressure map.
+fn whole(graph: Message, metadata: &[(&str, String)]) -> Vec<u8> {
+    let graph = graph.message(11, &map_info("pressure_pa")).message(12, &map_info("sed_j_per_m3"));
     let opset = Message::default().text(1, "").int(2, 13);
     let mut model = Message::default().int(1, 8).text(2, "papilla-tests");
     model = model.message(7, &graph).message(8, &opset);

@@ -1,0 +1,132 @@
+use proptest::prelude::*;
+use serde_json::json;
+
+use super::*;
+
+#[test]
+fn the_smallest_hello_is_enough() {
+    let hello: ClientMessage =
+        serde_json::from_value(json!({"type": "hello", "version": 1})).unwrap();
+    assert_eq!(hello, ClientMessage::Hello(Hello::default()));
+}
+
+#[test]
+fn a_hello_of_version_1_keeps_its_form() {
+    let json = serde_json::to_value(Hello::default()).unwrap();
+    let names: Vec<_> = json.as_object().unwrap().keys().cloned().collect();
+    let due = ["atlas_hash", "budget_us", "effects", "pressure_scale_pa", "sample_type"];
+    assert_eq!(names, [&due[..], &["tier", "version"]].concat());
+    assert_eq!(Hello::default().member_of_version_2(), None);
+    let hello = Hello { map: Some(false), ..Hello::default() };
+    assert_eq!(hello.member_of_version_2(), Some("map"));
+}
+
+#[test]
+fn misspelt_and_mistyped_members_are_refused() {
+    for bad in [
+        json!({"type": "hello", "version": 1, "teir": "x"}),
+        json!({"type": "hello"}),
+        json!({"type": "helo", "version": 1}),
+        json!({"version": 1}),
+        json!({"type": "hello", "version": 1, "sample_type": "f64"}),
+        json!({"type": "hello", "version": 1, "budget_us": -1}),
+        json!({"type": "hello", "version": 1, "budget_us": 1.5}),
+        json!({"type": "hello", "version": "1"}),
+        json!([]),
+    ] {
+        assert!(serde_json::from_value::<ClientMessage>(bad.clone()).is_err(), "{bad}");
+        assert!(read(&bad).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn an_error_says_whether_the_session_goes_on() {
+    let problem = Problem::new(ErrorCode::WrongLength, "short").at("payload");
+    let message = ServerMessage::Error(SessionError::new(problem, Some(4), false));
+    assert_eq!(
+        serde_json::to_value(&message).unwrap(),
+        json!({"type": "error", "code": "wrong_length", "message": "short",
+               "field": "payload", "sequence": 4, "closes": false})
+    );
+}
+
+proptest! {
+    #[test]
+    fn hellos_come_back(
+        effects in prop::collection::vec("[a-z_]{1,12}", 0..4),
+        budget_us in any::<Option<u32>>(),
+        tier in prop::option::of(".{0,20}"),
+        kind in 0u8..4,
+        scale in prop::option::of(1e-6f32..1e6),
+    ) {
+        let hello = ClientMessage::Hello(Hello {
+            version: 1,
+            effects,
+            budget_us,
+            tier,
+            sample_type: SampleType::from_wire(kind).unwrap(),
+            pressure_scale_pa: scale,
+            ..Hello::default()
+        });
+        let text = serde_json::to_string(&hello).unwrap();
+        prop_assert_eq!(&serde_json::from_str::<ClientMessage>(&text).unwrap(), &hello);
+        prop_assert_eq!(ClientMessage::from_json(text.as_bytes()), Ok(hello));
+    }
+
+    #[test]
+    fn text_of_any_kind_does_not_panic(text in ".{0,200}") {
+        let _ = serde_json::from_str::<ClientMessage>(&text);
+        let _ = ClientMessage::from_json(text.as_bytes());
+        let _ = serde_json::from_str::<ServerMessage>(&text);
+    }
+}
+
+fn read(json: &serde_json::Value) -> Result<ClientMessage, MessageError> {
+    ClientMessage::from_json(json.to_string().as_bytes())
+}
+
+#[test]
+fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
+    let with = |members: &str| format!(r#"{{"type":"hello","version":2,{members}}}"#);
+    for (text, member, words) in [
+        (r#"{"type":"hello","version":"1"}"#.to_owned(), Some("version"), "line 1, column 29"),
+        (with(r#""budget_us":-1"#), Some("budget_us"), "a whole number from 0"),
+        (with(r#""effects":["a",7]"#), Some("effects[1]"), "the number 7 where a text is due"),
+        (with(r#""teir":"x""#), None, "unknown field `teir`"),
+        (
+            with(r#""actuators":{"actuators":[{"at":{"px":[1]}}]}"#),
+            Some("actuators.actuators[0].at.px"),
+            "a list of",
+        ),
+        (with(r#""points":[{"inch":[1]}]"#), Some("points[0]"), "`inch`"),
+        (r#"{"type":"hello"}"#.to_owned(), None, "missing field `version`"),
+    ] {
+        let error = ClientMessage::from_json(text.as_bytes()).unwrap_err();
+        assert!(matches!(error, MessageError::Hello(_)), "{text}: {error:?}");
+        assert!(error.to_string().contains(words), "{text}: {error}");
+        assert_eq!(error.json().member.as_deref(), member, "{text}: {error}");
+        for word in ["struct", "u32", "ClientMessage", "Hello"] {
+            assert!(!error.to_string().contains(word), "{text}: {error}");
+        }
+    }
+    let long = json!({"type": "hello", "version": 1, "tier": "x".repeat(2000)});
+    let large = json!({"type": "hello", "version": 1, "effects": vec![""; 1 << 18]});
+    for text in [
+        large.to_string(),
+        "?".to_owned(),
+        r#"{"type":"helo"}"#.to_owned(),
+        "[]".to_owned(),
+        long.to_string(),
+    ] {
+        let error = ClientMessage::from_json(text.as_bytes()).unwrap_err();
+        assert!(matches!(error, MessageError::Unknown(_)), "{error:?}");
+    }
+}
+
+#[test]
+fn the_type_may_stand_anywhere() {
+    for text in [r#"{"type":"hello","version":1}"#, r#"{"version":1,"type":"hello"}"#] {
+        let hello = ClientMessage::from_json(text.as_bytes());
+        assert_eq!(hello, Ok(ClientMessage::Hello(Hello::default())));
+    }
+}
