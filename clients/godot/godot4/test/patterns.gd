@@ -1,3 +1,4 @@
+# Made of clients/godot/godot3/test/patterns.gd by clients/godot/generate: edit that one.
 # The pressure patterns of docs/conformance.md.
 extends RefCounted
 

@@ -1,3 +1,4 @@
+# Made of clients/godot/godot3/test/scenes.gd by clients/godot/generate: edit that one.
 # Runs a node or a scene until it has shown maps, named in PAPILLA_NODE.
 extends SceneTree
 
@@ -13,14 +14,14 @@ func _initialize():
 	var path = OS.get_environment("PAPILLA_NODE")
 	if path.ends_with(".tscn"):
 		_node = load(path).instantiate()
-		_node.get_node("Papilla").url = _url
-		_node.get_node("Papilla").hello = {"tier": "half-space"}
-		_node.get_node("Papilla").map_received.connect(_on_map)
+		_node.get_node("Session").url = _url
+		_node.get_node("Session").hello = {"tier": "half-space"}
+		_node.get_node("Session").map_received.connect(_on_map)
 	else:
 		_node = Node.new()
 		_node.set_script(load(path))
-		_node.papilla.url = _url
-		_node.papilla.map_received.connect(_on_map)
+		_node.session.url = _url
+		_node.session.map_received.connect(_on_map)
 	root.add_child(_node)
 
 
