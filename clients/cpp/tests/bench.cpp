@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   if (url) options.url = url;
   options.hello = "\"tier\": \"half-space\"";
   // The client time is the instant at which the frame was meant to leave.
-  options.on_outcome = [&](const papilla::Answer& answer) {
+  options.on_answer = [&](const papilla::Answer& answer) {
     if (answer.status == papilla::Status::ok) {
       times_us.push_back(double(papilla::now_us() - answer.client_time_us));
     }

@@ -56,13 +56,13 @@ class Run {
     bool good;
     Problem problem;
     if (session_) {
-      good = session_->terms(members(step["hello"]));
+      good = session_->renew(members(step["hello"]));
       problem = session_->problem();
     } else {
       Session::Options options;
       options.url = url_;
       options.hello = members(step["hello"]);
-      options.on_outcome = [this](const Answer& answer) {
+      options.on_answer = [this](const Answer& answer) {
         std::lock_guard<std::mutex> lock(mutex_);
         outcomes_.push_back({answer.sequence, answer.status, answer.by_client});
       };
@@ -73,9 +73,9 @@ class Run {
     }
     must(good == (due_status(expect) == "ok"), "the hello: " + problem.code + " " + problem.message);
     if (!good) return check_problem(expect, problem);
-    const Terms terms = session_->agreed();
+    const Ready ready = session_->ready();
     for (const auto& [name, due] : expect["ready"].members) {
-      must(json::print(terms.ready[name]) == json::print(due), "ready." + name + " is another");
+      must(json::print(ready.message[name]) == json::print(due), "ready." + name + " is another");
     }
   }
 
