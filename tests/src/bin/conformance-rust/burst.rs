@@ -8,7 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, ensure};
-use papilla_client::{Answer, Outcome};
+use papilla_client::{Answer, Status};
 use papilla_tests::conformance::pattern::Pressure;
 use serde_json::{Value, json};
 use tokio::{sync::oneshot::Receiver, time};
@@ -106,8 +106,8 @@ fn check_burst(
     sequences.dedup();
     ensure!(sequences.len() == count, "two outcomes of one frame");
     let superseded = |due: bool| {
-        let due = Outcome::Superseded { by_client: due };
-        arrived.iter().filter(|(_, answer)| answer.outcome == due).count() as u64
+        let due = Status::Superseded { by_client: due };
+        arrived.iter().filter(|(_, answer)| answer.status == due).count() as u64
     };
     let (here, there) = (superseded(true), superseded(false));
     let good: Vec<usize> =
