@@ -14,11 +14,11 @@ static std::atomic<unsigned long long> allocations{0};
 
 void* operator new(std::size_t size) {
   ++allocations;
-  if (void* const room = std::malloc(size)) return room;
+  if (void* const block = std::malloc(size)) return block;
   std::abort();
 }
-void operator delete(void* room) noexcept { std::free(room); }
-void operator delete(void* room, std::size_t) noexcept { std::free(room); }
+void operator delete(void* block) noexcept { std::free(block); }
+void operator delete(void* block, std::size_t) noexcept { std::free(block); }
 
 int main(int argc, char** argv) {
   double rate_hz = 90.0, duration_s = 60.0;

@@ -131,13 +131,13 @@ class Run {
     }
     std::set<std::uint32_t> named;
     std::uint32_t last = 0;
-    std::size_t replaced = 0, here = 0, good = 0;
+    std::size_t superseded = 0, here = 0, good = 0;
     for (const Outcome& outcome : found) {
       named.insert(outcome.sequence);
       must(outcome.status == Status::ok || outcome.status == Status::superseded, name_of(outcome.status));
       here += outcome.by_client;
       if (outcome.status == Status::superseded) {
-        ++replaced;
+        ++superseded;
         continue;
       }
       ++good;
@@ -146,14 +146,14 @@ class Run {
     }
     must(named == std::set<std::uint32_t>(sent.begin(), sent.end()), "two outcomes of one frame");
     must(last == sent.back(), "the newest frame was not rendered last");
-    must(here == session().superseded_by_client() - before, "the client miscounts what it replaced");
-    must(replaced >= expect["superseded"].whole(), "too few were superseded");
-    must(here >= expect["superseded_by_client"].whole(), "the client replaced too few");
+    must(here == session().superseded_by_client() - before, "the client miscounts what it superseded");
+    must(superseded >= expect["superseded"].whole(), "too few were superseded");
+    must(here >= expect["superseded_by_client"].whole(), "the client superseded too few");
     Answer newest;
     must(session().latest(newest) && newest.sequence == last, "latest() gives another answer");
     check_answer(expect["newest"], newest);
-    note = " (" + std::to_string(good) + " ok, " + std::to_string(here) + " replaced here, " +
-           std::to_string(replaced - here) + " by the service)";
+    note = " (" + std::to_string(good) + " ok, " + std::to_string(here) + " superseded here, " +
+           std::to_string(superseded - here) + " by the service)";
   }
 
   void reconnect(const Value& step) {

@@ -33,7 +33,7 @@ class Frame:
 
 
 async def dial(host: str, port: int) -> socket.socket:
-    """A connection with room for a whole frame each way; the room must be named before."""
+    """A connection with buffers for a whole frame each way, which must be asked for before connecting."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
     for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):

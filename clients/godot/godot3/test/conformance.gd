@@ -145,7 +145,7 @@ func step_frame(step, expect):
 	var map = Patterns.pattern(step.pressure, 1.0)
 	session.deadline_us = int(step.get("deadline_us", 0))
 	for attempt in int(step.get("attempts", 1)):
-		session.time_us = int(step.get("client_time_us", 0))
+		session.client_time_us = int(step.get("client_time_us", 0))
 		var before = OS.get_ticks_usec()
 		var sequence
 		if step.has("window"):
@@ -164,7 +164,7 @@ func step_frame(step, expect):
 			continue
 		if outcome.has("client_time_us"):
 			var stamp = outcome.client_time_us
-			if stamp != session.time_us if session.time_us > 0 else (stamp < before or stamp > after):
+			if stamp != session.client_time_us if session.client_time_us > 0 else (stamp < before or stamp > after):
 				fail("client time %d" % stamp)
 		check(expect, outcome)
 		return

@@ -3,7 +3,7 @@ using Papilla;
 using UnityEngine;
 
 /// <summary>
-/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A press of half a newton
+/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A contact of half a newton
 /// circles the pad; a game fills <c>pressurePa</c> from its own contacts.
 /// </summary>
 [RequireComponent(typeof(MeshFilter), typeof(MeshRenderer))]

@@ -39,8 +39,8 @@ export var in_flight_max = 3
 var server_ready = null
 # Deadline of the frames to come, us; 0: the session's budget.
 var deadline_us = 0
-# us of the header; 0: the clock.
-var time_us = 0
+# Time of the frames to come by the client's clock, us; 0: the engine's own.
+var client_time_us = 0
 # Frames that went out, and frames that a newer one replaced before they left.
 var sent = 0
 var superseded_by_client = 0
@@ -118,7 +118,7 @@ func send_window(samples_pa, column, row, width, height):
 		return -1
 	_supersede_waiting()
 	_sequence = (_sequence + 1) & 0xffffffff
-	var stamp = time_us if time_us > 0 else OS.get_ticks_usec()
+	var stamp = client_time_us if client_time_us > 0 else OS.get_ticks_usec()
 	var type = _asked.get("sample_type", "f32")
 	_waiting = Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, stamp, deadline_us)
 	_waiting_sequence = _sequence
