@@ -13,15 +13,17 @@ use std::{
 fn main() -> Result<(), Box<dyn Error>> {
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    embed(&root.join("../models"), &["onnx", "json"], &out.join("models.rs"))?;
-    let page = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
-    embed(&root.join("web"), &page, &out.join("page.rs"))?;
+    embed(files(&root.join("../models"), &["onnx", "json"])?, &out.join("models.rs"))?;
+    let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
+    let mut page = files(&root.join("web"), &endings)?;
+    // The web client's: the page paints the same pixels.
+    page.push(root.join("../clients/web/src/raster.js").canonicalize()?);
+    embed(page, &out.join("page.rs"))?;
     Ok(())
 }
 
-/// Writes an expression of type `&[(&str, &[u8])]`: name and bytes of every
-/// file in `folder` with one of the `endings`, sorted by name.
-fn embed(folder: &Path, endings: &[&str], into: &Path) -> Result<(), Box<dyn Error>> {
+/// Every file in `folder` with one of the `endings`.
+fn files(folder: &Path, endings: &[&str]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     println!("cargo:rerun-if-changed={}", folder.display());
     let mut files = Vec::new();
     if folder.is_dir() {
@@ -33,6 +35,12 @@ fn embed(folder: &Path, endings: &[&str], into: &Path) -> Result<(), Box<dyn Err
             }
         }
     }
+    Ok(files)
+}
+
+/// Writes an expression of type `&[(&str, &[u8])]`: name and bytes of every
+/// file, sorted by path.
+fn embed(mut files: Vec<PathBuf>, into: &Path) -> Result<(), Box<dyn Error>> {
     files.sort();
     let mut list = String::from("&[\n");
     for path in files {

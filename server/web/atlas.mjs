@@ -1,6 +1,6 @@
 // The atlas as flat typed arrays, and the geometry the page needs from it.
 
-import { Raster } from './raster.mjs';
+import { Raster } from './raster.js';
 
 /** A surface patch of the finger unwrapped into the 224 x 224 map. */
 class Patch {

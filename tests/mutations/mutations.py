@@ -107,7 +107,7 @@ MUTATIONS = [
     ),
     Mutation(
         "the page's raster with two corners of each triangle exchanged",
-        "server/web/raster.mjs",
+        "clients/web/src/raster.js",
         "out[pixels[n]] = weights[k] * values[corners[k]]\n        + weights[k + 1] * values[corners[k + 1]]",
         "out[pixels[n]] = weights[k] * values[corners[k + 1]]\n        + weights[k + 1] * values[corners[k]]",
         "cd tests/browser && node --test modules.test.mjs",

@@ -177,6 +177,7 @@ def full() -> list[Step]:
         Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 27),
         Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 30),
         Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 54),
+        Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/godot/generate --check"),
         Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 27),
         Step(
             "client-godot4",

@@ -14,11 +14,11 @@ static std::atomic<unsigned long long> allocations{0};
 
 void* operator new(std::size_t size) {
   ++allocations;
-  if (void* const room = std::malloc(size)) return room;
+  if (void* const block = std::malloc(size)) return block;
   std::abort();
 }
-void operator delete(void* room) noexcept { std::free(room); }
-void operator delete(void* room, std::size_t) noexcept { std::free(room); }
+void operator delete(void* block) noexcept { std::free(block); }
+void operator delete(void* block, std::size_t) noexcept { std::free(block); }
 
 int main(int argc, char** argv) {
   double rate_hz = 90.0, duration_s = 60.0;
@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
   if (url) options.url = url;
   options.hello = "\"tier\": \"half-space\"";
   // The client time is the instant at which the frame was meant to leave.
-  options.on_outcome = [&](const papilla::Answer& answer) {
+  options.on_answer = [&](const papilla::Answer& answer) {
     if (answer.status == papilla::Status::ok) {
       times_us.push_back(double(papilla::now_us() - answer.client_time_us));
     }

@@ -56,13 +56,13 @@ class Run {
     bool good;
     Problem problem;
     if (session_) {
-      good = session_->terms(members(step["hello"]));
+      good = session_->renew(members(step["hello"]));
       problem = session_->problem();
     } else {
       Session::Options options;
       options.url = url_;
       options.hello = members(step["hello"]);
-      options.on_outcome = [this](const Answer& answer) {
+      options.on_answer = [this](const Answer& answer) {
         std::lock_guard<std::mutex> lock(mutex_);
         outcomes_.push_back({answer.sequence, answer.status, answer.by_client});
       };
@@ -73,9 +73,9 @@ class Run {
     }
     must(good == (due_status(expect) == "ok"), "the hello: " + problem.code + " " + problem.message);
     if (!good) return check_problem(expect, problem);
-    const Terms terms = session_->agreed();
+    const Ready ready = session_->ready();
     for (const auto& [name, due] : expect["ready"].members) {
-      must(json::print(terms.ready[name]) == json::print(due), "ready." + name + " is another");
+      must(json::print(ready.message[name]) == json::print(due), "ready." + name + " is another");
     }
   }
 
@@ -131,13 +131,13 @@ class Run {
     }
     std::set<std::uint32_t> named;
     std::uint32_t last = 0;
-    std::size_t replaced = 0, here = 0, good = 0;
+    std::size_t superseded = 0, here = 0, good = 0;
     for (const Outcome& outcome : found) {
       named.insert(outcome.sequence);
       must(outcome.status == Status::ok || outcome.status == Status::superseded, name_of(outcome.status));
       here += outcome.by_client;
       if (outcome.status == Status::superseded) {
-        ++replaced;
+        ++superseded;
         continue;
       }
       ++good;
@@ -146,14 +146,14 @@ class Run {
     }
     must(named == std::set<std::uint32_t>(sent.begin(), sent.end()), "two outcomes of one frame");
     must(last == sent.back(), "the newest frame was not rendered last");
-    must(here == session().superseded_by_client() - before, "the client miscounts what it replaced");
-    must(replaced >= expect["superseded"].whole(), "too few were superseded");
-    must(here >= expect["superseded_by_client"].whole(), "the client replaced too few");
+    must(here == session().superseded_by_client() - before, "the client miscounts what it superseded");
+    must(superseded >= expect["superseded"].whole(), "too few were superseded");
+    must(here >= expect["superseded_by_client"].whole(), "the client superseded too few");
     Answer newest;
     must(session().latest(newest) && newest.sequence == last, "latest() gives another answer");
     check_answer(expect["newest"], newest);
-    note = " (" + std::to_string(good) + " ok, " + std::to_string(here) + " replaced here, " +
-           std::to_string(replaced - here) + " by the service)";
+    note = " (" + std::to_string(good) + " ok, " + std::to_string(here) + " superseded here, " +
+           std::to_string(superseded - here) + " by the service)";
   }
 
   void reconnect(const Value& step) {

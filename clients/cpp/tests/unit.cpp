@@ -56,18 +56,18 @@ static void messages() {
   // Whatever comes, the core neither crashes nor takes it for an answer.
   papilla::Core core;
   int outcomes = 0;
-  core.on_outcome = [&](const papilla::Answer&) { ++outcomes; };
-  CHECK(core.text("no json") == papilla::Core::Heard::broken);
+  core.on_answer = [&](const papilla::Answer&) { ++outcomes; };
+  CHECK(core.text("no json") == papilla::Core::Event::broken);
   CHECK(core.text(R"({"type": "ready", "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
-        papilla::Core::Heard::ready);
+        papilla::Core::Event::ready);
   const std::vector<float> map(papilla::map_len, 1.0F);
   const std::uint32_t sequence = core.send(map.data(), {}, 7);
   papilla::Outgoing* const frame = core.take();
   CHECK(frame && frame->size == 48 + 4 * papilla::map_len && core.in_flight() == 1);
   std::vector<std::uint8_t> answer(frame->data(), frame->data() + frame->size);
   answer[5] = 2;
-  CHECK(core.binary(answer.data(), 47) == papilla::Core::Heard::broken);
-  CHECK(core.binary(answer.data(), answer.size() - 1) == papilla::Core::Heard::broken && outcomes == 0);
+  CHECK(core.binary(answer.data(), 47) == papilla::Core::Event::broken);
+  CHECK(core.binary(answer.data(), answer.size() - 1) == papilla::Core::Event::broken && outcomes == 0);
   core.send(map.data(), {}, 8);
   core.send(map.data(), {}, 9);
   CHECK(outcomes == 1 && core.superseded_by_client() == 1);

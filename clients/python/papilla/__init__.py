@@ -9,10 +9,10 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 """
 
 from .aio import AsyncSession
-from .answer import Answer, FrameProblem, Summary
+from .answer import Answer, Problem, Summary
 from .atlas import Atlas, Contact
 from .errors import Closed, NotRendered, PapillaError, Refused, Unreachable
-from .http import DEFAULT_URL, Press, post, press, sed
+from .http import DEFAULT_URL, Indentation, indentation, post, sed
 from .sync import Session
 from .wire import SIDE_PX
 
@@ -24,15 +24,15 @@ __all__ = [
     "Atlas",
     "Closed",
     "Contact",
-    "FrameProblem",
+    "Indentation",
     "NotRendered",
     "PapillaError",
-    "Press",
+    "Problem",
     "Refused",
     "Session",
     "Summary",
     "Unreachable",
+    "indentation",
     "post",
-    "press",
     "sed",
 ]

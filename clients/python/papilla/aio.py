@@ -17,7 +17,7 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 
 from . import answer as answers
 from . import wire
-from .answer import Answer, FrameProblem
+from .answer import Answer, Problem
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
 from .link import Frame, dial
@@ -54,7 +54,7 @@ class AsyncSession:
         self._sent: dict[int, Frame] = {}
         self._wake = asyncio.Event()
         self._connected = asyncio.Event()
-        self._terms: asyncio.Future[dict[str, Any]] | None = None
+        self._renewal: asyncio.Future[dict[str, Any]] | None = None
         self._writing = asyncio.Lock()
         self._tasks: list[asyncio.Task[None]] = []
         self._closed = False
@@ -115,17 +115,17 @@ class AsyncSession:
         """`send`, and waits for the outcome."""
         return await asyncio.wrap_future(self.send(pressure_pa, **more))
 
-    async def terms(self, **hello: Any) -> dict[str, Any]:
+    async def renew(self, **hello: Any) -> dict[str, Any]:
         """Says hello again, in the open session; raises Refused, and the old terms stand."""
         async with self._writing:
             if self._socket is None:
                 raise Unreachable(f"{self.url} is not connected")
-            self._terms = asyncio.get_running_loop().create_future()
+            self._renewal = asyncio.get_running_loop().create_future()
             try:
                 await self._socket.send(self._words(hello))
-                ready = await asyncio.wait_for(self._terms, _PATIENCE_S)
+                ready = await asyncio.wait_for(self._renewal, _PATIENCE_S)
             finally:
-                self._terms = None
+                self._renewal = None
             await self._agree(ready)
             self._hello = hello
             return ready
@@ -200,8 +200,8 @@ class AsyncSession:
             await self._read()
             self._connected.clear()
             self._wake.set()
-            if self._terms is not None and not self._terms.done():
-                self._terms.set_exception(Unreachable("the connection broke"))
+            if self._renewal is not None and not self._renewal.done():
+                self._renewal.set_exception(Unreachable("the connection broke"))
             for frame in list(self._sent.values()):
                 self._lose(frame)
             self._sent.clear()
@@ -244,14 +244,14 @@ class AsyncSession:
     def _told(self, message: dict[str, Any]) -> None:
         frame = self._sent.pop(message.get("sequence", -1), None)
         if frame is not None:
-            problem = FrameProblem(message["code"], message["message"], message.get("field"))
+            problem = Problem(message["code"], message["message"], message.get("field"))
             frame.end("error", problem=problem)
-        elif self._terms is not None and not self._terms.done():
+        elif self._renewal is not None and not self._renewal.done():
             if message["type"] == "ready":
-                self._terms.set_result(message)
+                self._renewal.set_result(message)
             else:
                 refused = Refused(message["code"], message["message"], message.get("field"))
-                self._terms.set_exception(refused)
+                self._renewal.set_exception(refused)
 
     async def _write(self) -> None:
         """Sends what waits, one frame at a time."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +34,7 @@ class Summary(NamedTuple):
     sa1_rate_hz: float
 
 
-class FrameProblem(NamedTuple):
+class Problem(NamedTuple):
     """Why the service refused a frame."""
 
     code: str
@@ -52,12 +52,16 @@ class Answer:
     client_time_us: int
     by_client: bool = False
     """Superseded here: the frame never left the client."""
-    problem: FrameProblem | None = None
+    problem: Problem | None = None
     """With status `error`."""
     kind: str = "sed"
     """`sed` (J/m3) or, with the effect `afferents`, `sa1_rate` (Hz)."""
-    flags: frozenset[str] = field(default_factory=frozenset)
-    """Of `out_of_range`, `no_contact` and `unfamiliar` (rougher or heavier than any map of the training)."""
+    out_of_range: bool = False
+    """A pressure is above what the tier was trained on; the map is an extrapolation."""
+    no_contact: bool = False
+    """The map is zero; no network was asked."""
+    unfamiliar: bool = False
+    """The map is rougher or heavier than any the tier was trained on: it may mean nothing."""
     tier: str = ""
     window: Window = wire.WHOLE
     """Column, row, width and height of `values`."""
@@ -100,7 +104,9 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         header.status,
         header.client_time_us,
         kind=header.kind,
-        flags=header.flags,
+        out_of_range="out_of_range" in header.flags,
+        no_contact="no_contact" in header.flags,
+        unfamiliar="unfamiliar" in header.flags,
         tier=tier,
         window=header.window,
         total_us=header.total_us,

@@ -31,8 +31,8 @@ class HttpAnswer(NamedTuple):
     total_us: int
 
 
-class Press(NamedTuple):
-    """A press that the FE solver computed: its pressure, Pa, and its SED, J/m3."""
+class Indentation(NamedTuple):
+    """An indentation that the FE solver computed: its pressure, Pa, and its SED, J/m3."""
 
     name: str
     pressure_pa: Map
@@ -120,9 +120,9 @@ def sed(
     return post(pressure_pa, url=url, tier=tier, budget_us=budget_us, token=token).sed
 
 
-def press(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Press:
-    """One of the FE presses that the service ships: input and truth."""
+def indentation(number: int = 0, *, url: str = DEFAULT_URL, token: str | None = None) -> Indentation:
+    """One of the FE indentations that the service ships: input and truth."""
     name = get_json(url, "/v1/presses", token)["presses"][number]["name"]
     maps = [_array(request(url, f"/v1/presses/{number}/{what}", None, _NPY, token)[0]) for what in ("pressure", "sed")]
     assert all(map_.shape == (SIDE_PX, SIDE_PX) for map_ in maps)
-    return Press(name, *maps)
+    return Indentation(name, *maps)

@@ -7,7 +7,7 @@ import socket
 from concurrent.futures import Future
 from typing import Any, Final
 
-from .answer import Answer, FrameProblem
+from .answer import Answer, Problem
 
 _SOCKET_BYTES: Final = 512 * 1024
 
@@ -24,7 +24,7 @@ class Frame:
         self.outcome: Future[Answer] = Future()
         self.ready: dict[str, Any] = {}
 
-    def end(self, status: str, by_client: bool = False, problem: FrameProblem | None = None) -> None:
+    def end(self, status: str, by_client: bool = False, problem: Problem | None = None) -> None:
         self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem))
 
     def give(self, answer: Answer) -> None:
@@ -33,7 +33,7 @@ class Frame:
 
 
 async def dial(host: str, port: int) -> socket.socket:
-    """A connection with room for a whole frame each way; the room must be named before."""
+    """A connection with buffers for a whole frame each way, which must be asked for before connecting."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
     for family, kind, proto, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):

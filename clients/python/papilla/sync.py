@@ -110,6 +110,6 @@ class Session:
         sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
         return sent.result(timeout_s)
 
-    def terms(self, **hello: Any) -> dict[str, Any]:
+    def renew(self, **hello: Any) -> dict[str, Any]:
         """Says hello again, in the open session; raises Refused, and the old terms stand."""
-        return self._call(self._session.terms(**hello))
+        return self._call(self._session.renew(**hello))

@@ -42,10 +42,10 @@ def test_asyncio_sessions_side_by_side(url):
     assert half.summary.force_n == pytest.approx(whole.summary.force_n / 2, rel=1e-5)
 
 
-def test_the_presses_of_the_service_are_rendered_as_its_card_promises(url):
-    press = papilla.press(0, url=url)
-    rendered = papilla.sed(press.pressure_pa, url=url)
-    error = np.linalg.norm(rendered - press.sed_j_per_m3) / np.linalg.norm(press.sed_j_per_m3)
+def test_the_indentations_of_the_service_are_rendered_as_its_card_promises(url):
+    indentation = papilla.indentation(0, url=url)
+    rendered = papilla.sed(indentation.pressure_pa, url=url)
+    error = np.linalg.norm(rendered - indentation.sed_j_per_m3) / np.linalg.norm(indentation.sed_j_per_m3)
     assert error < 0.3, f"relative L2 {error}"
 
 
@@ -94,5 +94,5 @@ def test_figure_4_is_drawn(url, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = runpy.run_path(str(EXAMPLES / "figure4.py"))
     assert (tmp_path / "figure4.png").stat().st_size > 20_000
-    assert len(names["presses"]) == 3
+    assert len(names["indentations"]) == 3
     assert os.environ["PAPILLA_URL"] == url

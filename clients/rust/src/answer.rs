@@ -2,14 +2,14 @@
 
 use papilla_proto::{
     Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
-    Window, effects::SectionName,
+    Window, effects::SectionName, flags,
 };
 
-use crate::ClientError;
+use crate::PapillaError;
 
-/// How a frame fared.
+/// What became of a frame.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum Status {
     /// It was rendered.
     Ok,
     /// A newer frame took its place.
@@ -32,14 +32,18 @@ pub enum Outcome {
 pub struct Answer {
     /// Number of the frame, as [`Session::send`](crate::Session::send) gave it.
     pub sequence: u32,
-    /// How it fared; everything below `client_time_us` is of rendered frames.
-    pub outcome: Outcome,
+    /// What became of it; everything below `client_time_us` is of rendered frames.
+    pub status: Status,
     /// The frame's time by the client's clock, us.
     pub client_time_us: u64,
     /// SED (J/m3), or with the effect `afferents` firing rates (Hz).
     pub kind: FrameKind,
-    /// Bits of [`flags`](papilla_proto::flags).
-    pub flags: u8,
+    /// A pressure is above what the tier was trained on: the map is an extrapolation.
+    pub out_of_range: bool,
+    /// The map is zero; no network was asked.
+    pub no_contact: bool,
+    /// Rougher or heavier than any map the tier was trained on: it may mean nothing.
+    pub unfamiliar: bool,
     /// Name of the tier that rendered.
     pub tier: String,
     /// Time in the server, us.
@@ -64,7 +68,7 @@ impl Answer {
     /// Whether there is a map (or what the session asked for in its place).
     #[must_use]
     pub fn is_ok(&self) -> bool {
-        self.outcome == Outcome::Ok
+        self.status == Status::Ok
     }
 
     /// The greatest value of the map; 0 without one.
@@ -73,13 +77,15 @@ impl Answer {
         self.map.iter().copied().fold(0.0, f32::max)
     }
 
-    pub(crate) fn without_map(sequence: u32, client_time_us: u64, outcome: Outcome) -> Self {
+    pub(crate) fn without_map(sequence: u32, client_time_us: u64, status: Status) -> Self {
         Self {
             sequence,
-            outcome,
+            status,
             client_time_us,
             kind: FrameKind::Sed,
-            flags: 0,
+            out_of_range: false,
+            no_contact: false,
+            unfamiliar: false,
             tier: String::new(),
             total_us: 0,
             queue_us: 0,
@@ -98,26 +104,29 @@ impl Answer {
         message: &[u8],
         ready: &Ready,
         tier: String,
-    ) -> Result<Self, ClientError> {
-        let Extension { queue_us, infer_us, flags, .. } = header.extension.unwrap_or_default();
-        let outcome = match header.status {
-            FrameStatus::Ok => Outcome::Ok,
-            FrameStatus::Superseded => Outcome::Superseded { by_client: false },
-            FrameStatus::Late => Outcome::Late,
-            FrameStatus::Stale => Outcome::Stale,
+    ) -> Result<Self, PapillaError> {
+        let Extension { queue_us, infer_us, flags: bits, .. } =
+            header.extension.unwrap_or_default();
+        let status = match header.status {
+            FrameStatus::Ok => Status::Ok,
+            FrameStatus::Superseded => Status::Superseded { by_client: false },
+            FrameStatus::Late => Status::Late,
+            FrameStatus::Stale => Status::Stale,
             FrameStatus::Error => {
-                return Err(ClientError::Protocol("an error came as a frame".to_owned()));
+                return Err(PapillaError::Protocol("an error came as a frame".to_owned()));
             }
         };
         let mut answer = Self {
             kind: header.kind,
-            flags,
+            out_of_range: bits & flags::OUT_OF_RANGE != 0,
+            no_contact: bits & flags::NO_CONTACT != 0,
+            unfamiliar: bits & flags::UNFAMILIAR != 0,
             tier,
             total_us: header.time_us,
             queue_us,
             infer_us,
             window: header.window(),
-            ..Self::without_map(header.sequence, header.client_time_us, outcome)
+            ..Self::without_map(header.sequence, header.client_time_us, status)
         };
         if answer.is_ok() {
             answer.read_sections(header, message, ready)?;
@@ -130,7 +139,7 @@ impl Answer {
         header: &FrameHeader,
         message: &[u8],
         ready: &Ready,
-    ) -> Result<(), ClientError> {
+    ) -> Result<(), PapillaError> {
         for section in ready.sections.iter().flatten() {
             let bytes = match section.name {
                 // Its window may differ from answer to answer.
@@ -138,7 +147,7 @@ impl Answer {
                 _ => section.bytes as usize,
             };
             let at = section.offset as usize;
-            let short = || ClientError::Protocol(format!("an answer ends in {:?}", section.name));
+            let short = || PapillaError::Protocol(format!("an answer ends in {:?}", section.name));
             let part = message.get(at..at + bytes).ok_or_else(short)?;
             match section.name {
                 SectionName::Summary => self.summary = Summary::decode(part),
@@ -148,7 +157,7 @@ impl Answer {
                     self.map = vec![0.0; MAP_LEN];
                     self.window
                         .decode(header.sample_type, part, header.scale, &mut self.map)
-                        .map_err(|error| ClientError::Protocol(error.to_string()))?;
+                        .map_err(|error| PapillaError::Protocol(error.to_string()))?;
                 }
             }
         }
@@ -156,10 +165,10 @@ impl Answer {
     }
 }
 
-fn floats(bytes: &[u8]) -> Result<Vec<f32>, ClientError> {
+fn floats(bytes: &[u8]) -> Result<Vec<f32>, PapillaError> {
     let mut values = vec![0.0; bytes.len() / 4];
     SampleType::F32
         .decode(bytes, 1.0, &mut values)
-        .map_err(|error| ClientError::Protocol(error.to_string()))?;
+        .map_err(|error| PapillaError::Protocol(error.to_string()))?;
     Ok(values)
 }

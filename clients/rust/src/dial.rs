@@ -4,11 +4,11 @@ use std::io;
 
 use tokio::net::{TcpSocket, TcpStream, lookup_host};
 
-/// Room of the system for each direction, bytes: more than the largest frame. With less a
+/// Buffer of the system for each direction, bytes: more than the largest frame. With less a
 /// sender waits for room in the middle of a frame (docs/concepts/real-time.md).
 const SOCKET_BUFFER: u32 = 512 * 1024;
 
-/// Connects to `server` (host and port): room for a whole frame, `TCP_NODELAY` set.
+/// Connects to `server` (host and port): buffers for a whole frame, `TCP_NODELAY` set.
 pub(crate) async fn dial(server: &str) -> io::Result<TcpStream> {
     let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
     for address in lookup_host(server).await? {

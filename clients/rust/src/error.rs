@@ -6,7 +6,7 @@ use tokio_tungstenite::tungstenite;
 /// Why there is no session or no map.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum ClientError {
+pub enum PapillaError {
     /// Nobody listens, or the connection broke.
     #[error("{server}: {reason}; is papilla-server running there?")]
     Unreachable {
@@ -32,7 +32,7 @@ pub enum ClientError {
     Closed,
 }
 
-impl ClientError {
+impl PapillaError {
     /// The code of a refusal.
     #[must_use]
     pub fn code(&self) -> Option<ErrorCode> {

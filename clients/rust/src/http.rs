@@ -3,7 +3,7 @@
 use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleError, SampleType, atlas::Atlas};
 use ureq::{Body, http};
 
-use crate::{ClientError, dial::host_and_port, error::problem_of};
+use crate::{PapillaError, dial::host_and_port, error::problem_of};
 
 /// A map that came over HTTP.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub struct Rendered {
 ///
 /// # Errors
 /// Nobody listens, or the service refuses.
-pub fn get(server: &str, path: &str) -> Result<Vec<u8>, ClientError> {
+pub fn get(server: &str, path: &str) -> Result<Vec<u8>, PapillaError> {
     let server = host_and_port(server);
     let answer = agent().get(format!("http://{server}{path}")).call();
     body(server, answer).map(|(_, body)| body)
@@ -28,7 +28,7 @@ pub fn get(server: &str, path: &str) -> Result<Vec<u8>, ClientError> {
 ///
 /// # Errors
 /// As [`get`], or the atlas is damaged.
-pub fn atlas(server: &str) -> Result<Atlas, ClientError> {
+pub fn atlas(server: &str) -> Result<Atlas, PapillaError> {
     let text = String::from_utf8_lossy(&get(server, "/v1/atlas")?).into_owned();
     Ok(Atlas::from_json(&text)?)
 }
@@ -36,8 +36,12 @@ pub fn atlas(server: &str) -> Result<Atlas, ClientError> {
 /// SED of one pressure map (224 x 224, Pa), with the tier of that name or the service's default.
 ///
 /// # Errors
-/// Nobody listens, or the service refuses the map: [`ClientError::code`] says why.
-pub fn sed(server: &str, pressure_pa: &[f32], tier: Option<&str>) -> Result<Rendered, ClientError> {
+/// Nobody listens, or the service refuses the map: [`PapillaError::code`] says why.
+pub fn sed(
+    server: &str,
+    pressure_pa: &[f32],
+    tier: Option<&str>,
+) -> Result<Rendered, PapillaError> {
     let server = host_and_port(server);
     let mut payload = vec![0; 4 * pressure_pa.len()];
     SampleType::F32.encode(pressure_pa, 1.0, &mut payload).map_err(protocol)?;
@@ -57,16 +61,16 @@ fn agent() -> ureq::Agent {
     ureq::Agent::config_builder().http_status_as_error(false).proxy(None).build().into()
 }
 
-fn protocol(error: SampleError) -> ClientError {
-    ClientError::Protocol(error.to_string())
+fn protocol(error: SampleError) -> PapillaError {
+    PapillaError::Protocol(error.to_string())
 }
 
 /// Tier and body of an answer.
 fn body(
     server: &str,
     answer: Result<http::Response<Body>, ureq::Error>,
-) -> Result<(String, Vec<u8>), ClientError> {
-    let unreachable = |error: ureq::Error| ClientError::unreachable(server, &error);
+) -> Result<(String, Vec<u8>), PapillaError> {
+    let unreachable = |error: ureq::Error| PapillaError::unreachable(server, &error);
     let mut answer = answer.map_err(unreachable)?;
     let status = answer.status();
     let header = answer.headers().get("x-papilla-tier");
@@ -76,5 +80,5 @@ fn body(
         return Ok((tier, body));
     }
     let unnamed = || Problem::new(ErrorCode::Internal, format!("status {status}"));
-    Err(ClientError::Refused(problem_of(&body).unwrap_or_else(unnamed)))
+    Err(PapillaError::Refused(problem_of(&body).unwrap_or_else(unnamed)))
 }

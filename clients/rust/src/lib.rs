@@ -19,8 +19,8 @@ mod http;
 mod session;
 mod skin;
 
-pub use answer::{Answer, Outcome};
-pub use error::ClientError;
+pub use answer::{Answer, Status};
+pub use error::PapillaError;
 pub use http::{Rendered, atlas, get, sed};
 pub use papilla_proto as proto;
 pub use session::{Frame, Session};

@@ -14,7 +14,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-use crate::{Answer, ClientError, dial::host_and_port};
+use crate::{Answer, PapillaError, dial::host_and_port};
 use link::Link;
 use state::{Asked, State};
 
@@ -82,8 +82,8 @@ impl Session {
     /// Opens a session at `server` (host and port, or a URL). The hello goes as version 2.
     ///
     /// # Errors
-    /// Nobody listens, or the hello is refused: [`ClientError::code`] says why.
-    pub async fn open(server: &str, hello: Hello) -> Result<Self, ClientError> {
+    /// Nobody listens, or the hello is refused: [`PapillaError::code`] says why.
+    pub async fn open(server: &str, hello: Hello) -> Result<Self, PapillaError> {
         let server = host_and_port(server).to_owned();
         let hello = Hello { version: 2, ..hello };
         let (link, ready) = Link::open(&server, &hello).await?;
@@ -110,7 +110,7 @@ impl Session {
     pub fn send<'a>(
         &self,
         frame: impl Into<Frame<'a>>,
-    ) -> Result<oneshot::Receiver<Answer>, ClientError> {
+    ) -> Result<oneshot::Receiver<Answer>, PapillaError> {
         let frame = frame.into();
         let time_us = frame.client_time_us.unwrap_or_else(now_us);
         let outcome = self.shared.state().put(&frame, time_us)?;
@@ -122,21 +122,21 @@ impl Session {
     ///
     /// # Errors
     /// As [`send`](Self::send).
-    pub async fn render<'a>(&self, frame: impl Into<Frame<'a>>) -> Result<Answer, ClientError> {
+    pub async fn render<'a>(&self, frame: impl Into<Frame<'a>>) -> Result<Answer, PapillaError> {
         let outcome = self.send(frame)?;
-        outcome.await.map_err(|_| ClientError::Closed)
+        outcome.await.map_err(|_| PapillaError::Closed)
     }
 
     /// Says hello again in the open session: new tier, budget, sample type or effects.
     ///
     /// # Errors
     /// It is refused, and the old terms stand; or the connection broke meanwhile.
-    pub async fn terms(&self, hello: Hello) -> Result<Arc<Ready>, ClientError> {
+    pub async fn renew(&self, hello: Hello) -> Result<Arc<Ready>, PapillaError> {
         let (reply, answer) = oneshot::channel();
         self.shared.state().asked =
             Some(Asked { hello: Hello { version: 2, ..hello }, said: false, reply });
         self.shared.wake.notify_one();
-        answer.await.map_err(|_| ClientError::Closed)?
+        answer.await.map_err(|_| PapillaError::Closed)?
     }
 
     /// Times that a session was opened: more than 1 after a reconnect. The receiver tells when
@@ -149,7 +149,7 @@ impl Session {
     /// Frames that a newer one replaced before they left.
     #[must_use]
     pub fn superseded_by_client(&self) -> u64 {
-        self.shared.state().replaced
+        self.shared.state().superseded_by_client
     }
 }
 

@@ -19,26 +19,26 @@ static class Bench
         var due = new Dictionary<uint, ulong>(count + warm + 1);
         int answered = 0, missed = 0;
         bool isFramework = arguments.Contains("client-web-socket");
-        var client = new PapillaClient(Environment.GetEnvironmentVariable("PAPILLA_URL"), new Hello { Tier = "half-space" }, null,
+        var session = new Session(Environment.GetEnvironmentVariable("PAPILLA_URL"), new Hello { Tier = "half-space" }, null,
             isFramework ? (Func<ITransport>)(() => new ClientWebSocketTransport()) : null);
-        client.Answered += answer =>
+        session.Answered += answer =>
         {
             if (answer.Status != Status.Ok) { missed++; return; }
             ulong at;
             lock (due) if (!due.TryGetValue(answer.Sequence, out at)) return;
-            latencies[answered++] = (long)(PapillaClient.Now() - at);
+            latencies[answered++] = (long)(Session.Now() - at);
         };
-        client.Open().WaitReady();
+        session.Open().WaitReady();
         var maps = Enumerable.Range(0, 16).Select(k => Map(k / 16.0)).ToArray();
         long before = 0;
         int collections = 0;
-        ulong start = PapillaClient.Now() + 10000;
+        ulong start = Session.Now() + 10000;
         uint next = 1;
         for (int k = 0; k < count + warm; k++)
         {
             ulong at = start + (ulong)(k * 1e6 / rateHz);
-            while (PapillaClient.Now() + 1500 < at) Thread.Sleep(1);
-            while (PapillaClient.Now() < at) Thread.SpinWait(50);
+            while (Session.Now() + 1500 < at) Thread.Sleep(1);
+            while (Session.Now() < at) Thread.SpinWait(50);
             if (k == warm)
             {
                 GC.Collect();
@@ -47,12 +47,12 @@ static class Bench
             }
             // The entry is there before the answer can be.
             lock (due) due[next] = at;
-            next = client.Send(maps[k % maps.Length]) + 1;
+            next = session.Send(maps[k % maps.Length]) + 1;
         }
         long after = GC.GetTotalMemory(false);
         int collected = GC.CollectionCount(0) - collections;
         for (int k = 0; k < 2000 && answered + missed < count + warm; k++) Thread.Sleep(1);
-        client.Dispose();
+        session.Dispose();
         var sorted = latencies.Skip(warm).Take(answered - warm).OrderBy(v => v).ToArray();
         Console.WriteLine("{{\"client\": \"unity{0}\", \"rate_hz\": {1}, \"frames\": {2}, \"missing\": {3}, \"p50_us\": {4}, \"p99_us\": {5}, \"max_us\": {6}, \"allocated_bytes_per_frame\": {7:0.0}, \"collections\": {8}}}",
             isFramework ? "-client-web-socket" : "", rateHz, sorted.Length, missed, sorted[sorted.Length / 2], sorted[(int)(0.99 * sorted.Length)], sorted[sorted.Length - 1], (double)(after - before) / count, collected);

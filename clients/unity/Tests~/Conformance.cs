@@ -73,7 +73,7 @@ sealed partial class Run : IDisposable
     readonly Dictionary<uint, Outcome> outcomes = new Dictionary<uint, Outcome>();
     readonly List<uint> order = new List<uint>();
     readonly Dictionary<int, string> tiers = new Dictionary<int, string>();
-    PapillaClient client;
+    Session session;
     object reply;
     string twice;
     ulong clockUs;
@@ -88,7 +88,7 @@ sealed partial class Run : IDisposable
 
     public void Dispose()
     {
-        if (client != null) client.Dispose();
+        if (session != null) session.Dispose();
     }
 
     internal void Do(JObject step)
@@ -111,18 +111,18 @@ sealed partial class Run : IDisposable
     {
         var hello = Papilla.Hello.FromJson((JObject)step["hello"]);
         lock (gate) reply = null;
-        if (client == null)
+        if (session == null)
         {
-            client = new PapillaClient(url, hello, null, isFramework ? (Func<ITransport>)(() => new ClientWebSocketTransport()) : null);
-            client.ClockUs = () => clockUs != 0 ? clockUs : PapillaClient.Now();
-            client.SessionReady += ready => { lock (gate) { reply = ready; tiers[ready.TierNumber] = ready.Tier; Monitor.PulseAll(gate); } };
-            client.Refused += problem => { lock (gate) { reply = problem; Monitor.PulseAll(gate); } };
-            client.Answered += Keep;
-            client.Open();
+            session = new Session(url, hello, null, isFramework ? (Func<ITransport>)(() => new ClientWebSocketTransport()) : null);
+            session.ClockUs = () => clockUs != 0 ? clockUs : Session.Now();
+            session.SessionReady += ready => { lock (gate) { reply = ready; tiers[ready.TierNumber] = ready.Tier; Monitor.PulseAll(gate); } };
+            session.Refused += problem => { lock (gate) { reply = problem; Monitor.PulseAll(gate); } };
+            session.Answered += Keep;
+            session.Open();
         }
         else
         {
-            client.Renew(hello);
+            session.Renew(hello);
         }
         object got = Until("a reply", () => reply, patienceMs);
         var refused = got as Problem;
@@ -161,23 +161,23 @@ sealed partial class Run : IDisposable
     void Frame(JObject step, JObject expect)
     {
         var map = Pattern((JObject)step["pressure"], 1);
-        client.DeadlineUs = (uint?)step["deadline_us"] ?? 0;
+        session.DeadlineUs = (uint?)step["deadline_us"] ?? 0;
         int attempts = (int?)step["attempts"] ?? 1;
         while (true)
         {
             clockUs = (ulong?)step["client_time_us"] ?? 0;
-            ulong before = PapillaClient.Now();
+            ulong before = Session.Now();
             uint sequence;
             try
             {
-                sequence = step["window"] == null ? client.Send(map) : SendWindow(map, step["window"].Select(v => (int)v).ToArray());
+                sequence = step["window"] == null ? session.Send(map) : SendWindow(map, step["window"].Select(v => (int)v).ToArray());
             }
             catch (PapillaException error)
             {
                 Check(expect, new Outcome { Status = Status.Error, Code = error.Problem.Code });
                 return;
             }
-            ulong after = PapillaClient.Now();
+            ulong after = Session.Now();
             var outcome = Until("the outcome", () => Of(sequence), patienceMs);
             if (outcome.Status == Status.Lost && --attempts > 0) continue;
             if (outcome.Status != Status.Error && outcome.Status != Status.Lost)
@@ -194,7 +194,7 @@ sealed partial class Run : IDisposable
     {
         var samples = new float[w[2] * w[3]];
         for (int y = 0; y < w[3]; y++) for (int x = 0; x < w[2]; x++) samples[y * w[2] + x] = map[((w[1] + y) * 224 + w[0] + x) % map.Length];
-        return client.Send(samples, w[0], w[1], w[2], w[3]);
+        return session.Send(samples, w[0], w[1], w[2], w[3]);
     }
 
     Outcome Of(uint sequence)
@@ -227,13 +227,13 @@ sealed partial class Run : IDisposable
 
     void Burst(JObject step, JObject expect)
     {
-        int count = (int)step["count"], gapMs = (int?)step["gap_ms"] ?? 0, replaced = client.Replaced;
+        int count = (int)step["count"], gapMs = (int?)step["gap_ms"] ?? 0, before = session.SupersededByClient;
         bool isPaused = (bool?)step["paused"] ?? false;
         var sequences = new uint[count];
         if (isPaused) Steer("pause");
         for (int k = 1; k <= count; k++)
         {
-            sequences[k - 1] = client.Send(Pattern((JObject)step["pressure"], (double)k / count));
+            sequences[k - 1] = session.Send(Pattern((JObject)step["pressure"], (double)k / count));
             Thread.Sleep(gapMs);
         }
         if (isPaused) Steer("resume");
@@ -247,7 +247,7 @@ sealed partial class Run : IDisposable
         Check((JObject)expect["newest"] ?? new JObject(), outcomes[sequences[count - 1]]);
         int superseded = sequences.Count(one => outcomes[one].Status == Status.Superseded);
         if (superseded < ((int?)expect["superseded"] ?? 0)) throw new Missed(superseded + " superseded");
-        if (client.Replaced - replaced < ((int?)expect["superseded_by_client"] ?? 0)) throw new Missed((client.Replaced - replaced) + " superseded by the client");
+        if (session.SupersededByClient - before < ((int?)expect["superseded_by_client"] ?? 0)) throw new Missed((session.SupersededByClient - before) + " superseded by the client");
     }
 
     void Reconnect(double withinS)

@@ -13,9 +13,9 @@ static class Steady
         for (int k = 0; k < 5000; k++) pressurePa[20000 + k] = 3000;
         long before = 0;
         int collections = 0;
-        using (var client = new PapillaClient(Environment.GetEnvironmentVariable("PAPILLA_URL"), new Hello { Tier = "half-space" }).Open())
+        using (var session = new Session(Environment.GetEnvironmentVariable("PAPILLA_URL"), new Hello { Tier = "half-space" }).Open())
         {
-            client.WaitReady(20000);
+            session.WaitReady(20000);
             for (int k = 0; k < Warm + Frames; k++)
             {
                 if (k == Warm)
@@ -24,9 +24,9 @@ static class Steady
                     before = GC.GetTotalMemory(true);
                     collections = GC.CollectionCount(0);
                 }
-                uint sequence = client.Send(pressurePa);
+                uint sequence = session.Send(pressurePa);
                 Answer answer = null;
-                while (!client.TryTake(out answer)) Thread.Sleep(0);
+                while (!session.TryTakeLatest(out answer)) Thread.Sleep(0);
                 if (answer.Sequence != sequence || answer.Status != Status.Ok) throw new Exception("frame " + sequence + ": " + answer.Status);
             }
             long grown = GC.GetTotalMemory(false) - before;

@@ -1,11 +1,11 @@
-// Fits the foundation to the training presses of data/s1 and data/broad and prints its error on presses that took no part
+// Fits the foundation to the training indentations of data/s1 and data/broad and prints its error on indentations that took no part
 // in the fit: `npm run foundation`. With --json one object.
 
 import { fileURLToPath } from 'node:url';
 import { FITTED, Foundation, WINKLER } from '../src/foundation.js';
-import { readStates } from './presses.js';
+import { readStates } from './states.js';
 
-/** @typedef {import('./presses.js').State} State */
+/** @typedef {import('./states.js').State} State */
 /** @typedef {import('../src/foundation.js').Law} Law */
 
 const DATA = fileURLToPath(new URL('../../../data/', import.meta.url));
@@ -75,7 +75,7 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
     const [fitted, winkler] = laws;
     const percent = (/** @type {number} */ value) => `${(100 * value).toFixed(1)} %`;
     for (const { name, law, stiffness } of laws) console.log(`${name}: ${JSON.stringify(law)}; the fit gives ${stiffness.toFixed(0)} Pa/mm^n`);
-    console.log('\n| presses | states | L2, median | L2, p95 | sum, median | Winkler: L2, median | sum, median |\n|---|---|---|---|---|---|---|');
+    console.log('\n| indentations | states | L2, median | L2, p95 | sum, median | Winkler: L2, median | sum, median |\n|---|---|---|---|---|---|---|');
     fitted.rows.forEach((row, n) => {
       const other = winkler.rows[n];
       console.log(`| ${row.of} | ${row.states} | ${[row.l2_median, row.l2_p95, row.sum_median, other.l2_median, other.sum_median].map(percent).join(' | ')} |`);

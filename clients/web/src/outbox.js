@@ -20,7 +20,7 @@ export class Outbox {
   sequence = 0;
   /** Frames that went out, and frames whose place a newer one took before they could. */
   sent = 0;
-  replaced = 0;
+  superseded = 0;
 
   #frame = new RequestFrame();
   #waits = false;
@@ -64,7 +64,7 @@ export class Outbox {
   supersede() {
     if (!this.#waits) return;
     this.#waits = false;
-    this.replaced++;
+    this.superseded++;
     this.#settle(this.sequence, 'superseded');
   }
 

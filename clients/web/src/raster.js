@@ -1,8 +1,7 @@
 // Vertex values to 224 x 224 maps: the pixel -> (triangle, weights) table, built once from the
 // atlas by the server's own rule, so that both paint the same pixels: a pixel belongs to the patch
 // if its centre lies in a triangle, borders included, and to the lowest such triangle.
-// This file is clients/web/src/raster.js and server/web/raster.mjs: neither the package nor the page may
-// read beyond its folder, so both have it, and a test holds the two equal (tests/browser).
+// The server's page imports this file too: server/build.rs puts it beside the page's own.
 
 const SIDE_PX = 224;
 const MAP_LEN = SIDE_PX * SIDE_PX;

@@ -20,8 +20,8 @@ const page = await openPage(browser);
 /** @param {number} durationS */
 const run = (durationS) => page.evaluate(async ([url, hz, seconds, type]) => {
   // @ts-ignore: a path of the page
-  const { MAP_LEN, Papilla } = await import('/client/papilla.js');
-  const session = await Papilla.connect(url, { tier: 'half-space', sample_type: type }, { crop: false });
+  const { MAP_LEN, Session } = await import('/client/papilla.js');
+  const session = await Session.connect(url, { tier: 'half-space', sample_type: type }, { crop: false });
   const maps = Array.from({ length: 16 }, (_, k) => Float32Array.from({ length: MAP_LEN }, (_, i) => {
     const [u, v] = [(i % 224) + 0.5 - 112 - 20 * Math.cos(k * Math.PI / 8), Math.floor(i / 224) + 0.5 - 112 - 20 * Math.sin(k * Math.PI / 8)];
     return 15000 * Math.exp(-(u * u + v * v) / 288);

@@ -1,6 +1,6 @@
 // The steps of docs/reference/conformance.md by this client; runs in the page, which has nothing but the client and the server.
 
-import { Atlas, MAP_LEN, Papilla, PapillaError, SIDE_PX, postPressure } from '../papilla.js';
+import { Atlas, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '../papilla.js';
 
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
@@ -63,7 +63,7 @@ function checkMap(expect, map) {
 
 /** One case's session. */
 class Runner {
-  /** @type {Papilla | null} */ session = null;
+  /** @type {Session | null} */ session = null;
   /** @type {Map<number, Outcome>} */ outcomes = new Map();
   /** @type {number[]} */ order = [];
   /** @type {Map<number, string>} */ tiers = new Map();
@@ -99,10 +99,10 @@ class Runner {
     const hello = { sample_type: 'f32', ...wire };
     let reply = /** @type {any} */ (null);
     const fresh = this.session === null || this.session.state === 'refused';
-    if (fresh) this.session = new Papilla(this.url, hello, { crop: false, clockUs: () => this.now() });
-    const session = /** @type {Papilla} */ (this.session);
+    if (fresh) this.session = new Session(this.url, hello, { crop: false, clockUs: () => this.now() });
+    const session = /** @type {Session} */ (this.session);
     session.onready = (ready) => { reply = ready; this.tiers.set(ready.tier_number, ready.tier); };
-    session.onproblem = (problem) => { reply = problem; };
+    session.onrefused = (problem) => { reply = problem; };
     session.onanswer = (answer) => this.keep(answer);
     if (fresh) session.open();
     else session.renew(hello);
@@ -127,7 +127,7 @@ class Runner {
 
   /** @param {Step} step */
   async frame({ pressure, window, client_time_us: timeUs, deadline_us: deadlineUs, attempts = 1, expect }) {
-    const session = /** @type {Papilla} */ (this.session);
+    const session = /** @type {Session} */ (this.session);
     const map = pressureMap(pressure);
     session.deadlineUs = deadlineUs ?? 0;
     for (let attempt = 1; ; attempt++) {
@@ -181,8 +181,8 @@ class Runner {
 
   /** @param {Step} step */
   async burst({ count, gap_ms: gapMs = 0, pressure, paused, expect }) {
-    const session = /** @type {Papilla} */ (this.session);
-    const { replaced } = session;
+    const session = /** @type {Session} */ (this.session);
+    const before = session.supersededByClient;
     if (paused) await this.steer('pause');
     /** @type {number[]} */
     const sequences = [];
@@ -200,13 +200,13 @@ class Runner {
     this.check(expect.newest ?? {}, all[count - 1]);
     const superseded = all.filter(({ status }) => status === 'superseded').length;
     if (superseded < (expect.superseded ?? 0)) throw new Error(`${superseded} superseded, ${expect.superseded} are due`);
-    const own = session.replaced - replaced;
+    const own = session.supersededByClient - before;
     if (own < (expect.superseded_by_client ?? 0)) throw new Error(`${own} superseded by the client, ${expect.superseded_by_client} are due`);
   }
 
   /** @param {Step} step */
   async reconnect({ within_s: withinS }) {
-    const session = /** @type {Papilla} */ (this.session);
+    const session = /** @type {Session} */ (this.session);
     const before = session.ready?.session;
     let fresh = false;
     session.onready = (ready) => { fresh = true; this.tiers.set(ready.tier_number, ready.tier); };

@@ -3,7 +3,7 @@
 import {
   CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
-import { Atlas, Papilla, SUMMARY } from '../papilla.js';
+import { Atlas, SUMMARY, Session } from '../papilla.js';
 import { Finger } from './finger.js';
 import { Hands, Pointer } from './hands.js';
 import { makeObjects } from './objects.js';
@@ -112,7 +112,7 @@ async function start() {
 
   let hello = wish();
   let late = 0;
-  const session = new Papilla('', hello);
+  const session = new Session('', hello);
   scene.userData.camera = camera;
   const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, frames: 0, isPresenting: false };
   session.onstate = (now, why) => { element('state').textContent = why ? `${now}: ${why}` : now; };

@@ -1,5 +1,5 @@
 //! The memory that bodies and messages can claim, against the sum that `check` prints and
-//! docs/operating.md explains: a process of its own, its peak resident memory from the system.
+//! docs/guides/operating.md explains: a process of its own, its peak resident memory from the system.
 
 use std::{fs, path::Path};
 

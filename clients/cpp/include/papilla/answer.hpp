@@ -32,7 +32,9 @@ struct Answer {
   bool by_client = false;             ///< superseded here: the frame never left
   Problem problem;                    ///< with status error
   Kind kind = Kind::sed;
-  std::uint8_t flags = 0;             ///< out_of_range, no_contact, unfamiliar
+  bool out_of_range = false;          ///< a pressure is above what the tier was trained on
+  bool no_contact = false;            ///< the map is zero; no network was asked
+  bool unfamiliar = false;            ///< rougher or heavier than any map the tier was trained on
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`
   std::uint64_t client_time_us = 0;
@@ -60,13 +62,13 @@ struct Answer {
 };
 
 /// What the service agreed to.
-struct Terms {
+struct Ready {
   struct Section {
     std::size_t offset = 0;
     std::size_t bytes = 0;
     bool there = false;
   };
-  json::Value ready;                  ///< as it came
+  json::Value message;                ///< as it came
   SampleType sample_type = SampleType::f32;
   std::string tier;
   std::uint64_t tier_number = 0;

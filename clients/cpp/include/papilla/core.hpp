@@ -14,37 +14,37 @@ namespace papilla {
 
 class Core {
  public:
-  enum class Heard { nothing, ready, refused, broken };
+  enum class Event { nothing, ready, refused, broken };
 
   /// Called with every outcome, once a frame. `Answer` is reused: copy what has to stay.
-  std::function<void(const Answer&)> on_outcome;
+  std::function<void(const Answer&)> on_answer;
 
   /// `hello`: members of the protocol's hello as JSON without braces, as
   /// `"tier": "small", "sample_type": "u16"`.
   explicit Core(std::string hello = {}) : hello_(std::move(hello)) { sent_.reserve(sent_max); }
 
-  std::string hello() const { return words(hello_); }
-  static std::string words(const std::string& members) {
+  std::string hello() const { return hello_text(hello_); }
+  static std::string hello_text(const std::string& members) {
     return "{\"type\":\"hello\",\"version\":2" + (members.empty() ? "" : "," + members) + "}";
   }
   /// What to say again after a reconnect.
   void set_hello(std::string hello) { hello_ = std::move(hello); }
 
-  bool agreed() const { return agreed_; }
-  const Terms& terms() const { return history_.back(); }
+  bool is_ready() const { return is_ready_; }
+  const Ready& ready() const { return history_.back(); }
   const Problem& refusal() const { return refusal_; }
   bool waiting() const { return is_waiting_; }
   /// Whether `take` would give a frame.
-  bool can_take() const { return is_waiting_ && agreed_ && sent_.size() < sent_max; }
+  bool can_take() const { return is_waiting_ && is_ready_ && sent_.size() < sent_max; }
   std::size_t in_flight() const { return sent_.size(); }
-  std::uint64_t superseded_by_client() const { return replaced_; }
+  std::uint64_t superseded_by_client() const { return superseded_; }
 
   /// Takes a frame: the samples of a window, Pa, row by row (none: no contact). Replaces one that
   /// has not left. Returns its sequence. Copies; allocates nothing.
   std::uint32_t send(const float* pressure_pa, Window window, std::uint64_t client_time_us,
                      std::uint32_t deadline_us = 0) {
     if (is_waiting_) {
-      ++replaced_;
+      ++superseded_;
       outcome(waiting_.sequence, waiting_.client_time_us, Status::superseded, true);
     }
     if (!pressure_pa) window = {0, 0, 0, 0};
@@ -80,7 +80,7 @@ class Core {
 
   /// The connection broke: what was sent is lost; what waits goes on waiting.
   void lost() {
-    agreed_ = false;
+    is_ready_ = false;
     for (const Sent& sent : sent_) outcome(sent.sequence, sent.client_time_us, Status::lost);
     sent_.clear();
   }
@@ -93,108 +93,110 @@ class Core {
   }
 
   /// A text message: ready, refused (see `refusal`), or the error of a frame (its outcome).
-  Heard text(std::string_view message) {
+  Event text(std::string_view message) {
     json::Value value;
-    if (!json::parse(message, value)) return Heard::broken;
+    if (!json::parse(message, value)) return Event::broken;
     if (value["type"].string == "ready") return agree(value);
     const Problem problem{value["code"].string, value["message"].string, value["field"].string};
-    if (!value.has("sequence")) return refusal_ = problem, Heard::refused;
+    if (!value.has("sequence")) return refusal_ = problem, Event::refused;
     const auto sequence = static_cast<std::uint32_t>(value["sequence"].whole());
     Sent sent;
     if (forget(sequence, sent)) {
       scratch_.problem = problem;
       outcome(sequence, sent.client_time_us, Status::error);
     }
-    return Heard::nothing;
+    return Event::nothing;
   }
 
   /// A binary message: the answer to a frame.
-  Heard binary(const std::uint8_t* bytes, std::size_t size) {
+  Event binary(const std::uint8_t* bytes, std::size_t size) {
     Header header;
     Sent sent;
-    if (!wire::decode(bytes, size, header) || !header.window.inside()) return Heard::broken;
-    if (!forget(header.sequence, sent)) return Heard::nothing;
-    const Terms& terms = history_[sent.terms];
+    if (!wire::decode(bytes, size, header) || !header.window.inside()) return Event::broken;
+    if (!forget(header.sequence, sent)) return Event::nothing;
+    const Ready& ready = history_[sent.ready];
     Answer& answer = scratch_;
     answer.kind = header.kind;
-    answer.flags = header.flags;
+    answer.out_of_range = (header.flags & wire::out_of_range) != 0;
+    answer.no_contact = (header.flags & wire::no_contact) != 0;
+    answer.unfamiliar = (header.flags & wire::unfamiliar) != 0;
     answer.window = header.window;
     answer.total_us = header.time_us;
     answer.queue_us = header.queue_us;
     answer.infer_us = header.infer_us;
     answer.tier.clear();
-    for (const Terms& each : history_) {
+    for (const Ready& each : history_) {
       if (each.tier_number == header.tier) answer.tier = each.tier;
     }
-    if (header.status == Status::ok && !read(bytes, size, header, terms)) return Heard::broken;
+    if (header.status == Status::ok && !read(bytes, size, header, ready)) return Event::broken;
     outcome(header.sequence, header.client_time_us, header.status);
-    return Heard::nothing;
+    return Event::nothing;
   }
 
  private:
   struct Sent {
     std::uint32_t sequence = 0;
     std::uint64_t client_time_us = 0;
-    std::size_t terms = 0;
+    std::size_t ready = 0;            ///< place in history_
   };
   static constexpr std::size_t sent_max = 256;
 
   std::string hello_;
-  std::vector<Terms> history_ = std::vector<Terms>(1);
-  bool agreed_ = false;
+  std::vector<Ready> history_ = std::vector<Ready>(1);
+  bool is_ready_ = false;
   Problem refusal_;
   std::uint32_t sequence_ = 0;
   Outgoing waiting_, leaving_;
   bool is_waiting_ = false;
   std::vector<Sent> sent_;
   std::vector<float> recoded_ = std::vector<float>(map_len);
-  std::uint64_t replaced_ = 0;
+  std::uint64_t superseded_ = 0;
   Answer scratch_;
 
-  Heard agree(const json::Value& ready) {
-    Terms terms;
-    if (!sample_type_of(ready["sample_type"].string, terms.sample_type)) return Heard::broken;
-    terms.tier = ready["tier"].string;
-    terms.tier_number = ready["tier_number"].whole();
-    terms.pressure_max_pa = static_cast<float>(ready["pressure_max_pa"].number);
-    terms.atlas_hash = ready["atlas_hash"].string;
-    for (const json::Value& section : ready["sections"].items) {
+  Event agree(const json::Value& message) {
+    Ready ready;
+    if (!sample_type_of(message["sample_type"].string, ready.sample_type)) return Event::broken;
+    ready.tier = message["tier"].string;
+    ready.tier_number = message["tier_number"].whole();
+    ready.pressure_max_pa = static_cast<float>(message["pressure_max_pa"].number);
+    ready.atlas_hash = message["atlas_hash"].string;
+    for (const json::Value& section : message["sections"].items) {
       const std::string& name = section["name"].string;
-      Terms::Section& room = name == "summary"     ? terms.summary
-                             : name == "points"    ? terms.points
-                             : name == "actuators" ? terms.actuators
-                                                   : terms.map;
-      room = {section["offset"].whole(), section["bytes"].whole(), true};
+      Ready::Section& at = name == "summary"     ? ready.summary
+                           : name == "points"    ? ready.points
+                           : name == "actuators" ? ready.actuators
+                                                 : ready.map;
+      at = {section["offset"].whole(), section["bytes"].whole(), true};
     }
-    terms.ready = ready;
+    ready.message = message;
     // Reserved here, so that no answer allocates.
     scratch_.values.reserve(map_len);
-    scratch_.points.reserve(terms.points.bytes / 4);
-    scratch_.actuators.reserve(terms.actuators.bytes / 4);
-    history_.push_back(std::move(terms));
-    agreed_ = true;
-    return Heard::ready;
+    scratch_.points.reserve(ready.points.bytes / 4);
+    scratch_.actuators.reserve(ready.actuators.bytes / 4);
+    history_.push_back(std::move(ready));
+    is_ready_ = true;
+    return Event::ready;
   }
 
-  bool read(const std::uint8_t* bytes, std::size_t size, const Header& header, const Terms& terms) {
-    const auto floats = [&](const Terms::Section& section, float* to) {
+  bool read(const std::uint8_t* bytes, std::size_t size, const Header& header, const Ready& ready) {
+    const auto floats = [&](const Ready::Section& section, float* to) {
       if (section.offset + section.bytes > size) return false;
       decode_samples(SampleType::f32, bytes + section.offset, section.bytes / 4, 1.0F, to);
       return true;
     };
     Answer& answer = scratch_;
-    answer.has_summary = terms.summary.there && terms.summary.bytes == 64;
-    answer.points.resize(terms.points.bytes / 4);
-    answer.actuators.resize(terms.actuators.bytes / 4);
-    if (answer.has_summary && !floats(terms.summary, answer.summary.data())) return false;
-    if (!floats(terms.points, answer.points.data())) return false;
-    if (!floats(terms.actuators, answer.actuators.data())) return false;
-    answer.has_map = terms.map.there;
+    answer.has_summary = ready.summary.there && ready.summary.bytes == 64;
+    answer.points.resize(ready.points.bytes / 4);
+    answer.actuators.resize(ready.actuators.bytes / 4);
+    if (answer.has_summary && !floats(ready.summary, answer.summary.data())) return false;
+    if (!floats(ready.points, answer.points.data())) return false;
+    if (!floats(ready.actuators, answer.actuators.data())) return false;
+    answer.has_map = ready.map.there;
     if (!answer.has_map) return true;
     const std::size_t count = header.window.pixels();
-    if (terms.map.offset + count * sample_bytes(header.sample_type) > size) return false;
+    if (ready.map.offset + count * sample_bytes(header.sample_type) > size) return false;
     answer.values.resize(count);
-    decode_samples(header.sample_type, bytes + terms.map.offset, count, header.scale,
+    decode_samples(header.sample_type, bytes + ready.map.offset, count, header.scale,
                    answer.values.data());
     return true;
   }
@@ -217,7 +219,7 @@ class Core {
     answer.status = status;
     answer.by_client = by_client;
     if (status != Status::ok) answer.has_map = answer.has_summary = false;
-    if (on_outcome) on_outcome(answer);
+    if (on_answer) on_answer(answer);
   }
 
   /// A frame that was encoded before the terms changed.

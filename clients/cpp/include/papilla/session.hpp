@@ -30,14 +30,14 @@ class Session {
     std::string hello;
     /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
     /// what is needed and return.
-    std::function<void(const Answer&)> on_outcome;
+    std::function<void(const Answer&)> on_answer;
     int retry_ms = 150;
   };
 
   Session() : Session(Options()) {}
   explicit Session(Options options)
       : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(options_.hello) {
-    core_.on_outcome = [this](const Answer& answer) { outcome(answer); };
+    core_.on_answer = [this](const Answer& answer) { outcome(answer); };
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -105,26 +105,27 @@ class Session {
   }
 
   /// Says hello again in the open session; false: `problem()` says why not, and the old terms stand.
-  bool terms(const std::string& hello, int timeout_ms = 30000) {
+  bool renew(const std::string& hello, int timeout_ms = 30000) {
     std::unique_lock<std::mutex> lock(mutex_);
-    if (!core_.agreed()) return problem_ = {"", "there is no session just now", ""}, false;
-    new_hello_ = Core::words(hello);
-    told_ = granted_ = false;
+    if (!core_.is_ready()) return problem_ = {"", "there is no session just now", ""}, false;
+    new_hello_ = Core::hello_text(hello);
+    is_answered_ = is_granted_ = false;
     changed_.notify_all();
     const auto wait = std::chrono::milliseconds(timeout_ms);
-    const bool good = changed_.wait_for(lock, wait, [this] { return told_ || closed_; }) && granted_;
-    told_ = true;  // also after a timeout: frames go on under the old terms
+    const bool good = changed_.wait_for(lock, wait, [this] { return is_answered_ || closed_; }) && is_granted_;
+    is_answered_ = true;  // also after a timeout: frames go on under the old terms
     if (good) core_.set_hello(hello);
     return good;
   }
 
-  Terms agreed() const {
+  /// What the service agreed to.
+  Ready ready() const {
     std::lock_guard<std::mutex> lock(mutex_);
-    return core_.terms();
+    return core_.ready();
   }
   bool connected() const {
     std::lock_guard<std::mutex> lock(mutex_);
-    return core_.agreed();
+    return core_.is_ready();
   }
   /// Times that a session was opened: more than 1 after a reconnect.
   std::uint64_t connections() const {
@@ -135,7 +136,7 @@ class Session {
     std::lock_guard<std::mutex> lock(mutex_);
     return core_.superseded_by_client();
   }
-  /// Why the last `open` or `terms` failed.
+  /// Why the last `open` or `renew` failed.
   Problem problem() const {
     std::lock_guard<std::mutex> lock(mutex_);
     return problem_;
@@ -159,10 +160,10 @@ class Session {
   bool wants_ = false;
   std::uint32_t wanted_ = 0;
   std::string new_hello_, pong_;
-  bool told_ = true, granted_ = false, pong_due_ = false;
+  bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
 
   void outcome(const Answer& answer) {
-    if (options_.on_outcome) options_.on_outcome(answer);
+    if (options_.on_answer) options_.on_answer(answer);
     if (answer.status == Status::ok) {
       latest_ = answer;               // keeps its room: no allocation
       fresh_ = true;
@@ -189,9 +190,9 @@ class Session {
     if (!socket_.send_text(core_.hello())) return false;
     const auto kind = socket_.receive(message_);
     std::lock_guard<std::mutex> lock(mutex_);
-    const auto heard = kind == WebSocket::Message::text ? core_.text(text()) : Core::Heard::broken;
-    if (heard != Core::Heard::ready) {
-      problem_ = heard == Core::Heard::refused ? core_.refusal() : Problem{"", "no ready came", ""};
+    const auto event = kind == WebSocket::Message::text ? core_.text(text()) : Core::Event::broken;
+    if (event != Core::Event::ready) {
+      problem_ = event == Core::Event::refused ? core_.refusal() : Problem{"", "no ready came", ""};
       return false;
     }
     socket_.patience(0);
@@ -209,7 +210,7 @@ class Session {
       read();
       std::unique_lock<std::mutex> lock(mutex_);
       core_.lost();
-      told_ = true, granted_ = false, pong_due_ = false;
+      is_answered_ = true, is_granted_ = false, pong_due_ = false;
       socket_.shut();
       changed_.notify_all();
       changed_.wait(lock, [this] { return !sending_; });
@@ -238,15 +239,15 @@ class Session {
         changed_.notify_all();
         continue;
       }
-      const auto heard = kind == WebSocket::Message::text
+      const auto event = kind == WebSocket::Message::text
                              ? core_.text(text())
                              : core_.binary(message_.data(), message_.size());
-      if (heard == Core::Heard::broken) return;
+      if (event == Core::Event::broken) return;
       if (core_.waiting()) changed_.notify_all();
-      if (heard == Core::Heard::nothing || told_) continue;
-      told_ = true;
-      granted_ = heard == Core::Heard::ready;
-      if (!granted_) problem_ = core_.refusal();
+      if (event == Core::Event::nothing || is_answered_) continue;
+      is_answered_ = true;
+      is_granted_ = event == Core::Event::ready;
+      if (!is_granted_) problem_ = core_.refusal();
       changed_.notify_all();
     }
   }
@@ -256,8 +257,8 @@ class Session {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
       changed_.wait(lock, [this] {
-        const bool frame = core_.can_take() && told_;
-        return closed_ || (core_.agreed() && (frame || pong_due_ || !new_hello_.empty()));
+        const bool frame = core_.can_take() && is_answered_;
+        return closed_ || (core_.is_ready() && (frame || pong_due_ || !new_hello_.empty()));
       });
       if (closed_) return;
       std::string hello, pong;

@@ -21,9 +21,6 @@ enum class Status : std::uint8_t { ok = 0, superseded = 1, late = 2, error = 3, 
 
 enum class Kind : std::uint8_t { pressure = 1, sed = 2, sa1_rate = 3 };
 
-/// Flags of an answer.
-enum : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4 };
-
 /// A rectangle of the map, pixels; the default is all of it.
 struct Window {
   std::uint16_t column = 0;
@@ -47,10 +44,13 @@ struct Header {
   std::uint32_t queue_us = 0;
   std::uint32_t infer_us = 0;
   std::uint16_t tier = 0;
-  std::uint8_t flags = 0;
+  std::uint8_t flags = 0;               ///< bits of wire::Flag
 };
 
 namespace wire {
+
+/// Bits of an answer's flags.
+enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4 };
 
 /// Little-endian, whatever the machine is; compilers make one move of it.
 template <class T>

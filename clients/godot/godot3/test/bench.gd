@@ -2,7 +2,7 @@
 # due to the answer in the user's hands; the node is polled without pause, as a thread of a game would.
 extends SceneTree
 
-const Papilla = preload("res://addons/papilla/papilla.gd")
+const Session = preload("res://addons/papilla/session.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const WARM = 50
 
@@ -14,13 +14,13 @@ var missing = 0
 func _init():
 	var rate_hz = float(OS.get_environment("RATE_HZ"))
 	var count = int(float(OS.get_environment("DURATION_S")) * rate_hz) + WARM
-	var client = Papilla.new()
-	client.url = OS.get_environment("PAPILLA_URL")
-	client.hello = {"tier": "half-space"}
-	client.connect("answered", self, "_on_answered")
-	client.open()
-	while client.terms == null:
-		client.poll()
+	var session = Session.new()
+	session.url = OS.get_environment("PAPILLA_URL")
+	session.hello = {"tier": "half-space"}
+	session.connect("answered", self, "_on_answered")
+	session.open()
+	while session.server_ready == null:
+		session.poll()
 		OS.delay_msec(1)
 	var maps = []
 	for k in 8:
@@ -31,17 +31,17 @@ func _init():
 		var at = start + int(next * 1e6 / rate_hz)
 		var now = OS.get_ticks_usec()
 		if next < count and now >= at:
-			due[client._sequence + 1] = at
-			client.send(maps[next % maps.size()])
+			due[session._sequence + 1] = at
+			session.send(maps[next % maps.size()])
 			next += 1
 		elif next >= count or at - now > 300:
 			OS.delay_usec(100)
-		client.poll()
-	client.close()
-	client.free()
+		session.poll()
+	session.close()
+	session.free()
 	var sorted = took.slice(WARM, took.size() - 1)
 	sorted.sort()
-	print(JSON.print({"client": "godot3", "rate_hz": rate_hz, "frames": sorted.size(), "missing": missing,
+	print(JSON.print({"client": "godot%d" % Engine.get_version_info().major, "rate_hz": rate_hz, "frames": sorted.size(), "missing": missing,
 		"p50_us": sorted[sorted.size() / 2], "p99_us": sorted[int(0.99 * sorted.size())], "max_us": sorted[-1]}))
 	quit()
 

@@ -1,7 +1,7 @@
-# The steps of docs/reference/conformance.md by this client: godot3-server --path . -s test/conformance.gd
+# The steps of docs/reference/conformance.md by this client: clients/godot/test runs it
 extends SceneTree
 
-const Papilla = preload("res://addons/papilla/papilla.gd")
+const Session = preload("res://addons/papilla/session.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
 const Patterns = preload("res://test/patterns.gd")
@@ -10,7 +10,7 @@ var url = OS.get_environment("PAPILLA_URL")
 var atlas
 var patience_ms
 var why = ""
-var client
+var session
 var outcomes = {}
 var order = []
 var tiers = {}
@@ -38,10 +38,10 @@ func _init():
 			call("step_" + step.do, step, step.get("expect", {}))
 			if why != "":
 				break
-		if client != null:
-			client.close()
-			client.free()
-			client = null
+		if session != null:
+			session.close()
+			session.free()
+			session = null
 		print("ok " + one.name if why == "" else "FAIL %s: step %d: %s" % [one.name, at, why])
 		failed += int(why != "")
 	quit(1 if failed else 0)
@@ -74,7 +74,7 @@ func all_near(what, found, due):
 func wait_for(method, argument = null, patience = 0):
 	var end = OS.get_ticks_msec() + (patience if patience > 0 else patience_ms)
 	while not call(method, argument):
-		client.poll()
+		session.poll()
 		OS.delay_msec(1)
 		if OS.get_ticks_msec() > end:
 			fail("%s: not in time" % method)
@@ -104,9 +104,9 @@ func on_answered(answer):
 	order.append(answer.sequence)
 
 
-func on_session(terms):
-	reply = terms
-	tiers[int(terms.tier_number)] = terms.tier
+func on_session_ready(server_ready):
+	reply = server_ready
+	tiers[int(server_ready.tier_number)] = server_ready.tier
 
 
 func on_refused(problem):
@@ -115,16 +115,16 @@ func on_refused(problem):
 
 func step_hello(step, expect):
 	reply = null
-	if client == null:
-		client = Papilla.new()
-		client.url = url
-		client.hello = step.hello
-		client.connect("answered", self, "on_answered")
-		client.connect("session_began", self, "on_session")
-		client.connect("refused", self, "on_refused")
-		client.open()
+	if session == null:
+		session = Session.new()
+		session.url = url
+		session.hello = step.hello
+		session.connect("answered", self, "on_answered")
+		session.connect("session_ready", self, "on_session_ready")
+		session.connect("refused", self, "on_refused")
+		session.open()
 	else:
-		client.renew(step.hello)
+		session.renew(step.hello)
 	if not wait_for("has_reply"):
 		return
 	if expect.get("status") == "error":
@@ -143,16 +143,16 @@ func step_hello(step, expect):
 
 func step_frame(step, expect):
 	var map = Patterns.pattern(step.pressure, 1.0)
-	client.deadline_us = int(step.get("deadline_us", 0))
+	session.deadline_us = int(step.get("deadline_us", 0))
 	for attempt in int(step.get("attempts", 1)):
-		client.time_us = int(step.get("client_time_us", 0))
+		session.client_time_us = int(step.get("client_time_us", 0))
 		var before = OS.get_ticks_usec()
 		var sequence
 		if step.has("window"):
 			var w = step.window
-			sequence = client.send_window(Patterns.cut(map, w), int(w[0]), int(w[1]), int(w[2]), int(w[3]))
+			sequence = session.send_window(Patterns.cut(map, w), int(w[0]), int(w[1]), int(w[2]), int(w[3]))
 		else:
-			sequence = client.send(map)
+			sequence = session.send(map)
 		var after = OS.get_ticks_usec()
 		if sequence < 0:
 			check(expect, {"status": "error", "problem": {"code": "wrong_shape"}})
@@ -164,7 +164,7 @@ func step_frame(step, expect):
 			continue
 		if outcome.has("client_time_us"):
 			var stamp = outcome.client_time_us
-			if stamp != client.time_us if client.time_us > 0 else (stamp < before or stamp > after):
+			if stamp != session.client_time_us if session.client_time_us > 0 else (stamp < before or stamp > after):
 				fail("client time %d" % stamp)
 		check(expect, outcome)
 		return
@@ -201,7 +201,7 @@ func check(expect, outcome):
 		if expect.has(section):
 			all_near(section, outcome.get(section), expect[section])
 	if expect.has("pixels") or expect.has("sum") or expect.has("max"):
-		check_map(expect, client.map_of(outcome))
+		check_map(expect, session.map_of(outcome))
 
 
 func check_map(expect, map):
@@ -225,14 +225,14 @@ func steer(what):
 
 
 func step_burst(step, expect):
-	var replaced = client.replaced
+	var before = session.superseded_by_client
 	var paused = step.get("paused", false)
 	var sequences = []
 	if paused:
 		steer("pause")
 	for k in int(step.count):
-		sequences.append(client.send(Patterns.pattern(step.pressure, (k + 1) / float(step.count))))
-		client.poll()
+		sequences.append(session.send(Patterns.pattern(step.pressure, (k + 1) / float(step.count))))
+		session.poll()
 		OS.delay_msec(int(step.get("gap_ms", 0)))
 	if paused:
 		steer("resume")
@@ -253,8 +253,8 @@ func step_burst(step, expect):
 	check(expect.get("newest", {}), outcomes[sequences[-1]])
 	if superseded < expect.get("superseded", 0):
 		fail("%d superseded" % superseded)
-	if client.replaced - replaced < expect.get("superseded_by_client", 0):
-		fail("%d superseded by the client" % (client.replaced - replaced))
+	if session.superseded_by_client - before < expect.get("superseded_by_client", 0):
+		fail("%d superseded by the client" % (session.superseded_by_client - before))
 
 
 func step_reconnect(step, _expect):

@@ -13,14 +13,14 @@ func _initialize():
 	var path = OS.get_environment("PAPILLA_NODE")
 	if path.ends_with(".tscn"):
 		_node = load(path).instance()
-		_node.get_node("Papilla").url = _url
-		_node.get_node("Papilla").hello = {"tier": "half-space"}
-		_node.get_node("Papilla").connect("map_received", self, "_on_map")
+		_node.get_node("Session").url = _url
+		_node.get_node("Session").hello = {"tier": "half-space"}
+		_node.get_node("Session").connect("map_received", self, "_on_map")
 	else:
 		_node = Node.new()
 		_node.set_script(load(path))
-		_node.papilla.url = _url
-		_node.papilla.connect("map_received", self, "_on_map")
+		_node.session.url = _url
+		_node.session.connect("map_received", self, "_on_map")
 	root.add_child(_node)
 
 

@@ -1,4 +1,5 @@
-# A press of half a newton circles the pad; the SED map is shown as a picture. Replace `_contacts` by those of your game.
+# Made of clients/godot/godot3/example/finger.gd by clients/godot/generate: edit that one.
+# A contact of half a newton circles the pad; the SED map is shown as a picture. Replace `_contacts` by those of your game.
 extends Control
 
 const Atlas = preload("res://addons/papilla/atlas.gd")
@@ -8,18 +9,18 @@ const SED_OF_WHITE = 300.0
 
 var maps = 0
 var _atlas
-var _presses = []
+var _pressures_pa = []
 
-@onready var papilla = $Papilla
+@onready var session = $Session
 @onready var picture = $Picture
 
 
 func _ready():
-	_atlas = Atlas.new(Http.atlas_text(papilla.url, papilla.token))
+	_atlas = Atlas.new(Http.atlas_text(session.url, session.token))
 	# Contact maps take tens of ms in GDScript: made once here, a few places on the way round.
 	for k in 12:
-		_presses.append(_atlas.contact_map(_contacts(TAU * k / 12)))
-	papilla.map_received.connect(_on_map)
+		_pressures_pa.append(_atlas.contact_map(_contacts(TAU * k / 12)))
+	session.map_received.connect(_on_map)
 	picture.modulate = Color(1 / SED_OF_WHITE, 1, 1)
 
 
@@ -28,9 +29,10 @@ func _contacts(angle):
 
 
 func _process(_delta):
-	papilla.send(_presses[Time.get_ticks_msec() / 80 % _presses.size()])
+	session.send(_pressures_pa[Time.get_ticks_msec() / 80 % _pressures_pa.size()])
 
 
 func _on_map(answer):
 	maps += 1
-	picture.texture = ImageTexture.create_from_image(papilla.image_of(answer))
+	var texture = ImageTexture.create_from_image(session.image_of(answer))
+	picture.texture = texture

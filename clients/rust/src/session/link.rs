@@ -14,7 +14,7 @@ use tokio::{
 use tokio_tungstenite::{WebSocketStream, client_async, tungstenite::Message};
 
 use super::{Shared, state::Next};
-use crate::{ClientError, dial::dial};
+use crate::{PapillaError, dial::dial};
 
 /// Pause before the next attempt to connect.
 const RETRY: Duration = Duration::from_millis(150);
@@ -31,40 +31,40 @@ pub(super) struct Link {
     stream: Stream,
 }
 
-fn words(hello: &Hello) -> Result<Message, ClientError> {
+fn hello_message(hello: &Hello) -> Result<Message, PapillaError> {
     serde_json::to_string(&ClientMessage::Hello(hello.clone()))
         .map(Message::from)
-        .map_err(|error| ClientError::Protocol(error.to_string()))
+        .map_err(|error| PapillaError::Protocol(error.to_string()))
 }
 
-fn message(text: &str) -> Result<ServerMessage, ClientError> {
-    serde_json::from_str(text).map_err(|error| ClientError::Protocol(error.to_string()))
+fn message(text: &str) -> Result<ServerMessage, PapillaError> {
+    serde_json::from_str(text).map_err(|error| PapillaError::Protocol(error.to_string()))
 }
 
 impl Link {
-    pub(super) async fn open(server: &str, hello: &Hello) -> Result<(Self, Ready), ClientError> {
+    pub(super) async fn open(server: &str, hello: &Hello) -> Result<(Self, Ready), PapillaError> {
         let opening = async {
-            let broke = |error| ClientError::of_socket(server, &error);
-            let raw = dial(server).await.map_err(|e| ClientError::unreachable(server, &e))?;
+            let broke = |error| PapillaError::of_socket(server, &error);
+            let raw = dial(server).await.map_err(|e| PapillaError::unreachable(server, &e))?;
             let (socket, _) =
                 client_async(format!("ws://{server}/v1/session"), raw).await.map_err(broke)?;
             let (mut sink, mut stream) = socket.split();
-            sink.send(words(hello)?).await.map_err(broke)?;
-            while let Some(heard) = stream.next().await {
-                let Message::Text(text) = heard.map_err(broke)? else { continue };
+            sink.send(hello_message(hello)?).await.map_err(broke)?;
+            while let Some(received) = stream.next().await {
+                let Message::Text(text) = received.map_err(broke)? else { continue };
                 return match message(&text)? {
                     ServerMessage::Ready(ready) => Ok((Self { sink, stream }, ready)),
-                    ServerMessage::Error(error) => Err(ClientError::Refused(Problem {
+                    ServerMessage::Error(error) => Err(PapillaError::Refused(Problem {
                         code: error.code,
                         message: error.message,
                         field: error.field,
                     })),
-                    _ => Err(ClientError::Protocol(format!("ready is due, not {text}"))),
+                    _ => Err(PapillaError::Protocol(format!("ready is due, not {text}"))),
                 };
             }
-            Err(ClientError::unreachable(server, &"it closed the connection"))
+            Err(PapillaError::unreachable(server, &"it closed the connection"))
         };
-        let silent = |_| ClientError::unreachable(server, &"no ready came");
+        let silent = |_| PapillaError::unreachable(server, &"no ready came");
         timeout(PATIENCE, opening).await.map_err(silent)?
     }
 }
@@ -100,7 +100,7 @@ async fn write(shared: &Shared, sink: &mut Sink) {
         let next = shared.state().next();
         let message = match next {
             Some(Next::Frame(message)) => Ok(Message::from(message)),
-            Some(Next::Hello(hello)) => words(&hello),
+            Some(Next::Hello(hello)) => hello_message(&hello),
             None => {
                 shared.wake.notified().await;
                 continue;
@@ -115,16 +115,16 @@ async fn write(shared: &Shared, sink: &mut Sink) {
 
 /// Takes what the service says until the connection breaks or the service leaves the protocol.
 async fn read(shared: &Shared, stream: &mut Stream) {
-    while let Some(Ok(heard)) = stream.next().await {
-        match heard {
+    while let Some(Ok(received)) = stream.next().await {
+        match received {
             Message::Binary(bytes) => {
-                if shared.state().answered(&bytes).is_err() {
+                if shared.state().on_binary(&bytes).is_err() {
                     return;
                 }
             }
             Message::Text(text) => {
                 let Ok(message) = message(&text) else { return };
-                shared.state().told(message);
+                shared.state().on_text(message);
                 // Frames may have waited for the terms.
                 shared.wake.notify_one();
             }

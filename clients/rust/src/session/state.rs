@@ -6,7 +6,7 @@ use papilla_proto::{FrameHeader, Hello, Problem, Ready, SampleType, ServerMessag
 use tokio::sync::oneshot;
 
 use super::Frame;
-use crate::{Answer, ClientError, Outcome};
+use crate::{Answer, PapillaError, Status};
 
 /// Waits for its turn or its answer.
 #[derive(Debug)]
@@ -18,8 +18,8 @@ struct Pending {
 }
 
 impl Pending {
-    fn end(self, outcome: Outcome) {
-        let answer = Answer::without_map(self.sequence, self.client_time_us, outcome);
+    fn end(self, status: Status) {
+        let answer = Answer::without_map(self.sequence, self.client_time_us, status);
         // Err: nobody waits for it any more.
         let _ = self.outcome.send(answer);
     }
@@ -30,7 +30,7 @@ impl Pending {
 pub(super) struct Asked {
     pub(super) hello: Hello,
     pub(super) said: bool,
-    pub(super) reply: oneshot::Sender<Result<Arc<Ready>, ClientError>>,
+    pub(super) reply: oneshot::Sender<Result<Arc<Ready>, PapillaError>>,
 }
 
 /// What the writer is to send.
@@ -44,7 +44,7 @@ pub(super) struct State {
     pub(super) hello: Hello,
     pub(super) ready: Arc<Ready>,
     pub(super) asked: Option<Asked>,
-    pub(super) replaced: u64,
+    pub(super) superseded_by_client: u64,
     tiers: HashMap<u16, String>,
     sequence: u32,
     waiting: Option<(Pending, Vec<u8>)>,
@@ -58,7 +58,7 @@ impl State {
             hello,
             ready: Arc::new(ready),
             asked: None,
-            replaced: 0,
+            superseded_by_client: 0,
             tiers: HashMap::new(),
             sequence: 0,
             waiting: None,
@@ -81,9 +81,9 @@ impl State {
         &mut self,
         frame: &Frame<'_>,
         client_time_us: u64,
-    ) -> Result<oneshot::Receiver<Answer>, ClientError> {
+    ) -> Result<oneshot::Receiver<Answer>, PapillaError> {
         if self.over {
-            return Err(ClientError::Closed);
+            return Err(PapillaError::Closed);
         }
         self.sequence = self.sequence.wrapping_add(1);
         let sequence = self.sequence;
@@ -91,11 +91,11 @@ impl State {
         let ready = Arc::clone(&self.ready);
         let pending = Pending { sequence, client_time_us, ready, outcome };
         match encode(frame, sequence, client_time_us, self.ready.sample_type) {
-            Err(problem) => pending.end(Outcome::Error(problem)),
+            Err(problem) => pending.end(Status::Error(problem)),
             Ok(message) => {
                 if let Some((old, _)) = self.waiting.replace((pending, message)) {
-                    self.replaced += 1;
-                    old.end(Outcome::Superseded { by_client: true });
+                    self.superseded_by_client += 1;
+                    old.end(Status::Superseded { by_client: true });
                 }
             }
         }
@@ -119,7 +119,7 @@ impl State {
     }
 
     /// Takes a binary message.
-    pub(super) fn answered(&mut self, message: &[u8]) -> Result<(), ClientError> {
+    pub(super) fn on_binary(&mut self, message: &[u8]) -> Result<(), PapillaError> {
         let header = FrameHeader::decode(message)?;
         let Some(pending) = self.forget(header.sequence) else { return Ok(()) };
         let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
@@ -131,7 +131,7 @@ impl State {
     }
 
     /// Takes a text message.
-    pub(super) fn told(&mut self, message: ServerMessage) {
+    pub(super) fn on_text(&mut self, message: ServerMessage) {
         match message {
             ServerMessage::Ready(ready) => {
                 let ready = Arc::new(ready);
@@ -144,10 +144,10 @@ impl State {
             ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
                 let problem = Problem { code, message, field };
                 match sequence.and_then(|sequence| self.forget(sequence)) {
-                    Some(pending) => pending.end(Outcome::Error(problem)),
+                    Some(pending) => pending.end(Status::Error(problem)),
                     None => {
                         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
-                            let _ = asked.reply.send(Err(ClientError::Refused(problem)));
+                            let _ = asked.reply.send(Err(PapillaError::Refused(problem)));
                         }
                     }
                 }
@@ -158,10 +158,10 @@ impl State {
 
     /// The connection broke: what was sent is lost, what waits goes on waiting.
     pub(super) fn lose(&mut self) {
-        self.sent.drain(..).for_each(|pending| pending.end(Outcome::Lost));
+        self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
             let reason = "the connection broke".to_owned();
-            let _ = asked.reply.send(Err(ClientError::Protocol(reason)));
+            let _ = asked.reply.send(Err(PapillaError::Protocol(reason)));
         }
     }
 
@@ -170,7 +170,7 @@ impl State {
         self.over = true;
         self.lose();
         if let Some((pending, _)) = self.waiting.take() {
-            pending.end(Outcome::Lost);
+            pending.end(Status::Lost);
         }
         self.asked = None;
     }

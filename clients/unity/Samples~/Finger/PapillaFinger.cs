@@ -3,7 +3,7 @@ using Papilla;
 using UnityEngine;
 
 /// <summary>
-/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A press of half a newton
+/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A contact of half a newton
 /// circles the pad; a game fills <c>pressurePa</c> from its own contacts.
 /// </summary>
 [RequireComponent(typeof(MeshFilter), typeof(MeshRenderer))]
@@ -17,7 +17,7 @@ public sealed class PapillaFinger : MonoBehaviour
 
     readonly float[] pressurePa = new float[Wire.MapLength];
     Papilla.Atlas atlas;
-    PapillaClient client;
+    Session session;
     Mesh mesh;
     float[] sed;
     Color32[] colours;
@@ -26,7 +26,7 @@ public sealed class PapillaFinger : MonoBehaviour
 
     void Start()
     {
-        client = new PapillaClient(address, new Hello { Tier = tier }).Open();
+        session = new Session(address, new Hello { Tier = tier }).Open();
         // HTTP waits: not on the main thread.
         loading = new Thread(() => loaded = PapillaHttp.LoadAtlas(address)) { IsBackground = true };
         loading.Start();
@@ -38,9 +38,9 @@ public sealed class PapillaFinger : MonoBehaviour
         if (atlas == null) return;
         System.Array.Clear(pressurePa, 0, pressurePa.Length);
         atlas.AddContact(10 + 2 * Mathf.Cos(Time.time), 2 * Mathf.Sin(Time.time), -6.5, 0.5, 2.5, pressurePa);
-        client.Send(pressurePa);
+        session.Send(pressurePa);
         Answer answer;
-        if (!client.TryTake(out answer)) return;
+        if (!session.TryTakeLatest(out answer)) return;
         atlas.AtVertices(answer.Map, sed);
         for (int i = 0; i < sed.Length; i++) colours[i] = Color32.Lerp(new Color32(219, 168, 143, 255), new Color32(120, 0, 60, 255), sed[i] / sedOfWhite);
         mesh.colors32 = colours;
@@ -61,6 +61,6 @@ public sealed class PapillaFinger : MonoBehaviour
 
     void OnDestroy()
     {
-        if (client != null) client.Dispose();
+        if (session != null) session.Dispose();
     }
 }

@@ -8,7 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, ensure};
-use papilla_client::{Answer, Outcome};
+use papilla_client::{Answer, Status};
 use papilla_tests::conformance::pattern::Pressure;
 use serde_json::{Value, json};
 use tokio::{sync::oneshot::Receiver, time};
@@ -87,8 +87,8 @@ impl Run {
             control("resume").await?;
         }
         time::timeout(self.patience, outcomes.all()).await?;
-        let replaced = session.superseded_by_client() - before;
-        self.note = check_burst(&step["expect"], count, replaced, &outcomes.arrived)?;
+        let counted = session.superseded_by_client() - before;
+        self.note = check_burst(&step["expect"], count, counted, &outcomes.arrived)?;
         Ok(())
     }
 }
@@ -97,7 +97,7 @@ impl Run {
 fn check_burst(
     expect: &Value,
     count: usize,
-    replaced: u64,
+    counted: u64,
     arrived: &[(usize, Answer)],
 ) -> Result<String> {
     ensure!(arrived.len() == count, "{} of {count} frames have an outcome", arrived.len());
@@ -106,21 +106,21 @@ fn check_burst(
     sequences.dedup();
     ensure!(sequences.len() == count, "two outcomes of one frame");
     let superseded = |due: bool| {
-        let due = Outcome::Superseded { by_client: due };
-        arrived.iter().filter(|(_, answer)| answer.outcome == due).count() as u64
+        let due = Status::Superseded { by_client: due };
+        arrived.iter().filter(|(_, answer)| answer.status == due).count() as u64
     };
     let (here, there) = (superseded(true), superseded(false));
     let good: Vec<usize> =
         arrived.iter().filter(|(_, answer)| answer.is_ok()).map(|(number, _)| *number).collect();
     ensure!(good.len() as u64 + here + there == count as u64, "other outcomes: {arrived:?}");
     ensure!(good.is_sorted(), "frames were answered in the order {good:?}");
-    ensure!(here == replaced, "the client counts {replaced} replaced, {here} were");
+    ensure!(here == counted, "the client counts {counted} superseded, {here} were");
     ensure!(here + there >= expect["superseded"].as_u64().unwrap_or(0), "{here} + {there}");
     let due = expect["superseded_by_client"].as_u64().unwrap_or(0);
-    ensure!(here >= due, "the client replaced {here}");
+    ensure!(here >= due, "the client superseded {here}");
     let newest = arrived.iter().find(|(number, _)| number + 1 == count);
     check_answer(&expect["newest"], &newest.context("the newest has no outcome")?.1)?;
-    Ok(format!(" ({} ok, {here} replaced here, {there} by the service)", good.len()))
+    Ok(format!(" ({} ok, {here} superseded here, {there} by the service)", good.len()))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! What a step found against what it was to find.
 
-use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{Answer, Outcome};
-use papilla_proto::{FrameKind, MAP_SIDE_PX, Problem, flags};
+use anyhow::{Result, bail, ensure};
+use papilla_client::{Answer, Status};
+use papilla_proto::{FrameKind, MAP_SIDE_PX, Problem};
 use serde_json::{Value, json};
 
 fn near(what: &str, found: f64, due: f64, tolerance: f64) -> Result<()> {
@@ -53,13 +53,13 @@ pub(crate) fn check_problem(expect: &Value, problem: &Problem) -> Result<()> {
 }
 
 pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
-    let status = match &answer.outcome {
-        Outcome::Ok => "ok",
-        Outcome::Superseded { .. } => "superseded",
-        Outcome::Late => "late",
-        Outcome::Stale => "stale",
-        Outcome::Error(problem) => return check_problem(expect, problem),
-        Outcome::Lost => "lost",
+    let status = match &answer.status {
+        Status::Ok => "ok",
+        Status::Superseded { .. } => "superseded",
+        Status::Late => "late",
+        Status::Stale => "stale",
+        Status::Error(problem) => return check_problem(expect, problem),
+        Status::Lost => "lost",
     };
     let due = expect.get("status").and_then(Value::as_str).unwrap_or("ok");
     ensure!(status == due, "the status is {status}, {due} is due");
@@ -76,12 +76,14 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
         ensure!(*due == json!(answer.tier), "the tier is {}", answer.tier);
     }
     if let Some(due) = expect["flags"].as_array() {
-        let bit = |name: &Value| {
-            let known = flags::NAMED.into_iter().find(|(_, known)| name == known);
-            known.map(|(bit, _)| bit).with_context(|| format!("no flag {name}"))
-        };
-        let due = due.iter().try_fold(0, |all, name| anyhow::Ok(all | bit(name)?))?;
-        ensure!(answer.flags == due, "the flags are {}, {due} is due", answer.flags);
+        let found = [
+            ("out_of_range", answer.out_of_range),
+            ("no_contact", answer.no_contact),
+            ("unfamiliar", answer.unfamiliar),
+        ];
+        for (name, is_set) in found {
+            ensure!(is_set == due.contains(&json!(name)), "the flag {name} is {is_set}");
+        }
     }
     if let Some(due) = expect.get("window") {
         let w = answer.window;

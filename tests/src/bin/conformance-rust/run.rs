@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{ClientError, Contact, Frame, Outcome, Session, Skin, atlas, sed};
+use papilla_client::{Contact, Frame, PapillaError, Session, Skin, Status, atlas, sed};
 use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch};
 use papilla_tests::{
     conformance::pattern::{self, Pressure, Vertices},
@@ -69,11 +69,11 @@ impl Run {
         hello["version"] = json!(2);
         let hello: Hello = serde_json::from_value(hello)?;
         let opened = match &self.session {
-            Some(session) => session.terms(hello).await.map(|_| None),
+            Some(session) => session.renew(hello).await.map(|_| None),
             None => Session::open(&self.server, hello).await.map(Some),
         };
         match opened {
-            Err(ClientError::Refused(problem)) => return check_problem(&step["expect"], &problem),
+            Err(PapillaError::Refused(problem)) => return check_problem(&step["expect"], &problem),
             Err(error) => return Err(error.into()),
             Ok(Some(session)) => self.session = Some(session),
             Ok(None) => {}
@@ -107,7 +107,7 @@ impl Run {
         let frame = Frame { pressure_pa: &samples, window, client_time_us, deadline_us };
         for attempt in (0..member::<Option<u32>>(step, "attempts")?.unwrap_or(1)).rev() {
             let answer = time::timeout(self.patience, self.session()?.render(frame)).await??;
-            if answer.outcome == Outcome::Lost && attempt > 0 {
+            if answer.status == Status::Lost && attempt > 0 {
                 continue;
             }
             let same = client_time_us.is_none_or(|time_us| time_us == answer.client_time_us);
@@ -133,7 +133,7 @@ impl Run {
         let (server, tier) = (self.server.clone(), member::<String>(step, "tier")?);
         let map = member::<Pressure>(step, "pressure")?.draw(1.0, None);
         match spawn_blocking(move || sed(&server, &map, Some(&tier))).await? {
-            Err(ClientError::Refused(problem)) => check_problem(&step["expect"], &problem),
+            Err(PapillaError::Refused(problem)) => check_problem(&step["expect"], &problem),
             Err(error) => Err(error.into()),
             Ok(rendered) => {
                 ensure!(step["expect"]["status"] == "ok", "the request is not refused");

@@ -1,7 +1,7 @@
 # The atlas: which point of the finger each pixel of a map is, and how to fill a map (docs/reference/atlas.md).
 extends Reference
 
-const Samples = preload("samples.gd")
+const Compat = preload("compat.gd")
 const SIDE_PX = 224
 const REACH_MM = 5.0
 
@@ -114,11 +114,9 @@ func force_n(map):
 	return sum
 
 
+# A map without pressure.
 static func zeros():
-	var image = Image.new()
-	# New images are black: a native way to 50176 zeros.
-	image.create(SIDE_PX, SIDE_PX, false, Image.FORMAT_RF)
-	return Samples.bytes_to_floats(image.get_data())
+	return Compat.zeros()
 
 
 func _claim_all():

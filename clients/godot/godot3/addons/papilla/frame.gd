@@ -1,6 +1,7 @@
 # Frames of the protocol, version 2: a header of 48 bytes, little-endian, and what follows.
 extends Reference
 
+const Compat = preload("compat.gd")
 const Samples = preload("samples.gd")
 const STATUS = ["ok", "superseded", "late", "error", "stale"]
 const HEADER_BYTES = 48
@@ -72,7 +73,7 @@ static func read_sections(answer, packet, sections):
 			if from < packet.size():
 				answer.samples = packet.subarray(from, packet.size() - 1)
 		else:
-			answer[section.name] = Samples.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
+			answer[section.name] = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
 	if not has_map:
 		answer.width = 0
 		answer.height = 0
@@ -83,10 +84,7 @@ static func map_of(answer):
 	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
 	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
 		return values
-	var map = PoolRealArray()
-	map.resize(Samples.MAP_LEN)
-	for i in Samples.MAP_LEN:
-		map[i] = 0.0
+	var map = Compat.zeros()
 	for y in answer.height:
 		for x in answer.width:
 			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]

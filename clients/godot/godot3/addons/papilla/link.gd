@@ -1,4 +1,4 @@
-# A WebSocket to the server, for one connection. For Godot 3.
+# A WebSocket to the server, for one connection. This file is for Godot 3.
 extends Reference
 
 # A frame has up to 200 768 bytes; Godot's buffers have 64 KiB unless they are asked for before connecting.
@@ -12,16 +12,13 @@ var has_ended = false
 var _socket = WebSocketClient.new()
 
 
-# `url`: http(s) address of the server. False where it is none.
-func open(url, token):
+# `url` starts with ws:// or wss://. False where it is no address.
+func open(url):
 	_socket.set_buffers(BUFFER_KB, BUFFER_PACKETS, BUFFER_KB, BUFFER_PACKETS)
 	_socket.connect("connection_established", self, "_on_begin")
 	_socket.connect("connection_closed", self, "_on_end")
 	_socket.connect("connection_error", self, "_on_end")
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.percent_encode()
-	return _socket.connect_to_url(address) == OK
+	return _socket.connect_to_url(url) == OK
 
 
 # Moves bytes; true once, when the connection is there.
@@ -35,7 +32,7 @@ func poll():
 	return true
 
 
-# The next message: a Dictionary, or bytes; null where there is none.
+# The next message: a String, or bytes; null where there is none.
 func next():
 	if has_ended:
 		return null
@@ -43,13 +40,13 @@ func next():
 	if peer.get_available_packet_count() == 0:
 		return null
 	var packet = peer.get_packet()
-	return JSON.parse(packet.get_string_from_utf8()).result if peer.was_string_packet() else packet
+	return packet.get_string_from_utf8() if peer.was_string_packet() else packet
 
 
-func send_text(message):
+func send_text(text):
 	var peer = _socket.get_peer(1)
 	peer.set_write_mode(WebSocketPeer.WRITE_MODE_TEXT)
-	peer.put_packet(JSON.print(message).to_utf8())
+	peer.put_packet(text.to_utf8())
 
 
 # False where the connection is lost.

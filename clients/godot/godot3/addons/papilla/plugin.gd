@@ -3,8 +3,8 @@ extends EditorPlugin
 
 
 func _enter_tree():
-	add_custom_type("Papilla", "Node", preload("papilla.gd"), null)
+	add_custom_type("PapillaSession", "Node", preload("session.gd"), null)
 
 
 func _exit_tree():
-	remove_custom_type("Papilla")
+	remove_custom_type("PapillaSession")

@@ -1,7 +1,8 @@
+# Made of clients/godot/godot3/addons/papilla/atlas.gd by clients/godot/generate: edit that one.
 # The atlas: which point of the finger each pixel of a map is, and how to fill a map (docs/reference/atlas.md).
 extends RefCounted
 
-const Samples = preload("samples.gd")
+const Compat = preload("compat.gd")
 const SIDE_PX = 224
 const REACH_MM = 5.0
 
@@ -95,6 +96,7 @@ func _add_contact(map, at, force_n, radius_mm):
 			total += parts[n] * areas_mm2[n]
 	for n in parts:
 		map[pixels[n]] += 1e6 * force_n * parts[n] / total
+	# Arrays of floats are handed over by value in Godot 3: hence the return.
 	return map
 
 
@@ -113,11 +115,9 @@ func force_n(map):
 	return sum
 
 
+# A map without pressure.
 static func zeros():
-	var map = PackedFloat32Array()
-	# New room is filled with zeros.
-	map.resize(Samples.MAP_LEN)
-	return map
+	return Compat.zeros()
 
 
 func _claim_all():

@@ -1,6 +1,8 @@
+# Made of clients/godot/godot3/addons/papilla/frame.gd by clients/godot/generate: edit that one.
 # Frames of the protocol, version 2: a header of 48 bytes, little-endian, and what follows.
 extends RefCounted
 
+const Compat = preload("compat.gd")
 const Samples = preload("samples.gd")
 const STATUS = ["ok", "superseded", "late", "error", "stale"]
 const HEADER_BYTES = 48
@@ -72,7 +74,7 @@ static func read_sections(answer, packet, sections):
 			if from < packet.size():
 				answer.samples = packet.slice(from, packet.size())
 		else:
-			answer[section.name] = packet.slice(from, from + int(section.bytes)).to_float32_array()
+			answer[section.name] = Compat.bytes_to_floats(packet.slice(from, from + int(section.bytes)))
 	if not has_map:
 		answer.width = 0
 		answer.height = 0
@@ -83,8 +85,7 @@ static func map_of(answer):
 	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
 	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
 		return values
-	var map = PackedFloat32Array()
-	map.resize(Samples.MAP_LEN)
+	var map = Compat.zeros()
 	for y in answer.height:
 		for x in answer.width:
 			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]
@@ -97,4 +98,5 @@ static func image_of(answer):
 	var format = formats[answer.sample_type]
 	if format < 0 or answer.width == 0:
 		return null
-	return Image.create_from_data(answer.width, answer.height, false, format, answer.samples)
+	var image = Image.create_from_data(answer.width, answer.height, false, format, answer.samples)
+	return image

@@ -1,7 +1,8 @@
+# Made of clients/godot/godot3/addons/papilla/http.gd by clients/godot/generate: edit that one.
 # What needs no session: the atlas, and one map at a time. Calls wait for the answer: make them while a scene loads, or in a Thread.
 extends RefCounted
 
-const Samples = preload("samples.gd")
+const Compat = preload("compat.gd")
 
 
 # {status, headers, body}; status 0 where no answer came within `patience_ms`.
@@ -13,7 +14,7 @@ static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body 
 	var http = HTTPClient.new()
 	http.blocking_mode_enabled = false
 	http.read_chunk_size = 1 << 20
-	http.connect_to_host(host[0], port, TLSOptions.client() if is_tls else null)
+	Compat.connect_http(http, host[0], port, is_tls)
 	var end = Time.get_ticks_msec() + patience_ms
 	var answer = {"status": 0, "headers": {}, "body": PackedByteArray()}
 	var is_asked = false
@@ -55,9 +56,9 @@ static func atlas_text(url, token = ""):
 # {map: 224 x 224 floats (J/m3), tier} or {problem: {code, message, field}}.
 static func post_pressure(url, pressure_pa, tier = "", token = ""):
 	var path = "v1/sed" + ("?tier=" + tier.uri_encode() if tier != "" else "")
-	var answer = fetch(url, path, HTTPClient.METHOD_POST, _headers(token), pressure_pa.to_byte_array())
+	var answer = fetch(url, path, HTTPClient.METHOD_POST, _headers(token), Compat.floats_to_bytes(pressure_pa))
 	if answer.status == 0:
 		return {"problem": {"code": "no_answer", "message": "no answer from " + url, "field": null}}
 	if answer.status != 200:
 		return {"problem": JSON.parse_string(answer.body.get_string_from_utf8()).error}
-	return {"map": answer.body.to_float32_array(), "tier": answer.headers.get("x-papilla-tier", "")}
+	return {"map": Compat.bytes_to_floats(answer.body), "tier": answer.headers.get("x-papilla-tier", "")}

@@ -1,4 +1,4 @@
-# A WebSocket to the server, for one connection. For Godot 4.
+# A WebSocket to the server, for one connection. This file is for Godot 4.
 extends RefCounted
 
 # A frame has up to 200 768 bytes; Godot's buffers have 64 KiB unless they are asked for before connecting.
@@ -12,15 +12,12 @@ var has_ended = false
 var _socket = WebSocketPeer.new()
 
 
-# `url`: http(s) address of the server. False where it is none.
-func open(url, token):
+# `url` starts with ws:// or wss://. False where it is no address.
+func open(url):
 	_socket.inbound_buffer_size = BUFFER_BYTES
 	_socket.outbound_buffer_size = BUFFER_BYTES
 	_socket.max_queued_packets = BUFFER_PACKETS
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.uri_encode()
-	return _socket.connect_to_url(address) == OK
+	return _socket.connect_to_url(url) == OK
 
 
 # Moves bytes; true once, when the connection is there.
@@ -35,16 +32,16 @@ func poll():
 	return true
 
 
-# The next message: a Dictionary, or bytes; null where there is none.
+# The next message: a String, or bytes; null where there is none.
 func next():
 	if _socket.get_available_packet_count() == 0:
 		return null
 	var packet = _socket.get_packet()
-	return JSON.parse_string(packet.get_string_from_utf8()) if _socket.was_string_packet() else packet
+	return packet.get_string_from_utf8() if _socket.was_string_packet() else packet
 
 
-func send_text(message):
-	_socket.send_text(JSON.stringify(_whole(message)))
+func send_text(text):
+	_socket.send_text(text)
 
 
 # False where the connection is lost.
@@ -60,15 +57,3 @@ func is_open():
 func close():
 	_socket.close()
 	_socket.poll()
-
-
-# Whole numbers as integers: Godot writes 10.0 for a float, and the server wants 10 where a count is due.
-static func _whole(value):
-	if value is Dictionary:
-		var members = {}
-		for key in value:
-			members[key] = _whole(value[key])
-		return members
-	if value is Array:
-		return value.map(_whole)
-	return int(value) if value is float and value == floor(value) else value

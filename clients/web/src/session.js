@@ -23,17 +23,17 @@ const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 10
  * A session. Frames are pressure maps (Pa); answers are maps of strain energy density (J/m3).
  *
  * The newest frame wins on this side too: while an earlier frame has not left the socket a frame waits, and
- * a newer one takes its place (`replaced` counts). A lost connection is made anew by itself, with the terms of
+ * a newer one takes its place (`supersededByClient` counts). A lost connection is made anew by itself, with the terms of
  * the last hello; a frame that waits then goes out first.
  *
  * `onanswer(answer)` is called exactly once for every frame, with `answer.status`: `ok`, `superseded` (by this client or the
  * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke before the answer). `onready(ready)`,
- * `onproblem(problem)` for refused hellos and faults of the session, `onstate(state, why)`.
+ * `onrefused(problem)` for refused hellos and faults of the session, `onstate(state, why)`.
  */
-export class Papilla {
+export class Session {
   /** @type {(ready: Ready) => void} */ onready = () => {};
   /** @type {(answer: Answer) => void} */ onanswer = () => {};
-  /** @type {(problem: Problem) => void} */ onproblem = () => {};
+  /** @type {(problem: Problem) => void} */ onrefused = () => {};
   /** @type {(state: State, why: string) => void} */ onstate = () => {};
 
   /** The terms as the server confirmed them; null while there is no session. @type {Ready | null} */
@@ -81,18 +81,18 @@ export class Papilla {
   /**
    * A session that is ready.
    * @param {string} [base] @param {Hello} [hello] @param {Options} [options]
-   * @returns {Promise<Papilla>} rejected with a PapillaError where the hello is refused
+   * @returns {Promise<Session>} rejected with a PapillaError where the hello is refused
    */
   static connect(base, hello, options) {
-    const papilla = new Papilla(base, hello, options);
+    const session = new Session(base, hello, options);
     return new Promise((resolve, reject) => {
-      papilla.onready = () => { papilla.onready = papilla.onproblem = () => {}; resolve(papilla); };
-      papilla.onproblem = (problem) => {
+      session.onready = () => { session.onready = session.onrefused = () => {}; resolve(session); };
+      session.onrefused = (problem) => {
         if (PASSING.has(problem.code)) return;
-        papilla.close();
+        session.close();
         reject(new PapillaError(problem));
       };
-      papilla.open();
+      session.open();
     });
   }
 
@@ -102,8 +102,8 @@ export class Papilla {
   }
 
   /** Frames whose place a newer one took before they could go out. */
-  get replaced() {
-    return this.#outbox.replaced;
+  get supersededByClient() {
+    return this.#outbox.superseded;
   }
 
   /** Connects, and again whenever the connection is lost, until `close`. */
@@ -118,7 +118,7 @@ export class Papilla {
   }
 
   /**
-   * New terms, in the open session: answered by `onready`, or by `onproblem` and the terms stay.
+   * New terms, in the open session: answered by `onready`, or by `onrefused` and the terms stay.
    * @param {Hello} hello
    */
   renew(hello) {
@@ -257,7 +257,7 @@ export class Papilla {
       return;
     }
     if (!this.ready && !problem.closes && !PASSING.has(problem.code)) this.#refused(problem);
-    this.onproblem(problem);
+    this.onrefused(problem);
   }
 
   /** A hello was refused: of a renewal the terms of before stand, at the start nothing does. @param {Problem} problem */
@@ -280,7 +280,7 @@ export class Papilla {
       if (!older) this.#viewsBefore = null;
       if (answer.status === 'ok' && views) answer.readBody(views, data.byteLength);
     } catch (error) {
-      this.onproblem({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
+      this.onrefused({ type: 'error', code: 'bad_frame', message: String(error), sequence: null, closes: false });
       return;
     }
     if (!this.#outbox.take(answer.sequence)) return;

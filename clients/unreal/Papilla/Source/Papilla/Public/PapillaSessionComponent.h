@@ -8,7 +8,7 @@
 #include <papilla/core.hpp>
 #include <papilla/pieces.hpp>
 
-#include "PapillaComponent.generated.h"
+#include "PapillaSessionComponent.generated.h"
 
 class IWebSocket;
 
@@ -31,19 +31,19 @@ struct FPapillaContact
 
 DECLARE_DYNAMIC_MULTICAST_DELEGATE(FPapillaReady);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaRefused, const FString&, Code, const FString&, Message);
-DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaAnswer, int32, Sequence, float, SedMaxJPerM3);
+DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaMapReceived, int32, Sequence, float, SedMaxJPerM3);
 
 /**
  * Sends pressure maps (Pa) and gives the newest strain energy density map (J/m3), 224 x 224 each.
  * The latest frame wins: sending never blocks or queues. Reconnects by itself. Game thread only.
  */
 UCLASS(ClassGroup = (Haptics), meta = (BlueprintSpawnableComponent))
-class PAPILLA_API UPapillaComponent : public UActorComponent
+class PAPILLA_API UPapillaSessionComponent : public UActorComponent
 {
     GENERATED_BODY()
 
 public:
-    UPapillaComponent();
+    UPapillaSessionComponent();
 
     /** Host and port of the service. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
@@ -55,7 +55,7 @@ public:
 
     /** Frames that may be on their way at once. IWebSocket queues without bound, so this bounds it. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "1", ClampMax = "8"))
-    int32 MaxInFlight = 2;
+    int32 InFlightMax = 2;
 
     /** A session is open. */
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
@@ -67,7 +67,7 @@ public:
 
     /** A map came; GetSed reads it. */
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
-    FPapillaAnswer OnAnswer;
+    FPapillaMapReceived OnMapReceived;
 
     /** Sends a whole map, row by row, Pa; an empty one is no contact. Returns the frame's sequence. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
@@ -82,7 +82,7 @@ public:
     bool GetSed(TArray<float>& SedJPerM3) const;
 
     /** The newest answer with all it carries: summary, points, actuators, times. */
-    const papilla::Answer& Newest() const { return Answer; }
+    const papilla::Answer& Latest() const { return Answer; }
 
     /** Sends a window of the map: its samples, Pa, row by row. */
     int32 SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs = 0);

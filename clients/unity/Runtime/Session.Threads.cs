@@ -8,7 +8,7 @@ using Newtonsoft.Json.Linq;
 namespace Papilla
 {
     /// <content>The two threads: one sends the frame that waits, the other connects and receives.</content>
-    public sealed partial class PapillaClient
+    public sealed partial class Session
     {
         void SendWaiting()
         {
@@ -113,7 +113,7 @@ namespace Papilla
                 var terms = new Ready(json);
                 lock (gate)
                 {
-                    olderTerms = readyBefore;
+                    olderReady = readyBefore;
                     readyBefore = null;
                     helloBefore = null;
                     ready = terms;
@@ -166,9 +166,9 @@ namespace Papilla
             lock (gate)
             {
                 if (!outstanding.Remove(answered)) return;
-                bool isOlder = olderTerms != null && (int)(answered - termsFrom) < 0;
-                if (!isOlder) olderTerms = null;
-                terms = isOlder ? olderTerms : ready ?? readyBefore;
+                bool isOlder = olderReady != null && (int)(answered - renewedFrom) < 0;
+                if (!isOlder) olderReady = null;
+                terms = isOlder ? olderReady : ready ?? readyBefore;
                 if (terms == null) return;
                 Monitor.PulseAll(gate);
             }

@@ -1,10 +1,12 @@
-# A session of Papilla: pressure maps (Pa) out, maps of strain energy density (J/m3) in. For Godot 4.
+# Made of clients/godot/godot3/addons/papilla/session.gd by clients/godot/generate: edit that one.
+# A session of Papilla: pressure maps (Pa) out, maps of strain energy density (J/m3) in.
 #
 # Put the node into the scene, connect `map_received`, call `send` or `send_window`. The newest frame wins here too: with
 # `in_flight_max` frames without an answer a frame waits, and a newer one takes its place. A lost connection is made anew
 # by itself.
 extends Node
 
+const Compat = preload("compat.gd")
 const Frame = preload("frame.gd")
 const Link = preload("link.gd")
 const Samples = preload("samples.gd")
@@ -13,8 +15,8 @@ const Samples = preload("samples.gd")
 signal map_received(answer)
 # What became of a frame, once for each: `answer.status` is ok, superseded, late, stale, error or lost.
 signal answered(answer)
-# A session began; `terms` is the server's ready.
-signal session_began(terms)
+# A session began, on the terms of the server's `ready`.
+signal session_ready(server_ready)
 # A hello was refused.
 signal refused(problem)
 
@@ -28,21 +30,21 @@ const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_lim
 # Bearer token, for a server that asks for one.
 @export var token := ""
 # What to ask for, as in docs/reference/protocol.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
-@export var hello: Dictionary = {}
+@export var hello := {}
 # Connect when the scene starts.
 @export var auto_open := true
 # Frames that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
 @export var in_flight_max := 3
 
-# The server's ready; null while there is no session.
-var terms = null
+# The server's `ready`; null while there is no session. (`ready` itself is a signal of every Node.)
+var server_ready = null
 # Deadline of the frames to come, us; 0: the session's budget.
 var deadline_us = 0
-# us of the header; 0: the clock.
-var time_us = 0
-# Frames that went out, and frames that a newer one replaced before.
+# Time of the frames to come by the client's clock, us; 0: the engine's own.
+var client_time_us = 0
+# Frames that went out, and frames that a newer one replaced before they left.
 var sent = 0
-var replaced = 0
+var superseded_by_client = 0
 
 var _link = null
 var _open = false
@@ -55,8 +57,8 @@ var _waiting_sequence = 0
 var _outstanding = []
 var _asked = {}
 var _before = null
-var _older_terms = null
-var _terms_from = 0
+var _older_ready = null
+var _renewed_from = 0
 
 
 func _ready():
@@ -89,14 +91,14 @@ func close():
 		_tell({"status": "lost", "sequence": _waiting_sequence})
 
 
-# New terms in the open session: `session_began`, or `refused` and the old ones stay.
+# Says hello again in the open session: `session_ready`, or `refused` and the old terms stand.
 func renew(next):
-	_replace_waiting()
-	if terms != null:
-		_before = {"asked": _asked, "terms": terms}
+	_supersede_waiting()
+	if server_ready != null:
+		_before = {"asked": _asked, "server_ready": server_ready}
 	_asked = next.duplicate(true)
-	_terms_from = _sequence + 1
-	terms = null
+	_renewed_from = _sequence + 1
+	server_ready = null
 	if _link != null and _link.is_open():
 		_greet()
 	elif _is_refused:
@@ -115,9 +117,9 @@ func send_window(samples_pa, column, row, width, height):
 	if column < 0 or row < 0 or column + width > Samples.SIDE_PX or row + height > Samples.SIDE_PX or samples_pa.size() != width * height:
 		push_error("%d samples are no window of %d x %d at %d, %d" % [samples_pa.size(), width, height, column, row])
 		return -1
-	_replace_waiting()
+	_supersede_waiting()
 	_sequence = (_sequence + 1) & 0xffffffff
-	var stamp = time_us if time_us > 0 else Time.get_ticks_usec()
+	var stamp = client_time_us if client_time_us > 0 else Time.get_ticks_usec()
 	var type = _asked.get("sample_type", "f32")
 	_waiting = Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, stamp, deadline_us)
 	_waiting_sequence = _sequence
@@ -149,7 +151,7 @@ func poll():
 	_receive()
 	if _link == null:
 		return
-	if _link.has_ended or (terms == null and now > _gives_up_ms):
+	if _link.has_ended or (server_ready == null and now > _gives_up_ms):
 		_lost()
 		return
 	_flush()
@@ -160,8 +162,8 @@ func _receive():
 		var message = _link.next()
 		if message == null:
 			return
-		if message is Dictionary:
-			_text(message)
+		if message is String:
+			_text(JSON.parse_string(message))
 		else:
 			_binary(message)
 
@@ -170,7 +172,10 @@ func _connect():
 	_drop()
 	_link = Link.new()
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
-	if not _link.open(url, token):
+	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
+	if token != "":
+		address += "?access_token=" + token.uri_encode()
+	if not _link.open(address):
 		_lost()
 
 
@@ -178,12 +183,12 @@ func _greet():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
 	message["version"] = 2
-	_link.send_text(message)
+	_link.send_text(Compat.json_text(message))
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
 
 
 func _drop():
-	terms = null
+	server_ready = null
 	_before = null
 	if _link == null:
 		return
@@ -206,16 +211,16 @@ func _lose_all():
 		_tell({"status": "lost", "sequence": sequence})
 
 
-func _replace_waiting():
+func _supersede_waiting():
 	if _waiting == null:
 		return
 	_waiting = null
-	replaced += 1
+	superseded_by_client += 1
 	_tell({"status": "superseded", "sequence": _waiting_sequence})
 
 
 func _flush():
-	if _waiting == null or terms == null or _outstanding.size() >= in_flight_max:
+	if _waiting == null or server_ready == null or _outstanding.size() >= in_flight_max:
 		return
 	var frame = _waiting
 	_waiting = null
@@ -227,10 +232,10 @@ func _flush():
 
 func _text(message):
 	if message.type == "ready":
-		_older_terms = _before.terms if _before != null else null
+		_older_ready = _before.server_ready if _before != null else null
 		_before = null
-		terms = message
-		session_began.emit(terms)
+		server_ready = message
+		session_ready.emit(server_ready)
 		_flush()
 	elif message.get("sequence") != null:
 		var sequence = int(message.sequence)
@@ -245,11 +250,11 @@ func _text(message):
 
 # A refused renewal leaves the old terms; a refused first hello ends it, unless the reason passes by itself.
 func _on_refusal(problem):
-	if terms != null or problem.closes or PASSING.has(problem.code):
+	if server_ready != null or problem.closes or PASSING.has(problem.code):
 		return
 	if _before != null:
 		_asked = _before.asked
-		terms = _before.terms
+		server_ready = _before.server_ready
 		_before = null
 		return
 	_is_refused = true
@@ -265,11 +270,11 @@ func _binary(packet):
 		return
 	_outstanding.erase(answer.sequence)
 	answer.round_trip_us = Time.get_ticks_usec() - answer.client_time_us
-	var is_older = _older_terms != null and answer.sequence < _terms_from
+	var is_older = _older_ready != null and answer.sequence < _renewed_from
 	if answer.status == "ok":
-		Frame.read_sections(answer, packet, _older_terms.sections if is_older else terms.sections)
+		Frame.read_sections(answer, packet, _older_ready.sections if is_older else server_ready.sections)
 	if not is_older:
-		_older_terms = null
+		_older_ready = null
 	_flush()
 	_tell(answer)
 

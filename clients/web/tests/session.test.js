@@ -31,7 +31,7 @@ test('what is no pressure is refused before it is rounded, and cropping leaves n
   assert.equal(greatest(Float32Array.of(0, -0, 3, 7, 2, 9), 0, 3, 2, 2), 7);
 });
 
-test('the foundation is off the FE presses by what its page says, with the constants that fit', () => {
+test('the foundation is off the FE indentations by what its page says, with the constants that fit', () => {
   const [fitted, winkler] = measure();
   for (const { law, stiffness } of [fitted, winkler]) assert.ok(Math.abs(stiffness / law.stiffness - 1) < 1e-3, `${stiffness}`);
   const percent = (/** @type {number} */ value) => `${(100 * value).toFixed(1)} %`;

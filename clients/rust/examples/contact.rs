@@ -1,6 +1,6 @@
-//! A press that comes and goes, 90 times a second.
+//! A contact that comes and goes, 90 times a second.
 //!
-//! `cargo run --release -p papilla-client --example press [HOST:PORT]`
+//! `cargo run --release -p papilla-client --example contact [HOST:PORT]`
 
 use std::{env, time::Duration};
 
@@ -19,8 +19,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     for frame in 0..180 {
         beat.tick().await;
         let force_n = 0.5 * (f64::from(frame) / 57.0).sin().powi(2);
-        let press = Contact { at_mm: [11.25, 0.0, -6.53], force_n, radius_mm: 2.5 };
-        let answer = session.render(&skin.contacts(&[press])).await?;
+        let contact = Contact { at_mm: [11.25, 0.0, -6.53], force_n, radius_mm: 2.5 };
+        let answer = session.render(&skin.contacts(&[contact])).await?;
         let area_mm2 = answer.summary.map_or(0.0, |summary| summary.contact_area_mm2);
         println!(
             "{force_n:.3} N: {:.0} J/m3 at most, {area_mm2:.1} mm2 in contact, {} us in the server",

@@ -1,4 +1,4 @@
-// The committed FE presses as the foundation sees them: for each state the penetration of every vertex of the
+// The committed FE indentations as the foundation sees them: for each state the penetration of every vertex of the
 // undeformed skin into the indenter, and the pressure that the FE code found there.
 
 import { readFileSync } from 'node:fs';
@@ -34,9 +34,9 @@ function readNpz(file) {
   return arrays;
 }
 
-/** Columns are the indenter's axes: yaw about z, then pitch about y, then roll about x. @param {any} press */
-function rotation(press) {
-  const [p, r, y] = [press.pitch_deg, press.roll_deg, press.yaw_deg].map((deg) => (deg * Math.PI) / 180);
+/** Columns are the indenter's axes: yaw about z, then pitch about y, then roll about x. @param {any} indentation */
+function rotation(indentation) {
+  const [p, r, y] = [indentation.pitch_deg, indentation.roll_deg, indentation.yaw_deg].map((deg) => (deg * Math.PI) / 180);
   const [sp, cp, sr, cr, sy, cy] = [Math.sin(p), Math.cos(p), Math.sin(r), Math.cos(r), Math.sin(y), Math.cos(y)];
   const turn = [[cp * cy, -cp * sy, sp], [sy, cy, 0], [-sp * cy, sp * sy, cp]];
   return [turn[0], [0, 1, 2].map((k) => cr * turn[1][k] - sr * turn[2][k]), [0, 1, 2].map((k) => sr * turn[1][k] + cr * turn[2][k])];
@@ -45,11 +45,11 @@ function rotation(press) {
 /**
  * Distance of every vertex from the indenter when it has gone `depthMm` beyond its first touch: as
  * docs/reference/indenters.md says, from the skin point that a flat plate in that pose would touch first.
- * @param {Float32Array} positionsMm @param {any} press @param {any} shape
+ * @param {Float32Array} positionsMm @param {any} indentation @param {any} shape
  * @returns {(depthMm: number, out: Float32Array) => void}
  */
-function placed(positionsMm, press, shape) {
-  const turn = rotation(press);
+function placed(positionsMm, indentation, shape) {
+  const turn = rotation(indentation);
   const count = positionsMm.length / 3;
   const local = new Float64Array(positionsMm.length);
   for (let i = 0; i < count; i++) {
@@ -59,7 +59,7 @@ function placed(positionsMm, press, shape) {
   }
   let first = 0;
   for (let i = 1; i < count; i++) if (local[3 * i + 2] < local[3 * first + 2]) first = i;
-  const origin = [local[3 * first] + press.offset_mm[0], local[3 * first + 1] + press.offset_mm[1], local[3 * first + 2] - topMm(shape)];
+  const origin = [local[3 * first] + indentation.offset_mm[0], local[3 * first + 1] + indentation.offset_mm[1], local[3 * first + 2] - topMm(shape)];
   const gap = (/** @type {number} */ i, /** @type {number} */ travel) =>
     distanceMm(shape, local[3 * i] - origin[0], local[3 * i + 1] - origin[1], local[3 * i + 2] - origin[2] - travel);
   let touch = Infinity;
@@ -71,7 +71,7 @@ function placed(positionsMm, press, shape) {
       travel += Math.max(free, 1e-6);
     }
   }
-  if (touch === Infinity) throw new Error(`press ${press.id} of '${press.indenter}' never touches`);
+  if (touch === Infinity) throw new Error(`indentation ${indentation.id} of '${indentation.indenter}' never touches`);
   return (depthMm, out) => {
     for (let i = 0; i < count; i++) out[i] = Math.max(0, -gap(i, touch + depthMm));
   };
@@ -89,16 +89,16 @@ export function readStates(folder, set) {
   const { campaign } = manifest;
   /** @type {State[]} */
   const states = [];
-  for (const press of manifest.presses) {
-    const shape = campaign.indenters?.find((/** @type {any} */ entry) => entry.name === press.indenter).indenter ?? campaign.indenter;
-    const penetrate = placed(positionsMm, press, shape);
-    const shard = readNpz(`${folder}/${press.file}`);
+  for (const indentation of manifest.presses) {
+    const shape = campaign.indenters?.find((/** @type {any} */ entry) => entry.name === indentation.indenter).indenter ?? campaign.indenter;
+    const penetrate = placed(positionsMm, indentation, shape);
+    const shard = readNpz(`${folder}/${indentation.file}`);
     const [depths, pressures, forces] = ['depth_mm', 'pressure_pa', 'force_n'].map((name) => /** @type {Float32Array} */ (shard.get(name)));
     depths.forEach((depthMm, n) => {
       const penetrationMm = new Float32Array(count);
       penetrate(depthMm, penetrationMm);
       const forceN = Math.hypot(forces[3 * n], forces[3 * n + 1], forces[3 * n + 2]);
-      states.push({ set, split: press.split, indenter: press.indenter, depthMm, forceN, penetrationMm, pressurePa: pressures.slice(n * count, (n + 1) * count) });
+      states.push({ set, split: indentation.split, indenter: indentation.indenter, depthMm, forceN, penetrationMm, pressurePa: pressures.slice(n * count, (n + 1) * count) });
     });
   }
   return states;

@@ -1,4 +1,4 @@
-#include "PapillaComponent.h"
+#include "PapillaSessionComponent.h"
 
 #include "HttpModule.h"
 #include "IWebSocket.h"
@@ -27,30 +27,30 @@ uint64 NowUs()
 }
 }  // namespace
 
-UPapillaComponent::UPapillaComponent()
+UPapillaSessionComponent::UPapillaSessionComponent()
 {
     PrimaryComponentTick.bCanEverTick = true;
 }
 
-void UPapillaComponent::BeginPlay()
+void UPapillaSessionComponent::BeginPlay()
 {
     Super::BeginPlay();
     Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
     Core = MakeUnique<papilla::Core>(ToUtf8(Hello));
-    Core->on_outcome = [this](const papilla::Answer& Outcome)
+    Core->on_answer = [this](const papilla::Answer& Outcome)
     {
         if (Outcome.status != papilla::Status::ok) return;
         Answer = Outcome;
         bHasAnswer = true;
-        OnAnswer.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
+        OnMapReceived.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
     };
     FetchAtlas();
     Connect();
 }
 
-void UPapillaComponent::EndPlay(const EEndPlayReason::Type Reason)
+void UPapillaSessionComponent::EndPlay(const EEndPlayReason::Type Reason)
 {
-    if (Core) Core->on_outcome = nullptr;
+    if (Core) Core->on_answer = nullptr;
     if (Socket)
     {
         Socket->OnConnected().Clear();
@@ -64,18 +64,18 @@ void UPapillaComponent::EndPlay(const EEndPlayReason::Type Reason)
     Super::EndPlay(Reason);
 }
 
-void UPapillaComponent::Connect()
+void UPapillaSessionComponent::Connect()
 {
     FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
     Socket = Module.CreateWebSocket(TEXT("ws://") + Server + TEXT("/v1/session"), FString());
-    TWeakObjectPtr<UPapillaComponent> Weak(this);
+    TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Socket->OnConnected().AddLambda([Weak]()
     {
-        if (UPapillaComponent* Self = Weak.Get()) Self->Socket->Send(ToFString(Self->Core->hello()));
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Socket->Send(ToFString(Self->Core->hello()));
     });
     Socket->OnConnectionError().AddLambda([Weak](const FString& Error)
     {
-        if (UPapillaComponent* Self = Weak.Get())
+        if (UPapillaSessionComponent* Self = Weak.Get())
         {
             Self->OnRefused.Broadcast(FString(), Error);
             Self->Broke();
@@ -83,20 +83,20 @@ void UPapillaComponent::Connect()
     });
     Socket->OnClosed().AddLambda([Weak](int32, const FString&, bool)
     {
-        if (UPapillaComponent* Self = Weak.Get()) Self->Broke();
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Broke();
     });
     Socket->OnMessage().AddLambda([Weak](const FString& Message)
     {
-        if (UPapillaComponent* Self = Weak.Get()) Self->HandleText(Message);
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->HandleText(Message);
     });
     Socket->OnBinaryMessage().AddLambda([Weak](const void* Data, SIZE_T Size, bool bIsLast)
     {
-        if (UPapillaComponent* Self = Weak.Get()) Self->HandlePiece(Data, Size, bIsLast);
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->HandlePiece(Data, Size, bIsLast);
     });
     Socket->Connect();
 }
 
-void UPapillaComponent::Broke()
+void UPapillaSessionComponent::Broke()
 {
     Core->lost();
     Pieces.reset();
@@ -104,31 +104,31 @@ void UPapillaComponent::Broke()
     RetryAt = FPlatformTime::Seconds() + RetrySeconds;
 }
 
-void UPapillaComponent::HandleText(const FString& Message)
+void UPapillaSessionComponent::HandleText(const FString& Message)
 {
     switch (Core->text(ToUtf8(Message)))
     {
-    case papilla::Core::Heard::ready:
+    case papilla::Core::Event::ready:
         OnReady.Broadcast();
         Pump();
         break;
-    case papilla::Core::Heard::refused:
+    case papilla::Core::Event::refused:
         OnRefused.Broadcast(ToFString(Core->refusal().code), ToFString(Core->refusal().message));
         break;
-    case papilla::Core::Heard::broken:
+    case papilla::Core::Event::broken:
         Socket->Close();
         break;
-    case papilla::Core::Heard::nothing:
+    case papilla::Core::Event::nothing:
         Pump();
         break;
     }
 }
 
-void UPapillaComponent::HandlePiece(const void* Data, SIZE_T Size, bool bIsLast)
+void UPapillaSessionComponent::HandlePiece(const void* Data, SIZE_T Size, bool bIsLast)
 {
     // Unreal hands over 64 KiB at a time: a frame of f32 comes in four pieces.
     if (!Pieces.add(Data, Size, bIsLast)) return;
-    if (Core->binary(Pieces.message().data(), Pieces.message().size()) == papilla::Core::Heard::broken)
+    if (Core->binary(Pieces.message().data(), Pieces.message().size()) == papilla::Core::Event::broken)
     {
         Socket->Close();
         return;
@@ -136,9 +136,9 @@ void UPapillaComponent::HandlePiece(const void* Data, SIZE_T Size, bool bIsLast)
     Pump();
 }
 
-void UPapillaComponent::Pump()
+void UPapillaSessionComponent::Pump()
 {
-    while (Socket && Core->in_flight() < static_cast<size_t>(MaxInFlight))
+    while (Socket && Core->in_flight() < static_cast<size_t>(InFlightMax))
     {
         papilla::Outgoing* const Frame = Core->take();
         if (!Frame) return;
@@ -146,7 +146,7 @@ void UPapillaComponent::Pump()
     }
 }
 
-void UPapillaComponent::TickComponent(float DeltaTime, ELevelTick Tick, FActorComponentTickFunction* Function)
+void UPapillaSessionComponent::TickComponent(float DeltaTime, ELevelTick Tick, FActorComponentTickFunction* Function)
 {
     Super::TickComponent(DeltaTime, Tick, Function);
     if (!Core) return;
@@ -159,7 +159,7 @@ void UPapillaComponent::TickComponent(float DeltaTime, ELevelTick Tick, FActorCo
     Pump();
 }
 
-int32 UPapillaComponent::SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs)
+int32 UPapillaSessionComponent::SendWindow(const float* PressurePa, const papilla::Window& Window, uint32 DeadlineUs)
 {
     if (!Core) return 0;
     const int32 Sequence = static_cast<int32>(Core->send(PressurePa, Window, NowUs(), DeadlineUs));
@@ -167,7 +167,7 @@ int32 UPapillaComponent::SendWindow(const float* PressurePa, const papilla::Wind
     return Sequence;
 }
 
-int32 UPapillaComponent::SendPressure(const TArray<float>& PressurePa)
+int32 UPapillaSessionComponent::SendPressure(const TArray<float>& PressurePa)
 {
     if (PressurePa.IsEmpty()) return SendWindow(nullptr, {});
     if (PressurePa.Num() != static_cast<int32>(papilla::map_len))
@@ -178,7 +178,7 @@ int32 UPapillaComponent::SendPressure(const TArray<float>& PressurePa)
     return SendWindow(PressurePa.GetData(), {});
 }
 
-int32 UPapillaComponent::SendContacts(const TArray<FPapillaContact>& Contacts)
+int32 UPapillaSessionComponent::SendContacts(const TArray<FPapillaContact>& Contacts)
 {
     if (!bHasAtlas) return 0;
     Points.clear();
@@ -190,7 +190,7 @@ int32 UPapillaComponent::SendContacts(const TArray<FPapillaContact>& Contacts)
     return SendWindow(Drawn.GetData(), {});
 }
 
-bool UPapillaComponent::GetSed(TArray<float>& SedJPerM3) const
+bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
 {
     SedJPerM3.SetNumZeroed(static_cast<int32>(papilla::map_len));
     if (!bHasAnswer) return false;
@@ -204,14 +204,14 @@ bool UPapillaComponent::GetSed(TArray<float>& SedJPerM3) const
     return true;
 }
 
-void UPapillaComponent::FetchAtlas()
+void UPapillaSessionComponent::FetchAtlas()
 {
     const auto Request = FHttpModule::Get().CreateRequest();
     Request->SetURL(TEXT("http://") + Server + TEXT("/v1/atlas"));
-    TWeakObjectPtr<UPapillaComponent> Weak(this);
+    TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)
     {
-        UPapillaComponent* Self = Weak.Get();
+        UPapillaSessionComponent* Self = Weak.Get();
         if (!Self || !bGood || !Response || Response->GetResponseCode() != 200 || Self->bHasAtlas) return;
         Self->bHasAtlas = Self->Atlas.parse(ToUtf8(Response->GetContentAsString()));
     });

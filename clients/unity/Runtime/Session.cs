@@ -7,10 +7,10 @@ namespace Papilla
 {
     /// <summary>
     /// A session that keeps itself connected: pressure maps (Pa) out, maps of strain energy density (J/m3) in. Two threads of its own
-    /// move the bytes; <see cref="Send(float[])"/> never blocks, and the newest frame wins: one that has not left this client is replaced by a
+    /// move the bytes; <see cref="Send(float[])"/> never blocks, and the newest frame wins: one that has not left this client is superseded by a
     /// newer one. Frames and answers allocate nothing.
     /// </summary>
-    public sealed partial class PapillaClient : IDisposable
+    public sealed partial class Session : IDisposable
     {
         const int AttemptMs = 5000, RetryLeastMs = 100, RetryMostMs = 250, OutstandingMax = 1024;
 
@@ -25,8 +25,8 @@ namespace Papilla
         public Ready Ready { get { return ready; } }
         /// <summary>Deadline of the frames to come, us; 0: the session's budget.</summary>
         public uint DeadlineUs;
-        /// <summary>Frames that went out, and those that a newer one replaced before.</summary>
-        public int Sent, Replaced;
+        /// <summary>Frames that went out, and those that a newer one superseded before they left.</summary>
+        public int Sent, SupersededByClient;
         /// <summary>us of the client's clock.</summary>
         public Func<ulong> ClockUs = Now;
 
@@ -40,9 +40,9 @@ namespace Papilla
         Answer filling = new Answer(), newest = new Answer(), taken = new Answer();
         Frame waiting = new Frame(), leaving = new Frame();
         bool isWaiting, isFresh, isClosed, isRefused;
-        uint sequence, termsFrom;
+        uint sequence, renewedFrom;
         Hello hello, helloBefore;
-        Ready readyBefore, olderTerms;
+        Ready readyBefore, olderReady;
         Problem refusal;
         volatile Ready ready;
         ITransport transport;
@@ -52,7 +52,7 @@ namespace Papilla
         /// <param name="hello">what to ask for; null: the defaults</param>
         /// <param name="token">bearer token, for a server that asks for one</param>
         /// <param name="newTransport">another WebSocket than <see cref="SocketTransport"/></param>
-        public PapillaClient(string address, Hello hello = null, string token = null, Func<ITransport> newTransport = null)
+        public Session(string address, Hello hello = null, string token = null, Func<ITransport> newTransport = null)
         {
             var builder = new UriBuilder(new Uri(new Uri(address), "v1/session"));
             builder.Scheme = builder.Scheme == "https" || builder.Scheme == "wss" ? "wss" : "ws";
@@ -65,7 +65,7 @@ namespace Papilla
         }
 
         /// <summary>Connects, and again whenever the connection is lost, until <see cref="Dispose"/>.</summary>
-        public PapillaClient Open()
+        public Session Open()
         {
             receiver = new Thread(Receive) { IsBackground = true, Name = "papilla receive" };
             sender = new Thread(SendWaiting) { IsBackground = true, Name = "papilla send" };
@@ -95,24 +95,24 @@ namespace Papilla
         public void Renew(Hello next)
         {
             ITransport open;
-            uint replaced;
-            bool didReplace;
+            uint superseded;
+            bool didSupersede;
             lock (gate)
             {
-                didReplace = TakeWaiting(out replaced);
+                didSupersede = TakeWaiting(out superseded);
                 if (ready != null)
                 {
                     helloBefore = hello;
                     readyBefore = ready;
                 }
                 hello = next;
-                termsFrom = sequence + 1;
+                renewedFrom = sequence + 1;
                 ready = null;
                 isRefused = false;
                 open = transport;
                 Monitor.PulseAll(gate);
             }
-            if (didReplace) Tell(replaced, Status.Superseded, null);
+            if (didSupersede) Tell(superseded, Status.Superseded, null);
             if (open != null) Greet(open);
         }
 
@@ -132,7 +132,7 @@ namespace Papilla
         }
 
         /// <summary>The newest rendered answer that was not taken yet; valid until the next call. For one thread, as a game's Update.</summary>
-        public bool TryTake(out Answer answer)
+        public bool TryTakeLatest(out Answer answer)
         {
             lock (telling)
             {
@@ -159,28 +159,28 @@ namespace Papilla
         uint Put(float[] values, int column, int row, int width, int height)
         {
             ulong timeUs = ClockUs();
-            uint replaced, own;
-            bool didReplace;
+            uint superseded, own;
+            bool didSupersede;
             lock (gate)
             {
-                didReplace = TakeWaiting(out replaced);
+                didSupersede = TakeWaiting(out superseded);
                 own = ++sequence;
                 waiting.Encode(values, 0, width, column, row, width, height, hello.SampleType, hello.PressureScalePa);
                 waiting.Stamp(own, timeUs, DeadlineUs);
                 isWaiting = true;
                 Monitor.PulseAll(gate);
             }
-            if (didReplace) Tell(replaced, Status.Superseded, null);
+            if (didSupersede) Tell(superseded, Status.Superseded, null);
             return own;
         }
 
         /// <summary>Empties the place of the frame that waits; true if one did.</summary>
-        bool TakeWaiting(out uint replaced)
+        bool TakeWaiting(out uint superseded)
         {
-            replaced = waiting.Sequence;
+            superseded = waiting.Sequence;
             if (!isWaiting) return false;
             isWaiting = false;
-            Replaced++;
+            SupersededByClient++;
             return true;
         }
 
