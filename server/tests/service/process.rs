@@ -130,3 +130,17 @@ async fn sigterm_answers_what_was_accepted_and_ends() {
     };
     assert_eq!(status.code(), Some(0));
 }
+
+#[test]
+fn a_variable_beyond_its_range_is_refused_with_it() {
+    for (name, bad, range) in [
+        ("PAPILLA_MAX_SESSIONS", "18446744073709551615", "1 to 10000"),
+        ("PAPILLA_MAX_CONNECTIONS", "18446744073709551615", "1 to 100000"),
+        ("PAPILLA_IO_TIMEOUT_S", "9223372036854775807", "1 to 86400"),
+    ] {
+        let output = papilla(&["--print-config"]).env(name, bad).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}: {error}");
+        assert!(error.contains(range), "{name}: {error}");
+    }
+}
