@@ -3,7 +3,10 @@
 use axum::http::{HeaderMap, header};
 use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleType};
 
-use crate::codec::{Input, Output, is_npy, is_png};
+use crate::{
+    codec::{Input, Output, is_npy, is_png},
+    problem::excerpt,
+};
 
 /// The answer types, best first.
 const OFFERED: [Output; 4] =
@@ -36,6 +39,7 @@ impl Query {
                 "tier" => parsed.tier.replace(value.into_owned()).is_some(),
                 "budget_us" => {
                     let budget = value.parse().map_err(|_| {
+                        let value = excerpt(&value);
                         bad_query(&name, format!("'{value}' is not a whole number of microseconds"))
                     })?;
                     parsed.budget_us.replace(budget).is_some()
@@ -43,12 +47,13 @@ impl Query {
                 "pressure_max_pa" => {
                     let pressure = value.parse().ok().filter(|p: &f32| p.is_finite() && *p > 0.0);
                     let pressure = pressure.ok_or_else(|| {
+                        let value = excerpt(&value);
                         bad_query(&name, format!("'{value}' is not a pressure above 0 Pa"))
                     })?;
                     parsed.pressure_max_pa.replace(pressure).is_some()
                 }
                 _ => {
-                    let known = "tier, budget_us and pressure_max_pa";
+                    let (name, known) = (excerpt(&name), "tier, budget_us and pressure_max_pa");
                     return Err(bad_query(&name, format!("no parameter '{name}'; known: {known}")));
                 }
             };
@@ -101,6 +106,7 @@ pub(crate) fn input(headers: &HeaderMap, query: &Query, body: &[u8]) -> Result<I
             }
         }
         other => {
+            let other = excerpt(other);
             let message = format!(
                 "'{other}' is not taken here; send application/octet-stream, application/x-npy, \
                  image/png or application/json"

@@ -1,5 +1,7 @@
 //! Every refusal as one typed JSON answer: `{"error": {code, message, field}}`.
 
+use std::borrow::Cow;
+
 use axum::{
     body::Body,
     http::{HeaderMap, HeaderValue, StatusCode, header},
@@ -24,29 +26,71 @@ impl<T: Into<Problem>> From<T> for HttpProblem {
     }
 }
 
+/// Most characters of what a client sent that are repeated to it.
+const EXCERPT_MAX: usize = 100;
+
+/// Most characters of a message.
+const MESSAGE_MAX: usize = 1000;
+
+/// The beginning of what a client sent, for messages.
+pub(crate) fn excerpt(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(EXCERPT_MAX) {
+        Some((end, _)) => Cow::Owned(format!("{}…", &text[..end])),
+        None => Cow::Borrowed(text),
+    }
+}
+
+/// The problem with a message and a field of bounded length: what parsers say of input repeats it.
+pub(crate) fn bounded(mut problem: Problem) -> Problem {
+    if problem.message.len() > EXCERPT_MAX {
+        let words: Vec<_> = problem.message.split(' ').map(excerpt).collect();
+        problem.message = words.join(" ");
+    }
+    if let Some((end, _)) = problem.message.char_indices().nth(MESSAGE_MAX) {
+        problem.message.truncate(end);
+        problem.message.push('…');
+    }
+    problem.field = problem.field.map(|field| excerpt(&field).into_owned());
+    problem
+}
+
 impl IntoResponse for HttpProblem {
     fn into_response(self) -> Response {
-        let status = StatusCode::from_u16(self.0.code.http_status())
+        let problem = bounded(self.0);
+        let status = StatusCode::from_u16(problem.code.http_status())
             .unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let body = serde_json::to_vec(&ErrorBody { error: &self.0 }).unwrap_or_default();
+        let body = serde_json::to_vec(&ErrorBody { error: &problem }).unwrap_or_default();
         let mut response = Response::new(Body::from(body));
         *response.status_mut() = status;
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        label(headers, self.0.code);
+        label(headers, problem.code, problem.field.as_deref());
         response
     }
 }
 
+/// The field of a body that is compressed.
+pub(crate) const CODING: &str = "content-encoding";
+
 /// What clients are told of a refusal beside its body.
-pub(crate) fn label(headers: &mut HeaderMap, code: ErrorCode) {
+pub(crate) fn label(headers: &mut HeaderMap, code: ErrorCode, field: Option<&str>) {
     match code {
+        ErrorCode::WrongType if field == Some(CODING) => {
+            // RFC 9110 12.5.3: what would be taken.
+            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static("identity"));
+        }
         ErrorCode::Overloaded | ErrorCode::ShuttingDown | ErrorCode::RateLimited => {
             headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
         }
         ErrorCode::Unauthorized => {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
+        ErrorCode::UpgradeRequired => {
+            // RFC 9110 15.5.22 and RFC 6455 4.4: to what, and in which version.
+            headers.insert(header::CONNECTION, HeaderValue::from_static("upgrade"));
+            headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
+            headers.insert(header::SEC_WEBSOCKET_VERSION, HeaderValue::from_static("13"));
         }
         _ => {}
     }
@@ -86,4 +130,27 @@ pub(crate) fn shutting_down() -> Problem {
 /// The answer to work that missed its deadline.
 pub(crate) fn late() -> Problem {
     Problem::new(ErrorCode::Late, "the deadline passed before the map was done; it was dropped")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_repeated_is_cut() {
+        assert_eq!(excerpt("short"), "short");
+        assert_eq!(excerpt(&"ä".repeat(100)), "ä".repeat(100));
+        assert_eq!(excerpt(&"ä".repeat(101)), format!("{}…", "ä".repeat(100)));
+        let problem = |message: &str| Problem::new(ErrorCode::BadJson, message);
+        let whole = problem(
+            "a message of some words, each short, that goes on for longer than an \
+                             excerpt may, stays as it is",
+        );
+        assert_eq!(bounded(whole.clone()), whole);
+        let long =
+            bounded(problem(&format!("no '{}' here", "x".repeat(5000))).at("y".repeat(5000)));
+        assert_eq!(long.message, format!("no '{}… here", "x".repeat(99)));
+        assert_eq!(long.field.unwrap().chars().count(), 101);
+        assert_eq!(bounded(problem(&"a ".repeat(5000))).message.chars().count(), 1001);
+    }
 }

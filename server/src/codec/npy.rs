@@ -5,6 +5,8 @@
 use bytes::{BufMut, BytesMut};
 use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem};
 
+use crate::problem;
+
 use super::wrong_shape;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -87,6 +89,7 @@ pub(super) fn decode(bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Proble
         "<f8" => fill(pressure_pa, data, |b: [u8; 8]| f64::from_le_bytes(b) as f32),
         ">f8" => fill(pressure_pa, data, |b: [u8; 8]| f64::from_be_bytes(b) as f32),
         other => {
+            let other = problem::excerpt(other);
             let message = format!("the array's type is '{other}'; '<f4' or '<f8' is due");
             return Err(Problem::new(ErrorCode::WrongType, message).at("descr"));
         }

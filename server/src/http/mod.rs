@@ -32,7 +32,7 @@ use crate::{
     app::App,
     gate,
     oip::{self, OipProblem},
-    problem::HttpProblem,
+    problem::{HttpProblem, excerpt},
     session,
 };
 
@@ -119,12 +119,13 @@ pub(crate) fn router(app: Arc<App>, origins: &[String], xr_dir: Option<&Path>) -
 }
 
 async fn not_found(State(app): Shared, uri: Uri) -> Response {
-    let message = format!("there is nothing at {}", uri.path());
+    let message = format!("there is nothing at {}", excerpt(uri.path()));
     refusal(&app, &uri, Problem::new(ErrorCode::NotFound, message))
 }
 
 async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Response {
-    let message = format!("{} does not take {method}", uri.path());
+    let (path, method) = (excerpt(uri.path()), excerpt(method.as_str()));
+    let message = format!("{path} does not take {method}");
     refusal(&app, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
 }
 

@@ -13,6 +13,7 @@ use super::{Answer, Shared, refuse, tagged};
 use crate::{
     app::App,
     assets::{PAGE, sha256_hex},
+    problem::excerpt,
 };
 
 struct PageFile {
@@ -62,7 +63,7 @@ fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
             Ok(tagged(file.content_type, &file.etag, asked, Bytes::from_static(file.bytes)))
         }
         None => {
-            let message = format!("there is nothing at /{name}");
+            let message = format!("there is nothing at /{}", excerpt(name));
             refuse(app, Problem::new(ErrorCode::NotFound, message))
         }
     }

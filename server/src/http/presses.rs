@@ -40,6 +40,7 @@ fn find<'a>(catalogue: &'a Catalogue, uri: &Uri) -> Result<&'a Press, Problem> {
     let press = uri.path().split('/').nth(3).unwrap_or_default();
     let found = press.parse().ok().and_then(|id: usize| presses.get(id));
     found.ok_or_else(|| {
+        let press = problem::excerpt(press);
         let message = format!("no press '{press}'; there are {}, counted from 0", presses.len());
         Problem::new(ErrorCode::NotFound, message)
     })

@@ -16,7 +16,7 @@ use self::load::{judge, load_ladder, load_tier, text};
 use crate::{
     StartError,
     assets::Assets,
-    effects,
+    effects, problem,
     replay::Replay,
     speed::{Overhead, Speed, round_press},
 };
@@ -141,6 +141,11 @@ impl Catalogue {
         let index = text(read("index.json")?)
             .and_then(|json| Index::from_json(json).map_err(|e| e.to_string()))
             .map_err(|e| bad("index.json", &e))?;
+        for (place, name) in index.models.iter().enumerate() {
+            if index.models[..place].contains(name) {
+                return Err(bad("index.json", &format!("the model '{name}' is listed twice")));
+            }
+        }
         let atlas_json = Bytes::copy_from_slice(read("atlas.json")?);
         let atlas = text(&atlas_json)
             .and_then(|json| Atlas::from_json(json).map_err(|e| e.to_string()))
@@ -218,6 +223,7 @@ impl Catalogue {
     /// There is none.
     pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
         self.find(name).ok_or_else(|| {
+            let name = problem::excerpt(name);
             let message = format!("no tier '{name}'; there are {}", self.names());
             Problem::new(ErrorCode::UnknownTier, message).at("tier")
         })

@@ -45,15 +45,15 @@ pub(crate) struct OipProblem(pub(crate) Problem);
 
 impl IntoResponse for OipProblem {
     fn into_response(self) -> Response {
-        let Problem { code, message, field } = self.0;
-        let place = field.map(|field| format!(" ({field})")).unwrap_or_default();
+        let Problem { code, message, field } = problem::bounded(self.0);
+        let place = field.as_ref().map(|field| format!(" ({field})")).unwrap_or_default();
         let mut response = json_answer(&json!({"error": format!("{message}{place}")}));
         *response.status_mut() =
             StatusCode::from_u16(code.http_status()).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let headers = response.headers_mut();
         headers.insert("x-papilla-code", HeaderValue::from_static(code.as_str()));
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        problem::label(headers, code);
+        problem::label(headers, code, field.as_deref());
         response
     }
 }
@@ -116,6 +116,7 @@ fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
     let place = app.catalogue().tier_named(model)?;
     match (parts.next(), parts.next()) {
         (Some("versions"), Some(version)) if version != VERSION => {
+            let version = problem::excerpt(version);
             let message = format!("model {model} has no version '{version}', only {VERSION}");
             Err(Problem::new(ErrorCode::UnknownTier, message).at("version"))
         }
@@ -137,6 +138,7 @@ async fn answer(
 ) -> Result<Response, Problem> {
     // The body first: a client that is still sending would not read our answer.
     let body = body::read(body, app.body_max, app.timeouts.io).await?;
+    body::require_plain(headers)?;
     let received = Instant::now();
     let tier = named(app, uri)?;
     // Held until the answer is written: it bounds the work below as well.

@@ -13,9 +13,13 @@ use serde::{
 use serde_json::{Map, Value};
 
 use super::{DATATYPE, SHAPE};
+use crate::problem;
 
 /// Length of the JSON before the tensors' bytes; its presence says that there are any.
 const HEAD_LEN: &str = "inference-header-content-length";
+
+/// Parameters of requests that belong together.
+const SEQUENCE: [&str; 3] = ["sequence_id", "sequence_start", "sequence_end"];
 
 #[derive(Deserialize)]
 struct Request {
@@ -80,6 +84,7 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
         (body.slice(..head_len.unwrap_or(body.len())), head_len.map(|n| body.slice(n..)));
     let request: Request = serde_json::from_slice(&head)
         .map_err(|error| Problem::new(ErrorCode::BadJson, error.to_string()))?;
+    refuse_sequences(&request.parameters)?;
     let is_binary_wanted = wants_binary(&request)?;
     let [input] = <[InputTensor; 1]>::try_from(request.inputs).map_err(|inputs| {
         let message = format!("{} inputs; the model has one, {INPUT_NAME}", inputs.len());
@@ -105,13 +110,26 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
     Ok((Wish { id: request.id, is_binary_wanted, timeout_us }, payload))
 }
 
+/// Every request is rendered for itself.
+fn refuse_sequences(parameters: &Map<String, Value>) -> Result<(), Problem> {
+    match SEQUENCE.into_iter().find(|name| parameters.contains_key(*name)) {
+        None => Ok(()),
+        Some(name) => {
+            let message = "requests are rendered one by one; sequences of them are not served";
+            Err(Problem::new(ErrorCode::BadQuery, message).at(name))
+        }
+    }
+}
+
 fn check_input(input: &InputTensor) -> Result<(), Problem> {
     let InputTensor { name, shape, datatype, .. } = input;
     if name != INPUT_NAME {
+        let name = problem::excerpt(name);
         let message = format!("there is no input '{name}'; the model's is {INPUT_NAME}");
         return Err(Problem::new(ErrorCode::BadQuery, message).at("inputs"));
     }
     if datatype != DATATYPE {
+        let datatype = problem::excerpt(datatype);
         let message = format!("datatype {datatype} is not taken; {DATATYPE} is");
         return Err(Problem::new(ErrorCode::WrongType, message).at("datatype"));
     }
@@ -138,7 +156,8 @@ fn wants_binary(request: &Request) -> Result<bool, Problem> {
         }
     };
     if output.name != OUTPUT_NAME {
-        let message = format!("there is no output '{}'; the model's is {OUTPUT_NAME}", output.name);
+        let name = problem::excerpt(&output.name);
+        let message = format!("there is no output '{name}'; the model's is {OUTPUT_NAME}");
         return Err(Problem::new(ErrorCode::BadQuery, message).at("outputs"));
     }
     for unserved in ["classification", "shared_memory_region"] {

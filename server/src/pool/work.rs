@@ -8,9 +8,7 @@ use std::{
 };
 
 use papilla_engine::Session;
-use papilla_proto::{
-    ErrorCode, MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside,
-};
+use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
 
 use super::{
     Done, Drawn, FRONT, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
@@ -71,8 +69,7 @@ impl Worker {
             let abandoned = slot.is_abandoned();
             let Some((mut job, mut recycler)) = slot.take() else { continue };
             let done = if abandoned {
-                let gone = Problem::new(ErrorCode::Internal, "the client is gone");
-                finished(&job, Progress::default(), Outcome::Failed(gone))
+                finished(&job, Progress::default(), Outcome::Gone)
             } else {
                 self.serve(&mut job, &mut recycler)
             };

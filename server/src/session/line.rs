@@ -27,6 +27,7 @@ use super::{
 use crate::{
     app::{App, begun},
     net::Patient,
+    problem,
 };
 
 /// The connection and what it takes to speak over it.
@@ -200,7 +201,7 @@ impl Line {
             End::Client(code) => (code.unwrap_or(close::NORMAL), ""),
             End::Refused(problem, code) => {
                 self.app.metrics.error(problem.code);
-                let error = SessionError::new(problem.clone(), None, true);
+                let error = SessionError::new(problem::bounded(problem.clone()), None, true);
                 self.reply.say(&ServerMessage::Error(error));
                 (*code, problem.code.as_str())
             }

@@ -49,6 +49,16 @@ async fn damaged_files_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_tier_that_is_listed_twice_is_named() {
+    let folder = model_folder();
+    let index = br#"{"default": "quick", "models": ["quick", "slow", "quick"]}"#;
+    write(folder.path(), "index.json", index);
+    let error = start(folder.path(), |_| ()).await.unwrap_err();
+    assert!(matches!(&error, StartError::Unusable { file, .. } if file == "index.json"), "{error}");
+    assert!(error.to_string().contains("'quick' is listed twice"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_model_of_another_atlas_is_refused() {
     let folder = model_folder();
     let other = "f".repeat(64);
