@@ -142,6 +142,19 @@ pub(crate) fn output(headers: &HeaderMap) -> Result<Output, Problem> {
     })
 }
 
+/// Whether `Accept-Encoding` takes gzip, RFC 9110 12.5.3.
+pub(crate) fn takes_gzip(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(header::ACCEPT_ENCODING).iter();
+    let codings: Vec<Range<'_>> = values
+        .flat_map(|value| value.to_str().unwrap_or_default().split(',').map(Range::parse))
+        .collect();
+    let quality = |name: &str| {
+        codings.iter().find(|c| c.kind.eq_ignore_ascii_case(name)).map(|coding| coding.quality)
+    };
+    // By its name, or else as any.
+    quality("gzip").or_else(|| quality("*")).is_some_and(|quality| quality > 0.0)
+}
+
 /// One member of `Accept`, RFC 9110 12.5.1.
 struct Range<'a> {
     kind: &'a str,

@@ -5,6 +5,7 @@ mod atlas;
 pub(crate) mod body;
 mod effects;
 mod info;
+pub(crate) mod kept;
 mod page;
 mod presses;
 pub(crate) mod sed;
@@ -24,7 +25,6 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
-use bytes::Bytes;
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
 
@@ -49,7 +49,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/healthz", get(info::healthz)),
         (g.clone(), "/readyz", get(info::readyz)),
         (g.clone(), "/metrics", get(info::metrics)),
-        (g.clone(), "/openapi.json", get(info::openapi)),
+        (g.clone(), "/openapi.json", get(page::openapi)),
         (g.clone(), "/v1/tiers", get(info::tiers)),
         (g.clone(), "/v1/models", get(info::models)),
         (g.clone(), "/v1/effects", get(effects::list)),
@@ -159,33 +159,4 @@ pub(crate) fn json_answer(value: &impl Serialize) -> Response {
         Err(error) => HttpProblem(crate::problem::internal("the answer cannot be encoded", &error))
             .into_response(),
     }
-}
-
-/// An answer the client may keep, but must ask about: 304 if `etag` is the one it has.
-fn tagged(
-    content_type: &'static str,
-    etag: &str,
-    asked: Option<&HeaderValue>,
-    body: Bytes,
-) -> Response {
-    let quoted = format!("\"{etag}\"");
-    let known = asked.and_then(|v| v.to_str().ok()).is_some_and(|asked| {
-        asked
-            .split(',')
-            .any(|tag| matches!(tag.trim().trim_start_matches("W/"), t if t == quoted || t == "*"))
-    });
-    let mut response = if known {
-        let mut response = Response::new(Body::empty());
-        *response.status_mut() = axum::http::StatusCode::NOT_MODIFIED;
-        response
-    } else {
-        answer(content_type, body)
-    };
-    let headers = response.headers_mut();
-    if let Ok(etag) = HeaderValue::from_str(&quoted) {
-        headers.insert(header::ETAG, etag);
-    }
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-    response
 }

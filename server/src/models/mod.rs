@@ -5,7 +5,7 @@ mod load;
 use std::sync::{Arc, atomic::AtomicUsize};
 
 use bytes::Bytes;
-use papilla_engine::{Ladder, Model, Session, card::Index, ladder::Kind};
+use papilla_engine::{Model, Session, card::Index, ladder::Kind};
 use papilla_proto::{
     ErrorCode, Pattern, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
@@ -16,7 +16,9 @@ use self::load::{judge, load_ladder, load_tier, text};
 use crate::{
     StartError,
     assets::Assets,
-    effects, problem,
+    effects,
+    http::kept::Kept,
+    problem,
     replay::Replay,
     speed::{Overhead, Speed, round_press},
 };
@@ -87,13 +89,15 @@ pub(crate) struct Catalogue {
     pub(crate) skin_mask: PixelMask,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
-    /// All rungs as shipped, FE included; none if the folder has no `ladder.json`.
-    pub(crate) ladder: Option<Ladder>,
+    /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
+    pub(crate) ladder_json: String,
     /// The set by which tiers are compared; none: each by its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
     /// What sessions with effects share.
     pub(crate) runtime: effects::Shared,
+    /// Answers about all this.
+    pub(crate) kept: Kept,
 }
 
 impl Catalogue {
@@ -110,10 +114,11 @@ impl Catalogue {
             interface,
             atlas,
             replay: Replay::default(),
-            ladder: None,
+            ladder_json: "null".to_owned(),
             judged_on: None,
             overhead: Overhead::default(),
             runtime: effects::Shared::default(),
+            kept: Kept::default(),
         }
     }
 
@@ -183,6 +188,7 @@ impl Catalogue {
             None => None,
         };
         let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
+        let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let (skin, interface) =
             (Raster::new(&atlas, Patch::Skin), Raster::new(&atlas, Patch::Interface));
         let overhead = Overhead::default();
@@ -195,10 +201,11 @@ impl Catalogue {
             skin,
             interface,
             replay,
-            ladder,
+            ladder_json,
             judged_on,
             overhead,
             runtime: effects::Shared::default(),
+            kept: Kept::default(),
         })
     }
 

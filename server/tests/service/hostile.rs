@@ -1,6 +1,6 @@
 //! Clients that are broken, slow or malicious.
 
-use std::time::Duration;
+use std::{net::SocketAddr, time::Duration};
 
 use papilla_proto::{MAP_LEN, SampleType};
 use serde_json::json;
@@ -276,4 +276,50 @@ async fn a_compressed_body_is_not_taken_for_a_map() {
     }
     let plain = service.post("/v1/sed", map()).header("content-encoding", "Identity").send().await;
     assert_eq!(plain.status, 200);
+}
+
+/// Requests of one client, sent ahead of their answers, without end; what comes back is thrown away.
+async fn pipeline(address: SocketAddr, request: String) {
+    let mut stream = TcpStream::connect(address).await.unwrap();
+    let (mut read, mut write) = stream.split();
+    let asking = async { while write.write_all(request.as_bytes()).await.is_ok() {} };
+    let mut sink = tokio::io::sink();
+    let _ = tokio::join!(asking, tokio::io::copy(&mut read, &mut sink));
+}
+
+/// Neighbours of clients that ask for large answers without a pause are served all the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn information_is_not_computed_at_the_cost_of_neighbours() {
+    let service = Service::start_with(|config| config.rate_per_s = 0).await;
+    for (path, accept) in
+        [("/v1/presses/0/sed", "application/json"), ("/v1/atlas.glb", "*/*"), ("/metrics", "*/*")]
+    {
+        let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\naccept: {accept}\r\n\r\n");
+        let flood: Vec<_> =
+            (0..4).map(|_| tokio::spawn(pipeline(service.address, request.clone()))).collect();
+        let neighbour = async {
+            for _ in 0..50 {
+                assert_eq!(service.get("/healthz").send().await.status, 200);
+            }
+        };
+        timeout(Duration::from_secs(10), neighbour).await.expect("the neighbour waits");
+        flood.iter().for_each(tokio::task::JoinHandle::abort);
+    }
+}
+
+/// A connection that asks ahead of the answers has the rate of one that waits for them.
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_sent_ahead_count_in_the_rate() {
+    let service = Service::start_with(|config| {
+        config.rate_per_s = 1;
+        config.rate_burst = std::num::NonZeroU32::new(5);
+    })
+    .await;
+    let one = "GET /v1/atlas.obj HTTP/1.1\r\nhost: localhost\r\n\r\n";
+    let last = "GET /healthz HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n";
+    let answers = raw_exchange(service.address, (one.repeat(100) + last).as_bytes()).await;
+    let text = String::from_utf8_lossy(&answers);
+    let taken = text.matches("HTTP/1.1 200 ").count();
+    assert!((5..50).contains(&taken), "{taken}");
+    assert_eq!(text.matches("HTTP/1.1 429 ").count(), 101 - taken);
 }
