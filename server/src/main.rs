@@ -68,7 +68,9 @@ fn check(config: &Config) -> anyhow::Result<ExitCode> {
 async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
     let mut terminate = signal(SignalKind::terminate())?;
     let mut interrupt = signal(SignalKind::interrupt())?;
-    let server = papilla_server::start(config).await?;
+    let starting = papilla_server::listen(config)?;
+    tracing::info!(address = %starting.address(), "listening; the models are being loaded");
+    let server = starting.ready().await?;
     announce(&server, config)?;
     tokio::select! {
         _ = terminate.recv() => {}

@@ -12,7 +12,6 @@ use std::{
     time::Duration,
 };
 
-use axum::Router;
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
@@ -22,12 +21,8 @@ use tokio::{
     time::{Sleep, sleep, timeout},
 };
 use tokio_rustls::TlsAcceptor;
-use tower::ServiceExt;
 
-use crate::{
-    app::{App, begun},
-    gate::Peer,
-};
+use crate::{app::begun, config::Timeouts, front::Front, gate::Peer, metrics::Metrics};
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
 pub(crate) const BUFFER_MAX: usize = 128 * 1024;
@@ -57,8 +52,11 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
 /// What every connection needs.
 #[derive(Clone)]
 pub(crate) struct Line {
-    pub(crate) router: Router,
-    pub(crate) app: Arc<App>,
+    pub(crate) front: Arc<Front>,
+    pub(crate) metrics: Arc<Metrics>,
+    /// True once the server drains.
+    pub(crate) drain: Arc<watch::Sender<bool>>,
+    pub(crate) timeouts: Timeouts,
     /// None: plain text.
     pub(crate) tls: Option<TlsAcceptor>,
 }
@@ -66,7 +64,7 @@ pub(crate) struct Line {
 /// Accepts until the drain begins.
 pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
     let places = Arc::new(Semaphore::new(places));
-    let mut drain = line.app.drain.subscribe();
+    let mut drain = line.drain.subscribe();
     loop {
         let accepted = async {
             let place = Arc::clone(&places).acquire_owned().await;
@@ -93,10 +91,10 @@ pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
 }
 
 async fn connection(stream: TcpStream, peer: Peer, line: Line, _place: OwnedSemaphorePermit) {
-    line.app.metrics.connections_open.inc();
+    line.metrics.connections_open.inc();
     // Taken before anything is read: from here on the drain waits for this connection.
-    let drain = line.app.drain.subscribe();
-    let patience = line.app.timeouts.io;
+    let drain = line.drain.subscribe();
+    let patience = line.timeouts.io;
     let stream = Patient::new(stream, patience);
     match &line.tls {
         None => converse(stream, peer, &line, drain).await,
@@ -106,21 +104,22 @@ async fn connection(stream: TcpStream, peer: Peer, line: Line, _place: OwnedSema
             Err(_) => tracing::debug!("TLS handshake took too long"),
         },
     }
-    line.app.metrics.connections_open.dec();
+    line.metrics.connections_open.dec();
 }
 
 async fn converse<S>(stream: S, peer: Peer, line: &Line, mut drain: watch::Receiver<bool>)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let router = line.router.clone();
+    let front = Arc::clone(&line.front);
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer);
-        router.clone().oneshot(request)
+        let front = Arc::clone(&front);
+        async move { front.answer(request).await }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
-        .header_read_timeout(line.app.timeouts.io)
+        .header_read_timeout(line.timeouts.io)
         .max_buf_size(BUFFER_MAX)
         .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();

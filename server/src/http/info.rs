@@ -2,8 +2,13 @@
 
 use std::sync::{Arc, atomic::Ordering};
 
-use axum::{extract::State, http::HeaderMap, response::Response};
+use axum::{
+    extract::State,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    response::Response,
+};
 use papilla_proto::Problem;
+use serde::Serialize;
 use serde_json::{Value, json};
 use tokio::{sync::Semaphore, task::spawn_blocking};
 
@@ -12,19 +17,41 @@ use super::{
     kept::{Fresh, What},
     refuse,
 };
-use crate::{models::Catalogue, problem};
+use crate::{metrics::Metrics, models::Catalogue, problem, progress};
 
 /// Alive: the process answers.
-pub(super) async fn healthz() -> Response {
+pub(crate) async fn healthz() -> Response {
     json_answer(&json!({"status": "ok"}))
 }
 
-/// Ready: every thread has its models, and the server does not drain.
+/// Ready: every thread has its models, every tier is measured, and the server does not drain.
 pub(super) async fn readyz(State(app): Shared) -> Answer {
     if app.is_draining() {
         return refuse(&app, problem::shutting_down());
     }
-    Ok(json_answer(&json!({"status": "ready"})))
+    Ok(match app.progress.left() {
+        Some(left) => starting(&app.metrics, &left),
+        None => json_answer(&json!({"status": "ready"})),
+    })
+}
+
+/// What `/readyz` answers while the start goes on: a refusal that says what is left.
+pub(crate) fn starting(metrics: &Metrics, left: &progress::State) -> Response {
+    #[derive(Serialize)]
+    struct Starting<'a> {
+        error: &'a Problem,
+        status: &'static str,
+        #[serde(flatten)]
+        left: &'a progress::State,
+    }
+    let problem = left.problem();
+    metrics.error(problem.code);
+    let mut response = json_answer(&Starting { error: &problem, status: "starting", left });
+    *response.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+    let headers = response.headers_mut();
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    problem::label(headers, problem.code, None);
+    response
 }
 
 /// One text at a time, and not on a thread that moves bytes: it takes milliseconds, and looks into

@@ -4,7 +4,7 @@ mod admin;
 mod atlas;
 pub(crate) mod body;
 mod effects;
-mod info;
+pub(crate) mod info;
 pub(crate) mod kept;
 mod page;
 mod presses;
@@ -31,6 +31,7 @@ use serde::Serialize;
 use crate::{
     app::App,
     gate,
+    metrics::Metrics,
     oip::{self, OipProblem},
     problem::{HttpProblem, excerpt},
     session,
@@ -131,7 +132,12 @@ async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Res
 
 /// Counts a refusal that no handler made, in the words of the protocol of its path.
 pub(crate) fn refusal(app: &App, uri: &Uri, problem: Problem) -> Response {
-    app.metrics.error(problem.code);
+    refused(&app.metrics, uri, problem)
+}
+
+/// The same, before there is anything to serve.
+pub(crate) fn refused(metrics: &Metrics, uri: &Uri, problem: Problem) -> Response {
+    metrics.error(problem.code);
     if is_oip(uri.path()) {
         OipProblem(problem).into_response()
     } else {

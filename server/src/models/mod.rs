@@ -73,6 +73,14 @@ impl Tier {
     }
 }
 
+/// How far loading has come.
+pub(crate) enum Step<'a> {
+    /// These models will be loaded.
+    Listed(&'a [String]),
+    /// This one is.
+    Loaded(&'a str),
+}
+
 /// All there is to render with and to show.
 ///
 /// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
@@ -132,6 +140,19 @@ impl Catalogue {
         default: Option<&str>,
         running: Option<&Self>,
     ) -> Result<Self, StartError> {
+        Self::load_noting(assets, default, running, &mut |_| ())
+    }
+
+    /// The same; `note` is told what comes.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub(crate) fn load_noting(
+        assets: &Assets,
+        default: Option<&str>,
+        running: Option<&Self>,
+        note: &mut dyn FnMut(Step<'_>),
+    ) -> Result<Self, StartError> {
         let origin = || assets.origin.clone();
         let read = |name: &str| {
             assets
@@ -155,6 +176,7 @@ impl Catalogue {
         let atlas = text(&atlas_json)
             .and_then(|json| Atlas::from_json(json).map_err(|e| e.to_string()))
             .map_err(|e| bad("atlas.json", &e))?;
+        note(Step::Listed(&index.models));
         let mut tiers = Vec::with_capacity(index.models.len());
         for name in &index.models {
             let (onnx, card) = (format!("{name}.onnx"), format!("{name}.json"));
@@ -170,6 +192,7 @@ impl Catalogue {
                 ));
             }
             tiers.push(tier);
+            note(Step::Loaded(name));
         }
         let wanted = default.unwrap_or(&index.default);
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {

@@ -81,7 +81,10 @@ pub(crate) async fn ready(State(app): Shared) -> Answer {
     if app.is_draining() {
         return refuse(&app, problem::shutting_down());
     }
-    Ok(json_answer(&json!({"ready": true})))
+    match app.progress.left() {
+        Some(left) => refuse(&app, left.problem()),
+        None => Ok(json_answer(&json!({"ready": true}))),
+    }
 }
 
 pub(crate) async fn model(State(app): Shared, uri: Uri) -> Answer {

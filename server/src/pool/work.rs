@@ -155,7 +155,9 @@ impl Worker {
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
             drawn.flags |= flags::NO_CONTACT;
-        } else if job.deadline.is_some_and(|deadline| decoded + tier.speed.floor() >= deadline) {
+        } else if job.deadline.is_some_and(|deadline| {
+            tier.speed.is_hopeless(deadline.saturating_duration_since(decoded))
+        }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
             self.sessions[job.tier]
