@@ -85,3 +85,19 @@ async fn a_taken_address_is_named() {
     assert!(error.to_string().contains(&address.to_string()), "{error}");
     assert_eq!(error.exit_code(), 4);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_start_that_is_given_up_frees_its_port_at_once() {
+    let folder = model_folder();
+    let config = Config { models: Some(folder.path().to_owned()), ..Config::default() };
+    let starting = papilla_server::listen(&config).unwrap();
+    let address = starting.address();
+    assert!(std::net::TcpListener::bind(address).is_err(), "it listens");
+    drop(starting);
+    let free = async {
+        while std::net::TcpListener::bind(address).is_err() {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(30), free).await.expect("still taken");
+}
