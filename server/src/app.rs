@@ -16,6 +16,7 @@ use crate::{
     models::Catalogue,
     pool::{Entrance, Pool},
     problem,
+    progress::Progress,
     reload::{Changes, ReloadError, Reloader, Turn},
     session::Store,
 };
@@ -32,10 +33,13 @@ pub(crate) struct App {
     pub(crate) timeouts: Timeouts,
     /// True once the server drains. Whoever must be waited for holds a receiver.
     pub(crate) drain: Arc<watch::Sender<bool>>,
+    /// How far the start has come.
+    pub(crate) progress: Arc<Progress>,
     /// Memory of sessions that are over.
     pub(crate) store: Store,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
+    requests_max: usize,
     next_session: AtomicU64,
 }
 
@@ -47,6 +51,7 @@ impl App {
         pool: &Pool,
         gate: Gate,
         drain: Arc<watch::Sender<bool>>,
+        progress: Arc<Progress>,
     ) -> Self {
         let entrance = pool.entrance(&metrics);
         Self {
@@ -58,9 +63,11 @@ impl App {
             entrance,
             timeouts: config.timeouts(),
             drain,
+            progress,
             store: Store::new(config.max_sessions.get()),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),
+            requests_max: config.max_requests.get(),
             next_session: AtomicU64::new(1),
         }
     }
@@ -77,6 +84,12 @@ impl App {
     /// They cannot be served; nothing has changed then.
     pub(crate) fn reload(&self, turn: Turn) -> Result<Changes, ReloadError> {
         self.reloader.reload(turn, &self.catalogue, &|| self.is_draining())
+    }
+
+    /// Whether nobody is served: no session is open and no posted map is under way.
+    pub(crate) fn is_idle(&self) -> bool {
+        let is_any_posted = self.requests.available_permits() < self.requests_max;
+        self.metrics.sessions_open.get() == 0 && !is_any_posted
     }
 
     /// Whether new work is refused.

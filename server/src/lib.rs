@@ -12,7 +12,7 @@
 //! starts and drains it is not starved by clients. **Invariant:** every queue is bounded and every wait is timed.
 //! **Invariant:** a frame that was accepted is answered exactly once.
 //!
-//! [`start`] runs the whole service inside a process; the binary does little more.
+//! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
 
 mod app;
 mod assets;
@@ -22,6 +22,7 @@ mod codec;
 mod config;
 mod effects;
 mod error;
+mod front;
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]
 pub mod fuzz;
@@ -35,11 +36,13 @@ mod net;
 mod oip;
 mod pool;
 mod problem;
+mod progress;
 mod reload;
 mod replay;
 mod runtime;
 mod session;
 mod speed;
+mod start;
 mod telemetry;
 mod tls;
 
@@ -51,14 +54,35 @@ pub use error::{DrainError, StartError};
 pub use telemetry::Telemetry;
 use tokio::{
     sync::watch,
-    task::{JoinHandle, spawn_blocking},
+    task::{JoinHandle, JoinSet, spawn_blocking},
     time::timeout,
 };
 
 use crate::{
-    app::App, assets::Assets, gate::Gate, metrics::Metrics, models::Catalogue, net::Line,
-    pool::Pool, runtime::IoRuntime,
+    app::App,
+    front::Front,
+    gate::Gate,
+    metrics::Metrics,
+    net::{Line, Places},
+    pool::Pool,
+    progress::Progress,
+    runtime::IoRuntime,
+    start::Opened,
 };
+
+/// A service that listens, and loads its models.
+///
+/// Dropping it stops accepting.
+pub struct Starting {
+    address: SocketAddr,
+    drain: EndOnDrop,
+    drain_timeout: Duration,
+    accepting: JoinHandle<()>,
+    /// One task; dropped, it is given up.
+    opening: JoinSet<Result<Opened, StartError>>,
+    threads: usize,
+    io: IoRuntime,
+}
 
 /// A running service.
 ///
@@ -68,7 +92,7 @@ pub struct Server {
     tiers: Vec<String>,
     default_tier: String,
     threads: usize,
-    drain: Arc<watch::Sender<bool>>,
+    drain: EndOnDrop,
     drain_timeout: Duration,
     accepting: JoinHandle<()>,
     app: Arc<App>,
@@ -80,20 +104,26 @@ pub struct Server {
 /// Longest wait for the job that a thread has in hand, once the drain is over.
 const LAST_JOB: Duration = Duration::from_secs(1);
 
-/// Starts the service: loads the models, measures them on this machine, warms every thread,
-/// binds, accepts.
+/// Tells everybody that the server drains when it is dropped.
+struct EndOnDrop(Arc<watch::Sender<bool>>);
+
+impl Drop for EndOnDrop {
+    fn drop(&mut self) {
+        self.0.send_replace(true);
+    }
+}
+
+/// Listens, and begins to load the models.
 ///
-/// Must be called within a tokio runtime. When it returns, the service is ready.
+/// From here on connections are taken: `/healthz` answers, `/readyz` says how far the start has come,
+/// and other requests wait for the models, no longer than a client may take (`io_timeout_s`). Must be
+/// called within a tokio runtime.
 ///
 /// # Errors
-/// Settings do not go together, the models are missing or unusable, a thread cannot be started, or the address cannot be
-/// bound; each says what to do.
-pub async fn start(config: &Config) -> Result<Server, StartError> {
+/// Settings do not go together, or the address cannot be bound; each says what to do.
+pub fn listen(config: &Config) -> Result<Starting, StartError> {
     config.validate()?;
     let (gate, tls) = (Gate::new(config)?, tls::acceptor(config)?);
-    let loading = config.clone();
-    let (catalogue, metrics, pool) =
-        spawn_blocking(move || load(&loading)).await.map_err(|_| StartError::WorkerPanicked)??;
     let bind = |source| StartError::Bind { address: config.bind, source };
     let io = IoRuntime::start().map_err(StartError::Thread)?;
     let listener = {
@@ -102,45 +132,76 @@ pub async fn start(config: &Config) -> Result<Server, StartError> {
     };
     let address = listener.local_addr().map_err(bind)?;
     let drain = Arc::new(watch::Sender::new(false));
-    let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
-    let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app = Arc::new(App::new(config, catalogue, metrics, &pool, gate, Arc::clone(&drain)));
-    if let (true, Some(folder)) = (config.watch_models, &config.models) {
-        reload::watch(Arc::clone(&app), folder).map_err(|error| {
-            let reason = format!("{} cannot be watched: {error}", folder.display());
-            SettingError { field: "watch_models", reason }
-        })?;
-    }
-    let router = http::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref());
-    let line = Line { router, app: Arc::clone(&app), tls };
-    let accepting = io.spawn(net::serve(listener, line, config.max_connections.get()));
-    Ok(Server {
+    let (metrics, progress) = (Metrics::new(), Arc::<Progress>::default());
+    let timeouts = config.timeouts();
+    let front = Arc::new(Front::new(
+        Arc::clone(&progress),
+        Arc::clone(&metrics),
+        Arc::clone(&drain),
+        timeouts.io,
+    ));
+    let mut opening = JoinSet::new();
+    let parts = start::Parts {
+        config: config.clone(),
+        gate,
+        metrics: Arc::clone(&metrics),
+        progress,
+        front: Arc::clone(&front),
+        drain: Arc::clone(&drain),
+    };
+    opening.spawn_on(start::open(parts), io.handle());
+    let line = Line { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
+    let places = Places::new(config.max_connections.get(), config.tokens.is_some());
+    let accepting = io.handle().spawn(net::serve(listener, line, places));
+    Ok(Starting {
         address,
-        tiers,
-        default_tier,
-        threads: config.thread_count(),
-        drain,
+        drain: EndOnDrop(drain),
         drain_timeout: config.drain_timeout(),
         accepting,
-        app,
-        pool: Some(pool),
+        opening,
+        threads: config.thread_count(),
         io,
     })
 }
 
-type Loaded = (Arc<Catalogue>, Arc<Metrics>, Pool);
+/// Starts the service and waits until it is ready: [`listen`], then [`Starting::ready`].
+///
+/// # Errors
+/// As of those two.
+pub async fn start(config: &Config) -> Result<Server, StartError> {
+    listen(config)?.ready().await
+}
 
-fn load(config: &Config) -> Result<Loaded, StartError> {
-    let assets = Assets::of(config)?;
-    let catalogue = Arc::new(Catalogue::load(&assets, config.default_tier.as_deref(), None)?);
-    // Before the threads start: they would take time from what is measured.
-    speed::calibrate(&catalogue, config.calibration())?;
-    let metrics = Metrics::new();
-    metrics.name_tiers(&catalogue);
-    // A slot is in the queue at most once, so this many places are always enough.
-    let places = config.max_sessions.get() + config.max_requests.get();
-    let pool = Pool::start(&catalogue, &metrics, config.thread_count(), places)?;
-    Ok((catalogue, metrics, pool))
+impl Starting {
+    /// The address it listens on, with the port the system chose.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Waits until the models are loaded and measured on this machine, and every thread is warm.
+    ///
+    /// # Errors
+    /// The models are missing or unusable, a thread cannot be started, or the folder cannot be
+    /// watched; each says what to do. Nothing is accepted any more then.
+    pub async fn ready(mut self) -> Result<Server, StartError> {
+        let opened = match self.opening.join_next().await {
+            Some(Ok(opened)) => opened?,
+            Some(Err(_)) | None => return Err(StartError::WorkerPanicked),
+        };
+        Ok(Server {
+            address: self.address,
+            tiers: opened.tiers,
+            default_tier: opened.default_tier,
+            threads: self.threads,
+            drain: self.drain,
+            drain_timeout: self.drain_timeout,
+            accepting: self.accepting,
+            app: opened.app,
+            pool: Some(opened.pool),
+            io: self.io,
+        })
+    }
 }
 
 impl Server {
@@ -170,7 +231,7 @@ impl Server {
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
-        self.io.spawn(reload::once(Arc::clone(&self.app)));
+        self.io.handle().spawn(reload::once(Arc::clone(&self.app)));
     }
 
     /// Ends the service: takes nothing new, answers every accepted frame, tells
@@ -181,9 +242,9 @@ impl Server {
     /// # Errors
     /// Not done within the configured time; what was left is cut off.
     pub async fn drain(mut self) -> Result<(), DrainError> {
-        self.drain.send_replace(true);
+        let drain = Arc::clone(&self.drain.0);
+        drain.send_replace(true);
         let accepting = &mut self.accepting;
-        let drain = &self.drain;
         let all = async {
             // Err: it panicked; nothing is accepted then either.
             let _ = accepting.await;
@@ -196,12 +257,6 @@ impl Server {
             let _ = timeout(LAST_JOB, spawn_blocking(move || pool.stop())).await;
         }
         result.map_err(|_| DrainError { seconds: self.drain_timeout.as_secs() })
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        self.drain.send_replace(true);
     }
 }
 

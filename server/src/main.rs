@@ -74,8 +74,10 @@ fn check(config: &Config) -> anyhow::Result<ExitCode> {
 
 async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
     let mut signals = Signals::listen()?;
+    let starting = papilla_server::listen(config)?;
+    tracing::info!(address = %starting.address(), "listening; the models are being loaded");
     let server = tokio::select! {
-        server = papilla_server::start(config) => server?,
+        server = starting.ready() => server?,
         () = signals.end() => return Ok(ExitCode::from(INTERRUPTED)),
     };
     announce(&server, config)?;

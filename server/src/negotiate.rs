@@ -1,7 +1,7 @@
 //! What the client sends and what it wants back: `Content-Type`, `Accept` and the query.
 
 use axum::http::{HeaderMap, header};
-use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleType};
+use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleType, error::shortened};
 
 use crate::codec::{Input, Output, is_npy, is_png};
 
@@ -36,6 +36,7 @@ impl Query {
                 "tier" => parsed.tier.replace(value.into_owned()).is_some(),
                 "budget_us" => {
                     let budget = value.parse().map_err(|_| {
+                        let value = shortened(&value);
                         bad_query(&name, format!("'{value}' is not a whole number of microseconds"))
                     })?;
                     parsed.budget_us.replace(budget).is_some()
@@ -43,12 +44,13 @@ impl Query {
                 "pressure_max_pa" => {
                     let pressure = value.parse().ok().filter(|p: &f32| p.is_finite() && *p > 0.0);
                     let pressure = pressure.ok_or_else(|| {
+                        let value = shortened(&value);
                         bad_query(&name, format!("'{value}' is not a pressure above 0 Pa"))
                     })?;
                     parsed.pressure_max_pa.replace(pressure).is_some()
                 }
                 _ => {
-                    let known = "tier, budget_us and pressure_max_pa";
+                    let (name, known) = (shortened(&name), "tier, budget_us and pressure_max_pa");
                     return Err(bad_query(&name, format!("no parameter '{name}'; known: {known}")));
                 }
             };
@@ -101,6 +103,7 @@ pub(crate) fn input(headers: &HeaderMap, query: &Query, body: &[u8]) -> Result<I
             }
         }
         other => {
+            let other = shortened(other);
             let message = format!(
                 "'{other}' is not taken here; send application/octet-stream, application/x-npy, \
                  image/png or application/json"
@@ -134,6 +137,19 @@ pub(crate) fn output(headers: &HeaderMap) -> Result<Output, Problem> {
         let offered = OFFERED.map(Output::content_type).join(", ");
         Problem::new(ErrorCode::NotAcceptable, format!("offered are {offered}")).at("accept")
     })
+}
+
+/// Whether `Accept-Encoding` takes gzip, RFC 9110 12.5.3.
+pub(crate) fn takes_gzip(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(header::ACCEPT_ENCODING).iter();
+    let codings: Vec<Range<'_>> = values
+        .flat_map(|value| value.to_str().unwrap_or_default().split(',').map(Range::parse))
+        .collect();
+    let quality = |name: &str| {
+        codings.iter().find(|c| c.kind.eq_ignore_ascii_case(name)).map(|coding| coding.quality)
+    };
+    // By its name, or else as any.
+    quality("gzip").or_else(|| quality("*")).is_some_and(|quality| quality > 0.0)
 }
 
 /// One member of `Accept`, RFC 9110 12.5.1.

@@ -14,7 +14,6 @@ use std::{
     time::Duration,
 };
 
-use axum::Router;
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
@@ -24,14 +23,10 @@ use tokio::{
     time::{Sleep, sleep, timeout},
 };
 use tokio_rustls::TlsAcceptor;
-use tower::ServiceExt;
 
-pub(crate) use self::places::Standing;
-use self::places::{Place, Places};
-use crate::{
-    app::{App, begun},
-    gate::Peer,
-};
+use self::places::Place;
+pub(crate) use self::places::{Places, Standing};
+use crate::{app::begun, config::Timeouts, front::Front, gate::Peer, metrics::Metrics};
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
 pub(crate) const BUFFER_MAX: usize = 128 * 1024;
@@ -61,16 +56,18 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
 /// What every connection needs.
 #[derive(Clone)]
 pub(crate) struct Line {
-    pub(crate) router: Router,
-    pub(crate) app: Arc<App>,
+    pub(crate) front: Arc<Front>,
+    pub(crate) metrics: Arc<Metrics>,
+    /// True once the server drains.
+    pub(crate) drain: Arc<watch::Sender<bool>>,
+    pub(crate) timeouts: Timeouts,
     /// None: plain text.
     pub(crate) tls: Option<TlsAcceptor>,
 }
 
 /// Accepts until the drain begins.
-pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
-    let places = Places::new(places, line.app.gate.asks_for_tokens());
-    let mut drain = line.app.drain.subscribe();
+pub(crate) async fn serve(listener: TcpListener, line: Line, places: Places) {
+    let mut drain = line.drain.subscribe();
     loop {
         let accepted = async {
             let permit = places.free().await;
@@ -98,10 +95,10 @@ pub(crate) async fn serve(listener: TcpListener, line: Line, places: usize) {
 }
 
 async fn connection(stream: TcpStream, peer: Peer, line: Line, place: Place) {
-    line.app.metrics.connections_open.inc();
+    line.metrics.connections_open.inc();
     // Taken before anything is read: from here on the drain waits for this connection.
-    let drain = line.app.drain.subscribe();
-    let patience = line.app.timeouts.io;
+    let drain = line.drain.subscribe();
+    let patience = line.timeouts.io;
     let stream = Patient::new(stream, patience);
     let standing = &place.standing;
     let serving = async {
@@ -118,7 +115,7 @@ async fn connection(stream: TcpStream, peer: Peer, line: Line, place: Place) {
         () = serving => {}
         () = standing.evicted() => tracing::debug!("a connection without a token gave way"),
     }
-    line.app.metrics.connections_open.dec();
+    line.metrics.connections_open.dec();
 }
 
 async fn converse<S>(
@@ -130,15 +127,16 @@ async fn converse<S>(
 ) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let (router, standing) = (line.router.clone(), Arc::clone(standing));
+    let (front, standing) = (Arc::clone(&line.front), Arc::clone(standing));
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer);
         request.extensions_mut().insert(Arc::clone(&standing));
-        router.clone().oneshot(request)
+        let front = Arc::clone(&front);
+        async move { front.answer(request).await }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
-        .header_read_timeout(line.app.timeouts.io)
+        .header_read_timeout(line.timeouts.io)
         .max_buf_size(BUFFER_MAX)
         .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();

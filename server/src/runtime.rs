@@ -1,11 +1,8 @@
 //! The threads that move bytes.
 
-use std::{future::Future, io};
+use std::io;
 
-use tokio::{
-    runtime::{Builder, EnterGuard, Handle, Runtime},
-    task::JoinHandle,
-};
+use tokio::runtime::{Builder, EnterGuard, Handle, Runtime};
 
 /// However few cores there are: one slow turn never stops all sessions.
 const THREADS: usize = 2;
@@ -38,12 +35,9 @@ impl IoRuntime {
         self.handle.enter()
     }
 
-    /// Runs a task on these threads.
-    pub(crate) fn spawn<F>(&self, task: F) -> JoinHandle<F::Output>
-    where
-        F: Future<Output: Send> + Send + 'static,
-    {
-        self.handle.spawn(task)
+    /// Where tasks are run.
+    pub(crate) fn handle(&self) -> &Handle {
+        &self.handle
     }
 }
 

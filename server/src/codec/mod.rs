@@ -36,7 +36,7 @@ pub(crate) enum Input {
 }
 
 /// How a SED map is encoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Output {
     /// Bare samples.
     Samples(SampleType),
@@ -86,7 +86,7 @@ pub(crate) fn decode(input: Input, bytes: &[u8], pressure_pa: &mut [f32]) -> Res
 }
 
 /// What a map shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Quantity {
     /// Pressure on the skin, Pa.
     Pressure,

@@ -3,6 +3,7 @@
 mod error;
 mod file;
 mod print;
+mod range;
 mod rules;
 
 use std::{
@@ -93,7 +94,7 @@ pub struct Config {
     pub watch_models: bool,
 
     /// Inference threads; each owns a ready session of every tier [default: one per core].
-    #[arg(long, env = "PAPILLA_THREADS", value_name = "N")]
+    #[arg(long, env = "PAPILLA_THREADS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::THREADS), value_name = "N")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<NonZeroUsize>,
 
@@ -104,7 +105,7 @@ pub struct Config {
 
     /// Time for measuring the tiers on this machine at the start, milliseconds; slow tiers take
     /// two runs each whatever they need. 0: none, the shipped times stand.
-    #[arg(long, env = "PAPILLA_CALIBRATION_MS", default_value = "1500", value_name = "MS")]
+    #[arg(long, env = "PAPILLA_CALIBRATION_MS", value_parser = |text: &str| range::parse::<u64>(text, &range::CALIBRATION_MS), default_value = "1500", value_name = "MS")]
     pub calibration_ms: u64,
 
     /// Log filter, as `info` or `papilla_server=debug`.
@@ -147,16 +148,16 @@ pub struct Config {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub xr_dir: Option<PathBuf>,
 
-    /// Greatest number of open sessions; further ones are answered 503.
-    #[arg(long, env = "PAPILLA_MAX_SESSIONS", default_value = "64", value_name = "N")]
+    /// Greatest number of open sessions; further ones are answered 503; 1 to 10000.
+    #[arg(long, env = "PAPILLA_MAX_SESSIONS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_sessions: NonZeroUsize,
 
-    /// Greatest number of posted maps that wait or run; further ones are answered 503.
-    #[arg(long, env = "PAPILLA_MAX_REQUESTS", default_value = "64", value_name = "N")]
+    /// Greatest number of posted maps that wait or run; further ones are answered 503; 1 to 10000.
+    #[arg(long, env = "PAPILLA_MAX_REQUESTS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_requests: NonZeroUsize,
 
-    /// Greatest number of open connections; further ones wait to be accepted.
-    #[arg(long, env = "PAPILLA_MAX_CONNECTIONS", default_value = "256", value_name = "N")]
+    /// Greatest number of open connections; further ones wait to be accepted; 1 to 100000.
+    #[arg(long, env = "PAPILLA_MAX_CONNECTIONS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::CONNECTIONS), default_value = "256", value_name = "N")]
     pub max_connections: NonZeroUsize,
 
     /// Largest body of a request, bytes; a JSON map with every digit takes about 1.2 MB.
@@ -165,26 +166,26 @@ pub struct Config {
 
     /// Requests a second that one client (its token, or its address) may send, sessions opened
     /// included; further ones are answered 429. 0: any.
-    #[arg(long, env = "PAPILLA_RATE_PER_S", default_value = "5000", value_name = "N")]
+    #[arg(long, env = "PAPILLA_RATE_PER_S", value_parser = |text: &str| range::parse::<u32>(text, &range::RATE_PER_S), default_value = "5000", value_name = "N")]
     pub rate_per_s: u32,
 
     /// Requests a client may send at once before the rate holds [default: one second's worth].
-    #[arg(long, env = "PAPILLA_RATE_BURST", value_name = "N")]
+    #[arg(long, env = "PAPILLA_RATE_BURST", value_parser = |text: &str| range::parse::<NonZeroU32>(text, &range::RATE_BURST), value_name = "N")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_burst: Option<NonZeroU32>,
 
     /// A client that owes the server bytes (a request, a hello, room for an answer) for this
     /// long is dropped, seconds; so is a connection kept alive for nothing.
-    #[arg(long, env = "PAPILLA_IO_TIMEOUT_S", default_value = "10", value_name = "S")]
+    #[arg(long, env = "PAPILLA_IO_TIMEOUT_S", value_parser = |text: &str| range::parse::<u64>(text, &range::TIMEOUT_S), default_value = "10", value_name = "S")]
     pub io_timeout_s: u64,
 
     /// A session silent for this long is closed, seconds. Pings count, and any WebSocket
     /// library answers them.
-    #[arg(long, env = "PAPILLA_IDLE_TIMEOUT_S", default_value = "60", value_name = "S")]
+    #[arg(long, env = "PAPILLA_IDLE_TIMEOUT_S", value_parser = |text: &str| range::parse::<u64>(text, &range::TIMEOUT_S), default_value = "60", value_name = "S")]
     pub idle_timeout_s: u64,
 
     /// Time for the drain, seconds; longer than --io-timeout-s, or a slow client can outlast it.
-    #[arg(long, env = "PAPILLA_DRAIN_TIMEOUT_S", default_value = "15", value_name = "S")]
+    #[arg(long, env = "PAPILLA_DRAIN_TIMEOUT_S", value_parser = |text: &str| range::parse::<u64>(text, &range::DRAIN_S), default_value = "15", value_name = "S")]
     pub drain_timeout_s: u64,
 }
 

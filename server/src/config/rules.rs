@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, time::Duration};
 
 use papilla_proto::MAP_LEN;
 
-use super::{Config, SettingError};
+use super::{Config, SettingError, range};
 
 /// The times the service runs by.
 #[derive(Debug, Clone, Copy)]
@@ -16,11 +16,12 @@ pub(crate) struct Timeouts {
 }
 
 impl Config {
-    /// Checks what one setting alone cannot tell.
+    /// Checks every number against its range, and what one setting alone cannot tell.
     ///
     /// # Errors
-    /// The first setting that is at odds with another, and what would do.
+    /// The first setting that is beyond its range or at odds with another, and what would do.
     pub fn validate(&self) -> Result<(), SettingError> {
+        range::check(self)?;
         let refuse = |field, reason: String| Err(SettingError { field, reason });
         if !self.bind.ip().is_loopback() && self.tokens.is_none() && !self.allow_anyone {
             let reason = format!(
@@ -72,8 +73,8 @@ impl Config {
 
     pub(crate) fn timeouts(&self) -> Timeouts {
         Timeouts {
-            io: Duration::from_secs(self.io_timeout_s.max(1)),
-            idle: Duration::from_secs(self.idle_timeout_s.max(1)),
+            io: Duration::from_secs(self.io_timeout_s),
+            idle: Duration::from_secs(self.idle_timeout_s),
         }
     }
 

@@ -132,3 +132,46 @@ fn settings_at_odds_are_refused_by_field() {
     let open = Config { allow_anyone: true, bind: ([0, 0, 0, 0], 80).into(), ..Config::default() };
     open.validate().unwrap();
 }
+
+/// Each layer refuses a number beyond its range, and says the range.
+#[test]
+fn numbers_beyond_their_range_are_refused_with_it() {
+    let huge = u64::MAX.to_string();
+    for (field, bad, range) in [
+        ("max_sessions", huge.as_str(), "1 to 10000"),
+        ("max_sessions", "1000000000000", "1 to 10000"),
+        ("max_requests", &huge, "1 to 10000"),
+        ("max_requests", "99999999999999999999", "1 to 10000"),
+        ("max_connections", &huge, "1 to 100000"),
+        ("threads", &huge, "1 to 1024"),
+        ("rate_per_s", "4000000000", "0 to 1000000"),
+        ("rate_burst", "4000000000", "1 to 1000000"),
+        ("io_timeout_s", "9223372036854775807", "1 to 86400"),
+        ("io_timeout_s", "0", "1 to 86400"),
+        ("idle_timeout_s", &huge, "1 to 86400"),
+        ("drain_timeout_s", &huge, "0 to 86400"),
+        ("calibration_ms", &huge, "0 to 600000"),
+    ] {
+        let flag = format!("--{}", field.replace('_', "-"));
+        let error = read(&[&flag, bad]).unwrap_err();
+        assert!(error.contains(&flag) && error.contains(range), "{field}: {error}");
+        if bad.parse::<i64>().is_ok() {
+            let (_folder, path) = file(&format!("{field} = {bad}"));
+            let error = read(&["--config", &path]).unwrap_err();
+            assert!(error.contains(field) && error.contains(range), "{field}: {error}");
+        }
+    }
+    // A program that starts the service itself reads no layer.
+    let n = |n| NonZeroUsize::new(n).unwrap();
+    for (field, change) in [
+        ("max_sessions", (|s| s.max_sessions = NonZeroUsize::MAX) as fn(&mut Config)),
+        ("max_connections", |s| s.max_connections = NonZeroUsize::MAX),
+        ("io_timeout_s", |s| s.io_timeout_s = u64::MAX),
+        ("io_timeout_s", |s| s.io_timeout_s = 0),
+    ] {
+        let mut settings = Config { max_sessions: n(10_000), ..Config::default() };
+        settings.validate().unwrap();
+        change(&mut settings);
+        assert_eq!(settings.validate().unwrap_err().field, field);
+    }
+}

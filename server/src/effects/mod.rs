@@ -99,16 +99,16 @@ impl Effects {
     /// Parameters are unusable, missing, or of an effect that is not named.
     pub(crate) fn of(hello: &Hello, catalogue: &Catalogue) -> Result<Option<Self>, Problem> {
         let names = named(hello)?;
-        let map = hello.map.unwrap_or(true);
-        if names.is_empty() && map {
-            return Ok(None);
-        }
-        let has = |effect| names.contains(&effect);
         let contact_pa = hello.contact_pa.unwrap_or(0.0);
         if !(contact_pa.is_finite() && contact_pa >= 0.0) {
             let message = format!("{contact_pa} Pa is no pressure; name 0 or more");
             return Err(unusable("contact_pa", message));
         }
+        let map = hello.map.unwrap_or(true);
+        if names.is_empty() && map {
+            return Ok(None);
+        }
+        let has = |effect| names.contains(&effect);
         let geometry = || {
             let shared = &catalogue.runtime.geometry;
             Arc::clone(shared.get_or_init(|| {

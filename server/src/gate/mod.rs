@@ -9,7 +9,7 @@ use std::{net::IpAddr, sync::Arc, time::Instant};
 use axum::{
     body::Body,
     extract::{MatchedPath, Request, State},
-    http::{HeaderMap, HeaderValue, Method, StatusCode, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     middleware::Next,
     response::Response,
 };
@@ -42,7 +42,7 @@ fn is_public(route: &str) -> bool {
     PUBLIC.contains(&route) || http::xr::PATHS.contains(&route)
 }
 
-/// A browser opens WebSockets to any address, whosever page it shows, and without CORS.
+/// Browsers cannot put a token into a header here.
 const WEBSOCKET: &str = "/v1/session";
 
 /// The address at the other end of the connection.
@@ -92,11 +92,6 @@ impl Gate {
         })
     }
 
-    /// Whether tokens are asked for.
-    pub(crate) fn asks_for_tokens(&self) -> bool {
-        self.tokens.is_some()
-    }
-
     /// Who is let in, in words.
     pub(crate) fn describe(&self) -> String {
         match (&self.tokens, self.is_local) {
@@ -127,9 +122,8 @@ impl Gate {
         if let (Some(rates), Some(key)) = (&self.rates, key) {
             rates.check(&key)?;
         }
-        if request.method() != Method::GET || route == WEBSOCKET {
-            origin::check(headers, &self.origins, self.is_local)?;
-        }
+        origin::check_host(request, &self.origins, self.is_local)?;
+        origin::check(headers, &self.origins, self.is_local)?;
         let is_known = self.tokens.is_none() || holder.is_some();
         if !is_known && (in_query.is_some() || !is_public(route)) {
             let message = "a token is asked for here: Authorization: Bearer TOKEN";

@@ -5,8 +5,11 @@
 
 use std::net::IpAddr;
 
-use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, header};
-use papilla_proto::{ErrorCode, Problem};
+use axum::{
+    extract::Request,
+    http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header, uri::Authority},
+};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tower_http::cors::CorsLayer;
 
 /// Headers of an answer that a page may read.
@@ -21,6 +24,42 @@ const EXPOSED: [&str; 9] = [
     "inference-header-content-length",
     "retry-after",
 ];
+
+/// Refuses a request that does not name one host, and on the loopback one that names a stranger's:
+/// a page whose name was rebound to this machine asks under that name, and as a page of the same
+/// origin it says none.
+///
+/// # Errors
+/// The host is missing, doubled, or neither an address, `localhost` nor that of an allowed origin.
+pub(super) fn check_host(
+    request: &Request,
+    allowed: &[String],
+    is_local: bool,
+) -> Result<(), Problem> {
+    let bad = |message: &str| Err(Problem::new(ErrorCode::BadQuery, message).at("host"));
+    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let host = match (hosts.next(), hosts.next()) {
+        (Some(host), None) => host.to_str().unwrap_or("?"),
+        (None, _) if request.version() < Version::HTTP_11 => return Ok(()),
+        (None, _) => return bad("the request names no host; RFC 9112 asks for one Host"),
+        (Some(_), Some(_)) => return bad("the request names more than one host"),
+    };
+    let is_allowed = |host: &str| {
+        let of_origin = allowed.iter().filter_map(|origin| origin.split_once("://"));
+        is_own_name(host)
+            || of_origin.into_iter().any(|(_, own)| name(own).eq_ignore_ascii_case(name(host)))
+    };
+    // A target in absolute form names a host as well, and goes before the header.
+    let named = [Some(host), request.uri().authority().map(Authority::as_str)];
+    match named.into_iter().flatten().find(|host| is_local && !is_allowed(host)) {
+        None => Ok(()),
+        Some(host) => {
+            let host = shortened(host);
+            let message = format!("this service is not known as {host}; see --allow-origin");
+            Err(Problem::new(ErrorCode::Forbidden, message).at("host"))
+        }
+    }
+}
 
 /// Refuses the pages of strangers. Programs other than browsers send no origin.
 ///
@@ -37,6 +76,7 @@ pub(super) fn check(
     if is_own(origin, host, is_local) || allowed.iter().any(|a| a.eq_ignore_ascii_case(origin)) {
         return Ok(());
     }
+    let origin = shortened(origin);
     let message = format!("pages of {origin} may not use this service; see --allow-origin");
     Err(Problem::new(ErrorCode::Forbidden, message).at("origin"))
 }
@@ -47,17 +87,22 @@ pub(super) fn check(
 /// whose name now resolves to this machine.
 fn is_own(origin: &str, host: &str, is_local: bool) -> bool {
     let Some((_, authority)) = origin.split_once("://") else { return false };
-    authority.eq_ignore_ascii_case(host) && (!is_local || is_loopback_name(host))
+    authority.eq_ignore_ascii_case(host) && (!is_local || is_own_name(host))
 }
 
-fn is_loopback_name(host: &str) -> bool {
-    let name = match host.rsplit_once(':') {
+/// Whether no name server decides where the host is: it is an address, or `localhost`.
+fn is_own_name(host: &str) -> bool {
+    let name = name(host);
+    let bare = name.trim_start_matches('[').trim_end_matches(']');
+    name.eq_ignore_ascii_case("localhost") || bare.parse::<IpAddr>().is_ok()
+}
+
+/// The host without its port.
+fn name(host: &str) -> &str {
+    match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) => name,
         _ => host,
-    };
-    let bare = name.trim_start_matches('[').trim_end_matches(']');
-    name.eq_ignore_ascii_case("localhost")
-        || bare.parse().is_ok_and(|address: IpAddr| address.is_loopback())
+    }
 }
 
 /// Lets the pages of `origins` read answers; None without any.

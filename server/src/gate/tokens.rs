@@ -10,6 +10,9 @@ use tokio::sync::Semaphore;
 /// Shortest token taken from a file, bytes; shorter ones can be guessed.
 const TOKEN_MIN: usize = 16;
 
+/// The members of a `[[token]]`.
+const MEMBERS: [&str; 5] = ["name", "token", "sha256", "max_sessions", "admin"];
+
 /// The file: a list of `[[token]]`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -59,7 +62,7 @@ impl Tokens {
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let file: File = toml::from_str(text).map_err(|error| error.to_string())?;
+        let file: File = toml::from_str(text).map_err(|error| reason(text, &error))?;
         let mut holders: Vec<Arc<Holder>> = Vec::with_capacity(file.token.len());
         for entry in file.token {
             let name = entry.name.clone();
@@ -91,6 +94,28 @@ impl Tokens {
         }
         self.0.get(usize::try_from(found).ok()?).map(Arc::clone)
     }
+}
+
+/// What is wrong and in which line, without what the line says: it may be a token. Of what the
+/// parser quotes stay the words that are too short for one.
+fn reason(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+    let line = 1 + before.matches('\n').count();
+    let member = text.lines().nth(line - 1).and_then(|line| line.split_once('='));
+    let member = member.map(|(member, _)| member.trim()).filter(|member| MEMBERS.contains(member));
+    let of_member = member.map(|member| format!(", {member}")).unwrap_or_default();
+    // Texts come in double quotes, and may hold quotes themselves: nothing behind the first stays.
+    let message = error.message();
+    let (message, is_cut) = match message.split_once('"') {
+        Some((message, _)) => (message, true),
+        None => (message, false),
+    };
+    let parts = message.split('`').enumerate().map(|(place, part)| {
+        // Every second part stands between backticks.
+        if place % 2 == 1 && part.len() >= TOKEN_MIN { "…" } else { part }
+    });
+    let message = parts.collect::<Vec<_>>().join("`");
+    format!("line {line}{of_member}: {}{}", message.trim_end(), if is_cut { " …" } else { "" })
 }
 
 fn holder(entry: Entry) -> Result<Holder, String> {
@@ -166,6 +191,29 @@ mod tests {
         assert_eq!((&*b.name, b.is_admin, b.sessions.is_none()), ("b", true, true));
         for wrong in ["", "0123456789abcdeF", "0123456789abcde", "0123456789abcdef0"] {
             assert!(tokens.holder(wrong).is_none(), "{wrong}");
+        }
+    }
+
+    /// What is wrong is said without the line it is in.
+    #[test]
+    fn no_error_tells_a_token() {
+        let secret = "s3cret-0123456789abcdef";
+        for text in [
+            format!("[[token]]\nname = \"a\"\ntoken = \"{secret}\nadmin = true"),
+            format!("[[token]]\nname = \"a\"\ntoken = {secret}"),
+            format!("token = \"{secret}\""),
+            format!("token = [\"{secret}\"]"),
+            format!("[[token]]\nname = \"a\"\n{secret} = true"),
+            format!("[[token]]\nname = \"a\"\nadmin = \"{secret}\""),
+            format!("[[token]]\nname = \"a\"\nmax_sessions = \"x\\\"{secret}\""),
+            format!("[[token]]\nname = \"a\"\ntoken = \"{secret}\"\ntoken = \"{secret}\""),
+            format!("\"{secret}\""),
+            "[[token]]\nname = \"a\"\ntoken = 1234567890123456789".to_owned(),
+        ] {
+            let error = Tokens::parse(&text).unwrap_err();
+            assert!(error.contains("line "), "{error}");
+            let tells = error.contains("s3cret") || error.contains("0123456789");
+            assert!(!tells && !error.contains("1234567"), "{error}");
         }
     }
 

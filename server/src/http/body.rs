@@ -2,11 +2,16 @@
 
 use std::time::Duration;
 
-use axum::body::Body;
+use axum::{
+    body::Body,
+    http::{HeaderMap, HeaderValue, header},
+};
 use bytes::{Bytes, BytesMut};
 use http_body_util::BodyExt;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tokio::time::timeout;
+
+use crate::problem::CODING;
 
 /// So much more than is taken is read and thrown away, so that a client that is still sending
 /// gets to read why it is refused.
@@ -28,6 +33,19 @@ pub(crate) async fn read(
             Err(Problem::new(ErrorCode::Timeout, message))
         }
     }
+}
+
+/// Whether the body is what it says: no coding of content is undone here.
+///
+/// # Errors
+/// `Content-Encoding` names one.
+pub(crate) fn require_plain(headers: &HeaderMap) -> Result<(), Problem> {
+    let codings = headers.get_all(header::CONTENT_ENCODING).iter();
+    let is_plain = |value: &HeaderValue| value.as_bytes().eq_ignore_ascii_case(b"identity");
+    let Some(coding) = codings.into_iter().find(|value| !is_plain(value)) else { return Ok(()) };
+    let coding = shortened(coding.to_str().unwrap_or("?"));
+    let message = format!("a body coded as '{coding}' is not taken; send it as it is");
+    Err(Problem::new(ErrorCode::WrongType, message).at(CODING))
 }
 
 async fn collect(mut body: Body, bytes_max: usize) -> Result<Bytes, Problem> {

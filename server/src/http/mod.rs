@@ -4,7 +4,8 @@ mod admin;
 mod atlas;
 pub(crate) mod body;
 mod effects;
-mod info;
+pub(crate) mod info;
+pub(crate) mod kept;
 mod page;
 mod presses;
 pub(crate) mod sed;
@@ -24,13 +25,13 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{MethodRouter, get, post},
 };
-use bytes::Bytes;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
 use serde::Serialize;
 
 use crate::{
     app::App,
     gate,
+    metrics::Metrics,
     oip::{self, OipProblem},
     problem::HttpProblem,
     session,
@@ -49,7 +50,7 @@ fn routes() -> Vec<(Method, &'static str, MethodRouter<Arc<App>>)> {
         (g.clone(), "/healthz", get(info::healthz)),
         (g.clone(), "/readyz", get(info::readyz)),
         (g.clone(), "/metrics", get(info::metrics)),
-        (g.clone(), "/openapi.json", get(info::openapi)),
+        (g.clone(), "/openapi.json", get(page::openapi)),
         (g.clone(), "/v1/tiers", get(info::tiers)),
         (g.clone(), "/v1/models", get(info::models)),
         (g.clone(), "/v1/effects", get(effects::list)),
@@ -119,18 +120,24 @@ pub(crate) fn router(app: Arc<App>, origins: &[String], xr_dir: Option<&Path>) -
 }
 
 async fn not_found(State(app): Shared, uri: Uri) -> Response {
-    let message = format!("there is nothing at {}", uri.path());
+    let message = format!("there is nothing at {}", shortened(uri.path()));
     refusal(&app, &uri, Problem::new(ErrorCode::NotFound, message))
 }
 
 async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Response {
-    let message = format!("{} does not take {method}", uri.path());
+    let (path, method) = (shortened(uri.path()), shortened(method.as_str()));
+    let message = format!("{path} does not take {method}");
     refusal(&app, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
 }
 
 /// Counts a refusal that no handler made, in the words of the protocol of its path.
 pub(crate) fn refusal(app: &App, uri: &Uri, problem: Problem) -> Response {
-    app.metrics.error(problem.code);
+    refused(&app.metrics, uri, problem)
+}
+
+/// The same, before there is anything to serve.
+pub(crate) fn refused(metrics: &Metrics, uri: &Uri, problem: Problem) -> Response {
+    metrics.error(problem.code);
     if is_oip(uri.path()) {
         OipProblem(problem).into_response()
     } else {
@@ -158,33 +165,4 @@ pub(crate) fn json_answer(value: &impl Serialize) -> Response {
         Err(error) => HttpProblem(crate::problem::internal("the answer cannot be encoded", &error))
             .into_response(),
     }
-}
-
-/// An answer the client may keep, but must ask about: 304 if `etag` is the one it has.
-fn tagged(
-    content_type: &'static str,
-    etag: &str,
-    asked: Option<&HeaderValue>,
-    body: Bytes,
-) -> Response {
-    let quoted = format!("\"{etag}\"");
-    let known = asked.and_then(|v| v.to_str().ok()).is_some_and(|asked| {
-        asked
-            .split(',')
-            .any(|tag| matches!(tag.trim().trim_start_matches("W/"), t if t == quoted || t == "*"))
-    });
-    let mut response = if known {
-        let mut response = Response::new(Body::empty());
-        *response.status_mut() = axum::http::StatusCode::NOT_MODIFIED;
-        response
-    } else {
-        answer(content_type, body)
-    };
-    let headers = response.headers_mut();
-    if let Ok(etag) = HeaderValue::from_str(&quoted) {
-        headers.insert(header::ETAG, etag);
-    }
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
-    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
-    response
 }

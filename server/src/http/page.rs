@@ -4,33 +4,22 @@ use std::sync::LazyLock;
 
 use axum::{
     extract::State,
-    http::{HeaderMap, Uri, header},
+    http::{HeaderMap, Uri},
 };
-use bytes::Bytes;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
 
-use super::{Answer, Shared, refuse, tagged};
-use crate::{
-    app::App,
-    assets::{PAGE, sha256_hex},
+use super::{
+    Answer, Shared,
+    kept::{Fresh, Kept, What},
+    refuse,
 };
+use crate::{app::App, assets::PAGE};
 
-struct PageFile {
-    name: &'static str,
-    content_type: &'static str,
-    etag: String,
-    bytes: &'static [u8],
-}
+/// The description of the HTTP surface, written by hand.
+const OPENAPI: &str = include_str!("../../openapi.json");
 
-static FILES: LazyLock<Vec<PageFile>> = LazyLock::new(|| {
-    let files = PAGE.iter().map(|&(name, bytes)| PageFile {
-        name,
-        content_type: content_type(name),
-        etag: sha256_hex(bytes),
-        bytes,
-    });
-    files.collect()
-});
+/// Answers that last as long as the binary.
+static KEPT: LazyLock<Kept> = LazyLock::new(Kept::default);
 
 fn content_type(name: &str) -> &'static str {
     match name.rsplit('.').next().unwrap_or_default() {
@@ -48,22 +37,25 @@ fn content_type(name: &str) -> &'static str {
 }
 
 pub(super) async fn index(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, "index.html", &headers)
+    serve(&app, "index.html", &headers).await
 }
 
 pub(super) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    serve(&app, uri.path().trim_start_matches('/'), &headers)
+    serve(&app, uri.path().trim_start_matches('/'), &headers).await
 }
 
-fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
-    match FILES.iter().find(|file| file.name == name) {
-        Some(file) => {
-            let asked = headers.get(header::IF_NONE_MATCH);
-            Ok(tagged(file.content_type, &file.etag, asked, Bytes::from_static(file.bytes)))
-        }
-        None => {
-            let message = format!("there is nothing at /{name}");
-            refuse(app, Problem::new(ErrorCode::NotFound, message))
-        }
-    }
+/// The description of the HTTP surface.
+pub(super) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
+    let make = || Ok(Fresh::new("application/json", OPENAPI));
+    KEPT.answer(&headers, What::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
+}
+
+async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
+    let Some(place) = PAGE.iter().position(|(file, _)| *file == name) else {
+        let message = format!("there is nothing at /{}", shortened(name));
+        return refuse(app, Problem::new(ErrorCode::NotFound, message));
+    };
+    let (name, bytes) = PAGE[place];
+    let make = move || Ok(Fresh::new(content_type(name), bytes));
+    KEPT.answer(headers, What::Page(place), make).await.or_else(|problem| refuse(app, problem))
 }

@@ -57,6 +57,7 @@ async fn render(
     // The body first: a client that is still sending would not read our answer.
     let payload = body::read(body, app.body_max, app.timeouts.io).await?;
     let received = Instant::now();
+    body::require_plain(headers)?;
     let query = Query::parse(uri.query().unwrap_or_default())?;
     let input = negotiate::input(headers, &query, &payload)?;
     let output = negotiate::output(headers)?;
@@ -115,6 +116,8 @@ pub(crate) async fn through_pool(
     match done.outcome {
         Outcome::Failed(problem) => Err(problem),
         Outcome::Late(stage) => Err(late(stage)),
+        // Whoever reads this has not left.
+        Outcome::Gone => Err(problem::internal("the pool dropped the map", &"no client")),
         Outcome::Map { .. } if is_past(done.deadline) => Err(late(Stage::Sending)),
         Outcome::Map { bytes, scale } => {
             let total = done.received.elapsed();

@@ -2,7 +2,7 @@
 //!
 //! Not in the list of routes: without a folder there is nothing there.
 
-use std::{path::Path, sync::Arc};
+use std::{io::ErrorKind, path::Path, sync::Arc};
 
 use axum::{
     Router,
@@ -11,12 +11,11 @@ use axum::{
     response::{IntoResponse, Redirect, Response},
     routing::get,
 };
-use papilla_proto::{ErrorCode, Problem};
-use tower::ServiceExt;
+use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tower_http::services::ServeDir;
 
 use super::{Shared, refuse};
-use crate::app::App;
+use crate::{app::App, problem};
 
 /// What a folder adds to the routes; none of it asks for a token, as the page does not.
 pub(crate) const PATHS: [&str; 3] = ["/xr", "/xr/", "/xr/{*path}"];
@@ -33,24 +32,49 @@ pub(super) fn routes(folder: &Path) -> Router<Arc<App>> {
         .route(below, serve)
 }
 
-async fn file(files: ServeDir, State(app): Shared, mut request: Request) -> Response {
-    let asked = request.uri().path().to_owned();
-    let below = asked.strip_prefix("/xr").and_then(|path| path.parse::<PathAndQuery>().ok());
-    let Some(below) = below else { return missing(&app, &asked) };
+async fn file(mut files: ServeDir, State(app): Shared, mut request: Request) -> Response {
+    let asked = request.uri().clone();
+    let Some(below) = below(&asked) else { return missing(&app, asked.path()) };
     *request.uri_mut() = Uri::from(below);
-    // Its error type has no values: a file that cannot be read is an answer too.
-    let Ok(found) = files.oneshot(request).await;
-    if found.status() == StatusCode::NOT_FOUND {
-        return missing(&app, &asked);
-    }
-    let mut response = found.into_response();
+    let found = match files.try_call(request).await {
+        Ok(found) => found,
+        // No file can have this name.
+        Err(error)
+            if matches!(error.kind(), ErrorKind::InvalidFilename | ErrorKind::InvalidInput) =>
+        {
+            return missing(&app, asked.path());
+        }
+        Err(error) => return broken(&app, &error),
+    };
+    let mut response = match found.status() {
+        StatusCode::NOT_FOUND => return missing(&app, asked.path()),
+        status if status.is_server_error() => return broken(&app, &status),
+        _ => found.into_response(),
+    };
     let headers = response.headers_mut();
+    // A folder without its slash: `ServeDir` names the way as it sees it.
+    let location = headers.get(header::LOCATION).and_then(|location| location.to_str().ok());
+    if let Some(location) = location.and_then(|way| format!("/xr{way}").parse().ok()) {
+        headers.insert(header::LOCATION, location);
+    }
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     response
 }
 
+/// What `ServeDir` is asked for; none for a path with an empty part, which is no file's and whose
+/// redirect would name another host.
+fn below(asked: &Uri) -> Option<PathAndQuery> {
+    let whole = asked.path_and_query()?.as_str().strip_prefix("/xr")?;
+    if asked.path().contains("//") { None } else { whole.parse().ok() }
+}
+
+fn broken(app: &App, error: &dyn std::fmt::Display) -> Response {
+    refuse(app, problem::internal("the file cannot be read", error)).into_response()
+}
+
 fn missing(app: &App, path: &str) -> Response {
-    let problem = Problem::new(ErrorCode::NotFound, format!("there is nothing at {path}"));
+    let problem =
+        Problem::new(ErrorCode::NotFound, format!("there is nothing at {}", shortened(path)));
     refuse(app, problem).into_response()
 }

@@ -96,6 +96,8 @@ pub(crate) struct TransportMetrics {
     pub(crate) stale: Counter,
     /// Refused.
     pub(crate) error: Counter,
+    /// Not rendered, since its session had ended.
+    pub(crate) gone: Counter,
 }
 
 /// Everything that is counted.
@@ -304,5 +306,6 @@ fn transport_metrics(
         late: count("late"),
         stale: count("stale"),
         error: count("error"),
+        gone: count("gone"),
     }
 }

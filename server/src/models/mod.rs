@@ -5,10 +5,11 @@ mod load;
 use std::sync::{Arc, atomic::AtomicUsize};
 
 use bytes::Bytes;
-use papilla_engine::{Ladder, Model, Session, card::Index, ladder::Kind};
+use papilla_engine::{Model, Session, card::Index, ladder::Kind};
 use papilla_proto::{
     ErrorCode, Pattern, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
+    error::shortened,
 };
 use serde_json::Value;
 
@@ -17,6 +18,7 @@ use crate::{
     StartError,
     assets::Assets,
     effects,
+    http::kept::Kept,
     replay::Replay,
     speed::{Overhead, Speed, round_press},
 };
@@ -71,6 +73,14 @@ impl Tier {
     }
 }
 
+/// How far loading has come.
+pub(crate) enum Step<'a> {
+    /// These models will be loaded.
+    Listed(&'a [String]),
+    /// This one is.
+    Loaded(&'a str),
+}
+
 /// All there is to render with and to show.
 ///
 /// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
@@ -87,13 +97,15 @@ pub(crate) struct Catalogue {
     pub(crate) skin_mask: PixelMask,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
-    /// All rungs as shipped, FE included; none if the folder has no `ladder.json`.
-    pub(crate) ladder: Option<Ladder>,
+    /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
+    pub(crate) ladder_json: String,
     /// The set by which tiers are compared; none: each by its card.
     pub(crate) judged_on: Option<String>,
     pub(crate) overhead: Overhead,
     /// What sessions with effects share.
     pub(crate) runtime: effects::Shared,
+    /// Answers about all this.
+    pub(crate) kept: Kept,
 }
 
 impl Catalogue {
@@ -110,10 +122,11 @@ impl Catalogue {
             interface,
             atlas,
             replay: Replay::default(),
-            ladder: None,
+            ladder_json: "null".to_owned(),
             judged_on: None,
             overhead: Overhead::default(),
             runtime: effects::Shared::default(),
+            kept: Kept::default(),
         }
     }
 
@@ -127,6 +140,19 @@ impl Catalogue {
         default: Option<&str>,
         running: Option<&Self>,
     ) -> Result<Self, StartError> {
+        Self::load_noting(assets, default, running, &mut |_| ())
+    }
+
+    /// The same; `note` is told what comes.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub(crate) fn load_noting(
+        assets: &Assets,
+        default: Option<&str>,
+        running: Option<&Self>,
+        note: &mut dyn FnMut(Step<'_>),
+    ) -> Result<Self, StartError> {
         let origin = || assets.origin.clone();
         let read = |name: &str| assets.require(name);
         let bad = |file: &str, error: &dyn std::fmt::Display| StartError::Unusable {
@@ -137,10 +163,16 @@ impl Catalogue {
         let index = text(read("index.json")?)
             .and_then(|json| Index::from_json(json).map_err(|e| e.to_string()))
             .map_err(|e| bad("index.json", &e))?;
+        for (place, name) in index.models.iter().enumerate() {
+            if index.models[..place].contains(name) {
+                return Err(bad("index.json", &format!("the model '{name}' is listed twice")));
+            }
+        }
         let atlas_json = Bytes::copy_from_slice(read("atlas.json")?);
         let atlas = text(&atlas_json)
             .and_then(|json| Atlas::from_json(json).map_err(|e| e.to_string()))
             .map_err(|e| bad("atlas.json", &e))?;
+        note(Step::Listed(&index.models));
         let mut tiers = Vec::with_capacity(index.models.len());
         for name in &index.models {
             let (onnx, file) = (format!("{name}.onnx"), format!("{name}.json"));
@@ -157,6 +189,7 @@ impl Catalogue {
                 ));
             }
             tiers.push(tier);
+            note(Step::Loaded(name));
         }
         let wanted = default.unwrap_or(&index.default);
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
@@ -175,6 +208,7 @@ impl Catalogue {
             None => None,
         };
         let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
+        let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let (skin, interface) =
             (Raster::new(&atlas, Patch::Skin), Raster::new(&atlas, Patch::Interface));
         let overhead = Overhead::default();
@@ -187,10 +221,11 @@ impl Catalogue {
             skin,
             interface,
             replay,
-            ladder,
+            ladder_json,
             judged_on,
             overhead,
             runtime: effects::Shared::default(),
+            kept: Kept::default(),
         })
     }
 
@@ -215,6 +250,7 @@ impl Catalogue {
     /// There is none.
     pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
         self.find(name).ok_or_else(|| {
+            let name = shortened(name);
             let message = format!("no tier '{name}'; there are {}", self.names());
             Problem::new(ErrorCode::UnknownTier, message).at("tier")
         })

@@ -17,7 +17,7 @@ use axum::{
 };
 use bytes::Bytes;
 use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
-use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType};
+use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType, error::shortened};
 use serde_json::json;
 use tokio::task::spawn_blocking;
 
@@ -45,15 +45,15 @@ pub(crate) struct OipProblem(pub(crate) Problem);
 
 impl IntoResponse for OipProblem {
     fn into_response(self) -> Response {
-        let Problem { code, message, field } = self.0;
-        let place = field.map(|field| format!(" ({field})")).unwrap_or_default();
+        let Problem { code, message, field } = problem::bounded(self.0);
+        let place = field.as_ref().map(|field| format!(" ({field})")).unwrap_or_default();
         let mut response = json_answer(&json!({"error": format!("{message}{place}")}));
         *response.status_mut() =
             StatusCode::from_u16(code.http_status()).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
         let headers = response.headers_mut();
         headers.insert("x-papilla-code", HeaderValue::from_static(code.as_str()));
         headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        problem::label(headers, code);
+        problem::label(headers, code, field.as_deref());
         response
     }
 }
@@ -81,7 +81,10 @@ pub(crate) async fn ready(State(app): Shared) -> Answer {
     if app.is_draining() {
         return refuse(&app, problem::shutting_down());
     }
-    Ok(json_answer(&json!({"ready": true})))
+    match app.progress.left() {
+        Some(left) => refuse(&app, left.problem()),
+        None => Ok(json_answer(&json!({"ready": true}))),
+    }
 }
 
 pub(crate) async fn model(State(app): Shared, uri: Uri) -> Answer {
@@ -116,6 +119,7 @@ fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
     let place = app.catalogue().tier_named(model)?;
     match (parts.next(), parts.next()) {
         (Some("versions"), Some(version)) if version != VERSION => {
+            let version = shortened(version);
             let message = format!("model {model} has no version '{version}', only {VERSION}");
             Err(Problem::new(ErrorCode::UnknownTier, message).at("version"))
         }
@@ -137,6 +141,7 @@ async fn answer(
 ) -> Result<Response, Problem> {
     // The body first: a client that is still sending would not read our answer.
     let body = body::read(body, app.body_max, app.timeouts.io).await?;
+    body::require_plain(headers)?;
     let received = Instant::now();
     let tier = named(app, uri)?;
     // Held until the answer is written: it bounds the work below as well.

@@ -83,6 +83,7 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
     let (head, blob) =
         (body.slice(..head_len.unwrap_or(body.len())), head_len.map(|n| body.slice(n..)));
     let request: Request = json::read_bounded(&head)?;
+    refuse_sequences(&request.parameters)?;
     let is_binary_wanted = wants_binary(&request)?;
     let input = match request.inputs {
         First { first: Some(input), count: 1 } => input,
@@ -109,6 +110,17 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
     };
     let timeout_us = request.parameters.timeout.whole_number("timeout")?.filter(|us| *us > 0);
     Ok((Wish { id: request.id, is_binary_wanted, timeout_us }, payload))
+}
+
+/// Every request is rendered for itself.
+fn refuse_sequences(parameters: &Parameters) -> Result<(), Problem> {
+    match parameters.of_sequence() {
+        None => Ok(()),
+        Some(name) => {
+            let message = "requests are rendered one by one; sequences of them are not served";
+            Err(Problem::new(ErrorCode::BadQuery, message).at(name))
+        }
+    }
 }
 
 fn check_input(input: &InputTensor) -> Result<(), Problem> {

@@ -109,6 +109,8 @@ pub(crate) enum Outcome {
     Late(Stage),
     /// Something was wrong with the map, or with us.
     Failed(Problem),
+    /// Nobody is there for an answer; nothing was rendered.
+    Gone,
 }
 
 /// What the payload of an answer holds.

@@ -8,9 +8,7 @@ use std::{
 };
 
 use papilla_engine::Session;
-use papilla_proto::{
-    ErrorCode, MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside,
-};
+use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
 
 use super::{
     Done, Drawn, FRONT, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
@@ -71,8 +69,7 @@ impl Worker {
             let abandoned = slot.is_abandoned();
             let Some((mut job, mut recycler)) = slot.take() else { continue };
             let done = if abandoned {
-                let gone = Problem::new(ErrorCode::Internal, "the client is gone");
-                finished(&job, Progress::default(), Outcome::Failed(gone))
+                finished(&job, Progress::default(), Outcome::Gone)
             } else {
                 self.serve(&mut job, &mut recycler)
             };
@@ -158,7 +155,9 @@ impl Worker {
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
             drawn.flags |= flags::NO_CONTACT;
-        } else if job.deadline.is_some_and(|deadline| decoded + tier.speed.floor() >= deadline) {
+        } else if job.deadline.is_some_and(|deadline| {
+            tier.speed.is_hopeless(deadline.saturating_duration_since(decoded))
+        }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
             self.sessions[job.tier].infer(&self.pressure_pa, &mut self.sed_j_per_m3).map_err(

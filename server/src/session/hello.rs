@@ -10,6 +10,7 @@ use papilla_proto::{
     ClientMessage, ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, MessageError, PROTOCOL_VERSIONS,
     Problem, Ready, RuntimeEffect, SampleType, ServerMessage,
     effects::{OutOfRange, Section, SectionName},
+    error::shortened,
     json::JsonError,
 };
 use tokio::{task::spawn_blocking, time::timeout};
@@ -227,13 +228,13 @@ fn meet_now(app: &App, hello: &Hello) -> Result<Terms, Problem> {
     };
     let tier = &catalogue.tiers[index];
     if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
-        let rendered = tier.effects.join(", ");
-        let hint = runtime_effect(effect).map_or("", |_| "; effects of sessions need version 2");
+        let (effect, rendered) = (shortened(effect), tier.effects.join(", "));
+        let hint = runtime_effect(&effect).map_or("", |_| "; effects of sessions need version 2");
         let message = format!("tier {} renders {rendered}, but not '{effect}'{hint}", tier.name);
         return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
     }
     if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != tier.atlas_hash) {
-        let ours = &tier.atlas_hash;
+        let (hash, ours) = (shortened(hash), &tier.atlas_hash);
         let message = format!("the client has atlas {hash}, tier {} has {ours}", tier.name);
         return Err(Problem::new(ErrorCode::AtlasMismatch, message).at("atlas_hash"));
     }

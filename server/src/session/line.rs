@@ -28,6 +28,7 @@ use super::{
 use crate::{
     app::{App, begun},
     net::Patient,
+    problem,
 };
 
 /// The connection and what it takes to speak over it.
@@ -126,9 +127,9 @@ impl Line {
                 () = begun(&mut self.drain), if !draining => return Ok(Event::Draining),
                 () = &mut self.alarm => self.look()?,
                 () = &mut self.pause, if resume_at.is_some() => {}
-                read = self.stream.read(self.inbound.room()), if resume_at.is_none() => {
-                    self.came(read)?;
-                }
+                // In a future of its own: room is made only where there will be a read.
+                read = async { self.stream.read(self.inbound.room()).await },
+                    if resume_at.is_none() => self.came(read)?,
             }
         }
     }
@@ -237,7 +238,7 @@ impl Line {
             End::Client(code) => (code.unwrap_or(close::NORMAL), ""),
             End::Refused(problem, code) => {
                 self.app.metrics.error(problem.code);
-                let error = SessionError::new(problem.clone(), None, true);
+                let error = SessionError::new(problem::bounded(problem.clone()), None, true);
                 self.reply.say(&ServerMessage::Error(error));
                 (*code, problem.code.as_str())
             }

@@ -23,6 +23,7 @@ use crate::{
     codec::Output,
     metrics::Transport,
     pool::{Done, FRONT, Outcome, Recycler, Sink, Stage, is_past},
+    problem,
 };
 
 /// The voice of a session.
@@ -81,6 +82,7 @@ impl Reply {
     /// Tells the client of an error the session survives.
     pub(super) fn complain(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.error(problem.code);
+        let problem = problem::bounded(problem);
         self.say(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
     }
 
@@ -123,6 +125,10 @@ impl Reply {
                 return self.short(&header, done.tier, FrameStatus::Late, done.received);
             }
             Outcome::Failed(problem) => return self.refuse(problem, Some(header.sequence)),
+            Outcome::Gone => {
+                self.app.metrics.of(Transport::Session).gone.inc();
+                return;
+            }
         };
         let mut head = header.answer(FrameStatus::Ok, us(done.received.elapsed()), scale);
         if header.extension.is_some() {

@@ -91,7 +91,7 @@ impl Client {
     fn connect(service: &Service, hello: &Value) -> Self {
         let mut stream = TcpStream::connect(service.address).unwrap();
         stream.set_nodelay(true).unwrap();
-        let handshake = "GET /v1/session HTTP/1.1\r\nhost: test\r\nconnection: upgrade\r\n\
+        let handshake = "GET /v1/session HTTP/1.1\r\nhost: localhost\r\nconnection: upgrade\r\n\
                          upgrade: websocket\r\nsec-websocket-version: 13\r\n\
                          sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
         stream.write_all(handshake.as_bytes()).unwrap();

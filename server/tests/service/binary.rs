@@ -55,6 +55,8 @@ fn exit_codes_are_the_documented_ones() {
         (empty.path(), vec![], 3, "index.json"),
         (models.path(), vec!["--default-tier", "best"], 3, "quick, slow"),
         (models.path(), vec!["--bind", &taken], 4, "--bind"),
+        // Said before any model is looked for.
+        (empty.path(), vec!["--bind", &taken], 4, "--bind"),
         (models.path(), vec!["--threads", "none"], 2, "--threads"),
         (models.path(), vec!["--log", "=="], 2, "log"),
     ] {

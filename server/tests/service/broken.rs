@@ -9,7 +9,8 @@ fn a_start_names_the_file_in_one_line() {
     let folder = model_folder();
     add_model_to_panic_over(folder.path(), "quick", atlas().hash());
     let folder = folder.path().to_str().unwrap();
-    let output = papilla(&["--models", folder, "--bind", "127.0.0.1:0"]).output().unwrap();
+    let output =
+        papilla(&["--models", folder, "--bind", "127.0.0.1:0", "--log", "warn"]).output().unwrap();
     let log = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(3), "{log}");
     assert_eq!(log.trim_end().lines().count(), 1, "{log}");

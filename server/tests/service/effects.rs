@@ -318,3 +318,15 @@ async fn effects_are_listed_with_what_they_cost() {
     let service = Service::start_with(|config| config.calibration_ms = 0).await;
     assert_eq!(service.json("/v1/effects").await["effects"][0]["cost_us"], Value::Null);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_contact_pressure_is_looked_at_whoever_uses_it() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    for effects in [json!([]), json!(["summary"])] {
+        socket.send(hello_2(&json!({"effects": effects, "contact_pa": -1.0})).to_string()).await;
+        let error = socket.hear_refusal("bad_effect").await;
+        assert_eq!(error["field"], "contact_pa", "{error}");
+    }
+    socket.open(hello_2(&json!({"contact_pa": 1.0}))).await;
+}

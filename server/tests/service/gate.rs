@@ -14,7 +14,9 @@ use tokio::{
     time::timeout,
 };
 
-use crate::support::{Service, Socket, bytes_of, hello, model_folder, ramp, write};
+use crate::support::{
+    Answer, Service, Socket, bytes_of, hello, model_folder, ramp, raw_exchange, write,
+};
 
 /// Longest wait for what comes at once; only a hang takes longer.
 const HANG: Duration = Duration::from_secs(60);
@@ -159,6 +161,54 @@ async fn pages_of_strangers_are_refused() {
         .send()
         .await;
     assert_eq!(preflight.header("access-control-allow-origin"), Some("https://lab.example"));
+}
+
+/// Sends a request of these lines, and an empty line behind them.
+async fn asked(service: &Service, lines: &[&str]) -> Answer {
+    let bytes = format!("{}\r\nconnection: close\r\n\r\n", lines.join("\r\n"));
+    Answer::parse(&raw_exchange(service.address, bytes.as_bytes()).await)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pages_of_strangers_may_not_read_either() {
+    let service = Service::start_with(|config| {
+        config.allow_origin = vec!["https://lab.example".to_owned()];
+    })
+    .await;
+    let port = service.address.port();
+    for path in ["/v1/tiers", "/metrics", "/healthz", "/", "/v2/models/quick", "/nothing"] {
+        let line = format!("GET {path} HTTP/1.1");
+        let host = format!("host: 127.0.0.1:{port}");
+        let stranger = asked(&service, &[&line, &host, "origin: https://evil.example"]).await;
+        assert_eq!(stranger.status, 403, "{path}");
+        // A name that was rebound to the loopback: its page is of the same origin, and says none.
+        let rebound = asked(&service, &[&line, &format!("host: evil.example:{port}")]).await;
+        assert_eq!(rebound.status, 403, "{path}");
+    }
+    let tiers = "GET /v1/tiers HTTP/1.1";
+    for host in ["localhost", "127.0.0.1:1", "[::1]:7224", "LOCALHOST:7224", "lab.example"] {
+        let own = asked(&service, &[tiers, &format!("host: {host}")]).await;
+        assert_eq!(own.status, 200, "{host}");
+    }
+    let lab = asked(&service, &[tiers, "host: localhost", "origin: https://lab.example"]).await;
+    assert_eq!(lab.status, 200);
+}
+
+/// RFC 9112 3.2.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_request_names_one_host() {
+    let service = Service::start().await;
+    for hosts in [
+        &[][..],
+        &["host: localhost", "host: localhost"],
+        &["host: localhost", "host: evil.example"],
+    ] {
+        let lines = [&["GET /v1/tiers HTTP/1.1"][..], hosts].concat();
+        let answer = asked(&service, &lines).await;
+        assert_eq!(answer.assert_refused(400, "bad_query").as_deref(), Some("host"), "{hosts:?}");
+    }
+    let old = asked(&service, &["GET /v1/tiers HTTP/1.0"]).await;
+    assert_eq!(old.status, 200, "version 1.0 knows no Host");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -112,3 +112,18 @@ async fn what_cannot_be_inferred_is_refused_in_words_of_the_protocol() {
     let zero = request(&json!({"data": vec![0.0; ramp().len()]}));
     assert_eq!(infer(zero.to_string()).await.status, 200);
 }
+
+/// A parameter that would change the answer is refused where it is not served.
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_that_belong_together_are_not_served() {
+    let service = Service::start().await;
+    for name in ["sequence_id", "sequence_start", "sequence_end"] {
+        for value in [json!(7), json!("a"), json!(true)] {
+            let mut request = request(&json!({"data": ramp()}));
+            request["parameters"] = json!({name: value});
+            let answer = service.post("/v2/models/quick/infer", request.to_string()).send().await;
+            assert_refused(&answer, 400, "bad_query");
+            assert!(answer.text().contains(name), "{}", answer.text());
+        }
+    }
+}

@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 use tokio::time::{sleep, timeout};
 
 use crate::support::{
-    Heard, Running, Socket, add_model_of_gain, atlas, frame, hello, metric_at, model_folder,
-    papilla, ramp, signal, write,
+    Heard, Request, Running, Socket, add_model_of_gain, atlas, bytes_of, frame, hello, metric_at,
+    model_folder, papilla, ramp, signal, write,
 };
 
 /// Longest wait for what comes within seconds; only a hang takes longer.
@@ -169,4 +169,65 @@ async fn a_signal_ends_a_start_at_once() {
     let is_ended = timeout(HANG, ended).await.is_ok();
     let _ = child.kill();
     assert!(is_ended, "Ctrl-C does not end the start");
+}
+
+#[test]
+fn a_variable_beyond_its_range_is_refused_with_it() {
+    for (name, bad, range) in [
+        ("PAPILLA_MAX_SESSIONS", "18446744073709551615", "1 to 10000"),
+        ("PAPILLA_MAX_CONNECTIONS", "18446744073709551615", "1 to 100000"),
+        ("PAPILLA_IO_TIMEOUT_S", "9223372036854775807", "1 to 86400"),
+    ] {
+        let output = papilla(&["--print-config"]).env(name, bad).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}: {error}");
+        assert!(error.contains(range), "{name}: {error}");
+    }
+}
+
+/// Connections are taken at once; how far the start has come is said until it is over.
+#[tokio::test(flavor = "multi_thread")]
+async fn it_listens_while_its_models_are_loaded_and_measured() {
+    let models = model_folder();
+    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let child = papilla(&["--models", models.path().to_str().unwrap(), "--threads", "1"])
+        .args(["--bind", &address.to_string(), "--calibration-ms", "3000", "--log", "error"])
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let _running = Running { child, address };
+    while tokio::net::TcpStream::connect(address).await.is_err() {
+        sleep(Duration::from_millis(10)).await;
+    }
+    // It waits for the models, and is answered.
+    let early =
+        tokio::spawn(Request::new(address, "POST", "/v1/sed").body(bytes_of(&ramp())).send());
+    let mut seen = Vec::new();
+    loop {
+        let ready = Request::new(address, "GET", "/readyz").send().await;
+        if ready.status == 200 {
+            break;
+        }
+        assert_eq!(ready.header("retry-after"), Some("1"));
+        ready.assert_refused(503, "overloaded");
+        seen.push(ready.json());
+        let health = Request::new(address, "GET", "/healthz").send().await;
+        assert_eq!((health.status, health.json()), (200, json!({"status": "ok"})));
+        let oip = Request::new(address, "GET", "/v2/health/ready").send().await;
+        let live = Request::new(address, "GET", "/v2/health/live").send().await;
+        assert_eq!(live.status, 200);
+        assert!(oip.status == 503 || oip.status == 200, "{}", oip.text());
+    }
+    assert_eq!(early.await.unwrap().status, 200);
+    let stages: Vec<_> = seen.iter().map(|body| body["stage"].as_str().unwrap()).collect();
+    assert!(stages.contains(&"calibrating"), "{stages:?}");
+    for body in &seen {
+        let count = |list: &str| body[list].as_array().unwrap().len();
+        assert_eq!(body["status"], "starting");
+        if body["stage"] == "calibrating" {
+            assert_eq!(count("tiers_done") + count("tiers_left"), 2, "{body}");
+        }
+    }
+    let measured = seen.iter().find(|body| body["tiers_done"] == json!(["quick"]));
+    assert!(measured.is_some(), "the fastest is measured first: {seen:?}");
 }

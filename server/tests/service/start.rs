@@ -49,6 +49,16 @@ async fn damaged_files_are_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_tier_that_is_listed_twice_is_named() {
+    let folder = model_folder();
+    let index = br#"{"default": "quick", "models": ["quick", "slow", "quick"]}"#;
+    write(folder.path(), "index.json", index);
+    let error = start(folder.path(), |_| ()).await.unwrap_err();
+    assert!(matches!(&error, StartError::Unusable { file, .. } if file == "index.json"), "{error}");
+    assert!(error.to_string().contains("'quick' is listed twice"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_model_of_another_atlas_is_refused() {
     let folder = model_folder();
     let other = "f".repeat(64);
@@ -74,4 +84,20 @@ async fn a_taken_address_is_named() {
     let error = start(folder.path(), |c| c.bind = address).await.unwrap_err();
     assert!(error.to_string().contains(&address.to_string()), "{error}");
     assert_eq!(error.exit_code(), 4);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_start_that_is_given_up_frees_its_port_at_once() {
+    let folder = model_folder();
+    let config = Config { models: Some(folder.path().to_owned()), ..Config::default() };
+    let starting = papilla_server::listen(&config).unwrap();
+    let address = starting.address();
+    assert!(std::net::TcpListener::bind(address).is_err(), "it listens");
+    drop(starting);
+    let free = async {
+        while std::net::TcpListener::bind(address).is_err() {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+    };
+    tokio::time::timeout(std::time::Duration::from_secs(30), free).await.expect("still taken");
 }

@@ -44,3 +44,36 @@ async fn without_a_folder_there_is_nothing_at_xr() {
         service.get(path).send().await.assert_refused(404, "not_found");
     }
 }
+
+/// A folder with one page in a folder of its own.
+async fn with_a_page_below() -> (Service, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir_all(folder.path().join("sub")).unwrap();
+    for page in ["index.html", "sub/index.html"] {
+        fs::write(folder.path().join(page), "<!doctype html><title>page</title>").unwrap();
+    }
+    let path = folder.path().to_owned();
+    (Service::start_with(|config| config.xr_dir = Some(path)).await, folder)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_folder_without_its_slash_leads_to_itself_and_to_no_other_host() {
+    let (service, _folder) = with_a_page_below().await;
+    let bare = service.get("/xr/sub").send().await;
+    assert_eq!((bare.status, bare.header("location")), (307, Some("/xr/sub/")));
+    assert_eq!(service.get("/xr/sub/").send().await.status, 200);
+    let query = service.get("/xr/sub?scene=a").send().await;
+    assert_eq!(query.header("location"), Some("/xr/sub/?scene=a"));
+    // `Location: //sub/` is the host `sub`.
+    for path in ["/xr//sub", "/xr//sub/", "/xr///sub", "/xr/sub//"] {
+        service.get(path).send().await.assert_refused(404, "not_found");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_name_that_no_file_can_have_is_not_found() {
+    let (service, _folder) = with_a_page_below().await;
+    for name in ["x".repeat(300), "%61".repeat(300), format!("sub/{}/x", "y".repeat(5000))] {
+        service.get(&format!("/xr/{name}")).send().await.assert_refused(404, "not_found");
+    }
+}

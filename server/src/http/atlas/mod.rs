@@ -2,59 +2,82 @@
 
 mod glb;
 
+use std::sync::Arc;
+
 use axum::{
     extract::State,
-    http::{HeaderMap, Uri, header},
-    response::Response,
+    http::{HeaderMap, Uri},
 };
-use bytes::Bytes;
-use papilla_proto::{ErrorCode, Problem};
+use papilla_proto::{
+    ErrorCode, Problem,
+    atlas::{Patch, Raster},
+};
 
-use super::{Answer, Shared, refuse, tagged};
-use crate::{codec, problem};
+use super::{
+    Answer, Shared,
+    kept::{Fresh, What},
+    refuse,
+};
+use crate::{app::App, codec, models::Catalogue, problem};
 
-pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Response {
-    let asked = headers.get(header::IF_NONE_MATCH);
-    let catalogue = app.catalogue();
-    let body = catalogue.atlas_json.clone();
-    tagged("application/json", catalogue.atlas.hash(), asked, body)
+pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, What::Atlas, |catalogue| {
+        Ok(Fresh::new("application/json", catalogue.atlas_json.clone()))
+    })
+    .await
 }
 
-pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Response {
-    let asked = headers.get(header::IF_NONE_MATCH);
-    let catalogue = app.catalogue();
-    let atlas = &catalogue.atlas;
-    tagged("model/obj", atlas.hash(), asked, Bytes::from(atlas.to_obj()))
+pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, What::AtlasObj, |catalogue| {
+        Ok(Fresh::new("model/obj", catalogue.atlas.to_obj()))
+    })
+    .await
 }
 
 /// Both patches as binary glTF, each with its mask as a texture.
 pub(super) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
-    let catalogue = app.catalogue();
-    let mut masks = [Vec::new(), Vec::new()];
-    for (raster, png) in [&catalogue.skin, &catalogue.interface].into_iter().zip(&mut masks) {
-        codec::encode_mask(raster.mask(), png)
-            .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
-    }
-    let atlas = &catalogue.atlas;
-    let asked = headers.get(header::IF_NONE_MATCH);
-    let tag = format!("{}-glb", atlas.hash());
-    Ok(tagged("model/gltf-binary", &tag, asked, Bytes::from(glb::write(atlas, &masks))))
+    serve(&app, &headers, What::AtlasGlb, |catalogue| {
+        let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
+        Ok(Fresh::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
+    })
+    .await
 }
 
 /// White where the patch is: the interface, or with `?patch=skin` the skin.
 pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
-    let catalogue = app.catalogue();
-    let (patch, raster) = match uri.query() {
-        None | Some("" | "patch=interface") => ("interface", &catalogue.interface),
-        Some("patch=skin") => ("skin", &catalogue.skin),
+    let patch = match uri.query() {
+        None | Some("" | "patch=interface") => Patch::Interface,
+        Some("patch=skin") => Patch::Skin,
         Some(_) => {
             let message = "the parameter is patch=interface or patch=skin";
             return refuse(&app, Problem::new(ErrorCode::BadQuery, message).at("patch"));
         }
     };
+    serve(&app, &headers, What::Mask(patch), move |catalogue| {
+        let raster = match patch {
+            Patch::Skin => &catalogue.skin,
+            Patch::Interface => &catalogue.interface,
+        };
+        Ok(Fresh::new("image/png", png(raster)?))
+    })
+    .await
+}
+
+fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
     let mut png = Vec::new();
     codec::encode_mask(raster.mask(), &mut png)
         .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
-    let tag = format!("{}-{patch}", catalogue.atlas.hash());
-    Ok(tagged("image/png", &tag, headers.get(header::IF_NONE_MATCH), Bytes::from(png)))
+    Ok(png)
+}
+
+async fn serve(
+    app: &App,
+    headers: &HeaderMap,
+    what: What,
+    make: impl FnOnce(&Catalogue) -> Result<Fresh, Problem> + Send + 'static,
+) -> Answer {
+    let catalogue = app.catalogue();
+    let of = Arc::clone(&catalogue);
+    let made = catalogue.kept.answer(headers, what, move || make(&of)).await;
+    made.or_else(|problem| refuse(app, problem))
 }

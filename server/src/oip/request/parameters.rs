@@ -22,6 +22,12 @@ pub(super) struct Parameters {
     #[serde(default)]
     pub(super) classification: Parameter,
     #[serde(default)]
+    sequence_id: Parameter,
+    #[serde(default)]
+    sequence_start: Parameter,
+    #[serde(default)]
+    sequence_end: Parameter,
+    #[serde(default)]
     shared_memory_region: Parameter,
     #[serde(default)]
     shared_memory_byte_size: Parameter,
@@ -30,6 +36,16 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
+    /// The first of the parameters that make a request part of a sequence.
+    pub(super) fn of_sequence(&self) -> Option<&'static str> {
+        let parts = [
+            ("sequence_id", &self.sequence_id),
+            ("sequence_start", &self.sequence_start),
+            ("sequence_end", &self.sequence_end),
+        ];
+        parts.into_iter().find(|(_, parameter)| parameter.is_there()).map(|(name, _)| name)
+    }
+
     /// Whether a tensor is to be found in memory that client and server share.
     pub(super) fn has_shared_memory(&self) -> bool {
         let parts =

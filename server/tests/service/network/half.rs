@@ -65,7 +65,7 @@ async fn half_a_connection_is_none() {
     // A post whose sender says at once that it will send no more: a whole answer or none.
     for tier in ["quick", "slow"] {
         let head = format!(
-            "POST /v1/sed?tier={tier} HTTP/1.1\r\nhost: t\r\ncontent-length: 200704\r\n\r\n"
+            "POST /v1/sed?tier={tier} HTTP/1.1\r\nhost: localhost\r\ncontent-length: 200704\r\n\r\n"
         );
         let mut stream = TcpStream::connect(service.address).await.unwrap();
         stream.write_all(&[head.as_bytes(), &bytes_of(&ramp())].concat()).await.unwrap();

@@ -29,7 +29,7 @@ async fn a_byte_at_a_time_is_slow_but_right() {
     encoder.set_color(png::ColorType::Grayscale);
     encoder.write_header().unwrap().write_image_data(&vec![255; MAP_LEN]).unwrap();
     let head = format!(
-        "POST /v1/sed?pressure_max_pa=5000 HTTP/1.1\r\nhost: t\r\nconnection: close\r\n\
+        "POST /v1/sed?pressure_max_pa=5000 HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\
          content-type: image/png\r\ncontent-length: {}\r\n\r\n",
         png.len()
     );
@@ -84,7 +84,7 @@ async fn a_dribble_without_end_is_ended() {
     let connect = || TcpStream::connect(service.address);
     let trouble = async {
         drip(connect().await.unwrap(), b"GET /healthz HTTP/1.1\r\nx: ").await;
-        let post = b"POST /v1/sed HTTP/1.1\r\nhost: t\r\ncontent-length: 200704\r\n\r\n";
+        let post = b"POST /v1/sed HTTP/1.1\r\nhost: localhost\r\ncontent-length: 200704\r\n\r\n";
         let answer = drip(connect().await.unwrap(), post).await;
         Answer::parse(&answer).assert_refused(408, "timeout");
         let raw = Raw::open(service.address, &hello(&json!({}))).await;

@@ -38,7 +38,8 @@ impl Request {
 
     pub(crate) async fn send(self) -> Answer {
         let (method, path) = (&self.method, &self.path);
-        let mut bytes = format!("{method} {path} HTTP/1.1\r\nhost: test\r\nconnection: close\r\n");
+        let mut bytes =
+            format!("{method} {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n");
         for (name, value) in &self.headers {
             bytes.push_str(&format!("{name}: {value}\r\n"));
         }

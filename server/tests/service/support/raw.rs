@@ -12,7 +12,7 @@ use tokio::{
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The handshake of a session.
-pub(crate) const HANDSHAKE: &str = "GET /v1/session HTTP/1.1\r\nhost: t\r\nconnection: upgrade\r\n\
+pub(crate) const HANDSHAKE: &str = "GET /v1/session HTTP/1.1\r\nhost: localhost\r\nconnection: upgrade\r\n\
     upgrade: websocket\r\nsec-websocket-version: 13\r\nsec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";
 
 /// Kinds of WebSocket frames (RFC 6455, section 5.2).

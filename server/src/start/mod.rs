@@ -1,0 +1,121 @@
+//! From settings to a service that renders, behind a port that is open already: load, warm, serve,
+//! measure.
+
+mod again;
+
+use std::{sync::Arc, thread};
+
+use tokio::sync::{oneshot, watch};
+
+use crate::{
+    SettingError, StartError,
+    app::App,
+    assets::Assets,
+    config::Config,
+    front::Front,
+    gate::Gate,
+    http,
+    metrics::Metrics,
+    models::{Catalogue, Step},
+    pool::Pool,
+    progress::{Progress, Stage},
+    reload, speed,
+};
+
+/// What there is before the models are.
+pub(crate) struct Parts {
+    pub(crate) config: Config,
+    pub(crate) gate: Gate,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) progress: Arc<Progress>,
+    pub(crate) front: Arc<Front>,
+    pub(crate) drain: Arc<watch::Sender<bool>>,
+}
+
+/// What there is once they are ready.
+pub(crate) struct Opened {
+    pub(crate) app: Arc<App>,
+    pub(crate) pool: Pool,
+    pub(crate) tiers: Vec<String>,
+    pub(crate) default_tier: String,
+}
+
+/// Loads the models and opens the front; returns once every tier is measured.
+///
+/// # Errors
+/// The models are missing or unusable, or do not run; a thread cannot be started; the folder
+/// cannot be watched.
+pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
+    let Parts { config, gate, metrics, progress, front, drain } = parts;
+    let (loaded, loading) = oneshot::channel();
+    let (measured, measuring) = oneshot::channel();
+    let work = {
+        let (config, metrics, progress) =
+            (config.clone(), Arc::clone(&metrics), Arc::clone(&progress));
+        move || {
+            let catalogue = match load(&config, &metrics, &progress) {
+                Ok((catalogue, pool)) => {
+                    let to_measure = Arc::clone(&catalogue);
+                    // Err: the start was given up.
+                    if loaded.send(Ok((catalogue, pool))).is_err() {
+                        return;
+                    }
+                    to_measure
+                }
+                Err(error) => {
+                    let _ = loaded.send(Err(error));
+                    return;
+                }
+            };
+            let _ = measured.send(measure(&config, &catalogue, &progress));
+        }
+    };
+    // A thread of its own: a runtime that ends would wait for its blocking tasks.
+    thread::Builder::new().name("start".to_owned()).spawn(work).map_err(StartError::Thread)?;
+    let (catalogue, pool) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
+    let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
+    let default_tier = catalogue.tiers[catalogue.default].name.clone();
+    let app = App::new(&config, catalogue, metrics, &pool, gate, drain, Arc::clone(&progress));
+    let app = Arc::new(app);
+    if let (true, Some(folder)) = (config.watch_models, &config.models) {
+        reload::watch(Arc::clone(&app), folder).map_err(|error| {
+            let reason = format!("{} cannot be watched: {error}", folder.display());
+            SettingError { field: "watch_models", reason }
+        })?;
+    }
+    front.open(http::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref()));
+    measuring.await.map_err(|_| StartError::WorkerPanicked)??;
+    progress.enter(Stage::Ready, Vec::new());
+    if !config.calibration().is_zero() {
+        tokio::spawn(again::measure(Arc::clone(&app)));
+    }
+    Ok(Opened { app, pool, tiers, default_tier })
+}
+
+fn load(
+    config: &Config,
+    metrics: &Arc<Metrics>,
+    progress: &Progress,
+) -> Result<(Arc<Catalogue>, Pool), StartError> {
+    let assets = Assets::of(config)?;
+    let default = config.default_tier.as_deref();
+    let catalogue = Catalogue::load_noting(&assets, default, None, &mut |step| match step {
+        Step::Listed(names) => progress.enter(Stage::Loading, names.to_vec()),
+        Step::Loaded(name) => progress.done(name),
+    })?;
+    let catalogue = Arc::new(catalogue);
+    progress.enter(Stage::Warming, Vec::new());
+    metrics.name_tiers(&catalogue);
+    // A slot is in the queue at most once, so this many places are always enough.
+    let places = config.max_sessions.get() + config.max_requests.get();
+    let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
+    Ok((catalogue, pool))
+}
+
+/// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not
+/// last, since every frame is measured as well.
+fn measure(config: &Config, catalogue: &Catalogue, progress: &Progress) -> Result<(), StartError> {
+    let names = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
+    progress.enter(Stage::Calibrating, names);
+    speed::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
+}
