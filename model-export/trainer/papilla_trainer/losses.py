@@ -1,9 +1,9 @@
 """What training minimises.
 
-``mse`` is S1's: the mean square of max-normalised maps. It hardly sees a shallow press, whose SED
-is a hundredth of the dataset's maximum, nor the far field of a deep one. ``relative`` is the
-measure that a model is judged by: each sample's squared error over its own squared norm, and the
-same once more over the far field alone.
+``mse`` is the U-Net paper's: the mean square of max-normalised maps. It hardly sees a shallow
+indentation, whose greatest SED is 4 to 5 % of the dataset's maximum (plates, 0.25 mm), nor the far
+field of a deep one. ``relative`` is the measure that a model is judged by: each sample's squared
+error over its own squared norm, and the same once more over the far field alone.
 """
 
 from __future__ import annotations
