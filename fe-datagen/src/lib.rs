@@ -3,7 +3,7 @@
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
-pub mod atlas;
+pub use papilla_atlas::flatten as atlas;
 pub mod campaign;
 pub mod cli;
 pub mod contact;
@@ -17,7 +17,7 @@ pub mod linear;
 pub mod material;
 pub mod mesh;
 pub mod operator;
-pub mod output;
+pub use papilla_output as output;
 pub mod press;
 pub mod processor;
 pub mod rungs;

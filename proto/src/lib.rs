@@ -19,7 +19,6 @@
 //!
 //! The protocol in prose, with examples: `docs/protocol.md`.
 
-pub mod atlas;
 pub mod effects;
 pub mod error;
 pub mod frame;
@@ -29,6 +28,9 @@ pub mod pattern;
 pub mod sample;
 pub mod summary;
 pub mod window;
+
+/// The two unwrapped patches, their rasteriser and hash.
+pub use papilla_atlas as atlas;
 
 pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};

@@ -6,6 +6,7 @@ use super::laws::solids;
 use super::section::SectionSpec;
 use crate::element::ElementKind;
 use crate::geometry::fingertip::FingertipShape;
+use crate::indenter::IndenterError;
 use crate::mesh::block::{BlockLattice, build as build_block, even};
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::{Geometry, Layer, Motion, Plan, Scene, TissueTable};
@@ -35,7 +36,7 @@ impl Setup {
     fn build(scene: &Scene) -> Result<Self, PressError> {
         let plan = scene.plan()?;
         let approach = Approach {
-            shape: scene.indenter.build(&scene.folder)?,
+            shape: scene.indenter.build(&scene.folder).map_err(IndenterError::from)?,
             top_mm: scene.indenter.top_mm(),
             pose: scene.motion.pose(),
             offset_mm: scene.motion.offset_mm,

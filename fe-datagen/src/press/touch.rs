@@ -39,7 +39,8 @@ impl Body {
         };
         let contact = self.contact_rule(approach);
         let points = self.contact_points_mm(contact);
-        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)?;
+        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)
+            .map_err(IndenterError::from)?;
         // A plate's face is there already, to rounding.
         if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
             for i in 0..3 {

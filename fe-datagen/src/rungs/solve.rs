@@ -4,6 +4,7 @@ use super::store::{Part, Record};
 use super::{Rung, RungsError, Strain};
 use crate::campaign::{CampaignSpec, Press};
 use crate::dataset::fault;
+use crate::indenter::IndenterError;
 use crate::mesh::Tissue;
 use crate::mesh::fingertip::{Density, Order};
 use crate::mesh::nearest::NearestPoints;
@@ -127,7 +128,7 @@ impl Prepared {
     ) -> Result<Part, RungsError> {
         let candidate = &spec.candidates()[press.candidate];
         let approach = Approach {
-            shape: candidate.indenter.build(&spec.folder)?,
+            shape: candidate.indenter.build(&spec.folder).map_err(IndenterError::from)?,
             top_mm: candidate.indenter.top_mm(),
             pose: press.pose,
             offset_mm: press.offset_mm,

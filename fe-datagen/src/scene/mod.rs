@@ -21,7 +21,7 @@ pub use motion::{Motion, PathPoint};
 pub use origin::{Located, Origin, Place};
 pub use outputs::Output;
 
-use crate::indenter::IndenterSpec;
+use crate::indenter::{IndenterError, IndenterSpec};
 use error::require;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -123,7 +123,7 @@ impl Scene {
     pub fn validate(&self) -> Result<(), SceneError> {
         self.geometry.validate()?;
         self.motion.validate()?;
-        self.indenter.validate()?;
+        self.indenter.validate().map_err(IndenterError::from)?;
         let c = self.friction.coefficient;
         require(
             (0.0..=FRICTION_MAX).contains(&c),

@@ -4,6 +4,7 @@ use super::record::Record;
 use super::{Ending, SceneRecord, ScenesError};
 use crate::campaign::{CampaignSpec, Press};
 use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
+use crate::indenter::IndenterError;
 use crate::press::body::{Body, PressError};
 use crate::press::drive::{Approach, Drive};
 use crate::press::record::IncrementRecord;
@@ -31,7 +32,11 @@ pub(super) fn approaches(
     first: &Approach,
 ) -> Result<Vec<Approach>, ScenesError> {
     let built = spec.candidates().into_iter().map(|c| {
-        let shape = c.indenter.build(&spec.folder).map_err(PressError::from)?;
+        let shape = c
+            .indenter
+            .build(&spec.folder)
+            .map_err(IndenterError::from)
+            .map_err(PressError::from)?;
         Ok(Approach { shape, top_mm: c.indenter.top_mm(), ..first.clone() })
     });
     built.collect()

@@ -1,8 +1,8 @@
 //! Surface from a picture.
 
-use super::rules::{BadValue, length, lengths, require};
-use super::spec::IndenterError;
+use super::rules::{BadValue, ShapeError, length, lengths, require};
 use super::{Distance, SignedDistance};
+#[cfg(feature = "pictures")]
 use image::{ColorType, DynamicImage};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,8 @@ use std::path::{Path, PathBuf};
 /// differentiable, as Newton's method needs, never above white or below black, and
 /// smoothed over a pixel (kernel 1/6, 4/6, 1/6), so details should be some pixels
 /// wide. Beyond the picture its border goes on without end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Heightmap {
     /// PNG, gray, 8 or 16 bits a pixel, relative to the scene's folder.
@@ -26,6 +27,7 @@ pub struct Heightmap {
 }
 
 /// Most pixels along a side.
+#[cfg(feature = "pictures")]
 const SIDE_MAX_PX: u32 = 4096;
 
 impl Heightmap {
@@ -36,10 +38,18 @@ impl Heightmap {
         length("height_mm", self.height_mm)
     }
 
+    /// Refuses the picture: this build reads none.
+    #[cfg(not(feature = "pictures"))]
+    pub(super) fn read(&self, folder: &Path) -> Result<HeightField, ShapeError> {
+        let message = "this program is built without the feature `pictures`".into();
+        Err(ShapeError::Picture { path: folder.join(&self.file), message })
+    }
+
     /// Reads the picture.
-    pub(super) fn read(&self, folder: &Path) -> Result<HeightField, IndenterError> {
+    #[cfg(feature = "pictures")]
+    pub(super) fn read(&self, folder: &Path) -> Result<HeightField, ShapeError> {
         let path = folder.join(&self.file);
-        let refuse = |message: String| IndenterError::Picture { path: path.clone(), message };
+        let refuse = |message: String| ShapeError::Picture { path: path.clone(), message };
         let picture = image::open(&path).map_err(|e| refuse(e.to_string()))?;
         if !matches!(picture.color(), ColorType::L8 | ColorType::L16) {
             return Err(refuse(format!(
@@ -50,6 +60,7 @@ impl Heightmap {
         self.field(&picture).map_err(refuse)
     }
 
+    #[cfg(feature = "pictures")]
     fn field(&self, picture: &DynamicImage) -> Result<HeightField, String> {
         let (columns, rows) = (picture.width(), picture.height());
         if !(2..=SIDE_MAX_PX).contains(&columns) || !(2..=SIDE_MAX_PX).contains(&rows) {
@@ -79,7 +90,9 @@ pub struct HeightField {
 type Jet = [[f64; 4]; 4];
 
 impl HeightField {
-    fn new(count: [usize; 2], pixel_mm: [f64; 2], heights_mm: Vec<f64>) -> Self {
+    /// Of `count` pixels of `pixel_mm` along x and y; heights, mm, by rows from the lowest y.
+    #[must_use]
+    pub fn new(count: [usize; 2], pixel_mm: [f64; 2], heights_mm: Vec<f64>) -> Self {
         let [columns, rows] = count;
         let at = |x: usize, y: usize| heights_mm[y * columns + x];
         let mut slope = [0.0f64; 2];
@@ -192,7 +205,7 @@ impl SignedDistance for HeightField {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
     use image::{ImageBuffer, Luma};
 
     fn hills() -> HeightField {

@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 /// The union of rounded bars with their base. Where a wall meets the floor of a groove
 /// the surface has a concave corner, and the gap a kink; skin that has closed a groove
 /// down to there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Grating {
     /// Number of ridges.
@@ -117,7 +118,7 @@ impl SignedDistance for Grating {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         grating: Grating::default() => Exactness::ExactOutside, detail_mm 0.25, mirrors [0, 1]

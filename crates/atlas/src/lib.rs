@@ -21,6 +21,8 @@
 
 mod error;
 mod exact;
+#[cfg(feature = "flatten")]
+pub mod flatten;
 mod obj;
 mod raster;
 mod validate;
@@ -31,7 +33,6 @@ pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
-use crate::MAP_SIDE_PX;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -39,6 +40,12 @@ use std::fmt;
 pub use error::AtlasError;
 pub use raster::{Pixel, Raster};
 pub use vertices::VertexSampler;
+
+/// Side of every map, pixels.
+pub const MAP_SIDE_PX: usize = 224;
+
+/// Number of samples of a map.
+pub const MAP_LEN: usize = MAP_SIDE_PX * MAP_SIDE_PX;
 
 /// Version of the atlas file format that this code reads and writes.
 pub const ATLAS_VERSION: u32 = 1;

@@ -1,6 +1,7 @@
 //! Rules for dimensions.
 
 use std::fmt::Debug;
+use std::path::PathBuf;
 
 /// Largest dimension of an indenter, mm.
 pub(super) const LENGTH_MAX_MM: f64 = 1000.0;
@@ -15,6 +16,22 @@ pub struct BadValue {
     pub value: String,
     /// What it has to be.
     pub rule: &'static str,
+}
+
+/// Why a description is not a shape.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// A dimension makes no sense.
+    #[error(transparent)]
+    Value(#[from] BadValue),
+    /// A picture cannot be taken as a height map.
+    #[error("{} cannot be a height map: {message}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// Why, and the cure.
+        message: String,
+    },
 }
 
 impl BadValue {

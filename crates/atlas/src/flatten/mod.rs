@@ -2,7 +2,7 @@
 //!
 //! [`flatten`] unwraps a triangulated disc into the plane, by angle-based flattening or
 //! by a conformal map. [`build_atlas`] flattens the skin and the interface below it,
-//! orients and scales both alike and returns a checked [`papilla_proto::atlas::Atlas`]
+//! orients and scales both alike and returns a checked [`crate::Atlas`]
 //! with a report of how much each method distorts.
 //!
 //! Sources: A. Sheffer, E. de Sturler, 'Parameterization of faceted surfaces for meshing

@@ -103,12 +103,12 @@ pub enum BuildAtlasError {
     #[error("the {patch} could not be flattened: {source}")]
     Flatten {
         /// `skin` or `interface`.
-        patch: papilla_proto::atlas::Patch,
+        patch: crate::Patch,
         /// Why.
         #[source]
         source: FlattenError,
     },
     /// The layout breaks a rule of the atlas, such as a fold.
     #[error("the flattened patches do not make an atlas: {0}")]
-    Atlas(#[from] papilla_proto::atlas::AtlasError),
+    Atlas(#[from] crate::AtlasError),
 }

@@ -5,7 +5,6 @@
 //! ```
 
 use super::{Distance, SignedDistance};
-use crate::mesh::surface::norm;
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 
@@ -42,6 +41,10 @@ fn along(p: [f64; 3], step: f64, v: [f64; 3]) -> [f64; 3] {
 
 fn axis(i: usize, sign: f64) -> [f64; 3] {
     std::array::from_fn(|k| if k == i { sign } else { 0.0 })
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
 fn largest(h: &[[f64; 3]; 3]) -> f64 {
@@ -190,7 +193,7 @@ macro_rules! distance_tests {
     ($name:ident: $shape:expr => $exactness:expr, detail_mm $detail:expr, mirrors [$($axis:expr),*]) => {
         mod $name {
             use super::*;
-            use crate::indenter::testing::{Subject, draw};
+            use crate::testing::{Subject, draw};
 
             fn subject() -> Subject {
                 Subject { shape: Box::new($shape), exactness: $exactness, detail_mm: $detail }

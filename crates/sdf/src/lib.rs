@@ -1,10 +1,21 @@
-//! Rigid indenters as signed distance functions.
+//! Rigid shapes as signed distance functions, and where they lie: for finite elements that
+//! are pressed by them and for whoever asks how far a point is from one.
 //!
 //! Distance is positive outside the indenter; its gradient is the outward unit
 //! normal, which is the direction in which the indenter pushes the skin. In its
 //! own frame an indenter presses towards +z. A shape is one file: its
 //! dimensions with defaults and rules, its distance and its reach; a line in
-//! [`IndenterSpec`](spec::IndenterSpec) makes it known to scenes.
+//! [`IndenterSpec`] makes it known to files.
+//!
+//! ```
+//! use papilla_sdf::{Placement, SignedDistance, Sphere};
+//!
+//! let sphere = Sphere { radius_mm: 5.0 };
+//! assert_eq!(sphere.distance([0.0, 0.0, 7.0]).gap_mm, 2.0);
+//! let lower = Placement::turned(0.0, 0.0, 0.0, [0.0, 0.0, -3.0]);
+//! let found = lower.distance(&sphere, [0.0, 0.0, 7.0]);
+//! assert_eq!((found.gap_mm, found.normal), (5.0, [0.0, 0.0, 1.0]));
+//! ```
 
 mod cylinder;
 mod dots;
@@ -32,11 +43,11 @@ pub use placed::{Placed, Placement};
 pub use plate::{Plate, RoundedPlate};
 pub use punch::Punch;
 pub use ring::Ring;
-pub use rules::BadValue;
-pub use spec::{IndenterError, IndenterSpec};
+pub use rules::{BadValue, ShapeError};
+pub use spec::{IndenterSpec, Part, Union};
 pub use sphere::Sphere;
-pub use touch::first_touch_travel;
-pub use union::{AnyOf, Part, Union};
+pub use touch::{TouchError, first_touch_travel};
+pub use union::AnyOf;
 pub use wedge::Wedge;
 
 /// Signed distance with its first two derivatives at a point.

@@ -6,7 +6,8 @@ use super::{Distance, SignedDistance};
 use serde::{Deserialize, Serialize};
 
 /// A cylinder along y, centred at the origin; its top is at `z = radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Cylinder {
     /// Radius, mm.
@@ -58,7 +59,7 @@ impl SignedDistance for Cylinder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         cylinder: Cylinder::default() => Exactness::Exact, detail_mm 1.0, mirrors [0, 1, 2]

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// An upright tube with rounded rims about the z axis, its end at `z = 0`, its
 /// body below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Ring {
     /// Outer radius, mm.
@@ -68,7 +69,7 @@ impl SignedDistance for Ring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         ring: Ring::default() => Exactness::Exact, detail_mm 0.25, mirrors [0, 1]

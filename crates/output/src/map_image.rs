@@ -2,7 +2,7 @@
 
 use super::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX, TEXT_WIDTH_PX, viridis};
 use super::{OutputError, atomic};
-use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -15,7 +15,8 @@ use serde::{Deserialize, Serialize};
 /// Service's Specification 800: dots 1.44 mm wide at the base and 0.48 mm high,
 /// 2.34 mm apart. Where a dot meets the plate the surface has a concave corner, and the
 /// gap a kink; skin that reaches there is pushed by the nearer of the two.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Dots {
     /// Dots along x and y.
@@ -112,7 +113,7 @@ impl SignedDistance for Dots {
 mod tests {
     use super::super::plate::THICKNESS_MM;
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         dots: Dots::default() => Exactness::ExactOutside, detail_mm 0.5, mirrors [0, 1]

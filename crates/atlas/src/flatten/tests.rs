@@ -1,9 +1,7 @@
 use super::shapes::{Shape, cylinder_sector, octahedron, spherical_cap, tongue};
 use super::*;
-use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, Order, Parts, build};
-use papilla_proto::MAP_SIDE_PX;
-use papilla_proto::atlas::{Atlas, Patch, Raster};
+use crate::MAP_SIDE_PX;
+use crate::{Atlas, Patch, Raster};
 use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -317,28 +315,6 @@ fn the_report_compares_all_methods() {
         let errors: Vec<f64> = errors.map(|e| e.as_f64().unwrap()).collect();
         assert!(errors.iter().all(|&e| e > 1e-4 && e < 0.5), "{errors:?}");
         assert_eq!(methods[0]["distortion"]["flipped"], 0);
-    }
-}
-
-#[test]
-fn the_fingertip_flattens_at_every_density() {
-    for density in [Density::Coarse, Density::Medium, Density::Fine] {
-        let finger =
-            build(&FingertipShape::default(), density, Order::Linear, Parts::default()).unwrap();
-        let at = |nodes: &[u32]| nodes.iter().map(|&n| finger.mesh.nodes[n as usize]).collect();
-        let (skin, interface): (Vec<_>, Vec<_>) =
-            (at(&finger.patch.skin), at(&finger.patch.interface));
-        let (atlas, report) = build_atlas(&skin, &interface, &finger.patch.triangles).unwrap();
-        assert_eq!(atlas.triangles(), finger.patch.triangles, "already wound outward");
-        for patch in [&report.skin, &report.interface] {
-            let [abf, lscm, spectral] = [0, 1, 2].map(|i| &patch.methods[i]);
-            assert!(abf.convergence.is_some_and(|c| c.iterations <= 8), "{abf:?}");
-            for method in [abf, lscm, spectral] {
-                assert_eq!(method.distortion.flipped, 0, "{density:?}");
-            }
-            let [abf, lscm] = [abf, lscm].map(|m| m.distortion.angle_error_rad);
-            assert!(abf.rms < lscm.rms && abf.mean < 0.03, "{density:?}: {abf:?} {lscm:?}");
-        }
     }
 }
 

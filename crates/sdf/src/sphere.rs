@@ -5,7 +5,8 @@ use super::{Distance, SignedDistance};
 use serde::{Deserialize, Serialize};
 
 /// A sphere centred at the origin; its top is at `z = radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Sphere {
     /// Radius, mm.
@@ -57,7 +58,7 @@ impl SignedDistance for Sphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         sphere: Sphere { radius_mm: 4.0 } => Exactness::Exact, detail_mm 4.0, mirrors [0, 1, 2]

@@ -1,6 +1,5 @@
 //! Where an indenter first touches.
 
-use super::spec::IndenterError;
 use super::{Placement, SignedDistance};
 
 /// Least step of the search, mm: what is thinner along the way may be missed.
@@ -12,6 +11,20 @@ const ROUNDING: f64 = 1e-13;
 /// Part of the size of things that counts as inside.
 const INSIDE: f64 = 1e-10;
 
+/// Why an indenter does not come to a first touch.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TouchError {
+    /// It goes by.
+    #[error("the indenter never meets the points on its way")]
+    NeverTouches,
+    /// It has a point inside before it moves.
+    #[error("the indenter starts with a point {by_mm:.3e} mm inside")]
+    StartsInside {
+        /// How deep, mm.
+        by_mm: f64,
+    },
+}
+
 /// How far an indenter can travel from `placement` along the unit vector `direction` until it
 /// touches the first of `points`, mm. Exactly 0 for a touch to rounding.
 ///
@@ -21,14 +34,14 @@ const INSIDE: f64 = 1e-10;
 /// step and bisection take over. The shape need not be convex.
 ///
 /// # Errors
-/// [`IndenterError::StartsInside`] if a point is in the shape already,
-/// [`IndenterError::NeverTouches`] if it passes all of them.
+/// [`TouchError::StartsInside`] if a point is in the shape already,
+/// [`TouchError::NeverTouches`] if it passes all of them.
 pub fn first_touch_travel(
     shape: &dyn SignedDistance,
     placement: &Placement,
     direction: [f64; 3],
     points: &[[f64; 3]],
-) -> Result<f64, IndenterError> {
+) -> Result<f64, TouchError> {
     let along = |p: &[f64; 3]| (0..3).map(|i| p[i] * direction[i]).sum::<f64>();
     let size =
         |p: &[f64; 3]| (0..3).map(|i| (p[i] - placement.origin_mm[i]).powi(2)).sum::<f64>().sqrt();
@@ -49,9 +62,9 @@ pub fn first_touch_travel(
         }
     }
     if inside > INSIDE * scale {
-        return Err(IndenterError::StartsInside { by_mm: inside });
+        return Err(TouchError::StartsInside { by_mm: inside });
     }
-    if first.is_finite() { Ok(first) } else { Err(IndenterError::NeverTouches) }
+    if first.is_finite() { Ok(first) } else { Err(TouchError::NeverTouches) }
 }
 
 /// Smallest travel up to `end` at which there is no clearance, to `rounding`.
@@ -86,7 +99,7 @@ fn bisect(clearance: &dyn Fn(f64) -> f64, mut free: f64, mut taken: f64) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::{Cylinder, Dots, Grating, IndenterSpec, Ring, RoundedPlate, Sphere};
+    use crate::{Cylinder, Dots, Grating, IndenterSpec, Ring, RoundedPlate, Sphere};
 
     const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -108,12 +121,12 @@ mod tests {
         // A thin ring seen from its end: the axis is free for good.
         let ring = Ring { height_mm: 2.0, ..Ring::default() };
         let error = first_touch_travel(&ring, &below(3.0), UP, &[[0.0, 0.0, 0.0]]).unwrap_err();
-        assert_eq!(error, IndenterError::NeverTouches);
+        assert_eq!(error, TouchError::NeverTouches);
         let travel =
             first_touch_travel(&ring, &below(3.0), UP, &[[0.0, 0.0, 0.0], [3.5, 0.0, 1.0]]);
         assert!((travel.unwrap() - 4.0).abs() < 1e-12);
         let far = first_touch_travel(&ring, &below(3.0), UP, &[[50.0, 0.0, 0.0]]).unwrap_err();
-        assert!(far.to_string().contains("motion.offset_mm"), "{far}");
+        assert_eq!(far, TouchError::NeverTouches);
     }
 
     #[test]
@@ -155,12 +168,10 @@ mod tests {
     }
 
     #[test]
-    fn starting_inside_is_an_error_with_a_cure() {
+    fn starting_inside_is_an_error() {
         let shape = IndenterSpec::default().build(std::path::Path::new("")).unwrap();
         let error =
             first_touch_travel(shape.as_ref(), &below(1.0), UP, &[[0.0, 0.0, 1.5]]).unwrap_err();
-        assert!(
-            matches!(error, IndenterError::StartsInside { by_mm } if (by_mm - 0.5).abs() < 1e-9)
-        );
+        assert!(matches!(error, TouchError::StartsInside { by_mm } if (by_mm - 0.5).abs() < 1e-9));
     }
 }

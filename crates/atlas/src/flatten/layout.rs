@@ -2,8 +2,8 @@
 
 use super::angles::{area, difference, doubled_area_vector};
 use super::{BuildAtlasError, Convergence, Distortion, Flattening, Method, flatten};
-use papilla_proto::MAP_SIDE_PX;
-use papilla_proto::atlas::{Atlas, Patch, PatchVertices, Raster};
+use crate::MAP_SIDE_PX;
+use crate::{Atlas, Patch, PatchVertices, Raster};
 use serde::Serialize;
 use std::time::Instant;
 

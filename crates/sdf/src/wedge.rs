@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 /// 1.0 mm at the base and 2.0 mm high. Its widths are those of the sharp
 /// section. All edges are rounded by `tip_radius_mm`, which leaves the height as
 /// it is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Wedge {
     /// Width at the tip, mm.
@@ -165,8 +166,8 @@ impl SignedDistance for Wedge {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::Placement;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::Placement;
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         wedge: Wedge::default() => Exactness::Exact, detail_mm 0.02, mirrors [0, 1]

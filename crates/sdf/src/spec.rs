@@ -1,16 +1,17 @@
 //! Indenters in scenes and campaigns.
 
-use super::rules::BadValue;
+use super::rules::{BadValue, ShapeError, require};
 use super::{
-    Cylinder, Dots, Grating, Heightmap, Plate, Punch, Ring, RoundedPlate, SignedDistance, Sphere,
-    Union, Wedge,
+    AnyOf, Cylinder, Dots, Grating, Heightmap, Placed, Placement, Plate, Punch, Ring, RoundedPlate,
+    SignedDistance, Sphere, Wedge,
 };
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// An indenter as a scene describes it: `shape = "plate"` and its dimensions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "shape", rename_all = "snake_case")]
 pub enum IndenterSpec {
     /// Flat plate with rounded edges.
@@ -42,48 +43,6 @@ impl Default for IndenterSpec {
     }
 }
 
-/// Why an indenter was refused, or does not meet the body.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum IndenterError {
-    /// A dimension makes no sense.
-    #[error(transparent)]
-    Value(#[from] BadValue),
-    /// A picture cannot be taken as a height map.
-    #[error("indenter.file: {} cannot be a height map: {message}", path.display())]
-    Picture {
-        /// The picture.
-        path: PathBuf,
-        /// Why, and the cure.
-        message: String,
-    },
-    /// It goes by.
-    #[error(
-        "the indenter never meets the body on its way: bring it nearer by motion.offset_mm and \
-         the angles, or take a larger one"
-    )]
-    NeverTouches,
-    /// A part of it fits between the nodes that contact is found at.
-    #[error(
-        "the indenter is finer than the mesh: {by_mm:.3} mm of it goes in between the nodes of a face \
-         {face_mm:.3} mm wide before one is touched. Take a finer mesh, or an indenter as wide as a few faces"
-    )]
-    FinerThanMesh {
-        /// How deep a face's middle is in the indenter at first touch of a node, mm.
-        by_mm: f64,
-        /// Width of the face, mm.
-        face_mm: f64,
-    },
-    /// It is in the body before it moves.
-    #[error(
-        "the indenter starts {by_mm:.3e} mm inside the body: move it back along its way \
-         (motion.offset_mm, angles)"
-    )]
-    StartsInside {
-        /// How deep, mm.
-        by_mm: f64,
-    },
-}
-
 impl IndenterSpec {
     /// Name of the shape in scenes.
     #[must_use]
@@ -105,8 +64,8 @@ impl IndenterSpec {
     /// Checks every dimension.
     ///
     /// # Errors
-    /// [`IndenterError::Value`] names the field and its rule.
-    pub fn validate(&self) -> Result<(), IndenterError> {
+    /// [`ShapeError::Value`] names the field and its rule.
+    pub fn validate(&self) -> Result<(), ShapeError> {
         Ok(self.validate_part().map_err(|e| e.under("indenter"))?)
     }
 
@@ -164,8 +123,8 @@ impl IndenterSpec {
     /// The shape; pictures are read from `folder`.
     ///
     /// # Errors
-    /// [`IndenterError::Picture`] if a picture cannot be read.
-    pub fn build(&self, folder: &Path) -> Result<Arc<dyn SignedDistance>, IndenterError> {
+    /// [`ShapeError::Picture`] if a picture cannot be read.
+    pub fn build(&self, folder: &Path) -> Result<Arc<dyn SignedDistance>, ShapeError> {
         Ok(match self {
             Self::Plate(s) => shared(RoundedPlate::from(s)),
             Self::Sphere(s) => shared(*s),
@@ -183,6 +142,88 @@ impl IndenterSpec {
 
 fn shared(shape: impl SignedDistance + 'static) -> Arc<dyn SignedDistance> {
     Arc::new(shape)
+}
+
+/// Parts that move as one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Union {
+    /// The parts.
+    pub parts: Vec<Part>,
+}
+
+/// A part of a union: a shape, moved and turned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// What it is.
+    pub part: IndenterSpec,
+    /// Where its own origin lies in the union's frame, mm.
+    #[serde(default)]
+    pub at_mm: [f64; 3],
+    /// Turn about the union's y, degrees.
+    #[serde(default)]
+    pub pitch_deg: f64,
+    /// Turn about the union's x, degrees.
+    #[serde(default)]
+    pub roll_deg: f64,
+    /// Turn about its own z, degrees; the first of the three.
+    #[serde(default)]
+    pub yaw_deg: f64,
+}
+
+/// Most parts of a union.
+const PARTS_MAX: usize = 64;
+
+impl Union {
+    fn validate(&self) -> Result<(), BadValue> {
+        let some = (1..=PARTS_MAX).contains(&self.parts.len());
+        require(some, "parts", &self.parts.len(), "has to list 1 to 64 parts")?;
+        for (i, part) in self.parts.iter().enumerate() {
+            part.validate().map_err(|e| e.under(&format!("parts[{i}]")))?;
+        }
+        Ok(())
+    }
+
+    fn bound_mm(&self, direction: [f64; 3]) -> f64 {
+        let bound = |part: &Part| part.placement().along_mm(direction, |d| part.part.bound_mm(d));
+        self.parts.iter().map(bound).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn build(&self, folder: &Path) -> Result<AnyOf, ShapeError> {
+        let placed = |part: &Part| {
+            Ok(Placed { part: part.part.build(folder)?, placement: part.placement() })
+        };
+        let parts = self.parts.iter().map(placed).collect::<Result<_, ShapeError>>()?;
+        Ok(AnyOf { parts })
+    }
+}
+
+impl Part {
+    fn validate(&self) -> Result<(), BadValue> {
+        let near = self.at_mm.iter().all(|v| v.abs() <= 1000.0);
+        require(near, "at_mm", &self.at_mm, "has to be within 1000 mm")?;
+        let angles =
+            [("pitch_deg", self.pitch_deg), ("roll_deg", self.roll_deg), ("yaw_deg", self.yaw_deg)];
+        for (field, angle) in angles {
+            require(angle.abs() <= 180.0, field, &angle, "has to be within -180 to 180")?;
+        }
+        let level = self.pitch_deg == 0.0 && self.roll_deg == 0.0;
+        require(
+            level || !matches!(self.part, IndenterSpec::Heightmap(_)),
+            "pitch_deg",
+            &[self.pitch_deg, self.roll_deg],
+            "and roll_deg have to be 0 for a heightmap, which has no sides: turn the whole \
+             indenter by motion.pitch_deg",
+        )?;
+        self.part.validate_part().map_err(|e| e.under("part"))
+    }
+
+    fn placement(&self) -> Placement {
+        Placement::turned(self.pitch_deg, self.roll_deg, self.yaw_deg, self.at_mm)
+    }
 }
 
 #[cfg(test)]
@@ -241,5 +282,39 @@ mod tests {
             let error = parse(text).unwrap_err();
             assert!(error.contains(word), "{error} should name {word}");
         }
+    }
+}
+
+#[cfg(test)]
+mod union_tests {
+    use super::*;
+    use crate::testing::{Exactness, distance_tests};
+
+    fn union() -> Union {
+        let part =
+            |part, at_mm, pitch_deg| Part { part, at_mm, pitch_deg, roll_deg: 0.0, yaw_deg: 0.0 };
+        Union {
+            parts: vec![
+                part(IndenterSpec::Sphere(Sphere { radius_mm: 2.0 }), [1.0, 0.0, 0.5], 0.0),
+                part(IndenterSpec::Cylinder(Cylinder::default()), [0.0; 3], 20.0),
+            ],
+        }
+    }
+
+    distance_tests! {
+        sphere_and_cylinder: union().build(Path::new("")).unwrap() =>
+            Exactness::ExactOutside, detail_mm 1.0, mirrors [1]
+    }
+
+    #[test]
+    fn the_nearest_part_counts_and_the_highest_is_the_top() {
+        let any = union().build(Path::new("")).unwrap();
+        // The sphere's pole at z = 2.5; the cylinder's axis is y, so pitch leaves its top.
+        assert!((any.distance([1.0, 0.0, 4.0]).gap_mm - (17f64.sqrt() - 3.0)).abs() < 1e-12);
+        assert!((any.distance([1.0, 0.0, 0.5]).gap_mm + 2.0).abs() < 1.0);
+        for up in [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [-1.0, 0.0, 0.0]] {
+            assert!((any.reach_mm(up) - union().bound_mm(up)).abs() < 1e-12, "{up:?}");
+        }
+        assert!((union().bound_mm([0.0, 0.0, 1.0]) - 3.0).abs() < 1e-12);
     }
 }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 /// An upright cylinder with rounded rims; the middle of its flat end is the
 /// origin, its body below.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Punch {
     /// Outer radius, mm.
@@ -57,7 +58,7 @@ impl SignedDistance for Punch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         punch: Punch::default() => Exactness::Exact, detail_mm 0.25, mirrors [0, 1]

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub(super) const THICKNESS_MM: f64 = 4.0;
 
 /// A flat plate; the middle of its pressing face is at `z = 2 + edge_radius_mm`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Plate {
     /// Side lengths along x and y, mm.
@@ -101,7 +102,7 @@ impl SignedDistance for RoundedPlate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
+    use crate::testing::{Exactness, distance_tests};
 
     distance_tests! {
         plate: RoundedPlate::from(&Plate::default()) =>

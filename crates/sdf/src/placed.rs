@@ -1,7 +1,6 @@
 //! Indenters moved and turned.
 
 use super::{Distance, SignedDistance};
-use crate::material::kinematics::product;
 use std::sync::Arc;
 
 /// A rotation and a translation: `world = rotation * local + origin`.
@@ -73,6 +72,11 @@ impl Placement {
     }
 }
 
+/// Matrix product.
+fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
 /// An indenter moved and turned, as a part of another one.
 #[derive(Clone)]
 pub struct Placed {
@@ -103,8 +107,8 @@ impl SignedDistance for Placed {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::indenter::testing::{Exactness, distance_tests};
-    use crate::indenter::{Plate, RoundedPlate};
+    use crate::testing::{Exactness, distance_tests};
+    use crate::{Plate, RoundedPlate};
 
     distance_tests! {
         turned_plate: Placed {
