@@ -3,7 +3,7 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
-use fe_datagen::export::{Ccx, witness};
+use papilla_validation::calculix::{Ccx, witness};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

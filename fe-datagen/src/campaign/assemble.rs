@@ -1,11 +1,13 @@
 //! The manifest, assembled from the records of all presses.
 
-use super::sampling::split_of;
+use super::CampaignError;
 use super::state::{Outcome, PressState, SOFTWARE};
-use super::{CampaignError, CampaignSpec, Press, splits};
-use crate::dataset::{self, DroppedSample, FailedPress, Manifest, PressEntry, Splits};
-use crate::output::OutputError;
-use papilla_proto::atlas::Atlas;
+use papilla_atlas::Atlas;
+use papilla_dataset as dataset;
+use papilla_dataset::{DroppedSample, FailedPress, Manifest, PressEntry, Split, Splits};
+use papilla_fingertip::campaign::{CampaignSpec, HeldOut, Press, held_out};
+use papilla_fingertip::scene::Pose;
+use papilla_output::OutputError;
 
 /// The manifest of all presses, which stand in order of their ids.
 pub(super) fn manifest(
@@ -13,11 +15,13 @@ pub(super) fn manifest(
     atlas: &Atlas,
     states: &[PressState],
 ) -> Result<Manifest, CampaignError> {
-    let all = splits(spec);
+    let all = held_out(spec);
     let (mut presses, mut failed, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
     let (mut pressure_max, mut sed_max) = (0.0f64, 0.0f64);
     for PressState { press, outcome, .. } in states {
         let Press { id, indenter, shape, pose, offset_mm, .. } = press.clone();
+        let Pose { pitch_deg, roll_deg, yaw_deg } = pose;
+        let pose = dataset::Pose { pitch_deg, roll_deg, yaw_deg };
         match outcome {
             Outcome::Failed { error } => {
                 failed.push(FailedPress {
@@ -86,4 +90,9 @@ pub(super) fn manifest(
         failed,
         dropped,
     })
+}
+
+/// The split of one press.
+fn split_of(all: &HeldOut, id: usize) -> Split {
+    if all.test.binary_search(&id).is_ok() { Split::Test } else { Split::Train }
 }

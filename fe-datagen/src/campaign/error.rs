@@ -1,8 +1,8 @@
 //! What can stop a campaign.
 
-use crate::dataset::DatasetError;
-use crate::output::OutputError;
-use crate::scene::SceneError;
+use papilla_dataset::DatasetError;
+use papilla_fingertip::campaign::SpecError;
+use papilla_output::OutputError;
 use std::path::PathBuf;
 
 /// Any error of a solver; its text goes into the manifest.
@@ -12,34 +12,9 @@ pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 /// these: it is recorded and the campaign continues.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The TOML file cannot be understood.
-    #[error("{path}: {message}")]
-    Spec {
-        /// The campaign file.
-        path: PathBuf,
-        /// Line and cause.
-        message: String,
-    },
-    /// A value of the campaign makes no sense.
-    #[error("campaign {campaign}: {field} {message}")]
-    Value {
-        /// Name of the campaign.
-        campaign: String,
-        /// The field.
-        field: String,
-        /// What is wrong and what is allowed.
-        message: String,
-    },
-    /// A value that a scene could not have either.
-    #[error("campaign {campaign}, indenter '{indenter}': {source}")]
-    Scene {
-        /// Name of the campaign.
-        campaign: String,
-        /// Name of the indenter.
-        indenter: String,
-        /// What is wrong.
-        source: Box<SceneError>,
-    },
+    /// The campaign cannot be read, or makes no sense.
+    #[error(transparent)]
+    Spec(#[from] SpecError),
     /// The folder belongs to something else.
     #[error("{folder} holds {what}: choose another --out, or remove the folder to start over")]
     Occupied {

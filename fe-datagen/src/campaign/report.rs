@@ -1,7 +1,7 @@
 //! What a finished campaign says of itself.
 
 use super::progress::clock;
-use crate::dataset::{DroppedSample, FailedPress};
+use papilla_dataset::{DroppedSample, FailedPress};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;

@@ -2,12 +2,13 @@
 
 use super::assemble::manifest;
 use super::state::{Outcome, PressState, Workspace};
-use super::{BoxError, CampaignError, CampaignReport, CampaignSpec, Press, presses, progress};
-use crate::dataset;
-use crate::output::atomic;
-use crate::press::record::IncrementRecord;
+use super::{BoxError, CampaignError, CampaignReport, progress};
 use indicatif::ProgressBar;
-use papilla_proto::atlas::Atlas;
+use papilla_atlas::Atlas;
+use papilla_dataset as dataset;
+use papilla_dataset::Sample;
+use papilla_fingertip::campaign::{CampaignSpec, Press, presses};
+use papilla_output::atomic;
 use std::any::Any;
 use std::num::NonZero;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,7 +25,7 @@ pub trait PressSolver {
     ///
     /// # Errors
     /// What did not converge and where; it is recorded in the manifest.
-    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError>;
+    fn solve(&mut self, press: &Press) -> Result<Vec<Sample>, BoxError>;
 }
 
 /// How to run, as opposed to what.
@@ -206,10 +207,7 @@ impl Queue<'_> {
         Ok(state)
     }
 
-    fn encode(
-        &self,
-        records: &[IncrementRecord],
-    ) -> Result<(Outcome, Option<Vec<u8>>), CampaignError> {
+    fn encode(&self, records: &[Sample]) -> Result<(Outcome, Option<Vec<u8>>), CampaignError> {
         let finite = |(depth, reason): (f64, String)| (depth.is_finite().then_some(depth), reason);
         Ok(match dataset::encode(records, self.vertex_count)? {
             Ok(encoded) => {
@@ -234,10 +232,10 @@ impl Queue<'_> {
 }
 
 /// Each depth has to have its record, in order.
-fn complete(press: &Press, records: Vec<IncrementRecord>) -> Result<Vec<IncrementRecord>, String> {
+fn complete(press: &Press, records: Vec<Sample>) -> Result<Vec<Sample>, String> {
     let due = &press.depths_mm;
     // A depth that is no number is left to the sample's own checks.
-    let fit = |r: &IncrementRecord, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
+    let fit = |r: &Sample, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
     let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
     let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
     let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");

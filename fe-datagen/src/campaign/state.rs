@@ -1,10 +1,10 @@
 //! What a campaign remembers between runs, in `DIR/progress`.
 
-use super::{CampaignError, CampaignSpec, Press};
-use crate::dataset::{FORMAT, sha256_hex, shard_file};
-use crate::output::{OutputError, atomic};
-use crate::press::record::Checks;
-use papilla_proto::atlas::Atlas;
+use super::CampaignError;
+use papilla_atlas::Atlas;
+use papilla_dataset::{Checks, FORMAT, sha256_hex, shard_file};
+use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_output::{OutputError, atomic};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};

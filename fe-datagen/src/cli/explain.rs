@@ -1,11 +1,11 @@
 //! `explain`: what a scene is going to simulate and cost, before it runs.
 
 use super::print;
-use crate::forecast::Forecast;
-use crate::press::drive::Drive;
-use crate::press::setup::Setup;
-use crate::scene::effects::{EFFECTS, Effect};
-use crate::scene::{Output, Plan, Scene};
+use papilla_fingertip::forecast::Forecast;
+use papilla_fingertip::scene::effects::{EFFECTS, Effect};
+use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::simulation::drive::Drive;
+use papilla_fingertip::simulation::setup::Setup;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,14 +1,17 @@
 //! `generate`: a campaign of presses into a dataset.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign::{self, BoxError, CampaignSpec, Press, PressSolver, RunOptions};
-use crate::dataset::BALANCE_RELATIVE_MAX;
-use crate::press::body::Body;
-use crate::press::drive::{Approach, Drive};
-use crate::press::record::IncrementRecord;
-use crate::press::setup::Setup;
-use crate::solve::{Options, Solver};
+use crate::campaign;
+use crate::campaign::{BoxError, PressSolver, RunOptions};
 use anyhow::Context as _;
+use papilla_dataset::{BALANCE_RELATIVE_MAX, Sample};
+use papilla_fem::solve::{Options, Solver};
+use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::indenter::IndenterError;
+use papilla_fingertip::simulation::body::Body;
+use papilla_fingertip::simulation::drive::{Approach, Drive};
+use papilla_fingertip::simulation::setup::Setup;
+use papilla_validation::acceptance;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -40,7 +43,7 @@ struct BodySolver<'a> {
 }
 
 impl PressSolver for BodySolver<'_> {
-    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError> {
+    fn solve(&mut self, press: &Press) -> Result<Vec<Sample>, BoxError> {
         let approach = Approach {
             pose: press.pose,
             offset_mm: press.offset_mm,
@@ -52,7 +55,7 @@ impl PressSolver for BodySolver<'_> {
             &approach,
             &drive,
             BALANCE_RELATIVE_MAX,
-            &mut |_, _, record, _| record.clone(),
+            &mut |_, _, record, _| acceptance::sample(record),
         );
         pressed?;
         Ok(records)
@@ -69,7 +72,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut approaches = Vec::new();
     for candidate in &candidates {
         approaches.push(Approach {
-            shape: candidate.indenter.build(&spec.folder)?,
+            shape: candidate.indenter.build(&spec.folder).map_err(IndenterError::from)?,
             top_mm: candidate.indenter.top_mm(),
             ..approach.clone()
         });

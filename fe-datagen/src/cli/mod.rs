@@ -1,6 +1,7 @@
 //! The command line: one file a command.
 
 mod atlas;
+mod choices;
 mod dataset;
 mod effects;
 mod explain;

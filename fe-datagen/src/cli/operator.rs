@@ -1,10 +1,12 @@
 //! `operator`: the finger's own linear operator.
 
+use super::choices::Density;
 use super::print;
-use crate::mesh::fingertip::{Density, Order};
-use crate::operator::{self, Card};
-use crate::processor;
-use crate::scene::TissueTable;
+use crate::influence_file::{self, Card};
+use papilla_fingertip::influence;
+use papilla_fingertip::mesh::fingertip::Order;
+use papilla_fingertip::scene::TissueTable;
+use papilla_validation::processor;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -38,14 +40,15 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let begun_s = processor::thread_s();
     let (order, materials) = (Order::Linear, TissueTable::default());
-    let body = operator::body(args.density, order, &materials)?;
+    let density = args.density.into();
+    let body = influence::body(density, order, &materials)?;
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let bar = super::progress("solving for vertices", vertices);
-    let operator = operator::build(&body, &mut |done| bar.set_position(done as u64))?;
+    let operator = influence::build(&body, &mut |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     let seconds = processor::thread_s() - begun_s;
-    let card = Card::new(&operator, args.density, order, &materials, seconds);
-    operator::write(&args.out, &operator, &card)?;
+    let card = Card::new(&operator, density, order, &materials, seconds);
+    influence_file::write(&args.out, &operator, &card)?;
     print(&card, args.json, || {
         let q = &card.quality;
         format!(

@@ -1,8 +1,9 @@
 //! `rungs`: finite elements as rungs of the ladder.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign::CampaignSpec;
-use crate::rungs::{self, Ladder, Report};
+use papilla_fingertip::campaign::CampaignSpec;
+use papilla_validation::fidelity;
+use papilla_validation::fidelity::{Ladder, Report};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,7 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         bar.set_position(done as u64);
         bar.set_message(what.to_owned());
     };
-    let report = rungs::run(&spec, &ladder, args.presses, &args.out, tell)?;
+    let report = fidelity::run(&spec, &ladder, args.presses, &args.out, tell)?;
     bar.finish_and_clear();
     print(&report, args.json, || human(&report))?;
     let clean = report.left_out.is_empty();

@@ -1,11 +1,12 @@
 //! `s2`: the wedge press of Chen, Shuai & Zhu.
 
+use super::choices;
 use super::{CHECKS_FAILED, print};
-use crate::mesh::fingertip::Density;
-use crate::output::atomic;
-use crate::s2::reading::Reading;
-use crate::s2::report::{Summary, readings_table, write};
-use crate::s2::run as press;
+use papilla_fingertip::mesh::fingertip::Density;
+use papilla_output::atomic;
+use papilla_validation::wedge::reading::Reading;
+use papilla_validation::wedge::report::{Summary, readings_table, write};
+use papilla_validation::wedge::run as press;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -21,11 +22,11 @@ pub(super) struct Args {
     #[arg(long)]
     out: PathBuf,
     /// Density of the mesh.
-    #[arg(long, value_enum, default_value_t = Density::Medium)]
-    density: Density,
+    #[arg(long, value_enum, default_value_t = choices::Density::Medium)]
+    density: choices::Density,
     /// How to read what the paper leaves open.
-    #[arg(long, value_enum, default_value_t = Reading::Taken)]
-    reading: Reading,
+    #[arg(long, value_enum, default_value_t = choices::Reading::Taken)]
+    reading: choices::Reading,
     /// Run every other reading too, for the table readings.md.
     #[arg(long)]
     all_readings: bool,
@@ -35,16 +36,17 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let outcome = press(args.reading, args.density)?;
+    let (taken, density) = (Reading::from(args.reading), Density::from(args.density));
+    let outcome = press(taken, density)?;
     let summary = Summary::from(&outcome);
     atomic::create_folder(&args.out)?;
     write(&args.out, &outcome, &summary)?;
     let reproduces = summary.reproduces();
     print(&summary, args.json, || format!("{}written to {}", summary.human(), args.out.display()))?;
     if args.all_readings {
-        let mut rows = vec![(args.reading, Ok(summary))];
-        for reading in Reading::ALL.into_iter().filter(|r| *r != args.reading) {
-            rows.push((reading, press(reading, args.density).map(|o| Summary::from(&o))));
+        let mut rows = vec![(taken, Ok(summary))];
+        for reading in Reading::ALL.into_iter().filter(|r| *r != taken) {
+            rows.push((reading, press(reading, density).map(|o| Summary::from(&o))));
         }
         atomic::write(&args.out.join("readings.md"), readings_table(&rows).as_bytes())?;
     }

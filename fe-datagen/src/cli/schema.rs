@@ -1,6 +1,6 @@
 //! `schema`: JSON schemas of the files that this program reads.
 
-use crate::scene::schema;
+use papilla_fingertip::scene::schema;
 use std::process::ExitCode;
 
 /// Print the JSON schema of a file that this program reads, for editors and other

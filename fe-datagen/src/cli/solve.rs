@@ -1,21 +1,23 @@
 //! `solve`: one scene, with everything that can be looked at.
 
 use super::{CHECKS_FAILED, print};
-use crate::contact::ContactRule;
-use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
-use crate::output::map_image::{MapView, Quantity, white_of};
-use crate::output::npz::NpzBuilder;
-use crate::output::{atomic, vtu};
-use crate::press::body::PressError;
-use crate::press::fields::{PA_PER_MPA, write_vtu};
-use crate::press::record::{Checks, IncrementRecord};
-use crate::press::setup::Setup;
-use crate::scene::{Output, Plan, Scene};
-use crate::solve::{Effort, Options, Solver, StepReport};
+use crate::body_file::write_vtu;
 use anyhow::Context as _;
 use ndarray::Array2;
-use papilla_proto::atlas::{Atlas, Patch, Raster};
-use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use papilla_atlas::{Atlas, Patch, Raster};
+use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
+use papilla_dataset::BALANCE_RELATIVE_MAX;
+use papilla_fem::contact::ContactRule;
+use papilla_fem::solve::{Effort, Options, Solver, StepReport};
+use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::fields::PA_PER_MPA;
+use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
+use papilla_fingertip::simulation::setup::Setup;
+use papilla_output::map_image::{MapView, Quantity, white_of};
+use papilla_output::npz::NpzBuilder;
+use papilla_output::{atomic, vtu};
+use papilla_validation::acceptance::fault;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -286,7 +288,7 @@ fn human(s: &Summary, out: &Path) -> String {
     text +=
         "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   int p dA   energy\n";
     for i in &s.increments {
-        let force = crate::mesh::surface::norm(i.force_n);
+        let force = papilla_fem::tensor::norm(i.force_n);
         text += &format!(
             "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:9.2} % {:6.2} %{}\n",
             i.depth_mm,

@@ -1,10 +1,11 @@
 //! `witness`: the same problems in CalculiX.
 
 use super::{CHECKS_FAILED, print};
-use crate::export::Ccx;
-use crate::export::witness::{self, CASES};
-use crate::verify::Row;
 use anyhow::{Context, bail};
+use papilla_validation::calculix::Ccx;
+use papilla_validation::calculix::witness;
+use papilla_validation::calculix::witness::CASES;
+use papilla_validation::verify::Row;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -47,7 +48,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let scratch = tempfile::tempdir().context("cannot create a folder for the decks")?;
     let folder = args.keep.as_deref().unwrap_or(scratch.path());
-    crate::output::atomic::create_folder(folder)?;
+    papilla_output::atomic::create_folder(folder)?;
     let wanted = |c: &witness::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
     if !args.json {
         println!("{}", Row::heading());

@@ -3,16 +3,17 @@
 
 use std::{fs, sync::LazyLock};
 
-use fe_datagen::{
-    dataset::fault,
-    press::{record::IncrementRecord, setup::Setup},
+use papilla_fem::solve::{Options, Solver, StepReport};
+use papilla_fingertip::{
     scene::Scene,
-    solve::{Options, Solver, StepReport},
+    simulation::{record::IncrementRecord, setup::Setup},
 };
 use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, Patch, Raster},
 };
+
+use papilla_validation::acceptance::fault;
 
 use crate::{
     client,

@@ -6,11 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fe_datagen::{
-    dataset::{Dataset, PressEntry, Shard, Split},
-    scene::Scene,
-};
+use papilla_dataset::{Dataset, PressEntry, Shard, Split};
 use papilla_engine::Card;
+use papilla_fingertip::scene::Scene;
 use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, Patch, Raster},

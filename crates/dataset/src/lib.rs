@@ -1,0 +1,48 @@
+//! The dataset's format: what a campaign leaves on disk and a trainer reads.
+//!
+//! ```text
+//! DIR/manifest.json           campaign, units, scales, splits, hashes, checks
+//! DIR/atlas.json              where every pixel lies on the finger
+//! DIR/raster.npz              the atlas' pixel -> (vertices, weights) maps
+//! DIR/shards/press-00000.npz  vertex values of all samples of one press
+//! ```
+//!
+//! The format in prose: `docs/dataset.md`.
+
+// Determinism is tested: the same bits, not nearly the same.
+#![cfg_attr(test, allow(clippy::float_cmp))]
+
+mod error;
+mod images;
+mod limits;
+mod manifest;
+mod reader;
+mod record;
+mod replay;
+mod shard;
+mod sheet;
+mod stats;
+mod table;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
+
+pub use error::DatasetError;
+pub use images::{ImageEntry, ImageOptions, ImagesReport, images};
+pub use limits::{
+    BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIVE_MAX, fault, worst_checks,
+};
+pub use manifest::{
+    DroppedSample, FORMAT, FailedPress, Manifest, PressEntry, Split, Splits, Units, dataset_sha256,
+    sha256_hex,
+};
+pub use reader::{Dataset, VerifyReport, verify};
+pub use record::{Checks, Pose, Sample};
+pub use replay::replay;
+pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
+pub use sheet::contact_sheet;
+pub use stats::{DepthStats, Range, StatsReport, stats};
+
+/// File name of a press' shard, relative to the dataset's folder.
+pub fn shard_file(id: usize) -> String {
+    format!("shards/press-{id:05}.npz")
+}

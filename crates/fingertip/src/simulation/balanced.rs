@@ -1,0 +1,63 @@
+//! A press whose energy balances: taken again where its path was too coarse or its nodes slipped.
+
+use super::body::{Body, PressError};
+use super::drive::{Approach, Drive};
+use super::record::IncrementRecord;
+use papilla_fem::contact::ContactRule;
+use papilla_fem::solve::{Solver, StepReport};
+
+/// How often the path between stored states is made finer for the work integral.
+const REFINEMENTS: [u32; 3] = [1, 2, 4];
+
+impl Body {
+    /// Presses, keeps something of each stored state (`keep` is told its number and may be
+    /// told again), and takes the press again on a finer path as long as energy and work
+    /// part by more than `energy_vs_work_max`: the states are the same there, the work
+    /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
+    /// off the indenter, and energy with them: it is pressed again, felt within faces, if
+    /// it is wide enough for that; and at more points of them, if energy is lost there too.
+    /// States before an error are kept.
+    ///
+    /// # Errors
+    /// As [`Self::press`], beside what was kept.
+    pub fn press_balanced<T>(
+        &self,
+        solver: &mut Solver<'_>,
+        approach: &Approach,
+        drive: &Drive,
+        energy_vs_work_max: f64,
+        keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
+    ) -> (Vec<T>, Result<(), PressError>) {
+        let mut press = |approach: &Approach| {
+            let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
+            let mut balanced = false;
+            for refinement in REFINEMENTS {
+                kept.clear();
+                balanced = true;
+                pressed = self.press(solver, approach, drive, refinement, &mut |s, record, r| {
+                    balanced &= record.checks.energy_vs_work <= energy_vs_work_max;
+                    kept.push(keep(kept.len(), s, record, r));
+                });
+                if pressed.is_err() || balanced || !matches!(drive, Drive::Depths(_)) {
+                    break;
+                }
+            }
+            let loses = pressed.is_ok() && !balanced && matches!(drive, Drive::Depths(_));
+            (loses, kept, pressed)
+        };
+        let felt = |rule| Approach { contact: Some(rule), ..approach.clone() };
+        let mut taken = approach.clone();
+        let (mut loses, mut kept, mut pressed) = press(&taken);
+        let stopped = matches!(pressed, Err(PressError::Solve { .. } | PressError::Slipped { .. }));
+        if (loses || stopped) && self.could_be_felt_within_faces(approach) {
+            tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
+            taken = felt(ContactRule::Faces);
+            (loses, kept, pressed) = press(&taken);
+        }
+        if loses && self.could_be_felt_more_finely(&taken) {
+            tracing::info!("it jumps within faces: pressed again, felt at more of their points");
+            (_, kept, pressed) = press(&felt(ContactRule::FacesFinely));
+        }
+        (kept, pressed)
+    }
+}
