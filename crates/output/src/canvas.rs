@@ -115,7 +115,7 @@ impl Canvas {
     /// # Errors
     /// [`OutputError::Encode`] for an empty canvas.
     pub fn encode_png(&self) -> Result<Vec<u8>, OutputError> {
-        super::map_image::encode_png(
+        super::png_file::encode_png(
             (self.width, self.height),
             (png::ColorType::Rgb, png::BitDepth::Eight),
             &self.rgb,

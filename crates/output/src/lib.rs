@@ -9,6 +9,7 @@ mod error;
 pub mod map_image;
 pub mod npz;
 pub mod plot;
+pub mod png_file;
 pub mod vtu;
 
 pub use error::OutputError;

@@ -13,8 +13,9 @@
 //! integration points).
 
 use super::geometry::ElementGeometry;
-use super::kernel::{UNIT, displacement_gradient};
+use super::geometry::displacement_gradient;
 use crate::tensor::Kinematics;
+use crate::tensor::UNIT;
 use crate::tensor::{double_dot, trace};
 
 /// Coefficients of `theta - 1` in the dilatation basis of an element.

@@ -1,6 +1,7 @@
 //! What an element needs of its undeformed shape, computed once per mesh.
 
 use super::reference::ElementKind;
+use crate::tensor::Mat3;
 
 /// Why an element's undeformed shape was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -193,6 +194,20 @@ fn push_inverse(gram: &[[f64; 4]; 4], m: usize, out: &mut Vec<f64>) {
     for row in inverse.iter().take(m) {
         out.extend_from_slice(&row[..m]);
     }
+}
+
+/// Displacement gradient at a point from nodal displacements.
+#[inline(always)]
+pub fn displacement_gradient(u: &[[f64; 3]], gradients: &[[f64; 3]]) -> Mat3 {
+    let mut h = [[0.0; 3]; 3];
+    for (v, g) in u.iter().zip(gradients) {
+        for i in 0..3 {
+            for j in 0..3 {
+                h[i][j] += v[i] * g[j];
+            }
+        }
+    }
+    h
 }
 
 #[cfg(test)]

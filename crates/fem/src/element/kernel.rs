@@ -11,10 +11,9 @@
 //! With a law of small strain `J - 1` is `tr H` and its second derivative vanishes.
 
 use super::carried::{Carried, Dilatation};
-use super::geometry::ElementGeometry;
-use super::solid::Points;
+use super::geometry::{ElementGeometry, displacement_gradient};
 use crate::material::Isochoric;
-use crate::tensor::{Kinematics, Mat3};
+use crate::tensor::{Kinematics, Mat3, UNIT};
 use crate::tensor::{cofactor_derivative, trace};
 
 /// Where an element turned inside out.
@@ -41,18 +40,12 @@ pub struct ElementState {
     pub gap_squared_mm3: f64,
 }
 
-/// Displacement gradient at a point from nodal displacements.
-#[inline(always)]
-pub fn displacement_gradient(u: &[[f64; 3]], gradients: &[[f64; 3]]) -> Mat3 {
-    let mut h = [[0.0; 3]; 3];
-    for (v, g) in u.iter().zip(gradients) {
-        for i in 0..3 {
-            for j in 0..3 {
-                h[i][j] += v[i] * g[j];
-            }
-        }
-    }
-    h
+/// Where an element's laws come from.
+pub trait Points {
+    /// Law of a point.
+    type At: Isochoric;
+    /// Law of the quadrature point `q`.
+    fn at(&self, q: usize) -> Self::At;
 }
 
 /// Largest `3 * nodes * dilatation functions`.
@@ -142,8 +135,6 @@ pub fn evaluate<P: Points>(
     }
     Ok(ElementState { energy_mj: energy, j_min, theta_minus_1: theta, gap_squared_mm3 })
 }
-
-pub(super) const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// `force[a] = K sum_r theta_r g_r[a]`.
 #[inline(always)]

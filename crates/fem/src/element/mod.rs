@@ -6,7 +6,7 @@ pub mod geometry;
 pub mod kernel;
 mod materials;
 pub mod reference;
-pub(crate) mod shape;
+pub mod shape;
 pub mod solid;
 
 pub use carried::{Carried, Dilatation, next_dilatation};

@@ -27,7 +27,7 @@
 //! they are here for files and for comparisons on equal meshes; `Quad9` and `Hex27`
 //! are the quadratic elements to choose.
 
-use super::shape::{linear_1d, quadratic_1d, serendipity, tensor, tetrahedron};
+use super::shape::{TET10_EDGES, linear_1d, quadratic_1d, serendipity, tensor, tetrahedron};
 use serde::{Deserialize, Serialize};
 
 /// Kind of solid element.
@@ -106,9 +106,6 @@ pub const QUAD9_LATTICE: [[i8; 3]; 9] = [
     [-1, 0, 0],
     [0, 0, 0],
 ];
-
-/// Edges of a tetrahedron in the order of its mid-edge nodes (VTK).
-pub const TET10_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
 impl ElementKind {
     /// Every kind.

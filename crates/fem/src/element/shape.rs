@@ -1,6 +1,7 @@
 //! Formulas of the shape functions on the lattice `{-1, 0, 1}^d` and the simplex.
 
-use super::reference::TET10_EDGES;
+/// Edges of a tetrahedron in the order of its mid-edge nodes (VTK).
+pub const TET10_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
 /// Linear function of the node at `at` (-1 or 1) and its slope.
 pub(crate) fn linear_1d(at: i8, x: f64) -> (f64, f64) {

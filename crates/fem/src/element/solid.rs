@@ -6,7 +6,7 @@
 
 use super::carried::Carried;
 use super::geometry::ElementGeometry;
-use super::kernel::{ElementState, Inverted, evaluate};
+use super::kernel::{ElementState, Inverted, Points, evaluate};
 use crate::material::{Isochoric, Prony, Relaxing, prony};
 use crate::tensor::{Kinematics, Mat3};
 use std::sync::Arc;
@@ -83,14 +83,6 @@ pub trait Solid: Send + Sync {
 
     /// Moves a point's history over a step of `dt_s` that ended at `k`.
     fn advance(&self, _k: &Kinematics, _dt_s: f64, _history: &mut [f64]) {}
-}
-
-/// Where an element's laws come from.
-pub trait Points {
-    /// Law of a point.
-    type At: Isochoric;
-    /// Law of the quadrature point `q`.
-    fn at(&self, q: usize) -> Self::At;
 }
 
 /// A law without memory.

@@ -1,5 +1,6 @@
 //! Conjugate gradients preconditioned by an older or coarser factor.
 
+use super::dot::dot;
 use super::factor::Factorizer;
 use super::structure::{Structure, SymmetricMatrix};
 
@@ -86,17 +87,4 @@ pub fn conjugate_gradient(
         }
     }
     outcome
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Four sums: fixed order, so the result repeats, and no serial dependency.
-    let mut s = [0.0; 4];
-    let (mut p, mut q) = (a.chunks_exact(4), b.chunks_exact(4));
-    for (x, y) in (&mut p).zip(&mut q) {
-        for i in 0..4 {
-            s[i] += x[i] * y[i];
-        }
-    }
-    let tail: f64 = p.remainder().iter().zip(q.remainder()).map(|(x, y)| x * y).sum();
-    (s[0] + s[1]) + (s[2] + s[3]) + tail
 }

@@ -6,6 +6,7 @@
 
 mod cg;
 mod direct;
+mod dot;
 mod eigen;
 mod equations;
 mod factor;
@@ -13,9 +14,9 @@ mod ordering;
 mod pattern;
 mod structure;
 
-pub(crate) use cg::dot;
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
 pub use direct::Direct;
+pub(crate) use dot::dot;
 pub(crate) use eigen::eigen;
 pub use equations::Equations;
 pub use factor::{Factor, FactorError, Factorizer};

@@ -3,7 +3,8 @@
 use super::block::{BlockLattice, build, even};
 use super::{Block, FaceKind, Mesh, Region, Surface};
 use crate::element::ElementKind;
-use crate::element::reference::{HEX27_LATTICE, TET10_EDGES};
+use crate::element::reference::HEX27_LATTICE;
+use crate::element::shape::TET10_EDGES;
 use std::collections::{HashMap, HashSet};
 
 /// Region of every element of a [`lattice`].

@@ -1,8 +1,8 @@
 //! Fields at a point of an element.
 
 use super::{Mesh, Region};
+use crate::element::geometry::displacement_gradient;
 use crate::element::geometry::{BlockGeometry, jacobian};
-use crate::element::kernel::displacement_gradient;
 use crate::element::{Inverted, Materials, Memory, extrapolate};
 use crate::tensor::{Kinematics, Mat3};
 

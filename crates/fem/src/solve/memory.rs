@@ -1,60 +1,10 @@
-//! Memory of materials that have one: layout, and its move over a step.
+//! Memory of materials that have one: its move over a step, and the energy of a body with it.
 
+use super::layout::MemoryLayout;
 use super::problem::Problem;
-use crate::element::kernel::displacement_gradient;
-use crate::element::{BlockGeometry, Materials, Memory};
-use crate::mesh::Mesh;
+use crate::element::Memory;
+use crate::element::geometry::displacement_gradient;
 use crate::tensor::Kinematics;
-
-/// Where the history of each element is in one long array.
-#[derive(Clone, Debug)]
-pub struct MemoryLayout {
-    /// First number of each element, one list a block, with the end as last entry.
-    start: Vec<Vec<usize>>,
-    /// Numbers in all.
-    pub len: usize,
-}
-
-impl MemoryLayout {
-    /// `None` if no element's material has memory.
-    pub(super) fn new(
-        mesh: &Mesh,
-        geometry: &[BlockGeometry],
-        materials: &Materials,
-    ) -> Option<Self> {
-        let mut len = 0;
-        let mut start = Vec::with_capacity(mesh.blocks.len());
-        for (block, g) in mesh.blocks.iter().zip(geometry) {
-            let mut of = vec![len];
-            for &region in &block.region {
-                len += g.points * materials[region].history_len();
-                of.push(len);
-            }
-            start.push(of);
-        }
-        (len > 0).then_some(Self { start, len })
-    }
-
-    /// Range of an element's numbers.
-    #[inline]
-    #[must_use]
-    pub fn range(&self, block: usize, element: usize) -> std::ops::Range<usize> {
-        self.start[block][element]..self.start[block][element + 1]
-    }
-
-    /// An element's memory in `history`.
-    #[inline]
-    #[must_use]
-    pub fn of<'a>(
-        &self,
-        history: &'a [f64],
-        dt_s: f64,
-        block: usize,
-        element: usize,
-    ) -> Memory<'a> {
-        Memory { history: &history[self.range(block, element)], dt_s }
-    }
-}
 
 /// Deformation at the quadrature points of the elements that have memory.
 fn visit_points(

@@ -1,6 +1,6 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
-use super::memory::MemoryLayout;
+use super::layout::MemoryLayout;
 use crate::contact::{ContactRule, ContactSurface};
 use crate::element::{BlockGeometry, Materials, ShapeError};
 use crate::linear::{Structure, StructureError};

@@ -1,7 +1,6 @@
-//! Equilibria: what makes one, where the search for the next starts, and how one is told of.
+//! Equilibria: what makes one and how one is told of.
 
 use super::effort::Effort;
-use super::stepping::Solver;
 use super::work::Work;
 use crate::contact::FrictionTrial;
 use crate::element::Dilatation;
@@ -50,42 +49,4 @@ pub struct StepReport {
     pub condition_at_least: f64,
     /// Work since the last report.
     pub effort: Effort,
-}
-
-impl Solver<'_> {
-    /// Extrapolates the last two equilibria.
-    pub(super) fn predict(&self, next: f64) -> State {
-        let mut trial = self.state.clone();
-        if let Some(before) = &self.before {
-            let ratio = (next - self.state.fraction) / (self.state.fraction - before.fraction);
-            for (v, w) in trial.u.iter_mut().zip(&before.u) {
-                for i in 0..3 {
-                    v[i] += ratio * (v[i] - w[i]);
-                }
-            }
-            for (c, old) in trial.carried.iter_mut().zip(&before.carried) {
-                for r in 0..c.len() {
-                    c[r] += ratio * (c[r] - old[r]);
-                }
-            }
-            for (l, m) in trial.multipliers.iter_mut().zip(&before.multipliers) {
-                *l = (*l + ratio * (*l - m)).max(0.0);
-            }
-        }
-        self.prescribe(next, &mut trial.u);
-        trial
-    }
-
-    /// The last equilibrium as it meets what is prescribed at `next`.
-    pub(super) fn unmoved(&self, next: f64) -> State {
-        let mut trial = self.state.clone();
-        self.prescribe(next, &mut trial.u);
-        trial
-    }
-
-    fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
-        for &(dof, value) in &self.loading.prescribed_mm {
-            u[dof / 3][dof % 3] = fraction * value;
-        }
-    }
 }

@@ -173,6 +173,9 @@ pub fn cofactor_derivative(f: &Mat3) -> Tensor4 {
     d
 }
 
+/// The unit tensor.
+pub const UNIT: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 #[cfg(test)]
 mod tests {
     use super::*;

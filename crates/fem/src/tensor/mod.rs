@@ -4,7 +4,7 @@ pub mod eigen;
 mod kinematics;
 
 pub use kinematics::{
-    Kinematics, Mat3, Tensor4, cofactor, cofactor_derivative, double_dot, product, trace,
+    Kinematics, Mat3, Tensor4, UNIT, cofactor, cofactor_derivative, double_dot, product, trace,
 };
 
 /// Euclidean norm.

@@ -1,7 +1,6 @@
 //! What presses where and how deep, and which presses are held out.
 
-use super::spec::Candidate;
-use super::{CampaignSpec, DepthRange, PoseRanges};
+use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
 use crate::scene::Pose;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -23,6 +22,13 @@ pub struct Press {
     pub offset_mm: [f64; 2],
     /// Depths that are stored, mm from first touch, rising.
     pub depths_mm: Vec<f64>,
+}
+
+impl CampaignSpec {
+    /// Samples in all.
+    pub fn samples(&self) -> usize {
+        presses(self).iter().map(|p| p.depths_mm.len()).sum()
+    }
 }
 
 /// All presses by id.

@@ -1,6 +1,6 @@
 //! The campaign file.
 
-use super::{SpecError, presses};
+use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::Pose;
@@ -133,11 +133,6 @@ impl CampaignSpec {
         spec.folder = path.parent().unwrap_or(Path::new("")).into();
         spec.validate()?;
         Ok(spec)
-    }
-
-    /// Samples in all.
-    pub fn samples(&self) -> usize {
-        presses(self).iter().map(|p| p.depths_mm.len()).sum()
     }
 
     /// The indenters; a single one is called after its shape.

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use papilla_fem::element::Memory;
-use papilla_fem::element::kernel::displacement_gradient;
+use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::solve::Solver;
 use papilla_fem::tensor::Kinematics;
 

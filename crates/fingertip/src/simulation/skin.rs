@@ -1,7 +1,7 @@
 //! What a stored state says beyond pressure and SED, where a scene gives rise to it.
 
 use super::body::Body;
-use papilla_fem::element::kernel::displacement_gradient;
+use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::solve::Solver;
 use papilla_fem::tensor::Kinematics;
 

@@ -135,7 +135,7 @@ pub fn run(
     spec.validate()?;
     let chosen = choose(spec, count)?;
     let target = Target::new(spec, ladder.atlas)?;
-    let store = Store::open(folder, spec, &target)?;
+    let store = Store::open(folder, spec, &target.atlas_hash, target.vertices())?;
     let plan = ladder.all(chosen.len());
     let all = plan.iter().map(|(_, n)| n).sum();
     let (mut parts, mut done) = (Vec::new(), 0);

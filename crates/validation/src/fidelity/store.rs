@@ -1,7 +1,6 @@
 //! What is on disk between runs: one archive and one record a press and rung.
 
 use super::RungsError;
-use super::solve::Target;
 use ndarray::Ix2;
 use papilla_dataset::sha256_hex;
 use papilla_fingertip::campaign::{CampaignSpec, Press};
@@ -99,7 +98,8 @@ impl Store {
     pub(super) fn open(
         out: &Path,
         spec: &CampaignSpec,
-        target: &Target,
+        atlas_hash: &str,
+        vertices: usize,
     ) -> Result<Self, RungsError> {
         let folder = out.join("parts");
         atomic::create_folder(&folder)?;
@@ -110,7 +110,7 @@ impl Store {
             Err(TryLockError::WouldBlock) => return Err(RungsError::Busy { folder: out.into() }),
             Err(TryLockError::Error(e)) => return Err(OutputError::io("lock", &path)(e).into()),
         }
-        let text = serde_json::to_string(&(spec, &target.atlas_hash, SOFTWARE))
+        let text = serde_json::to_string(&(spec, atlas_hash, SOFTWARE))
             .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
         let owner = Owner { fingerprint: sha256_hex(text.as_bytes()) };
         let path = folder.join("owner.json");
@@ -120,7 +120,7 @@ impl Store {
             return Err(RungsError::Occupied { folder: out.into() });
         }
         atomic::remove_partial(&folder)?;
-        Ok(Self { folder, vertices: target.vertices(), _lock: lock })
+        Ok(Self { folder, vertices, _lock: lock })
     }
 
     fn path(&self, rung: &str, id: usize, extension: &str) -> PathBuf {

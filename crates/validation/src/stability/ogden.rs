@@ -168,7 +168,7 @@ fn outside(problem: &Problem, u: &[[f64; 3]]) -> f64 {
             let local: Vec<_> = block.element(e).iter().map(|&n| u[n as usize]).collect();
             let g = geometry.element(e);
             for (gradients, w) in g.gradients.chunks_exact(block.kind.nodes()).zip(g.weights) {
-                let h = papilla_fem::element::kernel::displacement_gradient(&local, gradients);
+                let h = papilla_fem::element::geometry::displacement_gradient(&local, gradients);
                 let solid = &problem.materials[block.region[e]];
                 all += w;
                 out += if solid.outside_calibration(&Kinematics::new(h)) { *w } else { 0.0 };

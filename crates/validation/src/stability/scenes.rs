@@ -4,13 +4,15 @@
 //! cut off goes on with the scenes that have none, and a longer run with the same seed goes
 //! on from a shorter one.
 
+mod ending;
 mod queue;
 mod record;
 mod report;
 mod share;
 mod table;
 
-pub use report::{Ending, SceneRecord, ScenesReport};
+pub use ending::{Ending, SceneRecord};
+pub use report::ScenesReport;
 pub use table::Row;
 
 use papilla_fingertip::campaign::{CampaignSpec, Press, SpecError, presses};

@@ -1,7 +1,7 @@
 //! Meshes, materials, loads and fields that the cases share.
 
 use super::CaseError;
-use papilla_fem::element::kernel::displacement_gradient;
+use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::element::{Elastic, ElementKind, Inverted, Memory, Solid};
 use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::Mesh;

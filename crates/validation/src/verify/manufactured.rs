@@ -2,8 +2,8 @@
 
 use super::bodies::{solve, tight, uniform};
 use super::{CaseError, Check, Context};
+use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::element::geometry::jacobian;
-use papilla_fem::element::kernel::displacement_gradient;
 use papilla_fem::element::reference::GAUSS_3;
 use papilla_fem::element::{ElementKind, Memory, Solid};
 use papilla_fem::mesh::Mesh;

@@ -1,7 +1,7 @@
 //! The file that scenes are added to.
 
 use super::ScenesError;
-use super::report::SceneRecord;
+use super::ending::SceneRecord;
 use papilla_output::OutputError;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions, TryLockError};
@@ -79,7 +79,7 @@ fn write_line<T: Serialize>(file: &mut File, value: &T) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::Ending;
+    use super::super::ending::Ending;
     use super::super::report::tests::record;
     use super::*;
 

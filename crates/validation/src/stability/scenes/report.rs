@@ -1,40 +1,9 @@
 //! What became of the scenes.
 
+use super::ending::{Ending, SceneRecord};
 use super::{Row, share, table};
-use papilla_fingertip::campaign::Press;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::fmt::{self, Write as _};
-
-/// What became of a scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ending {
-    /// In equilibrium, every balance of a dataset kept.
-    Balanced,
-    /// In equilibrium, a balance missed.
-    Unbalanced(String),
-    /// A typed error.
-    Refused(String),
-    /// A panic.
-    Panicked(String),
-}
-
-/// One scene in the record.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SceneRecord {
-    /// What was pressed how.
-    pub press: Press,
-    /// What became of it.
-    pub ending: Ending,
-    /// Newton iterations.
-    pub newton_iterations: u32,
-    /// Halved load steps.
-    pub cuts: u32,
-    /// Smallest `J`; absent without an equilibrium.
-    pub j_min: Option<f64>,
-    /// Processor time, s.
-    pub seconds: f64,
-}
 
 /// The scenes of a run, counted.
 #[derive(Clone, Debug, Serialize)]
@@ -177,6 +146,7 @@ pub(super) fn count(drawn_from: String, records: Vec<SceneRecord>, reused: usize
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use papilla_fingertip::campaign::Press;
 
     pub(in super::super) fn record(id: usize, ending: Ending) -> SceneRecord {
         let press = Press {

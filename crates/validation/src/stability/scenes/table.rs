@@ -1,6 +1,6 @@
 //! How hard the scenes were, indenter by indenter.
 
-use super::report::{Ending, SceneRecord};
+use super::ending::{Ending, SceneRecord};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
