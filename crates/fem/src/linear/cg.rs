@@ -1,7 +1,7 @@
 //! Conjugate gradients preconditioned by an older or coarser factor.
 
 use super::dot::dot;
-use super::factor::Factorizer;
+use super::factor::NumericFactor;
 use super::structure::{Structure, SymmetricMatrix};
 
 /// Vectors of the iteration, re-used.
@@ -32,7 +32,7 @@ pub struct CgOutcome {
 pub fn conjugate_gradient(
     structure: &Structure,
     matrix: &SymmetricMatrix,
-    preconditioner: &mut Factorizer,
+    preconditioner: &mut NumericFactor,
     b: &[f64],
     x: &mut [f64],
     tolerance: f64,

@@ -29,177 +29,199 @@ fn scratch(structure: &Structure) -> StackReq {
         .or(s.solve_in_place_scratch::<f64>(1, Par::Seq))
 }
 
-/// Owns the memory of one numeric factor; re-used by every factorization.
-pub struct Factorizer {
+/// Memory for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
+/// ([`NumericFactor::release`]): to factorize anew allocates nothing. Nothing can be solved with it.
+pub struct FactorMemory(Box<Buffers>);
+
+struct Buffers {
     single: Vec<f32>,
     single_matrix: Vec<f32>,
     double: Vec<f64>,
     subdiagonal: Vec<f64>,
     pivot: [Vec<usize>; 2],
-    memory: MemBuffer,
-    kind: Option<Kind>,
+    scratch: MemBuffer,
     right_hand_side: Vec<f32>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Cholesky,
-    Lblt,
-}
-
-/// How a matrix was factorized.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Factor {
-    /// f32 Cholesky: a preconditioner.
-    Preconditioner,
-    /// f64 `L B L^T` of an indefinite matrix: a direct solver.
-    Indefinite,
-}
-
-impl Factorizer {
+impl FactorMemory {
     /// Memory for factors on `structure`.
     ///
     /// # Errors
     /// [`FactorError::Memory`].
     pub fn new(structure: &Structure) -> Result<Self, FactorError> {
-        let s = &structure.symbolic;
-        let memory = MemBuffer::try_new(scratch(structure))
+        let scratch = MemBuffer::try_new(scratch(structure))
             .map_err(|_| FactorError::Memory(structure.factor_entries()))?;
-        Ok(Self {
-            single: vec![0.0; s.len_val()],
+        Ok(Self(Box::new(Buffers {
+            single: vec![0.0; structure.symbolic.len_val()],
             single_matrix: vec![0.0; structure.row.len()],
             double: Vec::new(),
             subdiagonal: Vec::new(),
             pivot: [Vec::new(), Vec::new()],
-            memory,
-            kind: None,
+            scratch,
             right_hand_side: vec![0.0; structure.equations.count],
-        })
+        })))
     }
 
-    /// Memory that a factorizer takes on `structure`, bytes, with an f32 factor.
+    /// What it takes on `structure`, bytes, with an f32 factor.
     #[must_use]
     pub fn bytes(structure: &Structure) -> usize {
         scratch(structure).unaligned_bytes_required()
             + 4 * (structure.factor_entries() + structure.row.len() + structure.equations.count)
     }
 
-    /// What the held factor is, if there is one.
-    #[must_use]
-    pub fn held(&self) -> Option<Factor> {
-        self.kind
-            .map(|k| if k == Kind::Cholesky { Factor::Preconditioner } else { Factor::Indefinite })
-    }
-
     /// Factorizes by f32 Cholesky.
     ///
     /// # Errors
-    /// [`FactorError::NotPositiveDefinite`]; no factor is held then.
+    /// Gives the memory back where the matrix is not positive definite.
     pub fn cholesky(
-        &mut self,
+        mut self,
         structure: &Structure,
         matrix: &SymmetricMatrix,
-    ) -> Result<(), FactorError> {
-        for (s, v) in self.single_matrix.iter_mut().zip(&matrix.values) {
+    ) -> Result<NumericFactor, Self> {
+        let b = &mut *self.0;
+        for (s, v) in b.single_matrix.iter_mut().zip(&matrix.values) {
             *s = *v as f32;
         }
-        self.kind = None;
         let result = structure.symbolic.factorize_numeric_llt(
-            &mut self.single,
-            structure.lower(&self.single_matrix),
+            &mut b.single,
+            structure.lower(&b.single_matrix),
             Side::Lower,
             LltRegularization::default(),
             Par::Seq,
-            MemStack::new(&mut self.memory),
+            MemStack::new(&mut b.scratch),
             Spec::default(),
         );
-        result.map_err(|_| FactorError::NotPositiveDefinite)?;
         // An overflow or a NaN in the matrix passes the pivot test of some kernels.
-        if self.single.iter().any(|v| !v.is_finite()) {
-            return Err(FactorError::NotPositiveDefinite);
+        if result.is_err() || b.single.iter().any(|v| !v.is_finite()) {
+            return Err(self);
         }
-        self.kind = Some(Kind::Cholesky);
-        Ok(())
+        Ok(NumericFactor { kind: FactorKind::Preconditioner, buffers: self.0 })
     }
 
     /// Factorizes an indefinite matrix as `L B L^T` in f64 (pivoting inside
     /// supernodes only).
-    pub fn indefinite(&mut self, structure: &Structure, matrix: &SymmetricMatrix) {
+    #[must_use]
+    pub fn indefinite(mut self, structure: &Structure, matrix: &SymmetricMatrix) -> NumericFactor {
         let n = structure.equations.count;
-        self.double.resize(structure.symbolic.len_val(), 0.0);
-        self.subdiagonal.resize(n, 0.0);
-        for p in &mut self.pivot {
+        let b = &mut *self.0;
+        b.double.resize(structure.symbolic.len_val(), 0.0);
+        b.subdiagonal.resize(n, 0.0);
+        for p in &mut b.pivot {
             p.resize(n, 0);
         }
-        let [forward, inverse] = &mut self.pivot;
+        let [forward, inverse] = &mut b.pivot;
         structure.symbolic.factorize_numeric_intranode_lblt(
-            &mut self.double,
-            &mut self.subdiagonal,
+            &mut b.double,
+            &mut b.subdiagonal,
             forward,
             inverse,
             structure.lower(&matrix.values),
             Side::Lower,
             Par::Seq,
-            MemStack::new(&mut self.memory),
+            MemStack::new(&mut b.scratch),
             Spec::default(),
         );
-        self.kind = Some(Kind::Lblt);
+        NumericFactor { kind: FactorKind::Indefinite, buffers: self.0 }
+    }
+}
+
+impl Default for FactorMemory {
+    /// None at all: what stands where memory has been taken from. To factorize with it panics.
+    fn default() -> Self {
+        Self(Box::new(Buffers {
+            single: Vec::new(),
+            single_matrix: Vec::new(),
+            double: Vec::new(),
+            subdiagonal: Vec::new(),
+            pivot: [Vec::new(), Vec::new()],
+            scratch: MemBuffer::new(StackReq::EMPTY),
+            right_hand_side: Vec::new(),
+        }))
+    }
+}
+
+/// How a matrix was factorized.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FactorKind {
+    /// f32 Cholesky: a preconditioner.
+    Preconditioner,
+    /// f64 `L B L^T` of an indefinite matrix: a direct solver.
+    Indefinite,
+}
+
+/// A factorized matrix.
+pub struct NumericFactor {
+    kind: FactorKind,
+    buffers: Box<Buffers>,
+}
+
+impl NumericFactor {
+    /// How the matrix was factorized.
+    #[must_use]
+    pub const fn kind(&self) -> FactorKind {
+        self.kind
     }
 
-    /// A lower bound of the condition number of the matrix that was last factorized by
-    /// Cholesky, from its factor's diagonal: `(max l / min l)^2`. A triangular matrix's least
+    /// Gives the factor up for its memory.
+    #[must_use]
+    pub fn release(self) -> FactorMemory {
+        FactorMemory(self.buffers)
+    }
+
+    /// A lower bound of the condition number of a matrix factorized by Cholesky, from its
+    /// factor's diagonal: `(max l / min l)^2`. A triangular matrix's least
     /// singular value is at most its least diagonal entry, its largest at least the largest.
-    /// `None` without a Cholesky factor.
+    /// `None` for an indefinite matrix.
     #[must_use]
     pub fn condition_at_least(&self, structure: &Structure) -> Option<f64> {
-        if self.kind != Some(Kind::Cholesky) {
+        if self.kind != FactorKind::Preconditioner {
             return None;
         }
         let (mut least, mut largest) = (f32::INFINITY, 0.0f32);
         structure.visit_diagonal(&mut |at| {
-            least = least.min(self.single[at]);
-            largest = largest.max(self.single[at]);
+            least = least.min(self.buffers.single[at]);
+            largest = largest.max(self.buffers.single[at]);
         });
         Some((f64::from(largest) / f64::from(least)).powi(2))
     }
 
-    /// Solves in place with the held factor; without one, leaves `x` as it is.
+    /// Solves in place.
     pub fn solve(&mut self, structure: &Structure, x: &mut [f64]) {
         let n = x.len();
+        let b = &mut *self.buffers;
         match self.kind {
-            None => {}
-            Some(Kind::Cholesky) => {
+            FactorKind::Preconditioner => {
                 // Scaled to unit size: f32 has a small range of exponents.
                 let scale = x.iter().fold(0.0f64, |m, v| m.max(v.abs()));
                 if scale == 0.0 {
                     return;
                 }
-                for (s, v) in self.right_hand_side.iter_mut().zip(&*x) {
+                for (s, v) in b.right_hand_side.iter_mut().zip(&*x) {
                     *s = (*v / scale) as f32;
                 }
-                LltRef::new(&structure.symbolic, &self.single).solve_in_place_with_conj(
+                LltRef::new(&structure.symbolic, &b.single).solve_in_place_with_conj(
                     Conj::No,
-                    MatMut::from_column_major_slice_mut(&mut self.right_hand_side, n, 1),
+                    MatMut::from_column_major_slice_mut(&mut b.right_hand_side, n, 1),
                     Par::Seq,
-                    MemStack::new(&mut self.memory),
+                    MemStack::new(&mut b.scratch),
                 );
-                for (s, v) in self.right_hand_side.iter().zip(x) {
+                for (s, v) in b.right_hand_side.iter().zip(x) {
                     *v = f64::from(*s) * scale;
                 }
             }
-            Some(Kind::Lblt) => {
-                let [forward, inverse] = &self.pivot;
+            FactorKind::Indefinite => {
+                let [forward, inverse] = &b.pivot;
                 IntranodeLbltRef::new(
                     &structure.symbolic,
-                    &self.double,
-                    &self.subdiagonal,
+                    &b.double,
+                    &b.subdiagonal,
                     PermRef::new_checked(forward, inverse, n),
                 )
                 .solve_in_place_with_conj(
                     Conj::No,
                     MatMut::from_column_major_slice_mut(x, n, 1),
                     Par::Seq,
-                    MemStack::new(&mut self.memory),
+                    MemStack::new(&mut b.scratch),
                 );
             }
         }
@@ -233,11 +255,43 @@ mod tests {
             for c in 0..count {
                 matrix.values[structure.column_start[c]] = 1.0 + c as f64;
             }
-            let mut factorizer = Factorizer::new(&structure).unwrap();
-            assert_eq!(factorizer.condition_at_least(&structure), None);
-            factorizer.cholesky(&structure, &matrix).unwrap();
-            let found = factorizer.condition_at_least(&structure).unwrap();
+            let memory = FactorMemory::new(&structure).unwrap();
+            let Ok(factor) = memory.cholesky(&structure, &matrix) else { panic!("it is definite") };
+            let found = factor.condition_at_least(&structure).unwrap();
             assert!((found / count as f64 - 1.0).abs() < 1e-5, "{found} {count}");
         }
+    }
+
+    /// The memory of a failed try, and of a factor that is given up, serves the next.
+    #[test]
+    fn memory_goes_from_try_to_try() {
+        let mesh = cube(ElementKind::Hex8, 2, |p| p);
+        let fixed = hold(&mesh, &[("z_min", [true; 3])]);
+        let structure = Structure::new(&mesh, &fixed).unwrap();
+        let mut matrix = structure.zeros();
+        let count = structure.equations.count;
+        let diagonal = |matrix: &mut SymmetricMatrix, value: &dyn Fn(usize) -> f64| {
+            for c in 0..count {
+                matrix.values[structure.column_start[c]] = value(c);
+            }
+        };
+        let solved = |factor: &mut NumericFactor| {
+            let mut x = vec![1.0; count];
+            factor.solve(&structure, &mut x);
+            x
+        };
+        diagonal(&mut matrix, &|c| if c == 1 { -2.0 } else { 1.0 + c as f64 });
+        let memory = FactorMemory::new(&structure).unwrap();
+        let Err(memory) = memory.cholesky(&structure, &matrix) else { panic!("it is indefinite") };
+        let mut factor = memory.indefinite(&structure, &matrix);
+        assert_eq!(factor.kind(), FactorKind::Indefinite);
+        assert_eq!(factor.condition_at_least(&structure), None);
+        assert!((solved(&mut factor)[1] + 0.5).abs() < 1e-12);
+        diagonal(&mut matrix, &|_| 4.0);
+        let Ok(mut factor) = factor.release().cholesky(&structure, &matrix) else {
+            panic!("it is definite")
+        };
+        assert_eq!(factor.kind(), FactorKind::Preconditioner);
+        assert!(solved(&mut factor).iter().all(|x| (x - 0.25).abs() < 1e-6));
     }
 }

@@ -19,6 +19,6 @@ pub use direct::Direct;
 pub(crate) use dot::dot;
 pub(crate) use eigen::eigen;
 pub use equations::Equations;
-pub use factor::{Factor, FactorError, Factorizer};
+pub use factor::{FactorError, FactorKind, FactorMemory, NumericFactor};
 pub use ordering::{Elimination, OrderingError};
 pub use structure::{Structure, StructureError, SymmetricMatrix};

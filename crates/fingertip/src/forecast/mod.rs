@@ -19,7 +19,7 @@ pub use work::Work;
 use crate::scene::{Census, Scene};
 use crate::simulation::setup::Setup;
 use assembly::Pass;
-use papilla_fem::linear::Factorizer;
+use papilla_fem::linear::FactorMemory;
 use papilla_fem::solve::Problem;
 use serde::Serialize;
 
@@ -129,7 +129,7 @@ fn memory_bytes(problem: &Problem) -> usize {
         + history
         + structure.bytes()
         + 8 * structure.row.len()
-        + Factorizer::bytes(structure)
+        + FactorMemory::bytes(structure)
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 //! preconditions conjugate gradients on the current tangent, and is renewed
 //! when that takes too many iterations.
 
-use super::{Fixed, Newton};
+use super::{Fixed, Held, Newton};
 use crate::contact::Support;
 use crate::element::Dilatation;
-use crate::linear::{Equations, Factor, conjugate_gradient};
+use crate::linear::{Equations, FactorKind, FactorMemory, NumericFactor, conjugate_gradient};
 use crate::solve::StepError;
 use crate::solve::loading::Loading;
 use crate::solve::mixed;
@@ -33,25 +33,29 @@ impl Newton<'_> {
     /// that is not, if there is one.
     pub(super) fn solve_step(&mut self, loading: &Loading, tolerance: f64, mixed: bool) {
         let mut cg_max = self.options.cg_max;
-        if self.stale || self.factorizer.held() != Some(Factor::Preconditioner) {
-            self.factorize(loading);
-        } else if mixed {
-            cg_max = cg_max.min(mixed::OLD_FACTOR_CG_MAX);
-        }
+        let mut factor = match self.held.take() {
+            Held::Factor(f) if !self.stale && f.kind() == FactorKind::Preconditioner => {
+                if mixed {
+                    cg_max = cg_max.min(mixed::OLD_FACTOR_CG_MAX);
+                }
+                f
+            }
+            other => self.factorize(other.release(), loading),
+        };
         let mut fresh = false;
         loop {
-            if self.factorizer.held() == Some(Factor::Indefinite) {
+            if factor.kind() == FactorKind::Indefinite {
                 let clock = Instant::now();
                 self.step.copy_from_slice(&self.right);
-                self.factorizer.solve(&self.problem.structure, &mut self.step);
+                factor.solve(&self.problem.structure, &mut self.step);
                 self.effort.solve_s += clock.elapsed().as_secs_f64();
-                return;
+                break;
             }
             let clock = Instant::now();
             let found = conjugate_gradient(
                 &self.problem.structure,
                 &self.tangent,
-                &mut self.factorizer,
+                &mut factor,
                 &self.right,
                 &mut self.step,
                 tolerance,
@@ -67,12 +71,13 @@ impl Newton<'_> {
             let usable = found.relative_residual <= tolerance
                 || (found.negative_curvature && found.iterations > 0);
             if usable || fresh {
-                return;
+                break;
             }
-            self.factorize(loading);
+            factor = self.factorize(factor.release(), loading);
             cg_max = self.options.cg_max;
             fresh = true;
         }
+        self.held = Held::Factor(factor);
     }
 
     /// Gives back to the tangent what convex edges of the indenter take from it, which is
@@ -89,24 +94,29 @@ impl Newton<'_> {
         any
     }
 
-    fn factorize(&mut self, loading: &Loading) {
+    fn factorize(&mut self, memory: FactorMemory, loading: &Loading) -> NumericFactor {
         let clock = Instant::now();
         self.effort.factorizations += 1;
         let structure = &self.problem.structure;
-        let mut definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
-        if !definite && self.convexify(loading) {
-            definite = self.factorizer.cholesky(structure, &self.tangent).is_ok();
+        let mut tried = memory.cholesky(structure, &self.tangent);
+        if let Err(memory) = tried {
+            tried = if self.convexify(loading) {
+                memory.cholesky(structure, &self.tangent)
+            } else {
+                Err(memory)
+            };
         }
-        if let Some(condition) = self.factorizer.condition_at_least(structure) {
+        let factor = tried.unwrap_or_else(|memory| {
+            tracing::debug!("tangent not positive definite: L B L^T");
+            self.effort.indefinite_factorizations += 1;
+            memory.indefinite(structure, &self.tangent)
+        });
+        if let Some(condition) = factor.condition_at_least(structure) {
             self.condition = condition;
             tracing::trace!(condition, "tangent factorized");
         }
-        if !definite {
-            tracing::debug!("tangent not positive definite: L B L^T");
-            self.effort.indefinite_factorizations += 1;
-            self.factorizer.indefinite(structure, &self.tangent);
-        }
         self.stale = false;
         self.effort.factor_s += clock.elapsed().as_secs_f64();
+        factor
     }
 }

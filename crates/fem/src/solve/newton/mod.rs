@@ -11,7 +11,7 @@ use super::problem::Problem;
 use super::{Options, SolveError, StepError};
 use crate::contact::{ContactRule, FrictionTrial};
 use crate::element::{Dilatation, Memory};
-use crate::linear::{CgWorkspace, Equations, Factorizer, SymmetricMatrix};
+use crate::linear::{CgWorkspace, Equations, FactorMemory, NumericFactor, SymmetricMatrix};
 use std::time::Instant;
 
 /// What stays fixed while an equilibrium is sought.
@@ -38,6 +38,26 @@ impl<'a> Fixed<'a> {
     }
 }
 
+/// A factor of an earlier tangent, or memory for one.
+enum Held {
+    Memory(FactorMemory),
+    Factor(NumericFactor),
+}
+
+impl Held {
+    /// Leaves nothing in its place.
+    fn take(&mut self) -> Self {
+        std::mem::replace(self, Self::Memory(FactorMemory::default()))
+    }
+
+    fn release(self) -> FactorMemory {
+        match self {
+            Self::Memory(memory) => memory,
+            Self::Factor(factor) => factor.release(),
+        }
+    }
+}
+
 /// Memory and counters of the iteration.
 pub(super) struct Newton<'a> {
     pub problem: &'a Problem,
@@ -46,11 +66,11 @@ pub(super) struct Newton<'a> {
     /// Forces below this are rounding of a body at rest, N.
     pub rounding_force_n: f64,
     pub effort: Effort,
-    factorizer: Factorizer,
+    held: Held,
     tangent: SymmetricMatrix,
     /// Renew the factor at the next linear solve.
     stale: bool,
-    /// See [`Factorizer::condition_at_least`]; of the last Cholesky factor.
+    /// See [`NumericFactor::condition_at_least`]; of the last Cholesky factor.
     pub condition: f64,
     cg: CgWorkspace,
     right: Vec<f64>,
@@ -72,7 +92,7 @@ impl<'a> Newton<'a> {
             penalty: 0.0,
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
-            factorizer: Factorizer::new(&problem.structure)?,
+            held: Held::Memory(FactorMemory::new(&problem.structure)?),
             tangent: problem.structure.zeros(),
             stale: true,
             condition: f64::NAN,
