@@ -19,6 +19,7 @@ mod manifest;
 mod reader;
 mod record;
 mod replay;
+mod schema;
 mod shard;
 mod sheet;
 mod stats;
@@ -38,6 +39,7 @@ pub use manifest::{
 pub use reader::{Dataset, VerifyReport, verify};
 pub use record::{Checks, Pose, Sample};
 pub use replay::replay;
+pub use schema::{ArraySpec, FormatSchema, RASTER_ARRAYS, SHARD_ARRAYS, schema};
 pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
 pub use sheet::contact_sheet;
 pub use stats::{DepthStats, Range, StatsReport, stats};

@@ -1,6 +1,7 @@
 //! `manifest.json`: what a dataset is and where it comes from.
 
 use crate::record::{Checks, Pose};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -9,7 +10,7 @@ pub const FORMAT: u32 = 1;
 
 /// The manifest. Its bytes depend on campaign and shards alone: no time, no
 /// host, no thread count.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Manifest {
     /// [`FORMAT`].
     pub format: u32,
@@ -46,7 +47,7 @@ pub struct Manifest {
 }
 
 /// Units of the arrays in a shard.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Units {
     /// Unit of `pressure_pa`.
     pub pressure: String,
@@ -66,7 +67,7 @@ impl Default for Units {
 }
 
 /// What a press is for. A press is never divided: its depths are near-copies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
     /// Seen in training.
@@ -76,7 +77,7 @@ pub enum Split {
 }
 
 /// Ids of the presses of each split, rising.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Splits {
     /// Training presses.
     pub train: Vec<usize>,
@@ -85,7 +86,7 @@ pub struct Splits {
 }
 
 /// One press of the dataset.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PressEntry {
     /// Number within the campaign.
     pub id: usize,
@@ -112,7 +113,7 @@ pub struct PressEntry {
 }
 
 /// A press without a shard.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FailedPress {
     /// Number within the campaign.
     pub id: usize,
@@ -130,7 +131,7 @@ pub struct FailedPress {
 }
 
 /// A sample that failed its own checks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DroppedSample {
     /// Id of the press.
     pub press: usize,

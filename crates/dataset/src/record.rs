@@ -1,9 +1,10 @@
 //! What a dataset holds of one equilibrium.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Self-checks of one equilibrium; dimensionless unless the name says otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Checks {
     /// Norm of the out-of-balance force over the norm of the internal force.
     pub residual_relative: f64,
@@ -55,7 +56,7 @@ pub struct Sample {
 }
 
 /// Orientation of the plate relative to the finger.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Pose {
     /// Pitch about y (lateral), degrees; tip first is positive.
     pub pitch_deg: f64,

@@ -6,11 +6,11 @@ use papilla_fem::solve::{Effort, Options};
 use papilla_fem::tensor::norm;
 use papilla_fingertip::scene::effects::EFFECTS;
 use papilla_fingertip::scene::{EffectName, Scene};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::PressError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_fingertip::simulation::record::relative_l2;
-use papilla_fingertip::simulation::setup::Setup;
 use serde::Serialize;
 
 /// The last stored state of one solve, and its price.
@@ -151,7 +151,7 @@ fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'sta
 
 fn solve(scene: &Scene) -> Result<Solved, PressError> {
     let begun_s = processor::thread_s();
-    let setup = Setup::new(scene)?;
+    let setup = Simulation::new(scene)?;
     let mut solver = setup.body.solver(Options::default())?;
     let ready_s = processor::thread_s();
     let (mut effort, mut last) = (Effort::default(), None);

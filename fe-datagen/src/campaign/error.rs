@@ -31,7 +31,7 @@ pub enum CampaignError {
     },
     /// No solver could be built, so no press can be solved.
     #[error("cannot set up the solver: {0}")]
-    Setup(#[source] BoxError),
+    Simulation(#[source] BoxError),
     /// Every press failed; there is no dataset.
     #[error("all {presses} presses failed, the first with: {first}")]
     NothingSolved {

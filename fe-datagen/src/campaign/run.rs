@@ -90,7 +90,7 @@ pub fn run<S: PressSolver>(
             let builder = std::thread::Builder::new().stack_size(16 << 20);
             let spawned = builder.spawn_scoped(scope, || queue.work(&solver));
             if let Err(error) = spawned {
-                queue.fail(CampaignError::Setup(error.into()));
+                queue.fail(CampaignError::Simulation(error.into()));
             }
         }
     });
@@ -175,7 +175,7 @@ impl Queue<'_> {
     ) -> Result<PressState, CampaignError> {
         let mut ready = match solver.take() {
             Some(ready) => ready,
-            None => build().map_err(CampaignError::Setup)?,
+            None => build().map_err(CampaignError::Simulation)?,
         };
         let start = Instant::now();
         let id = press.id;

@@ -1,9 +1,9 @@
 //! What `solve` writes of a plane section: values along the skin.
 
 use papilla_fingertip::scene::{Output, Scene};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_output::OutputError;
 use papilla_output::npz::NpzBuilder;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
@@ -20,7 +20,7 @@ const CURVES_MAX: usize = 5;
 pub(super) fn write(
     folder: &Path,
     scene: &Scene,
-    setup: &Setup,
+    setup: &Simulation,
     records: &[IncrementRecord],
 ) -> Result<(), OutputError> {
     let (body, timed) = (&setup.body, setup.drive.is_timed());

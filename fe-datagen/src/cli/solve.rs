@@ -10,10 +10,10 @@ use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::PressError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_output::map_image::{MapView, Quantity, white_of};
 use papilla_output::npz::NpzBuilder;
 use papilla_output::{atomic, vtu};
@@ -93,7 +93,7 @@ struct Summary {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
-    let setup = Setup::new(&scene)?;
+    let setup = Simulation::new(&scene)?;
     let body = &setup.body;
     let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
     let atlas = if mapped { body.atlas().transpose()?.map(|(atlas, _)| atlas) } else { None };
@@ -142,11 +142,11 @@ struct Pressed {
 /// Presses and writes the fields of every stored equilibrium into `out`, if given; those
 /// before an error are kept.
 fn press(
-    setup: &Setup,
+    setup: &Simulation,
     solver: &mut Solver<'_>,
     out: Option<&PathBuf>,
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
-    let Setup { body, approach, drive, .. } = setup;
+    let Simulation { body, approach, drive, .. } = setup;
     let bar = super::progress("pressing", drive.len());
     let mut written = Ok(());
     let file = |state: usize| format!("state-{state:03}.vtu");

@@ -8,7 +8,7 @@ use crate::element::shape::TET10_EDGES;
 use std::collections::{HashMap, HashSet};
 
 /// Region of every element of a [`lattice`].
-pub const REGION: Region = Region(1);
+pub const REGION: Region = Region(0);
 
 /// Meshes `axes` with elements of `kind`, all of one region, nodes moved by
 /// `map`. Planar elements take the first two axes.

@@ -2,12 +2,12 @@
 
 use crate::scene::effects::Law;
 use crate::scene::{Census, Scene};
-use crate::simulation::setup::Setup;
+use crate::simulation::Simulation;
 use crate::tissue::Tissue;
 
 /// Counts what `setup` made of `scene`.
 #[must_use]
-pub fn census(scene: &Scene, setup: &Setup) -> Census {
+pub fn census(scene: &Scene, setup: &Simulation) -> Census {
     let problem = &setup.body.problem;
     let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes().len());
     let mut census = Census {
@@ -29,7 +29,7 @@ pub fn census(scene: &Scene, setup: &Setup) -> Census {
     census
 }
 
-fn add(census: &mut Census, scene: &Scene, setup: &Setup, tissue: Tissue, points: usize) {
+fn add(census: &mut Census, scene: &Scene, setup: &Simulation, tissue: Tissue, points: usize) {
     census.elements += 1;
     census.points += points;
     if setup.body.problem.materials[tissue.region()].is_finite_strain() {

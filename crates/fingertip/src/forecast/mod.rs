@@ -17,7 +17,7 @@ pub use machine::Machine;
 pub use work::Work;
 
 use crate::scene::{Census, Scene};
-use crate::simulation::setup::Setup;
+use crate::simulation::Simulation;
 use assembly::Pass;
 use papilla_fem::linear::FactorMemory;
 use papilla_fem::solve::Problem;
@@ -70,7 +70,7 @@ const BASE_BYTES: usize = 8 << 20;
 impl Forecast {
     /// Counts, probes and predicts.
     #[must_use]
-    pub fn new(scene: &Scene, setup: &Setup) -> Self {
+    pub fn new(scene: &Scene, setup: &Simulation) -> Self {
         let problem = &setup.body.problem;
         let structure = &problem.structure;
         // Elements first: after the matrix product's wide registers the same code was

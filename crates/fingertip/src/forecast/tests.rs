@@ -25,7 +25,7 @@ fn possible() -> Vec<Vec<&'static str>> {
 fn an_effect_that_is_not_named_assembles_and_stores_nothing() {
     for names in std::iter::once(Vec::new()).chain(possible()) {
         let scene = finger(&names);
-        let setup = Setup::new(&scene).unwrap();
+        let setup = Simulation::new(&scene).unwrap();
         let census = census(&scene, &setup);
         for effect in EFFECTS {
             let (state, on) = ((effect.state)(&census), names.contains(&effect.name));
@@ -39,7 +39,7 @@ fn an_effect_that_is_not_named_assembles_and_stores_nothing() {
 fn the_solver_holds_what_the_census_counts() {
     for names in [&[][..], &["viscoelastic"], &["friction"], &["elastic_bone", "nail"]] {
         let scene = finger(names);
-        let setup = Setup::new(&scene).unwrap();
+        let setup = Simulation::new(&scene).unwrap();
         let census = census(&scene, &setup);
         let body = &setup.body;
         let mut solver = body.solver(Options::default()).unwrap();
@@ -66,7 +66,7 @@ fn the_solver_holds_what_the_census_counts() {
 fn an_effect_adds_its_own_state_and_no_other() {
     let count = |names: &[&str]| {
         let scene = finger(names);
-        census(&scene, &Setup::new(&scene).unwrap())
+        census(&scene, &Simulation::new(&scene).unwrap())
     };
     let bare = count(&[]);
     let friction = count(&["friction"]);
@@ -80,7 +80,7 @@ fn an_effect_adds_its_own_state_and_no_other() {
 #[test]
 fn a_forecast_counts_the_factor_and_predicts_something() {
     let scene = finger(&["finite_strain", "layers"]);
-    let setup = Setup::new(&scene).unwrap();
+    let setup = Simulation::new(&scene).unwrap();
     let forecast = Forecast::new(&scene, &setup);
     // A full lower triangle bounds entries and operations.
     let n = forecast.census.unknowns as f64;
@@ -97,7 +97,7 @@ fn a_section_counts_its_plane_elements() {
     let text = "effects = [\"plane_strain\"]\n[geometry]\nkind = \"section\"\ndensity = \"coarse\"\n\
                 [motion]\ndepth_mm = 0.2\n";
     let scene = Scene::parse(Path::new("section.toml"), text.into()).unwrap();
-    let census = census(&scene, &Setup::new(&scene).unwrap());
+    let census = census(&scene, &Simulation::new(&scene).unwrap());
     for effect in EFFECTS {
         assert_eq!((effect.state)(&census) > 0, effect.name == "plane_strain", "{}", effect.name);
     }

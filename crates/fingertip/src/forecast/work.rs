@@ -5,8 +5,8 @@
 //! the number of equilibria follows from the stored states.
 
 use crate::scene::effects::Law;
+use crate::simulation::Simulation;
 use crate::simulation::drive::{Drive, DrivePoint};
-use crate::simulation::setup::Setup;
 use serde::Serialize;
 
 /// Iterations of a whole press.
@@ -48,7 +48,7 @@ const TRIES_PER_FORCE: f64 = 7.7;
 const EXTRA_DEPTHS: [usize; 2] = [5, 1];
 
 impl Work {
-    pub(super) fn new(setup: &Setup) -> Self {
+    pub(super) fn new(setup: &Simulation) -> Self {
         let equilibria = equilibria(setup);
         let rate = if setup.approach.friction > 0.0 {
             Rate { newton: 14.0, factorizations: 1.5, cg: 4.9 }
@@ -73,7 +73,7 @@ impl Work {
     }
 }
 
-fn equilibria(setup: &Setup) -> f64 {
+fn equilibria(setup: &Simulation) -> f64 {
     let points = match &setup.drive {
         Drive::Forces(forces) => return TRIES_PER_FORCE * forces.len() as f64,
         Drive::Depths(depths) => {

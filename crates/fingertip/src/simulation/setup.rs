@@ -1,7 +1,7 @@
 //! From a scene to a body and an indenter.
 
 use super::body::{Body, PressError};
-use super::drive::{Approach, Drive, DrivePoint};
+use super::drive::{Approach, Drive, DrivePoint, Visit};
 use super::laws::solids;
 use super::section::SectionSpec;
 use crate::geometry::fingertip::FingertipShape;
@@ -11,9 +11,10 @@ use crate::scene::{Geometry, Layer, Motion, Plan, Scene, TissueTable};
 use crate::tissue::Tissue;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::block::{BlockLattice, build as build_block, even};
+use papilla_fem::solve::Options;
 
-/// Everything that a scene is solved with.
-pub struct Setup {
+/// A scene ready to run: everything that it is solved with.
+pub struct Simulation {
     /// What is going to be simulated.
     pub plan: Plan,
     /// The body.
@@ -24,7 +25,7 @@ pub struct Setup {
     pub drive: Drive,
 }
 
-impl Setup {
+impl Simulation {
     /// Meshes and sets up what a scene describes, the indenter at first touch.
     ///
     /// # Errors
@@ -32,6 +33,16 @@ impl Setup {
     /// to blame.
     pub fn new(scene: &Scene) -> Result<Self, PressError> {
         Self::build(scene).map_err(|e| e.at(scene))
+    }
+
+    /// Finds the equilibria of the whole motion; `observer` is called with the solver at each
+    /// stored state and its record.
+    ///
+    /// # Errors
+    /// As [`Body::press`].
+    pub fn run(&self, observer: Visit<'_>) -> Result<(), PressError> {
+        let mut solver = self.body.solver(Options::default())?;
+        self.body.press(&mut solver, &self.approach, &self.drive, 1, observer)
     }
 
     fn build(scene: &Scene) -> Result<Self, PressError> {

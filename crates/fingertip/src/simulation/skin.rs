@@ -51,8 +51,8 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use crate::scene::Scene;
+    use crate::simulation::Simulation;
     use crate::simulation::record::IncrementRecord;
-    use crate::simulation::setup::Setup;
     use papilla_fem::contact::ContactRule;
     use papilla_fem::solve::{Options, Solver, StepReport};
     use std::path::Path;
@@ -94,7 +94,7 @@ mod tests {
     }
 
     fn shear_carries_the_drag(scene: &Scene, rule: ContactRule) {
-        let Setup { body, approach, drive, .. } = Setup::new(scene).unwrap();
+        let Simulation { body, approach, drive, .. } = Simulation::new(scene).unwrap();
         assert_eq!(body.indenter(&approach, &drive).unwrap().contact, rule);
         let mut solver = body.solver(Options::default()).unwrap();
         body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn without_friction_and_limits_there_is_nothing_to_say() {
-        let Setup { body, approach, drive, .. } = Setup::new(&scene("")).unwrap();
+        let Simulation { body, approach, drive, .. } = Simulation::new(&scene("")).unwrap();
         let mut solver = body.solver(Options::default()).unwrap();
         body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
         assert!(body.shear_mpa(&solver, &[0, 1]).is_empty());
@@ -143,7 +143,7 @@ mod tests {
         let mut shallow = deep.clone();
         shallow.motion.depth_mm = Some(0.05);
         let [little, much] = [shallow, deep].map(|scene| {
-            let Setup { body, approach, drive, .. } = Setup::new(&scene).unwrap();
+            let Simulation { body, approach, drive, .. } = Simulation::new(&scene).unwrap();
             let mut solver = body.solver(Options::default()).unwrap();
             let mut flags = Vec::new();
             let keep = &mut |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| {

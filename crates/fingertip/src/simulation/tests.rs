@@ -4,7 +4,7 @@ use super::body::{Body, PressError};
 use super::drive::{Approach, Drive};
 use super::laws::solids;
 use super::record::IncrementRecord;
-use super::setup::Setup;
+use super::setup::Simulation;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order, Parts};
 use crate::scene::Pose;
@@ -226,7 +226,8 @@ fn what_only_meshing_finds_names_its_line_too() {
         ),
     ];
     for (text, line) in cases {
-        let Err(error) = Setup::new(&Scene::parse(Path::new("bad.toml"), text.clone()).unwrap())
+        let Err(error) =
+            Simulation::new(&Scene::parse(Path::new("bad.toml"), text.clone()).unwrap())
         else {
             panic!("{text} was set up")
         };

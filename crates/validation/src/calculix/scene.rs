@@ -5,16 +5,16 @@ use super::{
     refuse_inexpressible,
 };
 use papilla_fingertip::scene::{Scene, TissueError};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::PressError;
 use papilla_fingertip::simulation::drive::Drive;
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_fingertip::tissue::Tissue;
 use papilla_sdf::{IndenterSpec, RoundedPlate};
 
 /// A scene set up for our solver, and what a deck of it needs.
 pub struct SceneDeck {
     /// The scene as our solver takes it.
-    pub setup: Setup,
+    pub setup: Simulation,
     /// What CalculiX takes the tissues for.
     pub cards: [Option<MaterialCard>; Tissue::ALL.len()],
     /// What presses.
@@ -46,7 +46,7 @@ impl SceneDeck {
     pub fn new(scene: &Scene) -> Result<Self, SceneDeckError> {
         refuse_inexpressible(scene)?;
         let shape = RigidShape::of(&scene.indenter)?;
-        let setup = Setup::new(scene)?;
+        let setup = Simulation::new(scene)?;
         let outputs = match &setup.drive {
             Drive::Depths(depths) => {
                 let last = depths.last().copied().unwrap_or(1.0);

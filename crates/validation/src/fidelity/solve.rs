@@ -11,11 +11,11 @@ use papilla_fingertip::campaign::{CampaignSpec, Press};
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{EffectName, Geometry, Scene};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, PressError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_fingertip::tissue::{NoTissue, Tissue};
 
 /// Where every field is read.
@@ -55,7 +55,7 @@ fn surfaces(body: &Body) -> Option<Surfaces> {
 }
 
 /// The campaign's finger as a rung has it.
-fn setup(spec: &CampaignSpec, rung: Rung) -> Result<Setup, RungsError> {
+fn setup(spec: &CampaignSpec, rung: Rung) -> Result<Simulation, RungsError> {
     let failed =
         |source: PressError| RungsError::Rung { rung: rung.name(), source: Box::new(source) };
     let candidates = spec.candidates();
@@ -77,7 +77,7 @@ fn setup(spec: &CampaignSpec, rung: Rung) -> Result<Setup, RungsError> {
     }
     let scene = Scene { geometry, effects, ..scene };
     scene.validate().map_err(|e| failed(e.into()))?;
-    Setup::new(&scene).map_err(failed)
+    Simulation::new(&scene).map_err(failed)
 }
 
 /// A rung's finger, ready to be pressed.
@@ -98,7 +98,7 @@ impl Prepared {
         target: &Target,
     ) -> Result<Self, RungsError> {
         let begun_s = processor::thread_s();
-        let Setup { body, plan, .. } = setup(spec, rung)?;
+        let Simulation { body, plan, .. } = setup(spec, rung)?;
         let setup_s = processor::thread_s() - begun_s;
         let name = rung.name();
         let Some((skin, interface, triangles)) = surfaces(&body) else {

@@ -6,10 +6,10 @@ use crate::verify::bodies::noise;
 use crate::verify::{CaseError, Check};
 use papilla_fem::linear::{Elimination, Structure};
 use papilla_fem::solve::{Effort, Loading, Options, Problem, StepReport};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::relative_l2;
-use papilla_fingertip::simulation::setup::Setup;
 
 /// A repeatable draw of a problem.
 struct Draw {
@@ -120,8 +120,8 @@ fn find(
 }
 
 /// The same body with another elimination order.
-fn eliminated(seed: u64, elimination: Elimination) -> Result<Setup, CaseError> {
-    let mut setup = Setup::new(&scene(&random_scene(seed, "linear", 1))?)?;
+fn eliminated(seed: u64, elimination: Elimination) -> Result<Simulation, CaseError> {
+    let mut setup = Simulation::new(&scene(&random_scene(seed, "linear", 1))?)?;
     let Problem { mesh, fixed, .. } = &setup.body.problem;
     setup.body.problem.structure = Structure::eliminated(mesh, fixed, elimination)?;
     Ok(setup)
@@ -141,8 +141,8 @@ pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
 }
 
 fn one(seed: u64) -> Result<(Line, Vec<u64>), CaseError> {
-    let Setup { body, approach, drive, .. } =
-        Setup::new(&scene(&random_scene(seed, "linear", 1))?)?;
+    let Simulation { body, approach, drive, .. } =
+        Simulation::new(&scene(&random_scene(seed, "linear", 1))?)?;
     let usual = find(&body, &approach, &drive, Options::default(), 1)?;
     let again = find(&body, &approach, &drive, Options::default(), 1)?;
     let exact = find(&body, &approach, &drive, tight(), 1)?;
@@ -160,7 +160,7 @@ fn one(seed: u64) -> Result<(Line, Vec<u64>), CaseError> {
     for (name, elimination) in
         [("Cuthill-McKee", Elimination::CuthillMckee), ("natural order", Elimination::Natural)]
     {
-        let Setup { body, approach, drive, .. } = eliminated(seed, elimination)?;
+        let Simulation { body, approach, drive, .. } = eliminated(seed, elimination)?;
         let other = find(&body, &approach, &drive, tight(), 1)?;
         checks.push(Check::vanishes(name, other.from(&exact), 1e-6, "nested dissection"));
     }
@@ -180,7 +180,8 @@ fn one(seed: u64) -> Result<(Line, Vec<u64>), CaseError> {
 
 /// Contact force of a problem, to tight tolerances, N.
 fn force_n(seed: u64, order: &str, per: u32) -> Result<[f64; 3], CaseError> {
-    let Setup { body, approach, drive, .. } = Setup::new(&scene(&random_scene(seed, order, per))?)?;
+    let Simulation { body, approach, drive, .. } =
+        Simulation::new(&scene(&random_scene(seed, order, per))?)?;
     Ok(find(&body, &approach, &drive, tight(), 1)?.force_n)
 }
 
@@ -188,8 +189,8 @@ fn force_n(seed: u64, order: &str, per: u32) -> Result<[f64; 3], CaseError> {
 /// bits.
 fn threads(seeds: &[u64], alone: &[Vec<u64>]) -> Result<Line, CaseError> {
     let solve = |seed: u64| -> Result<Vec<u64>, CaseError> {
-        let Setup { body, approach, drive, .. } =
-            Setup::new(&scene(&random_scene(seed, "linear", 1))?)?;
+        let Simulation { body, approach, drive, .. } =
+            Simulation::new(&scene(&random_scene(seed, "linear", 1))?)?;
         Ok(find(&body, &approach, &drive, Options::default(), 1)?.bits())
     };
     let (even, odd): (Vec<_>, Vec<_>) = seeds.iter().copied().partition(|s| s % 2 == 0);

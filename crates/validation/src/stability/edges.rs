@@ -4,8 +4,8 @@ use super::lab::{press, press_body, scene, solve, tight};
 use super::{Line, Suite};
 use crate::verify::{CaseError, Check};
 use papilla_fem::solve::{Loading, Options, Problem};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, PressError};
-use papilla_fingertip::simulation::setup::Setup;
 
 /// What a wedge may end with that is sharper than its mesh can follow: what was not reached or
 /// what happened there, and what to do.
@@ -116,7 +116,7 @@ fn row_led_down(body: &Body, depth_mm: f64) -> Result<f64, CaseError> {
 
 /// A wedge on the block's middle row, or a little beside it: the row led down, or refused.
 fn on_a_row(variant: &str, text: &str) -> Result<Line, CaseError> {
-    let Setup { body, approach, drive, .. } = Setup::new(&scene(text)?)?;
+    let Simulation { body, approach, drive, .. } = Simulation::new(&scene(text)?)?;
     Ok(match press_body(&body, &approach, &drive, tight()) {
         Ok(pressed) => {
             let due_mj = row_led_down(&body, pressed.record.depth_mm)?;
@@ -167,7 +167,7 @@ pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
             let variant = format!("block, {place}, tip {tip} mm");
             lines.push(on_a_row(&variant, &block(tip, aside_mm, depth_mm))?);
         }
-        let between = Setup::new(&scene(&block(tip, 0.25, 0.6))?).map(drop);
+        let between = Simulation::new(&scene(&block(tip, 0.25, 0.6))?).map(drop);
         let words = &["between the nodes", "finer mesh"];
         lines.push(Line::refused(format!("block, between nodes, tip {tip} mm"), between, words));
     }

@@ -5,7 +5,7 @@ use crate::verify::{CaseError, Check};
 use papilla_fem::mesh::gmsh::read;
 use papilla_fem::solve::Options;
 use papilla_fingertip::scene::Scene;
-use papilla_fingertip::simulation::setup::Setup;
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::tissue::Tissue;
 use std::fmt::Write as _;
 
@@ -156,7 +156,8 @@ fn loose() -> Result<Vec<Line>, CaseError> {
         let text = "[geometry]\nkind = \"mesh\"\nfile = \"body.msh\"\nfixed = [\"fixed\"]\n\
                     contact = \"contact\"\n[motion]\ndepth_mm = 0.1\n";
         let scene = Scene::parse(&folder.path().join("scene.toml"), text.into())?;
-        let solved = Setup::new(&scene).and_then(|s| s.body.solver(Options::default()).map(drop));
+        let solved =
+            Simulation::new(&scene).and_then(|s| s.body.solver(Options::default()).map(drop));
         lines.push(Line::refused(variant, solved, &words));
     }
     Ok(lines)

@@ -5,10 +5,10 @@ use crate::verify::Check;
 use papilla_dataset::{BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIVE_MAX};
 use papilla_fem::solve::{Effort, Loading, Options, Problem, SolveError, Solver, StepReport};
 use papilla_fingertip::scene::{Scene, SceneError};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, PressError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
-use papilla_fingertip::simulation::setup::Setup;
 use std::path::Path;
 
 /// The deepest state of a press, and what all of it took.
@@ -79,7 +79,7 @@ pub(super) fn scene(text: &str) -> Result<Scene, SceneError> {
 
 /// Presses what a scene describes and gives its last state.
 pub(super) fn press(scene: &Scene, options: Options) -> Result<Pressed, PressError> {
-    let Setup { body, approach, drive, .. } = Setup::new(scene)?;
+    let Simulation { body, approach, drive, .. } = Simulation::new(scene)?;
     press_body(&body, &approach, &drive, options)
 }
 

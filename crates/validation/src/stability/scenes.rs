@@ -17,8 +17,8 @@ pub use table::Row;
 
 use papilla_fingertip::campaign::{CampaignSpec, Press, SpecError, presses};
 use papilla_fingertip::mesh::fingertip::Density;
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::PressError;
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_output::OutputError;
 use queue::Queue;
 use record::Record;
@@ -125,7 +125,7 @@ pub fn run(
     let (record, known) = Record::open(folder, &drawn_from(&spec))?;
     let (mut records, todo) = split(scenes(&spec), known);
     let reused = records.len();
-    let Setup { body, approach, .. } = Setup::new(&spec.scene(&spec.candidates()[0]))?;
+    let Simulation { body, approach, .. } = Simulation::new(&spec.scene(&spec.candidates()[0]))?;
     begun(reused);
     let queue = Queue {
         body: &body,

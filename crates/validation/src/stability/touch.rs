@@ -4,9 +4,9 @@ use super::lab::{Pressed, press, scene, solve, tight};
 use super::{Hardness, Line, Suite};
 use crate::verify::{CaseError, Check};
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Solver, StepReport};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
-use papilla_fingertip::simulation::setup::Setup;
 use papilla_sdf::{Placement, Sphere, first_touch_travel};
 
 /// A layered block under a sphere.
@@ -42,7 +42,7 @@ pub(super) fn lost_and_regained(suite: &Suite) -> Result<Vec<Line>, CaseError> {
         "path = [{ time_s = 1.0, depth_mm = 0.5 }, { time_s = 2.0, depth_mm = -0.5 },
                  { time_s = 3.0, depth_mm = 0.5 }]",
     );
-    let Setup { body, approach, .. } = Setup::new(&scene(&text)?)?;
+    let Simulation { body, approach, .. } = Simulation::new(&scene(&text)?)?;
     lines.extend(cycle("block", &body, &approach, 0.5)?);
     if suite.quick() {
         return Ok(lines);
@@ -160,7 +160,7 @@ pub(super) fn gaps(_: &Suite) -> Result<Vec<Line>, CaseError> {
 }
 
 fn against_touch(gaps: &[(&str, f64)]) -> Result<Vec<Line>, CaseError> {
-    let Setup { body, approach, .. } = Setup::new(&scene(&block("depth_mm = 0.5"))?)?;
+    let Simulation { body, approach, .. } = Simulation::new(&scene(&block("depth_mm = 0.5"))?)?;
     let (due, _, due_n) = from_gap(&body, &approach, 0.0)?;
     let mut lines = Vec::new();
     for &(name, gap) in gaps {

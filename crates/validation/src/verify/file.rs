@@ -3,7 +3,7 @@
 use super::{CaseError, Check, Context};
 use papilla_fem::solve::Options;
 use papilla_fingertip::scene::Scene;
-use papilla_fingertip::simulation::setup::Setup;
+use papilla_fingertip::simulation::Simulation;
 use std::path::Path;
 
 const SOURCE: &str = "the same elements made by this code";
@@ -40,7 +40,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
 /// Force, greatest pressure and stored energy of the last state.
 fn press(folder: &Path, text: &str) -> Result<[f64; 3], CaseError> {
     let scene = Scene::parse(&folder.join("scene.toml"), text.into())?;
-    let setup = Setup::new(&scene)?;
+    let setup = Simulation::new(&scene)?;
     let options =
         Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-7, ..Options::default() };
     let mut solver = setup.body.solver(options)?;

@@ -15,9 +15,9 @@ use papilla_fem::mesh::probe::ProbeError;
 use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::{Geometry, Scene, SceneError};
+use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::PressError;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_fingertip::simulation::setup::Setup;
 use reading::Reading;
 use std::time::Instant;
 
@@ -106,7 +106,7 @@ pub fn run(reading: Reading, density: Density) -> Result<Outcome, S2Error> {
         return Err(S2Error::Scene("geometry.kind has to be \"section\"".into()));
     };
     let clock = Instant::now();
-    let setup = Setup::new(&scene)?;
+    let setup = Simulation::new(&scene)?;
     let body = &setup.body;
     // Nodes at the tip's edges press ten times stiffer tissue than the penalty is made for.
     let options = Options { augmentations_max: 40, ..Options::default() };

@@ -9,7 +9,7 @@ use crate::verify::CaseError;
 use crate::verify::bodies::internal_force;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::Mesh;
-use papilla_fem::mesh::lattice::cube;
+use papilla_fem::mesh::lattice::{REGION, cube};
 use papilla_fem::mesh::supports::{hold, prescribe};
 use papilla_fem::solve::{Loading, Options, Problem, Solver};
 use papilla_fingertip::tissue::Tissue;
@@ -107,7 +107,7 @@ fn calculix(
 ) -> Result<Answer, CaseError> {
     let (mesh, fixed, values) = body(kind, motion);
     let mut materials = [const { None }; Tissue::ALL.len()];
-    materials[Tissue::Dermis.index()] = Some(card.clone());
+    materials[REGION.index()] = Some(card.clone());
     let deck = Deck {
         title: job,
         mesh: &mesh,
@@ -132,7 +132,7 @@ fn calculix(
 fn solver(card: &MaterialCard, kind: ElementKind, motion: Motion) -> Result<Answer, CaseError> {
     let (mesh, fixed, prescribed_mm) = body(kind, motion);
     let mut cards = [const { None }; Tissue::ALL.len()];
-    cards[Tissue::Dermis.index()] = Some(card.clone());
+    cards[REGION.index()] = Some(card.clone());
     let problem = Problem::new(mesh, laws(&cards)?, fixed, None)?;
     let options = Options { residual_tolerance: 1e-12, ..Options::default() };
     let mut solver = Solver::new(&problem, options)?;
