@@ -1,6 +1,6 @@
 //! The operator on disk: `operator.npz` and `operator.json`.
 
-use papilla_fingertip::influence::{COMPONENTS, Operator, Quality};
+use papilla_fingertip::influence::{COMPONENTS, InfluenceOperator, Quality};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::TissueTable;
 use papilla_output::npz::NpzBuilder;
@@ -62,7 +62,7 @@ impl Card {
     /// The card of an operator.
     #[must_use]
     pub fn new(
-        operator: &Operator,
+        operator: &InfluenceOperator,
         density: Density,
         order: Order,
         materials: &TissueTable,
@@ -89,7 +89,7 @@ impl Card {
 ///
 /// # Errors
 /// [`OutputError`] if the folder is not writable.
-pub fn write(folder: &Path, operator: &Operator, card: &Card) -> Result<(), OutputError> {
+pub fn write(folder: &Path, operator: &InfluenceOperator, card: &Card) -> Result<(), OutputError> {
     atomic::create_folder(folder)?;
     let v = operator.vertices();
     let mut npz = NpzBuilder::new();

@@ -33,8 +33,8 @@ pub use limits::{
     BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIVE_MAX, fault, worst_checks,
 };
 pub use manifest::{
-    DroppedSample, FORMAT, FailedPress, Manifest, PressEntry, Split, Splits, Units, dataset_sha256,
-    sha256_hex,
+    DroppedSample, FORMAT, FailedIndentation, IndentationEntry, Manifest, Split, Splits, Units,
+    dataset_sha256, sha256_hex,
 };
 pub use reader::{Dataset, VerifyReport, verify};
 pub use record::{Checks, Pose, Sample};

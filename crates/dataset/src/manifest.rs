@@ -35,9 +35,9 @@ pub struct Manifest {
     /// Names of the columns of the shards' `checks` array.
     pub check_columns: Vec<String>,
     /// The presses that are in the dataset, by rising id.
-    pub presses: Vec<PressEntry>,
+    pub presses: Vec<IndentationEntry>,
     /// Presses that did not converge; they have no shard.
-    pub failed: Vec<FailedPress>,
+    pub failed: Vec<FailedIndentation>,
     /// Samples that failed their own checks; they are not in the shards.
     pub dropped: Vec<DroppedSample>,
     /// Ids of the presses of each split.
@@ -87,7 +87,7 @@ pub struct Splits {
 
 /// One press of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PressEntry {
+pub struct IndentationEntry {
     /// Number within the campaign.
     pub id: usize,
     /// Its shard, relative to the manifest.
@@ -114,7 +114,7 @@ pub struct PressEntry {
 
 /// A press without a shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct FailedPress {
+pub struct FailedIndentation {
     /// Number within the campaign.
     pub id: usize,
     /// Name of the indenter in the campaign.
@@ -124,7 +124,7 @@ pub struct FailedPress {
     /// Orientation of the indenter.
     #[serde(flatten)]
     pub pose: Pose,
-    /// Where the indenter's axis meets the skin, mm, as in [`PressEntry`].
+    /// Where the indenter's axis meets the skin, mm, as in [`IndentationEntry`].
     pub offset_mm: [f64; 2],
     /// The solver's own words.
     pub error: String,

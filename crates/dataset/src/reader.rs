@@ -1,7 +1,7 @@
 //! Opening a dataset, and making sure that it is what it says.
 
 use super::shard::{Shard, raster_npz};
-use super::{DatasetError, FORMAT, Manifest, PressEntry, dataset_sha256, sha256_hex};
+use super::{DatasetError, FORMAT, IndentationEntry, Manifest, dataset_sha256, sha256_hex};
 use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, Patch};
 use papilla_output::npz::NpzArrays;
@@ -59,7 +59,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`] when it is absent, altered or damaged.
-    pub fn shard(&self, press: &PressEntry) -> Result<Shard, DatasetError> {
+    pub fn shard(&self, press: &IndentationEntry) -> Result<Shard, DatasetError> {
         let name = Path::new(&press.file);
         let path = self.folder.join(name);
         if !name.components().all(|c| matches!(c, Component::Normal(_))) {

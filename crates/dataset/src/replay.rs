@@ -1,6 +1,6 @@
 //! A few held-out presses for the service's page, next to their FE truth.
 
-use super::{Dataset, DatasetError, PressEntry, Split};
+use super::{Dataset, DatasetError, IndentationEntry, Split};
 use crate::record::Pose;
 use papilla_output::atomic;
 use serde::Serialize;
@@ -31,7 +31,7 @@ struct Replay {
 /// [`DatasetError`] when the dataset is damaged or `path` is not writable.
 pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, DatasetError> {
     let dataset = Dataset::open(folder)?;
-    let held_out: Vec<&PressEntry> =
+    let held_out: Vec<&IndentationEntry> =
         dataset.manifest().presses.iter().filter(|p| p.split == Split::Test).collect();
     let count = count.min(held_out.len());
     let mut presses = Vec::with_capacity(count);

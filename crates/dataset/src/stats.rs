@@ -1,8 +1,8 @@
 //! What is in a dataset: ranges, worst checks, a table per depth.
 
 use super::{
-    Dataset, DatasetError, DroppedSample, FailedPress, PressEntry, Shard, contact_sheet,
-    worst_checks,
+    Dataset, DatasetError, DroppedSample, FailedIndentation, IndentationEntry, Shard,
+    contact_sheet, worst_checks,
 };
 use crate::record::Checks;
 use papilla_atlas::{Atlas, Patch};
@@ -90,7 +90,7 @@ pub struct StatsReport {
     /// The worst of each check over all samples.
     pub worst_checks: Checks,
     /// Presses that failed.
-    pub failed: Vec<FailedPress>,
+    pub failed: Vec<FailedIndentation>,
     /// Samples that were left out.
     pub dropped: Vec<DroppedSample>,
     /// Where the contact sheet was written, if one was asked for.
@@ -159,7 +159,7 @@ fn report(
 ) -> Result<StatsReport, DatasetError> {
     let m = dataset.manifest();
     let empty = || DatasetError::Empty { path: dataset.folder().join("manifest.json") };
-    let range = |value: fn(&PressEntry) -> f64| {
+    let range = |value: fn(&IndentationEntry) -> f64| {
         Range::of(m.presses.iter().map(value).collect()).ok_or_else(empty)
     };
     let samples =

@@ -7,7 +7,7 @@ use papilla_fem::tensor::norm;
 use papilla_fingertip::scene::effects::EFFECTS;
 use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_fingertip::simulation::record::relative_l2;
@@ -94,9 +94,9 @@ pub struct Study {
 /// Solves `scene` and every variant of it; `visit` is told of each before.
 ///
 /// # Errors
-/// [`PressError`] if the scene itself cannot be solved; variants report theirs in
+/// [`SimulationError`] if the scene itself cannot be solved; variants report theirs in
 /// [`Outcome`].
-pub fn run(scene: &Scene, visit: &mut dyn FnMut(&str)) -> Result<Study, PressError> {
+pub fn run(scene: &Scene, visit: &mut dyn FnMut(&str)) -> Result<Study, SimulationError> {
     visit("as it stands");
     let base = solve(scene)?;
     let mut switched = Vec::new();
@@ -149,7 +149,7 @@ fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'sta
     (Scene { effects, ..scene.clone() }, along)
 }
 
-fn solve(scene: &Scene) -> Result<Solved, PressError> {
+fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
     let begun_s = processor::thread_s();
     let setup = Simulation::new(scene)?;
     let mut solver = setup.body.solver(Options::default())?;
@@ -160,9 +160,9 @@ fn solve(scene: &Scene) -> Result<Solved, PressError> {
         last = Some(record.clone());
     })?;
     let solve_s = processor::thread_s() - ready_s;
-    let last = last.ok_or(PressError::Empty)?;
+    let last = last.ok_or(SimulationError::Empty)?;
     Ok(Solved {
-        unknowns: setup.body.problem.structure.equations.count,
+        unknowns: setup.body.problem.system.dofs.count,
         setup_s: ready_s - begun_s,
         solve_s,
         effort,

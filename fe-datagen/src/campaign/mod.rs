@@ -17,4 +17,4 @@ mod tests;
 
 pub use error::{BoxError, CampaignError};
 pub use report::CampaignReport;
-pub use run::{PressSolver, RunOptions, run};
+pub use run::{IndentationSolver, RunOptions, run};

@@ -1,7 +1,7 @@
 //! What a finished campaign says of itself.
 
 use super::progress::clock;
-use papilla_dataset::{DroppedSample, FailedPress};
+use papilla_dataset::{DroppedSample, FailedIndentation};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub struct CampaignReport {
     /// Samples that the campaign asks for.
     pub samples_due: usize,
     /// Presses that failed.
-    pub failed: Vec<FailedPress>,
+    pub failed: Vec<FailedIndentation>,
     /// Samples that failed their own checks.
     pub dropped: Vec<DroppedSample>,
     /// Largest pressure, Pa.

@@ -1,13 +1,13 @@
 //! Solving the presses of a campaign in parallel.
 
 use super::assemble::manifest;
-use super::state::{Outcome, PressState, Workspace};
+use super::state::{IndentationState, Outcome, Workspace};
 use super::{BoxError, CampaignError, CampaignReport, progress};
 use indicatif::ProgressBar;
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::Sample;
-use papilla_fingertip::campaign::{CampaignSpec, Press, presses};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
 use papilla_output::atomic;
 use std::any::Any;
 use std::num::NonZero;
@@ -18,14 +18,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Solves one press after another; each worker thread has its own.
-pub trait PressSolver {
+pub trait IndentationSolver {
     /// Presses to each of the depths and returns one equilibrium per depth, with
     /// values at the vertices of the campaign's atlas. Equal presses have to give
     /// equal records (`seconds` apart), whatever was solved before.
     ///
     /// # Errors
     /// What did not converge and where; it is recorded in the manifest.
-    fn solve(&mut self, press: &Press) -> Result<Vec<Sample>, BoxError>;
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError>;
 }
 
 /// How to run, as opposed to what.
@@ -53,7 +53,7 @@ impl Default for RunOptions {
 /// [`CampaignError`] when the campaign makes no sense, the folder belongs to
 /// another one or is in use, no solver can be built, a file cannot be written,
 /// or every press failed. Single failures are in the report and the manifest.
-pub fn run<S: PressSolver>(
+pub fn run<S: IndentationSolver>(
     spec: &CampaignSpec,
     atlas: &Atlas,
     solver: impl Fn() -> Result<S, BoxError> + Sync,
@@ -65,7 +65,7 @@ pub fn run<S: PressSolver>(
     let workspace = Workspace::open(folder, spec, atlas)?;
     dataset::write_atlas(folder, atlas)?;
     let (mut done, mut todo) = (Vec::new(), Vec::new());
-    for press in presses(spec) {
+    for press in indentations(spec) {
         match workspace.load(&press) {
             Some(state) if !(options.retry_failed && is_failed(&state)) => done.push(state),
             _ => todo.push(press),
@@ -121,11 +121,11 @@ pub fn run<S: PressSolver>(
     })
 }
 
-fn is_failed(state: &PressState) -> bool {
+fn is_failed(state: &IndentationState) -> bool {
     matches!(state.outcome, Outcome::Failed { .. })
 }
 
-fn is_in(todo: &[Press], id: usize) -> bool {
+fn is_in(todo: &[Indentation], id: usize) -> bool {
     todo.binary_search_by_key(&id, |press| press.id).is_ok()
 }
 
@@ -133,17 +133,17 @@ fn is_in(todo: &[Press], id: usize) -> bool {
 struct Queue<'a> {
     vertex_count: usize,
     workspace: &'a Workspace,
-    todo: &'a [Press],
+    todo: &'a [Indentation],
     next: AtomicUsize,
     stop: AtomicBool,
     bar: &'a ProgressBar,
-    results: Mutex<Vec<Result<PressState, CampaignError>>>,
+    results: Mutex<Vec<Result<IndentationState, CampaignError>>>,
 }
 
 impl Queue<'_> {
     /// One worker: takes the next press until none is left or one worker met
     /// an error that stops all.
-    fn work<S: PressSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
+    fn work<S: IndentationSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
         let mut solver = None;
         while !self.stop.load(Ordering::Relaxed) {
             let Some(press) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else {
@@ -163,16 +163,16 @@ impl Queue<'_> {
         self.push(Err(error));
     }
 
-    fn push(&self, result: Result<PressState, CampaignError>) {
+    fn push(&self, result: Result<IndentationState, CampaignError>) {
         self.results.lock().unwrap_or_else(|poison| poison.into_inner()).push(result);
     }
 
-    fn press<S: PressSolver>(
+    fn press<S: IndentationSolver>(
         &self,
-        press: &Press,
+        press: &Indentation,
         solver: &mut Option<S>,
         build: &(impl Fn() -> Result<S, BoxError> + Sync),
-    ) -> Result<PressState, CampaignError> {
+    ) -> Result<IndentationState, CampaignError> {
         let mut ready = match solver.take() {
             Some(ready) => ready,
             None => build().map_err(CampaignError::Simulation)?,
@@ -202,7 +202,7 @@ impl Queue<'_> {
                 tracing::info!(press = id, seconds, samples, "press solved");
             }
         }
-        let state = PressState { press: press.clone(), seconds, outcome };
+        let state = IndentationState { press: press.clone(), seconds, outcome };
         self.workspace.store(&state, shard.as_deref())?;
         Ok(state)
     }
@@ -232,7 +232,7 @@ impl Queue<'_> {
 }
 
 /// Each depth has to have its record, in order.
-fn complete(press: &Press, records: Vec<Sample>) -> Result<Vec<Sample>, String> {
+fn complete(press: &Indentation, records: Vec<Sample>) -> Result<Vec<Sample>, String> {
     let due = &press.depths_mm;
     // A depth that is no number is left to the sample's own checks.
     let fit = |r: &Sample, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;

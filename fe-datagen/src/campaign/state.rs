@@ -3,7 +3,7 @@
 use super::CampaignError;
 use papilla_atlas::Atlas;
 use papilla_dataset::{Checks, FORMAT, sha256_hex, shard_file};
-use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_output::{OutputError, atomic};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -20,8 +20,8 @@ struct Owner {
 
 /// What became of one press; written after its shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct PressState {
-    pub press: Press,
+pub(super) struct IndentationState {
+    pub press: Indentation,
     /// Wall time, s. Not part of the dataset: it is never the same twice.
     pub seconds: f64,
     pub outcome: Outcome,
@@ -97,8 +97,8 @@ impl Workspace {
 
     /// What an earlier run left of a press: only what can be trusted, that is a
     /// readable record whose shard is there and has the recorded hash.
-    pub(super) fn load(&self, press: &Press) -> Option<PressState> {
-        let state: PressState = atomic::read_json(&self.record_path(press.id)).ok()?;
+    pub(super) fn load(&self, press: &Indentation) -> Option<IndentationState> {
+        let state: IndentationState = atomic::read_json(&self.record_path(press.id)).ok()?;
         if state.press != *press {
             return None;
         }
@@ -114,7 +114,7 @@ impl Workspace {
     /// Stores a press: the shard first, then the record that vouches for it.
     pub(super) fn store(
         &self,
-        state: &PressState,
+        state: &IndentationState,
         shard: Option<&[u8]>,
     ) -> Result<(), OutputError> {
         let path = self.folder.join(shard_file(state.press.id));

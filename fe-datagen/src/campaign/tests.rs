@@ -6,7 +6,7 @@ use papilla_atlas::Atlas;
 use papilla_dataset::testing::{atlas, posed_record};
 use papilla_dataset::{Dataset, ImageOptions, Sample, Split, images, stats, verify};
 use papilla_fingertip::campaign::{
-    CampaignSpec, Candidate, DepthRange, PoseRanges, Press, presses,
+    CampaignSpec, Candidate, DepthRange, Indentation, PoseRanges, indentations,
 };
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::Pose;
@@ -36,8 +36,8 @@ struct Formula<'a> {
     calls: &'a AtomicUsize,
 }
 
-impl PressSolver for Formula<'_> {
-    fn solve(&mut self, press: &Press) -> Result<Vec<Sample>, BoxError> {
+impl IndentationSolver for Formula<'_> {
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
         let Pose { pitch_deg, roll_deg, yaw_deg } = press.pose;
         let pose = papilla_dataset::Pose { pitch_deg, roll_deg, yaw_deg };
         let call = self.calls.fetch_add(1, Ordering::SeqCst);
@@ -248,7 +248,7 @@ fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let s1 = CampaignSpec::read(&root.join("campaigns/s1.toml")).unwrap();
     let shipped = Dataset::open(&root.join("data/s1")).unwrap();
-    let planned = presses(&s1);
+    let planned = indentations(&s1);
     for entry in &shipped.manifest().presses {
         let press = &planned[entry.id];
         let (due, found) = (press.pose, entry.pose);
@@ -275,7 +275,7 @@ fn the_manifest_names_the_indenter_of_every_press() {
     assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
     assert_eq!((report.samples_due, report.failed.len()), (20, 1));
     let manifest = Dataset::open(folder.path()).unwrap().manifest().clone();
-    let planned = presses(&spec);
+    let planned = indentations(&spec);
     for entry in &manifest.presses {
         assert_eq!(entry.indenter, planned[entry.id].indenter);
         let bits = |offset: [f64; 2]| offset.map(f64::to_bits);

@@ -2,11 +2,11 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::campaign;
-use crate::campaign::{BoxError, PressSolver, RunOptions};
+use crate::campaign::{BoxError, IndentationSolver, RunOptions};
 use anyhow::Context as _;
 use papilla_dataset::{BALANCE_RELATIVE_MAX, Sample};
 use papilla_fem::solve::{Options, Solver};
-use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::Body;
@@ -42,8 +42,8 @@ struct BodySolver<'a> {
     approaches: &'a [Approach],
 }
 
-impl PressSolver for BodySolver<'_> {
-    fn solve(&mut self, press: &Press) -> Result<Vec<Sample>, BoxError> {
+impl IndentationSolver for BodySolver<'_> {
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
         let approach = Approach {
             pose: press.pose,
             offset_mm: press.offset_mm,

@@ -11,7 +11,7 @@ use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
 use papilla_output::map_image::{MapView, Quantity, white_of};
@@ -111,9 +111,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let summary = Summary {
         plan: setup.plan,
-        unknowns: body.problem.structure.equations.count,
+        unknowns: body.problem.system.dofs.count,
         elements: body.problem.mesh.element_count(),
-        factor_entries: body.problem.structure.factor_entries(),
+        factor_entries: body.problem.system.factor_entries(),
         atlas_hash: atlas.as_ref().map(|a| a.hash().to_owned()),
         setup_s,
         solve_s: clock.elapsed().as_secs_f64(),
@@ -145,7 +145,7 @@ fn press(
     setup: &Simulation,
     solver: &mut Solver<'_>,
     out: Option<&PathBuf>,
-) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
+) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
     let Simulation { body, approach, drive, .. } = setup;
     let bar = super::progress("pressing", drive.len());
     let mut written = Ok(());
@@ -300,7 +300,7 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
-        if i.contact.is_within_faces() {
+        if i.contact.is_gauss() {
             text += "         contact within faces: the indenter is too narrow for their nodes\n";
         }
         if i.outside_calibration > 0.0 {

@@ -21,9 +21,9 @@ use std::collections::BTreeMap;
 /// Nodes that may touch, with their share of the undeformed area, `integral N_a dA`.
 #[derive(Clone, Debug)]
 pub struct ContactSurface {
-    at_nodes: ContactPoints,
-    in_faces: ContactPoints,
-    in_faces_finely: ContactPoints,
+    nodal: ContactPoints,
+    gauss: ContactPoints,
+    gauss_order_3: ContactPoints,
 }
 
 impl ContactSurface {
@@ -41,23 +41,23 @@ impl ContactSurface {
             .filter(|&(_, a)| a > 0.0)
             .collect();
         let (nodes, area_mm2) = by_node.into_iter().unzip();
-        let at_nodes = ContactPoints::nodes(nodes, area_mm2);
-        let within = |rule: &[_]| ContactPoints::faces(surface, rule, positions, &at_nodes.node);
-        let in_faces = within(&surface.kind.contact_points());
-        let in_faces_finely = within(&surface.kind.quadrature());
-        Self { at_nodes, in_faces, in_faces_finely }
+        let nodal = ContactPoints::nodes(nodes, area_mm2);
+        let within = |rule: &[_]| ContactPoints::faces(surface, rule, positions, &nodal.node);
+        let gauss = within(&surface.kind.contact_points());
+        let gauss_order_3 = within(&surface.kind.quadrature());
+        Self { nodal, gauss, gauss_order_3 }
     }
 
     /// Mesh nodes, sorted.
     #[must_use]
     pub fn nodes(&self) -> &[u32] {
-        &self.at_nodes.node
+        &self.nodal.node
     }
 
     /// Nodal area, mm2.
     #[must_use]
     pub fn area_mm2(&self) -> &[f64] {
-        &self.at_nodes.area_mm2
+        &self.nodal.area_mm2
     }
 
     /// Distance of neighbours, mm: the side of the square of a node's mean area.
@@ -72,9 +72,9 @@ impl ContactSurface {
     #[must_use]
     pub const fn points(&self, rule: ContactRule) -> &ContactPoints {
         match rule {
-            ContactRule::Nodes => &self.at_nodes,
-            ContactRule::Faces => &self.in_faces,
-            ContactRule::FacesFinely => &self.in_faces_finely,
+            ContactRule::Nodal => &self.nodal,
+            ContactRule::Gauss => &self.gauss,
+            ContactRule::GaussOrder3 => &self.gauss_order_3,
         }
     }
 }

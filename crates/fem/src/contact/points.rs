@@ -1,36 +1,39 @@
-//! Points of the skin at which contact is found.
+//! Points of a surface at which contact is found.
 
 use crate::mesh::Surface;
 use crate::tensor::norm;
 
-/// Where on the skin contact is looked for.
+/// Where on the surface contact is looked for; files know the rules as `nodes`, `faces` and
+/// `faces_finely`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
 pub enum ContactRule {
     /// At its nodes: one multiplier a node is what the displacement space can control, so
     /// pressure does not oscillate. An edge narrower than some three faces falls between.
     #[default]
-    Nodes,
+    #[serde(rename = "nodes")]
+    Nodal,
     /// At Gauss points of its faces, two by two on flat ones: an edge finds hold within a face
     /// and slides on to the next without a jump. These are more points than the displacement
     /// space can control, so that multipliers would not settle: a stiff penalty takes their place.
-    Faces,
-    /// As [`Self::Faces`], at more points on flat faces, three by three: a rounded edge that
+    #[serde(rename = "faces")]
+    Gauss,
+    /// As [`Self::Gauss`], at more points on flat faces, three by three: a rounded edge that
     /// lies along the rows of the fewer points can still jump from one to the next.
-    FacesFinely,
+    #[serde(rename = "faces_finely")]
+    GaussOrder3,
 }
 
 impl ContactRule {
     /// Whether multipliers close the gap that a penalty leaves.
     #[must_use]
     pub const fn has_multipliers(self) -> bool {
-        !self.is_within_faces()
+        !self.is_gauss()
     }
 
-    /// Whether it is the faces that feel, not their nodes.
+    /// Whether contact is at Gauss points of the faces, not at nodes.
     #[must_use]
-    pub const fn is_within_faces(self) -> bool {
-        matches!(self, Self::Faces | Self::FacesFinely)
+    pub const fn is_gauss(self) -> bool {
+        matches!(self, Self::Gauss | Self::GaussOrder3)
     }
 }
 

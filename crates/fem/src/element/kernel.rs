@@ -10,8 +10,8 @@
 //! tangent are plain derivatives: symmetric, and consistent by construction.
 //! With a law of small strain `J - 1` is `tr H` and its second derivative vanishes.
 
-use super::carried::{Carried, Dilatation};
 use super::geometry::{ElementGeometry, displacement_gradient};
+use super::independent::{Dilatation, IndependentDilatation};
 use crate::material::Isochoric;
 use crate::tensor::{Kinematics, Mat3, UNIT};
 use crate::tensor::{cofactor_derivative, trace};
@@ -60,7 +60,7 @@ const NODES_MAX: usize = 27;
 ///
 /// Overwrites `force` (N, one per node) and, if given, the tangent `stiffness`
 /// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only). With a dilatation
-/// carried along the tangent takes its pressure, see [`Carried`].
+/// carried along the tangent takes its pressure, see [`IndependentDilatation`].
 ///
 /// # Errors
 /// [`Inverted`] where `J <= 0`; outputs are then meaningless.
@@ -70,7 +70,7 @@ pub fn evaluate<P: Points>(
     law: &P,
     bulk_mpa: f64,
     u: &[[f64; 3]],
-    carried: Option<Carried<'_>>,
+    independent: Option<IndependentDilatation<'_>>,
     force: &mut [[f64; 3]],
     stiffness: Option<&mut [f64]>,
 ) -> Result<ElementState, Inverted> {
@@ -104,11 +104,11 @@ pub fn evaluate<P: Points>(
     let bulk = bulk_mpa;
     let mut energy = 0.5 * bulk * (0..m).map(|r| b[r] * theta[r]).sum::<f64>();
     set_volumetric(force, bulk, &theta, &volume_gradient[..m * n]);
-    let held = carried.as_ref().map_or(theta, |c| c.theta_minus_1);
+    let held = independent.as_ref().map_or(theta, |c| c.theta_minus_1);
     let at_point =
         |c: &Dilatation, q: usize| -> f64 { (0..m).map(|r| c[r] * geometry.basis[q][r]).sum() };
     let mut gap_squared_mm3 = 0.0;
-    if let Some(c) = carried {
+    if let Some(c) = independent {
         let gap: Dilatation = std::array::from_fn(|r| held[r] - theta[r]);
         set_volumetric(c.lag_n, bulk, &gap, &volume_gradient[..m * n]);
         for (q, weight) in geometry.weights.iter().enumerate() {

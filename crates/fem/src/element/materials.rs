@@ -1,6 +1,6 @@
 //! Regions of a body and what each is made of.
 
-use super::Solid;
+use super::ConstitutiveModel;
 use std::ops::Index;
 use std::sync::Arc;
 
@@ -20,14 +20,14 @@ impl Region {
 /// Constitutive model of each region.
 #[derive(Clone)]
 pub struct Materials {
-    models: Vec<Arc<dyn Solid>>,
+    models: Vec<Arc<dyn ConstitutiveModel>>,
     stiff: Vec<bool>,
 }
 
 impl Materials {
     /// `models` by [`Region::index`].
     #[must_use]
-    pub fn new(models: Vec<Arc<dyn Solid>>) -> Self {
+    pub fn new(models: Vec<Arc<dyn ConstitutiveModel>>) -> Self {
         let stiff = vec![false; models.len()];
         Self { models, stiff }
     }
@@ -46,7 +46,7 @@ impl Materials {
     }
 
     /// The models by region.
-    pub fn models(&self) -> impl Iterator<Item = &dyn Solid> {
+    pub fn models(&self) -> impl Iterator<Item = &dyn ConstitutiveModel> {
         self.models.iter().map(AsRef::as_ref)
     }
 
@@ -76,7 +76,7 @@ impl Materials {
 }
 
 impl Index<Region> for Materials {
-    type Output = dyn Solid;
+    type Output = dyn ConstitutiveModel;
 
     #[inline]
     fn index(&self, region: Region) -> &Self::Output {

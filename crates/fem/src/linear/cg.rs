@@ -2,7 +2,7 @@
 
 use super::dot::dot;
 use super::factor::NumericFactor;
-use super::structure::{Structure, SymmetricMatrix};
+use super::symbolic::{SymbolicSystem, SymmetricMatrix};
 
 /// Vectors of the iteration, re-used.
 #[derive(Clone, Debug, Default)]
@@ -30,7 +30,7 @@ pub struct CgOutcome {
 /// (`x` is then the best so far; zero if it was the first).
 #[allow(clippy::too_many_arguments)]
 pub fn conjugate_gradient(
-    structure: &Structure,
+    system: &SymbolicSystem,
     matrix: &SymmetricMatrix,
     preconditioner: &mut NumericFactor,
     b: &[f64],
@@ -56,7 +56,7 @@ pub fn conjugate_gradient(
     for iteration in 0..iterations_max {
         w.preconditioned.clear();
         w.preconditioned.extend_from_slice(&w.residual);
-        preconditioner.solve(structure, &mut w.preconditioned);
+        preconditioner.solve(system, &mut w.preconditioned);
         let rz = dot(&w.residual, &w.preconditioned);
         if iteration == 0 {
             w.direction.clear();
@@ -68,7 +68,7 @@ pub fn conjugate_gradient(
             }
         }
         rz_old = rz;
-        structure.multiply(matrix, &w.direction, &mut w.product);
+        system.multiply(matrix, &w.direction, &mut w.product);
         let curvature = dot(&w.direction, &w.product);
         if !(curvature > 0.0) {
             outcome.negative_curvature = true;

@@ -4,7 +4,7 @@
 //! in f64: half the memory and time, and it stays useful while the tangent
 //! drifts. Where the tangent is indefinite, `L B L^T` in f64 solves directly.
 
-use super::structure::{Structure, SymmetricMatrix};
+use super::symbolic::{SymbolicSystem, SymmetricMatrix};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
@@ -22,14 +22,14 @@ pub enum FactorError {
     Memory(usize),
 }
 
-fn scratch(structure: &Structure) -> StackReq {
-    let s = &structure.symbolic;
+fn scratch(system: &SymbolicSystem) -> StackReq {
+    let s = &system.symbolic;
     s.factorize_numeric_llt_scratch::<f32>(Par::Seq, Spec::default())
         .or(s.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, Spec::default()))
         .or(s.solve_in_place_scratch::<f64>(1, Par::Seq))
 }
 
-/// Memory for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
+/// HistoryVariables for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
 /// ([`NumericFactor::release`]): to factorize anew allocates nothing. Nothing can be solved with it.
 pub struct FactorMemory(Box<Buffers>);
 
@@ -44,29 +44,29 @@ struct Buffers {
 }
 
 impl FactorMemory {
-    /// Memory for factors on `structure`.
+    /// HistoryVariables for factors on `structure`.
     ///
     /// # Errors
-    /// [`FactorError::Memory`].
-    pub fn new(structure: &Structure) -> Result<Self, FactorError> {
-        let scratch = MemBuffer::try_new(scratch(structure))
-            .map_err(|_| FactorError::Memory(structure.factor_entries()))?;
+    /// [`FactorError::HistoryVariables`].
+    pub fn new(system: &SymbolicSystem) -> Result<Self, FactorError> {
+        let scratch = MemBuffer::try_new(scratch(system))
+            .map_err(|_| FactorError::Memory(system.factor_entries()))?;
         Ok(Self(Box::new(Buffers {
-            single: vec![0.0; structure.symbolic.len_val()],
-            single_matrix: vec![0.0; structure.row.len()],
+            single: vec![0.0; system.symbolic.len_val()],
+            single_matrix: vec![0.0; system.row.len()],
             double: Vec::new(),
             subdiagonal: Vec::new(),
             pivot: [Vec::new(), Vec::new()],
             scratch,
-            right_hand_side: vec![0.0; structure.equations.count],
+            right_hand_side: vec![0.0; system.dofs.count],
         })))
     }
 
     /// What it takes on `structure`, bytes, with an f32 factor.
     #[must_use]
-    pub fn bytes(structure: &Structure) -> usize {
-        scratch(structure).unaligned_bytes_required()
-            + 4 * (structure.factor_entries() + structure.row.len() + structure.equations.count)
+    pub fn bytes(system: &SymbolicSystem) -> usize {
+        scratch(system).unaligned_bytes_required()
+            + 4 * (system.factor_entries() + system.row.len() + system.dofs.count)
     }
 
     /// Factorizes by f32 Cholesky.
@@ -75,16 +75,16 @@ impl FactorMemory {
     /// Gives the memory back where the matrix is not positive definite.
     pub fn cholesky(
         mut self,
-        structure: &Structure,
+        system: &SymbolicSystem,
         matrix: &SymmetricMatrix,
     ) -> Result<NumericFactor, Self> {
         let b = &mut *self.0;
         for (s, v) in b.single_matrix.iter_mut().zip(&matrix.values) {
             *s = *v as f32;
         }
-        let result = structure.symbolic.factorize_numeric_llt(
+        let result = system.symbolic.factorize_numeric_llt(
             &mut b.single,
-            structure.lower(&b.single_matrix),
+            system.lower(&b.single_matrix),
             Side::Lower,
             LltRegularization::default(),
             Par::Seq,
@@ -101,21 +101,25 @@ impl FactorMemory {
     /// Factorizes an indefinite matrix as `L B L^T` in f64 (pivoting inside
     /// supernodes only).
     #[must_use]
-    pub fn indefinite(mut self, structure: &Structure, matrix: &SymmetricMatrix) -> NumericFactor {
-        let n = structure.equations.count;
+    pub fn indefinite(
+        mut self,
+        system: &SymbolicSystem,
+        matrix: &SymmetricMatrix,
+    ) -> NumericFactor {
+        let n = system.dofs.count;
         let b = &mut *self.0;
-        b.double.resize(structure.symbolic.len_val(), 0.0);
+        b.double.resize(system.symbolic.len_val(), 0.0);
         b.subdiagonal.resize(n, 0.0);
         for p in &mut b.pivot {
             p.resize(n, 0);
         }
         let [forward, inverse] = &mut b.pivot;
-        structure.symbolic.factorize_numeric_intranode_lblt(
+        system.symbolic.factorize_numeric_intranode_lblt(
             &mut b.double,
             &mut b.subdiagonal,
             forward,
             inverse,
-            structure.lower(&matrix.values),
+            system.lower(&matrix.values),
             Side::Lower,
             Par::Seq,
             MemStack::new(&mut b.scratch),
@@ -173,12 +177,12 @@ impl NumericFactor {
     /// singular value is at most its least diagonal entry, its largest at least the largest.
     /// `None` for an indefinite matrix.
     #[must_use]
-    pub fn condition_at_least(&self, structure: &Structure) -> Option<f64> {
+    pub fn condition_at_least(&self, system: &SymbolicSystem) -> Option<f64> {
         if self.kind != FactorKind::Preconditioner {
             return None;
         }
         let (mut least, mut largest) = (f32::INFINITY, 0.0f32);
-        structure.visit_diagonal(&mut |at| {
+        system.visit_diagonal(&mut |at| {
             least = least.min(self.buffers.single[at]);
             largest = largest.max(self.buffers.single[at]);
         });
@@ -186,7 +190,7 @@ impl NumericFactor {
     }
 
     /// Solves in place.
-    pub fn solve(&mut self, structure: &Structure, x: &mut [f64]) {
+    pub fn solve(&mut self, system: &SymbolicSystem, x: &mut [f64]) {
         let n = x.len();
         let b = &mut *self.buffers;
         match self.kind {
@@ -199,7 +203,7 @@ impl NumericFactor {
                 for (s, v) in b.right_hand_side.iter_mut().zip(&*x) {
                     *s = (*v / scale) as f32;
                 }
-                LltRef::new(&structure.symbolic, &b.single).solve_in_place_with_conj(
+                LltRef::new(&system.symbolic, &b.single).solve_in_place_with_conj(
                     Conj::No,
                     MatMut::from_column_major_slice_mut(&mut b.right_hand_side, n, 1),
                     Par::Seq,
@@ -212,7 +216,7 @@ impl NumericFactor {
             FactorKind::Indefinite => {
                 let [forward, inverse] = &b.pivot;
                 IntranodeLbltRef::new(
-                    &structure.symbolic,
+                    &system.symbolic,
                     &b.double,
                     &b.subdiagonal,
                     PermRef::new_checked(forward, inverse, n),
@@ -249,15 +253,15 @@ mod tests {
         ] {
             let mesh = cube(ElementKind::Hex8, cells, |p| p);
             let fixed = hold(&mesh, &[("z_min", [true; 3])]);
-            let structure = Structure::eliminated(&mesh, &fixed, elimination).unwrap();
-            let mut matrix = structure.zeros();
-            let count = structure.equations.count;
+            let system = SymbolicSystem::eliminated(&mesh, &fixed, elimination).unwrap();
+            let mut matrix = system.zeros();
+            let count = system.dofs.count;
             for c in 0..count {
-                matrix.values[structure.column_start[c]] = 1.0 + c as f64;
+                matrix.values[system.column_start[c]] = 1.0 + c as f64;
             }
-            let memory = FactorMemory::new(&structure).unwrap();
-            let Ok(factor) = memory.cholesky(&structure, &matrix) else { panic!("it is definite") };
-            let found = factor.condition_at_least(&structure).unwrap();
+            let memory = FactorMemory::new(&system).unwrap();
+            let Ok(factor) = memory.cholesky(&system, &matrix) else { panic!("it is definite") };
+            let found = factor.condition_at_least(&system).unwrap();
             assert!((found / count as f64 - 1.0).abs() < 1e-5, "{found} {count}");
         }
     }
@@ -267,28 +271,28 @@ mod tests {
     fn memory_goes_from_try_to_try() {
         let mesh = cube(ElementKind::Hex8, 2, |p| p);
         let fixed = hold(&mesh, &[("z_min", [true; 3])]);
-        let structure = Structure::new(&mesh, &fixed).unwrap();
-        let mut matrix = structure.zeros();
-        let count = structure.equations.count;
+        let system = SymbolicSystem::new(&mesh, &fixed).unwrap();
+        let mut matrix = system.zeros();
+        let count = system.dofs.count;
         let diagonal = |matrix: &mut SymmetricMatrix, value: &dyn Fn(usize) -> f64| {
             for c in 0..count {
-                matrix.values[structure.column_start[c]] = value(c);
+                matrix.values[system.column_start[c]] = value(c);
             }
         };
         let solved = |factor: &mut NumericFactor| {
             let mut x = vec![1.0; count];
-            factor.solve(&structure, &mut x);
+            factor.solve(&system, &mut x);
             x
         };
         diagonal(&mut matrix, &|c| if c == 1 { -2.0 } else { 1.0 + c as f64 });
-        let memory = FactorMemory::new(&structure).unwrap();
-        let Err(memory) = memory.cholesky(&structure, &matrix) else { panic!("it is indefinite") };
-        let mut factor = memory.indefinite(&structure, &matrix);
+        let memory = FactorMemory::new(&system).unwrap();
+        let Err(memory) = memory.cholesky(&system, &matrix) else { panic!("it is indefinite") };
+        let mut factor = memory.indefinite(&system, &matrix);
         assert_eq!(factor.kind(), FactorKind::Indefinite);
-        assert_eq!(factor.condition_at_least(&structure), None);
+        assert_eq!(factor.condition_at_least(&system), None);
         assert!((solved(&mut factor)[1] + 0.5).abs() < 1e-12);
         diagonal(&mut matrix, &|_| 4.0);
-        let Ok(mut factor) = factor.release().cholesky(&structure, &matrix) else {
+        let Ok(mut factor) = factor.release().cholesky(&system, &matrix) else {
             panic!("it is definite")
         };
         assert_eq!(factor.kind(), FactorKind::Preconditioner);

@@ -4,7 +4,7 @@
 //! the factor entries of approximate minimum degree. The graph is that of the nodes, not of the
 //! degrees of freedom: a third of the size and supernodes for free.
 
-use super::Equations;
+use super::DofMap;
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
@@ -34,12 +34,11 @@ pub enum Elimination {
 /// Order of the nodes with unknowns, expanded to equations.
 pub(super) fn elimination_order(
     neighbours: &[BTreeSet<u32>],
-    equations: &Equations,
+    dofs: &DofMap,
     elimination: Elimination,
 ) -> Result<Vec<usize>, OrderingError> {
-    let unknowns = |node: usize| {
-        equations.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != Equations::FIXED)
-    };
+    let unknowns =
+        |node: usize| dofs.of_dof[3 * node..3 * node + 3].iter().filter(|&&e| e != DofMap::FIXED);
     let mut compact = vec![u32::MAX; neighbours.len()];
     let mut kept = Vec::new();
     for node in 0..neighbours.len() {

@@ -1,6 +1,6 @@
 //! Which entries a mesh's matrix has, and where elements add to them.
 
-use super::Equations;
+use super::DofMap;
 use crate::mesh::Mesh;
 use std::collections::BTreeSet;
 
@@ -19,24 +19,21 @@ pub(super) fn node_graph(mesh: &Mesh) -> Vec<BTreeSet<u32>> {
 }
 
 /// Lower triangle of the pattern, by columns.
-pub(super) fn pattern(
-    neighbours: &[BTreeSet<u32>],
-    equations: &Equations,
-) -> (Vec<usize>, Vec<usize>) {
+pub(super) fn pattern(neighbours: &[BTreeSet<u32>], dofs: &DofMap) -> (Vec<usize>, Vec<usize>) {
     let mut start = vec![0];
     let mut row = Vec::new();
     for node in 0..neighbours.len() {
         for i in 0..3 {
-            let column = equations.of_dof[3 * node + i];
-            if column == Equations::FIXED {
+            let column = dofs.of_dof[3 * node + i];
+            if column == DofMap::FIXED {
                 continue;
             }
             let first = row.len();
             for &b in neighbours[node].iter().chain(std::iter::once(&(node as u32))) {
                 row.extend(
-                    equations.of_dof[3 * b as usize..3 * b as usize + 3]
+                    dofs.of_dof[3 * b as usize..3 * b as usize + 3]
                         .iter()
-                        .filter(|&&r| r != Equations::FIXED && r >= column)
+                        .filter(|&&r| r != DofMap::FIXED && r >= column)
                         .map(|&r| r as usize),
                 );
             }
@@ -60,10 +57,10 @@ pub(super) fn entry(column_start: &[usize], row: &[usize], r: usize, c: usize) -
 }
 
 /// Per block: value index of every local pair `p <= q` of every element, row-major upper
-/// triangle, [`Equations::FIXED`] where a degree of freedom is prescribed.
+/// triangle, [`DofMap::FIXED`] where a degree of freedom is prescribed.
 pub(super) fn scatter_maps(
     mesh: &Mesh,
-    equations: &Equations,
+    dofs: &DofMap,
     column_start: &[usize],
     row: &[usize],
 ) -> Vec<Vec<u32>> {
@@ -77,12 +74,12 @@ pub(super) fn scatter_maps(
                     .element(e)
                     .iter()
                     .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
-                    .map(|d| equations.of_dof[d])
+                    .map(|d| dofs.of_dof[d])
                     .collect();
                 for p in 0..size {
                     for q in p..size {
-                        map.push(if of[p] == Equations::FIXED || of[q] == Equations::FIXED {
-                            Equations::FIXED
+                        map.push(if of[p] == DofMap::FIXED || of[q] == DofMap::FIXED {
+                            DofMap::FIXED
                         } else {
                             entry(column_start, row, of[p] as usize, of[q] as usize) as u32
                         });

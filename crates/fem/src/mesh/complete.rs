@@ -14,8 +14,8 @@ use std::collections::HashMap;
 /// exist), else with every serendipity hexahedron completed.
 #[must_use]
 pub fn for_contact(mesh: Mesh, contact: &str) -> Mesh {
-    let carries = mesh.surfaces.get(contact).is_none_or(|s| s.kind.carries_contact());
-    if carries { mesh } else { complete(mesh) }
+    let keeps = mesh.surfaces.get(contact).is_none_or(|s| s.kind.carries_contact());
+    if keeps { mesh } else { complete(mesh) }
 }
 
 /// Completes every `Hex20` to `Hex27` and every `Quad8` face to `Quad9`. New

@@ -160,7 +160,7 @@ fn faces(mesh: &Mesh, surface: &Surface) -> Vec<(Vec<u32>, usize, f64)> {
 mod tests {
     use super::*;
     use crate::element::ElementKind;
-    use crate::element::{BlockGeometry, Elastic, Materials, Solid};
+    use crate::element::{BlockGeometry, ConstitutiveModel, Elastic, Materials};
     use crate::material::NeoHookean;
     use crate::mesh::FaceKind;
     use crate::mesh::block::{BlockLattice, build, even};
@@ -177,7 +177,7 @@ mod tests {
     ];
 
     /// Poisson's ratio 0.45.
-    fn material(e_mpa: f64) -> Arc<dyn Solid> {
+    fn material(e_mpa: f64) -> Arc<dyn ConstitutiveModel> {
         Elastic::shared(NeoHookean { mu_mpa: e_mpa / 2.9 }, e_mpa / 0.3)
     }
 

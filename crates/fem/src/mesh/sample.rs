@@ -3,7 +3,7 @@
 use super::{Mesh, Region};
 use crate::element::geometry::displacement_gradient;
 use crate::element::geometry::{BlockGeometry, jacobian};
-use crate::element::{Inverted, Materials, Memory, extrapolate};
+use crate::element::{HistoryVariables, Inverted, Materials, extrapolate};
 use crate::tensor::{Kinematics, Mat3};
 
 /// A deformed body, as far as fields at a point need it.
@@ -88,7 +88,7 @@ impl Sample {
         let history = (body.history)(self.block, self.element);
         let shape = body.geometry[self.block].element(self.element);
         let mut force = vec![[0.0; 3]; local.len()];
-        let memory = Memory { history, dt_s: 0.0 };
+        let memory = HistoryVariables { history, dt_s: 0.0 };
         let state = material.evaluate(shape, &local, memory, &mut force, None)?;
         let theta: f64 = self.basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t).sum();
         let k = Kinematics::new(displacement_gradient(&local, &self.gradients));

@@ -1,11 +1,11 @@
 //! One equilibrium: Newton's method between updates of contact's multipliers.
 
 use super::StepError;
+use super::friction;
 use super::newton::Fixed;
-use super::rubbing;
 use super::state::State;
 use super::stepping::Solver;
-use crate::element::Memory;
+use crate::element::HistoryVariables;
 
 /// Least share of its way that the friction bound goes in one update.
 const RELAX_MIN: f64 = 0.1;
@@ -20,7 +20,7 @@ impl Solver<'_> {
         let problem = self.newton.problem;
         let bound = |relax: f64, trial: &mut State| {
             let State { u, multipliers, friction, .. } = trial;
-            rubbing::bound(problem, &self.loading, fraction, u, multipliers, relax, friction);
+            friction::bound(problem, &self.loading, fraction, u, multipliers, relax, friction);
         };
         bound(1.0, trial);
         let (mut relax, mut last_change) = (1.0f64, f64::INFINITY);
@@ -32,23 +32,24 @@ impl Solver<'_> {
             false => 1e-3f64.max(options.residual_tolerance),
         };
         for update in 0..=updates {
-            let (multipliers, u, carried) = (&trial.multipliers, &mut trial.u, &mut trial.carried);
+            let (multipliers, u, independent) =
+                (&trial.multipliers, &mut trial.u, &mut trial.independent);
             let fixed = Fixed {
                 loading: &self.loading,
                 load_fraction: fraction,
                 multipliers,
-                memory: Memory { history: &trial.memory, dt_s },
+                memory: HistoryVariables { history: &trial.memory, dt_s },
                 friction: rubs.then_some(&trial.friction),
             };
-            self.newton.equilibrate(tolerance, fixed, u, carried)?;
+            self.newton.equilibrate(tolerance, fixed, u, independent)?;
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
             let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;
             if closes(e.gap_error_mm) && !exact {
-                self.newton.equilibrate(options.residual_tolerance, fixed, u, carried)?;
+                self.newton.equilibrate(options.residual_tolerance, fixed, u, independent)?;
             }
             let closed = closes(self.newton.current.gap_error_mm);
-            let change = rubbing::change(&trial.friction, &self.newton.current);
+            let change = friction::change(&trial.friction, &self.newton.current);
             if closed && change <= options.friction_tolerance {
                 return Ok(());
             }
@@ -56,7 +57,7 @@ impl Solver<'_> {
                 tolerance = options.residual_tolerance;
                 let e = &self.newton.current;
                 trial.multipliers.copy_from_slice(&e.traction_mpa);
-                rubbing::update(&mut trial.friction, e);
+                friction::update(&mut trial.friction, e);
                 if change > 0.9 * last_change {
                     relax = (0.5 * relax).max(RELAX_MIN);
                 }

@@ -5,7 +5,7 @@ use super::loading::Loading;
 use super::mixed::Lag;
 use super::problem::Problem;
 use crate::contact::{FrictionTrial, PointContact, PointFriction, Support};
-use crate::element::{Carried, Dilatation, Memory};
+use crate::element::{Dilatation, HistoryVariables, IndependentDilatation};
 use crate::linear::SymmetricMatrix;
 
 /// What an evaluation at one displacement found.
@@ -50,7 +50,7 @@ pub struct Trial<'a> {
     /// Displacement, mm, one a mesh node.
     pub u: &'a [[f64; 3]],
     /// Dilatation of each element, block by block; empty if none is carried along.
-    pub carried: &'a [Dilatation],
+    pub independent: &'a [Dilatation],
     /// Contact multipliers, MPa, one a contact point.
     pub multipliers_mpa: &'a [f64],
     /// Contact penalty, MPa/mm.
@@ -58,7 +58,7 @@ pub struct Trial<'a> {
     /// Part of the loading that acts, 0 to 1.
     pub load_fraction: f64,
     /// History of materials with memory at the start of the step, and its length, s.
-    pub memory: Memory<'a>,
+    pub memory: HistoryVariables<'a>,
     /// Tangential contact; `None` without friction.
     pub friction: Option<&'a FrictionTrial>,
 }
@@ -78,7 +78,7 @@ pub fn evaluate_body(
     out.residual_n.resize(3 * problem.mesh.nodes.len(), 0.0);
     (out.stored_mj, out.contact_mj) = (0.0, 0.0);
     out.j_min = f64::INFINITY;
-    let mut lag = Lag::new(problem, trial.carried);
+    let mut lag = Lag::new(problem, trial.independent);
     elements(problem, trial, tangent.as_deref_mut(), out, &mut lag)?;
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent, out);
@@ -92,8 +92,8 @@ pub fn evaluate_body(
     }
     out.mixed_norm = lag.norm_n(problem, &out.residual_n);
     let mut norm = 0.0;
-    for (r, &e) in out.residual_n.iter().zip(&problem.structure.equations.of_dof) {
-        if e == crate::linear::Equations::FIXED {
+    for (r, &e) in out.residual_n.iter().zip(&problem.system.dofs.of_dof) {
+        if e == crate::linear::DofMap::FIXED {
             reference += r * r;
         } else {
             norm += r * r;
@@ -115,7 +115,7 @@ fn elements(
     out: &mut Evaluation,
     lag: &mut Lag,
 ) -> Result<(), StepError> {
-    let mut carried = trial.carried.iter();
+    let mut independent = trial.independent.iter();
     let mut lag_n = [[0.0; 3]; 27];
     let mut local = [[0.0; 3]; 27];
     let mut force = [[0.0; 3]; 27];
@@ -133,13 +133,15 @@ fn elements(
                 dense.as_mut_slice()
             });
             let material = &problem.materials[block.region[e]];
-            let memory = problem.memory.as_ref().map_or(Memory::default(), |layout| {
-                layout.of(trial.memory.history, trial.memory.dt_s, b, e)
+            let memory =
+                problem.history_layout.as_ref().map_or(HistoryVariables::default(), |layout| {
+                    layout.of(trial.memory.history, trial.memory.dt_s, b, e)
+                });
+            let own = independent.next().map(|&theta_minus_1| IndependentDilatation {
+                theta_minus_1,
+                lag_n: &mut lag_n[..n],
             });
-            let own = carried
-                .next()
-                .map(|&theta_minus_1| Carried { theta_minus_1, lag_n: &mut lag_n[..n] });
-            let carries = own.is_some();
+            let keeps = own.is_some();
             let g = geometry.element(e);
             let state = material
                 .evaluate_with(g, &local[..n], memory, own, &mut force[..n], stiffness)
@@ -153,12 +155,12 @@ fn elements(
                     out.residual_n[3 * node as usize + i] += f[i];
                 }
             }
-            if carries {
+            if keeps {
                 let mu_mpa = material.shear_modulus_mpa();
                 lag.add(nodes, &lag_n, mu_mpa, g.weights, state.gap_squared_mm3);
             }
             if let Some(t) = tangent.as_deref_mut() {
-                problem.structure.add_element(t, b, e, &dense);
+                problem.system.add_element(t, b, e, &dense);
             }
         }
     }
@@ -202,7 +204,7 @@ fn contact(
         }
         square += out.add_contact_force(support, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.structure.add_point(t, support.nodes, support.values, &c.stiffness);
+            problem.system.add_point(t, support.nodes, support.values, &c.stiffness);
             out.curvature.extend(c.curvature.map(|k| (at, k)));
         }
     }
@@ -234,7 +236,7 @@ fn add_friction(
         out.potential_mj += f.energy_mj;
         square += out.add_contact_force(support, f.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.structure.add_point(t, support.nodes, support.values, &f.stiffness);
+            problem.system.add_point(t, support.nodes, support.values, &f.stiffness);
         }
     }
     square

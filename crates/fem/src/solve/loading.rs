@@ -27,7 +27,7 @@ impl MovingIndenter {
         start: Placement,
         path: Vec<(f64, [f64; 3])>,
     ) -> Self {
-        Self { shape, start, path, contact: ContactRule::Nodes }
+        Self { shape, start, path, contact: ContactRule::Nodal }
     }
 
     /// One that moves straight by `travel_mm` over the whole load.
@@ -96,6 +96,6 @@ impl Loading {
     /// Where on the skin contact is found.
     #[must_use]
     pub fn contact(&self) -> ContactRule {
-        self.indenter.as_ref().map_or(ContactRule::Nodes, |m| m.contact)
+        self.indenter.as_ref().map_or(ContactRule::Nodal, |m| m.contact)
     }
 }

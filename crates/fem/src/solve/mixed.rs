@@ -10,7 +10,7 @@
 
 use super::problem::Problem;
 use crate::element::{Dilatation, next_dilatation};
-use crate::linear::Equations;
+use crate::linear::DofMap;
 
 /// Ratio of bulk to shear modulus beyond which dilatations are carried along: nu = .495. Below,
 /// the potential alone leads to the same equilibria, at .48 in as many iterations.
@@ -45,8 +45,8 @@ pub(super) struct Lag {
 }
 
 impl Lag {
-    pub(super) fn new(problem: &Problem, carried: &[Dilatation]) -> Self {
-        let dofs = if carried.is_empty() { 0 } else { 3 * problem.mesh.nodes.len() };
+    pub(super) fn new(problem: &Problem, independent: &[Dilatation]) -> Self {
+        let dofs = if independent.is_empty() { 0 } else { 3 * problem.mesh.nodes.len() };
         Self { force_n: vec![0.0; dofs], gap_n2: 0.0 }
     }
 
@@ -71,9 +71,9 @@ impl Lag {
     /// Norm of the residual of both fields, N, from the one of the displacement.
     pub(super) fn norm_n(&self, problem: &Problem, residual_n: &[f64]) -> f64 {
         let mut square = self.gap_n2;
-        let equations = &problem.structure.equations.of_dof;
-        for ((r, l), &e) in residual_n.iter().zip(&self.force_n).zip(equations) {
-            if e != Equations::FIXED {
+        let dofs = &problem.system.dofs.of_dof;
+        for ((r, l), &e) in residual_n.iter().zip(&self.force_n).zip(dofs) {
+            if e != DofMap::FIXED {
                 square += (r + l) * (r + l);
             }
         }
@@ -88,7 +88,7 @@ pub(super) fn next_dilatations(
     step: &[f64],
     out: &mut Vec<Dilatation>,
 ) {
-    let of_dof = &problem.structure.equations.of_dof;
+    let of_dof = &problem.system.dofs.of_dof;
     let (mut local, mut change) = ([[0.0; 3]; 27], [[0.0; 3]; 27]);
     for (block, geometry) in problem.mesh.blocks.iter().zip(&problem.geometry) {
         let n = block.kind.nodes();
@@ -96,7 +96,7 @@ pub(super) fn next_dilatations(
             for (a, &node) in block.element(e).iter().enumerate() {
                 local[a] = u[node as usize];
                 change[a] = std::array::from_fn(|i| match of_dof[3 * node as usize + i] {
-                    Equations::FIXED => 0.0,
+                    DofMap::FIXED => 0.0,
                     e => step[e as usize],
                 });
             }
@@ -110,7 +110,7 @@ pub(super) fn next_dilatations(
 
 /// Dilatation that every element has at `u`.
 pub(super) fn dilatations(problem: &Problem, u: &[[f64; 3]], out: &mut Vec<Dilatation>) {
-    next_dilatations(problem, u, &vec![0.0; problem.structure.equations.count], out);
+    next_dilatations(problem, u, &vec![0.0; problem.system.dofs.count], out);
 }
 
 /// How exactly to solve the linear system where `forcing` is what the residual alone asks for:
@@ -171,17 +171,17 @@ mod tests {
         for kind in [ElementKind::Hex8, ElementKind::Quad9] {
             let (problem, loading, _) = squeezed(kind, 3, 0.48);
             let mut found = Vec::new();
-            for carries in [false, true] {
+            for keeps in [false, true] {
                 let mut solver = Solver::new(&problem, tight()).unwrap();
                 solver.start(loading.clone());
-                assert!(solver.state.carried.is_empty(), "nu = .48 is solved as it always was");
-                if carries {
+                assert!(solver.state.independent.is_empty(), "nu = .48 is solved as it always was");
+                if keeps {
                     let elements = problem.mesh.blocks.iter().map(|b| b.len()).sum();
-                    solver.state.carried = vec![[0.0; 4]; elements];
+                    solver.state.independent = vec![[0.0; 4]; elements];
                 }
                 solver.advance_to(0.4).unwrap();
                 solver.advance_to(1.0).unwrap();
-                if carries {
+                if keeps {
                     // What is carried is the body's own dilatation by then.
                     let own = carried_gap(&problem, &solver);
                     assert!(own < 1e-6, "{own}");
@@ -201,8 +201,9 @@ mod tests {
         let mut own = Vec::new();
         dilatations(problem, u, &mut own);
         let largest = |values: &[f64]| values.iter().fold(0.0f64, |m, v| m.max(v.abs()));
-        let carried = solver.state.carried.as_flattened();
-        let gap: Vec<f64> = carried.iter().zip(own.as_flattened()).map(|(a, b)| a - b).collect();
+        let independent = solver.state.independent.as_flattened();
+        let gap: Vec<f64> =
+            independent.iter().zip(own.as_flattened()).map(|(a, b)| a - b).collect();
         largest(&gap) / largest(own.as_flattened())
     }
 
@@ -211,11 +212,11 @@ mod tests {
         for friction in [0.5, 10.0] {
             let (problem, loading, up) = squeezed(ElementKind::Hex8, 3, 0.48);
             let loading = Loading { friction, ..loading };
-            let force = [false, true].map(|carries| {
+            let force = [false, true].map(|keeps| {
                 let mut solver = Solver::new(&problem, Options::default()).unwrap();
                 solver.start(loading.clone());
-                if carries {
-                    solver.state.carried = vec![[0.0; 4]; problem.mesh.blocks[0].len()];
+                if keeps {
+                    solver.state.independent = vec![[0.0; 4]; problem.mesh.blocks[0].len()];
                 }
                 for step in 1..=4 {
                     solver.advance_to(0.25 * f64::from(step)).unwrap();
@@ -233,7 +234,7 @@ mod tests {
             let (problem, loading, _) = squeezed(ElementKind::Quad4, 8, nu);
             let mut solver = Solver::new(&problem, Options::default()).unwrap();
             solver.start(loading);
-            assert!(!solver.state.carried.is_empty());
+            assert!(!solver.state.independent.is_empty());
             let effort = solver.advance_to(1.0).unwrap().effort;
             assert!(effort.cuts == 0 && effort.newton_iterations <= 20, "nu {nu}: {effort:?}");
         }

@@ -1,31 +1,31 @@
 //! Static equilibrium: Newton with line search, augmented contact, load steps.
 
-mod answers;
 mod augmented;
 mod effort;
 pub mod evaluate;
-mod free;
-mod layout;
+mod friction;
+mod history;
+mod history_layout;
 mod loading;
-mod memory;
 mod mixed;
 mod newton;
-mod pace;
 mod prediction;
 mod problem;
-mod rubbing;
+mod results;
+mod rigid_modes;
 mod state;
 mod stepping;
+mod time_step;
 mod work;
 
 pub use crate::element::Materials;
 pub use effort::Effort;
 pub use evaluate::Balance;
-pub use free::{FreeMode, FreePart};
-pub use layout::MemoryLayout;
+pub use history::EnergySplit;
+pub use history_layout::HistoryLayout;
 pub use loading::{Loading, MovingIndenter};
-pub use memory::EnergySplit;
 pub use problem::{Problem, ProblemError};
+pub use rigid_modes::{FreeMode, FreePart};
 pub use state::{Mark, StepReport};
 pub use stepping::Solver;
 

@@ -14,7 +14,7 @@ impl Solver<'_> {
                     v[i] += ratio * (v[i] - w[i]);
                 }
             }
-            for (c, old) in trial.carried.iter_mut().zip(&before.carried) {
+            for (c, old) in trial.independent.iter_mut().zip(&before.independent) {
                 for r in 0..c.len() {
                     c[r] += ratio * (c[r] - old[r]);
                 }

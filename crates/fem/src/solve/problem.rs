@@ -1,9 +1,9 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
-use super::layout::MemoryLayout;
+use super::history_layout::HistoryLayout;
 use crate::contact::{ContactRule, ContactSurface};
 use crate::element::{BlockGeometry, Materials, ShapeError};
-use crate::linear::{Structure, StructureError};
+use crate::linear::{SymbolicError, SymbolicSystem};
 use crate::mesh::Mesh;
 
 /// A body ready to be loaded. Shared by every press of a campaign.
@@ -15,11 +15,11 @@ pub struct Problem {
     /// What each region is made of.
     pub materials: Materials,
     /// Where each element's memory is; `None` if no material has any.
-    pub memory: Option<MemoryLayout>,
+    pub history_layout: Option<HistoryLayout>,
     /// Prescribed degrees of freedom, `3 node + component`.
     pub fixed: Vec<bool>,
     /// Sparsity pattern, ordering and symbolic factor.
-    pub structure: Structure,
+    pub system: SymbolicSystem,
     /// Where contact may happen.
     pub contact: Option<ContactSurface>,
 }
@@ -37,7 +37,7 @@ pub enum ProblemError {
     },
     /// The system has no structure.
     #[error(transparent)]
-    Structure(#[from] StructureError),
+    Structure(#[from] SymbolicError),
     /// The faces of the contact surface cannot carry contact at their nodes.
     #[error(
         "surface '{name}' has 8-node faces, whose corners would have to be pulled under an even \
@@ -82,7 +82,7 @@ impl Problem {
                     .map_err(|source| ProblemError::Shape { block, source })
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let structure = Structure::new(&mesh, &fixed)?;
+        let system = SymbolicSystem::new(&mesh, &fixed)?;
         let contact = match contact_surface {
             None => None,
             Some(name) => {
@@ -97,8 +97,8 @@ impl Problem {
                 Some(ContactSurface::new(surface, &mesh.nodes, &fixed))
             }
         };
-        let memory = MemoryLayout::new(&mesh, &geometry, &materials);
-        Ok(Self { mesh, geometry, materials, memory, fixed, structure, contact })
+        let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
+        Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
     }
 
     /// Contact penalty from material and mesh, MPa/mm: a few hundred times the

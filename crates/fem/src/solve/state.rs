@@ -11,7 +11,7 @@ pub(super) struct State {
     pub fraction: f64,
     pub u: Vec<[f64; 3]>,
     /// Dilatation of each element that is carried along; empty if none is.
-    pub carried: Vec<Dilatation>,
+    pub independent: Vec<Dilatation>,
     pub multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.
     pub memory: Vec<f64>,

@@ -1,17 +1,17 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
 use super::effort::Effort;
+use super::friction;
+use super::history::{self, EnergySplit};
 use super::loading::Loading;
-use super::memory::{self, EnergySplit};
 use super::mixed;
 use super::newton::{Fixed, Newton};
 use super::problem::Problem;
-use super::rubbing;
 use super::state::{Mark, State, StepReport};
 use super::work::Work;
 use super::{Options, SolveError, StepError};
 use crate::contact::{FrictionPoint, FrictionTrial};
-use crate::element::Memory;
+use crate::element::HistoryVariables;
 
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
@@ -22,11 +22,11 @@ pub struct Solver<'a> {
     pub(super) before: Option<State>,
     pub(super) work: Work,
     /// Load fraction that a time step may take; `None` for bodies without memory.
-    pub(super) pace: Option<f64>,
+    pub(super) time_step: Option<f64>,
 }
 
 impl<'a> Solver<'a> {
-    /// Memory for solving `problem`.
+    /// HistoryVariables for solving `problem`.
     ///
     /// # Errors
     /// [`SolveError::Factor`] if the factor does not fit in memory,
@@ -39,7 +39,7 @@ impl<'a> Solver<'a> {
             state: State::default(),
             before: None,
             work: Work::default(),
-            pace: None,
+            time_step: None,
         };
         solver.start(Loading::default());
         Ok(solver)
@@ -54,9 +54,9 @@ impl<'a> Solver<'a> {
         self.state = State {
             fraction: 0.0,
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
-            carried: mixed::at_rest(problem),
+            independent: mixed::at_rest(problem),
             multipliers: vec![0.0; contact_points],
-            memory: vec![0.0; problem.memory.as_ref().map_or(0, |m| m.len)],
+            memory: vec![0.0; problem.history_layout.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
         };
         if self.loading.friction > 0.0 {
@@ -66,11 +66,11 @@ impl<'a> Solver<'a> {
                 heat_mj: 0.0,
             };
             let State { u, friction, .. } = &mut self.state;
-            rubbing::anchor(problem, &self.loading, 0.0, u, friction);
+            friction::anchor(problem, &self.loading, 0.0, u, friction);
         }
         self.before = None;
         self.work = Work::default();
-        self.pace = self.first_pace();
+        self.time_step = self.first_time_step();
         self.newton.forget(rule);
     }
 
@@ -78,7 +78,7 @@ impl<'a> Solver<'a> {
     /// about to turn.
     pub fn turn(&mut self) {
         self.before = None;
-        self.pace = self.first_pace();
+        self.time_step = self.first_time_step();
     }
 
     /// The present equilibrium, to come back to with [`Self::restore`].
@@ -126,7 +126,7 @@ impl<'a> Solver<'a> {
     }
 
     fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {
-        let mut step = self.paced(target - self.state.fraction);
+        let mut step = self.within_time_step(target - self.state.fraction);
         let (mut cuts, mut steps) = (0, 0);
         while self.state.fraction < target {
             let reached = self.state.fraction;
@@ -140,7 +140,7 @@ impl<'a> Solver<'a> {
                 Ok(()) => {
                     steps += 1;
                     self.newton.effort.steps += 1;
-                    step = self.paced(1.5 * step);
+                    step = self.within_time_step(1.5 * step);
                 }
                 Err(cause) => {
                     cuts += 1;
@@ -159,16 +159,16 @@ impl<'a> Solver<'a> {
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
     fn settle(&mut self) {
-        let State { fraction, u, carried, multipliers, memory, friction } = &self.state;
+        let State { fraction, u, independent, multipliers, memory, friction } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,
             load_fraction: *fraction,
             multipliers,
-            memory: Memory { history: memory, dt_s: 0.0 },
+            memory: HistoryVariables { history: memory, dt_s: 0.0 },
             friction: (!friction.points.is_empty()).then_some(friction),
         };
         // It was in equilibrium: nothing in it is inverted.
-        if let Err(error) = self.newton.evaluate(fixed, u, carried) {
+        if let Err(error) = self.newton.evaluate(fixed, u, independent) {
             tracing::warn!(%error, "the last equilibrium cannot be evaluated");
         }
     }
@@ -183,8 +183,8 @@ impl<'a> Solver<'a> {
     fn report(&self, since: &Effort) -> StepReport {
         let e = &self.newton.current;
         // The potential of a body without memory is its stored energy.
-        let energy = if self.newton.problem.memory.is_some() {
-            memory::energies(self.newton.problem, &self.state.memory, &self.state.u)
+        let energy = if self.newton.problem.history_layout.is_some() {
+            history::energies(self.newton.problem, &self.state.memory, &self.state.u)
         } else {
             EnergySplit { stored_mj: e.stored_mj, dissipated_mj: 0.0 }
         };
@@ -212,23 +212,23 @@ impl<'a> Solver<'a> {
             found = self.augmented(next, &mut trial);
         }
         // Or the dilatations: downhill on the potential alone, which is slower.
-        if let (Err(cause), true) = (&found, !self.state.carried.is_empty()) {
-            tracing::debug!(next, %cause, "carried dilatations failed");
+        if let (Err(cause), true) = (&found, !self.state.independent.is_empty()) {
+            tracing::debug!(next, %cause, "independent dilatations failed");
             trial = self.unmoved(next);
-            trial.carried.clear();
+            trial.independent.clear();
             found = self.augmented(next, &mut trial);
-            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.carried);
+            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
         }
         found?;
-        self.set_pace(next, &trial.u);
+        self.set_time_step(next, &trial.u);
         let problem = self.newton.problem;
         let dt_s = self.seconds(next);
         trial.fraction = next;
-        if let Some(layout) = &problem.memory {
-            memory::advance(problem, layout, &trial.u, dt_s, &mut trial.memory);
+        if let Some(layout) = &problem.history_layout {
+            history::advance(problem, layout, &trial.u, dt_s, &mut trial.memory);
         }
-        rubbing::update(&mut trial.friction, &self.newton.current);
-        rubbing::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
+        friction::update(&mut trial.friction, &self.newton.current);
+        friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
             self.work.add(indenter, next, self.newton.current.contact_force_n);

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 /// One press of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Press {
+pub struct Indentation {
     /// Number within the campaign.
     pub id: usize,
     /// Place of its indenter among [`CampaignSpec::candidates`].
@@ -27,7 +27,7 @@ pub struct Press {
 impl CampaignSpec {
     /// Samples in all.
     pub fn samples(&self) -> usize {
-        presses(self).iter().map(|p| p.depths_mm.len()).sum()
+        indentations(self).iter().map(|p| p.depths_mm.len()).sum()
     }
 }
 
@@ -38,7 +38,7 @@ impl CampaignSpec {
 /// of an Owen-scrambled Sobol sequence of its own (Burley, Practical Hash-based Owen
 /// Scrambling, JCGT 9(4), 2020), scaled to the ranges: they fill the ranges far more
 /// evenly than random ones. The first n presses do not depend on how many follow.
-pub fn presses(spec: &CampaignSpec) -> Vec<Press> {
+pub fn indentations(spec: &CampaignSpec) -> Vec<Indentation> {
     let candidates = spec.candidates();
     let mut had = vec![0u32; candidates.len()];
     let all: u64 = candidates.iter().map(|c| u64::from(c.share)).sum();
@@ -58,7 +58,7 @@ pub fn presses(spec: &CampaignSpec) -> Vec<Press> {
 }
 
 /// Press `id`, the `index`-th of a candidate.
-fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32) -> Press {
+fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32) -> Indentation {
     // The sequence takes 32 bits: both halves of the seed count.
     let seed = (spec.seed ^ (spec.seed >> 32)) as u32;
     let own = seed.wrapping_add((place as u32).wrapping_mul(0x9e37_79b9));
@@ -74,7 +74,7 @@ fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32
             (1..=states).map(|i| deepest * i as f64 / states as f64).collect()
         }
     };
-    Press {
+    Indentation {
         id,
         candidate: place,
         indenter: c.name.clone(),

@@ -51,7 +51,7 @@ fn several() -> CampaignSpec {
 fn poses_fill_their_ranges_and_follow_the_seed() {
     let wide = CampaignSpec { presses: 64, ..spec() };
     let poses =
-        |spec: &CampaignSpec| -> Vec<Pose> { presses(spec).iter().map(|p| p.pose).collect() };
+        |spec: &CampaignSpec| -> Vec<Pose> { indentations(spec).iter().map(|p| p.pose).collect() };
     let points = poses(&wide);
     assert_eq!(points[..7], poses(&spec())[..], "the first poses do not depend on the number");
     let cell = |p: &Pose| {
@@ -71,7 +71,7 @@ fn poses_fill_their_ranges_and_follow_the_seed() {
 
 #[test]
 fn indenters_take_turns_by_their_shares() {
-    let all = presses(&several());
+    let all = indentations(&several());
     let count = |name: &str, n: usize| all[..n].iter().filter(|p| p.indenter == name).count();
     for n in 1..=64 {
         for (name, share) in [("plate", 0.25), ("ball", 0.5), ("small plate", 0.25)] {
@@ -79,13 +79,13 @@ fn indenters_take_turns_by_their_shares() {
             assert!(lag.abs() < 1.0, "{name}: {lag} behind after {n}");
         }
     }
-    assert_eq!(all[..9], presses(&CampaignSpec { presses: 9, ..several() })[..]);
-    assert_ne!(all, presses(&CampaignSpec { seed: 4, ..several() }));
+    assert_eq!(all[..9], indentations(&CampaignSpec { presses: 9, ..several() })[..]);
+    assert_ne!(all, indentations(&CampaignSpec { seed: 4, ..several() }));
 }
 
 #[test]
 fn an_indenter_has_its_own_ranges() {
-    let all = presses(&several());
+    let all = indentations(&several());
     for ball in all.iter().filter(|p| p.indenter == "ball") {
         assert_eq!((ball.shape.as_str(), ball.depths_mm.len()), ("sphere", 3));
         assert!((10.0..20.0).contains(&ball.pose.pitch_deg));
@@ -123,7 +123,7 @@ fn shipped_campaigns_are_readable() {
     let broad = CampaignSpec::read(&folder.join("broad.toml")).unwrap();
     let held = CampaignSpec::read(&folder.join("heldout.toml")).unwrap();
     let shapes = |spec: &CampaignSpec| -> BTreeSet<String> {
-        presses(spec).into_iter().map(|p| p.shape).collect()
+        indentations(spec).into_iter().map(|p| p.shape).collect()
     };
     for shape in ["plate", "sphere", "cylinder", "punch", "grating"] {
         assert!(shapes(&broad).contains(shape), "{shape}");

@@ -2,7 +2,7 @@
 
 use super::machine::fastest_s;
 use crate::tissue::Tissue;
-use papilla_fem::element::Memory;
+use papilla_fem::element::HistoryVariables;
 use papilla_fem::mesh::Block;
 use papilla_fem::solve::Problem;
 use std::hint::black_box;
@@ -27,7 +27,7 @@ impl Pass {
     /// different principal stretches.
     pub(super) fn probe(problem: &Problem) -> Self {
         let mut pass = Self::default();
-        let mut tangent = problem.structure.zeros();
+        let mut tangent = problem.system.zeros();
         for (b, block) in problem.mesh.blocks.iter().enumerate() {
             let size = 3 * block.kind.nodes();
             let mut dense = vec![0.0; size * size];
@@ -41,7 +41,7 @@ impl Pass {
                     let both = fastest_s(RUNS, || {
                         dense.fill(0.0);
                         evaluate(problem, b, block, e, Some(dense.as_mut_slice()));
-                        problem.structure.add_element(&mut tangent, b, e, &dense);
+                        problem.system.add_element(&mut tangent, b, e, &dense);
                     });
                     pass.forces_s += share * forces;
                     pass.tangent_s += share * both;
@@ -65,7 +65,7 @@ fn evaluate(problem: &Problem, b: usize, block: &Block, e: usize, tangent: Optio
     }
     let solid = &problem.materials[block.region[e]];
     let history = vec![0.0; problem.geometry[b].points * solid.history_len()];
-    let memory = Memory { history: &history, dt_s: 0.1 };
+    let memory = HistoryVariables { history: &history, dt_s: 0.1 };
     let (u, force) = (&u[..nodes.len()], &mut force[..nodes.len()]);
     // The deformation is far from turning an element inside out.
     let _ = black_box(solid.evaluate(problem.geometry[b].element(e), u, memory, force, tangent));

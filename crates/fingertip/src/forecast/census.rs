@@ -11,10 +11,10 @@ pub fn census(scene: &Scene, setup: &Simulation) -> Census {
     let problem = &setup.body.problem;
     let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes().len());
     let mut census = Census {
-        unknowns: problem.structure.equations.count,
-        tangent_entries: problem.structure.row.len(),
+        unknowns: problem.system.dofs.count,
+        tangent_entries: problem.system.row.len(),
         contact_nodes,
-        history_numbers: problem.memory.as_ref().map_or(0, |m| m.len),
+        history_numbers: problem.history_layout.as_ref().map_or(0, |m| m.len),
         friction_states: if setup.approach.friction > 0.0 { contact_nodes } else { 0 },
         ..Census::default()
     };

@@ -32,9 +32,9 @@ pub struct Forecast {
     pub factor_entries: usize,
     /// Multiplications and additions of one factorization.
     pub factor_flops: f64,
-    /// Memory of the process while it solves, bytes.
+    /// HistoryVariables of the process while it solves, bytes.
     pub memory_bytes: usize,
-    /// Memory that one factorization of an indefinite tangent would add, bytes.
+    /// HistoryVariables that one factorization of an indefinite tangent would add, bytes.
     pub memory_indefinite_bytes: usize,
     /// How much iteration the press takes.
     pub work: Work,
@@ -64,7 +64,7 @@ const FACTOR_EFFICIENCY: f64 = 0.75;
 const FACTOR_BYTES_PER_ENTRY: f64 = 180.0;
 /// Share of the streaming speed that the triangular solves reach on those meshes.
 const SOLVE_EFFICIENCY: f64 = 0.36;
-/// Memory of the process without a scene, bytes.
+/// HistoryVariables of the process without a scene, bytes.
 const BASE_BYTES: usize = 8 << 20;
 
 impl Forecast {
@@ -72,14 +72,14 @@ impl Forecast {
     #[must_use]
     pub fn new(scene: &Scene, setup: &Simulation) -> Self {
         let problem = &setup.body.problem;
-        let structure = &problem.structure;
+        let system = &problem.system;
         // Elements first: after the matrix product's wide registers the same code was
         // measured to run three times slower for a while.
         let pass = Pass::probe(problem);
         let (machine, work) = (Machine::probe(), Work::new(setup));
-        let (entries, flops) = (structure.factor_entries(), structure.factor_flops());
+        let (entries, flops) = (system.factor_entries(), system.factor_flops());
         // Forward and backward through the f32 factor, once through tangent and pattern.
-        let cg_bytes = (8 * entries + 16 * structure.row.len()) as f64;
+        let cg_bytes = (8 * entries + 16 * system.row.len()) as f64;
         let mut seconds = Seconds {
             assembly: work.newton_iterations * pass.tangent_s
                 + work.force_evaluations * pass.forces_s,
@@ -104,9 +104,9 @@ impl Forecast {
     }
 }
 
-/// Memory of the process while it solves, bytes.
+/// HistoryVariables of the process while it solves, bytes.
 fn memory_bytes(problem: &Problem) -> usize {
-    let (mesh, structure) = (&problem.mesh, &problem.structure);
+    let (mesh, system) = (&problem.mesh, &problem.system);
     let elements: usize = mesh
         .blocks
         .iter()
@@ -120,16 +120,16 @@ fn memory_bytes(problem: &Problem) -> usize {
         .sum();
     // Displacement of three states and a trial, two residuals, a handful of vectors.
     let vectors = 24 * 4 * mesh.nodes.len() + 8 * 2 * 3 * mesh.nodes.len();
-    let iteration = 8 * 8 * structure.equations.count;
-    let history = 8 * 4 * problem.memory.as_ref().map_or(0, |m| m.len);
+    let iteration = 8 * 8 * system.dofs.count;
+    let history = 8 * 4 * problem.history_layout.as_ref().map_or(0, |m| m.len);
     BASE_BYTES
         + elements
         + vectors
         + iteration
         + history
-        + structure.bytes()
-        + 8 * structure.row.len()
-        + FactorMemory::bytes(structure)
+        + system.bytes()
+        + 8 * system.row.len()
+        + FactorMemory::bytes(system)
 }
 
 #[cfg(test)]

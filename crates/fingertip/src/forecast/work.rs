@@ -58,7 +58,7 @@ impl Work {
             Rate { newton: 3.8, factorizations: 0.65, cg: 4.6 }
         };
         let newton = rate.newton * equilibria;
-        let remembers = setup.body.problem.memory.is_some();
+        let remembers = setup.body.problem.history_layout.is_some();
         let per_equilibrium =
             FORCES_PER_EQUILIBRIUM + if remembers { FORCES_PER_HISTORY } else { 0.0 };
         Self {
@@ -82,7 +82,7 @@ fn equilibria(setup: &Simulation) -> f64 {
         Drive::Path(points) => points,
     };
     let problem = &setup.body.problem;
-    if problem.memory.is_none() {
+    if problem.history_layout.is_none() {
         return points.len() as f64;
     }
     // From a stored time steps start at half the shortest relaxation time. While the

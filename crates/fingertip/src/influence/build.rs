@@ -1,9 +1,9 @@
 //! Assembling, factorizing and solving for every vertex of the skin.
 
 use super::strain::{StrainMap, Weighted};
-use super::{COMPONENTS, Faces, Operator, OperatorError, Quality};
-use crate::simulation::body::{Body, PressedPatch};
-use papilla_fem::linear::{Direct, Equations, Structure, SymmetricMatrix};
+use super::{COMPONENTS, Faces, InfluenceError, InfluenceOperator, Quality};
+use crate::simulation::body::{Body, RecordedPatch};
+use papilla_fem::linear::{Direct, DofMap, SymbolicSystem, SymmetricMatrix};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use papilla_fem::solve::{Loading, Problem};
@@ -32,15 +32,20 @@ pub(super) struct Load {
 /// the node's force over its area.
 ///
 /// # Errors
-/// [`OperatorError`] for a body that is no fingertip of small strain, or whose systems
+/// [`InfluenceError`] for a body that is no fingertip of small strain, or whose systems
 /// could not be solved.
-pub fn build(body: &Body, progress: &mut dyn FnMut(usize)) -> Result<Operator, OperatorError> {
-    let Some(PressedPatch { patch, .. }) = &body.patch else { return Err(OperatorError::NoPatch) };
+pub fn build(
+    body: &Body,
+    progress: &mut dyn FnMut(usize),
+) -> Result<InfluenceOperator, InfluenceError> {
+    let Some(RecordedPatch { patch, .. }) = &body.patch else {
+        return Err(InfluenceError::NoPatch);
+    };
     let problem = &body.problem;
     if problem.materials.models().any(|m| m.is_finite_strain()) {
-        return Err(OperatorError::FiniteStrain);
+        return Err(InfluenceError::FiniteStrain);
     }
-    let (atlas, _) = body.atlas().ok_or(OperatorError::NoPatch)??;
+    let (atlas, _) = body.atlas().ok_or(InfluenceError::NoPatch)??;
     let loads = loads(problem, &problem.mesh.surfaces[&body.contact], &patch.skin);
     let strain = StrainMap::new(problem, &patch.interface)?;
     let tangent = tangent_at_rest(problem)?;
@@ -51,7 +56,7 @@ pub fn build(body: &Body, progress: &mut dyn FnMut(usize)) -> Result<Operator, O
     for first in (0..vertices).step_by(COLUMNS) {
         let last = (first + COLUMNS).min(vertices);
         for (j, u) in (first..last).zip(solved.solve(first..last)) {
-            let at = |node: u32| displacement(&problem.structure, u, node);
+            let at = |node: u32| displacement(&problem.system, u, node);
             let faces = strain.apply(at);
             put(&mut g, &strain.average(&faces), j, vertices);
             put(&mut of_faces, &faces, j, vertices);
@@ -61,7 +66,7 @@ pub fn build(body: &Body, progress: &mut dyn FnMut(usize)) -> Result<Operator, O
     let quality = solved.quality()?;
     let area_mm2 = loads.iter().map(|l| l.area_mm2).collect();
     let faces = Faces { g: of_faces, of_vertex: strain.terms().to_vec() };
-    Ok(Operator { atlas_hash: atlas.hash().to_owned(), g, faces, area_mm2, quality })
+    Ok(InfluenceOperator { atlas_hash: atlas.hash().to_owned(), g, faces, area_mm2, quality })
 }
 
 /// Puts strain under unit pressure at vertex `j` into its column.
@@ -92,13 +97,13 @@ pub(super) fn loads(problem: &Problem, surface: &Surface, nodes: &[u32]) -> Vec<
     nodes.iter().map(load).collect()
 }
 
-fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, OperatorError> {
-    let mut tangent = problem.structure.zeros();
+fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, InfluenceError> {
+    let mut tangent = problem.system.zeros();
     let rest = vec![[0.0; 3]; problem.mesh.nodes.len()];
     let multipliers = vec![0.0; problem.contact.as_ref().map_or(0, |c| c.nodes().len())];
     let trial = Trial {
         u: &rest,
-        carried: &[],
+        independent: &[],
         multipliers_mpa: &multipliers,
         penalty: 1.0,
         load_fraction: 0.0,
@@ -111,16 +116,16 @@ fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, OperatorError> 
 }
 
 /// Displacement of a node of a solution over the unknowns.
-fn displacement(structure: &Structure, u: &[f64], node: u32) -> [f64; 3] {
-    std::array::from_fn(|i| match structure.equations.of_dof[3 * node as usize + i] {
-        Equations::FIXED => 0.0,
+fn displacement(system: &SymbolicSystem, u: &[f64], node: u32) -> [f64; 3] {
+    std::array::from_fn(|i| match system.dofs.of_dof[3 * node as usize + i] {
+        DofMap::FIXED => 0.0,
         e => u[e as usize],
     })
 }
 
 /// Solutions for all loads, block by block, and what checks them.
 struct Columns<'a> {
-    structure: &'a Structure,
+    system: &'a SymbolicSystem,
     tangent: &'a SymmetricMatrix,
     loads: &'a [Load],
     direct: Direct<'a>,
@@ -137,14 +142,14 @@ impl<'a> Columns<'a> {
         problem: &'a Problem,
         tangent: &'a SymmetricMatrix,
         loads: &'a [Load],
-    ) -> Result<Self, OperatorError> {
-        let structure = &problem.structure;
-        let n = structure.equations.count;
+    ) -> Result<Self, InfluenceError> {
+        let system = &problem.system;
+        let n = system.dofs.count;
         Ok(Self {
-            structure,
+            system,
             tangent,
             loads,
-            direct: Direct::new(structure, tangent, COLUMNS)?,
+            direct: Direct::new(system, tangent, COLUMNS)?,
             right: Vec::new(),
             solution: Vec::new(),
             product: vec![0.0; n],
@@ -155,13 +160,13 @@ impl<'a> Columns<'a> {
 
     /// Solutions for a range of loads.
     fn solve(&mut self, range: std::ops::Range<usize>) -> impl Iterator<Item = &[f64]> {
-        let n = self.structure.equations.count;
+        let n = self.system.dofs.count;
         self.right.clear();
         self.right.resize(n * range.len(), 0.0);
         for (load, column) in self.loads[range].iter().zip(self.right.chunks_exact_mut(n)) {
             for i in 0..3 {
-                let equation = self.structure.equations.of_dof[3 * load.node as usize + i];
-                if equation != Equations::FIXED {
+                let equation = self.system.dofs.of_dof[3 * load.node as usize + i];
+                if equation != DofMap::FIXED {
                     column[equation as usize] = load.force_n[i];
                 }
             }
@@ -170,7 +175,7 @@ impl<'a> Columns<'a> {
         self.solution.extend_from_slice(&self.right);
         self.direct.solve(&mut self.solution);
         for (f, u) in self.right.chunks_exact(n).zip(self.solution.chunks_exact(n)) {
-            self.structure.multiply(self.tangent, u, &mut self.product);
+            self.system.multiply(self.tangent, u, &mut self.product);
             let (mut miss, mut size) = (0.0, 0.0);
             for (f, p) in f.iter().zip(&self.product) {
                 miss += (f - p).powi(2);
@@ -183,17 +188,17 @@ impl<'a> Columns<'a> {
                 self.residual_relative = relative;
             }
             self.work.extend(self.loads.iter().map(|load| {
-                let d = displacement(self.structure, u, load.node);
+                let d = displacement(self.system, u, load.node);
                 (0..3).map(|i| d[i] * load.force_n[i]).sum::<f64>()
             }));
         }
         self.solution.chunks_exact(n)
     }
 
-    fn quality(&self) -> Result<Quality, OperatorError> {
+    fn quality(&self) -> Result<Quality, InfluenceError> {
         let found = self.residual_relative;
         if !(found <= RESIDUAL_MAX) {
-            return Err(OperatorError::Residual { found, accepted: RESIDUAL_MAX });
+            return Err(InfluenceError::Residual { found, accepted: RESIDUAL_MAX });
         }
         let n = self.loads.len();
         let (mut worst, mut largest) = (0.0f64, 0.0f64);
@@ -204,7 +209,7 @@ impl<'a> Columns<'a> {
             largest = largest.max(self.work[i * n + i]);
         }
         Ok(Quality {
-            unknowns: self.structure.equations.count,
+            unknowns: self.system.dofs.count,
             residual_relative: found,
             reciprocity_relative: worst / largest,
         })

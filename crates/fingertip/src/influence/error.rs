@@ -1,17 +1,17 @@
 //! What can stop the operator.
 
 use super::strain::StrainError;
-use crate::simulation::body::PressError;
+use crate::simulation::body::SimulationError;
 use papilla_atlas::flatten::BuildAtlasError;
 use papilla_fem::linear::FactorError;
 use papilla_fem::solve::StepError;
 
 /// The operator could not be built or written.
 #[derive(Debug, thiserror::Error)]
-pub enum OperatorError {
+pub enum InfluenceError {
     /// The finger could not be set up.
     #[error(transparent)]
-    Body(#[from] PressError),
+    Body(#[from] SimulationError),
     /// The body has no atlas, or it could not be flattened.
     #[error(transparent)]
     Atlas(#[from] BuildAtlasError),

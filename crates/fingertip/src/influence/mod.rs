@@ -22,19 +22,19 @@ pub mod strain;
 mod tests;
 
 pub use build::build;
-pub use error::OperatorError;
+pub use error::InfluenceError;
 pub use strain::COMPONENTS;
 
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::TissueTable;
 use crate::scene::effects::{Law, Plan};
-use crate::simulation::body::{Body, PressError};
+use crate::simulation::body::{Body, SimulationError};
 use crate::simulation::laws::solids;
 use serde::Serialize;
 
 /// The linear operator of a finger.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Operator {
+pub struct InfluenceOperator {
     /// Hash of the atlas whose vertices these are.
     pub atlas_hash: String,
     /// sqrt(J/m3) per Pa, `[vertex of the interface][component][vertex of the skin]`.
@@ -69,7 +69,7 @@ pub struct Quality {
     pub reciprocity_relative: f64,
 }
 
-impl Operator {
+impl InfluenceOperator {
     /// Number of vertices.
     #[must_use]
     pub fn vertices(&self) -> usize {
@@ -80,26 +80,26 @@ impl Operator {
     /// strain averaged to the vertices.
     ///
     /// # Errors
-    /// [`OperatorError::Pressures`] for another number of them.
-    pub fn sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
+    /// [`InfluenceError::Pressures`] for another number of them.
+    pub fn sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, InfluenceError> {
         self.sums_of_squares(&self.g, pressure_pa)
     }
 
     /// SED on the dermis side, J/m3, as a press records it: means of the faces' SED.
     ///
     /// # Errors
-    /// [`OperatorError::Pressures`] for another number of pressures.
-    pub fn recorded_sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
+    /// [`InfluenceError::Pressures`] for another number of pressures.
+    pub fn recorded_sed_j_per_m3(&self, pressure_pa: &[f64]) -> Result<Vec<f64>, InfluenceError> {
         let of_face = self.sums_of_squares(&self.faces.g, pressure_pa)?;
         let mean = |t: &Vec<(usize, f64)>| t.iter().map(|&(f, w)| w * of_face[f]).sum();
         Ok(self.faces.of_vertex.iter().map(mean).collect())
     }
 
-    fn sums_of_squares(&self, g: &[f32], pressure_pa: &[f64]) -> Result<Vec<f64>, OperatorError> {
+    fn sums_of_squares(&self, g: &[f32], pressure_pa: &[f64]) -> Result<Vec<f64>, InfluenceError> {
         let vertices = self.vertices();
         if pressure_pa.len() != vertices {
             let found = pressure_pa.len();
-            return Err(OperatorError::Pressures { found, expected: vertices });
+            return Err(InfluenceError::Pressures { found, expected: vertices });
         }
         let square = |row: &[f32]| {
             row.iter().zip(pressure_pa).map(|(g, p)| f64::from(*g) * p).sum::<f64>().powi(2)
@@ -112,8 +112,12 @@ impl Operator {
 /// The fingertip of the design at small strain: layers, rigid bone and nail.
 ///
 /// # Errors
-/// [`PressError`] if it cannot be set up.
-pub fn body(density: Density, order: Order, materials: &TissueTable) -> Result<Body, PressError> {
+/// [`SimulationError`] if it cannot be set up.
+pub fn body(
+    density: Density,
+    order: Order,
+    materials: &TissueTable,
+) -> Result<Body, SimulationError> {
     let plan = Plan { law: Law::Linear, ..Plan::usual() };
     Body::fingertip(&Default::default(), solids(materials, &plan)?, density, order, plan.parts)
 }

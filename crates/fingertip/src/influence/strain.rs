@@ -2,7 +2,7 @@
 //! numbers whose squares sum to the energy density.
 
 use crate::tissue::{NoTissue, Tissue};
-use papilla_fem::element::{Inverted, Memory};
+use papilla_fem::element::{HistoryVariables, Inverted};
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::solve::Problem;
 use papilla_fem::tensor::Mat3;
@@ -92,8 +92,13 @@ impl StrainMap {
                 let mut local = vec![[0.0; 3]; nodes.len()];
                 let mut unit = |a: usize, i: usize| -> Result<Weighted, Inverted> {
                     local[a][i] = 1.0;
-                    let state =
-                        solid.evaluate(shape, &local, Memory::default(), &mut force, None)?;
+                    let state = solid.evaluate(
+                        shape,
+                        &local,
+                        HistoryVariables::default(),
+                        &mut force,
+                        None,
+                    )?;
                     local[a][i] = 0.0;
                     let theta = sample.basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t);
                     let mut h = [[0.0; 3]; 3];
@@ -156,7 +161,7 @@ impl SampleMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use papilla_fem::element::{Elastic, Solid};
+    use papilla_fem::element::{ConstitutiveModel, Elastic};
     use papilla_fem::material::LinearElastic;
     use papilla_fem::tensor::Kinematics;
     use proptest::prelude::*;

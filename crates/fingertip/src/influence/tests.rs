@@ -11,8 +11,8 @@ use papilla_fem::solve::{Loading, Options};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
-fn finger() -> &'static (Body, Operator) {
-    static FINGER: OnceLock<(Body, Operator)> = OnceLock::new();
+fn finger() -> &'static (Body, InfluenceOperator) {
+    static FINGER: OnceLock<(Body, InfluenceOperator)> = OnceLock::new();
     FINGER.get_or_init(|| {
         let body = body(Density::Coarse, Order::Linear, &TissueTable::default()).unwrap();
         let operator = build(&body, &mut |_| ()).unwrap();
@@ -152,12 +152,12 @@ fn zero_pressure_gives_zero_and_twice_the_pressure_four_times_the_sed() {
     let [once, twice] = [1e3, 2e3].map(|p| operator.sed_j_per_m3(&vec![p; v]).unwrap());
     assert!(once.iter().zip(&twice).all(|(a, b)| (4.0 * a - b).abs() <= 1e-12 * b && *a > 0.0));
     let error = operator.sed_j_per_m3(&[1.0]).unwrap_err();
-    assert!(matches!(error, OperatorError::Pressures { found: 1, .. }), "{error}");
+    assert!(matches!(error, InfluenceError::Pressures { found: 1, .. }), "{error}");
 }
 
 #[test]
 fn what_is_not_linear_is_refused() {
     let finite = Body::usual(Density::Coarse).unwrap();
     let error = build(&finite, &mut |_| ()).unwrap_err();
-    assert!(matches!(error, OperatorError::FiniteStrain), "{error}");
+    assert!(matches!(error, InfluenceError::FiniteStrain), "{error}");
 }

@@ -1,6 +1,6 @@
 //! A press whose energy balances: taken again where its path was too coarse or its nodes slipped.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
 use super::record::IncrementRecord;
 use papilla_fem::contact::ContactRule;
@@ -27,7 +27,7 @@ impl Body {
         drive: &Drive,
         energy_vs_work_max: f64,
         keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
-    ) -> (Vec<T>, Result<(), PressError>) {
+    ) -> (Vec<T>, Result<(), SimulationError>) {
         let mut press = |approach: &Approach| {
             let (mut kept, mut pressed) = (Vec::with_capacity(drive.len()), Ok(()));
             let mut balanced = false;
@@ -48,15 +48,16 @@ impl Body {
         let felt = |rule| Approach { contact: Some(rule), ..approach.clone() };
         let mut taken = approach.clone();
         let (mut loses, mut kept, mut pressed) = press(&taken);
-        let stopped = matches!(pressed, Err(PressError::Solve { .. } | PressError::Slipped { .. }));
-        if (loses || stopped) && self.could_be_felt_within_faces(approach) {
+        let stopped =
+            matches!(pressed, Err(SimulationError::Solve { .. } | SimulationError::Slipped { .. }));
+        if (loses || stopped) && self.can_take_gauss_points(approach) {
             tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
-            taken = felt(ContactRule::Faces);
+            taken = felt(ContactRule::Gauss);
             (loses, kept, pressed) = press(&taken);
         }
-        if loses && self.could_be_felt_more_finely(&taken) {
+        if loses && self.can_take_order_3(&taken) {
             tracing::info!("it jumps within faces: pressed again, felt at more of their points");
-            (_, kept, pressed) = press(&felt(ContactRule::FacesFinely));
+            (_, kept, pressed) = press(&felt(ContactRule::GaussOrder3));
         }
         (kept, pressed)
     }

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 
 /// Why a body could not be set up or pressed.
 #[derive(Debug, thiserror::Error)]
-pub enum PressError {
+pub enum SimulationError {
     /// The shape contradicts itself.
     #[error(transparent)]
     Shape(#[from] FingertipShapeError),
@@ -106,7 +106,7 @@ pub enum PressError {
     Located(Box<Located<Self>>),
 }
 
-impl PressError {
+impl SimulationError {
     /// The field of a scene that is to blame, dotted.
     #[must_use]
     pub fn field(&self) -> Option<String> {
@@ -149,13 +149,13 @@ pub struct Body {
     /// Name of the surface that the indenter may touch.
     pub contact: String,
     /// The fingertip's atlas patch or the section's line; other bodies have none.
-    pub patch: Option<PressedPatch>,
+    pub patch: Option<RecordedPatch>,
     /// Whether the body is a plane section in x and y.
     pub plane: bool,
 }
 
 /// What is read off a fingertip at each equilibrium.
-pub struct PressedPatch {
+pub struct RecordedPatch {
     /// Vertices and triangles; of a section the vertices along the skin and
     /// no triangles.
     pub patch: Patch,
@@ -175,14 +175,14 @@ impl Body {
     /// held; an elastic nail is carried by that skin alone.
     ///
     /// # Errors
-    /// See [`PressError`].
+    /// See [`SimulationError`].
     pub fn fingertip(
         shape: &FingertipShape,
         materials: Materials,
         density: Density,
         order: Order,
         parts: Parts,
-    ) -> Result<Self, PressError> {
+    ) -> Result<Self, SimulationError> {
         let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in &mesh.node_sets["base"] {
@@ -203,14 +203,14 @@ impl Body {
         fixed: Vec<bool>,
         patch: Patch,
         plane: bool,
-    ) -> Result<Self, PressError> {
+    ) -> Result<Self, SimulationError> {
         let side = |tissue: Tissue| {
             SedRecovery::new(&mesh, "interface", tissue.region(), &patch.interface)
                 .map_err(NoTissue::from)
         };
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
-        let patch = Some(PressedPatch { patch, dermis, epidermis });
+        let patch = Some(RecordedPatch { patch, dermis, epidermis });
         Ok(Self { problem, contact: "skin".into(), patch, plane })
     }
 
@@ -218,13 +218,13 @@ impl Body {
     /// surface `contact`.
     ///
     /// # Errors
-    /// [`PressError::Problem`] names a surface that the mesh lacks.
+    /// [`SimulationError::Problem`] names a surface that the mesh lacks.
     pub fn from_mesh(
         mesh: Mesh,
         materials: Materials,
         held: &[String],
         contact: &str,
-    ) -> Result<Self, PressError> {
+    ) -> Result<Self, SimulationError> {
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for name in held {
             let nodes = mesh.node_sets.get(name).ok_or_else(|| ProblemError::Missing {
@@ -268,7 +268,7 @@ impl Body {
     /// show counts as none, so contact outside it shows in the balance.
     fn force_of_pressure_n(&self, solver: &Solver<'_>, pressure_mpa: &[f64]) -> [f64; 3] {
         let surface = &self.problem.mesh.surfaces[&self.contact];
-        let Some(PressedPatch { patch, .. }) = &self.patch else {
+        let Some(RecordedPatch { patch, .. }) = &self.patch else {
             return solver.force_of_pressure_n(surface, pressure_mpa);
         };
         let mut shown = vec![0.0; pressure_mpa.len()];
@@ -298,14 +298,14 @@ impl Body {
     /// Vertex values and checks of the solver's equilibrium.
     ///
     /// # Errors
-    /// [`PressError::Slipped`] where the skin does not follow the indenter,
-    /// [`PressError::Inverted`] where SED cannot be read.
+    /// [`SimulationError::Slipped`] where the skin does not follow the indenter,
+    /// [`SimulationError::Inverted`] where SED cannot be read.
     pub fn record(
         &self,
         solver: &Solver<'_>,
         depth_mm: f64,
         report: &StepReport,
-    ) -> Result<IncrementRecord, PressError> {
+    ) -> Result<IncrementRecord, SimulationError> {
         self.follows(solver, depth_mm)?;
         let skin = &self.problem.mesh.surfaces[&self.contact];
         let pressure = solver.pressure_mpa(skin);
@@ -357,10 +357,10 @@ impl Body {
     /// A solver for this body.
     ///
     /// # Errors
-    /// [`PressError::Solve`] if the factor does not fit in memory.
-    pub fn solver(&self, options: Options) -> Result<Solver<'_>, PressError> {
+    /// [`SimulationError::Solve`] if the factor does not fit in memory.
+    pub fn solver(&self, options: Options) -> Result<Solver<'_>, SimulationError> {
         Solver::new(&self.problem, options)
-            .map_err(|source| PressError::Solve { depth_mm: 0.0, source })
+            .map_err(|source| SimulationError::Solve { depth_mm: 0.0, source })
     }
 }
 

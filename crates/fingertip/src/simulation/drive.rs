@@ -1,6 +1,6 @@
 //! How an indenter is driven into a body, and the states at which it is recorded.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use super::record::IncrementRecord;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
@@ -97,7 +97,7 @@ impl Body {
     /// not depend on it.
     ///
     /// # Errors
-    /// [`PressError::Solve`] names the state that found no equilibrium; records
+    /// [`SimulationError::Solve`] names the state that found no equilibrium; records
     /// up to it have been visited.
     pub fn press(
         &self,
@@ -106,7 +106,7 @@ impl Body {
         drive: &Drive,
         refinement: u32,
         visit: Visit<'_>,
-    ) -> Result<(), PressError> {
+    ) -> Result<(), SimulationError> {
         drive.validate()?;
         let duration_s = match drive {
             Drive::Path(points) => points.last().map_or(0.0, |p| p.time_s),
@@ -131,11 +131,11 @@ impl Body {
         depths_mm: &[f64],
         refinement: u32,
         visit: Visit<'_>,
-    ) -> Result<(), PressError> {
+    ) -> Result<(), SimulationError> {
         let last = depths_mm.last().copied().unwrap_or(1.0);
         for (i, &depth_mm) in depths_mm.iter().enumerate() {
             let clock = Instant::now();
-            let at = |source| PressError::Solve { depth_mm, source };
+            let at = |source| SimulationError::Solve { depth_mm, source };
             let mut effort = Effort::default();
             for between in path_mm(depths_mm, i, refinement) {
                 effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
@@ -154,12 +154,12 @@ impl Body {
         solver: &mut Solver<'_>,
         points: &[DrivePoint],
         visit: Visit<'_>,
-    ) -> Result<(), PressError> {
+    ) -> Result<(), SimulationError> {
         let end = points.last().map_or(1.0, |p| p.time_s);
         for p in points {
             let clock = Instant::now();
             solver.turn();
-            let at = |source| PressError::Solve { depth_mm: p.depth_mm, source };
+            let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
             let report = solver.advance_to(p.time_s / end).map_err(at)?;
             let mut record = self.record(solver, p.depth_mm, &report)?;
             record.time_s = p.time_s;
@@ -175,7 +175,7 @@ impl Body {
         solver: &mut Solver<'_>,
         forces_n: &[f64],
         visit: Visit<'_>,
-    ) -> Result<(), PressError> {
+    ) -> Result<(), SimulationError> {
         // Depth grows about as force^(2/3); the first guess is a small part of it.
         let mut low: (f64, f64) = (0.0, 0.0);
         let mut step = 0.02;
@@ -197,7 +197,7 @@ impl Body {
                 let mark = solver.mark();
                 let report = solver
                     .advance_to(next)
-                    .map_err(|source| PressError::Solve { depth_mm, source })?;
+                    .map_err(|source| SimulationError::Solve { depth_mm, source })?;
                 effort = effort.plus(&report.effort);
                 let force = solver.force_along_path_n();
                 if (force - wanted).abs() <= FORCE_TOLERANCE * wanted {
@@ -217,7 +217,7 @@ impl Body {
                 }
             }
             let Some((at, force, mut report)) = found else {
-                return Err(PressError::Force { wanted_n: wanted, reached_n: low.1 });
+                return Err(SimulationError::Force { wanted_n: wanted, reached_n: low.1 });
             };
             low = (at, force);
             report.effort = effort;
@@ -251,7 +251,7 @@ impl Drive {
         matches!(self, Self::Path(_))
     }
 
-    fn validate(&self) -> Result<(), PressError> {
+    fn validate(&self) -> Result<(), SimulationError> {
         let rising: Vec<f64> = match self {
             Self::Depths(v) | Self::Forces(v) => v.clone(),
             Self::Path(points) => points.iter().map(|p| p.time_s).collect(),
@@ -259,7 +259,7 @@ impl Drive {
         let mut last = 0.0;
         for v in rising {
             if !(v.is_finite() && v > last) {
-                return Err(PressError::Rising(v, last));
+                return Err(SimulationError::Rising(v, last));
             }
             last = v;
         }

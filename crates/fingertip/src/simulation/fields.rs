@@ -1,7 +1,7 @@
 //! Fields of a whole body at one equilibrium, for looking at.
 
 use super::body::Body;
-use papilla_fem::element::Memory;
+use papilla_fem::element::HistoryVariables;
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::solve::Solver;
 use papilla_fem::tensor::Kinematics;
@@ -35,7 +35,7 @@ impl ElementFields {
                 let solid = &problem.materials[block.region[e]];
                 let shape = geometry.element(e);
                 let history = solver.history_of(b, e);
-                let memory = Memory { history, dt_s: 0.0 };
+                let memory = HistoryVariables { history, dt_s: 0.0 };
                 // An equilibrium has no inverted element; NaN would show one.
                 let theta = solid
                     .evaluate(shape, &local, memory, &mut force, None)

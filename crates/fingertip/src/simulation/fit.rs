@@ -5,7 +5,7 @@
 //! flank: it is then in balance, pushed aside by the flank, while the edge stands in a face
 //! between the nodes, unseen. Pressure, balances and residual say nothing of it, the normals do.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::Solver;
 use papilla_fem::tensor::norm;
@@ -23,8 +23,12 @@ impl Body {
     /// Refuses an equilibrium whose indenter pushes nodes along the skin instead of into it.
     ///
     /// # Errors
-    /// [`PressError::Slipped`].
-    pub(super) fn follows(&self, solver: &Solver<'_>, depth_mm: f64) -> Result<(), PressError> {
+    /// [`SimulationError::Slipped`].
+    pub(super) fn follows(
+        &self,
+        solver: &Solver<'_>,
+        depth_mm: f64,
+    ) -> Result<(), SimulationError> {
         let Some(contact) = &self.problem.contact else { return Ok(()) };
         let surface = &self.problem.mesh.surfaces[&self.contact];
         let x = solver.deformed();
@@ -52,7 +56,7 @@ impl Body {
         let share = norm(aside_n) / pressing_n;
         if touching > 0 && !(share <= ASIDE_MAX) {
             let spacing_mm = (touched_mm2 / f64::from(touching)).sqrt();
-            return Err(PressError::Slipped { depth_mm, share, spacing_mm });
+            return Err(SimulationError::Slipped { depth_mm, share, spacing_mm });
         }
         Ok(())
     }

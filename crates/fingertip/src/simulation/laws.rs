@@ -4,7 +4,7 @@ use crate::materials::{MaterialError, MaterialSpec};
 use crate::scene::effects::{Law, Plan};
 use crate::scene::{TissueError, TissueTable};
 use crate::tissue::Tissue;
-use papilla_fem::element::{Elastic, Solid, Viscoelastic};
+use papilla_fem::element::{ConstitutiveModel, Elastic, Viscoelastic};
 use papilla_fem::material::{Isochoric, LinearElastic, NeoHookean, Prony};
 use papilla_fem::solve::Materials;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ pub fn solids(table: &TissueTable, plan: &Plan) -> Result<Materials, TissueError
     Ok(Materials::new(models).with_stiff(&Tissue::STIFF))
 }
 
-fn solid(spec: &MaterialSpec, plan: &Plan) -> Result<Arc<dyn Solid>, MaterialError> {
+fn solid(spec: &MaterialSpec, plan: &Plan) -> Result<Arc<dyn ConstitutiveModel>, MaterialError> {
     let series = match &spec.prony {
         Some(prony) if plan.relaxes => Some(prony.series()?),
         _ => None,
@@ -43,7 +43,11 @@ fn solid(spec: &MaterialSpec, plan: &Plan) -> Result<Arc<dyn Solid>, MaterialErr
     })
 }
 
-fn shared<L: Isochoric>(law: L, bulk_mpa: f64, series: Option<(Prony, f64)>) -> Arc<dyn Solid> {
+fn shared<L: Isochoric>(
+    law: L,
+    bulk_mpa: f64,
+    series: Option<(Prony, f64)>,
+) -> Arc<dyn ConstitutiveModel> {
     match series {
         Some((prony, _)) => Viscoelastic::shared(law, bulk_mpa, prony),
         None => Elastic::shared(law, bulk_mpa),

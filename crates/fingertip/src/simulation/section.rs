@@ -1,6 +1,6 @@
 //! The fingertip's cross-section as a body.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use crate::geometry::section::SectionShape;
 use crate::mesh::fingertip::{Density, Order, Parts, Patch};
 use crate::mesh::section::{Extent, build};
@@ -24,12 +24,12 @@ impl Body {
     /// Meshes a cross-section of the fingertip, with its supports.
     ///
     /// # Errors
-    /// See [`PressError`].
+    /// See [`SimulationError`].
     pub fn section(
         spec: &SectionSpec<'_>,
         materials: Materials,
         parts: Parts,
-    ) -> Result<Self, PressError> {
+    ) -> Result<Self, SimulationError> {
         let kind = match spec.order {
             Order::Linear => ElementKind::Quad4,
             Order::Quadratic => ElementKind::Quad9,

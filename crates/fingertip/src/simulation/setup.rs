@@ -1,6 +1,6 @@
 //! From a scene to a body and an indenter.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive, DrivePoint, Visit};
 use super::laws::solids;
 use super::section::SectionSpec;
@@ -29,9 +29,9 @@ impl Simulation {
     /// Meshes and sets up what a scene describes, the indenter at first touch.
     ///
     /// # Errors
-    /// [`PressError`] names what cannot be built, and the line of the scene that is
+    /// [`SimulationError`] names what cannot be built, and the line of the scene that is
     /// to blame.
-    pub fn new(scene: &Scene) -> Result<Self, PressError> {
+    pub fn new(scene: &Scene) -> Result<Self, SimulationError> {
         Self::build(scene).map_err(|e| e.at(scene))
     }
 
@@ -40,12 +40,12 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Body::press`].
-    pub fn run(&self, observer: Visit<'_>) -> Result<(), PressError> {
+    pub fn run(&self, observer: Visit<'_>) -> Result<(), SimulationError> {
         let mut solver = self.body.solver(Options::default())?;
         self.body.press(&mut solver, &self.approach, &self.drive, 1, observer)
     }
 
-    fn build(scene: &Scene) -> Result<Self, PressError> {
+    fn build(scene: &Scene) -> Result<Self, SimulationError> {
         let plan = scene.plan()?;
         let approach = Approach {
             shape: scene.indenter.build(&scene.folder).map_err(IndenterError::from)?,
@@ -63,7 +63,7 @@ impl Simulation {
     }
 }
 
-fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
+fn body(scene: &Scene, plan: &Plan) -> Result<Body, SimulationError> {
     let materials = solids(&scene.materials, plan)?;
     match &scene.geometry {
         Geometry::Fingertip { density, order, shape } => {
@@ -84,7 +84,10 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, PressError> {
                 &Tissue::ALL.map(Tissue::name),
             )?;
             if mesh.is_planar() != plan.plane_strain {
-                return Err(PressError::Plane { file: file.clone(), planar: mesh.is_planar() });
+                return Err(SimulationError::Plane {
+                    file: file.clone(),
+                    planar: mesh.is_planar(),
+                });
             }
             let mesh = papilla_fem::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
@@ -97,8 +100,8 @@ impl Body {
     /// nail.
     ///
     /// # Errors
-    /// [`PressError`] if it cannot be set up.
-    pub fn usual(density: Density) -> Result<Self, PressError> {
+    /// [`SimulationError`] if it cannot be set up.
+    pub fn usual(density: Density) -> Result<Self, SimulationError> {
         let plan = Plan::usual();
         let materials = solids(&TissueTable::default(), &plan)?;
         let shape = FingertipShape::default();

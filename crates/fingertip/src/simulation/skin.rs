@@ -88,7 +88,7 @@ mod tests {
         bar.indenter =
             toml::from_str("shape = \"plate\"\nsize_mm = [1.5, 4.0]\nedge_radius_mm = 0.5")
                 .unwrap();
-        for (scene, rule) in [(ball, ContactRule::Nodes), (bar, ContactRule::Faces)] {
+        for (scene, rule) in [(ball, ContactRule::Nodal), (bar, ContactRule::Gauss)] {
             shear_carries_the_drag(&scene, rule);
         }
     }

@@ -1,6 +1,6 @@
 //! Presses of the coarse fingertip with bone and nail as solids.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
 use super::laws::solids;
 use super::record::IncrementRecord;
@@ -21,7 +21,7 @@ const BOTH: Parts = Parts { bone: true, nail: true };
 
 /// A coarse finger pressed .5 mm by a level plate.
 fn press(parts: Parts, table: &TissueTable, shape: &FingertipShape) -> Vec<IncrementRecord> {
-    let solve = || -> Result<_, PressError> {
+    let solve = || -> Result<_, SimulationError> {
         let plan = Plan { parts, ..Plan::usual() };
         let materials = solids(table, &plan)?;
         let body = Body::fingertip(shape, materials, Density::Coarse, Order::Linear, parts)?;
@@ -159,10 +159,10 @@ fn what_nodes_cannot_lead_is_felt_within_faces() {
     let wedge = "shape = \"wedge\"\ntip_width_mm = 0.5\nbase_width_mm = 4.0\nheight_mm = 4.0\n\
                  tip_radius_mm = 0.2\nlength_mm = 20.0";
     for (indenter, rule) in [
-        ("shape = \"sphere\"\nradius_mm = 3.0", ContactRule::Nodes),
-        ("shape = \"plate\"", ContactRule::Nodes),
-        (RULER, ContactRule::Faces),
-        (wedge, ContactRule::Nodes),
+        ("shape = \"sphere\"\nradius_mm = 3.0", ContactRule::Nodal),
+        ("shape = \"plate\"", ContactRule::Nodal),
+        (RULER, ContactRule::Gauss),
+        (wedge, ContactRule::Nodal),
     ] {
         let approach = approach(indenter, Pose::default(), [0.0; 2]);
         let found = body.indenter(&approach, &Drive::Depths(vec![1.0])).unwrap();
@@ -190,7 +190,7 @@ fn ridges_along_rows_of_points_do_not_let_the_skin_jump() {
                    edge_radius_mm = 0.7\nlength_mm = 24.0";
     let pose = Pose { pitch_deg: 31.352, roll_deg: 15.619, yaw_deg: 49.695 };
     let approach = approach(grating, pose, [0.138, 0.0]);
-    assert_eq!(fit_at(&approach, 1.208).contact, ContactRule::FacesFinely);
+    assert_eq!(fit_at(&approach, 1.208).contact, ContactRule::GaussOrder3);
 }
 
 /// No path balances to 1e-12: such a press is felt at more points of a face in the end.
@@ -203,7 +203,7 @@ fn energy_lost_within_faces_is_felt_at_more_points() {
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.contact;
     let (kept, pressed) = body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
     pressed.unwrap();
-    assert_eq!(kept, [ContactRule::FacesFinely]);
+    assert_eq!(kept, [ContactRule::GaussOrder3]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! An indenter in its pose, brought to where it first touches the skin, and how it is felt there.
 
-use super::body::{Body, PressError};
+use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive, FORCE_TRAVEL_MAX_MM};
 use crate::indenter::IndenterError;
 use papilla_fem::contact::{ContactRule, ContactSurface};
@@ -14,18 +14,18 @@ use papilla_sdf::{Placement, SignedDistance, first_touch_travel};
 const UNSEEN_MAX: f64 = 0.4;
 /// Least width of an indenter that nodes lead, in distances of nodes: rows of them slip off a
 /// narrower one.
-const LED_BY_NODES_MIN: f64 = 2.5;
+const NODAL_WIDTH_MIN: f64 = 2.5;
 
 impl Body {
     /// The indenter at first touch, on its way.
     ///
     /// # Errors
-    /// [`PressError::Indenter`] if it never touches.
+    /// [`SimulationError::Indenter`] if it never touches.
     pub fn indenter(
         &self,
         approach: &Approach,
         drive: &Drive,
-    ) -> Result<MovingIndenter, PressError> {
+    ) -> Result<MovingIndenter, SimulationError> {
         let rotation = self.rotation(approach.pose);
         let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
         let (x, y, normal) = (axis(0), axis(1), axis(2));
@@ -68,25 +68,25 @@ impl Body {
     /// by nodes; at nodes if it is not, or so narrow that faces would lose it too.
     fn contact_rule(&self, approach: &Approach) -> ContactRule {
         let spacings = self.spacings(approach);
-        approach.contact.unwrap_or(match (1.0..LED_BY_NODES_MIN).contains(&spacings) {
-            true => ContactRule::Faces,
-            false => ContactRule::Nodes,
+        approach.contact.unwrap_or(match (1.0..NODAL_WIDTH_MIN).contains(&spacings) {
+            true => ContactRule::Gauss,
+            false => ContactRule::Nodal,
         })
     }
 
     /// Whether an indenter that is felt at nodes could be felt within faces.
-    pub(super) fn could_be_felt_within_faces(&self, approach: &Approach) -> bool {
+    pub(super) fn can_take_gauss_points(&self, approach: &Approach) -> bool {
         let spacings = self.spacings(approach);
-        approach.contact.is_none() && spacings >= LED_BY_NODES_MIN && spacings.is_finite()
+        approach.contact.is_none() && spacings >= NODAL_WIDTH_MIN && spacings.is_finite()
     }
 
     /// Whether an indenter that is felt within faces could be felt at more points of them:
     /// quadratic faces have them already.
-    pub(super) fn could_be_felt_more_finely(&self, approach: &Approach) -> bool {
+    pub(super) fn can_take_order_3(&self, approach: &Approach) -> bool {
         let more = |c: &ContactSurface| {
-            c.points(ContactRule::FacesFinely).len() > c.points(ContactRule::Faces).len()
+            c.points(ContactRule::GaussOrder3).len() > c.points(ContactRule::Gauss).len()
         };
-        self.contact_rule(approach) == ContactRule::Faces
+        self.contact_rule(approach) == ContactRule::Gauss
             && self.problem.contact.as_ref().is_some_and(more)
     }
 
@@ -100,7 +100,7 @@ impl Body {
     fn contact_points_mm(&self, rule: ContactRule) -> Vec<[f64; 3]> {
         let at = &self.problem.mesh.nodes;
         match &self.problem.contact {
-            Some(c) if rule.is_within_faces() => {
+            Some(c) if rule.is_gauss() => {
                 c.points(rule).iter().map(|(support, _)| support.of(|n| at[n])).collect()
             }
             _ => self.problem.mesh.surfaces[&self.contact]

@@ -32,7 +32,7 @@ pub struct Deck<'a> {
     /// Their values at the end of the step, mm; the others stay 0.
     pub prescribed_mm: &'a [(usize, f64)],
     /// What presses on the body.
-    pub press: Option<Press<'a>>,
+    pub press: Option<Indentation<'a>>,
     /// CalculiX types of our elements.
     pub types: ElementTypes,
     /// Increments and output.
@@ -41,7 +41,7 @@ pub struct Deck<'a> {
 
 /// Contact with a rigid indenter.
 #[derive(Clone, Debug)]
-pub struct Press<'a> {
+pub struct Indentation<'a> {
     /// Surface of the mesh that may touch.
     pub contact: &'a str,
     /// What touches it.
@@ -203,7 +203,7 @@ impl Deck<'_> {
         out.push_str("*SURFACE, NAME=PRESSING, TYPE=ELEMENT\nEINDENTER,S2\n");
     }
 
-    fn contact(&self, press: &Press<'_>, out: &mut String) -> Result<(), ExportError> {
+    fn contact(&self, press: &Indentation<'_>, out: &mut String) -> Result<(), ExportError> {
         let name = press.contact;
         let surface = self.mesh.surfaces.get(name).ok_or_else(|| ExportError::NoSurface {
             name: name.into(),

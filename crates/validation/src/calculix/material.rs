@@ -1,7 +1,7 @@
 //! Material cards, and the energy that belongs to each.
 
 use super::ExportError;
-use papilla_fem::element::{Elastic, Solid};
+use papilla_fem::element::{ConstitutiveModel, Elastic};
 use papilla_fem::material::{LinearElastic, NeoHookean, Ogden, OgdenTerm};
 use papilla_fem::tensor::eigen::symmetric;
 use papilla_fingertip::materials::{MaterialError, MaterialSpec};
@@ -68,7 +68,7 @@ impl MaterialCard {
     /// The same law in our solver, Ogden's without its continuation outside
     /// stretches of 1/5 to 5, which CalculiX does not have.
     #[must_use]
-    pub fn solid(&self) -> Arc<dyn Solid> {
+    pub fn solid(&self) -> Arc<dyn ConstitutiveModel> {
         let bulk_mpa = self.bulk_modulus_mpa();
         match self {
             Self::NeoHookean { mu_mpa, .. } => {

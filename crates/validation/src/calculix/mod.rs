@@ -5,6 +5,7 @@
 //! cases that compare both codes are in [`witness`]. What to know of CalculiX
 //! stands in docs/calculix.md.
 
+pub mod cross_check;
 mod dat;
 mod deck;
 mod elements;
@@ -12,10 +13,9 @@ mod material;
 mod rigid;
 mod run;
 mod scene;
-pub mod witness;
 
 pub use dat::{Dat, DatError, Quantity, Table};
-pub use deck::{Deck, Press, StepControl};
+pub use deck::{Deck, Indentation, StepControl};
 pub use elements::{CcxElement, ElementTypes, LinearHex, QuadraticHex};
 pub use material::MaterialCard;
 pub use rigid::{RigidIndenter, RigidShape};

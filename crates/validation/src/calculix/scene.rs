@@ -1,12 +1,12 @@
 //! From a scene to a deck.
 
 use super::{
-    Deck, ElementTypes, ExportError, MaterialCard, Press, RigidIndenter, RigidShape, StepControl,
-    refuse_inexpressible,
+    Deck, ElementTypes, ExportError, Indentation, MaterialCard, RigidIndenter, RigidShape,
+    StepControl, refuse_inexpressible,
 };
 use papilla_fingertip::scene::{Scene, TissueError};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::drive::Drive;
 use papilla_fingertip::tissue::Tissue;
 use papilla_sdf::{IndenterSpec, RoundedPlate};
@@ -28,7 +28,7 @@ pub struct SceneDeck {
 pub enum SceneDeckError {
     /// The scene cannot be set up.
     #[error(transparent)]
-    Press(#[from] PressError),
+    Press(#[from] SimulationError),
     /// CalculiX cannot express it.
     #[error(transparent)]
     Export(#[from] ExportError),
@@ -83,7 +83,7 @@ impl SceneDeck {
             materials: &self.cards,
             fixed: &problem.fixed,
             prescribed_mm: &[],
-            press: Some(Press {
+            press: Some(Indentation {
                 contact: &self.setup.body.contact,
                 indenter: self.indenter.clone(),
                 stiffness_mpa_per_mm: None,

@@ -1,18 +1,18 @@
 //! `rungs.json` and one archive a rung, from the parts.
 
 use super::report::{
-    DiscretisationError, FORMAT, LeftOut, Quantiles, Report, RungEntry, StateEntry,
+    DiscretisationError, FORMAT, LeftOut, LevelEntry, Quantiles, Report, StateEntry,
 };
 use super::solve::Target;
 use super::store::{Part, SOFTWARE, archive};
-use super::{Ladder, Rung, RungsError};
+use super::{FidelityError, FidelityLevel, Ladder};
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_fingertip::simulation::record::relative_l2;
 use papilla_output::atomic;
 use std::path::Path;
 
 /// Parts of a rung, one a press.
-type Solved = (Rung, Vec<Part>);
+type Solved = (FidelityLevel, Vec<Part>);
 
 /// Writes everything and returns the report.
 pub(super) fn assemble(
@@ -21,7 +21,7 @@ pub(super) fn assemble(
     target: &Target,
     solved: &[Solved],
     folder: &Path,
-) -> Result<Report, RungsError> {
+) -> Result<Report, FidelityError> {
     let ranked = ladder.rungs.len() + 1;
     let (rungs, check) = solved.split_at(ranked.min(solved.len()));
     let mut left_out = Vec::new();
@@ -45,7 +45,7 @@ pub(super) fn assemble(
         let first = left_out.first().map_or_else(String::new, |l| {
             format!("{}, press {} at {} mm: {}", l.rung, l.press, l.depth_mm, l.why)
         });
-        return Err(RungsError::NothingSolved { first });
+        return Err(FidelityError::NothingSolved { first });
     }
     let v = target.vertices();
     let (_, reference) = &rungs[rungs.len() - 1];
@@ -93,7 +93,7 @@ fn unsound(part: &Part, d: usize) -> Option<String> {
     }
 }
 
-fn left(rung: Rung, part: &Part, d: usize, why: String) -> LeftOut {
+fn left(rung: FidelityLevel, part: &Part, d: usize, why: String) -> LeftOut {
     let press = &part.record.press;
     LeftOut { press: press.id, depth_mm: press.depths_mm[d], rung: rung.name(), why }
 }
@@ -122,18 +122,18 @@ fn difference(a: &Part, b: &Part, d: usize, v: usize, of: Field) -> f64 {
 }
 
 fn entry(
-    rung: Rung,
+    rung: FidelityLevel,
     parts: &[Part],
     places: &[(usize, usize)],
     v: usize,
     reference: &[Part],
     file: String,
-) -> RungEntry {
+) -> LevelEntry {
     let against = |of: Field| {
         Quantiles::of(places.iter().map(|&(p, d)| difference(&parts[p], &reference[p], d, v, of)))
     };
     let record = &parts[0].record;
-    RungEntry {
+    LevelEntry {
         name: rung.name(),
         density: rung.density,
         order: rung.order,

@@ -3,24 +3,24 @@
 use papilla_atlas::flatten::BuildAtlasError;
 use papilla_fingertip::campaign::SpecError;
 use papilla_fingertip::indenter::IndenterError;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
 use std::path::PathBuf;
 
 /// The rungs cannot be measured. A press that finds no equilibrium is none of these: it is
 /// reported among those left out.
 #[derive(Debug, thiserror::Error)]
-pub enum RungsError {
+pub enum FidelityError {
     /// The campaign makes no sense.
     #[error(transparent)]
     Campaign(#[from] SpecError),
     /// A rung's finger cannot be set up.
     #[error("{rung}: {source}")]
-    Rung {
+    FidelityLevel {
         /// Name of the rung.
         rung: String,
         /// Why.
-        source: Box<PressError>,
+        source: Box<SimulationError>,
     },
     /// The atlas cannot be flattened.
     #[error(transparent)]

@@ -13,10 +13,10 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-pub use error::RungsError;
-pub use report::{DiscretisationError, LeftOut, Quantiles, Report, RungEntry, StateEntry};
+pub use error::FidelityError;
+pub use report::{DiscretisationError, LeftOut, LevelEntry, Quantiles, Report, StateEntry};
 
-use papilla_fingertip::campaign::{CampaignSpec, Press, held_out, presses};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, held_out, indentations};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use serde::{Deserialize, Serialize};
 use solve::{Prepared, Target};
@@ -35,7 +35,7 @@ pub enum Strain {
 
 /// One way of solving a press.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Rung {
+pub struct FidelityLevel {
     /// Mesh density.
     pub density: Density,
     /// Order of the elements.
@@ -44,7 +44,7 @@ pub struct Rung {
     pub kinematics: Strain,
 }
 
-impl Rung {
+impl FidelityLevel {
     /// A rung.
     #[must_use]
     pub const fn new(density: Density, order: Order, kinematics: Strain) -> Self {
@@ -77,11 +77,11 @@ pub struct Ladder {
     /// Density whose atlas every field is read on.
     pub atlas: Density,
     /// Rungs, cheap ones first.
-    pub rungs: Vec<Rung>,
+    pub rungs: Vec<FidelityLevel>,
     /// What they are compared with.
-    pub reference: Rung,
+    pub reference: FidelityLevel,
     /// A still better one for a few presses, to tell the reference's own error.
-    pub check: Option<Rung>,
+    pub check: Option<FidelityLevel>,
     /// How many presses it solves.
     pub checked: usize,
 }
@@ -96,20 +96,22 @@ impl Ladder {
         let mut rungs = Vec::new();
         for density in [Density::Coarse, Density::Medium] {
             for order in [Order::Linear, Order::Quadratic] {
-                rungs.extend([Small, Finite].map(|strain| Rung::new(density, order, strain)));
+                rungs.extend(
+                    [Small, Finite].map(|strain| FidelityLevel::new(density, order, strain)),
+                );
             }
         }
         Self {
             atlas: Density::Medium,
             rungs,
-            reference: Rung::new(Density::Fine, Order::Linear, Finite),
-            check: Some(Rung::new(Density::Fine, Order::Quadratic, Finite)),
+            reference: FidelityLevel::new(Density::Fine, Order::Linear, Finite),
+            check: Some(FidelityLevel::new(Density::Fine, Order::Quadratic, Finite)),
             checked,
         }
     }
 
     /// Every rung in the order of solving, with the number of presses it solves.
-    fn all(&self, presses: usize) -> Vec<(Rung, usize)> {
+    fn all(&self, presses: usize) -> Vec<(FidelityLevel, usize)> {
         let mut all: Vec<_> = self.rungs.iter().map(|&r| (r, presses)).collect();
         all.push((self.reference, presses));
         all.extend(self.check.filter(|_| self.checked > 0).map(|r| (r, self.checked.min(presses))));
@@ -124,14 +126,14 @@ pub type Progress<'a> = &'a mut dyn FnMut(&str, usize, usize);
 /// run was stopped, and writes `rungs.json` and one npz a rung into `folder`.
 ///
 /// # Errors
-/// [`RungsError`]; single presses that fail are in the report.
+/// [`FidelityError`]; single presses that fail are in the report.
 pub fn run(
     spec: &CampaignSpec,
     ladder: &Ladder,
     count: usize,
     folder: &Path,
     progress: Progress<'_>,
-) -> Result<Report, RungsError> {
+) -> Result<Report, FidelityError> {
     spec.validate()?;
     let chosen = choose(spec, count)?;
     let target = Target::new(spec, ladder.atlas)?;
@@ -169,15 +171,15 @@ pub fn run(
 
 /// Held-out presses, as many different indenters as possible: in the order of their ids,
 /// always one of the indenters that had the fewest.
-fn choose(spec: &CampaignSpec, count: usize) -> Result<Vec<Press>, RungsError> {
+fn choose(spec: &CampaignSpec, count: usize) -> Result<Vec<Indentation>, FidelityError> {
     let test = held_out(spec).test;
     let found = test.len();
     if count == 0 || found < count {
         let campaign = spec.name.clone();
-        return Err(RungsError::TooFew { campaign, found, wanted: count });
+        return Err(FidelityError::TooFew { campaign, found, wanted: count });
     }
-    let all = presses(spec);
-    let mut left: Vec<&Press> = test.iter().map(|&id| &all[id]).collect();
+    let all = indentations(spec);
+    let mut left: Vec<&Indentation> = test.iter().map(|&id| &all[id]).collect();
     let mut had = vec![0usize; spec.candidates().len()];
     let mut chosen = Vec::with_capacity(count);
     for _ in 0..count {

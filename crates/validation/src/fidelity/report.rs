@@ -69,7 +69,7 @@ pub struct DiscretisationError {
 
 /// One rung of `rungs.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RungEntry {
+pub struct LevelEntry {
     /// Name.
     pub name: String,
     /// Mesh density.
@@ -113,7 +113,7 @@ pub struct Report {
     /// States, row by row of every archive.
     pub states: Vec<StateEntry>,
     /// Rungs.
-    pub rungs: Vec<RungEntry>,
+    pub rungs: Vec<LevelEntry>,
     /// States that are in no archive.
     pub left_out: Vec<LeftOut>,
 }

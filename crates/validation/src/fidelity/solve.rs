@@ -1,18 +1,18 @@
 //! One rung's finger, and one press of it.
 
 use super::store::{Part, Record};
-use super::{Rung, RungsError, Strain};
+use super::{FidelityError, FidelityLevel, Strain};
 use crate::acceptance::fault;
 use crate::processor;
 use papilla_fem::mesh::nearest::NearestPoints;
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::solve::Options;
-use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{EffectName, Geometry, Scene};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
@@ -29,10 +29,10 @@ pub(super) struct Target {
 
 impl Target {
     /// Vertices of the atlas of a density.
-    pub(super) fn new(spec: &CampaignSpec, density: Density) -> Result<Self, RungsError> {
-        let rung = Rung::new(density, Order::Linear, Strain::Finite);
+    pub(super) fn new(spec: &CampaignSpec, density: Density) -> Result<Self, FidelityError> {
+        let rung = FidelityLevel::new(density, Order::Linear, Strain::Finite);
         let body = setup(spec, rung)?.body;
-        let no_patch = || RungsError::NoPatch { rung: rung.name() };
+        let no_patch = || FidelityError::NoPatch { rung: rung.name() };
         let (atlas, _) = body.atlas().ok_or_else(no_patch)??;
         let (skin, interface, _) = surfaces(&body).ok_or_else(no_patch)?;
         Ok(Self { atlas_hash: atlas.hash().to_owned(), body, skin, interface })
@@ -55,12 +55,14 @@ fn surfaces(body: &Body) -> Option<Surfaces> {
 }
 
 /// The campaign's finger as a rung has it.
-fn setup(spec: &CampaignSpec, rung: Rung) -> Result<Simulation, RungsError> {
-    let failed =
-        |source: PressError| RungsError::Rung { rung: rung.name(), source: Box::new(source) };
+fn setup(spec: &CampaignSpec, rung: FidelityLevel) -> Result<Simulation, FidelityError> {
+    let failed = |source: SimulationError| FidelityError::FidelityLevel {
+        rung: rung.name(),
+        source: Box::new(source),
+    };
     let candidates = spec.candidates();
     let Some(first) = candidates.first() else {
-        return Err(failed(PressError::Empty));
+        return Err(failed(SimulationError::Empty));
     };
     let scene = spec.scene(first);
     let geometry = match scene.geometry {
@@ -94,15 +96,15 @@ pub(super) struct Prepared {
 impl Prepared {
     pub(super) fn new(
         spec: &CampaignSpec,
-        rung: Rung,
+        rung: FidelityLevel,
         target: &Target,
-    ) -> Result<Self, RungsError> {
+    ) -> Result<Self, FidelityError> {
         let begun_s = processor::thread_s();
         let Simulation { body, plan, .. } = setup(spec, rung)?;
         let setup_s = processor::thread_s() - begun_s;
         let name = rung.name();
         let Some((skin, interface, triangles)) = surfaces(&body) else {
-            return Err(RungsError::NoPatch { rung: name });
+            return Err(FidelityError::NoPatch { rung: name });
         };
         let nodes = &body.patch.as_ref().map_or(&[][..], |p| &p.patch.interface);
         let dermis = SedRecovery::by_quarters(
@@ -111,7 +113,7 @@ impl Prepared {
             Tissue::Dermis.region(),
             nodes,
         )
-        .map_err(|e| RungsError::Rung {
+        .map_err(|e| FidelityError::FidelityLevel {
             rung: rung.name(),
             source: Box::new(NoTissue::from(e).into()),
         })?;
@@ -130,9 +132,9 @@ impl Prepared {
     pub(super) fn part(
         &self,
         spec: &CampaignSpec,
-        press: &Press,
+        press: &Indentation,
         target: &Target,
-    ) -> Result<Part, RungsError> {
+    ) -> Result<Part, FidelityError> {
         let candidate = &spec.candidates()[press.candidate];
         let approach = Approach {
             shape: candidate.indenter.build(&spec.folder).map_err(IndenterError::from)?,
@@ -145,16 +147,18 @@ impl Prepared {
         let mut part = Part {
             record: Record {
                 press: press.clone(),
-                unknowns: self.body.problem.structure.equations.count,
-                factor_entries: self.body.problem.structure.factor_entries(),
+                unknowns: self.body.problem.system.dofs.count,
+                factor_entries: self.body.problem.system.factor_entries(),
                 setup_seconds: self.setup_s,
                 distance_mm_max: self.skin.distance_mm_max().max(self.interface.distance_mm_max()),
                 ..Record::default()
             },
             ..Part::default()
         };
-        let failed =
-            |e: PressError| RungsError::Rung { rung: self.name.clone(), source: Box::new(e) };
+        let failed = |e: SimulationError| FidelityError::FidelityLevel {
+            rung: self.name.clone(),
+            source: Box::new(e),
+        };
         let (approach, depths_mm) =
             self.in_place(approach, &press.depths_mm, target).map_err(failed)?;
         part.record.depth_shift_mm = depths_mm[0] - press.depths_mm[0];
@@ -187,7 +191,7 @@ impl Prepared {
         mut approach: Approach,
         depths_mm: &[f64],
         target: &Target,
-    ) -> Result<(Approach, Vec<f64>), PressError> {
+    ) -> Result<(Approach, Vec<f64>), SimulationError> {
         let drive = Drive::Depths(depths_mm.to_vec());
         let wanted = target.body.indenter(&approach, &drive)?.start.origin_mm;
         let rotation = self.body.rotation(approach.pose);
@@ -208,7 +212,7 @@ impl Prepared {
         depths_mm: Vec<f64>,
         approach: &Approach,
         keep: &mut dyn FnMut(&IncrementRecord),
-    ) -> Result<(), PressError> {
+    ) -> Result<(), SimulationError> {
         let mut solver = self.body.solver(Options::default())?;
         let drive = Drive::Depths(depths_mm);
         let mut read = Ok(());

@@ -1,9 +1,9 @@
 //! What is on disk between runs: one archive and one record a press and rung.
 
-use super::RungsError;
+use super::FidelityError;
 use ndarray::Ix2;
 use papilla_dataset::sha256_hex;
-use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::record::Checks;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
@@ -30,7 +30,7 @@ pub(super) struct Part {
 /// What vouches for a part's archive.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Record {
-    pub press: Press,
+    pub press: Indentation,
     pub unknowns: usize,
     pub factor_entries: usize,
     /// Processor seconds of mesh and symbolic factorization.
@@ -53,7 +53,7 @@ pub(super) struct Record {
 
 impl Default for Record {
     fn default() -> Self {
-        let press = Press {
+        let press = Indentation {
             id: 0,
             candidate: 0,
             indenter: String::new(),
@@ -100,14 +100,16 @@ impl Store {
         spec: &CampaignSpec,
         atlas_hash: &str,
         vertices: usize,
-    ) -> Result<Self, RungsError> {
+    ) -> Result<Self, FidelityError> {
         let folder = out.join("parts");
         atomic::create_folder(&folder)?;
         let path = folder.join("lock");
         let lock = File::create(&path).map_err(OutputError::io("write", &path))?;
         match lock.try_lock() {
             Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(RungsError::Busy { folder: out.into() }),
+            Err(TryLockError::WouldBlock) => {
+                return Err(FidelityError::Busy { folder: out.into() });
+            }
             Err(TryLockError::Error(e)) => return Err(OutputError::io("lock", &path)(e).into()),
         }
         let text = serde_json::to_string(&(spec, atlas_hash, SOFTWARE))
@@ -117,7 +119,7 @@ impl Store {
         if !path.exists() {
             atomic::write_json(&path, &owner)?;
         } else if atomic::read_json::<Owner>(&path)? != owner {
-            return Err(RungsError::Occupied { folder: out.into() });
+            return Err(FidelityError::Occupied { folder: out.into() });
         }
         atomic::remove_partial(&folder)?;
         Ok(Self { folder, vertices, _lock: lock })
@@ -129,7 +131,7 @@ impl Store {
 
     /// What an earlier run left of a press: a readable record whose archive has the
     /// recorded hash.
-    pub(super) fn load(&self, rung: &str, press: &Press) -> Option<Part> {
+    pub(super) fn load(&self, rung: &str, press: &Indentation) -> Option<Part> {
         let record: Record = atomic::read_json(&self.path(rung, press.id, "json")).ok()?;
         let path = self.path(rung, press.id, "npz");
         let bytes = std::fs::read(&path).ok()?;

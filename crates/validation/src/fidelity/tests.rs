@@ -8,7 +8,7 @@ use papilla_fingertip::scene::{Friction, TissueTable};
 use papilla_output::npz::NpzArrays;
 use papilla_sdf::{IndenterSpec, Sphere};
 
-const COARSE: Rung = Rung::new(Density::Coarse, Order::Linear, Strain::Finite);
+const COARSE: FidelityLevel = FidelityLevel::new(Density::Coarse, Order::Linear, Strain::Finite);
 
 fn spec() -> CampaignSpec {
     let candidate = |name: &str, indenter| Candidate {
@@ -42,10 +42,10 @@ fn spec() -> CampaignSpec {
 }
 
 fn ladder() -> Ladder {
-    let quadratic = Rung::new(Density::Coarse, Order::Quadratic, Strain::Finite);
+    let quadratic = FidelityLevel::new(Density::Coarse, Order::Quadratic, Strain::Finite);
     Ladder {
         atlas: Density::Coarse,
-        rungs: vec![Rung::new(Density::Coarse, Order::Linear, Strain::Small), quadratic],
+        rungs: vec![FidelityLevel::new(Density::Coarse, Order::Linear, Strain::Small), quadratic],
         reference: COARSE,
         check: Some(quadratic),
         checked: 1,
@@ -95,7 +95,7 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     // The folder is this campaign's.
     let other = CampaignSpec { seed: 6, ..spec() };
     let error = super::run(&other, &ladder(), 1, folder.path(), &mut |_, _, _| ()).unwrap_err();
-    assert!(matches!(error, RungsError::Occupied { .. }), "{error}");
+    assert!(matches!(error, FidelityError::Occupied { .. }), "{error}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn presses_that_are_not_held_out_are_not_taken() {
     assert!(chosen.iter().all(|p| test.contains(&p.id)));
     assert_ne!(chosen[0].candidate, chosen[1].candidate, "indenters take turns");
     let error = choose(&spec(), 5).unwrap_err();
-    assert!(matches!(error, RungsError::TooFew { found: 4, wanted: 5, .. }), "{error}");
+    assert!(matches!(error, FidelityError::TooFew { found: 4, wanted: 5, .. }), "{error}");
     assert!(choose(&spec(), 0).is_err());
 }
 

@@ -4,7 +4,7 @@ use super::lab::{scene, tight};
 use super::{Hardness, Line, Suite};
 use crate::verify::bodies::noise;
 use crate::verify::{CaseError, Check};
-use papilla_fem::linear::{Elimination, Structure};
+use papilla_fem::linear::{Elimination, SymbolicSystem};
 use papilla_fem::solve::{Effort, Loading, Options, Problem, StepReport};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::Body;
@@ -123,7 +123,7 @@ fn find(
 fn eliminated(seed: u64, elimination: Elimination) -> Result<Simulation, CaseError> {
     let mut setup = Simulation::new(&scene(&random_scene(seed, "linear", 1))?)?;
     let Problem { mesh, fixed, .. } = &setup.body.problem;
-    setup.body.problem.structure = Structure::eliminated(mesh, fixed, elimination)?;
+    setup.body.problem.system = SymbolicSystem::eliminated(mesh, fixed, elimination)?;
     Ok(setup)
 }
 

@@ -5,7 +5,7 @@ use super::{Line, Suite};
 use crate::verify::{CaseError, Check};
 use papilla_fem::solve::{Loading, Options, Problem};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 
 /// What a wedge may end with that is sharper than its mesh can follow: what was not reached or
 /// what happened there, and what to do.
@@ -135,7 +135,7 @@ fn on_a_row(variant: &str, text: &str) -> Result<Line, CaseError> {
 }
 
 /// Refused in one of the ways a sharp wedge may be.
-fn refusal(variant: &str, refused: Result<(), PressError>) -> Line {
+fn refusal(variant: &str, refused: Result<(), SimulationError>) -> Line {
     let text = refused.as_ref().map_or_else(ToString::to_string, |()| String::new());
     let words = REFUSALS.iter().find(|r| text.contains(r[1])).unwrap_or(&REFUSALS[0]);
     Line::refused(variant, refused, words)

@@ -6,7 +6,7 @@ use papilla_dataset::{BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIV
 use papilla_fem::solve::{Effort, Loading, Options, Problem, SolveError, Solver, StepReport};
 use papilla_fingertip::scene::{Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use std::path::Path;
@@ -25,7 +25,7 @@ impl Pressed {
         solver: &Solver<'_>,
         depth_mm: f64,
         report: StepReport,
-    ) -> Result<Self, PressError> {
+    ) -> Result<Self, SimulationError> {
         Ok(Self { record: body.record(solver, depth_mm, &report)?, report })
     }
 
@@ -78,7 +78,7 @@ pub(super) fn scene(text: &str) -> Result<Scene, SceneError> {
 }
 
 /// Presses what a scene describes and gives its last state.
-pub(super) fn press(scene: &Scene, options: Options) -> Result<Pressed, PressError> {
+pub(super) fn press(scene: &Scene, options: Options) -> Result<Pressed, SimulationError> {
     let Simulation { body, approach, drive, .. } = Simulation::new(scene)?;
     press_body(&body, &approach, &drive, options)
 }
@@ -89,14 +89,14 @@ pub(super) fn press_body(
     approach: &Approach,
     drive: &Drive,
     options: Options,
-) -> Result<Pressed, PressError> {
+) -> Result<Pressed, SimulationError> {
     let mut solver = body.solver(options)?;
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, s: &StepReport| (r.clone(), *s);
     let (kept, pressed) =
         body.press_balanced(&mut solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
     pressed?;
     let effort = kept.iter().fold(Effort::default(), |sum, (_, r)| sum.plus(&r.effort));
-    let (record, report) = kept.into_iter().next_back().ok_or(PressError::Empty)?;
+    let (record, report) = kept.into_iter().next_back().ok_or(SimulationError::Empty)?;
     Ok(Pressed { record, report: StepReport { effort, ..report } })
 }
 

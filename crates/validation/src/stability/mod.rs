@@ -11,14 +11,14 @@ mod bodies;
 mod differential;
 mod edges;
 mod files;
+mod friction;
+mod history;
 mod incompressible;
+mod indentation;
 mod lab;
 mod line;
-mod memory;
 mod ogden;
-mod press;
 mod report;
-mod rubbing;
 pub mod scenes;
 mod snap;
 mod stretches;
@@ -30,7 +30,7 @@ pub use line::{End, Hardness, Line};
 pub use report::Report;
 
 use crate::verify::CaseError;
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use serde::Serialize;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -65,7 +65,7 @@ impl Suite {
         self.extent == Extent::Long
     }
 
-    fn finger(&self) -> Result<&Body, PressError> {
+    fn finger(&self) -> Result<&Body, SimulationError> {
         if let Some(body) = self.finger.get() {
             return Ok(body);
         }
@@ -124,18 +124,18 @@ pub const CASES: &[Case] = &[
     Case {
         name: "one-increment",
         promise: "2 mm in one increment ends in the state that ten increments end in.",
-        run: press::one_increment,
+        run: indentation::one_increment,
     },
     Case {
         name: "deep",
         promise: "3 mm, near the bone: balances hold, no element inverts, quadratic elements agree.",
-        run: press::deep,
+        run: indentation::deep,
     },
     Case {
         name: "tilt",
         promise: "A plate at 0, 30, 60 and 80 degrees, and one that touches with a corner first, \
                   balance and keep the finger's symmetry.",
-        run: press::tilt,
+        run: indentation::tilt,
     },
     Case {
         name: "sharp-wedge",
@@ -171,18 +171,18 @@ pub const CASES: &[Case] = &[
         name: "time-steps",
         promise: "A ramp of 1e-6 s finds the instantaneous modulus, one of 1e6 s the long-term one, \
                   in a bounded number of steps.",
-        run: memory::durations,
+        run: history::durations,
     },
     Case {
         name: "relaxation-times",
         promise: "Tiny and huge relaxation times reach their limits, zero and nonsense are refused.",
-        run: memory::relaxation_times,
+        run: history::relaxation_times,
     },
     Case {
         name: "friction",
         promise: "Coefficients 0, 1e-9, 1 and 10: no drag, Coulomb's drag, Coulomb's drag, a glued \
                   block's force.",
-        run: rubbing::run,
+        run: friction::run,
     },
     Case {
         name: "free-modes",

@@ -15,10 +15,10 @@ pub use ending::{Ending, SceneRecord};
 pub use report::ScenesReport;
 pub use table::Row;
 
-use papilla_fingertip::campaign::{CampaignSpec, Press, SpecError, presses};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, SpecError, indentations};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
 use queue::Queue;
 use record::Record;
@@ -58,7 +58,7 @@ pub enum ScenesError {
     Campaign(#[from] SpecError),
     /// The body or an indenter cannot be set up.
     #[error(transparent)]
-    Press(#[from] PressError),
+    Press(#[from] SimulationError),
     /// A file cannot be read or written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -89,16 +89,16 @@ fn drawn_from(spec: &CampaignSpec) -> String {
 }
 
 /// The scenes: presses to their deepest states.
-fn scenes(spec: &CampaignSpec) -> Vec<Press> {
-    let deepest = |p: Press| {
+fn scenes(spec: &CampaignSpec) -> Vec<Indentation> {
+    let deepest = |p: Indentation| {
         let depths_mm = p.depths_mm.last().copied().into_iter().collect();
-        Press { depths_mm, ..p }
+        Indentation { depths_mm, ..p }
     };
-    presses(spec).into_iter().map(deepest).collect()
+    indentations(spec).into_iter().map(deepest).collect()
 }
 
 /// Splits the scenes into those that the record has, with what it says, and the others.
-fn split(all: Vec<Press>, known: Vec<SceneRecord>) -> (Vec<SceneRecord>, Vec<Press>) {
+fn split(all: Vec<Indentation>, known: Vec<SceneRecord>) -> (Vec<SceneRecord>, Vec<Indentation>) {
     let mut known: HashMap<_, _> = known.into_iter().map(|k| (k.press.id, k)).collect();
     let (mut reused, mut todo) = (Vec::new(), Vec::new());
     for press in all {

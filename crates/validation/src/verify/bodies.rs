@@ -2,7 +2,7 @@
 
 use super::CaseError;
 use papilla_fem::element::geometry::displacement_gradient;
-use papilla_fem::element::{Elastic, ElementKind, Inverted, Memory, Solid};
+use papilla_fem::element::{ConstitutiveModel, Elastic, ElementKind, HistoryVariables, Inverted};
 use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::{graded, lattice, part};
@@ -16,7 +16,7 @@ use papilla_fingertip::tissue::Tissue;
 use std::sync::Arc;
 
 /// The same constitutive model for every tissue.
-pub(crate) fn everywhere(solid: Arc<dyn Solid>) -> Materials {
+pub(crate) fn everywhere(solid: Arc<dyn ConstitutiveModel>) -> Materials {
     Materials::new(vec![solid; Tissue::ALL.len()]).with_stiff(&Tissue::STIFF)
 }
 
@@ -86,11 +86,11 @@ pub(crate) fn solve<'a>(
 pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
     let trial = Trial {
         u,
-        carried: &[],
+        independent: &[],
         multipliers_mpa: &[],
         penalty: 1.0,
         load_fraction: 0.0,
-        memory: Memory::default(),
+        memory: HistoryVariables::default(),
         friction: None,
     };
     let mut out = Evaluation::default();
@@ -117,11 +117,14 @@ pub(crate) fn points(
             let g = geometry.element(e);
             let material = &problem.materials[block.region[e]];
             let local: Vec<_> = block.element(e).iter().map(|&a| u[a as usize]).collect();
-            let state = material.evaluate(g, &local, Memory::default(), &mut force, None)?;
+            let state =
+                material.evaluate(g, &local, HistoryVariables::default(), &mut force, None)?;
             for (gradients, basis) in g.gradients.chunks_exact(n).zip(g.basis) {
                 let theta: f64 = basis.iter().zip(state.theta_minus_1).map(|(b, t)| b * t).sum();
                 let k = Kinematics::new(displacement_gradient(&local, gradients));
-                visit(Point { stress: material.first_piola_mpa(&k, theta, Memory::default()) });
+                visit(Point {
+                    stress: material.first_piola_mpa(&k, theta, HistoryVariables::default()),
+                });
             }
         }
     }

@@ -25,26 +25,26 @@ struct Equilibrium {
 }
 
 /// A press of the fingertip by a level plate.
-pub(super) struct FlatPress {
+pub(super) struct FlatIndentation {
     density: Density,
     equilibria: Vec<Equilibrium>,
 }
 
 impl Context {
-    fn flat_press(&self) -> Result<&FlatPress, CaseError> {
+    fn flat_press(&self) -> Result<&FlatIndentation, CaseError> {
         if let Some(press) = self.flat.get() {
             return Ok(press);
         }
         let press = if self.quick {
-            FlatPress::solve(Density::Coarse, 0.1, 10)?
+            FlatIndentation::solve(Density::Coarse, 0.1, 10)?
         } else {
-            FlatPress::solve(Density::Medium, 0.2, 10)?
+            FlatIndentation::solve(Density::Medium, 0.2, 10)?
         };
         Ok(self.flat.get_or_init(|| press))
     }
 }
 
-impl FlatPress {
+impl FlatIndentation {
     /// Presses in steps of `step_mm`.
     fn solve(density: Density, step_mm: f64, steps: u32) -> Result<Self, CaseError> {
         let finger = Body::usual(density)?;

@@ -5,7 +5,7 @@ use super::{CaseError, Check, Context};
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::element::geometry::jacobian;
 use papilla_fem::element::reference::GAUSS_3;
-use papilla_fem::element::{ElementKind, Memory, Solid};
+use papilla_fem::element::{ConstitutiveModel, ElementKind, HistoryVariables};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::REGION;
 use papilla_fem::mesh::lattice::cube;
@@ -50,12 +50,12 @@ impl Solution {
 
 /// Body force `-Div P` per undeformed volume, N/mm3: sixth-order differences
 /// of the material's own stress, whose error is below 1e-9 of the force.
-fn body_force(material: &dyn Solid, solution: Solution, x: [f64; 3]) -> [f64; 3] {
+fn body_force(material: &dyn ConstitutiveModel, solution: Solution, x: [f64; 3]) -> [f64; 3] {
     const H: f64 = 4e-3;
     const WEIGHTS: [f64; 3] = [0.75, -0.15, 1.0 / 60.0];
     let stress = |x: [f64; 3]| {
         let k = Kinematics::new(solution.gradient(x));
-        material.first_piola_mpa(&k, k.j_minus_1, Memory::default())
+        material.first_piola_mpa(&k, k.j_minus_1, HistoryVariables::default())
     };
     let mut force = [0.0; 3];
     for j in 0..3 {

@@ -40,7 +40,7 @@ pub(crate) struct Context {
     /// Smaller meshes, fewer presses.
     quick: bool,
     /// One flat press, solved when first asked for.
-    flat: OnceCell<finger::FlatPress>,
+    flat: OnceCell<finger::FlatIndentation>,
 }
 
 /// One verification case: a problem and the rows that it yields.

@@ -2,7 +2,7 @@
 
 use super::bodies::{largest, noise, points, solve, tight, uniform};
 use super::{CaseError, Check, Context};
-use papilla_fem::element::{ElementKind, Memory};
+use papilla_fem::element::{ElementKind, HistoryVariables};
 use papilla_fem::mesh::lattice::REGION;
 use papilla_fem::mesh::lattice::{cube, intervals};
 use papilla_fem::mesh::supports::{hold_boundary, prescribe};
@@ -74,7 +74,8 @@ fn errors(kind: ElementKind, cells: usize, h: Mat3) -> Result<[f64; 2], CaseErro
     let difference: Vec<f64> =
         u.as_flattened().iter().zip(exact.as_flattened()).map(|(a, b)| a - b).collect();
     let k = Kinematics::new(h);
-    let stress = problem.materials[REGION].first_piola_mpa(&k, k.j_minus_1, Memory::default());
+    let stress =
+        problem.materials[REGION].first_piola_mpa(&k, k.j_minus_1, HistoryVariables::default());
     let stress_scale = largest(stress.as_flattened());
     let mut worst = 0.0f64;
     points(&problem, u, &mut |p| {

@@ -3,8 +3,8 @@
 use super::bodies::{largest, noise, uniform};
 use super::{CaseError, Check, Context};
 use papilla_fem::contact::ContactRule;
-use papilla_fem::element::{ElementKind, Memory};
-use papilla_fem::linear::Equations;
+use papilla_fem::element::{ElementKind, HistoryVariables};
+use papilla_fem::linear::DofMap;
 use papilla_fem::mesh::FaceKind;
 use papilla_fem::mesh::lattice::cube;
 use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
@@ -29,8 +29,8 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
     for (kind, name, cells) in kinds {
         let carries = FaceKind::of(kind).carries_contact();
-        for (rule, points) in [(ContactRule::Nodes, "nodes"), (ContactRule::Faces, "face points")] {
-            if rule == ContactRule::Faces && !carries {
+        for (rule, points) in [(ContactRule::Nodal, "nodes"), (ContactRule::Gauss, "face points")] {
+            if rule == ContactRule::Gauss && !carries {
                 continue;
             }
             let (error, touching) = error(kind, cells, rule)?;
@@ -79,17 +79,17 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
         })
         .collect();
     let loading = loading(kind, rule);
-    let structure = &problem.structure;
-    let equations = &structure.equations;
-    let mut tangent = structure.zeros();
+    let system = &problem.system;
+    let equations = &system.dofs;
+    let mut tangent = system.zeros();
     let mut at = |u: &[[f64; 3]], with_tangent: bool| -> Result<Evaluation, StepError> {
         let trial = Trial {
             u,
-            carried: &[],
+            independent: &[],
             multipliers_mpa: &multipliers,
             penalty: 3.0,
             load_fraction: 1.0,
-            memory: Memory::default(),
+            memory: HistoryVariables::default(),
             friction: None,
         };
         let mut out = Evaluation::default();
@@ -98,7 +98,7 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
     };
     let touching = at(&u, true)?.traction_mpa.iter().filter(|t| **t > 0.0).count();
     let dofs: Vec<usize> =
-        (0..3 * u.len()).filter(|&d| equations.of_dof[d] != Equations::FIXED).collect();
+        (0..3 * u.len()).filter(|&d| equations.of_dof[d] != DofMap::FIXED).collect();
     let mut difference = Vec::new();
     for &dof in &dofs {
         let (node, i) = (dof / 3, dof % 3);
@@ -116,7 +116,7 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
     for (&dof, expected) in dofs.iter().zip(&difference) {
         let e = equations.of_dof[dof] as usize;
         unit[e] = 1.0;
-        structure.multiply(&tangent, &unit, &mut column);
+        system.multiply(&tangent, &unit, &mut column);
         unit[e] = 0.0;
         for (&d, expected) in dofs.iter().zip(expected) {
             worst = worst.max((column[equations.of_dof[d] as usize] - expected).abs());

@@ -2,8 +2,8 @@
 
 use super::bodies::{internal_force, solve, tight, uniform};
 use super::{CaseError, Check, Context};
+use papilla_fem::element::ConstitutiveModel;
 use papilla_fem::element::ElementKind;
-use papilla_fem::element::Solid;
 use papilla_fem::mesh::lattice::REGION;
 use papilla_fem::mesh::lattice::cube;
 use papilla_fem::mesh::supports::{hold, prescribe};
@@ -46,7 +46,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
 
 /// Lateral stretch and nominal stress (MPa) of
 /// `U = mu/2 (I1bar - 3) + K/2 (J - 1)^2` with free sides.
-fn closed_form(material: &dyn Solid, a: f64) -> (f64, f64) {
+fn closed_form(material: &dyn ConstitutiveModel, a: f64) -> (f64, f64) {
     let (mu, bulk) = (material.shear_modulus_mpa(), material.bulk_modulus_mpa());
     // Lateral Cauchy stress s(l) = mu J^(-5/3) (l^2 - a^2)/3 + K (J - 1), J = a l^2.
     let mut l = a.powf(-0.5);

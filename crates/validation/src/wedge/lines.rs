@@ -1,6 +1,6 @@
 //! The lines of the figures.
 
-use super::S2Error;
+use super::WedgeError;
 use papilla_fem::mesh::probe::{Probe, line};
 use papilla_fem::solve::Solver;
 use papilla_fem::tensor::Kinematics;
@@ -63,7 +63,7 @@ pub struct Lines {
 impl Lines {
     /// Finds the lines. Lateral points lie straight below skin nodes, where the
     /// mesh holds the layers' curves exactly.
-    pub(super) fn new(shape: &SectionShape, body: &Body) -> Result<Self, S2Error> {
+    pub(super) fn new(shape: &SectionShape, body: &Body) -> Result<Self, WedgeError> {
         let mesh = &body.problem.mesh;
         let skin = shape.skin(0.0)[1];
         let [_, b, c, d] = shape.layers(0.0);
@@ -91,12 +91,12 @@ impl Lines {
                 let x = points.iter().map(|p| p[0]).collect();
                 Ok((depth, x, Probe::new(mesh, &points)?))
             })
-            .collect::<Result<Vec<_>, S2Error>>()?;
+            .collect::<Result<Vec<_>, WedgeError>>()?;
         Ok(Self { depths_mm, depth, lateral })
     }
 
     /// SED along the lines at the solver's equilibrium.
-    pub(super) fn read(&self, body: &Body, solver: &Solver<'_>) -> Result<Read, S2Error> {
+    pub(super) fn read(&self, body: &Body, solver: &Solver<'_>) -> Result<Read, WedgeError> {
         let history = |block, element| solver.history_of(block, element);
         let deformed = body.deformed(solver, &history);
         let (mut depth_line, mut left_out) = (Vec::new(), 0);

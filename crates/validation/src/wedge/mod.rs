@@ -16,7 +16,7 @@ use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::{Geometry, Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::PressError;
+use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use reading::Reading;
 use std::time::Instant;
@@ -26,7 +26,7 @@ pub const SCENE: &str = include_str!("../../../../scenes/s2-wedge.toml");
 
 /// Why the press could not be reproduced.
 #[derive(Debug, thiserror::Error)]
-pub enum S2Error {
+pub enum WedgeError {
     /// The scene file is not the one that this code knows.
     #[error("scenes/s2-wedge.toml: {0}")]
     Scene(String),
@@ -35,7 +35,7 @@ pub enum S2Error {
     Invalid(#[from] SceneError),
     /// No equilibrium.
     #[error(transparent)]
-    Press(#[from] PressError),
+    Press(#[from] SimulationError),
     /// A line leaves the section.
     #[error(transparent)]
     Probe(#[from] ProbeError),
@@ -85,9 +85,9 @@ pub struct Outcome {
 /// The scene under a reading.
 ///
 /// # Errors
-/// [`S2Error`] if the file is not a section's.
-pub fn scene(reading: Reading, density: Density) -> Result<Scene, S2Error> {
-    let mut scene: Scene = toml::from_str(SCENE).map_err(|e| S2Error::Scene(e.to_string()))?;
+/// [`WedgeError`] if the file is not a section's.
+pub fn scene(reading: Reading, density: Density) -> Result<Scene, WedgeError> {
+    let mut scene: Scene = toml::from_str(SCENE).map_err(|e| WedgeError::Scene(e.to_string()))?;
     if let Geometry::Section { density: d, .. } = &mut scene.geometry {
         *d = density;
     }
@@ -99,11 +99,11 @@ pub fn scene(reading: Reading, density: Density) -> Result<Scene, S2Error> {
 /// Presses and reads the figures' lines.
 ///
 /// # Errors
-/// [`S2Error`] says what failed.
-pub fn run(reading: Reading, density: Density) -> Result<Outcome, S2Error> {
+/// [`WedgeError`] says what failed.
+pub fn run(reading: Reading, density: Density) -> Result<Outcome, WedgeError> {
     let scene = scene(reading, density)?;
     let Geometry::Section { shape, .. } = &scene.geometry else {
-        return Err(S2Error::Scene("geometry.kind has to be \"section\"".into()));
+        return Err(WedgeError::Scene("geometry.kind has to be \"section\"".into()));
     };
     let clock = Instant::now();
     let setup = Simulation::new(&scene)?;
@@ -135,7 +135,7 @@ pub fn run(reading: Reading, density: Density) -> Result<Outcome, S2Error> {
     failed?;
     Ok(Outcome {
         reading,
-        unknowns: body.problem.structure.equations.count,
+        unknowns: body.problem.system.dofs.count,
         elements: body.problem.mesh.element_count(),
         bone_depth_mm: shape.bone(0.0)[1] - shape.skin(0.0)[1],
         states,

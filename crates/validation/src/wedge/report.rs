@@ -3,7 +3,7 @@
 use super::findings::{Finding, Points, findings};
 use super::lines::DEPTHS_MM;
 use super::reading::Reading;
-use super::{Outcome, S2Error, State};
+use super::{Outcome, State, WedgeError};
 use papilla_fem::solve::Effort;
 use papilla_fingertip::simulation::record::Checks;
 use papilla_fingertip::tissue::Tissue;
@@ -186,7 +186,7 @@ fn lateral_chart(outcome: &Outcome, title: &str, wanted: &dyn Fn(f64, Tissue) ->
 
 /// Table of readings, Markdown; a reading without equilibrium says so.
 #[must_use]
-pub fn readings_table(rows: &[(Reading, Result<Summary, S2Error>)]) -> String {
+pub fn readings_table(rows: &[(Reading, Result<Summary, WedgeError>)]) -> String {
     let mut text = String::from(
         "| reading | time, s | force, N/mm | B, epidermis | B, dermis | C | D, dermis | D, fat | bone \
          | does not hold |\n|---|---|---|---|---|---|---|---|---|---|\n",

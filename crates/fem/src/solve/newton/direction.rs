@@ -7,7 +7,7 @@
 use super::{Fixed, Held, Newton};
 use crate::contact::Support;
 use crate::element::Dilatation;
-use crate::linear::{Equations, FactorKind, FactorMemory, NumericFactor, conjugate_gradient};
+use crate::linear::{DofMap, FactorKind, FactorMemory, NumericFactor, conjugate_gradient};
 use crate::solve::StepError;
 use crate::solve::loading::Loading;
 use crate::solve::mixed;
@@ -18,11 +18,11 @@ impl Newton<'_> {
         &mut self,
         fixed: Fixed<'_>,
         u: &[[f64; 3]],
-        carried: &[Dilatation],
+        independent: &[Dilatation],
     ) -> Result<(), StepError> {
-        let result = self.evaluate_with(fixed, u, carried, true);
-        for (dof, &e) in self.problem.structure.equations.of_dof.iter().enumerate() {
-            if e != Equations::FIXED {
+        let result = self.evaluate_with(fixed, u, independent, true);
+        for (dof, &e) in self.problem.system.dofs.of_dof.iter().enumerate() {
+            if e != DofMap::FIXED {
                 self.right[e as usize] = -self.current.residual_n[dof];
             }
         }
@@ -47,13 +47,13 @@ impl Newton<'_> {
             if factor.kind() == FactorKind::Indefinite {
                 let clock = Instant::now();
                 self.step.copy_from_slice(&self.right);
-                factor.solve(&self.problem.structure, &mut self.step);
+                factor.solve(&self.problem.system, &mut self.step);
                 self.effort.solve_s += clock.elapsed().as_secs_f64();
                 break;
             }
             let clock = Instant::now();
             let found = conjugate_gradient(
-                &self.problem.structure,
+                &self.problem.system,
                 &self.tangent,
                 &mut factor,
                 &self.right,
@@ -89,7 +89,7 @@ impl Newton<'_> {
         let points = surface.points(loading.contact());
         for (point, k) in self.current.curvature.drain(..) {
             let Support { nodes, values } = points.support(point);
-            self.problem.structure.add_point(&mut self.tangent, nodes, values, &k);
+            self.problem.system.add_point(&mut self.tangent, nodes, values, &k);
         }
         any
     }
@@ -97,11 +97,11 @@ impl Newton<'_> {
     fn factorize(&mut self, memory: FactorMemory, loading: &Loading) -> NumericFactor {
         let clock = Instant::now();
         self.effort.factorizations += 1;
-        let structure = &self.problem.structure;
-        let mut tried = memory.cholesky(structure, &self.tangent);
+        let system = &self.problem.system;
+        let mut tried = memory.cholesky(system, &self.tangent);
         if let Err(memory) = tried {
             tried = if self.convexify(loading) {
-                memory.cholesky(structure, &self.tangent)
+                memory.cholesky(system, &self.tangent)
             } else {
                 Err(memory)
             };
@@ -109,9 +109,9 @@ impl Newton<'_> {
         let factor = tried.unwrap_or_else(|memory| {
             tracing::debug!("tangent not positive definite: L B L^T");
             self.effort.indefinite_factorizations += 1;
-            memory.indefinite(structure, &self.tangent)
+            memory.indefinite(system, &self.tangent)
         });
-        if let Some(condition) = factor.condition_at_least(structure) {
+        if let Some(condition) = factor.condition_at_least(system) {
             self.condition = condition;
             tracing::trace!(condition, "tangent factorized");
         }

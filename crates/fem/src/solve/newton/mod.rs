@@ -1,7 +1,7 @@
 //! Newton's method at one load fraction.
 
 mod direction;
-mod length;
+mod line_search;
 
 use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};
@@ -10,8 +10,8 @@ use super::mixed;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
 use crate::contact::{ContactRule, FrictionTrial};
-use crate::element::{Dilatation, Memory};
-use crate::linear::{CgWorkspace, Equations, FactorMemory, NumericFactor, SymmetricMatrix};
+use crate::element::{Dilatation, HistoryVariables};
+use crate::linear::{CgWorkspace, DofMap, FactorMemory, NumericFactor, SymmetricMatrix};
 use std::time::Instant;
 
 /// What stays fixed while an equilibrium is sought.
@@ -20,15 +20,15 @@ pub(super) struct Fixed<'a> {
     pub loading: &'a Loading,
     pub load_fraction: f64,
     pub multipliers: &'a [f64],
-    pub memory: Memory<'a>,
+    pub memory: HistoryVariables<'a>,
     pub friction: Option<&'a FrictionTrial>,
 }
 
 impl<'a> Fixed<'a> {
-    fn trial(&self, u: &'a [[f64; 3]], carried: &'a [Dilatation], penalty: f64) -> Trial<'a> {
+    fn trial(&self, u: &'a [[f64; 3]], independent: &'a [Dilatation], penalty: f64) -> Trial<'a> {
         Trial {
             u,
-            carried,
+            independent,
             multipliers_mpa: self.multipliers,
             penalty,
             load_fraction: self.load_fraction,
@@ -58,7 +58,7 @@ impl Held {
     }
 }
 
-/// Memory and counters of the iteration.
+/// HistoryVariables and counters of the iteration.
 pub(super) struct Newton<'a> {
     pub problem: &'a Problem,
     pub options: Options,
@@ -78,22 +78,22 @@ pub(super) struct Newton<'a> {
     trial_u: Vec<[f64; 3]>,
     /// Dilatations at the end of a full step, and of the one that is tried.
     next: Vec<Dilatation>,
-    trial_carried: Vec<Dilatation>,
+    trial_independent: Vec<Dilatation>,
     pub current: Evaluation,
     trial: Evaluation,
 }
 
 impl<'a> Newton<'a> {
     pub(super) fn new(problem: &'a Problem, options: Options) -> Result<Self, SolveError> {
-        let n = problem.structure.equations.count;
+        let n = problem.system.dofs.count;
         Ok(Self {
             problem,
             options,
             penalty: 0.0,
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
-            held: Held::Memory(FactorMemory::new(&problem.structure)?),
-            tangent: problem.structure.zeros(),
+            held: Held::Memory(FactorMemory::new(&problem.system)?),
+            tangent: problem.system.zeros(),
             stale: true,
             condition: f64::NAN,
             cg: CgWorkspace::default(),
@@ -101,7 +101,7 @@ impl<'a> Newton<'a> {
             step: vec![0.0; n],
             trial_u: Vec::new(),
             next: Vec::new(),
-            trial_carried: Vec::new(),
+            trial_independent: Vec::new(),
             current: Evaluation::default(),
             trial: Evaluation::default(),
         })
@@ -124,9 +124,9 @@ impl<'a> Newton<'a> {
         tolerance: f64,
         fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
-        carried: &mut [Dilatation],
+        independent: &mut [Dilatation],
     ) -> Result<(), StepError> {
-        self.evaluate(fixed, u, carried)?;
+        self.evaluate(fixed, u, independent)?;
         let floor = self.rounding_force_n;
         let mut previous = f64::INFINITY;
         for iteration in 0..=self.options.newton_max {
@@ -146,15 +146,15 @@ impl<'a> Newton<'a> {
             if last {
                 break;
             }
-            self.assemble(fixed, u, carried)?;
+            self.assemble(fixed, u, independent)?;
             let mut forcing = Self::forcing(norm, previous, tolerance * reference);
-            if !carried.is_empty() {
+            if !independent.is_empty() {
                 let share = self.current.mixed_norm / norm;
                 forcing = mixed::forcing(forcing, share, tolerance * reference / norm);
             }
             previous = norm;
-            self.solve_step(fixed.loading, forcing, !carried.is_empty());
-            match self.line_search(fixed, u, carried) {
+            self.solve_step(fixed.loading, forcing, !independent.is_empty());
+            match self.line_search(fixed, u, independent) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
                 other => other?,
@@ -170,12 +170,12 @@ impl<'a> Newton<'a> {
     /// Residual that the rounding of `u` can make, N, with the tangent in hand.
     fn rounding_n(&self, u: &[[f64; 3]]) -> f64 {
         let mut unknowns = vec![0.0; self.right.len()];
-        for (v, &e) in u.as_flattened().iter().zip(&self.problem.structure.equations.of_dof) {
-            if e != Equations::FIXED {
+        for (v, &e) in u.as_flattened().iter().zip(&self.problem.system.dofs.of_dof) {
+            if e != DofMap::FIXED {
                 unknowns[e as usize] = *v;
             }
         }
-        f64::EPSILON * self.problem.structure.absolute_product_norm(&self.tangent, &unknowns)
+        f64::EPSILON * self.problem.system.absolute_product_norm(&self.tangent, &unknowns)
     }
 
     /// How exactly to solve the linear system: no more than its model of the
@@ -194,9 +194,9 @@ impl<'a> Newton<'a> {
         &mut self,
         fixed: Fixed<'_>,
         u: &[[f64; 3]],
-        carried: &[Dilatation],
+        independent: &[Dilatation],
     ) -> Result<(), StepError> {
-        self.evaluate_with(fixed, u, carried, false)
+        self.evaluate_with(fixed, u, independent, false)
     }
 
     /// Evaluates at `u` into `current`, with the tangent if it is wanted.
@@ -204,11 +204,11 @@ impl<'a> Newton<'a> {
         &mut self,
         fixed: Fixed<'_>,
         u: &[[f64; 3]],
-        carried: &[Dilatation],
+        independent: &[Dilatation],
         with_tangent: bool,
     ) -> Result<(), StepError> {
         let clock = Instant::now();
-        let trial = fixed.trial(u, carried, self.penalty);
+        let trial = fixed.trial(u, independent, self.penalty);
         let tangent = with_tangent.then_some(&mut self.tangent);
         let result = evaluate_body(self.problem, fixed.loading, &trial, tangent, &mut self.current);
         self.effort.assemble_s += clock.elapsed().as_secs_f64();

@@ -1,6 +1,6 @@
 //! What became of one scene.
 
-use papilla_fingertip::campaign::Press;
+use papilla_fingertip::campaign::Indentation;
 use serde::{Deserialize, Serialize};
 
 /// What became of a scene.
@@ -21,7 +21,7 @@ pub enum Ending {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneRecord {
     /// What was pressed how.
-    pub press: Press,
+    pub press: Indentation,
     /// What became of it.
     pub ending: Ending,
     /// Newton iterations.

@@ -7,9 +7,9 @@ use crate::processor;
 use crate::stability::panic_text;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::{Options, Solver, StepReport};
-use papilla_fingertip::campaign::{CampaignSpec, Press};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_fingertip::indenter::IndenterError;
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ pub(super) struct Queue<'a> {
     pub body: &'a Body,
     /// How each of the campaign's indenters is pressed, but for pose and offset.
     pub approaches: Vec<Approach>,
-    pub todo: &'a [Press],
+    pub todo: &'a [Indentation],
     pub next: AtomicUsize,
     pub record: &'a Record,
     pub solved: &'a (dyn Fn() + Sync),
@@ -36,7 +36,7 @@ pub(super) fn approaches(
             .indenter
             .build(&spec.folder)
             .map_err(IndenterError::from)
-            .map_err(PressError::from)?;
+            .map_err(SimulationError::from)?;
         Ok(Approach { shape, top_mm: c.indenter.top_mm(), ..first.clone() })
     });
     built.collect()
@@ -60,7 +60,7 @@ impl Queue<'_> {
         Ok(done)
     }
 
-    fn solve(&self, solver: &mut Solver<'_>, press: &Press) -> SceneRecord {
+    fn solve(&self, solver: &mut Solver<'_>, press: &Indentation) -> SceneRecord {
         let began_s = processor::thread_s();
         let (pose, offset_mm) = (press.pose, press.offset_mm);
         let approach = Approach { pose, offset_mm, ..self.approaches[press.candidate].clone() };

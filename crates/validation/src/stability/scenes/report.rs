@@ -146,10 +146,10 @@ pub(super) fn count(drawn_from: String, records: Vec<SceneRecord>, reused: usize
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use papilla_fingertip::campaign::Press;
+    use papilla_fingertip::campaign::Indentation;
 
     pub(in super::super) fn record(id: usize, ending: Ending) -> SceneRecord {
-        let press = Press {
+        let press = Indentation {
             id,
             candidate: 0,
             indenter: "plate".into(),

@@ -4,7 +4,7 @@ use super::evaluate::Balance;
 use super::problem::Problem;
 use super::stepping::Solver;
 use crate::contact::{ContactRule, Support};
-use crate::linear::Equations;
+use crate::linear::DofMap;
 use papilla_sdf::Distance;
 
 impl<'a> Solver<'a> {
@@ -37,9 +37,7 @@ impl<'a> Solver<'a> {
     fn at_contact_nodes<const N: usize>(&self, found: Vec<[f64; N]>) -> Vec<[f64; N]> {
         let rule = self.contact_rule();
         match &self.newton.problem.contact {
-            Some(c) if rule.is_within_faces() => {
-                c.points(rule).to_nodes(&found, c.nodes(), c.area_mm2())
-            }
+            Some(c) if rule.is_gauss() => c.points(rule).to_nodes(&found, c.nodes(), c.area_mm2()),
             _ => found,
         }
     }
@@ -81,7 +79,7 @@ impl<'a> Solver<'a> {
     /// materials without memory.
     #[must_use]
     pub fn history_of(&self, block: usize, element: usize) -> &[f64] {
-        let layout = self.newton.problem.memory.as_ref();
+        let layout = self.newton.problem.history_layout.as_ref();
         layout.map_or(&[], |m| &self.state.memory[m.range(block, element)])
     }
 
@@ -106,8 +104,8 @@ impl<'a> Solver<'a> {
             normal_force_n: e.normal_force_n,
             ..Balance::default()
         };
-        for (dof, &eq) in problem.structure.equations.of_dof.iter().enumerate() {
-            if eq == Equations::FIXED {
+        for (dof, &eq) in problem.system.dofs.of_dof.iter().enumerate() {
+            if eq == DofMap::FIXED {
                 balance.support_force_n[dof % 3] += e.residual_n[dof];
             }
         }
@@ -173,7 +171,7 @@ impl<'a> Solver<'a> {
         };
         let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
         let rule = self.contact_rule();
-        if !rule.is_within_faces() {
+        if !rule.is_gauss() {
             for n in surface.nodes().into_iter().map(|n| n as usize) {
                 if pressure[n] > 0.0 {
                     push[n] = normal(x[n]);

@@ -3,8 +3,8 @@
 use super::{CHECKS_FAILED, print};
 use anyhow::{Context, bail};
 use papilla_validation::calculix::Ccx;
-use papilla_validation::calculix::witness;
-use papilla_validation::calculix::witness::CASES;
+use papilla_validation::calculix::cross_check;
+use papilla_validation::calculix::cross_check::CASES;
 use papilla_validation::verify::Row;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,11 +49,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scratch = tempfile::tempdir().context("cannot create a folder for the decks")?;
     let folder = args.keep.as_deref().unwrap_or(scratch.path());
     papilla_output::atomic::create_folder(folder)?;
-    let wanted = |c: &witness::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
+    let wanted =
+        |c: &cross_check::Case| args.only.is_empty() || args.only.iter().any(|n| n == c.name);
     if !args.json {
         println!("{}", Row::heading());
     }
-    let report = witness::run(&ccx, folder, args.quick, &wanted, &mut |_, rows| {
+    let report = cross_check::run(&ccx, folder, args.quick, &wanted, &mut |_, rows| {
         for row in rows.into_iter().flatten().filter(|_| !args.json) {
             println!("{}", row.line());
         }

@@ -1,9 +1,9 @@
 //! Cases that both codes solve on equal meshes.
 
 mod finger;
+mod indentation;
 mod one_element;
 mod ours;
-mod press;
 mod section;
 mod sphere;
 

@@ -1,6 +1,6 @@
 //! A mesh's matrix: its pattern and symbolic factor, sums and products on them.
 
-use super::Equations;
+use super::DofMap;
 use super::ordering::{Elimination, OrderingError, elimination_order};
 use super::pattern::{entry, node_graph, pattern, scatter_maps};
 use crate::mesh::Mesh;
@@ -14,7 +14,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 
 /// Why a system's structure could not be built.
 #[derive(Debug, thiserror::Error)]
-pub enum StructureError {
+pub enum SymbolicError {
     /// Every degree of freedom is prescribed.
     #[error("no unknowns: every degree of freedom is prescribed")]
     NoUnknowns,
@@ -27,52 +27,52 @@ pub enum StructureError {
 }
 
 /// Pattern (lower triangle, columns), scatter maps and symbolic factorization.
-pub struct Structure {
+pub struct SymbolicSystem {
     /// Unknowns.
-    pub equations: Equations,
+    pub dofs: DofMap,
     /// First entry of each column; `n + 1` entries.
     pub column_start: Vec<usize>,
     /// Row of each entry, sorted in its column, starting with the diagonal.
     pub row: Vec<usize>,
     /// Per block: value index of every local pair `p <= q`, row-major upper
-    /// triangle, [`Equations::FIXED`] where a degree of freedom is prescribed.
+    /// triangle, [`DofMap::FIXED`] where a degree of freedom is prescribed.
     scatter: Vec<Vec<u32>>,
     pub(super) symbolic: SymbolicCholesky<usize>,
 }
 
-/// Values on a [`Structure`]'s pattern.
+/// Values on a [`SymbolicSystem`]'s pattern.
 #[derive(Clone, Debug)]
 pub struct SymmetricMatrix {
     /// One value per entry of the lower triangle.
     pub values: Vec<f64>,
 }
 
-impl Structure {
-    /// Structure of `mesh` with some degrees of freedom prescribed.
+impl SymbolicSystem {
+    /// SymbolicSystem of `mesh` with some degrees of freedom prescribed.
     ///
     /// # Errors
-    /// See [`StructureError`].
-    pub fn new(mesh: &Mesh, fixed: &[bool]) -> Result<Self, StructureError> {
+    /// See [`SymbolicError`].
+    pub fn new(mesh: &Mesh, fixed: &[bool]) -> Result<Self, SymbolicError> {
         Self::eliminated(mesh, fixed, Elimination::default())
     }
 
     /// The same with a choice of the elimination order.
     ///
     /// # Errors
-    /// See [`StructureError`].
+    /// See [`SymbolicError`].
     pub fn eliminated(
         mesh: &Mesh,
         fixed: &[bool],
         elimination: Elimination,
-    ) -> Result<Self, StructureError> {
-        let equations = Equations::new(fixed);
-        if equations.count == 0 {
-            return Err(StructureError::NoUnknowns);
+    ) -> Result<Self, SymbolicError> {
+        let dofs = DofMap::new(fixed);
+        if dofs.count == 0 {
+            return Err(SymbolicError::NoUnknowns);
         }
         let neighbours = node_graph(mesh);
-        let (column_start, row) = pattern(&neighbours, &equations);
-        let n = equations.count;
-        let order = elimination_order(&neighbours, &equations, elimination)?;
+        let (column_start, row) = pattern(&neighbours, &dofs);
+        let n = dofs.count;
+        let order = elimination_order(&neighbours, &dofs, elimination)?;
         let mut inverse = vec![0; n];
         for (k, &e) in order.iter().enumerate() {
             inverse[e] = k;
@@ -84,9 +84,9 @@ impl Structure {
             SymmetricOrdering::Custom(PermRef::new_checked(&order, &inverse, n)),
             CholeskySymbolicParams::default(),
         )
-        .map_err(|e| StructureError::Symbolic(format!("{e:?}")))?;
-        let scatter = scatter_maps(mesh, &equations, &column_start, &row);
-        Ok(Self { equations, column_start, row, scatter, symbolic })
+        .map_err(|e| SymbolicError::Symbolic(format!("{e:?}")))?;
+        let scatter = scatter_maps(mesh, &dofs, &column_start, &row);
+        Ok(Self { dofs, column_start, row, scatter, symbolic })
     }
 
     /// A matrix of zeros on this pattern.
@@ -138,7 +138,7 @@ impl Structure {
         }
     }
 
-    /// Memory of pattern, scatter maps and symbolic factorization, bytes.
+    /// HistoryVariables of pattern, scatter maps and symbolic factorization, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let scatter: usize = self.scatter.iter().map(Vec::len).sum();
@@ -146,8 +146,8 @@ impl Structure {
             SymbolicCholeskyRaw::Simplicial(s) => s.len_val(),
             SymbolicCholeskyRaw::Supernodal(s) => s.row_idx().len(),
         };
-        8 * (self.row.len() + self.column_start.len() + 2 * self.equations.count + supernodes)
-            + 4 * (scatter + self.equations.of_dof.len())
+        8 * (self.row.len() + self.column_start.len() + 2 * self.dofs.count + supernodes)
+            + 4 * (scatter + self.dofs.of_dof.len())
     }
 
     /// Adds an element's dense tangent (blocks `a <= b` of `3 n x 3 n`).
@@ -168,7 +168,7 @@ impl Structure {
             for &v in &line[p..] {
                 let target = map[at];
                 at += 1;
-                if target != Equations::FIXED {
+                if target != DofMap::FIXED {
                     matrix.values[target as usize] += v;
                 }
             }
@@ -187,17 +187,17 @@ impl Structure {
         values: &[f64],
         block: &[[f64; 3]; 3],
     ) {
-        let equation = |node: u32, i: usize| self.equations.of_dof[3 * node as usize + i];
+        let equation = |node: u32, i: usize| self.dofs.of_dof[3 * node as usize + i];
         for (&b, vb) in nodes.iter().zip(values) {
             for j in 0..3 {
                 let column = equation(b, j);
-                if column == Equations::FIXED {
+                if column == DofMap::FIXED {
                     continue;
                 }
                 for (&a, va) in nodes.iter().zip(values) {
                     for i in 0..3 {
                         let row = equation(a, i);
-                        if row != Equations::FIXED && row >= column {
+                        if row != DofMap::FIXED && row >= column {
                             let (row, column) = (row as usize, column as usize);
                             let at = entry(&self.column_start, &self.row, row, column);
                             matrix.values[at] += va * vb * block[i][j];
@@ -210,7 +210,7 @@ impl Structure {
 
     /// The lower triangle with these entries, as the factorizations take it.
     pub(super) fn lower<'a, T>(&'a self, values: &'a [T]) -> SparseColMatRef<'a, usize, T> {
-        let n = self.equations.count;
+        let n = self.dofs.count;
         let pattern =
             SymbolicSparseColMatRef::new_checked(n, n, &self.column_start, None, &self.row);
         SparseColMatRef::new(pattern, values)
@@ -219,7 +219,7 @@ impl Structure {
     /// `y = A x` over the unknowns.
     pub fn multiply(&self, matrix: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
-        for c in 0..self.equations.count {
+        for c in 0..self.dofs.count {
             let range = self.column_start[c]..self.column_start[c + 1];
             let xc = x[c];
             let mut sum = 0.0;
@@ -235,8 +235,8 @@ impl Structure {
     /// `A x`.
     #[must_use]
     pub fn absolute_product_norm(&self, matrix: &SymmetricMatrix, x: &[f64]) -> f64 {
-        let mut y = vec![0.0; self.equations.count];
-        for c in 0..self.equations.count {
+        let mut y = vec![0.0; self.dofs.count];
+        for c in 0..self.dofs.count {
             let range = self.column_start[c]..self.column_start[c + 1];
             for (&r, &v) in self.row[range.clone()].iter().zip(&matrix.values[range]) {
                 y[r] += (v * x[c]).abs();

@@ -4,26 +4,26 @@ use super::stepping::Solver;
 
 /// Least load fraction of a time step: what relaxes within it has relaxed at its end, and
 /// its history is exact for what changes linearly.
-const PACE_MIN: f64 = 1e-9;
+const TIME_STEP_MIN: f64 = 1e-9;
 
 impl Solver<'_> {
     /// Half the shortest relaxation time, as a load fraction.
-    pub(super) fn first_pace(&self) -> Option<f64> {
+    pub(super) fn first_time_step(&self) -> Option<f64> {
         let problem = self.newton.problem;
-        problem.memory.as_ref()?;
+        problem.history_layout.as_ref()?;
         let shortest = problem.materials.models().filter_map(|m| m.shortest_time_s());
         Some(0.5 * shortest.fold(f64::INFINITY, f64::min) / self.loading.duration_s)
     }
 
     /// `step`, no longer than time integration allows.
-    pub(super) fn paced(&self, step: f64) -> f64 {
-        self.pace.map_or(step, |p| step.min(p.max(PACE_MIN)))
+    pub(super) fn within_time_step(&self, step: f64) -> f64 {
+        self.time_step.map_or(step, |p| step.min(p.max(TIME_STEP_MIN)))
     }
 
     /// Sets the next time step by how far linear extrapolation missed this one:
     /// the recursion of a Prony series is exact for what changes linearly.
-    pub(super) fn set_pace(&mut self, next: f64, u: &[[f64; 3]]) {
-        let (Some(pace), Some(before)) = (&mut self.pace, &self.before) else { return };
+    pub(super) fn set_time_step(&mut self, next: f64, u: &[[f64; 3]]) {
+        let (Some(time_step), Some(before)) = (&mut self.time_step, &self.before) else { return };
         let step = next - self.state.fraction;
         let ratio = step / (self.state.fraction - before.fraction);
         let (mut miss, mut size) = (0.0f64, 0.0f64);
@@ -35,7 +35,7 @@ impl Solver<'_> {
             }
         }
         let wanted = (self.newton.options.time_error * size / miss.max(f64::MIN_POSITIVE)).sqrt();
-        *pace = step * wanted.clamp(0.3, 2.0);
+        *time_step = step * wanted.clamp(0.3, 2.0);
     }
 
     /// Time from the last equilibrium to `next`, s.

@@ -3,7 +3,7 @@
 use super::ours::{Cards, laws, sed_mpa};
 use super::{Check, Context, SOURCE};
 use crate::calculix::deck::{BODY, ELEMENTS, INDENTER};
-use crate::calculix::{Deck, ElementTypes, Press, Quantity, RigidIndenter, StepControl};
+use crate::calculix::{Deck, ElementTypes, Indentation, Quantity, RigidIndenter, StepControl};
 use crate::processor;
 use crate::verify::CaseError;
 use papilla_fem::mesh::Mesh;
@@ -114,7 +114,7 @@ impl Pressing<'_> {
             materials: &self.cards,
             fixed: &self.fixed,
             prescribed_mm: &[],
-            press: Some(Press {
+            press: Some(Indentation {
                 contact: self.contact,
                 indenter: self.indenter.clone(),
                 stiffness_mpa_per_mm: None,

@@ -2,14 +2,14 @@
 
 /// Which degrees of freedom are unknown.
 #[derive(Clone, Debug)]
-pub struct Equations {
+pub struct DofMap {
     /// Equation of each degree of freedom `3 node + component`; [`Self::FIXED`] if prescribed.
     pub of_dof: Vec<u32>,
     /// Number of unknowns.
     pub count: usize,
 }
 
-impl Equations {
+impl DofMap {
     /// Mark of a prescribed degree of freedom.
     pub const FIXED: u32 = u32::MAX;
 

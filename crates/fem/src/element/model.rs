@@ -4,16 +4,16 @@
 //! Each combination is its own type, so an elastic body's elements run through code
 //! that has no memory in it.
 
-use super::carried::Carried;
 use super::geometry::ElementGeometry;
+use super::independent::IndependentDilatation;
 use super::kernel::{ElementState, Inverted, Points, evaluate};
 use crate::material::{Isochoric, Prony, Relaxing, prony};
 use crate::tensor::{Kinematics, Mat3};
 use std::sync::Arc;
 
-/// Memory of one element over a time step.
+/// HistoryVariables of one element over a time step.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Memory<'a> {
+pub struct HistoryVariables<'a> {
     /// History of each quadrature point at the start of the step; empty for
     /// laws without.
     pub history: &'a [f64],
@@ -22,7 +22,7 @@ pub struct Memory<'a> {
 }
 
 /// A law as the solver sees it.
-pub trait Solid: Send + Sync {
+pub trait ConstitutiveModel: Send + Sync {
     /// Force (N, one a node) and, if asked, tangent of one element; see
     /// [`evaluate`].
     ///
@@ -32,7 +32,7 @@ pub trait Solid: Send + Sync {
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
-        memory: Memory<'_>,
+        memory: HistoryVariables<'_>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
@@ -47,8 +47,8 @@ pub trait Solid: Send + Sync {
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
-        memory: Memory<'_>,
-        carried: Option<Carried<'_>>,
+        memory: HistoryVariables<'_>,
+        independent: Option<IndependentDilatation<'_>>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted>;
@@ -57,7 +57,12 @@ pub trait Solid: Send + Sync {
     fn stored_mpa(&self, k: &Kinematics, theta_minus_1: f64, history: &[f64]) -> f64;
 
     /// First Piola-Kirchhoff stress of a point, volumetric part included, MPa.
-    fn first_piola_mpa(&self, k: &Kinematics, theta_minus_1: f64, memory: Memory<'_>) -> Mat3;
+    fn first_piola_mpa(
+        &self,
+        k: &Kinematics,
+        theta_minus_1: f64,
+        memory: HistoryVariables<'_>,
+    ) -> Mat3;
 
     /// Shear modulus at rest and at once, MPa.
     fn shear_modulus_mpa(&self) -> f64;
@@ -107,7 +112,7 @@ impl<L: Isochoric> Points for Same<L> {
 
 impl<L: Isochoric> Elastic<L> {
     /// As a value to share.
-    pub fn shared(law: L, bulk_mpa: f64) -> Arc<dyn Solid> {
+    pub fn shared(law: L, bulk_mpa: f64) -> Arc<dyn ConstitutiveModel> {
         Arc::new(Self { law, bulk_mpa })
     }
 }
@@ -129,19 +134,19 @@ fn with_volumetric<L: Isochoric>(p: &Mat3, pressure: f64, k: &Kinematics) -> Mat
     })
 }
 
-impl<L: Isochoric> Solid for Elastic<L> {
+impl<L: Isochoric> ConstitutiveModel for Elastic<L> {
     fn evaluate_with(
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
-        _memory: Memory<'_>,
-        carried: Option<Carried<'_>>,
+        _memory: HistoryVariables<'_>,
+        independent: Option<IndependentDilatation<'_>>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
         vectorized(
             #[inline(always)]
-            || evaluate(geometry, &Same(self.law), self.bulk_mpa, u, carried, force, stiffness),
+            || evaluate(geometry, &Same(self.law), self.bulk_mpa, u, independent, force, stiffness),
         )
     }
 
@@ -149,7 +154,12 @@ impl<L: Isochoric> Solid for Elastic<L> {
         self.law.energy(k) + 0.5 * self.bulk_mpa * theta_minus_1 * theta_minus_1
     }
 
-    fn first_piola_mpa(&self, k: &Kinematics, theta_minus_1: f64, _memory: Memory<'_>) -> Mat3 {
+    fn first_piola_mpa(
+        &self,
+        k: &Kinematics,
+        theta_minus_1: f64,
+        _memory: HistoryVariables<'_>,
+    ) -> Mat3 {
         with_volumetric::<L>(&self.law.first_piola(k), self.bulk_mpa * theta_minus_1, k)
     }
 
@@ -181,13 +191,13 @@ pub struct Viscoelastic<L> {
     pub prony: Prony,
 }
 
-struct Remembering<'a, L> {
+struct ViscoelasticPoints<'a, L> {
     solid: &'a Viscoelastic<L>,
-    memory: Memory<'a>,
+    memory: HistoryVariables<'a>,
     len: usize,
 }
 
-impl<L: Isochoric> Points for Remembering<'_, L> {
+impl<L: Isochoric> Points for ViscoelasticPoints<'_, L> {
     type At = Relaxing<L>;
 
     #[inline]
@@ -199,25 +209,25 @@ impl<L: Isochoric> Points for Remembering<'_, L> {
 
 impl<L: Isochoric> Viscoelastic<L> {
     /// As a value to share.
-    pub fn shared(law: L, bulk_mpa: f64, prony: Prony) -> Arc<dyn Solid> {
+    pub fn shared(law: L, bulk_mpa: f64, prony: Prony) -> Arc<dyn ConstitutiveModel> {
         Arc::new(Self { law, bulk_mpa, prony })
     }
 }
 
-impl<L: Isochoric> Solid for Viscoelastic<L> {
+impl<L: Isochoric> ConstitutiveModel for Viscoelastic<L> {
     fn evaluate_with(
         &self,
         geometry: ElementGeometry<'_>,
         u: &[[f64; 3]],
-        memory: Memory<'_>,
-        carried: Option<Carried<'_>>,
+        memory: HistoryVariables<'_>,
+        independent: Option<IndependentDilatation<'_>>,
         force: &mut [[f64; 3]],
         stiffness: Option<&mut [f64]>,
     ) -> Result<ElementState, Inverted> {
-        let points = Remembering { solid: self, memory, len: self.history_len() };
+        let points = ViscoelasticPoints { solid: self, memory, len: self.history_len() };
         vectorized(
             #[inline(always)]
-            || evaluate(geometry, &points, self.bulk_mpa, u, carried, force, stiffness),
+            || evaluate(geometry, &points, self.bulk_mpa, u, independent, force, stiffness),
         )
     }
 
@@ -226,7 +236,12 @@ impl<L: Isochoric> Solid for Viscoelastic<L> {
             + 0.5 * self.bulk_mpa * theta_minus_1 * theta_minus_1
     }
 
-    fn first_piola_mpa(&self, k: &Kinematics, theta_minus_1: f64, memory: Memory<'_>) -> Mat3 {
+    fn first_piola_mpa(
+        &self,
+        k: &Kinematics,
+        theta_minus_1: f64,
+        memory: HistoryVariables<'_>,
+    ) -> Mat3 {
         let law = Relaxing::new(self.law, &self.prony, memory.history, memory.dt_s);
         with_volumetric::<L>(&law.first_piola(k), self.bulk_mpa * theta_minus_1, k)
     }

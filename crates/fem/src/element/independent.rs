@@ -23,7 +23,7 @@ pub type Dilatation = [f64; 4];
 
 /// What an element carries along, and how far it is from equilibrium with it.
 #[derive(Debug)]
-pub struct Carried<'a> {
+pub struct IndependentDilatation<'a> {
     /// The dilatation.
     pub theta_minus_1: Dilatation,
     /// Overwritten with `K G (t - M^-1 b)`, N, one per node: added to the force of the condensed
@@ -59,7 +59,9 @@ pub fn next_dilatation(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::{BlockGeometry, Elastic, ElementKind, Memory, Solid};
+    use crate::element::{
+        BlockGeometry, ConstitutiveModel, Elastic, ElementKind, HistoryVariables,
+    };
     use crate::material::{LinearElastic, NeoHookean};
     use std::sync::Arc;
 
@@ -83,13 +85,18 @@ mod tests {
         gap_squared_mm3: f64,
     }
 
-    fn at(solid: &dyn Solid, g: ElementGeometry<'_>, u: &[[f64; 3]], t: Dilatation) -> Found {
+    fn at(
+        solid: &dyn ConstitutiveModel,
+        g: ElementGeometry<'_>,
+        u: &[[f64; 3]],
+        t: Dilatation,
+    ) -> Found {
         let n = u.len();
         let (mut force, mut lag_n) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
         let mut stiffness = vec![0.0; 9 * n * n];
-        let carried = Some(Carried { theta_minus_1: t, lag_n: &mut lag_n });
-        let (memory, dense) = (Memory::default(), Some(stiffness.as_mut_slice()));
-        let state = solid.evaluate_with(g, u, memory, carried, &mut force, dense).unwrap();
+        let independent = Some(IndependentDilatation { theta_minus_1: t, lag_n: &mut lag_n });
+        let (memory, dense) = (HistoryVariables::default(), Some(stiffness.as_mut_slice()));
+        let state = solid.evaluate_with(g, u, memory, independent, &mut force, dense).unwrap();
         Found {
             total_n: plus(&force, 1.0, &lag_n),
             lag_n,
@@ -153,7 +160,7 @@ mod tests {
 
     /// The dilatation's change is linear in the step; with its own an element is the condensed one.
     fn linear_change(
-        solid: &Arc<dyn Solid>,
+        solid: &Arc<dyn ConstitutiveModel>,
         g: ElementGeometry<'_>,
         u: &[[f64; 3]],
         d: &[[f64; 3]],

@@ -1,7 +1,7 @@
 //! The fingertip under a tilted plate, as a scene: the whole way from TOML to deck.
 //! Not run on small meshes: there is none small enough for CalculiX.
 
-use super::press::{Pressing, Tolerance};
+use super::indentation::{Pressing, Tolerance};
 use super::{Check, Context};
 use crate::calculix::{ElementTypes, SceneDeck};
 use crate::verify::CaseError;

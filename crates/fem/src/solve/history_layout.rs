@@ -1,18 +1,18 @@
 //! Where the memory of materials that have one lies.
 
-use crate::element::{BlockGeometry, Materials, Memory};
+use crate::element::{BlockGeometry, HistoryVariables, Materials};
 use crate::mesh::Mesh;
 
 /// Where the history of each element is in one long array.
 #[derive(Clone, Debug)]
-pub struct MemoryLayout {
+pub struct HistoryLayout {
     /// First number of each element, one list a block, with the end as last entry.
     start: Vec<Vec<usize>>,
     /// Numbers in all.
     pub len: usize,
 }
 
-impl MemoryLayout {
+impl HistoryLayout {
     /// `None` if no element's material has memory.
     pub(super) fn new(
         mesh: &Mesh,
@@ -48,7 +48,7 @@ impl MemoryLayout {
         dt_s: f64,
         block: usize,
         element: usize,
-    ) -> Memory<'a> {
-        Memory { history: &history[self.range(block, element)], dt_s }
+    ) -> HistoryVariables<'a> {
+        HistoryVariables { history: &history[self.range(block, element)], dt_s }
     }
 }

@@ -8,7 +8,7 @@ use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::mesh::fingertip::{Density, Order, Parts};
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::scene::{Plan, TissueTable};
-use papilla_fingertip::simulation::body::{Body, PressError};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::laws::solids;
 use papilla_sdf::{Plate, RoundedPlate};
@@ -24,7 +24,7 @@ fn incremented(
     pose: Pose,
     depth_mm: f64,
     increments: u32,
-) -> Result<Pressed, PressError> {
+) -> Result<Pressed, SimulationError> {
     let mut solver = body.solver(Options {
         residual_tolerance: 1e-9,
         gap_tolerance_mm: 1e-6,
@@ -34,7 +34,7 @@ fn incremented(
     solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
     let (mut report, mut effort) = (StepReport::default(), Effort::default());
     for i in 1..=increments {
-        let at = |source| PressError::Solve { depth_mm, source };
+        let at = |source| SimulationError::Solve { depth_mm, source };
         report = solver.advance_to(f64::from(i) / f64::from(increments)).map_err(at)?;
         effort = effort.plus(&report.effort);
     }

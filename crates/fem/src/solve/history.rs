@@ -1,15 +1,15 @@
-//! Memory of materials that have one: its move over a step, and the energy of a body with it.
+//! HistoryVariables of materials that have one: its move over a step, and the energy of a body with it.
 
-use super::layout::MemoryLayout;
+use super::history_layout::HistoryLayout;
 use super::problem::Problem;
-use crate::element::Memory;
+use crate::element::HistoryVariables;
 use crate::element::geometry::displacement_gradient;
 use crate::tensor::Kinematics;
 
 /// Deformation at the quadrature points of the elements that have memory.
 fn visit_points(
     problem: &Problem,
-    layout: &MemoryLayout,
+    layout: &HistoryLayout,
     u: &[[f64; 3]],
     visit: &mut dyn FnMut(usize, usize, usize, &Kinematics),
 ) {
@@ -27,7 +27,7 @@ fn visit_points(
 /// Moves `history` over a step of `dt_s` that ended at `u`.
 pub(super) fn advance(
     problem: &Problem,
-    layout: &MemoryLayout,
+    layout: &HistoryLayout,
     u: &[[f64; 3]],
     dt_s: f64,
     history: &mut [f64],
@@ -59,8 +59,8 @@ pub(super) fn energies(problem: &Problem, history: &[f64], u: &[[f64; 3]]) -> En
             let solid = &problem.materials[block.region[e]];
             let g = geometry.element(e);
             let len = solid.history_len();
-            let own = problem.memory.as_ref().map_or(&[][..], |m| &history[m.range(b, e)]);
-            let memory = Memory { history: own, dt_s: 0.0 };
+            let own = problem.history_layout.as_ref().map_or(&[][..], |m| &history[m.range(b, e)]);
+            let memory = HistoryVariables { history: own, dt_s: 0.0 };
             // An equilibrium has no inverted element; NaN would show one.
             let theta = solid
                 .evaluate(g, &local, memory, &mut force, None)

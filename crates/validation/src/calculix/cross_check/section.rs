@@ -4,8 +4,8 @@
 //! their layers to each other, so that its unknowns are as many as ours. A slab of
 //! bricks in the deck would have three times as many.
 
+use super::indentation::{Pressing, Tolerance};
 use super::ours::Cards;
-use super::press::{Pressing, Tolerance};
 use super::{Check, Context};
 use crate::calculix::{ElementTypes, MaterialCard, QuadraticHex, RigidIndenter, RigidShape};
 use crate::verify::CaseError;

@@ -2,7 +2,7 @@
 
 use super::{Fixed, Newton};
 use crate::element::Dilatation;
-use crate::linear::Equations;
+use crate::linear::DofMap;
 use crate::solve::StepError;
 use crate::solve::evaluate::evaluate_body;
 use crate::solve::mixed;
@@ -10,20 +10,20 @@ use std::time::Instant;
 
 impl Newton<'_> {
     /// Sets the trial to `length` of the step from `u` and what is carried.
-    fn go(&mut self, u: &[[f64; 3]], carried: &[Dilatation], length: f64) {
+    fn go(&mut self, u: &[[f64; 3]], independent: &[Dilatation], length: f64) {
         self.trial_u.clear();
         self.trial_u.extend_from_slice(u);
         for (node, v) in self.trial_u.iter_mut().enumerate() {
             for i in 0..3 {
-                let e = self.problem.structure.equations.of_dof[3 * node + i];
-                if e != Equations::FIXED {
+                let e = self.problem.system.dofs.of_dof[3 * node + i];
+                if e != DofMap::FIXED {
                     v[i] += length * self.step[e as usize];
                 }
             }
         }
-        self.trial_carried.clear();
-        for (c, n) in carried.iter().zip(&self.next) {
-            self.trial_carried.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
+        self.trial_independent.clear();
+        for (c, n) in independent.iter().zip(&self.next) {
+            self.trial_independent.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));
         }
     }
 
@@ -33,7 +33,7 @@ impl Newton<'_> {
         &mut self,
         fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
-        carried: &mut [Dilatation],
+        independent: &mut [Dilatation],
     ) -> Result<(), StepError> {
         // Derivative of the potential along the step; an indefinite tangent
         // can point uphill.
@@ -45,19 +45,19 @@ impl Newton<'_> {
         let (energy, norm) = (self.current.potential_mj, self.current.residual_norm);
         let mixed_norm = self.current.mixed_norm;
         self.next.clear();
-        if !carried.is_empty() {
+        if !independent.is_empty() {
             mixed::next_dilatations(self.problem, u, &self.step, &mut self.next);
         }
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
-            self.go(u, carried, length);
+            self.go(u, independent, length);
             let clock = Instant::now();
-            let trial = fixed.trial(&self.trial_u, &self.trial_carried, self.penalty);
+            let trial = fixed.trial(&self.trial_u, &self.trial_independent, self.penalty);
             let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
             self.effort.assemble_s += clock.elapsed().as_secs_f64();
             if found.is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
-                let smaller = if carried.is_empty() {
+                let smaller = if independent.is_empty() {
                     self.trial.residual_norm < 0.5 * norm
                 } else {
                     self.trial.mixed_norm <= (1.0 - 1e-4 * length) * mixed_norm
@@ -67,7 +67,7 @@ impl Newton<'_> {
                         tracing::trace!(length, energy, "newton step shortened");
                     }
                     u.copy_from_slice(&self.trial_u);
-                    carried.copy_from_slice(&self.trial_carried);
+                    independent.copy_from_slice(&self.trial_independent);
                     std::mem::swap(&mut self.current, &mut self.trial);
                     return Ok(());
                 }

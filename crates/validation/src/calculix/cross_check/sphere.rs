@@ -1,7 +1,7 @@
 //! Two layers under a rigid sphere: contact, and SED where the layers meet.
 
+use super::indentation::{Pressing, Tolerance};
 use super::ours::Cards;
-use super::press::{Pressing, Tolerance};
 use super::{Check, Context};
 use crate::calculix::{ElementTypes, LinearHex, MaterialCard, RigidIndenter, RigidShape};
 use crate::verify::CaseError;
