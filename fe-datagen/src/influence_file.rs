@@ -1,4 +1,4 @@
-//! The operator on disk: `operator.npz` and `operator.json`.
+//! The influence operator on disk: `operator.npz` and `operator.json`.
 
 use papilla_fingertip::influence::{COMPONENTS, InfluenceOperator, Quality};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// `operator.json`: what `operator.npz` is the operator of.
+/// `operator.json`: what `operator.npz` is the influence operator of.
 #[derive(Clone, Debug, Serialize)]
 pub struct Card {
     /// Version of this format.

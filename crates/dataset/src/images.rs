@@ -1,4 +1,4 @@
-//! S1's image pairs: 224 x 224 gray PNG of pressure and SED.
+//! The surface-pressure study's image pairs: 224 x 224 gray PNG of pressure and SED.
 
 use super::{Dataset, DatasetError, Split};
 use papilla_atlas::MAP_LEN;
@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 /// What to write.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageOptions {
-    /// Bits per pixel: 16 keeps the far field, 8 is what S1 used.
+    /// Bits per pixel: 16 keeps the far field, 8 is what the surface-pressure study used.
     pub bits: Bits,
 }
 
 /// One pair of images.
 #[derive(Clone, Debug, Serialize)]
 pub struct ImageEntry {
-    /// Id of the press.
+    /// Id of the indentation.
     pub press: usize,
     /// Depth, mm.
     pub depth_mm: f32,

@@ -4,7 +4,7 @@
 //! DIR/manifest.json           campaign, units, scales, splits, hashes, checks
 //! DIR/atlas.json              where every pixel lies on the finger
 //! DIR/raster.npz              the atlas' pixel -> (vertices, weights) maps
-//! DIR/shards/press-00000.npz  vertex values of all samples of one press
+//! DIR/shards/press-00000.npz  vertex values of all samples of one indentation
 //! ```
 //!
 //! The format in prose: `docs/dataset.md`.
@@ -44,7 +44,7 @@ pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
 pub use sheet::contact_sheet;
 pub use stats::{DepthStats, Range, StatsReport, stats};
 
-/// File name of a press' shard, relative to the dataset's folder.
+/// File name of an indentation's shard, relative to the dataset's folder.
 pub fn shard_file(id: usize) -> String {
     format!("shards/press-{id:05}.npz")
 }

@@ -34,13 +34,13 @@ pub struct Manifest {
     pub sed_max_j_per_m3: f64,
     /// Names of the columns of the shards' `checks` array.
     pub check_columns: Vec<String>,
-    /// The presses that are in the dataset, by rising id.
+    /// The indentations that are in the dataset, by rising id.
     pub presses: Vec<IndentationEntry>,
-    /// Presses that did not converge; they have no shard.
+    /// Indentations that did not converge; they have no shard.
     pub failed: Vec<FailedIndentation>,
     /// Samples that failed their own checks; they are not in the shards.
     pub dropped: Vec<DroppedSample>,
-    /// Ids of the presses of each split.
+    /// Ids of the indentations of each split.
     pub splits: Splits,
     /// See [`dataset_sha256`].
     pub dataset_sha256: String,
@@ -66,7 +66,7 @@ impl Default for Units {
     }
 }
 
-/// What a press is for. A press is never divided: its depths are near-copies.
+/// What an indentation is for. An indentation is never divided: its depths are near-copies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Split {
@@ -76,16 +76,16 @@ pub enum Split {
     Test,
 }
 
-/// Ids of the presses of each split, rising.
+/// Ids of the indentations of each split, rising.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Splits {
     /// Training presses.
     pub train: Vec<usize>,
-    /// Held-out presses.
+    /// Held-out indentations.
     pub test: Vec<usize>,
 }
 
-/// One press of the dataset.
+/// One indentation of the dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct IndentationEntry {
     /// Number within the campaign.
@@ -112,7 +112,7 @@ pub struct IndentationEntry {
     pub checks: Checks,
 }
 
-/// A press without a shard.
+/// An indentation without a shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FailedIndentation {
     /// Number within the campaign.
@@ -133,7 +133,7 @@ pub struct FailedIndentation {
 /// A sample that failed its own checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DroppedSample {
-    /// Id of the press.
+    /// Id of the indentation.
     pub press: usize,
     /// Depth of the sample, mm; null if the depth itself is not a number.
     pub depth_mm: Option<f64>,
@@ -147,7 +147,7 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 }
 
 /// Identity of a dataset: SHA-256 over the shards' hashes (as lower-case hex,
-/// without separator) in order of the press id.
+/// without separator) in order of the indentation id.
 pub fn dataset_sha256<'a>(shard_hashes: impl IntoIterator<Item = &'a str>) -> String {
     sha256_hex(shard_hashes.into_iter().collect::<String>().as_bytes())
 }

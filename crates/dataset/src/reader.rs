@@ -55,7 +55,7 @@ impl Dataset {
         &self.folder
     }
 
-    /// Reads the shard of a press and checks its hash.
+    /// Reads the shard of an indentation and checks its hash.
     ///
     /// # Errors
     /// [`DatasetError`] when it is absent, altered or damaged.
@@ -111,7 +111,7 @@ pub struct VerifyReport {
 
 /// Checks every hash of the dataset in `folder`, that all values are finite
 /// and not negative, that no value exceeds the manifest's maxima, that the
-/// splits agree with the presses and that `raster.npz` belongs to the atlas.
+/// splits agree with the indentations and that `raster.npz` belongs to the atlas.
 ///
 /// # Errors
 /// The first thing that is wrong, with the file it was found in.

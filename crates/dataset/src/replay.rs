@@ -1,4 +1,4 @@
-//! A few held-out presses for the service's page, next to their FE truth.
+//! A few held-out indentations for the service's page, next to their FE truth.
 
 use super::{Dataset, DatasetError, IndentationEntry, Split};
 use crate::record::Pose;
@@ -6,7 +6,7 @@ use papilla_output::atomic;
 use serde::Serialize;
 use std::path::Path;
 
-/// One press of `replay.json`.
+/// One indentation of `replay.json`.
 #[derive(Serialize)]
 struct ReplayPress {
     name: String,
@@ -24,7 +24,7 @@ struct Replay {
     presses: Vec<ReplayPress>,
 }
 
-/// Writes `count` samples of held-out presses, spread over the list of them and
+/// Writes `count` samples of held-out indentations, spread over the list of them and
 /// over their depths, to `path`; returns their names.
 ///
 /// # Errors

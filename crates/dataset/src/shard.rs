@@ -1,4 +1,4 @@
-//! Shards: the vertex values of one press in one archive.
+//! Shards: the vertex values of one indentation in one archive.
 
 use super::{DatasetError, fault, worst_checks};
 use crate::record::{Checks, Sample};

@@ -1,4 +1,4 @@
-//! A contact sheet: pressure and SED of many presses on one picture.
+//! A contact sheet: pressure and SED of many indentations on one picture.
 
 use super::{Dataset, DatasetError};
 use papilla_atlas::MAP_LEN;
@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// Presses shown at most, spread over the campaign.
 const ROWS_MAX: usize = 8;
-/// Depths shown per press at most, the deepest among them.
+/// Depths shown per indentation at most, the deepest among them.
 const PAIRS_MAX: usize = 4;
 const CELL_PX: usize = 150;
 const GAP_PX: usize = 8;
@@ -23,7 +23,7 @@ fn spread(count: usize, total: usize) -> Vec<usize> {
     (1..=count).map(|i| i * total / count - 1).collect()
 }
 
-/// Writes a PNG of pressure/SED pairs: a row for each of some presses, a pair
+/// Writes a PNG of pressure/SED pairs: a row for each of some indentations, a pair
 /// of maps for each of some depths. Each map has its own scale, from 0 to the
 /// maximum printed above it.
 ///

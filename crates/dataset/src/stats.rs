@@ -75,11 +75,11 @@ pub struct StatsReport {
     pub shard_bytes: u64,
     /// Presses by name of the indenter.
     pub indenters: BTreeMap<String, usize>,
-    /// Pitch over the presses, degrees.
+    /// Pitch over the indentations, degrees.
     pub pitch_deg: Range,
-    /// Roll over the presses, degrees.
+    /// Roll over the indentations, degrees.
     pub roll_deg: Range,
-    /// Yaw over the presses, degrees.
+    /// Yaw over the indentations, degrees.
     pub yaw_deg: Range,
     /// Largest pressure, Pa.
     pub pressure_max_pa: f64,
@@ -89,7 +89,7 @@ pub struct StatsReport {
     pub depths: Vec<DepthStats>,
     /// The worst of each check over all samples.
     pub worst_checks: Checks,
-    /// Presses that failed.
+    /// Indentations that failed.
     pub failed: Vec<FailedIndentation>,
     /// Samples that were left out.
     pub dropped: Vec<DroppedSample>,

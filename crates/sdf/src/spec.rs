@@ -37,7 +37,7 @@ pub enum IndenterSpec {
 }
 
 impl Default for IndenterSpec {
-    /// S1's plate.
+    /// The 20 mm plate of the surface-pressure study.
     fn default() -> Self {
         Self::Plate(Plate::default())
     }

@@ -20,7 +20,7 @@ pub struct Solved {
     pub unknowns: usize,
     /// Processor time of mesh, symbolic factorization and set-up, s.
     pub setup_s: f64,
-    /// Processor time of the press, s.
+    /// Processor time of the indentation, s.
     pub solve_s: f64,
     /// Iterations and the like.
     pub effort: Effort,

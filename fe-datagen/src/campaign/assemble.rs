@@ -1,4 +1,4 @@
-//! The manifest, assembled from the records of all presses.
+//! The manifest, assembled from the records of all indentations.
 
 use super::CampaignError;
 use super::state::{IndentationState, Outcome, SOFTWARE};
@@ -11,7 +11,7 @@ use papilla_fingertip::campaign::{CampaignSpec, HeldOut, Indentation, held_out};
 use papilla_fingertip::scene::Pose;
 use papilla_output::OutputError;
 
-/// The manifest of all presses, which stand in order of their ids.
+/// The manifest of all indentations, which stand in order of their ids.
 pub(super) fn manifest(
     spec: &CampaignSpec,
     atlas: &Atlas,
@@ -94,7 +94,7 @@ pub(super) fn manifest(
     })
 }
 
-/// The split of one press.
+/// The split of one indentation.
 fn split_of(all: &HeldOut, id: usize) -> Split {
     if all.test.binary_search(&id).is_ok() { Split::Test } else { Split::Train }
 }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Any error of a solver; its text goes into the manifest.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;
 
-/// A campaign cannot start or go on. A press that does not converge is none of
+/// A campaign cannot start or go on. An indentation that does not converge is none of
 /// these: it is recorded and the campaign continues.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
@@ -29,15 +29,15 @@ pub enum CampaignError {
         /// The output folder.
         folder: PathBuf,
     },
-    /// No solver could be built, so no press can be solved.
+    /// No solver could be built, so no indentation can be solved.
     #[error("cannot set up the solver: {0}")]
     Simulation(#[source] BoxError),
-    /// Every press failed; there is no dataset.
+    /// Every indentation failed; there is no dataset.
     #[error("all {presses} presses failed, the first with: {first}")]
     NothingSolved {
-        /// Number of presses.
+        /// Number of indentations.
         presses: usize,
-        /// The first press' error.
+        /// The first indentation' error.
         first: String,
     },
     /// A file cannot be written or read.

@@ -14,7 +14,7 @@ pub struct CampaignReport {
     pub name: String,
     /// The dataset's folder.
     pub folder: PathBuf,
-    /// Presses of the campaign.
+    /// Indentations of the campaign.
     pub presses: usize,
     /// Presses solved by this run.
     pub solved: usize,
@@ -24,7 +24,7 @@ pub struct CampaignReport {
     pub samples: usize,
     /// Samples that the campaign asks for.
     pub samples_due: usize,
-    /// Presses that failed.
+    /// Indentations that failed.
     pub failed: Vec<FailedIndentation>,
     /// Samples that failed their own checks.
     pub dropped: Vec<DroppedSample>,
@@ -38,7 +38,7 @@ pub struct CampaignReport {
     pub threads: usize,
     /// Wall time of this run, s.
     pub seconds: f64,
-    /// Solver time of all presses, summed over threads and runs, s.
+    /// Solver time of all indentations, summed over threads and runs, s.
     pub solver_seconds: f64,
 }
 

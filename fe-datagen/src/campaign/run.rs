@@ -1,4 +1,4 @@
-//! Solving the presses of a campaign in parallel.
+//! Solving the indentations of a campaign in parallel.
 
 use super::assemble::manifest;
 use super::state::{IndentationState, Outcome, Workspace};
@@ -17,9 +17,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Solves one press after another; each worker thread has its own.
+/// Solves one indentation after another; each worker thread has its own.
 pub trait IndentationSolver {
-    /// Presses to each of the depths and returns one equilibrium per depth, with
+    /// Indentations to each of the depths and returns one equilibrium per depth, with
     /// values at the vertices of the campaign's atlas. Equal presses have to give
     /// equal records (`seconds` apart), whatever was solved before.
     ///
@@ -52,7 +52,7 @@ impl Default for RunOptions {
 /// # Errors
 /// [`CampaignError`] when the campaign makes no sense, the folder belongs to
 /// another one or is in use, no solver can be built, a file cannot be written,
-/// or every press failed. Single failures are in the report and the manifest.
+/// or every indentation failed. Single failures are in the report and the manifest.
 pub fn run<S: IndentationSolver>(
     spec: &CampaignSpec,
     atlas: &Atlas,
@@ -129,7 +129,7 @@ fn is_in(todo: &[Indentation], id: usize) -> bool {
     todo.binary_search_by_key(&id, |press| press.id).is_ok()
 }
 
-/// The presses still to be solved, shared by the workers.
+/// The indentations still to be solved, shared by the workers.
 struct Queue<'a> {
     vertex_count: usize,
     workspace: &'a Workspace,

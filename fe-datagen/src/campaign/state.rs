@@ -18,7 +18,7 @@ struct Owner {
     fingerprint: String,
 }
 
-/// What became of one press; written after its shard.
+/// What became of one indentation; written after its shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct IndentationState {
     pub press: Indentation,
@@ -95,7 +95,7 @@ impl Workspace {
         self.folder.join(format!("progress/press-{id:05}.json"))
     }
 
-    /// What an earlier run left of a press: only what can be trusted, that is a
+    /// What an earlier run left of an indentation: only what can be trusted, that is a
     /// readable record whose shard is there and has the recorded hash.
     pub(super) fn load(&self, press: &Indentation) -> Option<IndentationState> {
         let state: IndentationState = atomic::read_json(&self.record_path(press.id)).ok()?;
@@ -111,7 +111,7 @@ impl Workspace {
         Some(state)
     }
 
-    /// Stores a press: the shard first, then the record that vouches for it.
+    /// Stores an indentation: the shard first, then the record that vouches for it.
     pub(super) fn store(
         &self,
         state: &IndentationState,
@@ -120,7 +120,7 @@ impl Workspace {
         let path = self.folder.join(shard_file(state.press.id));
         match shard {
             Some(bytes) => atomic::write(&path, bytes)?,
-            // A press that failed this time must not keep the shard of another time.
+            // An indentation that failed this time must not keep the shard of another time.
             None if path.exists() => {
                 std::fs::remove_file(&path).map_err(OutputError::io("remove", &path))?;
             }

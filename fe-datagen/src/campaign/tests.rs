@@ -271,7 +271,7 @@ fn the_manifest_names_the_indenter_of_every_press() {
     let build = || Ok(Formula { vertex_count, trouble: Trouble::Fail(1), calls: &calls });
     let spec = CampaignSpec { presses: 8, ..several() };
     let report = run(&spec, &atlas, build, folder.path(), &options).unwrap();
-    // Four presses of two depths, four of three, one of them failed.
+    // Four indentations of two depths, four of three, one of them failed.
     assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
     assert_eq!((report.samples_due, report.failed.len()), (20, 1));
     let manifest = Dataset::open(folder.path()).unwrap().manifest().clone();

@@ -41,8 +41,8 @@ enum Command {
     Explain(explain::Args),
     Schema(schema::Args),
     Generate(generate::Args),
-    InfluenceOperator(operator::Args),
-    Rungs(rungs::Args),
+    Operator(influence::Args),
+    Rungs(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
@@ -50,7 +50,7 @@ enum Command {
     Export(export::Args),
     Witness(cross_check::Args),
     Effects(effects::Args),
-    S2(s2::Args),
+    S2(wedge::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -68,9 +68,9 @@ pub fn run() -> ExitCode {
         Command::Witness(args) => cross_check::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
-        Command::InfluenceOperator(args) => operator::run(&args),
-        Command::Rungs(args) => rungs::run(&args),
-        Command::S2(args) => s2::run(&args),
+        Command::Operator(args) => influence::run(&args),
+        Command::Rungs(args) => fidelity::run(&args),
+        Command::S2(args) => wedge::run(&args),
     };
     match result {
         Ok(code) => code,

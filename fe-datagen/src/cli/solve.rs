@@ -60,7 +60,7 @@ struct Increment {
     stored_energy_mj: f64,
     /// Share of the volume beyond the calibrated stretches of its law.
     outside_calibration: f64,
-    /// Where on the skin the indenter was felt.
+    /// Where on the skin contact was found.
     contact: ContactRule,
     checks: Checks,
     /// Block of the mesh and element in it where J is smallest.

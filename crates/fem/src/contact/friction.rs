@@ -6,9 +6,9 @@
 //!
 //! `|q| <= s` (stick): `|q|^2 / 2 eps`;  `|q| > s` (slip): `s |q| / eps - s^2 / 2 eps`,
 //!
-//! and force and symmetric tangent are its derivatives. The update sets `lambda_t` to `q` cut to the
-//! bound, the bound to the new pressure and the plane to the new normal, until none changes: then
-//! Coulomb's law holds (Simo & Laursen 1992, made symmetric by the lagged bound).
+//! and force and symmetric tangent are its derivatives. The update sets `lambda_t` to `q` cut to
+//! the bound, the bound to the new pressure and the plane to the new normal, until none changes:
+//! then Coulomb's law holds (Simo & Laursen 1992, made symmetric by the lagged bound).
 
 use crate::tensor::norm;
 

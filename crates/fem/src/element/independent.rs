@@ -1,4 +1,4 @@
-//! A dilatation of its own in each element, carried from one iteration to the next.
+//! A dilatation of its own in each element, kept from one iteration to the next.
 //!
 //! Before it is condensed, the energy of an element has two fields, `u` and the coefficients
 //! `t` of `theta - 1`, with the pressure `K t`:
@@ -6,11 +6,10 @@
 //! `L(u, t) = sum_q w U_iso(F) + K t^T b(u) - K/2 t^T M t`.
 //!
 //! A Newton step on both, `t` condensed, is `(A + K t . b'' + K G M^-1 G^T) du = -f(u)` with
-//! `G = db/du`, and `t' = M^-1 (b + G^T du)`: force and volumetric stiffness are those of the condensed
-//! element, and so are its equilibria. But the geometric stiffness takes the
-//! pressure that the last step arrived at to first order, and not `K M^-1 b`, into which the second
-//! order of that step entered times `K` (Magisano, Leonetti & Garcea 2017: mixed
-//! integration points).
+//! `G = db/du`, and `t' = M^-1 (b + G^T du)`: force and volumetric stiffness are those of the
+//! condensed element, and so are its equilibria. But the geometric stiffness takes the pressure
+//! that the last step arrived at to first order, and not `K M^-1 b`, into which the second order of
+//! that step entered times `K` (Magisano, Leonetti & Garcea 2017: mixed integration points).
 
 use super::geometry::ElementGeometry;
 use super::geometry::displacement_gradient;
@@ -21,7 +20,7 @@ use crate::tensor::{double_dot, trace};
 /// Coefficients of `theta - 1` in the dilatation basis of an element.
 pub type Dilatation = [f64; 4];
 
-/// What an element carries along, and how far it is from equilibrium with it.
+/// What an element keeps, and how far it is from equilibrium with it.
 #[derive(Debug)]
 pub struct IndependentDilatation<'a> {
     /// The dilatation.

@@ -35,7 +35,7 @@ pub struct ElementState {
     pub j_min: f64,
     /// Coefficients of `theta - 1` in the dilatation basis.
     pub theta_minus_1: Dilatation,
-    /// What a carried dilatation differs from it by, squared and integrated, mm3; 0
+    /// What a independent dilatation differs from it by, squared and integrated, mm3; 0
     /// without one.
     pub gap_squared_mm3: f64,
 }
@@ -60,7 +60,7 @@ const NODES_MAX: usize = 27;
 ///
 /// Overwrites `force` (N, one per node) and, if given, the tangent `stiffness`
 /// (N/mm; dense row-major `3 n x 3 n`, blocks with node `a <= b` only). With a dilatation
-/// carried along the tangent takes its pressure, see [`IndependentDilatation`].
+/// independent the tangent takes its pressure, see [`IndependentDilatation`].
 ///
 /// # Errors
 /// [`Inverted`] where `J <= 0`; outputs are then meaningless.

@@ -39,7 +39,7 @@ pub trait ConstitutiveModel: Send + Sync {
         self.evaluate_with(geometry, u, memory, None, force, stiffness)
     }
 
-    /// The same with a dilatation carried along.
+    /// The same with an independent dilatation.
     ///
     /// # Errors
     /// [`Inverted`] where `J <= 0`.

@@ -3,7 +3,7 @@
 //!
 //! A solve reads the whole factor once, whatever the number of columns, so a block of
 //! some tens costs little more than one. It takes twice the memory of the f32 factor
-//! that preconditions a press, and is accurate to rounding without iteration.
+//! that preconditions an indentation, and is accurate to rounding without iteration.
 
 use super::FactorError;
 use super::symbolic::{SymbolicSystem, SymmetricMatrix};

@@ -30,7 +30,8 @@ fn scratch(system: &SymbolicSystem) -> StackReq {
 }
 
 /// HistoryVariables for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
-/// ([`NumericFactor::release`]): to factorize anew allocates nothing. Nothing can be solved with it.
+/// ([`NumericFactor::release`]): to factorize anew allocates nothing. Nothing can be solved with
+/// it.
 pub struct FactorMemory(Box<Buffers>);
 
 struct Buffers {

@@ -2,7 +2,7 @@
 //!
 //! The pattern of a mesh never changes (contact couples only degrees of freedom
 //! that an element couples already), so [`SymbolicSystem`] is built once per mesh
-//! and shared by every press of a campaign.
+//! and shared by every indentation of a campaign.
 
 mod cg;
 mod direct;

@@ -104,7 +104,7 @@ impl FaceKind {
         *gradient = slope.map(|d| [d[0], d[1]]);
     }
 
-    /// Points at which an indenter is felt within the face, and their weights: they see what
+    /// Gauss points of contact within the face, and their weights: they see what
     /// its shape functions can follow.
     #[must_use]
     pub fn contact_points(self) -> Vec<([f64; 2], f64)> {

@@ -21,7 +21,7 @@ pub struct Evaluation {
     pub residual_n: Vec<f64>,
     /// Its norm over the unknowns.
     pub residual_norm: f64,
-    /// How far displacement and carried dilatations are from equilibrium, N; 0 without.
+    /// How far displacement and independent dilatations are from equilibrium, N; 0 without.
     pub mixed_norm: f64,
     /// Norm of contact, dead and support forces: what the residual is small against.
     pub reference_norm: f64,
@@ -49,7 +49,7 @@ pub struct Evaluation {
 pub struct Trial<'a> {
     /// Displacement, mm, one a mesh node.
     pub u: &'a [[f64; 3]],
-    /// Dilatation of each element, block by block; empty if none is carried along.
+    /// Dilatation of each element, block by block; empty if none is kept as an unknown of its own.
     pub independent: &'a [Dilatation],
     /// Contact multipliers, MPa, one a contact point.
     pub multipliers_mpa: &'a [f64],

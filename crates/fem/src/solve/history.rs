@@ -1,4 +1,5 @@
-//! HistoryVariables of materials that have one: its move over a step, and the energy of a body with it.
+//! HistoryVariables of materials that have one: its move over a step, and the energy of a body with
+//! it.
 
 use super::history_layout::HistoryLayout;
 use super::problem::Problem;

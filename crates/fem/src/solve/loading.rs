@@ -15,12 +15,12 @@ pub struct MovingIndenter {
     /// Its displacement, mm, at rising load fractions; linear in between and
     /// from no displacement at fraction 0.
     pub path: Vec<(f64, [f64; 3])>,
-    /// Where on the skin it is felt.
+    /// Where on the skin contact is found.
     pub contact: ContactRule,
 }
 
 impl MovingIndenter {
-    /// An indenter that moves along `path` and is felt at nodes.
+    /// An indenter that moves along `path`, with nodal contact.
     #[must_use]
     pub fn along(
         shape: Arc<dyn SignedDistance>,

@@ -1,8 +1,9 @@
-//! Dilatations that elements carry along between Newton iterations, for a whole body.
+//! Dilatations that elements keep as unknowns of their own between Newton iterations, for a whole
+//! body.
 //!
 //! Taken as a penalty, the bulk modulus multiplies what a Newton step misses of the volume in
 //! second order: energy and residual jump, and the line search crawls. With the dilatations of
-//! [`carried`](crate::element::carried) as unknowns of their own both fields go their linear way,
+//! [`independent`](crate::element::independent) as unknowns of their own both fields go their linear way,
 //! and the line search asks for the residual of both to fall, in which the second order
 //! of the volume is weighed with the shear modulus. A Newton step reduces any such norm at
 //! first. Equilibria are those of the condensed element, whose residual still says when
@@ -12,8 +13,8 @@ use super::problem::Problem;
 use crate::element::{Dilatation, next_dilatation};
 use crate::linear::DofMap;
 
-/// Ratio of bulk to shear modulus beyond which dilatations are carried along: nu = .495. Below,
-/// the potential alone leads to the same equilibria, at .48 in as many iterations.
+/// Ratio of bulk to shear modulus beyond which dilatations are unknowns of their own: nu = .495.
+/// Below, the potential alone leads to the same equilibria, at .48 in as many iterations.
 const STIFF_RATIO: f64 = 100.0;
 
 /// Conjugate gradients on an old factor are given up after so many iterations: the stiff
@@ -24,7 +25,7 @@ pub(super) const OLD_FACTOR_CG_MAX: u32 = 20;
 /// Least relative residual that is asked of conjugate gradients.
 const LINEAR_MIN: f64 = 1e-10;
 
-/// The dilatations that a body carries along, at rest; none unless some of it is of finite strain
+/// The dilatations that a body keeps, at rest; none unless some of it is of finite strain
 /// and so nearly incompressible that it pays.
 pub(super) fn at_rest(problem: &Problem) -> Vec<Dilatation> {
     let blocks = &problem.mesh.blocks;
@@ -36,9 +37,9 @@ pub(super) fn at_rest(problem: &Problem) -> Vec<Dilatation> {
     if pays { vec![[0.0; 4]; blocks.iter().map(|b| b.len()).sum()] } else { Vec::new() }
 }
 
-/// What a body's carried dilatations differ by from those of the displacement.
+/// What a body's independent dilatations differ by from those of the displacement.
 pub(super) struct Lag {
-    /// Force of the difference at every degree of freedom, N; empty if none is carried.
+    /// Force of the difference at every degree of freedom, N; empty if there is no independent one.
     force_n: Vec<f64>,
     /// Square of the difference's part in the norm, N2.
     gap_n2: f64,
@@ -182,8 +183,8 @@ mod tests {
                 solver.advance_to(0.4).unwrap();
                 solver.advance_to(1.0).unwrap();
                 if keeps {
-                    // What is carried is the body's own dilatation by then.
-                    let own = carried_gap(&problem, &solver);
+                    // The independent one is the body's own dilatation by then.
+                    let own = independent_gap(&problem, &solver);
                     assert!(own < 1e-6, "{own}");
                 }
                 found.push(solver.displacement_mm().to_vec());
@@ -195,8 +196,8 @@ mod tests {
         }
     }
 
-    /// Largest difference between carried and own dilatations over the largest dilatation.
-    fn carried_gap(problem: &Problem, solver: &Solver<'_>) -> f64 {
+    /// Largest difference between independent and own dilatations over the largest dilatation.
+    fn independent_gap(problem: &Problem, solver: &Solver<'_>) -> f64 {
         let u = solver.displacement_mm();
         let mut own = Vec::new();
         dilatations(problem, u, &mut own);

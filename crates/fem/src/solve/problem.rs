@@ -6,7 +6,7 @@ use crate::element::{BlockGeometry, Materials, ShapeError};
 use crate::linear::{SymbolicError, SymbolicSystem};
 use crate::mesh::Mesh;
 
-/// A body ready to be loaded. Shared by every press of a campaign.
+/// A body ready to be loaded. Shared by every indentation of a campaign.
 pub struct Problem {
     /// Undeformed mesh.
     pub mesh: Mesh,

@@ -10,7 +10,7 @@ use crate::element::Dilatation;
 pub(super) struct State {
     pub fraction: f64,
     pub u: Vec<[f64; 3]>,
-    /// Dilatation of each element that is carried along; empty if none is.
+    /// Dilatation of each element that is kept as an unknown of its own; empty if none is.
     pub independent: Vec<Dilatation>,
     pub multipliers: Vec<f64>,
     /// History of materials with memory; empty if there are none.

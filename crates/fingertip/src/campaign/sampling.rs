@@ -1,11 +1,11 @@
-//! What presses where and how deep, and which presses are held out.
+//! What presses where and how deep, and which indentations are held out.
 
 use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
 use crate::scene::Pose;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// One press of a campaign.
+/// One indentation of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Indentation {
     /// Number within the campaign.
@@ -31,10 +31,10 @@ impl CampaignSpec {
     }
 }
 
-/// All presses by id.
+/// All indentations by id.
 ///
-/// Indenters take turns so that after any number of presses each has had its share, to
-/// less than one press. Pose, offset and depth of one indenter's presses are points
+/// Indenters take turns so that after any number of indentations each has had its share, to
+/// less than one indentation. Pose, offset and depth of one indenter's indentations are points
 /// of an Owen-scrambled Sobol sequence of its own (Burley, Practical Hash-based Owen
 /// Scrambling, JCGT 9(4), 2020), scaled to the ranges: they fill the ranges far more
 /// evenly than random ones. The first n presses do not depend on how many follow.
@@ -89,7 +89,7 @@ fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32
     }
 }
 
-/// Ids of the presses that a model is trained with and tested on, rising.
+/// Ids of the indentations that a model is trained with and tested on, rising.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct HeldOut {
     /// Seen in training.
@@ -98,9 +98,9 @@ pub struct HeldOut {
     pub test: Vec<usize>,
 }
 
-/// Divides the presses: the `test_fraction` (rounded; at least one, and never
+/// Divides the indentations: the `test_fraction` (rounded; at least one, and never
 /// all, when it is above 0) with the smallest SHA-256 of seed and id is held
-/// out. Whole presses, since two depths of one press are near-copies.
+/// out. Whole indentations, since two depths of one indentation are near-copies.
 pub fn held_out(spec: &CampaignSpec) -> HeldOut {
     let mut order: Vec<usize> = (0..spec.presses).collect();
     order.sort_by_cached_key(|id| {

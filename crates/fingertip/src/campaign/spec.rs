@@ -38,7 +38,7 @@ pub struct DepthRange {
 pub struct Candidate {
     /// Name in the manifest.
     pub name: String,
-    /// Its presses are to all presses as its share is to all shares.
+    /// Its indentations are to all indentations as its share is to all shares.
     #[serde(default = "one")]
     pub share: u32,
     /// The indenter.
@@ -66,15 +66,15 @@ pub struct CampaignSpec {
     pub name: String,
     /// Seed of poses, offsets and depths, and of the split.
     pub seed: u64,
-    /// Number of presses, each with its own pose.
+    /// Number of indentations, each with its own pose.
     pub presses: usize,
-    /// Depths stored for each press, mm from first touch, rising; or else `depths`.
+    /// Depths stored for each indentation, mm from first touch, rising; or else `depths`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub depths_mm: Vec<f64>,
     /// Depths that differ from press to press; or else `depths_mm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depths: Option<DepthRange>,
-    /// Share of the presses that is held out, 0 to less than 1.
+    /// Share of the indentations that is held out, 0 to less than 1.
     pub test_fraction: f64,
     /// Density of the mesh.
     pub density: Density,
@@ -114,7 +114,7 @@ const PRESSES_MAX: usize = 1 << 16;
 const INDENTERS_MAX: usize = 1000;
 /// Most shares of one indenter.
 const SHARE_MAX: u32 = 10_000;
-/// Most states of one press.
+/// Most states of one indentation.
 const STATES_MAX: usize = 1000;
 /// Largest offset, mm: the finger is 25 mm long.
 const OFFSET_MAX_MM: f64 = 25.0;
@@ -148,7 +148,7 @@ impl CampaignSpec {
         single.into_iter().chain(self.indenters.iter().cloned()).collect()
     }
 
-    /// What a candidate's presses have in common, as a scene.
+    /// What a candidate's indentations have in common, as a scene.
     pub fn scene(&self, candidate: &Candidate) -> Scene {
         Scene {
             geometry: Geometry::Fingertip {

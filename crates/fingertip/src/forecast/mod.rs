@@ -3,7 +3,7 @@
 //! Mesh, sparsity pattern and symbolic factorization are made (a second at the
 //! campaigns' density); nothing is solved. Factor entries and operations are exact,
 //! memory is the sum of the solver's arrays. Seconds are the product of
-//! three things: how much iteration such a press takes ([`Work`]), how much one
+//! three things: how much iteration such an indentation takes ([`Work`]), how much one
 //! iteration of this body takes (elements probed, the factor counted), and how fast
 //! this machine is ([`Machine`]).
 
@@ -23,7 +23,7 @@ use papilla_fem::linear::FactorMemory;
 use papilla_fem::solve::Problem;
 use serde::Serialize;
 
-/// What a press is going to cost.
+/// What an indentation is going to cost.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forecast {
     /// What is assembled and stored.
@@ -36,7 +36,7 @@ pub struct Forecast {
     pub memory_bytes: usize,
     /// HistoryVariables that one factorization of an indefinite tangent would add, bytes.
     pub memory_indefinite_bytes: usize,
-    /// How much iteration the press takes.
+    /// How much iteration the indentation takes.
     pub work: Work,
     /// Speed of this machine.
     pub machine: Machine,

@@ -1,6 +1,6 @@
-//! How much iteration a press takes.
+//! How much iteration an indentation takes.
 //!
-//! The numbers were counted in twelve presses of fingertip and block, coarse and
+//! The numbers were counted in twelve indentations of fingertip and block, coarse and
 //! medium, with each effect on and off (docs/scenes.md, 'What a scene costs');
 //! the number of equilibria follows from the stored states.
 
@@ -9,7 +9,7 @@ use crate::simulation::Simulation;
 use crate::simulation::drive::{Drive, DrivePoint};
 use serde::Serialize;
 
-/// Iterations of a whole press.
+/// Iterations of a whole indentation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Work {
     /// Equilibria on the way, stored or not.

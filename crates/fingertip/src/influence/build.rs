@@ -25,10 +25,10 @@ pub(super) struct Load {
     pub force_n: [f64; 3],
 }
 
-/// Builds the operator of `body`; `progress` is told how many vertices are done.
+/// Builds the influence operator of `body`; `progress` is told how many vertices are done.
 ///
 /// The load of unit pressure at a vertex is its area times the skin's inward normal there,
-/// on the node alone: contact is at nodes, and what a press records at a vertex is
+/// on the node alone: contact is at nodes, and what an indentation records at a vertex is
 /// the node's force over its area.
 ///
 /// # Errors

@@ -6,7 +6,7 @@ use papilla_atlas::flatten::BuildAtlasError;
 use papilla_fem::linear::FactorError;
 use papilla_fem::solve::StepError;
 
-/// The operator could not be built or written.
+/// The influence operator could not be built or written.
 #[derive(Debug, thiserror::Error)]
 pub enum InfluenceError {
     /// The finger could not be set up.
@@ -16,7 +16,9 @@ pub enum InfluenceError {
     #[error(transparent)]
     Atlas(#[from] BuildAtlasError),
     /// The body is no fingertip, so it has no skin and interface to map between.
-    #[error("the body has no atlas patch: the operator maps skin to interface of a fingertip")]
+    #[error(
+        "the body has no atlas patch: the influence operator maps skin to interface of a fingertip"
+    )]
     NoPatch,
     /// A law of finite strain has no one operator.
     #[error(
@@ -44,8 +46,8 @@ pub enum InfluenceError {
         /// Accepted.
         accepted: f64,
     },
-    /// Pressure of another length than the operator has vertices.
-    #[error("{found} pressures for an operator of {expected} vertices")]
+    /// Pressure of another length than the influence operator has vertices.
+    #[error("{found} pressures for an influence operator of {expected} vertices")]
     Pressures {
         /// Found.
         found: usize,

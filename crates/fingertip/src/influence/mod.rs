@@ -1,4 +1,4 @@
-//! This finger's linear operator: the strain at the interface that unit pressure at each
+//! This finger's influence operator: the strain at the interface that unit pressure at each
 //! vertex of the skin gives at small strain.
 //!
 //! To first order a finger is linear: displacement is `K^-1 f` with the tangent at rest `K`
@@ -8,7 +8,7 @@
 //!
 //! `SED_v = sum_k (sum_j g[v, k, j] p_j)^2`.
 //!
-//! That averages strain from the faces round a vertex. The record of a press averages SED
+//! That averages strain from the faces round a vertex. The record of an indentation averages SED
 //! instead, which is more where strain changes from face to face, as shear does below
 //! a narrow contact. [`Faces`] holds the strain of each face, of which SED is the mean
 //! of sums of squares, exactly as recorded.
@@ -32,7 +32,7 @@ use crate::simulation::body::{Body, SimulationError};
 use crate::simulation::laws::solids;
 use serde::Serialize;
 
-/// The linear operator of a finger.
+/// The influence operator of a finger.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InfluenceOperator {
     /// Hash of the atlas whose vertices these are.
@@ -57,7 +57,7 @@ pub struct Faces {
     pub of_vertex: Vec<Vec<(usize, f64)>>,
 }
 
-/// What the operator is checked by.
+/// What the influence operator is checked by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Quality {
     /// Unknowns of the mesh.
@@ -85,7 +85,7 @@ impl InfluenceOperator {
         self.sums_of_squares(&self.g, pressure_pa)
     }
 
-    /// SED on the dermis side, J/m3, as a press records it: means of the faces' SED.
+    /// SED on the dermis side, J/m3, as an indentation records it: means of the faces' SED.
     ///
     /// # Errors
     /// [`InfluenceError::Pressures`] for another number of pressures.

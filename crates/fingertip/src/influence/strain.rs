@@ -39,7 +39,7 @@ pub fn weighted(h: &Mat3, dilatation: f64, mu_mpa: f64, bulk_mpa: f64) -> Weight
 ///
 /// Strain is sampled where SED is sampled and the dilatation is the element's own
 /// (constant or linear in an element). A vertex averages its samples by the
-/// weights that the record of a press averages SED with.
+/// weights that the record of an indentation averages SED with.
 pub struct StrainMap {
     samples: Vec<SampleMap>,
     terms: Vec<Vec<(usize, f64)>>,

@@ -1,4 +1,4 @@
-//! The operator against the solver that makes datasets, and against itself.
+//! The influence operator against the solver that makes datasets, and against itself.
 
 use super::*;
 use crate::scene::Pose;
@@ -35,7 +35,7 @@ fn systems_are_solved_and_work_is_reciprocal() {
 }
 
 /// Pressure spread over the pad, put on the body as dead forces and solved by the solver
-/// of presses: the operator's displacements are its, and what is left between
+/// of indentations: the influence operator's displacements are its, and what is left between
 /// the two is how strain or SED is averaged from faces to vertices.
 #[test]
 fn a_smooth_pressure_gives_the_sed_that_the_solver_gives() {
@@ -84,7 +84,7 @@ fn a_smooth_pressure_gives_the_sed_that_the_solver_gives() {
     assert!(found.iter().zip(&recorded).all(|(f, r)| *f <= r * (1.0 + 1e-4)));
 }
 
-/// A real press at small strain: pressure and SED as a dataset records them. What is left
+/// A real indentation at small strain: pressure and SED as a dataset records them. What is left
 /// by face is where its forces point: along the plate's normal, to which the skin has
 /// turned, not along the skin's at rest. That recorded pressure is per deformed area
 /// matters little: the nominal traction does no better.
@@ -112,7 +112,7 @@ fn a_press_of_small_strain_is_reproduced() {
     }
 }
 
-/// The record of a tilted press and its traction per undeformed area at the skin's vertices.
+/// The record of a tilted indentation and its traction per undeformed area at the skin's vertices.
 fn press(body: &Body, depth_mm: f64) -> (IncrementRecord, Vec<f64>) {
     let mut solver = body.solver(Options::default()).unwrap();
     let pose = Pose { pitch_deg: 15.0, ..Pose::default() };

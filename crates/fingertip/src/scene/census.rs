@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// Counts of one body and one press. What no effect asked for counts 0.
+/// Counts of one body and one indentation. What no effect asked for counts 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Census {
     /// Degrees of freedom that are solved for.

@@ -33,7 +33,7 @@ pub enum Geometry {
         /// Element order: `Quad4` or `Quad9`.
         #[serde(default = "quadratic")]
         order: Order,
-        /// Half of it, for symmetric presses, or the whole.
+        /// Half of it, for symmetric indentations, or the whole.
         #[serde(default)]
         extent: Extent,
         /// Dimensions that differ from the default.

@@ -1,4 +1,4 @@
-//! Scenes: one press, described in TOML.
+//! Scenes: one indentation, described in TOML.
 //!
 //! A scene names a geometry, materials, an indenter, a motion and the effects
 //! it wants. What it does not name is not simulated.
@@ -39,7 +39,7 @@ pub struct Scene {
     /// What tissues are made of; the design's table where not given.
     #[serde(default)]
     pub materials: TissueTable,
-    /// What presses; S1's plate if not given.
+    /// What presses; the 20 mm plate of the surface-pressure study if not given.
     #[serde(default)]
     pub indenter: IndenterSpec,
     /// How it moves.
@@ -47,7 +47,7 @@ pub struct Scene {
     /// Friction, for the effect of that name.
     #[serde(default)]
     pub friction: Friction,
-    /// What the scene asks for; S1's analysis if not given.
+    /// What the scene asks for; the surface-pressure study's analysis if not given.
     #[serde(default = "effects::usual")]
     pub effects: Vec<EffectName>,
     /// What `solve` writes beside `summary.json`; all that the geometry has if not given.

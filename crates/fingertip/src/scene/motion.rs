@@ -65,7 +65,7 @@ pub struct PathPoint {
     pub shift_mm: [f64; 2],
 }
 
-/// Most stored increments of one press.
+/// Most stored increments of one indentation.
 const INCREMENTS_MAX: usize = 1000;
 /// Most points of a path.
 const PATH_MAX: usize = 1000;

@@ -1,4 +1,5 @@
-//! A press whose energy balances: taken again where its path was too coarse or its nodes slipped.
+//! An indentation whose energy balances: taken again where its path was too coarse or its nodes
+//! slipped.
 
 use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
@@ -11,10 +12,10 @@ const REFINEMENTS: [u32; 3] = [1, 2, 4];
 
 impl Body {
     /// Presses, keeps something of each stored state (`keep` is told its number and may be
-    /// told again), and takes the press again on a finer path as long as energy and work
+    /// told again), and takes the indentation again on a finer path as long as energy and work
     /// part by more than `energy_vs_work_max`: the states are the same there, the work
     /// integral is better. Where that does not help, or there is no equilibrium, nodes have slipped
-    /// off the indenter, and energy with them: it is pressed again, felt within faces, if
+    /// off the indenter, and energy with them: it is solved again with Gauss-point contact, if
     /// it is wide enough for that; and at more points of them, if energy is lost there too.
     /// States before an error are kept.
     ///
@@ -45,19 +46,21 @@ impl Body {
             let loses = pressed.is_ok() && !balanced && matches!(drive, Drive::Depths(_));
             (loses, kept, pressed)
         };
-        let felt = |rule| Approach { contact: Some(rule), ..approach.clone() };
+        let with = |rule| Approach { contact: Some(rule), ..approach.clone() };
         let mut taken = approach.clone();
         let (mut loses, mut kept, mut pressed) = press(&taken);
         let stopped =
             matches!(pressed, Err(SimulationError::Solve { .. } | SimulationError::Slipped { .. }));
         if (loses || stopped) && self.can_take_gauss_points(approach) {
-            tracing::info!("nodes slip off the indenter: pressed again, felt within faces");
-            taken = felt(ContactRule::Gauss);
+            tracing::info!("nodes slip off the indenter: solved again with Gauss-point contact");
+            taken = with(ContactRule::Gauss);
             (loses, kept, pressed) = press(&taken);
         }
         if loses && self.can_take_order_3(&taken) {
-            tracing::info!("it jumps within faces: pressed again, felt at more of their points");
-            (_, kept, pressed) = press(&felt(ContactRule::GaussOrder3));
+            tracing::info!(
+                "the skin jumps within faces: solved again with Gauss points of order 3"
+            );
+            (_, kept, pressed) = press(&with(ContactRule::GaussOrder3));
         }
         (kept, pressed)
     }

@@ -142,7 +142,7 @@ impl SimulationError {
     }
 }
 
-/// A body ready to be pressed, shared by every press of a campaign.
+/// A body ready to be pressed, shared by every indentation of a campaign.
 pub struct Body {
     /// Mesh, materials, supports and contact surface.
     pub problem: Problem,

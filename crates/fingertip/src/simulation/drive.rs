@@ -23,12 +23,12 @@ pub struct Approach {
     pub offset_mm: [f64; 2],
     /// Coulomb coefficient; 0 is no friction.
     pub friction: f64,
-    /// Where on the skin it is felt; `None` leaves that to its width and the mesh.
+    /// Where on the skin contact is found; `None` leaves that to its width and the mesh.
     pub contact: Option<ContactRule>,
 }
 
 impl Approach {
-    /// S1's plate in a pose, without friction.
+    /// The 20 mm plate of the surface-pressure study in a pose, without friction.
     #[must_use]
     pub fn plate(pose: Pose) -> Self {
         let plate = RoundedPlate::from(&Plate::default());

@@ -12,7 +12,7 @@ use papilla_fem::tensor::norm;
 use std::collections::BTreeMap;
 
 /// Most of the contact force's normal part that may act along the skin. It is 0 in the limit of
-/// fine meshes, at most .16 in random presses of the coarse fingertip whose faces are as wide
+/// fine meshes, at most .16 in random indentations of the coarse fingertip whose faces are as wide
 /// as some of the indenters, .35 on one half of a wedge and .73 where a row of nodes slipped.
 const ASIDE_MAX: f64 = 0.5;
 /// Cosine of the angle between a node's undeformed faces and their mean beyond which the skin has

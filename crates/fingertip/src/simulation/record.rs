@@ -1,4 +1,4 @@
-//! What one press hands to those who store it: checks, pose and vertex values.
+//! What one indentation hands to those who store it: checks, pose and vertex values.
 
 use papilla_fem::contact::ContactRule;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ pub struct Checks {
     pub cg_iterations: u32,
 }
 
-/// One stored equilibrium of a press: values at the atlas' vertices.
+/// One stored equilibrium of an indentation: values at the atlas' vertices.
 ///
 /// MPa = N/mm2 = mJ/mm3 inside the FE code; the dataset stores Pa and J/m3.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ pub struct IncrementRecord {
     /// Share of the volume that has left the stretches to which its law was fitted;
     /// 0 for laws that hold anywhere.
     pub outside_calibration: f64,
-    /// Where on the skin the indenter was felt.
+    /// Where on the skin contact was found.
     pub contact: ContactRule,
     /// Self-checks of this equilibrium.
     pub checks: Checks,

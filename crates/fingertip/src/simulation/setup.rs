@@ -96,8 +96,8 @@ fn body(scene: &Scene, plan: &Plan) -> Result<Body, SimulationError> {
 }
 
 impl Body {
-    /// The default finger with S1's analysis: neo-Hookean layers, rigid bone and
-    /// nail.
+    /// The default finger with the surface-pressure study's analysis: neo-Hookean layers, rigid
+    /// bone and nail.
     ///
     /// # Errors
     /// [`SimulationError`] if it cannot be set up.

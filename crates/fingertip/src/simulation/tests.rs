@@ -1,4 +1,4 @@
-//! Presses of the coarse fingertip with bone and nail as solids.
+//! Indentations of the coarse fingertip with bone and nail as solids.
 
 use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
@@ -154,7 +154,7 @@ fn fit_at(approach: &Approach, depth_mm: f64) -> IncrementRecord {
 }
 
 #[test]
-fn what_nodes_cannot_lead_is_felt_within_faces() {
+fn what_is_too_narrow_for_nodes_takes_gauss_points() {
     let body = coarse_finger();
     let wedge = "shape = \"wedge\"\ntip_width_mm = 0.5\nbase_width_mm = 4.0\nheight_mm = 4.0\n\
                  tip_radius_mm = 0.2\nlength_mm = 20.0";
@@ -180,7 +180,7 @@ fn an_edge_across_coarse_faces_keeps_its_hold() {
     assert!(found.checks.j_min > 0.7, "{:?}", found.checks);
 }
 
-/// A random scene, the 9938th: felt at two by two points of a face, the skin jumps .25 mm along the
+/// A random scene, the 9938th: found at two by two Gauss points, the skin jumps .25 mm along the
 /// ridges at 1.16 mm and .65 % of the work is lost, however short the steps; on a medium finger
 /// and on quadratic elements it glides.
 #[test]
@@ -193,9 +193,9 @@ fn ridges_along_rows_of_points_do_not_let_the_skin_jump() {
     assert_eq!(fit_at(&approach, 1.208).contact, ContactRule::GaussOrder3);
 }
 
-/// No path balances to 1e-12: such a press is felt at more points of a face in the end.
+/// No path balances to 1e-12: such an indentation ends with Gauss points of order 3.
 #[test]
-fn energy_lost_within_faces_is_felt_at_more_points() {
+fn energy_lost_at_gauss_points_takes_more_of_them() {
     let body = coarse_finger();
     let approach = approach(RULER, Pose::default(), [0.0; 2]);
     let mut solver = body.solver(Options::default()).unwrap();

@@ -1,4 +1,4 @@
-//! An indenter in its pose, brought to where it first touches the skin, and how it is felt there.
+//! An indenter in its pose, brought to where it first touches the skin, and how it touches there.
 
 use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive, FORCE_TRAVEL_MAX_MM};
@@ -12,7 +12,7 @@ use papilla_sdf::{Placement, SignedDistance, first_touch_travel};
 /// Part of a face's width that may be in the indenter before a node touches: a ball as wide
 /// as four faces has a sixteenth, a knife comes to a half.
 const UNSEEN_MAX: f64 = 0.4;
-/// Least width of an indenter that nodes lead, in distances of nodes: rows of them slip off a
+/// Least width of an indenter with nodal contact, in distances of nodes: rows of them slip off a
 /// narrower one.
 const NODAL_WIDTH_MIN: f64 = 2.5;
 
@@ -64,7 +64,7 @@ impl Body {
         Ok(MovingIndenter { shape: approach.shape.clone(), start, path, contact })
     }
 
-    /// Where on the skin an indenter is to be felt: within faces if it is too narrow to be led
+    /// Where on the skin contact is to be found: at Gauss points if it is too narrow for nodal
     /// by nodes; at nodes if it is not, or so narrow that faces would lose it too.
     fn contact_rule(&self, approach: &Approach) -> ContactRule {
         let spacings = self.spacings(approach);
@@ -74,13 +74,13 @@ impl Body {
         })
     }
 
-    /// Whether an indenter that is felt at nodes could be felt within faces.
+    /// Whether contact that is nodal could be at Gauss points.
     pub(super) fn can_take_gauss_points(&self, approach: &Approach) -> bool {
         let spacings = self.spacings(approach);
         approach.contact.is_none() && spacings >= NODAL_WIDTH_MIN && spacings.is_finite()
     }
 
-    /// Whether an indenter that is felt within faces could be felt at more points of them:
+    /// Whether contact at Gauss points could be at those of order 3:
     /// quadratic faces have them already.
     pub(super) fn can_take_order_3(&self, approach: &Approach) -> bool {
         let more = |c: &ContactSurface| {

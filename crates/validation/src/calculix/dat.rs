@@ -78,7 +78,7 @@ pub enum DatError {
         source: std::io::Error,
     },
     /// A line is not what its table announced.
-    #[error("line {line}: '{text}' is no row of a table of {quantity:?}")]
+    #[error("line {line}: '{text}' is not a row of a table of {quantity:?}")]
     Row {
         /// Line, from 1.
         line: usize,

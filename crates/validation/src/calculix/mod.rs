@@ -1,8 +1,8 @@
-//! CalculiX as an independent witness: decks out, results back in.
+//! CalculiX as an independent cross-check: decks out, results back in.
 //!
 //! [`Deck`] is plain data and knows no scene; [`Deck::to_text`] writes what
-//! CalculiX 2.20 reads, [`SceneDeck`] makes one of a scene, [`Ccx`] runs it and [`Dat`] reads what it prints. The
-//! cases that compare both codes are in [`witness`]. What to know of CalculiX
+//! CalculiX 2.20 reads, [`SceneDeck`] makes one of a scene, [`Ccx`] runs it and [`Dat`] reads what
+//! it prints. The cases that compare both codes are in [`cross_check`]. What to know of CalculiX
 //! stands in docs/calculix.md.
 
 pub mod cross_check;
@@ -93,7 +93,9 @@ pub enum ExportError {
         nodes: Vec<u32>,
     },
     /// The indenter has no size, or its edges are rounder than it is thick.
-    #[error("{shape:?} is no shape: sizes have to be positive, edges no rounder than half a side")]
+    #[error(
+        "{shape:?} is not a shape: sizes have to be positive, edges no rounder than half a side"
+    )]
     Shape {
         /// The shape.
         shape: RigidShape,
@@ -106,7 +108,7 @@ const INEXPRESSIBLE: [(&str, &str); 3] = [
     (
         "friction",
         "its penalty friction sticks by a spring that slips in any load step, so the force depends \
-         on increments and on a stiffness that is no property of skin",
+         on increments and on a stiffness that is not a property of skin",
     ),
     ("poroelastic", "it has no elements with pore pressure"),
 ];

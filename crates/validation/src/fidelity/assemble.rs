@@ -1,4 +1,4 @@
-//! `rungs.json` and one archive a rung, from the parts.
+//! `rungs.json` and one archive a fidelity level, from the parts.
 
 use super::report::{
     DiscretisationError, FORMAT, LeftOut, LevelEntry, Quantiles, Report, StateEntry,
@@ -11,7 +11,7 @@ use papilla_fingertip::simulation::record::relative_l2;
 use papilla_output::atomic;
 use std::path::Path;
 
-/// Parts of a rung, one a press.
+/// Parts of a fidelity level, one an indentation.
 type Solved = (FidelityLevel, Vec<Part>);
 
 /// Writes everything and returns the report.
@@ -102,7 +102,7 @@ fn row(values: &[f32], d: usize, v: usize) -> &[f32] {
     &values[d * v..(d + 1) * v]
 }
 
-/// The chosen states of a rung, in order.
+/// The chosen states of a fidelity level, in order.
 fn rows(parts: &[Part], places: &[(usize, usize)], v: usize) -> Part {
     let mut all = Part::default();
     for &(p, d) in places {

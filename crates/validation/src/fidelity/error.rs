@@ -1,4 +1,4 @@
-//! What can stop a measurement of rungs.
+//! What can stop a measurement of fidelity levels.
 
 use papilla_atlas::flatten::BuildAtlasError;
 use papilla_fingertip::campaign::SpecError;
@@ -7,17 +7,17 @@ use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
 use std::path::PathBuf;
 
-/// The rungs cannot be measured. A press that finds no equilibrium is none of these: it is
-/// reported among those left out.
+/// The fidelity levels cannot be measured. An indentation that finds no equilibrium is none of
+/// these: it is reported among those left out.
 #[derive(Debug, thiserror::Error)]
 pub enum FidelityError {
     /// The campaign makes no sense.
     #[error(transparent)]
     Campaign(#[from] SpecError),
-    /// A rung's finger cannot be set up.
+    /// A fidelity level's finger cannot be set up.
     #[error("{rung}: {source}")]
     FidelityLevel {
-        /// Name of the rung.
+        /// Name of the fidelity level.
         rung: String,
         /// Why.
         source: Box<SimulationError>,
@@ -25,16 +25,16 @@ pub enum FidelityError {
     /// The atlas cannot be flattened.
     #[error(transparent)]
     Atlas(#[from] BuildAtlasError),
-    /// A rung's body is no fingertip.
+    /// A fidelity level's body is not a fingertip.
     #[error("the body of {rung} has no atlas patch")]
     NoPatch {
-        /// Name of the rung.
+        /// Name of the fidelity level.
         rung: String,
     },
     /// An indenter cannot be built.
     #[error(transparent)]
     Indenter(#[from] IndenterError),
-    /// Not enough presses are held out.
+    /// Not enough indentations are held out.
     #[error(
         "campaign {campaign} holds out {found} presses, {wanted} are asked for: ask for fewer, or \
          raise its test_fraction"
@@ -49,7 +49,7 @@ pub enum FidelityError {
     },
     /// The folder belongs to another measurement.
     #[error(
-        "{folder} holds rungs of another campaign, finger or version: choose another --out, or \
+        "{folder} holds fidelity levels of another campaign, finger or version: choose another --out, or \
          remove the folder to start over"
     )]
     Occupied {
@@ -62,8 +62,8 @@ pub enum FidelityError {
         /// The folder.
         folder: PathBuf,
     },
-    /// No state was solved by every rung.
-    #[error("no state was solved by every rung; the first left out: {first}")]
+    /// No state was solved by every fidelity level.
+    #[error("no state was solved at every fidelity level; the first left out: {first}")]
     NothingSolved {
         /// The first.
         first: String,

@@ -1,5 +1,6 @@
-//! The rungs of the ladder that are finite elements themselves: the same held-out presses
-//! solved on coarser meshes, with other elements and at small strain, beside a reference.
+//! The fidelity levels of the ladder that are finite elements themselves: the same held-out
+//! indentations solved on coarser meshes, with other elements and at small strain, beside a
+//! reference.
 //!
 //! Every field is read at the vertices of one atlas ([`Ladder::atlas`]), whatever mesh it
 //! was solved on, and every state has its price in processor seconds. In prose:
@@ -33,7 +34,7 @@ pub enum Strain {
     Finite,
 }
 
-/// One way of solving a press.
+/// One way of solving an indentation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FidelityLevel {
     /// Mesh density.
@@ -45,7 +46,7 @@ pub struct FidelityLevel {
 }
 
 impl FidelityLevel {
-    /// A rung.
+    /// A fidelity level.
     #[must_use]
     pub const fn new(density: Density, order: Order, kinematics: Strain) -> Self {
         Self { density, order, kinematics }
@@ -76,11 +77,11 @@ impl FidelityLevel {
 pub struct Ladder {
     /// Density whose atlas every field is read on.
     pub atlas: Density,
-    /// Rungs, cheap ones first.
+    /// Fidelity levels, cheap ones first.
     pub rungs: Vec<FidelityLevel>,
     /// What they are compared with.
     pub reference: FidelityLevel,
-    /// A still better one for a few presses, to tell the reference's own error.
+    /// A still better one for a few indentations, to tell the reference's own error.
     pub check: Option<FidelityLevel>,
     /// How many presses it solves.
     pub checked: usize,
@@ -110,7 +111,7 @@ impl Ladder {
         }
     }
 
-    /// Every rung in the order of solving, with the number of presses it solves.
+    /// Every fidelity level in the order of solving, with the number of indentations it solves.
     fn all(&self, presses: usize) -> Vec<(FidelityLevel, usize)> {
         let mut all: Vec<_> = self.rungs.iter().map(|&r| (r, presses)).collect();
         all.push((self.reference, presses));
@@ -122,11 +123,11 @@ impl Ladder {
 /// How far a measurement is: what is solved now, and parts done of all.
 pub type Progress<'a> = &'a mut dyn FnMut(&str, usize, usize);
 
-/// Solves `count` held-out presses of a campaign by every rung, or goes on where an earlier
-/// run was stopped, and writes `rungs.json` and one npz a rung into `folder`.
+/// Solves `count` held-out indentations of a campaign by every fidelity level, or goes on where an
+/// earlier run was stopped, and writes `rungs.json` and one npz a fidelity level into `folder`.
 ///
 /// # Errors
-/// [`FidelityError`]; single presses that fail are in the report.
+/// [`FidelityError`]; single indentations that fail are in the report.
 pub fn run(
     spec: &CampaignSpec,
     ladder: &Ladder,
@@ -169,7 +170,7 @@ pub fn run(
     assemble::assemble(spec, ladder, &target, &parts, folder)
 }
 
-/// Held-out presses, as many different indenters as possible: in the order of their ids,
+/// Held-out indentations, as many different indenters as possible: in the order of their ids,
 /// always one of the indenters that had the fewest.
 fn choose(spec: &CampaignSpec, count: usize) -> Result<Vec<Indentation>, FidelityError> {
     let test = held_out(spec).test;

@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Version of the files.
 pub(super) const FORMAT: u32 = 1;
 
-/// One state that every rung solved.
+/// One state that every fidelity level solved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StateEntry {
     /// Press of the campaign.
@@ -24,14 +24,14 @@ pub struct StateEntry {
     pub pose: Pose,
 }
 
-/// A state that is missing because a rung has no sound solution of it.
+/// A state that is missing because a fidelity level has no sound solution of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeftOut {
     /// Press of the campaign.
     pub press: usize,
     /// Depth, mm.
     pub depth_mm: f64,
-    /// The rung.
+    /// The fidelity level.
     pub rung: String,
     /// What happened.
     pub why: String,
@@ -67,7 +67,7 @@ pub struct DiscretisationError {
     pub how: String,
 }
 
-/// One rung of `rungs.json`.
+/// One fidelity level of `rungs.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LevelEntry {
     /// Name.
@@ -86,7 +86,7 @@ pub struct LevelEntry {
     pub reference: bool,
     /// Processor seconds of mesh and symbolic factorization, once a finger.
     pub setup_seconds: f64,
-    /// Processor seconds from the start of the press to each state.
+    /// Processor seconds from the start of the indentation to each state.
     pub seconds: Vec<f64>,
     /// Archive beside `rungs.json`.
     pub file: String,
@@ -112,7 +112,7 @@ pub struct Report {
     pub campaign: String,
     /// States, row by row of every archive.
     pub states: Vec<StateEntry>,
-    /// Rungs.
+    /// Fidelity levels.
     pub rungs: Vec<LevelEntry>,
     /// States that are in no archive.
     pub left_out: Vec<LeftOut>,

@@ -1,4 +1,4 @@
-//! One rung's finger, and one press of it.
+//! One fidelity level's finger, and one indentation of it.
 
 use super::store::{Part, Record};
 use super::{FidelityError, FidelityLevel, Strain};
@@ -54,7 +54,7 @@ fn surfaces(body: &Body) -> Option<Surfaces> {
     Some((at(&patch.skin), at(&patch.interface), patch.triangles.clone()))
 }
 
-/// The campaign's finger as a rung has it.
+/// The campaign's finger as a fidelity level has it.
 fn setup(spec: &CampaignSpec, rung: FidelityLevel) -> Result<Simulation, FidelityError> {
     let failed = |source: SimulationError| FidelityError::FidelityLevel {
         rung: rung.name(),
@@ -82,7 +82,7 @@ fn setup(spec: &CampaignSpec, rung: FidelityLevel) -> Result<Simulation, Fidelit
     Simulation::new(&scene).map_err(failed)
 }
 
-/// A rung's finger, ready to be pressed.
+/// A fidelity level's finger, ready to be pressed.
 pub(super) struct Prepared {
     name: String,
     body: Body,
@@ -185,7 +185,7 @@ impl Prepared {
     /// The approach and depths that put the indenter where the target's body has it.
     ///
     /// A pose is told from the first skin node that a plate touches and depth from first
-    /// touch, and both depend on the mesh: unmoved, a rung would press another spot.
+    /// touch, and both depend on the mesh: unmoved, a fidelity level would press another spot.
     fn in_place(
         &self,
         mut approach: Approach,
@@ -232,7 +232,7 @@ impl Prepared {
         part.sed_j_per_m3.extend(pa(self.interface.read(&record.sed_dermis_mpa)));
         part.force_n.extend(record.force_n.map(|f| f as f32));
         // Energy against work says how fine the path is, not how good the state: a
-        // campaign takes a press that fails it again on a finer path.
+        // campaign takes an indentation that fails it again on a finer path.
         let checks = Checks { energy_vs_work: 0.0, ..record.checks };
         let judged = IncrementRecord { checks, ..record.clone() };
         part.record.seconds.push(seconds);

@@ -1,4 +1,4 @@
-//! What is on disk between runs: one archive and one record a press and rung.
+//! What is on disk between runs: one archive and one record an indentation and fidelity level.
 
 use super::FidelityError;
 use ndarray::Ix2;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// Program and version.
 pub(super) const SOFTWARE: &str = concat!("fe-datagen ", env!("CARGO_PKG_VERSION"));
 
-/// One press solved by one rung: fields of D states on the target's V vertices.
+/// One indentation solved by one fidelity level: fields of D states on the target's V vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Part {
     /// `[D][V]`.
@@ -35,13 +35,13 @@ pub(super) struct Record {
     pub factor_entries: usize,
     /// Processor seconds of mesh and symbolic factorization.
     pub setup_seconds: f64,
-    /// Largest distance of a target's vertex from the rung's own surface, mm.
+    /// Largest distance of a target's vertex from the fidelity level's own surface, mm.
     pub distance_mm_max: f64,
-    /// How much farther than the press says the indenter goes from this mesh's first touch,
+    /// How much farther than the indentation says the indenter goes from this mesh's first touch,
     /// and is offset, to be where the target's mesh has it, mm.
     pub depth_shift_mm: f64,
     pub offset_shift_mm: [f64; 2],
-    /// Processor seconds from the start of the press to each state.
+    /// Processor seconds from the start of the indentation to each state.
     pub seconds: Vec<f64>,
     pub checks: Vec<Checks>,
     /// What is wrong with each state.
@@ -129,7 +129,7 @@ impl Store {
         self.folder.join(format!("{rung}-press-{id:05}.{extension}"))
     }
 
-    /// What an earlier run left of a press: a readable record whose archive has the
+    /// What an earlier run left of an indentation: a readable record whose archive has the
     /// recorded hash.
     pub(super) fn load(&self, rung: &str, press: &Indentation) -> Option<Part> {
         let record: Record = atomic::read_json(&self.path(rung, press.id, "json")).ok()?;

@@ -68,7 +68,7 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     println!("small strain {:?}, own {own:?}", small.sed_relative_l2);
     assert!(own.states == 2 && own.sed_relative_l2 > 0.01 && own.presses.len() == 1);
     // At such depths strain is small; these few nodes in contact are no resolved contact, so
-    // of the quadratic rung only force is asked.
+    // of the quadratic fidelity level only force is asked.
     assert!(small.sed_relative_l2.median > 1e-4 && small.sed_relative_l2.p95 < 0.3);
     assert!(quadratic.sed_relative_l2.median.is_finite());
     for rung in &report.rungs {

@@ -1,4 +1,4 @@
-//! Presses of the coarse fingertip: in one increment, deep, tilted.
+//! Indentations of the coarse fingertip: in one increment, deep, tilted.
 
 use super::lab::{Pressed, press_body, tight};
 use super::{Line, Suite};

@@ -11,7 +11,7 @@ use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use std::path::Path;
 
-/// The deepest state of a press, and what all of it took.
+/// The deepest state of an indentation, and what all of it took.
 #[derive(Clone)]
 pub(super) struct Pressed {
     pub(super) record: IncrementRecord,
@@ -58,7 +58,7 @@ impl Pressed {
         papilla_fem::tensor::norm(self.record.force_n)
     }
 
-    /// Pressure and SED against those of another press of the same body.
+    /// Pressure and SED against those of another indentation of the same body.
     pub(super) fn same_as(&self, other: &Self, tolerance: f64, source: &'static str) -> Vec<Check> {
         let (a, b) = (&self.record, &other.record);
         let force = papilla_fem::tensor::norm(std::array::from_fn(|i| a.force_n[i] - b.force_n[i]));

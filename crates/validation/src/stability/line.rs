@@ -67,7 +67,7 @@ impl From<&StepReport> for Hardness {
 }
 
 impl Hardness {
-    /// Of a press, with the balances of its last state.
+    /// Of an indentation, with the balances of its last state.
     pub(super) fn of_press(record: &IncrementRecord, report: &StepReport) -> Self {
         let c = &record.checks;
         let worst =

@@ -77,7 +77,7 @@ pub enum ScenesError {
     Busy(PathBuf),
 }
 
-/// The campaign whose presses are the scenes.
+/// The campaign whose indentations are the scenes.
 fn drawn(spec: &CampaignSpec, count: NonZero<usize>, seed: u64) -> CampaignSpec {
     let (presses, density) = (count.get(), Density::Coarse);
     CampaignSpec { presses, seed, density, ..spec.clone() }

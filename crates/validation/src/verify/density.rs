@@ -1,4 +1,4 @@
-//! How far each mesh is from the fine one: the discretisation error of a press.
+//! How far each mesh is from the fine one: the discretisation error of an indentation.
 
 use super::{CaseError, Check, Context};
 use papilla_fem::mesh::nearest::NearestPoints;
@@ -51,7 +51,7 @@ fn compare(coarse: Density, fine: Density, accepted: Accepted) -> Result<Vec<Che
     ])
 }
 
-/// A press and where its values are.
+/// An indentation and where its values are.
 struct Pressed {
     record: IncrementRecord,
     skin: Vec<[f64; 3]>,

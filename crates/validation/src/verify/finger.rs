@@ -15,7 +15,7 @@ const REFINEMENT: u32 = 2;
 /// Before it a handful of coarse nodes touch and the work integral is poor.
 const DEPTH_MIN_MM: f64 = 0.25;
 
-/// One equilibrium of the flat press.
+/// One equilibrium of the flat indentation.
 struct Equilibrium {
     depth_mm: f64,
     force_n: f64,
@@ -24,7 +24,7 @@ struct Equilibrium {
     checks: Checks,
 }
 
-/// A press of the fingertip by a level plate.
+/// An indentation of the fingertip by a level plate.
 pub(super) struct FlatIndentation {
     density: Density,
     equilibria: Vec<Equilibrium>,

@@ -39,7 +39,7 @@ pub(crate) type CaseError = Box<dyn std::error::Error + Send + Sync>;
 pub(crate) struct Context {
     /// Smaller meshes, fewer presses.
     quick: bool,
-    /// One flat press, solved when first asked for.
+    /// One flat indentation, solved when first asked for.
     flat: OnceCell<finger::FlatIndentation>,
 }
 

@@ -167,7 +167,7 @@ mod tests {
     use crate::wedge::run;
     use papilla_fingertip::mesh::fingertip::Density;
 
-    /// The press itself, on the coarsest mesh. At the end of the ramp the two sides
+    /// The indentation itself, on the coarsest mesh. At the end of the ramp the two sides
     /// of B happen to be equal on finer meshes: stiff dermis stores more than the
     /// epidermis at first and less once it has relaxed.
     #[test]

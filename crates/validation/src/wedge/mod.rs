@@ -1,4 +1,4 @@
-//! The wedge press of Chen, Shuai & Zhu, 'Preliminary Study on SED Distribution
+//! The wedge indentation of Chen, Shuai & Zhu, 'Preliminary Study on SED Distribution
 //! of Tactile Sensation in Fingertip', and what they say of it.
 //!
 //! Their figure 2(a) is SED along the depth line under the wedge, 2(b) and 3 are
@@ -24,7 +24,7 @@ use std::time::Instant;
 /// The scene, as the file in `scenes/` has it.
 pub const SCENE: &str = include_str!("../../../../scenes/s2-wedge.toml");
 
-/// Why the press could not be reproduced.
+/// Why the indentation could not be reproduced.
 #[derive(Debug, thiserror::Error)]
 pub enum WedgeError {
     /// The scene file is not the one that this code knows.

@@ -231,7 +231,7 @@ pub enum GmshError {
         meant: &'static str,
     },
     /// A surface face on no solid element.
-    #[error("line {line}: face {element} of surface '{name}' is no side of a solid element")]
+    #[error("line {line}: face {element} of surface '{name}' is not a side of a solid element")]
     LooseFace {
         /// Line.
         line: usize,

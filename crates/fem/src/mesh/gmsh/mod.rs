@@ -1,7 +1,8 @@
 //! Meshes from Gmsh `.msh` files, ASCII format 4.1.
 //!
-//! Volumes belong to physical groups whose names the caller knows as regions. Physical surfaces become surfaces and node
-//! sets of their name, physical curves and points node sets: lengths are taken as mm.
+//! Volumes belong to physical groups whose names the caller knows as regions. Physical surfaces
+//! become surfaces and node sets of their name, physical curves and points node sets: lengths are
+//! taken as mm.
 //!
 //! Hexahedra with 8, 20 or 27 nodes and tetrahedra with 4 or 10. The faces of
 //! 20-node hexahedra carry no contact until [`super::complete`] has been there.

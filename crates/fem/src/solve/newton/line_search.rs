@@ -9,7 +9,7 @@ use crate::solve::mixed;
 use std::time::Instant;
 
 impl Newton<'_> {
-    /// Sets the trial to `length` of the step from `u` and what is carried.
+    /// Sets the trial to `length` of the step from `u` and the independent dilatations.
     fn go(&mut self, u: &[[f64; 3]], independent: &[Dilatation], length: f64) {
         self.trial_u.clear();
         self.trial_u.extend_from_slice(u);
@@ -27,7 +27,7 @@ impl Newton<'_> {
         }
     }
 
-    /// Backtracks along `step` until potential or residual falls; with carried dilatations,
+    /// Backtracks along `step` until potential or residual falls; with independent dilatations,
     /// which go the same way, until the potential or the residual of both fields does.
     pub(super) fn line_search(
         &mut self,

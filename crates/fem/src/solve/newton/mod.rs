@@ -117,8 +117,9 @@ impl<'a> Newton<'a> {
         self.effort = Effort::default();
     }
 
-    /// Brings `u`, and the dilatations that elements carry along, if any, to equilibrium with
-    /// everything else `fixed`, to a residual of `tolerance` times the reference force.
+    /// Brings `u`, and the dilatations that elements keep as unknowns of their own, if any, to
+    /// equilibrium with everything else `fixed`, to a residual of `tolerance` times the reference
+    /// force.
     pub(super) fn equilibrate(
         &mut self,
         tolerance: f64,

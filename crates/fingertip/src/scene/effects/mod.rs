@@ -98,7 +98,7 @@ impl Plan {
         }
     }
 
-    /// What S1's analysis has: large strain and layers.
+    /// What the surface-pressure study's analysis has: large strain and layers.
     #[must_use]
     pub fn usual() -> Self {
         Self { law: Law::NeoHookean, tissues: Tissue::ALL, ..Self::bare() }
@@ -172,7 +172,7 @@ impl From<EffectName> for String {
     }
 }
 
-/// The effects of a scene that names none: what S1's analysis has.
+/// The effects of a scene that names none: what the surface-pressure study's analysis has.
 #[must_use]
 pub fn usual() -> Vec<EffectName> {
     let of = |e: &Effect| EFFECTS.iter().position(|known| known.name == e.name).map(EffectName);

@@ -45,7 +45,7 @@ pub(super) struct Tolerance {
     pub sed: f64,
 }
 
-/// Most of CalculiX' CPU time that a press may take.
+/// Most of CalculiX' CPU time that an indentation may take.
 const CPU_SHARE: f64 = 0.1;
 
 /// What a code found.
