@@ -1,5 +1,7 @@
 //! Records and an atlas for tests of the file formats; no physics in them.
 
+#![allow(clippy::unwrap_used, reason = "for tests")]
+
 use crate::record::{Checks, Pose, Sample};
 use papilla_atlas::{Atlas, PatchVertices};
 

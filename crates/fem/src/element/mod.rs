@@ -13,5 +13,5 @@ pub use geometry::{BlockGeometry, ShapeError};
 pub use independent::{Dilatation, IndependentDilatation, next_dilatation};
 pub use kernel::{ElementState, Inverted};
 pub use materials::{Materials, Region};
-pub use model::{ConstitutiveModel, Elastic, HistoryVariables, Viscoelastic};
+pub use model::{ConstitutiveModel, Elastic, HistoryVariables, ModelOf, Viscoelastic};
 pub use reference::ElementKind;

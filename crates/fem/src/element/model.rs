@@ -7,7 +7,7 @@
 use super::geometry::ElementGeometry;
 use super::independent::IndependentDilatation;
 use super::kernel::{ElementState, Inverted, Points, evaluate};
-use crate::material::{Isochoric, Prony, Relaxing, prony};
+use crate::material::{Isochoric, LinearElastic, NeoHookean, Ogden, Prony, Relaxing, prony};
 use crate::tensor::{Kinematics, Mat3};
 use std::sync::Arc;
 
@@ -110,12 +110,49 @@ impl<L: Isochoric> Points for Same<L> {
     }
 }
 
-impl<L: Isochoric> Elastic<L> {
+impl<L: ModelOf> Elastic<L> {
     /// As a value to share.
     pub fn shared(law: L, bulk_mpa: f64) -> Arc<dyn ConstitutiveModel> {
-        Arc::new(Self { law, bulk_mpa })
+        law.elastic(bulk_mpa)
     }
 }
+
+/// A law of which elements are made. What it takes to evaluate them is compiled where this is
+/// implemented, with that crate's optimisation, not where a law is used.
+pub trait ModelOf: Isochoric {
+    /// The law and a bulk modulus, MPa.
+    fn elastic(self, bulk_mpa: f64) -> Arc<dyn ConstitutiveModel>;
+
+    /// The law with instantaneous moduli, a bulk modulus, MPa, and how the law relaxes.
+    fn viscoelastic(self, bulk_mpa: f64, prony: Prony) -> Arc<dyn ConstitutiveModel>;
+}
+
+/// Makes elements of a law; a new law has a line with it.
+#[macro_export]
+macro_rules! constitutive_model_of {
+    ($law:ty) => {
+        impl $crate::element::ModelOf for $law {
+            fn elastic(
+                self,
+                bulk_mpa: f64,
+            ) -> ::std::sync::Arc<dyn $crate::element::ConstitutiveModel> {
+                ::std::sync::Arc::new($crate::element::Elastic { law: self, bulk_mpa })
+            }
+
+            fn viscoelastic(
+                self,
+                bulk_mpa: f64,
+                prony: $crate::material::Prony,
+            ) -> ::std::sync::Arc<dyn $crate::element::ConstitutiveModel> {
+                ::std::sync::Arc::new($crate::element::Viscoelastic { law: self, bulk_mpa, prony })
+            }
+        }
+    };
+}
+
+constitutive_model_of!(LinearElastic);
+constitutive_model_of!(NeoHookean);
+constitutive_model_of!(Ogden);
 
 /// Runs `work` compiled for the widest vectors of this processor. Products and sums stay what
 /// they are, one by one, so the result is the same bit for bit on any.
@@ -207,10 +244,10 @@ impl<L: Isochoric> Points for ViscoelasticPoints<'_, L> {
     }
 }
 
-impl<L: Isochoric> Viscoelastic<L> {
+impl<L: ModelOf> Viscoelastic<L> {
     /// As a value to share.
     pub fn shared(law: L, bulk_mpa: f64, prony: Prony) -> Arc<dyn ConstitutiveModel> {
-        Arc::new(Self { law, bulk_mpa, prony })
+        law.viscoelastic(bulk_mpa, prony)
     }
 }
 

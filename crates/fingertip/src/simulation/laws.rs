@@ -4,8 +4,8 @@ use crate::materials::{MaterialError, MaterialSpec};
 use crate::scene::effects::{Law, Plan};
 use crate::scene::{TissueError, TissueTable};
 use crate::tissue::Tissue;
-use papilla_fem::element::{ConstitutiveModel, Elastic, Viscoelastic};
-use papilla_fem::material::{Isochoric, LinearElastic, NeoHookean, Prony};
+use papilla_fem::element::{ConstitutiveModel, Elastic, ModelOf, Viscoelastic};
+use papilla_fem::material::{LinearElastic, NeoHookean, Prony};
 use papilla_fem::solve::Materials;
 use std::sync::Arc;
 
@@ -43,7 +43,7 @@ fn solid(spec: &MaterialSpec, plan: &Plan) -> Result<Arc<dyn ConstitutiveModel>,
     })
 }
 
-fn shared<L: Isochoric>(
+fn shared<L: ModelOf>(
     law: L,
     bulk_mpa: f64,
     series: Option<(Prony, f64)>,
