@@ -15,6 +15,24 @@
 //! - Triangles are wound counter-clockwise as the image shows them, so that their
 //!   normals point out of the finger.
 //!
+//! The feature `flatten` adds what makes an atlas of two surfaces.
+//!
+//! ```
+//! use papilla_atlas::{Atlas, Patch, PatchVertices, Raster};
+//!
+//! // Two flat squares, 10 mm wide, one 1 mm above the other.
+//! let square = |z: f32| PatchVertices {
+//!     positions_mm: [[0, 0], [0, 1], [1, 0], [1, 1]]
+//!         .map(|[row, column]| [10.0 * row as f32, -10.0 * column as f32, z])
+//!         .into(),
+//!     uv_px: vec![[62.0, 62.0], [162.0, 62.0], [62.0, 162.0], [162.0, 162.0]],
+//! };
+//! let triangles = vec![[0, 2, 1], [1, 2, 3]];
+//! let atlas = Atlas::new(0.1, triangles, square(-1.0), square(0.0))?;
+//! assert_eq!(Raster::new(&atlas, Patch::Skin).pixel_count(), 100 * 100);
+//! # Ok::<(), papilla_atlas::AtlasError>(())
+//! ```
+//!
 //! An [`Atlas`] is valid by construction: [`Atlas::new`] and [`Atlas::from_json`] refuse
 //! what breaks these rules. Its [hash](Atlas::hash) names it; datasets, models, server
 //! and clients carry that hash, and mixing two atlases is an error.

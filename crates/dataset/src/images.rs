@@ -1,8 +1,7 @@
 //! The surface-pressure study's image pairs: 224 x 224 gray PNG of pressure and SED.
 
 use super::{Dataset, DatasetError, Split};
-use papilla_atlas::MAP_LEN;
-use papilla_atlas::{Patch, Raster};
+use papilla_atlas::{MAP_LEN, Patch, Raster};
 use papilla_output::map_image::{Bits, MapScale, MapView, Quantity};
 use papilla_output::{OutputError, atomic};
 use serde::Serialize;

@@ -7,6 +7,14 @@
 //! DIR/shards/press-00000.npz  vertex values of all samples of one indentation
 //! ```
 //!
+//! ```
+//! use papilla_dataset::{RASTER_ARRAYS, SHARD_ARRAYS, schema};
+//!
+//! let always = SHARD_ARRAYS.iter().filter(|array| !array.optional);
+//! assert!(always.clone().any(|a| a.name == "pressure_pa" && a.shape == ["D", "V"]));
+//! assert_eq!(schema().raster, RASTER_ARRAYS);
+//! ```
+//!
 //! The format in prose: `docs/dataset.md`.
 
 // Determinism is tested: the same bits, not nearly the same.

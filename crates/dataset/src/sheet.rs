@@ -1,8 +1,7 @@
 //! A contact sheet: pressure and SED of many indentations on one picture.
 
 use super::{Dataset, DatasetError};
-use papilla_atlas::MAP_LEN;
-use papilla_atlas::{Patch, Raster};
+use papilla_atlas::{MAP_LEN, Patch, Raster};
 use papilla_output::atomic;
 use papilla_output::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX};
 use papilla_output::map_image::{MapView, Quantity, white_of};

@@ -5,8 +5,10 @@
 use std::path::Path;
 
 use papilla_fem::element::BlockGeometry;
-use papilla_fem::mesh::{complete::for_contact, gmsh};
-use papilla_fingertip::{scene::Scene, tissue::Tissue};
+use papilla_fem::mesh::complete::for_contact;
+use papilla_fem::mesh::gmsh;
+use papilla_fingertip::scene::Scene;
+use papilla_fingertip::tissue::Tissue;
 
 /// A scene file: refused with words, or it can be written again and is the same scene.
 pub(crate) fn scene(data: &[u8]) {

@@ -9,8 +9,7 @@ use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
-use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_fingertip::simulation::record::relative_l2;
+use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use serde::Serialize;
 
 /// The last stored state of one solve, and its price.

@@ -4,6 +4,13 @@
 //! converges to a right answer or is refused. [`calculix`]: the same problems in another program.
 //! [`wedge`]: the figures of Chen, Shuai & Zhu. [`fidelity`]: coarser and finer elements beside
 //! each other. [`effect_study`]: what each effect of a scene changes and costs.
+//!
+//! ```
+//! use papilla_validation::verify;
+//!
+//! let report = verify::run(true, &|case| case.name == "uniaxial", &mut |_, _| ());
+//! assert!(report.passed());
+//! ```
 
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]

@@ -9,9 +9,8 @@ use papilla_fingertip::campaign::{
     CampaignSpec, Candidate, DepthRange, Indentation, PoseRanges, indentations,
 };
 use papilla_fingertip::mesh::fingertip::Density;
-use papilla_fingertip::scene::Pose;
 use papilla_fingertip::scene::effects::usual;
-use papilla_fingertip::scene::{Friction, TissueTable};
+use papilla_fingertip::scene::{Friction, Pose, TissueTable};
 use papilla_output::map_image::Bits;
 use papilla_sdf::{IndenterSpec, Plate, Sphere};
 use std::collections::BTreeMap;

@@ -3,8 +3,7 @@
 use super::{CHECKS_FAILED, print};
 use anyhow::{Context, bail};
 use papilla_validation::calculix::Ccx;
-use papilla_validation::calculix::cross_check;
-use papilla_validation::calculix::cross_check::CASES;
+use papilla_validation::calculix::cross_check::{self, CASES};
 use papilla_validation::verify::Row;
 use std::path::PathBuf;
 use std::process::ExitCode;

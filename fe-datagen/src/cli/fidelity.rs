@@ -2,8 +2,7 @@
 
 use super::{CHECKS_FAILED, print};
 use papilla_fingertip::campaign::CampaignSpec;
-use papilla_validation::fidelity;
-use papilla_validation::fidelity::{Ladder, Report};
+use papilla_validation::fidelity::{self, Ladder, Report};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,8 +1,7 @@
 //! `generate`: a campaign of presses into a dataset.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign;
-use crate::campaign::{BoxError, IndentationSolver, RunOptions};
+use crate::campaign::{self, BoxError, IndentationSolver, RunOptions};
 use anyhow::Context as _;
 use papilla_dataset::{BALANCE_RELATIVE_MAX, Sample};
 use papilla_fem::solve::{Options, Solver};

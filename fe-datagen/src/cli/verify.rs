@@ -2,8 +2,7 @@
 
 use super::{CHECKS_FAILED, print};
 use anyhow::Context;
-use papilla_validation::verify;
-use papilla_validation::verify::{CASES, Row};
+use papilla_validation::verify::{self, CASES, Row};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -1,7 +1,6 @@
 //! `s2`: the wedge press of Chen, Shuai & Zhu.
 
-use super::choices;
-use super::{CHECKS_FAILED, print};
+use super::{CHECKS_FAILED, choices, print};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_output::atomic;
 use papilla_validation::wedge::reading::Reading;

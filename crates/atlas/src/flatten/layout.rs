@@ -2,8 +2,7 @@
 
 use super::angles::{area, difference, doubled_area_vector};
 use super::{BuildAtlasError, Convergence, Distortion, Flattening, Method, flatten};
-use crate::MAP_SIDE_PX;
-use crate::{Atlas, Patch, PatchVertices, Raster};
+use crate::{Atlas, MAP_SIDE_PX, Patch, PatchVertices, Raster};
 use serde::Serialize;
 use std::time::Instant;
 

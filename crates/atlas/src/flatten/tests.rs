@@ -1,7 +1,6 @@
 use super::shapes::{Shape, cylinder_sector, octahedron, spherical_cap, tongue};
 use super::*;
-use crate::MAP_SIDE_PX;
-use crate::{Atlas, Patch, Raster};
+use crate::{Atlas, MAP_SIDE_PX, Patch, Raster};
 use proptest::prelude::*;
 use std::f64::consts::{PI, TAU};
 

@@ -11,11 +11,8 @@
 //! that the last step arrived at to first order, and not `K M^-1 b`, into which the second order of
 //! that step entered times `K` (Magisano, Leonetti & Garcea 2017: mixed integration points).
 
-use super::geometry::ElementGeometry;
-use super::geometry::displacement_gradient;
-use crate::tensor::Kinematics;
-use crate::tensor::UNIT;
-use crate::tensor::{double_dot, trace};
+use super::geometry::{ElementGeometry, displacement_gradient};
+use crate::tensor::{Kinematics, UNIT, double_dot, trace};
 
 /// Coefficients of `theta - 1` in the dilatation basis of an element.
 pub type Dilatation = [f64; 4];

@@ -13,8 +13,7 @@
 use super::geometry::{ElementGeometry, displacement_gradient};
 use super::independent::{Dilatation, IndependentDilatation};
 use crate::material::Isochoric;
-use crate::tensor::{Kinematics, Mat3, UNIT};
-use crate::tensor::{cofactor_derivative, trace};
+use crate::tensor::{Kinematics, Mat3, UNIT, cofactor_derivative, trace};
 
 /// Where an element turned inside out.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

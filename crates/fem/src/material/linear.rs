@@ -1,8 +1,7 @@
 //! Linear elasticity: small strain, `U = mu |dev sym H|^2`.
 
 use super::Isochoric;
-use crate::tensor::trace;
-use crate::tensor::{Kinematics, Mat3, Tensor4};
+use crate::tensor::{Kinematics, Mat3, Tensor4, trace};
 
 /// Hooke's law with shear modulus `mu`.
 #[derive(Clone, Copy, Debug, PartialEq)]

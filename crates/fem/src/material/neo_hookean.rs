@@ -1,8 +1,7 @@
 //! Neo-Hookean isochoric law `U = mu/2 (I1bar - 3)`.
 
 use super::Isochoric;
-use crate::tensor::trace;
-use crate::tensor::{Kinematics, Mat3, Tensor4};
+use crate::tensor::{Kinematics, Mat3, Tensor4, trace};
 
 /// Neo-Hookean law with shear modulus `mu`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,8 +9,7 @@
 //! least a small positive one): stress is C1, and `alpha = 25` cannot overflow.
 
 use super::Isochoric;
-use crate::tensor::eigen;
-use crate::tensor::{Kinematics, Mat3, Tensor4};
+use crate::tensor::{Kinematics, Mat3, Tensor4, eigen};
 
 /// Most terms of a law.
 const TERMS_MAX: usize = 6;

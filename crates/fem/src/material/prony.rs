@@ -14,8 +14,7 @@
 
 use super::Isochoric;
 use super::linear::deviatoric_strain;
-use crate::tensor::{Kinematics, Mat3, Tensor4};
-use crate::tensor::{double_dot, product};
+use crate::tensor::{Kinematics, Mat3, Tensor4, double_dot, product};
 
 /// Most terms of a series.
 const TERMS_MAX: usize = 6;

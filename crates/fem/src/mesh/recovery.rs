@@ -159,8 +159,7 @@ fn faces(mesh: &Mesh, surface: &Surface) -> Vec<(Vec<u32>, usize, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::ElementKind;
-    use crate::element::{BlockGeometry, ConstitutiveModel, Elastic, Materials};
+    use crate::element::{BlockGeometry, ConstitutiveModel, Elastic, ElementKind, Materials};
     use crate::material::NeoHookean;
     use crate::mesh::FaceKind;
     use crate::mesh::block::{BlockLattice, build, even};

@@ -1,8 +1,7 @@
 //! Fields at a point of an element.
 
 use super::{Mesh, Region};
-use crate::element::geometry::displacement_gradient;
-use crate::element::geometry::{BlockGeometry, jacobian};
+use crate::element::geometry::{BlockGeometry, displacement_gradient, jacobian};
 use crate::element::{HistoryVariables, Inverted, Materials, extrapolate};
 use crate::tensor::{Kinematics, Mat3};
 

@@ -1,10 +1,9 @@
 //! One equilibrium: Newton's method between updates of contact's multipliers.
 
-use super::StepError;
-use super::friction;
 use super::newton::Fixed;
 use super::state::State;
 use super::stepping::Solver;
+use super::{StepError, friction};
 use crate::element::HistoryVariables;
 
 /// Least share of its way that the friction bound goes in one update.

@@ -125,8 +125,7 @@ pub(super) fn forcing(forcing: f64, share: f64, target: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::ElementKind;
-    use crate::element::{Elastic, Materials};
+    use crate::element::{Elastic, ElementKind, Materials};
     use crate::material::{NeoHookean, moduli};
     use crate::mesh::block::even;
     use crate::mesh::lattice::{REGION, intervals, lattice};

@@ -1,15 +1,13 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
 use super::effort::Effort;
-use super::friction;
 use super::history::{self, EnergySplit};
 use super::loading::Loading;
-use super::mixed;
 use super::newton::{Fixed, Newton};
 use super::problem::Problem;
 use super::state::{Mark, State, StepReport};
 use super::work::Work;
-use super::{Options, SolveError, StepError};
+use super::{Options, SolveError, StepError, friction, mixed};
 use crate::contact::{FrictionPoint, FrictionTrial};
 use crate::element::HistoryVariables;
 

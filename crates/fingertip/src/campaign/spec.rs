@@ -3,9 +3,8 @@
 use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
-use crate::scene::Pose;
 use crate::scene::effects::usual;
-use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Scene, TissueTable};
+use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable};
 use papilla_sdf::IndenterSpec;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

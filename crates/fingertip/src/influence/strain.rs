@@ -5,8 +5,7 @@ use crate::tissue::{NoTissue, Tissue};
 use papilla_fem::element::{HistoryVariables, Inverted};
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::solve::Problem;
-use papilla_fem::tensor::Mat3;
-use papilla_fem::tensor::trace;
+use papilla_fem::tensor::{Mat3, trace};
 
 /// Numbers of strain at a vertex: five deviatoric, one volumetric.
 pub const COMPONENTS: usize = 6;

@@ -5,9 +5,8 @@ use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
 use crate::mesh::section::SectionMeshError;
-use crate::scene::Pose;
 use crate::scene::error::{indenter_field, material_field};
-use crate::scene::{Located, Scene, SceneError, TissueError};
+use crate::scene::{Located, Pose, Scene, SceneError, TissueError};
 use crate::tissue::{NoTissue, Tissue};
 use papilla_atlas::Atlas;
 use papilla_atlas::flatten::{AtlasReport, BuildAtlasError, build_atlas};
@@ -18,8 +17,7 @@ use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::solve::{
     Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
 };
-use papilla_fem::tensor::norm;
-use papilla_fem::tensor::product;
+use papilla_fem::tensor::{norm, product};
 use papilla_sdf::Placement;
 use std::path::PathBuf;
 

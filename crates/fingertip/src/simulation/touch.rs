@@ -64,8 +64,8 @@ impl Body {
         Ok(MovingIndenter { shape: approach.shape.clone(), start, path, contact })
     }
 
-    /// Where on the skin contact is to be found: at Gauss points if it is too narrow for nodal
-    /// by nodes; at nodes if it is not, or so narrow that faces would lose it too.
+    /// Where on the skin contact is to be found: at Gauss points if the indenter is too narrow for
+    /// nodes; at nodes if it is not, or so narrow that faces would lose it too.
     fn contact_rule(&self, approach: &Approach) -> ContactRule {
         let spacings = self.spacings(approach);
         approach.contact.unwrap_or(match (1.0..NODAL_WIDTH_MIN).contains(&spacings) {

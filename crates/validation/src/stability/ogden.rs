@@ -2,8 +2,7 @@
 
 use super::lab::{press, scene, solve, tight};
 use super::{Hardness, Line, Suite};
-use crate::verify::bodies::everywhere;
-use crate::verify::bodies::internal_force;
+use crate::verify::bodies::{everywhere, internal_force};
 use crate::verify::{CaseError, Check};
 use papilla_fem::element::{Elastic, ElementKind};
 use papilla_fem::material::{Isochoric, Ogden};

@@ -3,8 +3,7 @@
 use super::{Line, Suite};
 use crate::verify::{CaseError, Check};
 use papilla_fem::material::{Isochoric, NeoHookean, Ogden, OgdenTerm};
-use papilla_fem::tensor::product;
-use papilla_fem::tensor::{Kinematics, Mat3, Tensor4};
+use papilla_fem::tensor::{Kinematics, Mat3, Tensor4, product};
 use papilla_fingertip::materials::OgdenSpec;
 
 const GAPS: [f64; 12] =

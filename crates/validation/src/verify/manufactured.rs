@@ -2,17 +2,14 @@
 
 use super::bodies::{solve, tight, uniform};
 use super::{CaseError, Check, Context};
-use papilla_fem::element::geometry::displacement_gradient;
-use papilla_fem::element::geometry::jacobian;
+use papilla_fem::element::geometry::{displacement_gradient, jacobian};
 use papilla_fem::element::reference::GAUSS_3;
 use papilla_fem::element::{ConstitutiveModel, ElementKind, HistoryVariables};
 use papilla_fem::mesh::Mesh;
-use papilla_fem::mesh::lattice::REGION;
-use papilla_fem::mesh::lattice::cube;
+use papilla_fem::mesh::lattice::{REGION, cube};
 use papilla_fem::mesh::supports::{hold_boundary, prescribe};
 use papilla_fem::solve::{Loading, Problem};
-use papilla_fem::tensor::Kinematics;
-use papilla_fem::tensor::Mat3;
+use papilla_fem::tensor::{Kinematics, Mat3};
 
 const SOURCE: &str = "theory: order of interpolation, of the dilatation if that is lower";
 

@@ -3,12 +3,10 @@
 use super::bodies::{largest, noise, points, solve, tight, uniform};
 use super::{CaseError, Check, Context};
 use papilla_fem::element::{ElementKind, HistoryVariables};
-use papilla_fem::mesh::lattice::REGION;
-use papilla_fem::mesh::lattice::{cube, intervals};
+use papilla_fem::mesh::lattice::{REGION, cube, intervals};
 use papilla_fem::mesh::supports::{hold_boundary, prescribe};
 use papilla_fem::solve::{Loading, Problem};
-use papilla_fem::tensor::Kinematics;
-use papilla_fem::tensor::Mat3;
+use papilla_fem::tensor::{Kinematics, Mat3};
 
 const SOURCE: &str = "exact (Irons & Razzaque 1972)";
 

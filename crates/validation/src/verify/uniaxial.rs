@@ -2,10 +2,8 @@
 
 use super::bodies::{internal_force, solve, tight, uniform};
 use super::{CaseError, Check, Context};
-use papilla_fem::element::ConstitutiveModel;
-use papilla_fem::element::ElementKind;
-use papilla_fem::mesh::lattice::REGION;
-use papilla_fem::mesh::lattice::cube;
+use papilla_fem::element::{ConstitutiveModel, ElementKind};
+use papilla_fem::mesh::lattice::{REGION, cube};
 use papilla_fem::mesh::supports::{hold, prescribe};
 use papilla_fem::solve::{Loading, Problem};
 

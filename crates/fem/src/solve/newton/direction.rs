@@ -8,9 +8,8 @@ use super::{Fixed, Held, Newton};
 use crate::contact::Support;
 use crate::element::Dilatation;
 use crate::linear::{DofMap, FactorKind, FactorMemory, NumericFactor, conjugate_gradient};
-use crate::solve::StepError;
 use crate::solve::loading::Loading;
-use crate::solve::mixed;
+use crate::solve::{StepError, mixed};
 use std::time::Instant;
 
 impl Newton<'_> {

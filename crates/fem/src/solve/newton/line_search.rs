@@ -3,9 +3,8 @@
 use super::{Fixed, Newton};
 use crate::element::Dilatation;
 use crate::linear::DofMap;
-use crate::solve::StepError;
 use crate::solve::evaluate::evaluate_body;
-use crate::solve::mixed;
+use crate::solve::{StepError, mixed};
 use std::time::Instant;
 
 impl Newton<'_> {

@@ -2,9 +2,8 @@
 
 use super::ours::{laws, sed_mpa};
 use super::{Check, Context, SOURCE};
-use crate::calculix::Quantity;
 use crate::calculix::deck::{ELEMENTS, HELD};
-use crate::calculix::{Deck, ElementTypes, MaterialCard, StepControl};
+use crate::calculix::{Deck, ElementTypes, MaterialCard, Quantity, StepControl};
 use crate::verify::CaseError;
 use crate::verify::bodies::internal_force;
 use papilla_fem::element::ElementKind;
