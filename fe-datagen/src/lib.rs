@@ -1,28 +1,9 @@
-//! Finite-element fingertip: scenes, solver, atlas, dataset.
+//! Campaigns of indentations into datasets, and the command line over all that is offline.
 
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
-pub mod atlas;
+mod body_file;
 pub mod campaign;
 pub mod cli;
-pub mod contact;
-pub mod dataset;
-pub mod element;
-pub mod export;
-pub mod forecast;
-pub mod geometry;
-pub mod indenter;
-pub mod linear;
-pub mod material;
-pub mod mesh;
-pub mod operator;
-pub mod output;
-pub mod press;
-pub mod processor;
-pub mod rungs;
-pub mod s2;
-pub mod scene;
-pub mod solve;
-pub mod stability;
-pub mod verify;
+pub mod influence_file;

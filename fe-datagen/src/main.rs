@@ -1,12 +1,14 @@
 //! `fe-datagen` command line.
 
 use std::process::ExitCode;
+use tracing_subscriber::Layer as _;
 use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::{Layer as _, layer::SubscriberExt as _, util::SubscriberInitExt as _};
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 fn main() -> ExitCode {
     let filter = match std::env::var("RUST_LOG") {
-        Ok(text) => match text.parse() {
+        Ok(text) => match of_every_crate(&text).parse() {
             Ok(filter) => filter,
             Err(error) => {
                 eprintln!("error: RUST_LOG is '{text}', which is not a filter: {error}");
@@ -18,4 +20,11 @@ fn main() -> ExitCode {
     let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
     tracing_subscriber::registry().with(log).init();
     fe_datagen::cli::run()
+}
+
+/// A filter of this program's name is one for the crates that it is made of.
+fn of_every_crate(filter: &str) -> String {
+    let also = filter.split(',').filter(|d| d.contains("fe_datagen"));
+    let also = also.map(|d| d.replace("fe_datagen", "papilla"));
+    std::iter::once(filter.to_owned()).chain(also).collect::<Vec<_>>().join(",")
 }

@@ -3,7 +3,7 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
-use fe_datagen::export::{Ccx, witness};
+use papilla_validation::calculix::{Ccx, cross_check};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -134,7 +134,7 @@ fn the_witness_says_when_there_is_none() {
 fn calculix_agrees() {
     let ccx = Ccx::find(None).expect("ccx not installed (Debian: apt-get install calculix-ccx)");
     let folder = tempfile::tempdir().unwrap();
-    let report = witness::run(&ccx, folder.path(), true, &|_| true, &mut |_, rows| {
+    let report = cross_check::run(&ccx, folder.path(), true, &|_| true, &mut |_, rows| {
         for row in rows.into_iter().flatten() {
             println!("{}", row.line());
         }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use papilla_json::JsonError;
+pub use papilla_json::shortened;
 use serde::{Deserialize, Serialize};
 
 /// What went wrong, as one stable word a program can match on.
@@ -244,28 +246,19 @@ impl Problem {
     }
 }
 
-/// Longest piece of the input that an error repeats, characters.
-const ECHO_MAX: usize = 100;
-
-/// At most 100 characters of what came from outside and may be of any length.
-#[must_use]
-pub fn shortened(text: &str) -> String {
-    match text.char_indices().nth(ECHO_MAX) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
+impl From<JsonError> for Problem {
+    fn from(error: JsonError) -> Self {
+        let problem = Self::new(ErrorCode::BadJson, error.to_string());
+        match error.member {
+            Some(member) => problem.at(member),
+            None => problem,
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_is_repeated_is_cut_between_characters() {
-        assert_eq!(shortened("naïve"), "naïve");
-        let long = shortened(&"ï".repeat(500));
-        assert_eq!((long.chars().count(), long.chars().last()), (ECHO_MAX + 1, Some('…')));
-    }
 
     #[test]
     fn every_code_reads_back_from_its_own_word() {

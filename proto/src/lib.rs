@@ -20,17 +20,21 @@
 //!
 //! The protocol in prose, with examples: `docs/reference/protocol.md`.
 
-pub mod atlas;
 pub mod effects;
 pub mod error;
 pub mod frame;
-pub mod json;
 pub mod map;
 pub mod message;
 pub mod pattern;
 pub mod sample;
 pub mod summary;
 pub mod window;
+
+/// Reading JSON from outside, and why it is refused.
+pub use papilla_json as json;
+
+/// The two unwrapped patches, their rasteriser and hash.
+pub use papilla_atlas as atlas;
 
 pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};

@@ -2,11 +2,7 @@
 
 use crate::ErrorCode;
 
-/// Side of every map, pixels.
-pub const MAP_SIDE_PX: usize = 224;
-
-/// Number of samples of a map.
-pub const MAP_LEN: usize = MAP_SIDE_PX * MAP_SIDE_PX;
+pub use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 
 /// Room above the greatest trained pressure, as a factor.
 ///

@@ -27,29 +27,28 @@ def rust(targets: str, name_filter: str = "") -> str:
 MUTATIONS = [
     Mutation(
         "a sign in the tangent of the neo-Hookean law",
-        "fe-datagen/src/material/neo_hookean.rs",
+        "crates/fem/src/material/neo_hookean.rs",
         "+ c29 * g[b][a]",
         "- c29 * g[b][a]",
         rust("--test verify"),
     ),
     Mutation(
         "SED from the wrong side of the interface",
-        "fe-datagen/src/mesh/recovery.rs",
-        "let owner = element_on_side(mesh, tissue);",
-        "let owner = element_on_side(mesh, if tissue == Tissue::Dermis "
-        "{ Tissue::Epidermis } else { Tissue::Dermis });",
+        "crates/fem/src/mesh/recovery.rs",
+        "let owner = element_on_side(mesh, region);",
+        "let owner = element_on_side(mesh, Region(1 - region.0.min(1)));",
         rust("--lib", "mesh::"),
     ),
     Mutation(
         "contact that leaves half of its curvature out of the tangent",
-        "fe-datagen/src/contact/mod.rs",
+        "crates/fem/src/contact/mod.rs",
         "penalty * n[i] * n[j] - t * d.hessian[i][j]",
         "penalty * n[i] * n[j] - 0.5 * t * d.hessian[i][j]",
         rust("--test verify"),
     ),
     Mutation(
         "friction that sticks up to twice its bound",
-        "fe-datagen/src/contact/friction.rs",
+        "crates/fem/src/contact/friction.rs",
         "if size <= s {",
         "if size <= 2.0 * s {",
         rust("--test verify"),

@@ -29,7 +29,7 @@ def lints() -> dict[str, str]:
 # Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
 # Tests that solve for seconds: verification, hard cases, presses of whole fingers.
-SOLVES = ["every_quick_row", "every_hard_case", "press::tests", "rungs_are_solved_once"]
+SOLVES = ["every_quick_row", "every_hard_case", "simulation::tests", "rungs_are_solved_once"]
 # Debian's packages, by the program or file that shows that they are there.
 PACKAGES = {
     "ccx": "calculix-ccx",
@@ -99,12 +99,13 @@ def fast() -> list[Step]:
             after=("build",),
             tests_min=740,
         ),
+        Step("cycles", "no module imports itself in a circle", "tests/suite/cycles"),
         Step(
             "doc",
             "examples in the crates' documentation",
             f"cargo test --workspace --doc {FEATURES} -q -- --skip clients/rust/src/lib.rs",
             after=("rust",),
-            tests_min=1,
+            tests_min=7,
         ),
         Step(
             "data",

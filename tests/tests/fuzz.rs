@@ -4,14 +4,14 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
-#[path = "../../fe-datagen/fuzz/entries.rs"]
+#[path = "../../crates/fingertip/fuzz/entries.rs"]
 mod entries;
 #[path = "../fuzz/replay.rs"]
 mod replay;
 
 use replay::replay;
 
-const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../fe-datagen/fuzz/corpus");
+const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/fingertip/fuzz/corpus");
 
 #[test]
 fn scenes() {

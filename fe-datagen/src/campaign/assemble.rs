@@ -1,26 +1,32 @@
-//! The manifest, assembled from the records of all presses.
+//! The manifest, assembled from the records of all indentations.
 
-use super::sampling::split_of;
-use super::state::{Outcome, PressState, SOFTWARE};
-use super::{CampaignError, CampaignSpec, Press, splits};
-use crate::dataset::{self, DroppedSample, FailedPress, Manifest, PressEntry, Splits};
-use crate::output::OutputError;
-use papilla_proto::atlas::Atlas;
+use super::CampaignError;
+use super::state::{IndentationState, Outcome, SOFTWARE};
+use papilla_atlas::Atlas;
+use papilla_dataset as dataset;
+use papilla_dataset::{
+    DroppedSample, FailedIndentation, IndentationEntry, Manifest, Split, Splits,
+};
+use papilla_fingertip::campaign::{CampaignSpec, HeldOut, Indentation, held_out};
+use papilla_fingertip::scene::Pose;
+use papilla_output::OutputError;
 
-/// The manifest of all presses, which stand in order of their ids.
+/// The manifest of all indentations, which stand in order of their ids.
 pub(super) fn manifest(
     spec: &CampaignSpec,
     atlas: &Atlas,
-    states: &[PressState],
+    states: &[IndentationState],
 ) -> Result<Manifest, CampaignError> {
-    let all = splits(spec);
+    let all = held_out(spec);
     let (mut presses, mut failed, mut dropped) = (Vec::new(), Vec::new(), Vec::new());
     let (mut pressure_max, mut sed_max) = (0.0f64, 0.0f64);
-    for PressState { press, outcome, .. } in states {
-        let Press { id, indenter, shape, pose, offset_mm, .. } = press.clone();
+    for IndentationState { press, outcome, .. } in states {
+        let Indentation { id, indenter, shape, pose, offset_mm, .. } = press.clone();
+        let Pose { pitch_deg, roll_deg, yaw_deg } = pose;
+        let pose = dataset::Pose { pitch_deg, roll_deg, yaw_deg };
         match outcome {
             Outcome::Failed { error } => {
-                failed.push(FailedPress {
+                failed.push(FailedIndentation {
                     id,
                     indenter,
                     shape,
@@ -44,7 +50,7 @@ pub(super) fn manifest(
                     depth_mm: *depth_mm,
                     reason: reason.clone(),
                 }));
-                presses.push(PressEntry {
+                presses.push(IndentationEntry {
                     id,
                     file: dataset::shard_file(id),
                     sha256: sha256.clone(),
@@ -86,4 +92,9 @@ pub(super) fn manifest(
         failed,
         dropped,
     })
+}
+
+/// The split of one indentation.
+fn split_of(all: &HeldOut, id: usize) -> Split {
+    if all.test.binary_search(&id).is_ok() { Split::Test } else { Split::Train }
 }

@@ -1,8 +1,8 @@
-//! Campaigns: many presses of one finger, solved in parallel into a dataset.
+//! Campaigns: many indentations of one finger, solved in parallel into a dataset.
 //!
 //! A campaign is a TOML file ([`CampaignSpec`]). [`run`] solves its presses,
-//! one per core, and writes the dataset that [`crate::dataset`] describes. It can be
-//! killed at any instant and started again: every press is one shard, written
+//! one per core, and writes the dataset that [`papilla_dataset`] describes. It can be
+//! killed at any instant and started again: every indentation is one shard, written
 //! atomically, with a record in `DIR/progress` written after it. The dataset's
 //! bytes depend on the campaign alone, not on threads, kills or the clock.
 
@@ -11,14 +11,10 @@ mod error;
 pub(crate) mod progress;
 mod report;
 mod run;
-mod sampling;
-mod spec;
 mod state;
 #[cfg(test)]
 mod tests;
 
 pub use error::{BoxError, CampaignError};
 pub use report::CampaignReport;
-pub use run::{PressSolver, RunOptions, run};
-pub use sampling::{Press, presses, splits};
-pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
+pub use run::{IndentationSolver, RunOptions, run};

@@ -9,7 +9,7 @@ use std::time::Duration;
 pub(crate) fn bar(total: usize, reused: usize, visible: bool) -> ProgressBar {
     let target = if visible { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(total as u64), target);
-    // indicatif's own rate looks back some 15 s, less than one press takes.
+    // indicatif's own rate looks back some 15 s, less than one indentation takes.
     let solved = move |state: &ProgressState| state.pos().saturating_sub(reused as u64);
     let rate = move |state: &ProgressState, out: &mut dyn Write| {
         let minutes = state.elapsed().as_secs_f64() / 60.0;

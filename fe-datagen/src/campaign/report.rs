@@ -1,7 +1,7 @@
 //! What a finished campaign says of itself.
 
 use super::progress::clock;
-use crate::dataset::{DroppedSample, FailedPress};
+use papilla_dataset::{DroppedSample, FailedIndentation};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ pub struct CampaignReport {
     pub name: String,
     /// The dataset's folder.
     pub folder: PathBuf,
-    /// Presses of the campaign.
+    /// Indentations of the campaign.
     pub presses: usize,
     /// Presses solved by this run.
     pub solved: usize,
@@ -24,8 +24,8 @@ pub struct CampaignReport {
     pub samples: usize,
     /// Samples that the campaign asks for.
     pub samples_due: usize,
-    /// Presses that failed.
-    pub failed: Vec<FailedPress>,
+    /// Indentations that failed.
+    pub failed: Vec<FailedIndentation>,
     /// Samples that failed their own checks.
     pub dropped: Vec<DroppedSample>,
     /// Largest pressure, Pa.
@@ -38,7 +38,7 @@ pub struct CampaignReport {
     pub threads: usize,
     /// Wall time of this run, s.
     pub seconds: f64,
-    /// Solver time of all presses, summed over threads and runs, s.
+    /// Solver time of all indentations, summed over threads and runs, s.
     pub solver_seconds: f64,
 }
 

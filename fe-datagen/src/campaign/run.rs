@@ -1,13 +1,14 @@
-//! Solving the presses of a campaign in parallel.
+//! Solving the indentations of a campaign in parallel.
 
 use super::assemble::manifest;
-use super::state::{Outcome, PressState, Workspace};
-use super::{BoxError, CampaignError, CampaignReport, CampaignSpec, Press, presses, progress};
-use crate::dataset;
-use crate::output::atomic;
-use crate::press::record::IncrementRecord;
+use super::state::{IndentationState, Outcome, Workspace};
+use super::{BoxError, CampaignError, CampaignReport, progress};
 use indicatif::ProgressBar;
-use papilla_proto::atlas::Atlas;
+use papilla_atlas::Atlas;
+use papilla_dataset as dataset;
+use papilla_dataset::Sample;
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_output::atomic;
 use std::any::Any;
 use std::num::NonZero;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,15 +17,15 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Solves one press after another; each worker thread has its own.
-pub trait PressSolver {
-    /// Presses to each of the depths and returns one equilibrium per depth, with
+/// Solves one indentation after another; each worker thread has its own.
+pub trait IndentationSolver {
+    /// Indentations to each of the depths and returns one equilibrium per depth, with
     /// values at the vertices of the campaign's atlas. Equal presses have to give
     /// equal records (`seconds` apart), whatever was solved before.
     ///
     /// # Errors
     /// What did not converge and where; it is recorded in the manifest.
-    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError>;
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError>;
 }
 
 /// How to run, as opposed to what.
@@ -51,8 +52,8 @@ impl Default for RunOptions {
 /// # Errors
 /// [`CampaignError`] when the campaign makes no sense, the folder belongs to
 /// another one or is in use, no solver can be built, a file cannot be written,
-/// or every press failed. Single failures are in the report and the manifest.
-pub fn run<S: PressSolver>(
+/// or every indentation failed. Single failures are in the report and the manifest.
+pub fn run<S: IndentationSolver>(
     spec: &CampaignSpec,
     atlas: &Atlas,
     solver: impl Fn() -> Result<S, BoxError> + Sync,
@@ -64,7 +65,7 @@ pub fn run<S: PressSolver>(
     let workspace = Workspace::open(folder, spec, atlas)?;
     dataset::write_atlas(folder, atlas)?;
     let (mut done, mut todo) = (Vec::new(), Vec::new());
-    for press in presses(spec) {
+    for press in indentations(spec) {
         match workspace.load(&press) {
             Some(state) if !(options.retry_failed && is_failed(&state)) => done.push(state),
             _ => todo.push(press),
@@ -89,7 +90,7 @@ pub fn run<S: PressSolver>(
             let builder = std::thread::Builder::new().stack_size(16 << 20);
             let spawned = builder.spawn_scoped(scope, || queue.work(&solver));
             if let Err(error) = spawned {
-                queue.fail(CampaignError::Setup(error.into()));
+                queue.fail(CampaignError::Simulation(error.into()));
             }
         }
     });
@@ -120,29 +121,29 @@ pub fn run<S: PressSolver>(
     })
 }
 
-fn is_failed(state: &PressState) -> bool {
+fn is_failed(state: &IndentationState) -> bool {
     matches!(state.outcome, Outcome::Failed { .. })
 }
 
-fn is_in(todo: &[Press], id: usize) -> bool {
+fn is_in(todo: &[Indentation], id: usize) -> bool {
     todo.binary_search_by_key(&id, |press| press.id).is_ok()
 }
 
-/// The presses still to be solved, shared by the workers.
+/// The indentations still to be solved, shared by the workers.
 struct Queue<'a> {
     vertex_count: usize,
     workspace: &'a Workspace,
-    todo: &'a [Press],
+    todo: &'a [Indentation],
     next: AtomicUsize,
     stop: AtomicBool,
     bar: &'a ProgressBar,
-    results: Mutex<Vec<Result<PressState, CampaignError>>>,
+    results: Mutex<Vec<Result<IndentationState, CampaignError>>>,
 }
 
 impl Queue<'_> {
     /// One worker: takes the next press until none is left or one worker met
     /// an error that stops all.
-    fn work<S: PressSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
+    fn work<S: IndentationSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
         let mut solver = None;
         while !self.stop.load(Ordering::Relaxed) {
             let Some(press) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) else {
@@ -162,19 +163,19 @@ impl Queue<'_> {
         self.push(Err(error));
     }
 
-    fn push(&self, result: Result<PressState, CampaignError>) {
+    fn push(&self, result: Result<IndentationState, CampaignError>) {
         self.results.lock().unwrap_or_else(|poison| poison.into_inner()).push(result);
     }
 
-    fn press<S: PressSolver>(
+    fn press<S: IndentationSolver>(
         &self,
-        press: &Press,
+        press: &Indentation,
         solver: &mut Option<S>,
         build: &(impl Fn() -> Result<S, BoxError> + Sync),
-    ) -> Result<PressState, CampaignError> {
+    ) -> Result<IndentationState, CampaignError> {
         let mut ready = match solver.take() {
             Some(ready) => ready,
-            None => build().map_err(CampaignError::Setup)?,
+            None => build().map_err(CampaignError::Simulation)?,
         };
         let start = Instant::now();
         let id = press.id;
@@ -201,15 +202,12 @@ impl Queue<'_> {
                 tracing::info!(press = id, seconds, samples, "press solved");
             }
         }
-        let state = PressState { press: press.clone(), seconds, outcome };
+        let state = IndentationState { press: press.clone(), seconds, outcome };
         self.workspace.store(&state, shard.as_deref())?;
         Ok(state)
     }
 
-    fn encode(
-        &self,
-        records: &[IncrementRecord],
-    ) -> Result<(Outcome, Option<Vec<u8>>), CampaignError> {
+    fn encode(&self, records: &[Sample]) -> Result<(Outcome, Option<Vec<u8>>), CampaignError> {
         let finite = |(depth, reason): (f64, String)| (depth.is_finite().then_some(depth), reason);
         Ok(match dataset::encode(records, self.vertex_count)? {
             Ok(encoded) => {
@@ -234,10 +232,10 @@ impl Queue<'_> {
 }
 
 /// Each depth has to have its record, in order.
-fn complete(press: &Press, records: Vec<IncrementRecord>) -> Result<Vec<IncrementRecord>, String> {
+fn complete(press: &Indentation, records: Vec<Sample>) -> Result<Vec<Sample>, String> {
     let due = &press.depths_mm;
     // A depth that is no number is left to the sample's own checks.
-    let fit = |r: &IncrementRecord, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
+    let fit = |r: &Sample, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
     let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
     let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
     let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");

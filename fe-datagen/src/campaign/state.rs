@@ -1,10 +1,10 @@
 //! What a campaign remembers between runs, in `DIR/progress`.
 
-use super::{CampaignError, CampaignSpec, Press};
-use crate::dataset::{FORMAT, sha256_hex, shard_file};
-use crate::output::{OutputError, atomic};
-use crate::press::record::Checks;
-use papilla_proto::atlas::Atlas;
+use super::CampaignError;
+use papilla_atlas::Atlas;
+use papilla_dataset::{Checks, FORMAT, sha256_hex, shard_file};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
+use papilla_output::{OutputError, atomic};
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ struct Owner {
     fingerprint: String,
 }
 
-/// What became of one press; written after its shard.
+/// What became of one indentation; written after its shard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct PressState {
-    pub press: Press,
+pub(super) struct IndentationState {
+    pub press: Indentation,
     /// Wall time, s. Not part of the dataset: it is never the same twice.
     pub seconds: f64,
     pub outcome: Outcome,
@@ -95,10 +95,10 @@ impl Workspace {
         self.folder.join(format!("progress/press-{id:05}.json"))
     }
 
-    /// What an earlier run left of a press: only what can be trusted, that is a
+    /// What an earlier run left of an indentation: only what can be trusted, that is a
     /// readable record whose shard is there and has the recorded hash.
-    pub(super) fn load(&self, press: &Press) -> Option<PressState> {
-        let state: PressState = atomic::read_json(&self.record_path(press.id)).ok()?;
+    pub(super) fn load(&self, press: &Indentation) -> Option<IndentationState> {
+        let state: IndentationState = atomic::read_json(&self.record_path(press.id)).ok()?;
         if state.press != *press {
             return None;
         }
@@ -111,16 +111,16 @@ impl Workspace {
         Some(state)
     }
 
-    /// Stores a press: the shard first, then the record that vouches for it.
+    /// Stores an indentation: the shard first, then the record that vouches for it.
     pub(super) fn store(
         &self,
-        state: &PressState,
+        state: &IndentationState,
         shard: Option<&[u8]>,
     ) -> Result<(), OutputError> {
         let path = self.folder.join(shard_file(state.press.id));
         match shard {
             Some(bytes) => atomic::write(&path, bytes)?,
-            // A press that failed this time must not keep the shard of another time.
+            // An indentation that failed this time must not keep the shard of another time.
             None if path.exists() => {
                 std::fs::remove_file(&path).map_err(OutputError::io("remove", &path))?;
             }

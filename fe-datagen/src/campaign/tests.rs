@@ -2,16 +2,18 @@
 //! formula of pose and depth; what it returns is of no matter to the runner.
 
 use super::*;
-use crate::dataset::testing::{atlas, posed_record};
-use crate::dataset::{Dataset, ImageOptions, Split, images, stats, verify};
-use crate::indenter::{IndenterSpec, Plate, Sphere};
-use crate::mesh::fingertip::Density;
-use crate::output::map_image::Bits;
-use crate::press::record::{IncrementRecord, Pose};
-use crate::scene::effects::usual;
-use crate::scene::{Friction, TissueTable};
-use papilla_proto::atlas::Atlas;
-use std::collections::{BTreeMap, BTreeSet};
+use papilla_atlas::Atlas;
+use papilla_dataset::testing::{atlas, posed_record};
+use papilla_dataset::{Dataset, ImageOptions, Sample, Split, images, stats, verify};
+use papilla_fingertip::campaign::{
+    CampaignSpec, Candidate, DepthRange, Indentation, PoseRanges, indentations,
+};
+use papilla_fingertip::mesh::fingertip::Density;
+use papilla_fingertip::scene::effects::usual;
+use papilla_fingertip::scene::{Friction, Pose, TissueTable};
+use papilla_output::map_image::Bits;
+use papilla_sdf::{IndenterSpec, Plate, Sphere};
+use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -33,10 +35,12 @@ struct Formula<'a> {
     calls: &'a AtomicUsize,
 }
 
-impl PressSolver for Formula<'_> {
-    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError> {
+impl IndentationSolver for Formula<'_> {
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
+        let Pose { pitch_deg, roll_deg, yaw_deg } = press.pose;
+        let pose = papilla_dataset::Pose { pitch_deg, roll_deg, yaw_deg };
         let call = self.calls.fetch_add(1, Ordering::SeqCst);
-        let record = |d: &f64| posed_record(press.pose, *d, self.vertex_count);
+        let record = |d: &f64| posed_record(pose, *d, self.vertex_count);
         let mut records: Vec<_> = press.depths_mm.iter().map(record).collect();
         match self.trouble {
             // Not even a destructor runs: what kill -9 does.
@@ -237,73 +241,24 @@ fn a_solver_that_cannot_be_built_stops_the_campaign() {
     assert!(!folder.path().join("manifest.json").exists());
 }
 
-#[test]
-fn poses_fill_their_ranges_and_follow_the_seed() {
-    let wide = CampaignSpec { presses: 64, ..spec() };
-    let poses =
-        |spec: &CampaignSpec| -> Vec<Pose> { presses(spec).iter().map(|p| p.pose).collect() };
-    let points = poses(&wide);
-    assert_eq!(points[..7], poses(&spec())[..], "the first poses do not depend on the number");
-    let cell = |p: &Pose| {
-        let index = |x: f64, low: f64, width: f64| ((x - low) / width * 8.0) as usize;
-        index(p.pitch_deg, 0.0, 45.0) * 8 + index(p.roll_deg, -30.0, 60.0)
-    };
-    // 64 Sobol points in 2-D: at most two of 8 x 8 cells' neighbours stay
-    // empty; of random points some 23 cells would.
-    let mut cells: Vec<usize> = points.iter().map(cell).collect();
-    cells.sort_unstable();
-    cells.dedup();
-    assert!(cells.len() >= 60, "{} of 64 cells hit", cells.len());
-    assert!(points.iter().all(|p| (0.0..45.0).contains(&p.pitch_deg) && p.yaw_deg.abs() < 1e-12));
-    let other = poses(&CampaignSpec { seed: 4, ..wide });
-    assert!(points.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
-}
-
 /// The shipped dataset's poses: its seed has to give them for ever.
 #[test]
 fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let s1 = CampaignSpec::read(&root.join("campaigns/s1.toml")).unwrap();
     let shipped = Dataset::open(&root.join("data/s1")).unwrap();
-    let planned = presses(&s1);
+    let planned = indentations(&s1);
     for entry in &shipped.manifest().presses {
         let press = &planned[entry.id];
-        assert_eq!((press.pose, press.offset_mm), (entry.pose, entry.offset_mm));
+        let (due, found) = (press.pose, entry.pose);
+        assert_eq!(
+            ([due.pitch_deg, due.roll_deg, due.yaw_deg], press.offset_mm),
+            ([found.pitch_deg, found.roll_deg, found.yaw_deg], entry.offset_mm)
+        );
         assert_eq!((&press.indenter, &press.shape), (&entry.indenter, &entry.shape));
     }
     let campaign = serde_json::to_value(&s1).unwrap();
     assert_eq!(shipped.manifest().campaign, campaign, "as this program would write it");
-}
-
-#[test]
-fn indenters_take_turns_by_their_shares() {
-    let all = presses(&several());
-    let count = |name: &str, n: usize| all[..n].iter().filter(|p| p.indenter == name).count();
-    for n in 1..=64 {
-        for (name, share) in [("plate", 0.25), ("ball", 0.5), ("small plate", 0.25)] {
-            let lag = share * n as f64 - count(name, n) as f64;
-            assert!(lag.abs() < 1.0, "{name}: {lag} behind after {n}");
-        }
-    }
-    assert_eq!(all[..9], presses(&CampaignSpec { presses: 9, ..several() })[..]);
-    assert_ne!(all, presses(&CampaignSpec { seed: 4, ..several() }));
-}
-
-#[test]
-fn an_indenter_has_its_own_ranges() {
-    let all = presses(&several());
-    for ball in all.iter().filter(|p| p.indenter == "ball") {
-        assert_eq!((ball.shape.as_str(), ball.depths_mm.len()), ("sphere", 3));
-        assert!((10.0..20.0).contains(&ball.pose.pitch_deg));
-        assert!((-2.0..2.0).contains(&ball.offset_mm[0]));
-        let deepest = ball.depths_mm[2];
-        assert!((1.0..1.5).contains(&deepest) && (ball.depths_mm[0] - deepest / 3.0).abs() < 1e-15);
-    }
-    let plates: Vec<_> = all.iter().filter(|p| p.shape == "plate").collect();
-    assert!(plates.iter().all(|p| p.depths_mm == [0.25, 0.5] && p.offset_mm == [0.0, 0.0]));
-    // Each indenter has a sequence of its own: no two share a pose.
-    let first = |name: &str| plates.iter().find(|p| p.indenter == name).unwrap().pose;
-    assert_ne!(first("plate"), first("small plate"));
 }
 
 #[test]
@@ -315,11 +270,11 @@ fn the_manifest_names_the_indenter_of_every_press() {
     let build = || Ok(Formula { vertex_count, trouble: Trouble::Fail(1), calls: &calls });
     let spec = CampaignSpec { presses: 8, ..several() };
     let report = run(&spec, &atlas, build, folder.path(), &options).unwrap();
-    // Four presses of two depths, four of three, one of them failed.
+    // Four indentations of two depths, four of three, one of them failed.
     assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
     assert_eq!((report.samples_due, report.failed.len()), (20, 1));
     let manifest = Dataset::open(folder.path()).unwrap().manifest().clone();
-    let planned = presses(&spec);
+    let planned = indentations(&spec);
     for entry in &manifest.presses {
         assert_eq!(entry.indenter, planned[entry.id].indenter);
         let bits = |offset: [f64; 2]| offset.map(f64::to_bits);
@@ -329,92 +284,6 @@ fn the_manifest_names_the_indenter_of_every_press() {
     let stats = stats(folder.path(), None).unwrap();
     assert_eq!(stats.indenters.values().sum::<usize>(), 7);
     assert!(stats.to_string().contains("ball"));
-}
-
-#[test]
-fn the_split_is_by_press_and_follows_the_seed() {
-    let spec = CampaignSpec { presses: 125, test_fraction: 0.2, ..spec() };
-    let split = splits(&spec);
-    assert_eq!((split.train.len(), split.test.len()), (100, 25));
-    let mut all = [split.train.clone(), split.test.clone()].concat();
-    all.sort_unstable();
-    assert_eq!(all, (0..125).collect::<Vec<_>>());
-    assert_eq!(split, splits(&spec));
-    assert_ne!(split.test, splits(&CampaignSpec { seed: 9, ..spec.clone() }).test);
-    let two = splits(&CampaignSpec { presses: 2, test_fraction: 0.2, ..spec });
-    assert_eq!((two.train.len(), two.test.len()), (1, 1));
-}
-
-#[test]
-fn shipped_campaigns_are_readable() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../campaigns");
-    let s1 = CampaignSpec::read(&folder.join("s1.toml")).unwrap();
-    assert_eq!((s1.samples(), s1.test_fraction.to_bits()), (1000, 0.2f64.to_bits()));
-    assert_eq!(CampaignSpec::read(&folder.join("smoke.toml")).unwrap().density, Density::Coarse);
-    let broad = CampaignSpec::read(&folder.join("broad.toml")).unwrap();
-    let held_out = CampaignSpec::read(&folder.join("heldout.toml")).unwrap();
-    let shapes = |spec: &CampaignSpec| -> BTreeSet<String> {
-        presses(spec).into_iter().map(|p| p.shape).collect()
-    };
-    for shape in ["plate", "sphere", "cylinder", "punch", "grating"] {
-        assert!(shapes(&broad).contains(shape), "{shape}");
-    }
-    for shape in ["wedge", "ring", "dots"] {
-        assert!(shapes(&held_out).contains(shape), "{shape}");
-    }
-    assert!(shapes(&broad).is_disjoint(&shapes(&held_out)), "no held-out shape is seen");
-}
-
-fn several_with(change: fn(&mut Candidate)) -> CampaignSpec {
-    let mut spec = several();
-    change(&mut spec.indenters[1]);
-    spec
-}
-
-fn bad_depths() -> Option<DepthRange> {
-    Some(DepthRange { deepest_mm: [0.0, 1.0], states: 2 })
-}
-
-#[test]
-fn senseless_campaigns_are_refused_by_field() {
-    type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 15] = [
-        (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
-        (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
-        (|s| s.indenter = None, "indenter"),
-        (|s| s.depths = Some(DepthRange { deepest_mm: [1.0, 2.0], states: 2 }), "depths"),
-        (|s| s.offset_mm[1] = [2.0, -2.0], "offset_mm"),
-        (
-            |s| *s = CampaignSpec { indenter: Some(IndenterSpec::default()), ..several() },
-            "indenters",
-        ),
-        (|s| *s = several_with(|c| c.share = 0), "indenters[1].share"),
-        (|s| *s = several_with(|c| c.name = "plate".into()), "indenters[1].name"),
-        (|s| *s = several_with(|c| c.depths = bad_depths()), "indenters[1].depths.deepest_mm"),
-        (|s| s.presses = 0, "presses"),
-        (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
-        (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
-        (|s| s.test_fraction = 1.0, "test_fraction"),
-        (
-            |s| {
-                let plate = Plate { edge_radius_mm: 11.0, ..Plate::default() };
-                s.indenter = Some(IndenterSpec::Plate(plate));
-            },
-            "indenter.edge_radius_mm",
-        ),
-        (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
-    ];
-    for (spoil, field) in cases {
-        let mut bad = spec();
-        spoil(&mut bad);
-        let text = bad.validate().unwrap_err().to_string();
-        assert!(text.contains(field), "{text}");
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("odd.toml");
-    std::fs::write(&path, "name = \"x\"\nspeed = 3\n").unwrap();
-    let text = CampaignSpec::read(&path).unwrap_err().to_string();
-    assert!(text.contains("odd.toml") && text.contains("speed"), "{text}");
 }
 
 #[test]

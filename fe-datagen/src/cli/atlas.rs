@@ -1,10 +1,10 @@
 //! `atlas`: flatten the fingertip's patches and say how well it went.
 
 use super::print;
-use crate::mesh::fingertip::Density;
-use crate::output::atomic;
-use crate::press::body::Body;
 use anyhow::Context as _;
+use papilla_fingertip::mesh::fingertip::Density;
+use papilla_fingertip::simulation::body::Body;
+use papilla_output::atomic;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn human(r: &crate::atlas::AtlasReport) -> String {
+fn human(r: &papilla_atlas::flatten::AtlasReport) -> String {
     let mut text = format!(
         "atlas {}\n{} vertices, {} triangles, {:.4} mm per pixel\n",
         r.hash, r.vertices, r.triangles, r.mm_per_px

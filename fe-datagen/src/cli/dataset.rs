@@ -1,8 +1,9 @@
 //! `dataset`: look at, check and draw a dataset.
 
 use super::print;
-use crate::dataset::{self, ImageOptions};
-use crate::output::map_image::Bits;
+use papilla_dataset as dataset;
+use papilla_dataset::ImageOptions;
+use papilla_output::map_image::Bits;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

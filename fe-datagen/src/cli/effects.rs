@@ -1,10 +1,10 @@
 //! `effects`: what each effect of a scene changes and costs.
 
 use super::print;
-use crate::output::atomic;
-use crate::output::plot::{Axis, Chart, Mark, Series, write_svg};
-use crate::press::study::{self, Change, Outcome, Study, Switched};
-use crate::scene::{EffectName, Scene};
+use papilla_fingertip::scene::{EffectName, Scene};
+use papilla_output::atomic;
+use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
+use papilla_validation::effect_study::{self, Change, Outcome, Study, Switched};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,9 +30,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
-    let bar = super::progress("solving", crate::scene::effects::EFFECTS.len() + 1);
+    let bar = super::progress("solving", papilla_fingertip::scene::effects::EFFECTS.len() + 1);
     let mut begun = false;
-    let study = study::run(&scene, &mut |what| {
+    let study = effect_study::run(&scene, &mut |what| {
         bar.set_message(what.to_owned());
         if std::mem::replace(&mut begun, true) {
             bar.inc(1);

@@ -1,11 +1,11 @@
 //! `explain`: what a scene is going to simulate and cost, before it runs.
 
 use super::print;
-use crate::forecast::Forecast;
-use crate::press::drive::Drive;
-use crate::press::setup::Setup;
-use crate::scene::effects::{EFFECTS, Effect};
-use crate::scene::{Output, Plan, Scene};
+use papilla_fingertip::forecast::Forecast;
+use papilla_fingertip::scene::effects::{EFFECTS, Effect};
+use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::drive::Drive;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -63,7 +63,7 @@ struct Explanation {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
-    let setup = Setup::new(&scene)?;
+    let setup = Simulation::new(&scene)?;
     let setup_s = clock.elapsed().as_secs_f64();
     let forecast = Forecast::new(&scene, &setup);
     let state = |e: &Effect| (e.state)(&forecast.census);

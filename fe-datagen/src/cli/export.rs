@@ -1,8 +1,9 @@
 //! `export`: a scene as an input deck of another solver.
 
-use crate::export::{ElementTypes, LinearHex, QuadraticHex, SceneDeck};
-use crate::output::atomic;
-use crate::scene::Scene;
+use super::choices::{LinearHex, QuadraticHex};
+use papilla_fingertip::scene::Scene;
+use papilla_output::atomic;
+use papilla_validation::calculix::{ElementTypes, SceneDeck};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -24,10 +25,10 @@ pub(super) struct Args {
     #[arg(long)]
     out: PathBuf,
     /// Type that stands for Hex8.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t = LinearHex::C3d8)]
     linear: LinearHex,
     /// Type that stands for Hex20, Hex27, Quad8 and Quad9.
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t = QuadraticHex::C3d20r)]
     quadratic: QuadraticHex,
 }
 
@@ -40,7 +41,7 @@ enum Format {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let Format::Inp = args.format;
     let exported = SceneDeck::new(&Scene::read(&args.scene)?)?;
-    let types = ElementTypes { linear: args.linear, quadratic: args.quadratic };
+    let types = ElementTypes { linear: args.linear.into(), quadratic: args.quadratic.into() };
     let title = args.scene.display().to_string();
     let deck = exported.deck(&title, types);
     atomic::write(&args.out, deck.to_text()?.as_bytes())?;

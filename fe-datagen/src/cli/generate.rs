@@ -1,14 +1,16 @@
 //! `generate`: a campaign of presses into a dataset.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign::{self, BoxError, CampaignSpec, Press, PressSolver, RunOptions};
-use crate::dataset::BALANCE_RELATIVE_MAX;
-use crate::press::body::Body;
-use crate::press::drive::{Approach, Drive};
-use crate::press::record::IncrementRecord;
-use crate::press::setup::Setup;
-use crate::solve::{Options, Solver};
+use crate::campaign::{self, BoxError, IndentationSolver, RunOptions};
 use anyhow::Context as _;
+use papilla_dataset::{BALANCE_RELATIVE_MAX, Sample};
+use papilla_fem::solve::{Options, Solver};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation};
+use papilla_fingertip::indenter::IndenterError;
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::body::Body;
+use papilla_fingertip::simulation::drive::{Approach, Drive};
+use papilla_validation::acceptance;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,8 +41,8 @@ struct BodySolver<'a> {
     approaches: &'a [Approach],
 }
 
-impl PressSolver for BodySolver<'_> {
-    fn solve(&mut self, press: &Press) -> Result<Vec<IncrementRecord>, BoxError> {
+impl IndentationSolver for BodySolver<'_> {
+    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
         let approach = Approach {
             pose: press.pose,
             offset_mm: press.offset_mm,
@@ -52,7 +54,7 @@ impl PressSolver for BodySolver<'_> {
             &approach,
             &drive,
             BALANCE_RELATIVE_MAX,
-            &mut |_, _, record, _| record.clone(),
+            &mut |_, _, record, _| acceptance::sample(record),
         );
         pressed?;
         Ok(records)
@@ -63,13 +65,13 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let spec = CampaignSpec::read(&args.campaign)?;
     let candidates = spec.candidates();
     let first = candidates.first().context("a campaign has an indenter")?;
-    let Setup { body, approach, .. } = Setup::new(&spec.scene(first))?;
+    let Simulation { body, approach, .. } = Simulation::new(&spec.scene(first))?;
     let (atlas, _) = body.atlas().context("a fingertip has an atlas patch")??;
     let options = RunOptions { threads: args.threads, ..RunOptions::default() };
     let mut approaches = Vec::new();
     for candidate in &candidates {
         approaches.push(Approach {
-            shape: candidate.indenter.build(&spec.folder)?,
+            shape: candidate.indenter.build(&spec.folder).map_err(IndenterError::from)?,
             top_mm: candidate.indenter.top_mm(),
             ..approach.clone()
         });

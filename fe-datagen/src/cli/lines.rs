@@ -1,12 +1,12 @@
 //! What `solve` writes of a plane section: values along the skin.
 
-use crate::output::OutputError;
-use crate::output::npz::NpzBuilder;
-use crate::output::plot::{Axis, Chart, Mark, Series, write_svg};
-use crate::press::fields::PA_PER_MPA;
-use crate::press::record::IncrementRecord;
-use crate::press::setup::Setup;
-use crate::scene::{Output, Scene};
+use papilla_fingertip::scene::{Output, Scene};
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::fields::PA_PER_MPA;
+use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_output::OutputError;
+use papilla_output::npz::NpzBuilder;
+use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
 use std::path::Path;
 
 /// Values of a state along the skin.
@@ -20,7 +20,7 @@ const CURVES_MAX: usize = 5;
 pub(super) fn write(
     folder: &Path,
     scene: &Scene,
-    setup: &Setup,
+    setup: &Simulation,
     records: &[IncrementRecord],
 ) -> Result<(), OutputError> {
     let (body, timed) = (&setup.body, setup.drive.is_timed());

@@ -1,20 +1,21 @@
 //! The command line: one file a command.
 
 mod atlas;
+mod choices;
+mod cross_check;
 mod dataset;
 mod effects;
 mod explain;
 mod export;
+mod fidelity;
 mod generate;
+mod influence;
 mod lines;
-mod operator;
-mod rungs;
-mod s2;
 mod schema;
 mod solve;
 mod stability;
 mod verify;
-mod witness;
+mod wedge;
 
 use clap::{Parser, Subcommand};
 use std::io::Write as _;
@@ -40,16 +41,16 @@ enum Command {
     Explain(explain::Args),
     Schema(schema::Args),
     Generate(generate::Args),
-    Operator(operator::Args),
-    Rungs(rungs::Args),
+    Operator(influence::Args),
+    Rungs(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
-    Witness(witness::Args),
+    Witness(cross_check::Args),
     Effects(effects::Args),
-    S2(s2::Args),
+    S2(wedge::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -64,12 +65,12 @@ pub fn run() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),
-        Command::Witness(args) => witness::run(&args),
+        Command::Witness(args) => cross_check::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
-        Command::Operator(args) => operator::run(&args),
-        Command::Rungs(args) => rungs::run(&args),
-        Command::S2(args) => s2::run(&args),
+        Command::Operator(args) => influence::run(&args),
+        Command::Rungs(args) => fidelity::run(&args),
+        Command::S2(args) => wedge::run(&args),
     };
     match result {
         Ok(code) => code,

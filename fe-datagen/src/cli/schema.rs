@@ -1,10 +1,11 @@
-//! `schema`: JSON schemas of the files that this program reads.
+//! `schema`: JSON schemas of the files of this program.
 
-use crate::scene::schema;
+use papilla_dataset as dataset;
+use papilla_fingertip::scene;
 use std::process::ExitCode;
 
-/// Print the JSON schema of a file that this program reads, for editors and other
-/// programs. docs/reference/scene.schema.json is its output.
+/// Print the JSON schema of files of this program, for editors and other
+/// programs. docs/reference/scene.schema.json and docs/reference/dataset.schema.json are its output.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen schema scene > docs/reference/scene.schema.json")]
 pub(super) struct Args {
@@ -17,10 +18,15 @@ pub(super) struct Args {
 enum Kind {
     /// A scene in TOML.
     Scene,
+    /// The files of a dataset: manifest and arrays.
+    Dataset,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let Kind::Scene = args.kind;
-    println!("{}", serde_json::to_string_pretty(&schema())?);
+    let schema = match args.kind {
+        Kind::Scene => serde_json::to_string_pretty(&scene::schema())?,
+        Kind::Dataset => serde_json::to_string_pretty(&dataset::schema())?,
+    };
+    println!("{schema}");
     Ok(ExitCode::SUCCESS)
 }

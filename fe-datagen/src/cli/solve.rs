@@ -1,21 +1,22 @@
 //! `solve`: one scene, with everything that can be looked at.
 
 use super::{CHECKS_FAILED, print};
-use crate::contact::ContactRule;
-use crate::dataset::{BALANCE_RELATIVE_MAX, fault};
-use crate::output::map_image::{MapView, Quantity, white_of};
-use crate::output::npz::NpzBuilder;
-use crate::output::{atomic, vtu};
-use crate::press::body::PressError;
-use crate::press::fields::{PA_PER_MPA, write_vtu};
-use crate::press::record::{Checks, IncrementRecord};
-use crate::press::setup::Setup;
-use crate::scene::{Output, Plan, Scene};
-use crate::solve::{Effort, Options, Solver, StepReport};
+use crate::body_file::write_vtu;
 use anyhow::Context as _;
 use ndarray::Array2;
-use papilla_proto::atlas::{Atlas, Patch, Raster};
-use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, Raster};
+use papilla_dataset::BALANCE_RELATIVE_MAX;
+use papilla_fem::contact::ContactRule;
+use papilla_fem::solve::{Effort, Options, Solver, StepReport};
+use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::body::SimulationError;
+use papilla_fingertip::simulation::fields::PA_PER_MPA;
+use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
+use papilla_output::map_image::{MapView, Quantity, white_of};
+use papilla_output::npz::NpzBuilder;
+use papilla_output::{atomic, vtu};
+use papilla_validation::acceptance::fault;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -58,7 +59,7 @@ struct Increment {
     stored_energy_mj: f64,
     /// Share of the volume beyond the calibrated stretches of its law.
     outside_calibration: f64,
-    /// Where on the skin the indenter was felt.
+    /// Where on the skin contact was found.
     contact: ContactRule,
     checks: Checks,
     /// Block of the mesh and element in it where J is smallest.
@@ -91,7 +92,7 @@ struct Summary {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
-    let setup = Setup::new(&scene)?;
+    let setup = Simulation::new(&scene)?;
     let body = &setup.body;
     let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
     let atlas = if mapped { body.atlas().transpose()?.map(|(atlas, _)| atlas) } else { None };
@@ -109,9 +110,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let summary = Summary {
         plan: setup.plan,
-        unknowns: body.problem.structure.equations.count,
+        unknowns: body.problem.system.dofs.count,
         elements: body.problem.mesh.element_count(),
-        factor_entries: body.problem.structure.factor_entries(),
+        factor_entries: body.problem.system.factor_entries(),
         atlas_hash: atlas.as_ref().map(|a| a.hash().to_owned()),
         setup_s,
         solve_s: clock.elapsed().as_secs_f64(),
@@ -140,11 +141,11 @@ struct Pressed {
 /// Presses and writes the fields of every stored equilibrium into `out`, if given; those
 /// before an error are kept.
 fn press(
-    setup: &Setup,
+    setup: &Simulation,
     solver: &mut Solver<'_>,
     out: Option<&PathBuf>,
-) -> anyhow::Result<(Vec<Pressed>, Result<(), PressError>)> {
-    let Setup { body, approach, drive, .. } = setup;
+) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
+    let Simulation { body, approach, drive, .. } = setup;
     let bar = super::progress("pressing", drive.len());
     let mut written = Ok(());
     let file = |state: usize| format!("state-{state:03}.vtu");
@@ -286,7 +287,7 @@ fn human(s: &Summary, out: &Path) -> String {
     text +=
         "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   int p dA   energy\n";
     for i in &s.increments {
-        let force = crate::mesh::surface::norm(i.force_n);
+        let force = papilla_fem::tensor::norm(i.force_n);
         text += &format!(
             "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:9.2} % {:6.2} %{}\n",
             i.depth_mm,
@@ -298,7 +299,7 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
-        if i.contact.is_within_faces() {
+        if i.contact.is_gauss() {
             text += "         contact within faces: the indenter is too narrow for their nodes\n";
         }
         if i.outside_calibration > 0.0 {

@@ -1,14 +1,17 @@
 //! `stability`: the named suite of hard cases, and random scenes by the thousand.
 
 use super::{CHECKS_FAILED, print};
-use crate::campaign::CampaignSpec;
-use crate::output::atomic;
-use crate::stability::scenes::{self, ScenesOptions};
-use crate::stability::{self, CASES, Extent};
+use crate::campaign::progress;
 use anyhow::Context as _;
+use indicatif::ProgressBar;
+use papilla_fingertip::campaign::CampaignSpec;
+use papilla_output::atomic;
+use papilla_validation::stability::scenes::{self, Progress, ScenesOptions};
+use papilla_validation::stability::{self, CASES, Extent};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 /// Run the hard cases: each converges to a right answer or is refused with a typed error.
 ///
@@ -68,9 +71,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
             let spec = CampaignSpec::read(&args.campaign)?;
-            let (seed, threads, progress) = (args.seed, args.threads, !args.json);
-            let options = ScenesOptions { count, seed, threads, progress };
-            let report = scenes::run(&spec, out, &options)?;
+            let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
+            let bar = OnceLock::new();
+            let begun = |reused| {
+                bar.get_or_init(|| progress::bar(count.get(), reused, !args.json));
+            };
+            let solved = || bar.get().into_iter().for_each(|b: &ProgressBar| b.inc(1));
+            let told = Progress { begun: &begun, solved: &solved };
+            let report = scenes::run(&spec, out, &options, told)?;
+            bar.get().into_iter().for_each(ProgressBar::finish_and_clear);
             if let Some(path) = &args.markdown {
                 write(path, &report.markdown())?;
             }

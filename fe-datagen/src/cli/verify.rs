@@ -1,8 +1,8 @@
 //! `verify`: the solver against closed forms, published values and itself.
 
 use super::{CHECKS_FAILED, print};
-use crate::verify::{self, CASES, Row};
 use anyhow::Context;
+use papilla_validation::verify::{self, CASES, Row};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

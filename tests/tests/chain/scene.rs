@@ -3,16 +3,17 @@
 
 use std::{fs, sync::LazyLock};
 
-use fe_datagen::{
-    dataset::fault,
-    press::{record::IncrementRecord, setup::Setup},
+use papilla_fem::solve::{Options, Solver, StepReport};
+use papilla_fingertip::{
     scene::Scene,
-    solve::{Options, Solver, StepReport},
+    simulation::{Simulation, record::IncrementRecord},
 };
 use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, Patch, Raster},
 };
+
+use papilla_validation::acceptance::fault;
 
 use crate::{
     client,
@@ -40,7 +41,7 @@ pub(crate) struct Pressed {
 impl Pressed {
     /// Solves a fingertip's scene as `fe-datagen solve` does. Every state passes its checks.
     pub(crate) fn solve(scene: &Scene) -> Self {
-        let Setup { body, approach, drive, .. } = Setup::new(scene).unwrap();
+        let Simulation { body, approach, drive, .. } = Simulation::new(scene).unwrap();
         let (atlas, _) = body.atlas().expect("a fingertip has an atlas").unwrap();
         let mut solver = body.solver(Options::default()).unwrap();
         let mut records = Vec::new();

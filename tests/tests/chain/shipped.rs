@@ -6,11 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fe_datagen::{
-    dataset::{Dataset, PressEntry, Shard, Split},
-    scene::Scene,
-};
+use papilla_dataset::{Dataset, IndentationEntry, Shard, Split};
 use papilla_engine::Card;
+use papilla_fingertip::scene::Scene;
 use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, Patch, Raster},
@@ -52,7 +50,7 @@ fn judged_on(card: &Card) -> Dataset {
     found.unwrap_or_else(|| panic!("{}: its dataset {due} does not ship", card.name))
 }
 
-fn held_out(dataset: &Dataset) -> Vec<&PressEntry> {
+fn held_out(dataset: &Dataset) -> Vec<&IndentationEntry> {
     let presses = dataset.manifest().presses.iter();
     presses.filter(|press| press.split == Split::Test).collect()
 }

@@ -1,0 +1,305 @@
+//! Shards: the vertex values of one indentation in one archive.
+
+use super::{DatasetError, fault, worst_checks};
+use crate::record::{Checks, Sample};
+use ndarray::{Array1, Array2, Array3, Ix1, Ix2, Ix3};
+use papilla_atlas::{Atlas, Patch, Raster};
+use papilla_output::atomic;
+use papilla_output::npz::{NpzArrays, NpzBuilder};
+use std::path::Path;
+
+/// Pascal per megapascal, and J/m3 per mJ/mm3.
+const PA_PER_MPA: f64 = 1e6;
+
+/// Columns of a shard's `checks` array, in the order of [`Checks`]' fields.
+pub const CHECK_COLUMNS: [&str; 11] = [
+    "residual_relative",
+    "contact_force_vs_pressure_integral",
+    "plate_vs_support_reaction",
+    "energy_vs_work",
+    "j_min",
+    "penetration_mm_max",
+    "newton_iterations",
+    "step_cuts",
+    "augmentations",
+    "factorizations",
+    "cg_iterations",
+];
+
+fn check_row(c: &Checks) -> [f64; 11] {
+    [
+        c.residual_relative,
+        c.contact_force_vs_pressure_integral,
+        c.plate_vs_support_reaction,
+        c.energy_vs_work,
+        c.j_min,
+        c.penetration_mm_max,
+        c.newton_iterations.into(),
+        c.step_cuts.into(),
+        c.augmentations.into(),
+        c.factorizations.into(),
+        c.cg_iterations.into(),
+    ]
+}
+
+/// The arrays of one shard: D samples on V vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shard {
+    /// Pressure on the skin, Pa \[D, V\].
+    pub pressure_pa: Array2<f32>,
+    /// SED on the dermis side of the interface, J/m3 \[D, V\].
+    pub sed_dermis_j_per_m3: Array2<f32>,
+    /// SED on the epidermis side of the interface, J/m3 \[D, V\].
+    pub sed_epidermis_j_per_m3: Array2<f32>,
+    /// Depth, mm \[D\].
+    pub depth_mm: Array1<f32>,
+    /// Force of the plate on the finger, N \[D, 3\].
+    pub force_n: Array2<f32>,
+    /// Self-checks \[D, 11\], see [`CHECK_COLUMNS`].
+    pub checks: Array2<f64>,
+    /// Shear traction of the indenter on the skin in the finger's frame, Pa
+    /// \[D, V, 3\]; only with friction.
+    pub shear_pa: Option<Array3<f32>>,
+    /// Share of the volume beyond the calibrated stretches of its law \[D\]; only if
+    /// a sample has any.
+    pub outside_calibration: Option<Array1<f32>>,
+}
+
+/// A shard ready to be written, and what the manifest says of it.
+#[derive(Clone, Debug)]
+pub struct Encoded {
+    /// The archive's bytes.
+    pub bytes: Vec<u8>,
+    /// Samples in it.
+    pub samples: usize,
+    /// The worst of each check over these samples.
+    pub checks: Checks,
+    /// Largest pressure, Pa.
+    pub pressure_max_pa: f64,
+    /// Largest SED on the dermis side, J/m3.
+    pub sed_max_j_per_m3: f64,
+    /// Depth (mm) and reason of each record that was left out.
+    pub dropped: Vec<(f64, String)>,
+}
+
+/// Encodes the records that pass their own checks; `Err` holds the depth (mm)
+/// and fault of each when none does.
+///
+/// # Errors
+/// [`DatasetError::Output`] when the archive cannot be built.
+pub fn encode(
+    records: &[Sample],
+    vertex_count: usize,
+) -> Result<Result<Encoded, Vec<(f64, String)>>, DatasetError> {
+    let (mut kept, mut dropped) = (Vec::new(), Vec::new());
+    for record in records {
+        match fault(record, vertex_count) {
+            Some(reason) => dropped.push((record.depth_mm, reason)),
+            None => kept.push(record),
+        }
+    }
+    let Some(checks) = worst_checks(kept.iter().map(|r| &r.checks)) else {
+        return Ok(Err(dropped));
+    };
+    let field = |values: fn(&Sample) -> &[f64]| -> Vec<f32> {
+        kept.iter().flat_map(|r| values(r)).map(|v| (v * PA_PER_MPA) as f32).collect()
+    };
+    let max = |values: &[f32]| f64::from(values.iter().copied().fold(0.0, f32::max));
+    let pressure = field(|r| &r.pressure_mpa);
+    let dermis = field(|r| &r.sed_dermis_mpa);
+    let (d, v) = (kept.len(), vertex_count);
+    let depth: Vec<f32> = kept.iter().map(|r| r.depth_mm as f32).collect();
+    let force: Vec<f32> = kept.iter().flat_map(|r| r.force_n).map(|f| f as f32).collect();
+    let check_rows: Vec<f64> = kept.iter().flat_map(|r| check_row(&r.checks)).collect();
+    let mut npz = NpzBuilder::new();
+    npz.add_slice("pressure_pa", &[d, v], &pressure)?;
+    npz.add_slice("sed_dermis_j_per_m3", &[d, v], &dermis)?;
+    npz.add_slice("sed_epidermis_j_per_m3", &[d, v], &field(|r| &r.sed_epidermis_mpa))?;
+    npz.add_slice("depth_mm", &[d], &depth)?;
+    npz.add_slice("force_n", &[d, 3], &force)?;
+    npz.add_slice("checks", &[d, CHECK_COLUMNS.len()], &check_rows)?;
+    if kept.iter().any(|r| !r.shear_mpa.is_empty()) {
+        npz.add_slice("shear_pa", &[d, v, 3], &field(|r| r.shear_mpa.as_flattened()))?;
+    }
+    if kept.iter().any(|r| r.outside_calibration > 0.0) {
+        let share: Vec<f32> = kept.iter().map(|r| r.outside_calibration as f32).collect();
+        npz.add_slice("outside_calibration", &[d], &share)?;
+    }
+    Ok(Ok(Encoded {
+        bytes: npz.finish()?,
+        samples: d,
+        checks,
+        pressure_max_pa: max(&pressure),
+        sed_max_j_per_m3: max(&dermis),
+        dropped,
+    }))
+}
+
+impl Shard {
+    /// Decodes an archive; `path` is only for messages.
+    ///
+    /// # Errors
+    /// [`DatasetError::Output`] when an array is absent or of another type,
+    /// [`DatasetError::Mismatch`] when the shapes do not fit together.
+    pub fn decode(path: &Path, bytes: &[u8], vertex_count: usize) -> Result<Self, DatasetError> {
+        let mut npz = NpzArrays::new(path, bytes)?;
+        let (rubs, flagged) = (npz.has("shear_pa")?, npz.has("outside_calibration")?);
+        let shard = Self {
+            pressure_pa: npz.get::<f32, Ix2>("pressure_pa")?,
+            sed_dermis_j_per_m3: npz.get::<f32, Ix2>("sed_dermis_j_per_m3")?,
+            sed_epidermis_j_per_m3: npz.get::<f32, Ix2>("sed_epidermis_j_per_m3")?,
+            depth_mm: npz.get::<f32, Ix1>("depth_mm")?,
+            force_n: npz.get::<f32, Ix2>("force_n")?,
+            checks: npz.get::<f64, Ix2>("checks")?,
+            shear_pa: rubs.then(|| npz.get::<f32, Ix3>("shear_pa")).transpose()?,
+            outside_calibration: flagged
+                .then(|| npz.get::<f32, Ix1>("outside_calibration"))
+                .transpose()?,
+        };
+        let d = shard.depth_mm.len();
+        let by_sample = |a: &Array1<f32>| (a.len(), 1);
+        let by_vertex = |a: &Array3<f32>| (a.dim().0, a.len() / d.max(1));
+        let shapes = [
+            ("shape of pressure_pa", shard.pressure_pa.dim(), (d, vertex_count)),
+            ("shape of sed_dermis_j_per_m3", shard.sed_dermis_j_per_m3.dim(), (d, vertex_count)),
+            (
+                "shape of sed_epidermis_j_per_m3",
+                shard.sed_epidermis_j_per_m3.dim(),
+                (d, vertex_count),
+            ),
+            ("shape of force_n", shard.force_n.dim(), (d, 3)),
+            ("shape of checks", shard.checks.dim(), (d, CHECK_COLUMNS.len())),
+            (
+                "shape of shear_pa",
+                shard.shear_pa.as_ref().map_or((d, 3 * vertex_count), by_vertex),
+                (d, 3 * vertex_count),
+            ),
+            (
+                "shape of outside_calibration",
+                shard.outside_calibration.as_ref().map_or((d, 1), by_sample),
+                (d, 1),
+            ),
+        ];
+        for (what, found, expected) in shapes {
+            if found != expected {
+                let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
+                return Err(DatasetError::Mismatch { path: path.into(), what, found, expected });
+            }
+        }
+        Ok(shard)
+    }
+
+    /// Samples D.
+    pub fn len(&self) -> usize {
+        self.depth_mm.len()
+    }
+
+    /// No sample at all?
+    pub fn is_empty(&self) -> bool {
+        self.depth_mm.is_empty()
+    }
+}
+
+/// The bytes of `raster.npz`: for `skin` and `interface` the arrays `_pixel`
+/// u32 \[N\] (row * 224 + column), `_vertex` u32 \[N, 3\] and `_weight` f32 \[N, 3\].
+///
+/// # Errors
+/// [`DatasetError::Output`] when the archive cannot be built.
+pub fn raster_npz(atlas: &Atlas) -> Result<Vec<u8>, DatasetError> {
+    let mut npz = NpzBuilder::new();
+    for patch in Patch::ALL {
+        let raster = Raster::new(atlas, patch);
+        let (name, n) = (patch.name(), raster.pixel_count());
+        let vertices: Vec<u32> = raster.pixels().iter().flat_map(|p| p.vertices).collect();
+        let weights: Vec<f32> = raster.pixels().iter().flat_map(|p| p.weights).collect();
+        npz.add_slice(&format!("{name}_pixel"), &[n], raster.indices())?;
+        npz.add_slice(&format!("{name}_vertex"), &[n, 3], &vertices)?;
+        npz.add_slice(&format!("{name}_weight"), &[n, 3], &weights)?;
+    }
+    Ok(npz.finish()?)
+}
+
+/// Writes `atlas.json` and `raster.npz` into a dataset's folder.
+///
+/// # Errors
+/// [`DatasetError::Output`] when the folder is not writable.
+pub fn write_atlas(folder: &Path, atlas: &Atlas) -> Result<(), DatasetError> {
+    let path = folder.join("atlas.json");
+    let mut text =
+        atlas.to_json().map_err(|source| DatasetError::Atlas { path: path.clone(), source })?;
+    text.push('\n');
+    atomic::write(&path, text.as_bytes())?;
+    atomic::write(&folder.join("raster.npz"), &raster_npz(atlas)?)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{atlas, record};
+    use papilla_atlas::MAP_LEN;
+
+    #[test]
+    fn values_come_back_in_outside_units() {
+        let mut bad = record(0.5, 4);
+        bad.checks.j_min = -1.0;
+        let records = [record(0.25, 4), bad, record(1.0, 4)];
+        let encoded = encode(&records, 4).unwrap().unwrap();
+        assert_eq!((encoded.samples, encoded.dropped.len()), (2, 1));
+        let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
+        assert_eq!(shard.depth_mm.to_vec(), [0.25, 1.0]);
+        let expected = (records[2].pressure_mpa[3] * 1e6) as f32;
+        assert_eq!(shard.pressure_pa[[1, 3]].to_bits(), expected.to_bits());
+        assert_eq!(shard.checks[[0, 4]].to_bits(), records[0].checks.j_min.to_bits());
+        assert!(Shard::decode(Path::new("x"), &encoded.bytes, 5).is_err());
+    }
+
+    #[test]
+    fn further_arrays_are_there_only_with_their_effects() {
+        let plain = encode(&[record(1.0, 4)], 4).unwrap().unwrap();
+        let plain = Shard::decode(Path::new("x"), &plain.bytes, 4).unwrap();
+        assert_eq!((plain.shear_pa, plain.outside_calibration), (None, None));
+        let mut records = [record(0.5, 4), record(1.0, 4)];
+        for r in &mut records {
+            r.shear_mpa = vec![[1e-3, -2e-3, 0.0]; 4];
+        }
+        records[1].outside_calibration = 0.125;
+        let encoded = encode(&records, 4).unwrap().unwrap();
+        let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
+        assert_eq!(shard.outside_calibration.unwrap().to_vec(), [0.0, 0.125]);
+        let shear = shard.shear_pa.unwrap();
+        assert_eq!((shear.dim(), shear[[1, 3, 1]].to_bits()), ((2, 4, 3), (-2000f32).to_bits()));
+    }
+
+    #[test]
+    fn columns_are_the_fields_of_checks() {
+        let json = serde_json::to_value(Checks::default()).unwrap();
+        let fields = json.as_object().unwrap();
+        assert_eq!(fields.len(), CHECK_COLUMNS.len());
+        assert!(CHECK_COLUMNS.iter().all(|c| fields.contains_key(*c)));
+    }
+
+    #[test]
+    fn the_stored_raster_draws_what_the_code_draws() {
+        let atlas = atlas(6);
+        let bytes = raster_npz(&atlas).unwrap();
+        let mut npz = NpzArrays::new(Path::new("raster.npz"), &bytes).unwrap();
+        let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| (i as f32).sin().abs()).collect();
+        for patch in Patch::ALL {
+            let mut expected = vec![0.0; MAP_LEN];
+            Raster::new(&atlas, patch).rasterise(&values, &mut expected).unwrap();
+            let name = |part: &str| format!("{}_{part}", patch.name());
+            let pixel = npz.get::<u32, Ix1>(&name("pixel")).unwrap();
+            let vertex = npz.get::<u32, Ix2>(&name("vertex")).unwrap();
+            let weight = npz.get::<f32, Ix2>(&name("weight")).unwrap();
+            let mut map = vec![0.0f32; MAP_LEN];
+            for (n, p) in pixel.iter().enumerate() {
+                map[*p as usize] =
+                    (0..3).map(|k| values[vertex[[n, k]] as usize] * weight[[n, k]]).sum();
+            }
+            assert!(pixel.len() > 1000);
+            let worst = map.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(worst < 1e-6, "{worst}");
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Numbers of the unknowns.
+
+/// Which degrees of freedom are unknown.
+#[derive(Clone, Debug)]
+pub struct DofMap {
+    /// Equation of each degree of freedom `3 node + component`; [`Self::FIXED`] if prescribed.
+    pub of_dof: Vec<u32>,
+    /// Number of unknowns.
+    pub count: usize,
+}
+
+impl DofMap {
+    /// Mark of a prescribed degree of freedom.
+    pub const FIXED: u32 = u32::MAX;
+
+    /// Numbers the degrees of freedom for which `fixed` is false.
+    #[must_use]
+    pub fn new(fixed: &[bool]) -> Self {
+        let mut count = 0;
+        let of_dof = fixed
+            .iter()
+            .map(|&f| {
+                if f {
+                    Self::FIXED
+                } else {
+                    count += 1;
+                    count - 1
+                }
+            })
+            .collect();
+        Self { of_dof, count: count as usize }
+    }
+}

@@ -1,0 +1,42 @@
+//! Where the search for the next equilibrium starts.
+
+use super::state::State;
+use super::stepping::Solver;
+
+impl Solver<'_> {
+    /// Extrapolates the last two equilibria.
+    pub(super) fn predict(&self, next: f64) -> State {
+        let mut trial = self.state.clone();
+        if let Some(before) = &self.before {
+            let ratio = (next - self.state.fraction) / (self.state.fraction - before.fraction);
+            for (v, w) in trial.u.iter_mut().zip(&before.u) {
+                for i in 0..3 {
+                    v[i] += ratio * (v[i] - w[i]);
+                }
+            }
+            for (c, old) in trial.independent.iter_mut().zip(&before.independent) {
+                for r in 0..c.len() {
+                    c[r] += ratio * (c[r] - old[r]);
+                }
+            }
+            for (l, m) in trial.multipliers.iter_mut().zip(&before.multipliers) {
+                *l = (*l + ratio * (*l - m)).max(0.0);
+            }
+        }
+        self.prescribe(next, &mut trial.u);
+        trial
+    }
+
+    /// The last equilibrium as it meets what is prescribed at `next`.
+    pub(super) fn unmoved(&self, next: f64) -> State {
+        let mut trial = self.state.clone();
+        self.prescribe(next, &mut trial.u);
+        trial
+    }
+
+    fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
+        for &(dof, value) in &self.loading.prescribed_mm {
+            u[dof / 3][dof % 3] = fraction * value;
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What is solved: mesh, materials, constraints, contact surface, loads.
+
+use super::history_layout::HistoryLayout;
+use crate::contact::{ContactRule, ContactSurface};
+use crate::element::{BlockGeometry, Materials, ShapeError};
+use crate::linear::{SymbolicError, SymbolicSystem};
+use crate::mesh::Mesh;
+
+/// A body ready to be loaded. Shared by every indentation of a campaign.
+pub struct Problem {
+    /// Undeformed mesh.
+    pub mesh: Mesh,
+    /// Undeformed element geometry, one a block.
+    pub geometry: Vec<BlockGeometry>,
+    /// What each region is made of.
+    pub materials: Materials,
+    /// Where each element's memory is; `None` if no material has any.
+    pub history_layout: Option<HistoryLayout>,
+    /// Prescribed degrees of freedom, `3 node + component`.
+    pub fixed: Vec<bool>,
+    /// Sparsity pattern, ordering and symbolic factor.
+    pub system: SymbolicSystem,
+    /// Where contact may happen.
+    pub contact: Option<ContactSurface>,
+}
+
+/// Why a problem could not be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum ProblemError {
+    /// An element's undeformed shape is bad.
+    #[error("block {block}: {source}")]
+    Shape {
+        /// Mesh block.
+        block: usize,
+        /// What is wrong with it.
+        source: ShapeError,
+    },
+    /// The system has no structure.
+    #[error(transparent)]
+    Structure(#[from] SymbolicError),
+    /// The faces of the contact surface cannot carry contact at their nodes.
+    #[error(
+        "surface '{name}' has 8-node faces, whose corners would have to be pulled under an even \
+         pressure: contact there gives wrong forces. Complete the mesh to 27-node hexahedra \
+         (mesh::complete), or mesh with 8 or 27 nodes"
+    )]
+    ContactFaces {
+        /// Surface.
+        name: String,
+    },
+    /// A surface or node set is missing.
+    #[error("the mesh has no {kind} named '{name}'; it has: {known}")]
+    Missing {
+        /// "surface" or "node set".
+        kind: &'static str,
+        /// Name that was asked for.
+        name: String,
+        /// Names that exist.
+        known: String,
+    },
+}
+
+impl Problem {
+    /// Sets up a body with prescribed degrees of freedom `fixed` and contact
+    /// on the named surface. Plane-strain elements hold displacement along z.
+    ///
+    /// # Errors
+    /// See [`ProblemError`].
+    pub fn new(
+        mesh: Mesh,
+        materials: Materials,
+        mut fixed: Vec<bool>,
+        contact_surface: Option<&str>,
+    ) -> Result<Self, ProblemError> {
+        mesh.hold_out_of_plane(&mut fixed);
+        let geometry = mesh
+            .blocks
+            .iter()
+            .enumerate()
+            .map(|(block, b)| {
+                BlockGeometry::new(b.kind, &mesh.nodes, &b.connectivity)
+                    .map_err(|source| ProblemError::Shape { block, source })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let system = SymbolicSystem::new(&mesh, &fixed)?;
+        let contact = match contact_surface {
+            None => None,
+            Some(name) => {
+                let surface = mesh.surfaces.get(name).ok_or_else(|| ProblemError::Missing {
+                    kind: "surface",
+                    name: name.into(),
+                    known: mesh.surfaces.keys().cloned().collect::<Vec<_>>().join(", "),
+                })?;
+                if !surface.kind.carries_contact() {
+                    return Err(ProblemError::ContactFaces { name: name.into() });
+                }
+                Some(ContactSurface::new(surface, &mesh.nodes, &fixed))
+            }
+        };
+        let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
+        Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
+    }
+
+    /// Contact penalty from material and mesh, MPa/mm: a few hundred times the
+    /// largest shear modulus of what is soft over the contact nodes' spacing, so
+    /// that extrapolated multipliers need one update. Larger values cost the
+    /// preconditioned iterations more than they save. Where there are no multipliers
+    /// it is ten times that, which leaves gaps of some micrometres.
+    #[must_use]
+    pub fn penalty_mpa_per_mm(&self, rule: ContactRule) -> f64 {
+        let factor = if rule.has_multipliers() { 200.0 } else { 2000.0 };
+        let Some(contact) = &self.contact else { return 1.0 };
+        factor * self.reference_modulus_mpa() / contact.spacing_mm()
+    }
+
+    /// Shear modulus, MPa, by which is measured what an indenter meets, see
+    /// [`Materials::with_stiff`].
+    pub(super) fn reference_modulus_mpa(&self) -> f64 {
+        let blocks = &self.mesh.blocks;
+        self.materials.reference_modulus_mpa(|r| blocks.iter().any(|b| b.region.contains(&r)))
+    }
+}

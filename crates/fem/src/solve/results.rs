@@ -1,0 +1,204 @@
+//! What can be asked of a solver at an equilibrium.
+
+use super::evaluate::Balance;
+use super::problem::Problem;
+use super::stepping::Solver;
+use crate::contact::{ContactRule, Support};
+use crate::linear::DofMap;
+use papilla_sdf::Distance;
+
+impl<'a> Solver<'a> {
+    /// Displacement, mm, one a mesh node.
+    #[must_use]
+    pub fn displacement_mm(&self) -> &[[f64; 3]] {
+        &self.state.u
+    }
+
+    /// The problem being solved.
+    #[must_use]
+    pub fn problem(&self) -> &'a Problem {
+        self.newton.problem
+    }
+
+    /// Where on the skin contact is found.
+    #[must_use]
+    pub fn contact_rule(&self) -> ContactRule {
+        self.loading.contact()
+    }
+
+    /// Nominal traction of each contact node, MPa per undeformed area.
+    #[must_use]
+    pub fn traction_mpa(&self) -> Vec<f64> {
+        let found = self.newton.current.traction_mpa.iter().map(|&t| [t]);
+        self.at_contact_nodes(found.collect()).into_iter().map(|[t]| t).collect()
+    }
+
+    /// What contact points carry, as tractions of the contact nodes with the same force.
+    fn at_contact_nodes<const N: usize>(&self, found: Vec<[f64; N]>) -> Vec<[f64; N]> {
+        let rule = self.contact_rule();
+        match &self.newton.problem.contact {
+            Some(c) if rule.is_gauss() => c.points(rule).to_nodes(&found, c.nodes(), c.area_mm2()),
+            _ => found,
+        }
+    }
+
+    /// Contact force along a straight path, N.
+    #[must_use]
+    pub fn force_along_path_n(&self) -> f64 {
+        let force = self.newton.current.contact_force_n;
+        let travel = self.loading.indenter.as_ref().and_then(|m| m.straight_travel());
+        travel.map_or(0.0, |(_, direction)| (0..3).map(|i| force[i] * direction[i]).sum())
+    }
+
+    /// Distance of the point `x` (mm) to the indenter where it is now; `None` without one.
+    #[must_use]
+    pub fn distance(&self, x: [f64; 3]) -> Option<Distance> {
+        Some(self.loading.indenter.as_ref()?.distance(self.state.fraction, x))
+    }
+
+    /// Load fraction reached.
+    #[must_use]
+    pub fn fraction(&self) -> f64 {
+        self.state.fraction
+    }
+
+    /// Work of the indenter so far, mJ.
+    #[must_use]
+    pub fn indenter_work_mj(&self) -> f64 {
+        self.loading.indenter.as_ref().map_or(0.0, |m| self.work.total_mj(m))
+    }
+
+    /// Largest amount of the indenter's work at an equilibrium so far, mJ: what energies are
+    /// small against once the indenter has given its work back.
+    #[must_use]
+    pub fn indenter_work_mj_max(&self) -> f64 {
+        self.indenter_work_mj().abs().max(self.work.largest_mj)
+    }
+
+    /// History of an element's quadrature points at the equilibrium; empty for
+    /// materials without memory.
+    #[must_use]
+    pub fn history_of(&self, block: usize, element: usize) -> &[f64] {
+        let layout = self.newton.problem.history_layout.as_ref();
+        layout.map_or(&[], |m| &self.state.memory[m.range(block, element)])
+    }
+
+    /// Tangential traction of the indenter on each contact node, MPa per
+    /// undeformed area; empty without friction.
+    #[must_use]
+    pub fn shear_traction_mpa(&self) -> Vec<[f64; 3]> {
+        let found = &self.newton.current.friction;
+        if found.is_empty() {
+            return Vec::new();
+        }
+        self.at_contact_nodes(found.iter().map(|t| t.map(|v| -v)).collect())
+    }
+
+    /// Forces of indenter and supports, and the integral of true pressure.
+    #[must_use]
+    pub fn balance(&self) -> Balance {
+        let problem = self.newton.problem;
+        let e = &self.newton.current;
+        let mut balance = Balance {
+            contact_force_n: e.contact_force_n,
+            normal_force_n: e.normal_force_n,
+            ..Balance::default()
+        };
+        for (dof, &eq) in problem.system.dofs.of_dof.iter().enumerate() {
+            if eq == DofMap::FIXED {
+                balance.support_force_n[dof % 3] += e.residual_n[dof];
+            }
+        }
+        balance
+    }
+
+    /// True (Cauchy) pressure at every mesh node, MPa: the nominal traction
+    /// times undeformed over deformed nodal area of the contact surface.
+    #[must_use]
+    pub fn pressure_mpa(&self, surface: &crate::mesh::Surface) -> Vec<f64> {
+        let problem = self.newton.problem;
+        let x = self.deformed();
+        let mut deformed = vec![0.0; x.len()];
+        surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
+        let mut pressure = vec![0.0; x.len()];
+        if let Some(contact) = &problem.contact {
+            let traction = self.traction_mpa();
+            for ((&n, &area), t) in contact.nodes().iter().zip(contact.area_mm2()).zip(traction) {
+                pressure[n as usize] = t * area / deformed[n as usize];
+            }
+        }
+        pressure
+    }
+
+    /// Force that a nodal pressure (MPa) exerts on the deformed surface, N: Gauss
+    /// quadrature of the interpolated field, which acts along the indenter's normal.
+    #[must_use]
+    pub fn force_of_pressure_n(
+        &self,
+        surface: &crate::mesh::Surface,
+        pressure: &[f64],
+    ) -> [f64; 3] {
+        let x = self.deformed();
+        let push = self.push_directions(surface, pressure, &x);
+        let traction: Vec<[f64; 3]> =
+            push.iter().zip(pressure).map(|(d, p)| d.map(|v| v * p)).collect();
+        let mut total = [0.0; 3];
+        let rule = surface.kind.quadrature();
+        surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
+            let area = crate::tensor::norm(normal);
+            for (&n, v) in face.iter().zip(value) {
+                for i in 0..3 {
+                    total[i] += v * area * traction[n as usize][i];
+                }
+            }
+        });
+        total
+    }
+
+    /// Direction in which the indenter pushes, at every mesh node of the surface that it
+    /// presses: its normal, or the mean of its normals at contact points around, weighted
+    /// by their forces (shorter than 1 where these differ).
+    fn push_directions(
+        &self,
+        surface: &crate::mesh::Surface,
+        pressure: &[f64],
+        x: &[[f64; 3]],
+    ) -> Vec<[f64; 3]> {
+        let mut push = vec![[0.0; 3]; x.len()];
+        let (Some(contact), Some(_)) = (&self.newton.problem.contact, &self.loading.indenter)
+        else {
+            return push;
+        };
+        let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
+        let rule = self.contact_rule();
+        if !rule.is_gauss() {
+            for n in surface.nodes().into_iter().map(|n| n as usize) {
+                if pressure[n] > 0.0 {
+                    push[n] = normal(x[n]);
+                }
+            }
+            return push;
+        }
+        let points = contact.points(rule);
+        let of_point = |(support, t): (Support<'_>, f64)| {
+            let [nx, ny, nz] = normal(support.of(|n| x[n])).map(|v| v * t);
+            [t, nx, ny, nz]
+        };
+        let tractions = self.newton.current.traction_mpa.iter().copied();
+        let found: Vec<_> = points.iter().map(|(s, _)| s).zip(tractions).map(of_point).collect();
+        let nodal = points.to_nodes(&found, contact.nodes(), contact.area_mm2());
+        for (&n, [t, v @ ..]) in contact.nodes().iter().zip(nodal) {
+            if t > 0.0 {
+                push[n as usize] = v.map(|v| v / t);
+            }
+        }
+        push
+    }
+
+    /// Deformed node positions, mm.
+    #[must_use]
+    pub fn deformed(&self) -> Vec<[f64; 3]> {
+        let nodes = &self.newton.problem.mesh.nodes;
+        nodes.iter().zip(&self.state.u).map(|(x, u)| std::array::from_fn(|i| x[i] + u[i])).collect()
+    }
+}

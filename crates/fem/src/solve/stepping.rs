@@ -1,0 +1,236 @@
+//! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
+
+use super::effort::Effort;
+use super::history::{self, EnergySplit};
+use super::loading::Loading;
+use super::newton::{Fixed, Newton};
+use super::problem::Problem;
+use super::state::{Mark, State, StepReport};
+use super::work::Work;
+use super::{Options, SolveError, StepError, friction, mixed};
+use crate::contact::{FrictionPoint, FrictionTrial};
+use crate::element::HistoryVariables;
+
+/// Solves one loading of a [`Problem`]; re-usable for the next.
+pub struct Solver<'a> {
+    pub(super) newton: Newton<'a>,
+    pub(super) loading: Loading,
+    pub(super) state: State,
+    /// Equilibrium before the last, for extrapolation.
+    pub(super) before: Option<State>,
+    pub(super) work: Work,
+    /// Load fraction that a time step may take; `None` for bodies without memory.
+    pub(super) time_step: Option<f64>,
+}
+
+impl<'a> Solver<'a> {
+    /// HistoryVariables for solving `problem`.
+    ///
+    /// # Errors
+    /// [`SolveError::Factor`] if the factor does not fit in memory,
+    /// [`SolveError::RigidBodyMode`] if a part of the body is not held.
+    pub fn new(problem: &'a Problem, options: Options) -> Result<Self, SolveError> {
+        problem.is_held()?;
+        let mut solver = Self {
+            newton: Newton::new(problem, options)?,
+            loading: Loading::default(),
+            state: State::default(),
+            before: None,
+            work: Work::default(),
+            time_step: None,
+        };
+        solver.start(Loading::default());
+        Ok(solver)
+    }
+
+    /// Puts the body at rest and takes a new loading.
+    pub fn start(&mut self, loading: Loading) {
+        let problem = self.newton.problem;
+        self.loading = loading;
+        let rule = self.loading.contact();
+        let contact_points = problem.contact.as_ref().map_or(0, |c| c.points(rule).len());
+        self.state = State {
+            fraction: 0.0,
+            u: vec![[0.0; 3]; problem.mesh.nodes.len()],
+            independent: mixed::at_rest(problem),
+            multipliers: vec![0.0; contact_points],
+            memory: vec![0.0; problem.history_layout.as_ref().map_or(0, |m| m.len)],
+            friction: FrictionTrial::default(),
+        };
+        if self.loading.friction > 0.0 {
+            self.state.friction = FrictionTrial {
+                coefficient: self.loading.friction,
+                points: vec![FrictionPoint::default(); contact_points],
+                heat_mj: 0.0,
+            };
+            let State { u, friction, .. } = &mut self.state;
+            friction::anchor(problem, &self.loading, 0.0, u, friction);
+        }
+        self.before = None;
+        self.work = Work::default();
+        self.time_step = self.first_time_step();
+        self.newton.forget(rule);
+    }
+
+    /// Forgets how the last equilibria followed each other, because the load is
+    /// about to turn.
+    pub fn turn(&mut self) {
+        self.before = None;
+        self.time_step = self.first_time_step();
+    }
+
+    /// The present equilibrium, to come back to with [`Self::restore`].
+    #[must_use]
+    pub fn mark(&self) -> Mark {
+        Mark { state: self.state.clone(), before: self.before.clone(), work: self.work.clone() }
+    }
+
+    /// Goes back to an earlier equilibrium of the same loading.
+    pub fn restore(&mut self, mark: &Mark) {
+        self.state = mark.state.clone();
+        self.before = mark.before.clone();
+        self.work = mark.work.clone();
+    }
+
+    /// Goes on to `target` (in `[0, 1]`, above the fraction reached) through as
+    /// many equilibria as it takes.
+    ///
+    /// # Errors
+    /// [`SolveError::CutsExhausted`] and [`SolveError::StepsExhausted`]; the state is then
+    /// the last equilibrium.
+    pub fn advance_to(&mut self, target: f64) -> Result<StepReport, SolveError> {
+        let first = self.newton.effort;
+        let found = self.steps_to(target);
+        let report = self.report(&first);
+        let StepReport { load_fraction, j_min, condition_at_least, effort, .. } = report;
+        if let Err(error) = found {
+            let [block, element] = report.j_min_at;
+            tracing::warn!(
+                reached = load_fraction, target, %error, j_min, block, element, condition_at_least,
+                cuts = effort.cuts, iterations = effort.newton_iterations, "solve given up"
+            );
+            return Err(error);
+        }
+        tracing::debug!(
+            load_fraction,
+            steps = effort.steps,
+            cuts = effort.cuts,
+            iterations = effort.newton_iterations,
+            j_min,
+            condition_at_least,
+            "increment done"
+        );
+        Ok(report)
+    }
+
+    fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {
+        let mut step = self.within_time_step(target - self.state.fraction);
+        let (mut cuts, mut steps) = (0, 0);
+        while self.state.fraction < target {
+            let reached = self.state.fraction;
+            if steps == self.newton.options.steps_max {
+                self.settle();
+                return Err(SolveError::StepsExhausted { reached, steps });
+            }
+            let end = reached + 1.000_001 * step >= target;
+            let next = if end { target } else { reached + step };
+            match self.try_step(next) {
+                Ok(()) => {
+                    steps += 1;
+                    self.newton.effort.steps += 1;
+                    step = self.within_time_step(1.5 * step);
+                }
+                Err(cause) => {
+                    cuts += 1;
+                    self.newton.effort.cuts += 1;
+                    tracing::debug!(reached, next, %cause, "load step cut");
+                    if cuts > self.newton.options.cuts_max {
+                        self.settle();
+                        return Err(SolveError::CutsExhausted { reached, cuts: cuts - 1, cause });
+                    }
+                    step = 0.5 * (next - reached);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// After a step that failed: forces and tractions are again those of the last equilibrium.
+    fn settle(&mut self) {
+        let State { fraction, u, independent, multipliers, memory, friction } = &self.state;
+        let fixed = Fixed {
+            loading: &self.loading,
+            load_fraction: *fraction,
+            multipliers,
+            memory: HistoryVariables { history: memory, dt_s: 0.0 },
+            friction: (!friction.points.is_empty()).then_some(friction),
+        };
+        // It was in equilibrium: nothing in it is inverted.
+        if let Err(error) = self.newton.evaluate(fixed, u, independent) {
+            tracing::warn!(%error, "the last equilibrium cannot be evaluated");
+        }
+    }
+
+    /// Force that is told from rounding, N: what is small is measured by it where nothing
+    /// touches.
+    #[must_use]
+    pub fn least_force_n(&self) -> f64 {
+        self.newton.rounding_force_n / self.newton.options.residual_tolerance
+    }
+
+    fn report(&self, since: &Effort) -> StepReport {
+        let e = &self.newton.current;
+        // The potential of a body without memory is its stored energy.
+        let energy = if self.newton.problem.history_layout.is_some() {
+            history::energies(self.newton.problem, &self.state.memory, &self.state.u)
+        } else {
+            EnergySplit { stored_mj: e.stored_mj, dissipated_mj: 0.0 }
+        };
+        StepReport {
+            load_fraction: self.state.fraction,
+            residual_relative: e.residual_norm / e.reference_norm.max(self.least_force_n()),
+            gap_error_mm: e.gap_error_mm,
+            stored_mj: energy.stored_mj + e.contact_mj,
+            dissipated_mj: energy.dissipated_mj + self.state.friction.heat_mj,
+            j_min: e.j_min,
+            j_min_at: e.j_min_at,
+            condition_at_least: self.newton.condition,
+            effort: self.newton.effort.since(since),
+        }
+    }
+
+    /// One equilibrium at `next`, or the state as it was.
+    fn try_step(&mut self, next: f64) -> Result<(), StepError> {
+        let mut trial = self.predict(next);
+        let mut found = self.augmented(next, &mut trial);
+        // The extrapolation may be what failed: once more from the last equilibrium.
+        if let (Err(cause), Some(_)) = (&found, &self.before) {
+            tracing::debug!(next, %cause, "extrapolated start failed");
+            trial = self.unmoved(next);
+            found = self.augmented(next, &mut trial);
+        }
+        // Or the dilatations: downhill on the potential alone, which is slower.
+        if let (Err(cause), true) = (&found, !self.state.independent.is_empty()) {
+            tracing::debug!(next, %cause, "independent dilatations failed");
+            trial = self.unmoved(next);
+            trial.independent.clear();
+            found = self.augmented(next, &mut trial);
+            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
+        }
+        found?;
+        self.set_time_step(next, &trial.u);
+        let problem = self.newton.problem;
+        let dt_s = self.seconds(next);
+        trial.fraction = next;
+        if let Some(layout) = &problem.history_layout {
+            history::advance(problem, layout, &trial.u, dt_s, &mut trial.memory);
+        }
+        friction::update(&mut trial.friction, &self.newton.current);
+        friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
+        self.before = Some(std::mem::replace(&mut self.state, trial));
+        if let Some(indenter) = &self.loading.indenter {
+            self.work.add(indenter, next, self.newton.current.contact_force_n);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,122 @@
+//! What presses where and how deep, and which indentations are held out.
+
+use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
+use crate::scene::Pose;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// One indentation of a campaign.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Indentation {
+    /// Number within the campaign.
+    pub id: usize,
+    /// Place of its indenter among [`CampaignSpec::candidates`].
+    pub candidate: usize,
+    /// Name of its indenter.
+    pub indenter: String,
+    /// Name of the indenter's shape.
+    pub shape: String,
+    /// Orientation.
+    pub pose: Pose,
+    /// Where the indenter's axis meets the skin, mm, see [`CampaignSpec::offset_mm`].
+    pub offset_mm: [f64; 2],
+    /// Depths that are stored, mm from first touch, rising.
+    pub depths_mm: Vec<f64>,
+}
+
+impl CampaignSpec {
+    /// Samples in all.
+    pub fn samples(&self) -> usize {
+        indentations(self).iter().map(|p| p.depths_mm.len()).sum()
+    }
+}
+
+/// All indentations by id.
+///
+/// Indenters take turns so that after any number of indentations each has had its share, to
+/// less than one indentation. Pose, offset and depth of one indenter's indentations are points
+/// of an Owen-scrambled Sobol sequence of its own (Burley, Practical Hash-based Owen
+/// Scrambling, JCGT 9(4), 2020), scaled to the ranges: they fill the ranges far more
+/// evenly than random ones. The first n presses do not depend on how many follow.
+pub fn indentations(spec: &CampaignSpec) -> Vec<Indentation> {
+    let candidates = spec.candidates();
+    let mut had = vec![0u32; candidates.len()];
+    let all: u64 = candidates.iter().map(|c| u64::from(c.share)).sum();
+    (0..spec.presses)
+        .map(|id| {
+            // The one that its presses lag most behind its share.
+            let lag = |k: usize| {
+                let due = u64::from(candidates[k].share) * (id as u64 + 1);
+                due as i64 - (u64::from(had[k]) * all) as i64
+            };
+            let next = (0..candidates.len()).rev().max_by_key(|&k| lag(k)).unwrap_or(0);
+            let press = press(spec, id, next, &candidates[next], had[next]);
+            had[next] += 1;
+            press
+        })
+        .collect()
+}
+
+/// Press `id`, the `index`-th of a candidate.
+fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32) -> Indentation {
+    // The sequence takes 32 bits: both halves of the seed count.
+    let seed = (spec.seed ^ (spec.seed >> 32)) as u32;
+    let own = seed.wrapping_add((place as u32).wrapping_mul(0x9e37_79b9));
+    let within = |dimension: u32, [low, high]: [f64; 2]| {
+        low + (high - low) * f64::from(sobol_burley::sample(index, dimension, own))
+    };
+    let PoseRanges { pitch_deg, roll_deg, yaw_deg } = c.pose.unwrap_or(spec.pose);
+    let [x, y] = c.offset_mm.unwrap_or(spec.offset_mm);
+    let depths_mm = match c.depths.or(spec.depths) {
+        None => spec.depths_mm.clone(),
+        Some(DepthRange { deepest_mm, states }) => {
+            let deepest = within(5, deepest_mm);
+            (1..=states).map(|i| deepest * i as f64 / states as f64).collect()
+        }
+    };
+    Indentation {
+        id,
+        candidate: place,
+        indenter: c.name.clone(),
+        shape: c.indenter.name().into(),
+        pose: Pose {
+            pitch_deg: within(0, pitch_deg),
+            roll_deg: within(1, roll_deg),
+            yaw_deg: within(2, yaw_deg),
+        },
+        offset_mm: [within(3, x), within(4, y)],
+        depths_mm,
+    }
+}
+
+/// Ids of the indentations that a model is trained with and tested on, rising.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct HeldOut {
+    /// Seen in training.
+    pub train: Vec<usize>,
+    /// Held out.
+    pub test: Vec<usize>,
+}
+
+/// Divides the indentations: the `test_fraction` (rounded; at least one, and never
+/// all, when it is above 0) with the smallest SHA-256 of seed and id is held
+/// out. Whole indentations, since two depths of one indentation are near-copies.
+pub fn held_out(spec: &CampaignSpec) -> HeldOut {
+    let mut order: Vec<usize> = (0..spec.presses).collect();
+    order.sort_by_cached_key(|id| {
+        let mut hash = Sha256::new();
+        hash.update(b"papilla split\0");
+        hash.update(spec.seed.to_le_bytes());
+        hash.update((*id as u64).to_le_bytes());
+        <[u8; 32]>::from(hash.finalize())
+    });
+    let held_out = match (spec.test_fraction * spec.presses as f64).round() as usize {
+        count if spec.test_fraction > 0.0 && spec.presses > 1 => count.clamp(1, spec.presses - 1),
+        _ => 0,
+    };
+    let mut test = order[..held_out].to_vec();
+    let mut train = order[held_out..].to_vec();
+    test.sort_unstable();
+    train.sort_unstable();
+    HeldOut { train, test }
+}

@@ -1,0 +1,277 @@
+//! The campaign file.
+
+use super::error::SpecError;
+use crate::geometry::fingertip::FingertipShape;
+use crate::mesh::fingertip::{Density, Order};
+use crate::scene::effects::usual;
+use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable};
+use papilla_sdf::IndenterSpec;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Ranges \[lowest, highest\] of the indenter's orientation, degrees.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseRanges {
+    /// Pitch about the lateral axis; positive presses the tip first.
+    pub pitch_deg: [f64; 2],
+    /// Roll about the finger's axis.
+    pub roll_deg: [f64; 2],
+    /// Yaw about the indenter's own axis.
+    pub yaw_deg: [f64; 2],
+}
+
+/// How deep presses go: each has its own deepest state, drawn from a range.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DepthRange {
+    /// Range of the deepest state, mm from first touch.
+    pub deepest_mm: [f64; 2],
+    /// States stored on the way, equally spaced.
+    pub states: usize,
+}
+
+/// One of the indenters of a campaign.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Candidate {
+    /// Name in the manifest.
+    pub name: String,
+    /// Its indentations are to all indentations as its share is to all shares.
+    #[serde(default = "one")]
+    pub share: u32,
+    /// The indenter.
+    pub indenter: IndenterSpec,
+    /// Ranges of its orientation, if not the campaign's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<PoseRanges>,
+    /// Ranges of its offset, if not the campaign's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset_mm: Option<[[f64; 2]; 2]>,
+    /// Its depths, if not the campaign's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depths: Option<DepthRange>,
+}
+
+fn one() -> u32 {
+    1
+}
+
+/// A campaign: which presses to solve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CampaignSpec {
+    /// Name of the campaign.
+    pub name: String,
+    /// Seed of poses, offsets and depths, and of the split.
+    pub seed: u64,
+    /// Number of indentations, each with its own pose.
+    pub presses: usize,
+    /// Depths stored for each indentation, mm from first touch, rising; or else `depths`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub depths_mm: Vec<f64>,
+    /// Depths that differ from press to press; or else `depths_mm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depths: Option<DepthRange>,
+    /// Share of the indentations that is held out, 0 to less than 1.
+    pub test_fraction: f64,
+    /// Density of the mesh.
+    pub density: Density,
+    /// Effects, as in a scene.
+    #[serde(default = "usual")]
+    pub effects: Vec<EffectName>,
+    /// Constants of tissues, as in a scene.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub materials: TissueTable,
+    /// Friction, as in a scene.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub friction: Friction,
+    /// The indenter; or else `indenters`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub indenter: Option<IndenterSpec>,
+    /// Several indenters; or else `indenter`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub indenters: Vec<Candidate>,
+    /// Ranges of the orientation.
+    pub pose: PoseRanges,
+    /// Ranges of where the indenter's axis meets the skin, mm along its own x and y
+    /// from the skin point that a flat plate in its pose would touch first.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub offset_mm: [[f64; 2]; 2],
+    /// Where the file was: pictures of indenters are relative to this folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// Points that the low-discrepancy sequence has.
+const PRESSES_MAX: usize = 1 << 16;
+/// Most indenters of a campaign.
+const INDENTERS_MAX: usize = 1000;
+/// Most shares of one indenter.
+const SHARE_MAX: u32 = 10_000;
+/// Most states of one indentation.
+const STATES_MAX: usize = 1000;
+/// Largest offset, mm: the finger is 25 mm long.
+const OFFSET_MAX_MM: f64 = 25.0;
+
+impl CampaignSpec {
+    /// Reads and checks a campaign file.
+    ///
+    /// # Errors
+    /// [`SpecError`] naming the file and line, or the field and what it
+    /// may be.
+    pub fn read(path: &Path) -> Result<Self, SpecError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SpecError::Read { path: path.into(), source })?;
+        let mut spec: Self = toml::from_str(&text)
+            .map_err(|e| SpecError::Spec { path: path.to_path_buf(), message: e.to_string() })?;
+        spec.folder = path.parent().unwrap_or(Path::new("")).into();
+        spec.validate()?;
+        Ok(spec)
+    }
+
+    /// The indenters; a single one is called after its shape.
+    pub fn candidates(&self) -> Vec<Candidate> {
+        let single = self.indenter.as_ref().map(|indenter| Candidate {
+            name: indenter.name().into(),
+            share: 1,
+            indenter: indenter.clone(),
+            pose: None,
+            offset_mm: None,
+            depths: None,
+        });
+        single.into_iter().chain(self.indenters.iter().cloned()).collect()
+    }
+
+    /// What a candidate's indentations have in common, as a scene.
+    pub fn scene(&self, candidate: &Candidate) -> Scene {
+        Scene {
+            geometry: Geometry::Fingertip {
+                density: self.density,
+                order: Order::default(),
+                shape: FingertipShape::default(),
+            },
+            materials: self.materials.clone(),
+            indenter: candidate.indenter.clone(),
+            motion: Motion::to_depth(1.0, 1, Pose::default()),
+            friction: self.friction,
+            effects: self.effects.clone(),
+            outputs: None,
+            folder: self.folder.clone(),
+            origin: Origin::default(),
+        }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`SpecError::Value`] for the first that makes no sense,
+    /// [`SpecError::Scene`] for one that a scene could not have either.
+    pub fn validate(&self) -> Result<(), SpecError> {
+        let require = |ok, field: &str, message| self.require(ok, field, message);
+        require(!self.name.trim().is_empty(), "name", "must not be empty".into())?;
+        require(
+            (1..=PRESSES_MAX).contains(&self.presses),
+            "presses",
+            format!("is {}, it has to be 1 to {PRESSES_MAX}", self.presses),
+        )?;
+        require(
+            (0.0..1.0).contains(&self.test_fraction),
+            "test_fraction",
+            format!("is {}, it has to be 0 or more and less than 1", self.test_fraction),
+        )?;
+        require(
+            self.depths_mm.is_empty() != self.depths.is_none(),
+            "depths_mm",
+            "has to be given, or else depths: one of the two".into(),
+        )?;
+        let rising = self.depths_mm.windows(2).all(|d| d[0] < d[1]);
+        require(
+            rising && self.depths_mm.iter().all(|d| d.is_finite() && *d > 0.0),
+            "depths_mm",
+            format!("is {:?}, it has to be a rising list of depths above 0", self.depths_mm),
+        )?;
+        self.validate_ranges("", Some(&self.pose), Some(&self.offset_mm), self.depths.as_ref())?;
+        require(
+            self.indenter.is_some() == self.indenters.is_empty(),
+            "indenter",
+            "has to be given, or else indenters: one of the two".into(),
+        )?;
+        require(
+            self.indenters.len() <= INDENTERS_MAX,
+            "indenters",
+            format!("are {}, at most {INDENTERS_MAX}", self.indenters.len()),
+        )?;
+        for (i, candidate) in self.candidates().iter().enumerate() {
+            self.validate_candidate(i, candidate)?;
+        }
+        Ok(())
+    }
+
+    fn require(&self, ok: bool, field: &str, message: String) -> Result<(), SpecError> {
+        let campaign = self.name.clone();
+        if ok { Ok(()) } else { Err(SpecError::Value { campaign, field: field.into(), message }) }
+    }
+
+    fn validate_candidate(&self, i: usize, c: &Candidate) -> Result<(), SpecError> {
+        let table = format!("indenters[{i}].");
+        let first = self.indenters.iter().position(|other| other.name == c.name);
+        self.require(
+            !c.name.trim().is_empty() && first.is_none_or(|j| j == i),
+            &format!("{table}name"),
+            format!("is '{}', it has to be a name that no other indenter has", c.name),
+        )?;
+        self.require(
+            (1..=SHARE_MAX).contains(&c.share),
+            &format!("{table}share"),
+            format!("is {}, it has to be 1 to {SHARE_MAX}", c.share),
+        )?;
+        self.validate_ranges(&table, c.pose.as_ref(), c.offset_mm.as_ref(), c.depths.as_ref())?;
+        self.scene(c).validate().map_err(|source| SpecError::Scene {
+            campaign: self.name.clone(),
+            indenter: c.name.clone(),
+            source: Box::new(source),
+        })
+    }
+
+    fn validate_ranges(
+        &self,
+        table: &str,
+        pose: Option<&PoseRanges>,
+        offset_mm: Option<&[[f64; 2]; 2]>,
+        depths: Option<&DepthRange>,
+    ) -> Result<(), SpecError> {
+        let angles = pose.map(|p| {
+            [
+                ("pose.pitch_deg", p.pitch_deg, 90.0),
+                ("pose.roll_deg", p.roll_deg, 180.0),
+                ("pose.yaw_deg", p.yaw_deg, 180.0),
+            ]
+        });
+        let offsets = offset_mm.map(|o| o.map(|range| ("offset_mm", range, OFFSET_MAX_MM)));
+        for (field, [low, high], limit) in
+            angles.into_iter().flatten().chain(offsets.into_iter().flatten())
+        {
+            self.require(
+                -limit <= low && low <= high && high <= limit,
+                &format!("{table}{field}"),
+                format!("is [{low}, {high}], it has to rise within -{limit} to {limit}"),
+            )?;
+        }
+        let Some(DepthRange { deepest_mm: [low, high], states }) = depths else { return Ok(()) };
+        self.require(
+            0.0 < *low && low <= high && high.is_finite(),
+            &format!("{table}depths.deepest_mm"),
+            format!("is [{low}, {high}], it has to rise from above 0"),
+        )?;
+        self.require(
+            (1..=STATES_MAX).contains(states),
+            &format!("{table}depths.states"),
+            format!("is {states}, it has to be 1 to {STATES_MAX}"),
+        )
+    }
+}

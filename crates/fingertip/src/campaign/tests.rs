@@ -1,0 +1,187 @@
+//! Campaign files and what is drawn from them.
+
+use super::*;
+use crate::mesh::fingertip::Density;
+use crate::scene::effects::usual;
+use crate::scene::{Friction, Pose, TissueTable};
+use papilla_sdf::{IndenterSpec, Plate, Sphere};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn spec() -> CampaignSpec {
+    CampaignSpec {
+        name: "test".into(),
+        seed: 3,
+        presses: 7,
+        depths_mm: vec![0.25, 0.5],
+        depths: None,
+        test_fraction: 0.3,
+        density: Density::Coarse,
+        effects: usual(),
+        materials: TissueTable::default(),
+        friction: Friction::default(),
+        indenter: Some(IndenterSpec::default()),
+        indenters: Vec::new(),
+        pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
+        offset_mm: [[0.0; 2]; 2],
+        folder: PathBuf::new(),
+    }
+}
+
+fn candidate(name: &str, share: u32, indenter: IndenterSpec) -> Candidate {
+    let name = name.into();
+    Candidate { name, share, indenter, pose: None, offset_mm: None, depths: None }
+}
+
+/// Three indenters, one with a turn, an offset and depths of its own.
+fn several() -> CampaignSpec {
+    let ball = Candidate {
+        pose: Some(PoseRanges { pitch_deg: [10.0, 20.0], roll_deg: [0.0; 2], yaw_deg: [5.0; 2] }),
+        offset_mm: Some([[-2.0, 2.0], [1.0, 1.0]]),
+        depths: Some(DepthRange { deepest_mm: [1.0, 1.5], states: 3 }),
+        ..candidate("ball", 2, IndenterSpec::Sphere(Sphere::default()))
+    };
+    let plate = candidate("plate", 1, IndenterSpec::default());
+    let small = Plate { size_mm: [6.0, 6.0], edge_radius_mm: 0.5 };
+    let small = candidate("small plate", 1, IndenterSpec::Plate(small));
+    CampaignSpec { presses: 64, indenter: None, indenters: vec![plate, ball, small], ..spec() }
+}
+
+#[test]
+fn poses_fill_their_ranges_and_follow_the_seed() {
+    let wide = CampaignSpec { presses: 64, ..spec() };
+    let poses =
+        |spec: &CampaignSpec| -> Vec<Pose> { indentations(spec).iter().map(|p| p.pose).collect() };
+    let points = poses(&wide);
+    assert_eq!(points[..7], poses(&spec())[..], "the first poses do not depend on the number");
+    let cell = |p: &Pose| {
+        let index = |x: f64, low: f64, width: f64| ((x - low) / width * 8.0) as usize;
+        index(p.pitch_deg, 0.0, 45.0) * 8 + index(p.roll_deg, -30.0, 60.0)
+    };
+    // 64 Sobol points in 2-D: at most two of 8 x 8 cells' neighbours stay
+    // empty; of random points some 23 cells would.
+    let mut cells: Vec<usize> = points.iter().map(cell).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    assert!(cells.len() >= 60, "{} of 64 cells hit", cells.len());
+    assert!(points.iter().all(|p| (0.0..45.0).contains(&p.pitch_deg) && p.yaw_deg.abs() < 1e-12));
+    let other = poses(&CampaignSpec { seed: 4, ..wide });
+    assert!(points.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
+}
+
+#[test]
+fn indenters_take_turns_by_their_shares() {
+    let all = indentations(&several());
+    let count = |name: &str, n: usize| all[..n].iter().filter(|p| p.indenter == name).count();
+    for n in 1..=64 {
+        for (name, share) in [("plate", 0.25), ("ball", 0.5), ("small plate", 0.25)] {
+            let lag = share * n as f64 - count(name, n) as f64;
+            assert!(lag.abs() < 1.0, "{name}: {lag} behind after {n}");
+        }
+    }
+    assert_eq!(all[..9], indentations(&CampaignSpec { presses: 9, ..several() })[..]);
+    assert_ne!(all, indentations(&CampaignSpec { seed: 4, ..several() }));
+}
+
+#[test]
+fn an_indenter_has_its_own_ranges() {
+    let all = indentations(&several());
+    for ball in all.iter().filter(|p| p.indenter == "ball") {
+        assert_eq!((ball.shape.as_str(), ball.depths_mm.len()), ("sphere", 3));
+        assert!((10.0..20.0).contains(&ball.pose.pitch_deg));
+        assert!((-2.0..2.0).contains(&ball.offset_mm[0]));
+        let deepest = ball.depths_mm[2];
+        assert!((1.0..1.5).contains(&deepest) && (ball.depths_mm[0] - deepest / 3.0).abs() < 1e-15);
+    }
+    let plates: Vec<_> = all.iter().filter(|p| p.shape == "plate").collect();
+    assert!(plates.iter().all(|p| p.depths_mm == [0.25, 0.5] && p.offset_mm == [0.0, 0.0]));
+    // Each indenter has a sequence of its own: no two share a pose.
+    let first = |name: &str| plates.iter().find(|p| p.indenter == name).unwrap().pose;
+    assert_ne!(first("plate"), first("small plate"));
+}
+
+#[test]
+fn the_split_is_by_press_and_follows_the_seed() {
+    let spec = CampaignSpec { presses: 125, test_fraction: 0.2, ..spec() };
+    let split = held_out(&spec);
+    assert_eq!((split.train.len(), split.test.len()), (100, 25));
+    let mut all = [split.train.clone(), split.test.clone()].concat();
+    all.sort_unstable();
+    assert_eq!(all, (0..125).collect::<Vec<_>>());
+    assert_eq!(split, held_out(&spec));
+    assert_ne!(split.test, held_out(&CampaignSpec { seed: 9, ..spec.clone() }).test);
+    let two = held_out(&CampaignSpec { presses: 2, test_fraction: 0.2, ..spec });
+    assert_eq!((two.train.len(), two.test.len()), (1, 1));
+}
+
+#[test]
+fn shipped_campaigns_are_readable() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns");
+    let s1 = CampaignSpec::read(&folder.join("s1.toml")).unwrap();
+    assert_eq!((s1.samples(), s1.test_fraction.to_bits()), (1000, 0.2f64.to_bits()));
+    assert_eq!(CampaignSpec::read(&folder.join("smoke.toml")).unwrap().density, Density::Coarse);
+    let broad = CampaignSpec::read(&folder.join("broad.toml")).unwrap();
+    let held = CampaignSpec::read(&folder.join("heldout.toml")).unwrap();
+    let shapes = |spec: &CampaignSpec| -> BTreeSet<String> {
+        indentations(spec).into_iter().map(|p| p.shape).collect()
+    };
+    for shape in ["plate", "sphere", "cylinder", "punch", "grating"] {
+        assert!(shapes(&broad).contains(shape), "{shape}");
+    }
+    for shape in ["wedge", "ring", "dots"] {
+        assert!(shapes(&held).contains(shape), "{shape}");
+    }
+    assert!(shapes(&broad).is_disjoint(&shapes(&held)), "no held-out shape is seen");
+}
+
+fn several_with(change: fn(&mut Candidate)) -> CampaignSpec {
+    let mut spec = several();
+    change(&mut spec.indenters[1]);
+    spec
+}
+
+fn bad_depths() -> Option<DepthRange> {
+    Some(DepthRange { deepest_mm: [0.0, 1.0], states: 2 })
+}
+
+#[test]
+fn senseless_campaigns_are_refused_by_field() {
+    type Spoil = fn(&mut CampaignSpec);
+    let cases: [(Spoil, &str); 15] = [
+        (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
+        (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
+        (|s| s.indenter = None, "indenter"),
+        (|s| s.depths = Some(DepthRange { deepest_mm: [1.0, 2.0], states: 2 }), "depths"),
+        (|s| s.offset_mm[1] = [2.0, -2.0], "offset_mm"),
+        (
+            |s| *s = CampaignSpec { indenter: Some(IndenterSpec::default()), ..several() },
+            "indenters",
+        ),
+        (|s| *s = several_with(|c| c.share = 0), "indenters[1].share"),
+        (|s| *s = several_with(|c| c.name = "plate".into()), "indenters[1].name"),
+        (|s| *s = several_with(|c| c.depths = bad_depths()), "indenters[1].depths.deepest_mm"),
+        (|s| s.presses = 0, "presses"),
+        (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
+        (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
+        (|s| s.test_fraction = 1.0, "test_fraction"),
+        (
+            |s| {
+                let plate = Plate { edge_radius_mm: 11.0, ..Plate::default() };
+                s.indenter = Some(IndenterSpec::Plate(plate));
+            },
+            "indenter.edge_radius_mm",
+        ),
+        (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
+    ];
+    for (spoil, field) in cases {
+        let mut bad = spec();
+        spoil(&mut bad);
+        let text = bad.validate().unwrap_err().to_string();
+        assert!(text.contains(field), "{text}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("odd.toml");
+    std::fs::write(&path, "name = \"x\"\nspeed = 3\n").unwrap();
+    let text = CampaignSpec::read(&path).unwrap_err().to_string();
+    assert!(text.contains("odd.toml") && text.contains("speed"), "{text}");
+}

@@ -1,0 +1,119 @@
+//! What is pressed.
+
+use super::error::{SceneError, is_length, require};
+use crate::geometry::fingertip::FingertipShape;
+use crate::geometry::section::SectionShape;
+use crate::mesh::fingertip::{Density, Order};
+use crate::mesh::section::Extent;
+use crate::tissue::Tissue;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// What is pressed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Geometry {
+    /// The fingertip.
+    Fingertip {
+        /// Mesh density.
+        density: Density,
+        /// Element order.
+        #[serde(default)]
+        order: Order,
+        /// Dimensions that differ from the default.
+        #[serde(default)]
+        shape: FingertipShape,
+    },
+    /// The fingertip's cross-section, for the effect `plane_strain`. Forces and
+    /// energies are per mm of length.
+    Section {
+        /// Mesh density.
+        density: Density,
+        /// Element order: `Quad4` or `Quad9`.
+        #[serde(default = "quadratic")]
+        order: Order,
+        /// Half of it, for symmetric indentations, or the whole.
+        #[serde(default)]
+        extent: Extent,
+        /// Dimensions that differ from the default.
+        #[serde(default)]
+        shape: SectionShape,
+    },
+    /// A block in layers, pressed from below (`z_min`) and held on top (`z_max`).
+    Block {
+        /// Lengths along x and y, mm; the layers give the height.
+        size_mm: [f64; 2],
+        /// Elements along x and y.
+        elements: [usize; 2],
+        /// Layers from the pressed side.
+        layers: Vec<Layer>,
+        /// Element order.
+        #[serde(default)]
+        order: Order,
+    },
+    /// A Gmsh 4.1 file with physical groups: volumes named by tissue, surfaces
+    /// by what they are for.
+    Mesh {
+        /// The `.msh` file, relative to the scene.
+        file: PathBuf,
+        /// Surfaces whose nodes are held.
+        fixed: Vec<String>,
+        /// Surface that the indenter may touch.
+        contact: String,
+    },
+}
+
+fn quadratic() -> Order {
+    Order::Quadratic
+}
+
+/// One layer of a block.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// What it is made of.
+    pub tissue: Tissue,
+    /// Its thickness, mm.
+    pub thickness_mm: f64,
+    /// Elements through it.
+    pub elements: usize,
+}
+
+/// Beyond it a length in mm must have been meant in another unit.
+const LENGTH_MAX_MM: f64 = 1000.0;
+/// Most elements of a block along an axis or through a layer.
+const ELEMENTS_MAX: usize = 1000;
+
+impl Geometry {
+    pub(super) fn validate(&self) -> Result<(), SceneError> {
+        match self {
+            Self::Fingertip { shape, .. } => Ok(shape.validate()?),
+            Self::Block { size_mm, elements, layers, .. } => {
+                validate_block(size_mm, elements, layers)
+            }
+            Self::Section { shape, .. } => Ok(shape.validate()?),
+            Self::Mesh { .. } => Ok(()),
+        }
+    }
+}
+
+fn validate_block(
+    size_mm: &[f64; 2],
+    elements: &[usize; 2],
+    layers: &[Layer],
+) -> Result<(), SceneError> {
+    let length = |v: f64| is_length(v) && v <= LENGTH_MAX_MM;
+    let count = |n: usize| (1..=ELEMENTS_MAX).contains(&n);
+    let (a_length, a_count) = ("has to be above 0 and at most 1000 mm", "has to be 1 to 1000");
+    require(size_mm.iter().all(|&v| length(v)), "geometry.size_mm", size_mm, a_length)?;
+    require(elements.iter().all(|&n| count(n)), "geometry.elements", elements, a_count)?;
+    require(!layers.is_empty(), "geometry.layers", &layers, "has to list a layer at least")?;
+    for (i, layer) in layers.iter().enumerate() {
+        let field = |name: &str| format!("geometry.layers[{i}].{name}");
+        let thickness = layer.thickness_mm;
+        require(length(thickness), field("thickness_mm"), &thickness, a_length)?;
+        require(count(layer.elements), field("elements"), &layer.elements, a_count)?;
+    }
+    Ok(())
+}

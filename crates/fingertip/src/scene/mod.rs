@@ -1,0 +1,165 @@
+//! Scenes: one indentation, described in TOML.
+//!
+//! A scene names a geometry, materials, an indenter, a motion and the effects
+//! it wants. What it does not name is not simulated.
+
+mod census;
+pub mod effects;
+pub(crate) mod error;
+mod geometry;
+mod materials;
+mod motion;
+mod origin;
+mod outputs;
+#[cfg(test)]
+mod tests;
+
+pub use census::Census;
+pub use effects::{EffectName, Plan};
+pub use error::SceneError;
+pub use geometry::{Geometry, Layer};
+pub use materials::{TissueError, TissueTable};
+pub use motion::{Motion, PathPoint, Pose};
+pub use origin::{Located, Origin, Place};
+pub use outputs::Output;
+
+use crate::indenter::IndenterError;
+use error::require;
+use papilla_sdf::IndenterSpec;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A scene file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// What is pressed.
+    pub geometry: Geometry,
+    /// What tissues are made of; the design's table where not given.
+    #[serde(default)]
+    pub materials: TissueTable,
+    /// What presses; the 20 mm plate of the surface-pressure study if not given.
+    #[serde(default)]
+    pub indenter: IndenterSpec,
+    /// How it moves.
+    pub motion: Motion,
+    /// Friction, for the effect of that name.
+    #[serde(default)]
+    pub friction: Friction,
+    /// What the scene asks for; the surface-pressure study's analysis if not given.
+    #[serde(default = "effects::usual")]
+    pub effects: Vec<EffectName>,
+    /// What `solve` writes beside `summary.json`; all that the geometry has if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outputs: Option<Vec<Output>>,
+    /// Where the file was: paths in it are relative to this folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
+    /// What the file said, for errors that point at a line.
+    #[serde(skip)]
+    pub origin: Origin,
+}
+
+/// Coulomb friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Friction {
+    /// Coefficient.
+    pub coefficient: f64,
+}
+
+/// JSON schema of scene files (draft 2020-12), from the types that read them.
+#[must_use]
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(Scene)
+}
+
+/// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
+const FRICTION_MAX: f64 = 10.0;
+
+impl Scene {
+    /// Reads and checks a scene file.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file and line, or the field and its rule.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SceneError::Read { path: path.into(), source })?;
+        Self::parse(path, text)
+    }
+
+    /// Reads and checks the text of a scene; `path` is where it would stand.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file and line, or the field and its rule.
+    pub fn parse(path: &Path, text: String) -> Result<Self, SceneError> {
+        let origin = Origin::new(path, text);
+        let parsed = toml::from_str::<Self>(origin.text());
+        let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
+        scene.folder = path.parent().unwrap_or(Path::new("")).into();
+        scene.origin = origin;
+        match scene.validate() {
+            Ok(()) => Ok(scene),
+            Err(e) => {
+                let place = e.field().and_then(|f| scene.place(&f));
+                Err(e.with(place))
+            }
+        }
+    }
+
+    /// Where the file says what `field` is; `None` for a scene made by a program or
+    /// a field that the file leaves to its default.
+    #[must_use]
+    pub fn place(&self, field: &str) -> Option<Place> {
+        let name = field.strip_prefix("effects[").and_then(|f| f.strip_suffix(']'));
+        match name.and_then(|n| self.effects.iter().position(|e| e.as_str() == n)) {
+            Some(i) => self.origin.find(&format!("effects[{i}]")),
+            None => self.origin.find(field),
+        }
+    }
+
+    /// Checks what the type system cannot.
+    ///
+    /// # Errors
+    /// [`SceneError`] for the first field that makes no sense.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        self.geometry.validate()?;
+        self.motion.validate()?;
+        self.indenter.validate().map_err(IndenterError::from)?;
+        let c = self.friction.coefficient;
+        require(
+            (0.0..=FRICTION_MAX).contains(&c),
+            "friction.coefficient",
+            &c,
+            "has to be 0 to 10",
+        )?;
+        for (i, e) in self.effects.iter().enumerate() {
+            let twice = self.effects[..i].contains(e);
+            require(!twice, format!("effects[{i}]"), &e.as_str(), "is named twice: name it once")?;
+        }
+        if matches!(self.geometry, Geometry::Section { .. }) && !self.has("plane_strain") {
+            return Err(SceneError::Fields {
+                field: "effects",
+                rule: "geometry.kind = \"section\" is plane: name the effect \"plane_strain\"",
+            });
+        }
+        self.materials.validate()?;
+        self.validate_outputs()?;
+        self.plan().map(drop)
+    }
+
+    /// Whether an effect is named.
+    #[must_use]
+    pub fn has(&self, effect: &str) -> bool {
+        self.effects.iter().any(|e| e.as_str() == effect)
+    }
+
+    /// What is going to be simulated.
+    ///
+    /// # Errors
+    /// [`SceneError::Effect`] for an effect that the scene cannot have.
+    pub fn plan(&self) -> Result<Plan, SceneError> {
+        Plan::new(self)
+    }
+}

@@ -1,0 +1,137 @@
+use super::*;
+
+const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\ndepth_mm = 1.0\nincrements = 4\n";
+const BLOCK: &str = "[geometry]\nkind = \"block\"\nsize_mm = [4.0, 4.0]\nelements = [4, 4]\n\
+    layers = [\n  { tissue = \"dermis\", thickness_mm = 1.0, elements = 1 },\n\
+    \x20 { tissue = \"subcutaneous\", thickness_mm = 2.0, elements = 2 },\n]\n[motion]\ndepth_mm = 0.5\n";
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(Path::new("bad.toml"), text.into())
+}
+
+#[test]
+fn a_minimal_scene_takes_the_defaults() {
+    let scene = parse(FINGER).unwrap();
+    assert_eq!(scene.effects, effects::usual());
+    assert_eq!(scene.materials, TissueTable::default());
+    assert_eq!(scene.indenter, IndenterSpec::default());
+    let plan = scene.plan().unwrap();
+    assert!(!plan.relaxes && plan.friction == 0.0 && !plan.plane_strain);
+}
+
+#[test]
+fn outputs_are_what_is_named_or_all_that_the_geometry_has() {
+    let of = |text: &str| {
+        let scene = parse(text).unwrap();
+        Output::ALL.into_iter().filter(|&o| scene.writes(o)).collect::<Vec<_>>()
+    };
+    assert_eq!(of(FINGER), Output::ALL);
+    assert_eq!(of(BLOCK), [Output::Fields]);
+    assert_eq!(of(&format!("outputs = [\"maps\"]\n{FINGER}")), [Output::Maps]);
+    assert_eq!(of(&format!("outputs = []\n{FINGER}")), []);
+    assert_refused(&[
+        (format!("outputs = [\"maps\", \"maps\"]\n{FINGER}"), 1, &["outputs[1]", "twice"]),
+        (format!("outputs = [\"pictures\"]\n{BLOCK}"), 1, &["outputs[0]", "atlas"]),
+        (format!("outputs = [\"movie\"]\n{FINGER}"), 1, &["movie", "fields", "maps", "pictures"]),
+    ]);
+}
+
+/// Text of a bad scene, the line to blame, words that its message has.
+type Bad<'a> = (String, usize, &'a [&'a str]);
+
+fn assert_refused(cases: &[Bad<'_>]) {
+    for (text, line, words) in cases {
+        let error = parse(text).unwrap_err().to_string();
+        let at = format!("bad.toml:{line}:");
+        assert!(error.starts_with(&at), "{error}\nshould start with {at} in\n{text}");
+        for word in *words {
+            assert!(error.contains(word), "{error}\nshould name {word}");
+        }
+    }
+}
+
+#[test]
+fn bad_values_name_line_field_and_cure() {
+    let finger = |from: &str, to: &str| FINGER.replace(from, to);
+    let block = |from: &str, to: &str| BLOCK.replace(from, to);
+    let with = |tail: &str| format!("{FINGER}{tail}");
+    assert_refused(&[
+        (finger("depth_mm = 1.0", "depth_mm = -1.0"), 5, &["motion.depth_mm = -1.0", "above 0"]),
+        (finger("depth_mm = 1.0", "depth_mm = 2000.0"), 5, &["at most 100 mm"]),
+        (finger("depth_mm = 1.0", ""), 4, &["exactly one of depth_mm"]),
+        (finger("increments = 4", "increments = 0"), 6, &["motion.increments"]),
+        (
+            block("thickness_mm = 2.0", "thickness_mm = -2.0"),
+            7,
+            &["geometry.layers[1].thickness_mm"],
+        ),
+        (block("[4.0, 4.0]", "[4.0, 4e6]"), 3, &["geometry.size_mm", "at most 1000 mm"]),
+        (
+            with("[geometry.shape]\nepidermis_mm = 200.0\n"),
+            8,
+            &["geometry.shape.epidermis_mm = 200 mm", "at most 100"],
+        ),
+        (with("[geometry.shape]\ncap_length_mm = 30.0\n"), 8, &["below length_mm"]),
+        (with("[geometry.shape]\nnail_mm = [11.0, -12.0]\n"), 8, &["nail_mm[1] = -12"]),
+        (
+            with("[materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.5\n"),
+            9,
+            &["materials.dermis: Poisson's ratio 0.5", "0.49"],
+        ),
+        (
+            with("[materials.dermis]\nyoungs_modulus_mpa = 8e4\npoissons_ratio = 0.4\n"),
+            8,
+            &["was Pa meant"],
+        ),
+        (
+            with("[materials.bone]\nyoungs_modulus_mpa = 1.7e10\npoissons_ratio = 0.3\n"),
+            8,
+            &["was Pa meant"],
+        ),
+        (
+            with("[[motion.path]]\ntime_s = 0.0\ndepth_mm = 1.0\n")
+                .replace("depth_mm = 1.0\nincr", "incr"),
+            8,
+            &["motion.path[0].depth_mm", "inside the finger", "time_s"],
+        ),
+    ]);
+}
+
+#[test]
+fn bad_effects_name_line_and_cure() {
+    let with = |effects: &str| format!("effects = {effects}\n{FINGER}");
+    assert_refused(&[
+        (
+            with("[\"layers\",\n  \"sound\"]"),
+            2,
+            &["effects[1]", "unknown effect 'sound'; there are: finite_strain"],
+        ),
+        (with("[\"layers\",\n  \"hyperelastic\"]"), 2, &["needs 'finite_strain'"]),
+        (with("[\"viscoelastic\"]"), 1, &["motion.path"]),
+        (with("[\"plane_strain\"]"), 1, &["section"]),
+        (with("[\"friction\"]"), 1, &["friction.coefficient"]),
+        (with("[\"layers\", \"layers\"]"), 1, &["effects[1]", "twice"]),
+    ]);
+}
+
+#[test]
+fn what_is_no_scene_names_line_and_cure() {
+    let finger = |from: &str, to: &str| FINGER.replace(from, to);
+    assert_refused(&[
+        (finger("coarse", "huge"), 3, &["geometry.density", "`medium`"]),
+        (finger("fingertip", "foot"), 2, &["geometry.kind", "`block`"]),
+        (finger("depth_mm", "depth"), 5, &["motion.depth", "did you mean `depth_mm`"]),
+        (finger("density", "dense"), 3, &["geometry.dense", "`density`"]),
+        (finger("density = \"coarse\"", ""), 1, &["missing field `density`", "add it"]),
+        (finger("= 1.0", "= \"1 mm\""), 5, &["motion.depth_mm", "bare number"]),
+        (finger("= 1.0", "= 1.0 mm"), 5, &["expected"]),
+        (
+            BLOCK.replace("thickness_mm = 2.0", "thickness = 2.0"),
+            7,
+            &["did you mean `thickness_mm`"],
+        ),
+        (BLOCK.replace("[4.0, 4.0]", "[4.0]"), 3, &["geometry.size_mm", "length 2"]),
+    ]);
+    let error = parse("[motion]\ndepth_mm = 1.0\n").unwrap_err().to_string();
+    assert!(error.starts_with("bad.toml: missing field `geometry`: add it"), "{error}");
+}

@@ -1,0 +1,371 @@
+//! A body pressed by a rigid plate: set-up, pose, and vertex values.
+
+use super::record::{Checks, IncrementRecord};
+use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
+use crate::indenter::IndenterError;
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
+use crate::mesh::section::SectionMeshError;
+use crate::scene::error::{indenter_field, material_field};
+use crate::scene::{Located, Pose, Scene, SceneError, TissueError};
+use crate::tissue::{NoTissue, Tissue};
+use papilla_atlas::Atlas;
+use papilla_atlas::flatten::{AtlasReport, BuildAtlasError, build_atlas};
+use papilla_fem::element::Inverted;
+use papilla_fem::mesh::Mesh;
+use papilla_fem::mesh::recovery::SedRecovery;
+use papilla_fem::mesh::sample::Deformed;
+use papilla_fem::solve::{
+    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
+};
+use papilla_fem::tensor::{norm, product};
+use papilla_sdf::Placement;
+use std::path::PathBuf;
+
+/// Why a body could not be set up or pressed.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulationError {
+    /// The shape contradicts itself.
+    #[error(transparent)]
+    Shape(#[from] FingertipShapeError),
+    /// The problem could not be set up.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+    /// The interface has no elements on one side.
+    #[error(transparent)]
+    Recovery(#[from] NoTissue),
+    /// The scene contradicts itself.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A material is out of range.
+    #[error(transparent)]
+    Material(#[from] TissueError),
+    /// The mesh file is bad.
+    #[error(transparent)]
+    Mesh(#[from] papilla_fem::mesh::gmsh::GmshError),
+    /// The section was not meshed.
+    #[error(transparent)]
+    Section(#[from] SectionMeshError),
+    /// A mesh file and the effects disagree about the plane.
+    #[error(
+        "{} {}", file.display(),
+        if *planar { "is a plane section: name the effect 'plane_strain'" }
+        else { "is a solid: leave out the effect 'plane_strain'" }
+    )]
+    Plane {
+        /// The mesh file.
+        file: PathBuf,
+        /// Whether its elements are planar.
+        planar: bool,
+    },
+    /// No equilibrium.
+    #[error("at depth {depth_mm} mm: {source}")]
+    Solve {
+        /// Depth aimed at.
+        depth_mm: f64,
+        /// Why.
+        source: SolveError,
+    },
+    /// Nodes slipped off an edge of the indenter.
+    #[error(
+        "at depth {depth_mm} mm: {:.0} % of the contact force acts along the skin, not into it: nodes \
+         {spacing_mm:.2} mm apart have slipped off an edge of the indenter, which now stands between \
+         them, unseen. Take a finer mesh, or rounder edges", 100.0 * share
+    )]
+    Slipped {
+        /// Depth of the state.
+        depth_mm: f64,
+        /// Share of the contact force along the skin.
+        share: f64,
+        /// Mean distance of the nodes in contact, mm.
+        spacing_mm: f64,
+    },
+    /// An element is inside out where SED is wanted.
+    #[error(transparent)]
+    Inverted(#[from] Inverted),
+    /// Depths, forces and times must be positive and rising.
+    #[error("depths, forces and times must be positive, finite and rising; found {0} after {1}")]
+    Rising(f64, f64),
+    /// Nothing was stored.
+    #[error("the motion has no state to store")]
+    Empty,
+    /// A prescribed force was not reached.
+    #[error("the force of {wanted_n} N was not reached: {reached_n:.4} N after 6 mm or 60 tries")]
+    Force {
+        /// Force asked for, N.
+        wanted_n: f64,
+        /// Largest force below it, N.
+        reached_n: f64,
+    },
+    /// The indenter does not meet the body.
+    #[error(transparent)]
+    Indenter(#[from] IndenterError),
+    /// Any of these, at the line of the scene that is to blame.
+    #[error(transparent)]
+    Located(Box<Located<Self>>),
+}
+
+impl SimulationError {
+    /// The field of a scene that is to blame, dotted.
+    #[must_use]
+    pub fn field(&self) -> Option<String> {
+        match self {
+            Self::Shape(e) => Some(e.field()),
+            Self::Scene(e) => e.field(),
+            Self::Material(e) => Some(material_field(e)),
+            Self::Indenter(e) => Some(indenter_field(e)),
+            Self::Problem(ProblemError::Missing { kind: "node set", .. }) => {
+                Some("geometry.fixed".into())
+            }
+            Self::Problem(ProblemError::Missing { .. } | ProblemError::ContactFaces { .. }) => {
+                Some("geometry.contact".into())
+            }
+            Self::Mesh(_) => Some("geometry.file".into()),
+            Self::Problem(_) | Self::Recovery(_) => Some("geometry".into()),
+            Self::Slipped { .. } => Some("indenter".into()),
+            Self::Rising(..) | Self::Empty => Some("motion".into()),
+            Self::Solve { source: SolveError::RigidBodyMode(_), .. } => {
+                Some("geometry.fixed".into())
+            }
+            Self::Located(e) => e.error.field(),
+            _ => None,
+        }
+    }
+
+    /// The same with the line of `scene` that is to blame, if there is one.
+    pub(super) fn at(self, scene: &Scene) -> Self {
+        match self.field().and_then(|f| scene.place(&f)) {
+            Some(place) => Self::Located(Box::new(Located { place, error: self })),
+            None => self,
+        }
+    }
+}
+
+/// A body ready to be pressed, shared by every indentation of a campaign.
+pub struct Body {
+    /// Mesh, materials, supports and contact surface.
+    pub problem: Problem,
+    /// Name of the surface that the indenter may touch.
+    pub contact: String,
+    /// The fingertip's atlas patch or the section's line; other bodies have none.
+    pub patch: Option<RecordedPatch>,
+    /// Whether the body is a plane section in x and y.
+    pub plane: bool,
+}
+
+/// What is read off a fingertip at each equilibrium.
+pub struct RecordedPatch {
+    /// Vertices and triangles; of a section the vertices along the skin and
+    /// no triangles.
+    pub patch: Patch,
+    dermis: SedRecovery,
+    epidermis: SedRecovery,
+}
+
+impl Body {
+    /// Meshes a fingertip and holds what carries it.
+    ///
+    /// Always the axial displacement of the soft tissue's base, which goes on as
+    /// the rest of the finger. A rigid bone is held as a whole. An elastic one is
+    /// clamped where the base plane cuts it, because there the joint carries it; its
+    /// marrow cavity is free: marrow and cancellous bone are softer than the cortex
+    /// by a factor of ten and more, and to hold the cavity's wall would leave but
+    /// 0.75 mm of cortex to deform on a rigid core. The skin under a rigid nail is
+    /// held; an elastic nail is carried by that skin alone.
+    ///
+    /// # Errors
+    /// See [`SimulationError`].
+    pub fn fingertip(
+        shape: &FingertipShape,
+        materials: Materials,
+        density: Density,
+        order: Order,
+        parts: Parts,
+    ) -> Result<Self, SimulationError> {
+        let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
+        let mut fixed = vec![false; 3 * mesh.nodes.len()];
+        for &n in &mesh.node_sets["base"] {
+            fixed[3 * n as usize] = true;
+        }
+        let bone = if parts.bone { "bone_base" } else { "bone" };
+        let nail = (!parts.nail).then_some("nail");
+        for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
+            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+        }
+        Self::with_patch(mesh, materials, fixed, patch, false)
+    }
+
+    /// A body with layers, of which pressure and SED are read at vertices.
+    pub(super) fn with_patch(
+        mesh: Mesh,
+        materials: Materials,
+        fixed: Vec<bool>,
+        patch: Patch,
+        plane: bool,
+    ) -> Result<Self, SimulationError> {
+        let side = |tissue: Tissue| {
+            SedRecovery::new(&mesh, "interface", tissue.region(), &patch.interface)
+                .map_err(NoTissue::from)
+        };
+        let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
+        let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
+        let patch = Some(RecordedPatch { patch, dermis, epidermis });
+        Ok(Self { problem, contact: "skin".into(), patch, plane })
+    }
+
+    /// Any mesh, held on the surfaces or node sets `held` and touched on the
+    /// surface `contact`.
+    ///
+    /// # Errors
+    /// [`SimulationError::Problem`] names a surface that the mesh lacks.
+    pub fn from_mesh(
+        mesh: Mesh,
+        materials: Materials,
+        held: &[String],
+        contact: &str,
+    ) -> Result<Self, SimulationError> {
+        let mut fixed = vec![false; 3 * mesh.nodes.len()];
+        for name in held {
+            let nodes = mesh.node_sets.get(name).ok_or_else(|| ProblemError::Missing {
+                kind: "node set",
+                name: name.clone(),
+                known: mesh.node_sets.keys().cloned().collect::<Vec<_>>().join(", "),
+            })?;
+            for &n in nodes {
+                fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+            }
+        }
+        let plane = mesh.is_planar();
+        let problem = Problem::new(mesh, materials, fixed, Some(contact))?;
+        Ok(Self { problem, contact: contact.into(), patch: None, plane })
+    }
+
+    /// The atlas of the body's patch; `None` for a body without one and for a section.
+    ///
+    /// # Errors
+    /// [`BuildAtlasError`] if the patch cannot be flattened.
+    pub fn atlas(&self) -> Option<Result<(Atlas, AtlasReport), BuildAtlasError>> {
+        let patch = &self.patch.as_ref().filter(|_| !self.plane)?.patch;
+        let at = |nodes: &[u32]| -> Vec<[f64; 3]> {
+            nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect()
+        };
+        Some(build_atlas(&at(&patch.skin), &at(&patch.interface), &patch.triangles))
+    }
+
+    /// Orientation of an indenter in `pose`: its own z axis is the direction in
+    /// which it presses. A plane section is pressed in its plane, towards +y.
+    #[must_use]
+    pub fn rotation(&self, pose: Pose) -> [[f64; 3]; 3] {
+        if self.plane {
+            product(&[[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], &rotation(pose))
+        } else {
+            rotation(pose)
+        }
+    }
+
+    /// Force of the pressure that is recorded, N: what the atlas patch does not
+    /// show counts as none, so contact outside it shows in the balance.
+    fn force_of_pressure_n(&self, solver: &Solver<'_>, pressure_mpa: &[f64]) -> [f64; 3] {
+        let surface = &self.problem.mesh.surfaces[&self.contact];
+        let Some(RecordedPatch { patch, .. }) = &self.patch else {
+            return solver.force_of_pressure_n(surface, pressure_mpa);
+        };
+        let mut shown = vec![0.0; pressure_mpa.len()];
+        for &n in &patch.skin {
+            shown[n as usize] = pressure_mpa[n as usize];
+        }
+        solver.force_of_pressure_n(surface, &shown)
+    }
+
+    /// The body at the solver's equilibrium; `history` is the solver's
+    /// [`Solver::history_of`].
+    #[must_use]
+    pub fn deformed<'a>(
+        &'a self,
+        solver: &'a Solver<'_>,
+        history: &'a dyn Fn(usize, usize) -> &'a [f64],
+    ) -> Deformed<'a> {
+        Deformed {
+            mesh: &self.problem.mesh,
+            geometry: &self.problem.geometry,
+            materials: &self.problem.materials,
+            u: solver.displacement_mm(),
+            history,
+        }
+    }
+
+    /// Vertex values and checks of the solver's equilibrium.
+    ///
+    /// # Errors
+    /// [`SimulationError::Slipped`] where the skin does not follow the indenter,
+    /// [`SimulationError::Inverted`] where SED cannot be read.
+    pub fn record(
+        &self,
+        solver: &Solver<'_>,
+        depth_mm: f64,
+        report: &StepReport,
+    ) -> Result<IncrementRecord, SimulationError> {
+        self.follows(solver, depth_mm)?;
+        let skin = &self.problem.mesh.surfaces[&self.contact];
+        let pressure = solver.pressure_mpa(skin);
+        let integral = self.force_of_pressure_n(solver, &pressure);
+        let balance = solver.balance();
+        let force = balance.contact_force_n;
+        let size = norm(force).max(solver.least_force_n());
+        let difference =
+            |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|i| a[i] - b[i])) / size;
+        let work = solver.indenter_work_mj();
+        let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
+            Default::default();
+        if let Some(p) = &self.patch {
+            pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            shear_mpa = self.shear_mpa(solver, &p.patch.skin);
+            let history = |block, element| solver.history_of(block, element);
+            let body = self.deformed(solver, &history);
+            sed_dermis_mpa = p.dermis.sed_mpa(&body)?;
+            sed_epidermis_mpa = p.epidermis.sed_mpa(&body)?;
+        }
+        Ok(IncrementRecord {
+            depth_mm,
+            time_s: 0.0,
+            force_n: force,
+            pressure_mpa,
+            sed_dermis_mpa,
+            sed_epidermis_mpa,
+            shear_mpa,
+            outside_calibration: self.outside_calibration(solver),
+            contact: solver.contact_rule(),
+            checks: Checks {
+                residual_relative: report.residual_relative,
+                contact_force_vs_pressure_integral: difference(integral, balance.normal_force_n),
+                plate_vs_support_reaction: difference(balance.support_force_n.map(|v| -v), force),
+                energy_vs_work: (report.stored_mj + report.dissipated_mj - work).abs()
+                    / solver.indenter_work_mj_max().max(f64::MIN_POSITIVE),
+                j_min: report.j_min,
+                penetration_mm_max: report.gap_error_mm,
+                newton_iterations: report.effort.newton_iterations,
+                step_cuts: report.effort.cuts,
+                augmentations: report.effort.augmentations,
+                factorizations: report.effort.factorizations,
+                cg_iterations: report.effort.cg_iterations,
+            },
+            seconds: 0.0,
+        })
+    }
+
+    /// A solver for this body.
+    ///
+    /// # Errors
+    /// [`SimulationError::Solve`] if the factor does not fit in memory.
+    pub fn solver(&self, options: Options) -> Result<Solver<'_>, SimulationError> {
+        Solver::new(&self.problem, options)
+            .map_err(|source| SimulationError::Solve { depth_mm: 0.0, source })
+    }
+}
+
+/// Rotation of an indenter: at rest its pressing side looks along +z into the pad;
+/// yaw about its normal, then pitch about y (tip first is positive), then roll
+/// about x.
+#[must_use]
+pub fn rotation(pose: Pose) -> [[f64; 3]; 3] {
+    Placement::turned(pose.pitch_deg, pose.roll_deg, pose.yaw_deg, [0.0; 3]).rotation
+}

@@ -1,0 +1,290 @@
+//! How an indenter is driven into a body, and the states at which it is recorded.
+
+use super::body::{Body, SimulationError};
+use super::record::IncrementRecord;
+use crate::scene::Pose;
+use papilla_fem::contact::ContactRule;
+use papilla_fem::solve::{Effort, Loading, Solver, StepReport};
+use papilla_sdf::{Plate, RoundedPlate, SignedDistance};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// A rigid indenter in its pose, about to touch.
+#[derive(Clone)]
+pub struct Approach {
+    /// Its shape.
+    pub shape: Arc<dyn SignedDistance>,
+    /// Highest point of the shape along its own z, mm.
+    pub top_mm: f64,
+    /// Orientation.
+    pub pose: Pose,
+    /// Where its axis meets the skin, mm along its own x and y from the skin
+    /// point that a flat plate would touch first.
+    pub offset_mm: [f64; 2],
+    /// Coulomb coefficient; 0 is no friction.
+    pub friction: f64,
+    /// Where on the skin contact is found; `None` leaves that to its width and the mesh.
+    pub contact: Option<ContactRule>,
+}
+
+impl Approach {
+    /// The 20 mm plate of the surface-pressure study in a pose, without friction.
+    #[must_use]
+    pub fn plate(pose: Pose) -> Self {
+        let plate = RoundedPlate::from(&Plate::default());
+        let top_mm = plate.half_mm[2];
+        Self {
+            shape: Arc::new(plate),
+            top_mm,
+            pose,
+            offset_mm: [0.0; 2],
+            friction: 0.0,
+            contact: None,
+        }
+    }
+}
+
+/// States that are stored.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drive {
+    /// Straight, at these depths from first touch, mm, rising.
+    Depths(Vec<f64>),
+    /// Straight, at these forces along the motion, N, rising.
+    Forces(Vec<f64>),
+    /// Along a path over time.
+    Path(Vec<DrivePoint>),
+}
+
+/// A point of a path from first touch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DrivePoint {
+    /// Time, s.
+    pub time_s: f64,
+    /// Depth, mm.
+    pub depth_mm: f64,
+    /// Displacement along the indenter's own x and y, mm.
+    pub shift_mm: [f64; 2],
+}
+
+impl DrivePoint {
+    /// The point `i / n` of the way to `to`.
+    #[must_use]
+    pub fn towards(&self, to: &Self, i: usize, n: usize) -> Self {
+        let part = i as f64 / n as f64;
+        let mix = |a: f64, b: f64| a + part * (b - a);
+        Self {
+            time_s: mix(self.time_s, to.time_s),
+            depth_mm: mix(self.depth_mm, to.depth_mm),
+            shift_mm: std::array::from_fn(|k| mix(self.shift_mm[k], to.shift_mm[k])),
+        }
+    }
+}
+
+/// Called with the solver at each stored equilibrium.
+pub type Visit<'a> = &'a mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport);
+
+/// Farthest that a prescribed force is looked for, mm.
+pub(super) const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
+/// How closely a prescribed force is met.
+const FORCE_TOLERANCE: f64 = 1e-4;
+/// Equilibria tried for one prescribed force.
+const FORCE_TRIES_MAX: u32 = 60;
+
+impl Body {
+    /// Presses and calls `visit` with the solver at each stored equilibrium and
+    /// its record. There are more equilibria than stored depths, for the work integral;
+    /// `refinement` 2 halves their distance, and so on. The stored states do
+    /// not depend on it.
+    ///
+    /// # Errors
+    /// [`SimulationError::Solve`] names the state that found no equilibrium; records
+    /// up to it have been visited.
+    pub fn press(
+        &self,
+        solver: &mut Solver<'_>,
+        approach: &Approach,
+        drive: &Drive,
+        refinement: u32,
+        visit: Visit<'_>,
+    ) -> Result<(), SimulationError> {
+        drive.validate()?;
+        let duration_s = match drive {
+            Drive::Path(points) => points.last().map_or(0.0, |p| p.time_s),
+            _ => 0.0,
+        };
+        solver.start(Loading {
+            indenter: Some(self.indenter(approach, drive)?),
+            friction: approach.friction,
+            duration_s,
+            ..Loading::default()
+        });
+        match drive {
+            Drive::Depths(depths) => self.to_depths(solver, depths, refinement, visit),
+            Drive::Forces(forces) => self.to_forces(solver, forces, visit),
+            Drive::Path(points) => self.along(solver, points, visit),
+        }
+    }
+
+    fn to_depths(
+        &self,
+        solver: &mut Solver<'_>,
+        depths_mm: &[f64],
+        refinement: u32,
+        visit: Visit<'_>,
+    ) -> Result<(), SimulationError> {
+        let last = depths_mm.last().copied().unwrap_or(1.0);
+        for (i, &depth_mm) in depths_mm.iter().enumerate() {
+            let clock = Instant::now();
+            let at = |source| SimulationError::Solve { depth_mm, source };
+            let mut effort = Effort::default();
+            for between in path_mm(depths_mm, i, refinement) {
+                effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
+            }
+            let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
+            report.effort = report.effort.plus(&effort);
+            let mut record = self.record(solver, depth_mm, &report)?;
+            record.seconds = clock.elapsed().as_secs_f64();
+            visit(solver, &record, &report);
+        }
+        Ok(())
+    }
+
+    fn along(
+        &self,
+        solver: &mut Solver<'_>,
+        points: &[DrivePoint],
+        visit: Visit<'_>,
+    ) -> Result<(), SimulationError> {
+        let end = points.last().map_or(1.0, |p| p.time_s);
+        for p in points {
+            let clock = Instant::now();
+            solver.turn();
+            let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
+            let report = solver.advance_to(p.time_s / end).map_err(at)?;
+            let mut record = self.record(solver, p.depth_mm, &report)?;
+            record.time_s = p.time_s;
+            record.seconds = clock.elapsed().as_secs_f64();
+            visit(solver, &record, &report);
+        }
+        Ok(())
+    }
+
+    /// Secant and bisection on the depth, always coming from a state below.
+    fn to_forces(
+        &self,
+        solver: &mut Solver<'_>,
+        forces_n: &[f64],
+        visit: Visit<'_>,
+    ) -> Result<(), SimulationError> {
+        // Depth grows about as force^(2/3); the first guess is a small part of it.
+        let mut low: (f64, f64) = (0.0, 0.0);
+        let mut step = 0.02;
+        for &wanted in forces_n {
+            let clock = Instant::now();
+            let mut effort = Effort::default();
+            let mut high: Option<(f64, f64)> = None;
+            let mut found = None;
+            for _ in 0..FORCE_TRIES_MAX {
+                let next = match high {
+                    None => (low.0 + step).min(1.0),
+                    Some(h) => {
+                        let secant = low.0 + (wanted - low.1) / (h.1 - low.1) * (h.0 - low.0);
+                        let width = h.0 - low.0;
+                        secant.clamp(low.0 + 0.05 * width, h.0 - 0.05 * width)
+                    }
+                };
+                let depth_mm = next * FORCE_TRAVEL_MAX_MM;
+                let mark = solver.mark();
+                let report = solver
+                    .advance_to(next)
+                    .map_err(|source| SimulationError::Solve { depth_mm, source })?;
+                effort = effort.plus(&report.effort);
+                let force = solver.force_along_path_n();
+                if (force - wanted).abs() <= FORCE_TOLERANCE * wanted {
+                    found = Some((next, force, report));
+                    break;
+                }
+                if force > wanted {
+                    solver.restore(&mark);
+                    high = Some((next, force));
+                } else {
+                    step = (next - low.0)
+                        * ((wanted - force) / (force - low.1).max(1e-300)).clamp(0.2, 1.5);
+                    low = (next, force);
+                    if next >= 1.0 {
+                        break;
+                    }
+                }
+            }
+            let Some((at, force, mut report)) = found else {
+                return Err(SimulationError::Force { wanted_n: wanted, reached_n: low.1 });
+            };
+            low = (at, force);
+            report.effort = effort;
+            let mut record = self.record(solver, at * FORCE_TRAVEL_MAX_MM, &report)?;
+            record.seconds = clock.elapsed().as_secs_f64();
+            visit(solver, &record, &report);
+        }
+        Ok(())
+    }
+}
+
+impl Drive {
+    /// Number of stored states.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Depths(v) | Self::Forces(v) => v.len(),
+            Self::Path(points) => points.len(),
+        }
+    }
+
+    /// Whether nothing is stored.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether states have a time.
+    #[must_use]
+    pub const fn is_timed(&self) -> bool {
+        matches!(self, Self::Path(_))
+    }
+
+    fn validate(&self) -> Result<(), SimulationError> {
+        let rising: Vec<f64> = match self {
+            Self::Depths(v) | Self::Forces(v) => v.clone(),
+            Self::Path(points) => points.iter().map(|p| p.time_s).collect(),
+        };
+        let mut last = 0.0;
+        for v in rising {
+            if !(v.is_finite() && v > last) {
+                return Err(SimulationError::Rising(v, last));
+            }
+            last = v;
+        }
+        Ok(())
+    }
+}
+
+/// Depths between stored depth `i` and the one before it at which to find
+/// equilibrium too, mm. Force turns fast after first touch, and with it the
+/// work integral.
+fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
+    let to = depths_mm[i];
+    let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
+    let coarse: &[f64] = match i {
+        0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
+        1 => &[0.0, 0.5, 1.0],
+        _ => &[0.0, 1.0],
+    };
+    let at = |part: f64| from + part * (to - from);
+    let mut path = Vec::new();
+    for pair in coarse.windows(2) {
+        for k in 1..=refinement {
+            path.push(at(pair[0] + (pair[1] - pair[0]) * f64::from(k) / f64::from(refinement)));
+        }
+    }
+    path.pop();
+    path
+}

@@ -1,0 +1,125 @@
+use std::collections::BTreeMap;
+
+use proptest::prelude::*;
+use serde::Deserialize;
+
+use super::*;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(dead_code, reason = "only read")]
+struct Outer {
+    count: u32,
+    #[serde(default)]
+    inner: Vec<Inner>,
+    #[serde(default)]
+    is_on: bool,
+    #[serde(default)]
+    pair: [f32; 2],
+    #[serde(default)]
+    kind: Kind,
+}
+
+#[derive(Debug, Deserialize)]
+#[allow(dead_code, reason = "only read")]
+struct Inner {
+    length_mm: f64,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    #[default]
+    Soft,
+    Hard,
+}
+
+fn refused(json: &str) -> String {
+    read::<Outer>(json.as_bytes()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_wrong_type_names_member_and_place_and_no_type_of_ours() {
+    for (json, due) in [
+        (
+            r#"{"count": "1"}"#,
+            r#"count: the text "1" where a whole number from 0 to 4294967295 is due (line 1, column 13)"#,
+        ),
+        (
+            r#"{"count": -1}"#,
+            "count: the number -1 where a whole number from 0 to 4294967295 is due (line 1, column 12)",
+        ),
+        (
+            "{\"count\": 1,\n \"inner\": [{\"length_mm\": 1}, {\"length_mm\": [2]}]}",
+            "inner[1].length_mm: a list where a number is due (line 2, column 43)",
+        ),
+        (
+            r#"{"count": 1, "inner": [7]}"#,
+            "inner[0]: the number 7 where an object is due (line 1, column 24)",
+        ),
+        (
+            r#"{"count": 1, "is_on": 1}"#,
+            "is_on: the number 1 where true or false is due (line 1, column 23)",
+        ),
+        (
+            r#"{"count": 1, "pair": [1]}"#,
+            "pair: a list of 1 where a list of 2 is due (line 1, column 24)",
+        ),
+        ("[]", "a list of 0 where an object of 5 members is due (line 1, column 2)"),
+        ("5", "the number 5 where an object is due (line 1, column 1)"),
+    ] {
+        assert_eq!(refused(json), due);
+    }
+    let error = read::<Outer>(br#"{"count": 1, "kind": 5}"#).unwrap_err();
+    assert_eq!(error.member.as_deref(), Some("kind"));
+    for json in [r#"{"count": 1, "cuont": 2}"#, r#"{"count": 1, "kind": "hrad"}"#, "{}", "{", ""] {
+        let text = refused(json);
+        for word in ["struct", "enum", "Outer", "Kind", "u32", "f64"] {
+            assert!(!text.contains(word), "{json}: {text}");
+        }
+    }
+    assert!(refused(r#"{"count": 1, "cuont": 2}"#).contains("unknown field `cuont`"));
+}
+
+#[test]
+fn long_texts_are_not_repeated() {
+    let long = format!(r#"{{"count": "{}"}}"#, "x".repeat(5000));
+    assert!(refused(&long).len() < 300, "{}", refused(&long));
+    let long = format!(r#"{{"count": 1, "{}": 1}}"#, "x".repeat(5000));
+    assert!(refused(&long).len() < 300, "{}", refused(&long));
+}
+
+#[test]
+fn a_text_that_is_too_long_is_refused_before_it_is_read() {
+    let text = |length: usize, escapes: &str| {
+        format!("{{\"a\":\n \"{}{escapes}\"}}", "x".repeat(length - escapes.len()))
+    };
+    let read = |json: &str| read_bounded::<BTreeMap<String, String>>(json.as_bytes());
+    for escapes in ["", r"\\", r#"\""#] {
+        assert!(read(&text(TEXT_BYTES_MAX, escapes)).is_ok());
+        let error = read(&text(TEXT_BYTES_MAX + 1, escapes)).unwrap_err();
+        assert_eq!((error.member, error.place), (None, Some((2, 2))), "{}", error.reason);
+    }
+    // One that never ends.
+    assert!(read(&format!("{{\"{}", "x".repeat(2000))).unwrap_err().reason.contains("longer"));
+}
+
+proptest! {
+    #[test]
+    fn bytes_of_any_kind_do_not_panic(json in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = read_bounded::<Outer>(&json);
+    }
+
+    #[test]
+    fn the_longest_text_is_found(parts in prop::collection::vec("[a\"\\\\]{0,6}", 0..8)) {
+        let json = serde_json::to_string(&parts).unwrap();
+        prop_assert_eq!(read_bounded::<Vec<String>>(json.as_bytes()).unwrap(), parts);
+    }
+}
+
+#[test]
+fn what_is_repeated_is_cut_between_characters() {
+    assert_eq!(shortened("naïve"), "naïve");
+    let long = shortened(&"ï".repeat(500));
+    assert_eq!((long.chars().count(), long.chars().last()), (ECHO_MAX + 1, Some('…')));
+}

@@ -1,0 +1,80 @@
+//! Rules for dimensions.
+
+use std::fmt::Debug;
+use std::path::PathBuf;
+
+/// Largest dimension of an indenter, mm.
+pub(super) const LENGTH_MAX_MM: f64 = 1000.0;
+
+/// A dimension that makes no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field} = {value} {rule}")]
+pub struct BadValue {
+    /// Field, dotted.
+    pub field: String,
+    /// What was found.
+    pub value: String,
+    /// What it has to be.
+    pub rule: &'static str,
+}
+
+/// Why a description is not a shape.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// A dimension makes no sense.
+    #[error(transparent)]
+    Value(#[from] BadValue),
+    /// A picture cannot be taken as a height map.
+    #[error("{} cannot be a height map: {message}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// Why, and the cure.
+        message: String,
+    },
+}
+
+impl BadValue {
+    /// The same inside a table.
+    pub(super) fn under(mut self, table: &str) -> Self {
+        self.field = format!("{table}.{}", self.field);
+        self
+    }
+}
+
+/// `Ok` if the rule holds.
+pub(super) fn require(
+    ok: bool,
+    field: &str,
+    value: &dyn Debug,
+    rule: &'static str,
+) -> Result<(), BadValue> {
+    if ok {
+        Ok(())
+    } else {
+        Err(BadValue { field: field.into(), value: format!("{value:?}"), rule })
+    }
+}
+
+/// A length has to be positive and not absurd.
+pub(super) fn length(field: &str, value_mm: f64) -> Result<(), BadValue> {
+    let ok = value_mm > 0.0 && value_mm <= LENGTH_MAX_MM;
+    require(ok, field, &value_mm, "has to be positive and at most 1000 mm")
+}
+
+/// Lengths, each positive and not absurd.
+pub(super) fn lengths(field: &str, values_mm: &[f64]) -> Result<(), BadValue> {
+    let ok = values_mm.iter().all(|&v| v > 0.0 && v <= LENGTH_MAX_MM);
+    require(ok, field, &values_mm, "has to be positive and at most 1000 mm")
+}
+
+/// A radius that rounds edges has to be positive, or the normal would jump
+/// there, and leave the faces between them.
+pub(super) fn rounding(
+    field: &str,
+    radius_mm: f64,
+    most_mm: f64,
+    rule: &'static str,
+) -> Result<(), BadValue> {
+    require(radius_mm > 0.0 && radius_mm <= most_mm, field, &radius_mm, rule)
+}

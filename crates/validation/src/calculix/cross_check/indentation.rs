@@ -1,0 +1,195 @@
+//! One body pressed in both codes.
+
+use super::ours::{Cards, laws, sed_mpa};
+use super::{Check, Context, SOURCE};
+use crate::calculix::deck::{BODY, ELEMENTS, INDENTER};
+use crate::calculix::{Deck, ElementTypes, Indentation, Quantity, RigidIndenter, StepControl};
+use crate::processor;
+use crate::verify::CaseError;
+use papilla_fem::mesh::Mesh;
+use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem, Solver};
+use papilla_fingertip::simulation::record::relative_l2;
+use papilla_fingertip::tissue::Tissue;
+use papilla_sdf::SignedDistance;
+use std::sync::Arc;
+
+/// A body, what presses on it, and how far both codes may be apart.
+pub(super) struct Pressing<'a> {
+    /// Name of CalculiX' files.
+    pub job: &'a str,
+    /// What the rows are called.
+    pub name: &'a str,
+    pub mesh: Mesh,
+    pub cards: Cards,
+    pub fixed: Vec<bool>,
+    /// Surface that may be touched.
+    pub contact: &'a str,
+    /// The indenter for CalculiX; its shape for our solver.
+    pub indenter: RigidIndenter,
+    pub shape: Arc<dyn SignedDistance>,
+    pub types: ElementTypes,
+    /// SED is compared in the elements of the first tissue beside the second.
+    pub interface: [Tissue; 2],
+    /// Equal steps that our solver is led through; it takes more where it must.
+    pub steps: u32,
+    pub tolerance: Tolerance,
+}
+
+/// Largest relative differences.
+#[derive(Clone, Copy)]
+pub(super) struct Tolerance {
+    pub force: f64,
+    /// Norm over all nodes.
+    pub displacement: f64,
+    /// Peak, and norm over all points beside the interface.
+    pub sed: f64,
+}
+
+/// Most of CalculiX' CPU time that an indentation may take.
+const CPU_SHARE: f64 = 0.1;
+
+/// What a code found.
+struct Answer {
+    force_n: f64,
+    /// At the nodes that CalculiX has; 0 elsewhere.
+    displacement_mm: Vec<[f64; 3]>,
+    /// By element of the mesh and printed point.
+    sed_mpa: Vec<Vec<f64>>,
+    cpu_s: Option<f64>,
+}
+
+impl Pressing<'_> {
+    /// Solves it in both codes. CPU time is compared on full meshes only. What
+    /// does not end well in one of them is one row that fails.
+    pub(super) fn rows(self, context: &Context<'_>) -> Vec<Check> {
+        let name = self.name;
+        self.compare(context).unwrap_or_else(|e| {
+            let error: CaseError = format!("{name}: {e}").into();
+            vec![Check::failed(error.as_ref())]
+        })
+    }
+
+    fn compare(self, context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
+        let theirs = self.calculix(context)?;
+        let beside = beside(&self.mesh, self.interface);
+        let (name, tolerance) = (self.name, self.tolerance);
+        let [side, _] = self.interface.map(Tissue::name);
+        let ours = self.solver()?;
+        let row = |what: &str| format!("{name}: {what}");
+        let of = |a: &Answer| -> Vec<f64> {
+            beside.iter().flat_map(|&e| a.sed_mpa[e].iter().copied()).collect()
+        };
+        let (sed, their_sed) = (of(&ours), of(&theirs));
+        let peak = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
+        let u =
+            relative_l2(ours.displacement_mm.as_flattened(), theirs.displacement_mm.as_flattened());
+        let mut rows = vec![
+            Check::relative(row("force, N"), ours.force_n, theirs.force_n, tolerance.force, SOURCE),
+            Check::vanishes(row("displacement, L2"), u, tolerance.displacement, SOURCE),
+            Check::relative(
+                row(&format!("peak SED of {side} at the interface, MPa")),
+                peak(&sed),
+                peak(&their_sed),
+                tolerance.sed,
+                SOURCE,
+            ),
+            Check::vanishes(
+                row(&format!("SED of {side} at the interface, L2")),
+                relative_l2(&sed, &their_sed),
+                tolerance.sed,
+                SOURCE,
+            ),
+        ];
+        if let (Some(a), Some(b), false) = (ours.cpu_s, theirs.cpu_s, context.quick) {
+            let quantity = row(&format!("CPU s, {a:.2} over {b:.1}"));
+            rows.push(Check::within(quantity, a / b, [0.0, CPU_SHARE], SOURCE));
+        }
+        Ok(rows)
+    }
+
+    fn calculix(&self, context: &Context<'_>) -> Result<Answer, CaseError> {
+        let deck = Deck {
+            title: self.job,
+            mesh: &self.mesh,
+            materials: &self.cards,
+            fixed: &self.fixed,
+            prescribed_mm: &[],
+            press: Some(Indentation {
+                contact: self.contact,
+                indenter: self.indenter.clone(),
+                stiffness_mpa_per_mm: None,
+            }),
+            types: self.types,
+            step: StepControl::default(),
+        };
+        let run = context.ccx.run(context.folder, self.job, &deck.to_text()?)?;
+        let total = &run.dat.table(Quantity::TotalForce, INDENTER, 1.0)?.rows;
+        let mut displacement_mm = vec![[0.0; 3]; self.mesh.nodes.len()];
+        for row in &run.dat.table(Quantity::Displacement, BODY, 1.0)?.rows {
+            displacement_mm[row.id - 1].copy_from_slice(&row.values[..3]);
+        }
+        let blocks = &self.mesh.blocks;
+        let region: Vec<_> = blocks.iter().flat_map(|b| b.region.iter().copied()).collect();
+        let mut sed_mpa = vec![Vec::new(); region.len()];
+        for row in &run.dat.table(Quantity::Strain, ELEMENTS, 1.0)?.rows {
+            if let Some(card) = &self.cards[region[row.id - 1].index()] {
+                sed_mpa[row.id - 1].push(card.energy_mpa(&row.values));
+            }
+        }
+        let along = self.pressing_axis();
+        let force_n =
+            total.first().map_or(f64::NAN, |r| (0..3).map(|i| r.values[i] * along[i]).sum());
+        Ok(Answer { force_n, displacement_mm, sed_mpa, cpu_s: run.cpu_s })
+    }
+
+    /// The indenter's own +z in the world. Forces across it belong to planes of symmetry.
+    fn pressing_axis(&self) -> [f64; 3] {
+        self.indenter.start.rotation.map(|row| row[2])
+    }
+
+    fn solver(self) -> Result<Answer, CaseError> {
+        let along = self.pressing_axis();
+        let begun_s = processor::thread_s();
+        let problem = Problem::new(self.mesh, laws(&self.cards)?, self.fixed, Some(self.contact))?;
+        let RigidIndenter { start, path, .. } = self.indenter;
+        let indenter = MovingIndenter::along(self.shape, start, path);
+        let mut solver = Solver::new(&problem, Options::default())?;
+        solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
+        for step in 1..=self.steps {
+            solver.advance_to(f64::from(step) / f64::from(self.steps))?;
+        }
+        let u = solver.displacement_mm();
+        let sed_mpa = sed_mpa(&problem, self.types, u)?;
+        let cpu_s = Some(processor::thread_s() - begun_s);
+        let force = solver.balance().contact_force_n;
+        let force_n = (0..3).map(|i| force[i] * along[i]).sum();
+        let mut displacement_mm = vec![[0.0; 3]; u.len()];
+        for block in &problem.mesh.blocks {
+            for e in 0..block.len() {
+                for &n in &block.element(e)[..self.types.of(block.kind).nodes] {
+                    displacement_mm[n as usize] = u[n as usize];
+                }
+            }
+        }
+        Ok(Answer { force_n, displacement_mm, sed_mpa, cpu_s })
+    }
+}
+
+/// Elements of the first tissue that share a node with the second.
+fn beside(mesh: &Mesh, [side, other]: [Tissue; 2]) -> Vec<usize> {
+    let elements = || {
+        mesh.blocks
+            .iter()
+            .flat_map(|b| (0..b.len()).map(move |e| (Tissue::of(b.region[e]), b.element(e))))
+    };
+    let mut shared = vec![false; mesh.nodes.len()];
+    for (_, nodes) in elements().filter(|(tissue, _)| *tissue == other) {
+        nodes.iter().for_each(|&n| shared[n as usize] = true);
+    }
+    let touches = |nodes: &[u32]| nodes.iter().any(|&n| shared[n as usize]);
+    elements()
+        .enumerate()
+        .filter(|(_, (tissue, nodes))| *tissue == side && touches(nodes))
+        .map(|(number, _)| number)
+        .collect()
+}

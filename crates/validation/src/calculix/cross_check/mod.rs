@@ -1,0 +1,77 @@
+//! Cases that both codes solve on equal meshes.
+
+mod finger;
+mod indentation;
+mod one_element;
+mod ours;
+mod section;
+mod sphere;
+
+use super::Ccx;
+use crate::verify::{CaseError, Check, Report, Row};
+use std::path::Path;
+
+/// Where the references come from.
+const SOURCE: &str = "CalculiX";
+
+/// What the cases share.
+struct Context<'a> {
+    ccx: &'a Ccx,
+    /// Folder for decks and results.
+    folder: &'a Path,
+    /// Smaller meshes.
+    quick: bool,
+}
+
+/// One problem that both codes solve.
+pub struct Case {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What its rows show, one sentence.
+    pub shows: &'static str,
+    run: fn(&Context<'_>) -> Result<Vec<Check>, CaseError>,
+}
+
+/// Every case, cheap ones first.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "one-element",
+        shows: "One element of each material and kind, stretched and sheared: the laws and their \
+                constants mean the same in both codes.",
+        run: one_element::run,
+    },
+    Case {
+        name: "sphere",
+        shows: "A block of two layers under a rigid sphere: contact, force, displacement, and SED \
+                where the layers meet.",
+        run: sphere::run,
+    },
+    Case {
+        name: "section",
+        shows: "The plane-strain section under a flat plate: three laws in two dimensions.",
+        run: section::run,
+    },
+    Case {
+        name: "finger",
+        shows: "The fingertip under a tilted plate, from a scene.",
+        run: finger::run,
+    },
+];
+
+/// Runs the cases that `wanted` accepts, with decks and results in `folder`;
+/// `visit` is told of each before (`None`) and after (`Some(rows)`).
+pub fn run(
+    ccx: &Ccx,
+    folder: &Path,
+    quick: bool,
+    wanted: &dyn Fn(&Case) -> bool,
+    visit: &mut dyn FnMut(&Case, Option<&[Row]>),
+) -> Report {
+    let context = Context { ccx, folder, quick };
+    let mut report = Report { quick, ..Report::default() };
+    for case in CASES.iter().filter(|c| wanted(c)) {
+        visit(case, None);
+        visit(case, Some(report.take(case.name, || (case.run)(&context))));
+    }
+    report
+}

@@ -1,0 +1,233 @@
+//! What each effect of a scene changes and what it costs: the scene solved with each
+//! effect switched off, or on, in turn.
+
+use crate::processor;
+use papilla_fem::solve::{Effort, Options};
+use papilla_fem::tensor::norm;
+use papilla_fingertip::scene::effects::EFFECTS;
+use papilla_fingertip::scene::{EffectName, Scene};
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::body::SimulationError;
+use papilla_fingertip::simulation::fields::PA_PER_MPA;
+use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
+use serde::Serialize;
+
+/// The last stored state of one solve, and its price.
+#[derive(Clone, Debug, Serialize)]
+pub struct Solved {
+    /// Unknowns.
+    pub unknowns: usize,
+    /// Processor time of mesh, symbolic factorization and set-up, s.
+    pub setup_s: f64,
+    /// Processor time of the indentation, s.
+    pub solve_s: f64,
+    /// Iterations and the like.
+    pub effort: Effort,
+    /// Force on the body at the last state, N (plane sections: N per mm of length).
+    pub force_n: f64,
+    /// Greatest pressure, Pa.
+    pub pressure_pa_max: f64,
+    /// Greatest SED on the dermis side of the interface, J/m3.
+    pub sed_j_per_m3_max: f64,
+    #[serde(skip)]
+    last: IncrementRecord,
+}
+
+/// What switching an effect does to the last state, relative to the scene as
+/// it stands.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Change {
+    /// Relative L2 difference of SED over the interface's vertices.
+    pub sed_l2: f64,
+    /// Change of the greatest SED over the greatest SED.
+    pub sed_peak: f64,
+    /// Relative L2 difference of pressure over the skin's vertices.
+    pub pressure_l2: f64,
+    /// Change of the greatest pressure over the greatest pressure.
+    pub pressure_peak: f64,
+    /// Change of force over force.
+    pub force: f64,
+}
+
+/// What became of one switch.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// Solved.
+    Solved {
+        /// The variant.
+        state: Box<Solved>,
+        /// Against the scene as it stands; absent where the body's vertices differ.
+        change: Option<Change>,
+    },
+    /// The scene cannot be without it, or have it.
+    Refused(String),
+    /// The variant found no equilibrium.
+    Failed(String),
+}
+
+/// One effect switched.
+#[derive(Clone, Debug, Serialize)]
+pub struct Switched {
+    /// The effect.
+    pub effect: &'static str,
+    /// Whether the scene names it, so that it was switched off.
+    pub named: bool,
+    /// Effects that had to be switched with it.
+    pub along: Vec<&'static str>,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// The scene as it stands and with each effect switched.
+#[derive(Clone, Debug, Serialize)]
+pub struct Study {
+    /// Effects that the scene names.
+    pub effects: Vec<EffectName>,
+    /// The scene as it stands.
+    pub base: Solved,
+    /// One entry an effect, in the order of the table of effects.
+    pub switched: Vec<Switched>,
+}
+
+/// Solves `scene` and every variant of it; `visit` is told of each before.
+///
+/// # Errors
+/// [`SimulationError`] if the scene itself cannot be solved; variants report theirs in
+/// [`Outcome`].
+pub fn run(scene: &Scene, visit: &mut dyn FnMut(&str)) -> Result<Study, SimulationError> {
+    visit("as it stands");
+    let base = solve(scene)?;
+    let mut switched = Vec::new();
+    for effect in EFFECTS {
+        let named = scene.has(effect.name);
+        visit(effect.name);
+        let (variant, along) = switch(scene, effect.name, named);
+        let outcome = match variant.validate() {
+            Err(why) => Outcome::Refused(why.to_string()),
+            Ok(()) => match solve(&variant) {
+                Err(why) => Outcome::Failed(why.to_string()),
+                Ok(state) => {
+                    let change = change(&base, &state);
+                    Outcome::Solved { state: Box::new(state), change }
+                }
+            },
+        };
+        switched.push(Switched { effect: effect.name, named, along, outcome });
+    }
+    Ok(Study { effects: scene.effects.clone(), base, switched })
+}
+
+/// The scene with one effect off (and those that need it), or on (and those
+/// that it needs).
+fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'static str>) {
+    let mut names: Vec<_> = scene.effects.iter().map(EffectName::as_str).collect();
+    let mut along = Vec::new();
+    if named {
+        names.retain(|n| *n != effect);
+        while let Some(orphan) = EFFECTS
+            .iter()
+            .find(|e| names.contains(&e.name) && e.needs.iter().any(|n| !names.contains(n)))
+        {
+            names.retain(|n| *n != orphan.name);
+            along.push(orphan.name);
+        }
+    } else {
+        names.push(effect);
+        while let Some(missing) = EFFECTS
+            .iter()
+            .filter(|e| names.contains(&e.name))
+            .flat_map(|e| e.needs)
+            .find(|n| !names.contains(n))
+        {
+            names.push(missing);
+            along.push(missing);
+        }
+    }
+    let effects = names.into_iter().filter_map(EffectName::named).collect();
+    (Scene { effects, ..scene.clone() }, along)
+}
+
+fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
+    let begun_s = processor::thread_s();
+    let setup = Simulation::new(scene)?;
+    let mut solver = setup.body.solver(Options::default())?;
+    let ready_s = processor::thread_s();
+    let (mut effort, mut last) = (Effort::default(), None);
+    setup.body.press(&mut solver, &setup.approach, &setup.drive, 1, &mut |_, record, report| {
+        effort = effort.plus(&report.effort);
+        last = Some(record.clone());
+    })?;
+    let solve_s = processor::thread_s() - ready_s;
+    let last = last.ok_or(SimulationError::Empty)?;
+    Ok(Solved {
+        unknowns: setup.body.problem.system.dofs.count,
+        setup_s: ready_s - begun_s,
+        solve_s,
+        effort,
+        force_n: norm(last.force_n),
+        pressure_pa_max: PA_PER_MPA * max(&last.pressure_mpa),
+        sed_j_per_m3_max: PA_PER_MPA * max(&last.sed_dermis_mpa),
+        last,
+    })
+}
+
+fn max(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+fn change(base: &Solved, other: &Solved) -> Option<Change> {
+    let (a, b) = (&base.last, &other.last);
+    let same = a.pressure_mpa.len() == b.pressure_mpa.len()
+        && a.sed_dermis_mpa.len() == b.sed_dermis_mpa.len();
+    same.then(|| Change {
+        sed_l2: relative_l2(&b.sed_dermis_mpa, &a.sed_dermis_mpa),
+        sed_peak: other.sed_j_per_m3_max / base.sed_j_per_m3_max - 1.0,
+        pressure_l2: relative_l2(&b.pressure_mpa, &a.pressure_mpa),
+        pressure_peak: other.pressure_pa_max / base.pressure_pa_max - 1.0,
+        force: other.force_n / base.force_n - 1.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(effects: &str) -> Scene {
+        let text = format!(
+            "effects = {effects}\n[geometry]\nkind = \"block\"\nsize_mm = [4.0, 4.0]\n\
+             elements = [3, 3]\nlayers = [{{ tissue = \"dermis\", thickness_mm = 2.0, elements = 2 }}]\n\
+             [friction]\ncoefficient = 0.4\n\
+             [indenter]\nshape = \"sphere\"\nradius_mm = 3.0\n\
+             [motion]\ndepth_mm = 0.2\nincrements = 2\n"
+        );
+        toml::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn switching_takes_along_what_cannot_stay() {
+        let names = |s: &Scene| s.effects.iter().map(EffectName::as_str).collect::<Vec<_>>();
+        let all = scene("[\"finite_strain\", \"hyperelastic\", \"layers\"]");
+        let (off, along) = switch(&all, "finite_strain", true);
+        assert_eq!((names(&off), along), (vec!["layers"], vec!["hyperelastic"]));
+        let none = scene("[]");
+        let (on, along) = switch(&none, "hyperelastic", false);
+        assert_eq!(
+            (names(&on), along),
+            (vec!["hyperelastic", "finite_strain"], vec!["finite_strain"])
+        );
+    }
+
+    #[test]
+    fn every_effect_gets_a_row_and_friction_changes_the_force() {
+        let study = run(&scene("[\"finite_strain\", \"layers\"]"), &mut |_| {}).unwrap();
+        assert_eq!(study.switched.len(), EFFECTS.len());
+        let of = |name: &str| &study.switched.iter().find(|s| s.effect == name).unwrap().outcome;
+        let Outcome::Solved { change: Some(change), .. } = of("friction") else {
+            panic!("friction was not solved")
+        };
+        assert!(change.force > 1e-3, "friction stiffens a sphere's contact: {}", change.force);
+        assert!(matches!(of("viscoelastic"), Outcome::Refused(why) if why.contains("motion.path")));
+        assert!(matches!(of("finite_strain"), Outcome::Solved { .. }));
+    }
+}

@@ -1,0 +1,25 @@
+//! What the fingertip's finite elements are checked by.
+//!
+//! [`verify`]: closed forms, benchmarks, balances. [`stability`]: hard cases, each of which
+//! converges to a right answer or is refused. [`calculix`]: the same problems in another program.
+//! [`wedge`]: the figures of Chen, Shuai & Zhu. [`fidelity`]: coarser and finer elements beside
+//! each other. [`effect_study`]: what each effect of a scene changes and costs.
+//!
+//! ```
+//! use papilla_validation::verify;
+//!
+//! let report = verify::run(true, &|case| case.name == "uniaxial", &mut |_, _| ());
+//! assert!(report.passed());
+//! ```
+
+// Determinism is tested: the same bits, not nearly the same.
+#![cfg_attr(test, allow(clippy::float_cmp))]
+
+pub mod acceptance;
+pub mod calculix;
+pub mod effect_study;
+pub mod fidelity;
+pub mod processor;
+pub mod stability;
+pub mod verify;
+pub mod wedge;

@@ -1,0 +1,259 @@
+//! The named suite of hard cases: each converges to a right answer or is refused by a
+//! typed error that says what and where.
+//!
+//! One file a group of cases; [`CASES`] is the registry. A case is hard if a reasonable
+//! implementation would lock, invert, oscillate, overflow, diverge or quietly return a
+//! wrong map. What a case yields is a [`Line`] a variant, and a line passes only by its
+//! checks: against a closed form, another discretisation, an invariant, or the words of a
+//! refusal. How a single quantity is compared is [`crate::verify::Check`]'s business.
+
+mod bodies;
+mod differential;
+mod edges;
+mod files;
+mod friction;
+mod history;
+mod incompressible;
+mod indentation;
+mod lab;
+mod line;
+mod ogden;
+mod report;
+pub mod scenes;
+mod snap;
+mod stretches;
+mod touch;
+mod units;
+mod volume;
+
+pub use line::{End, Hardness, Line};
+pub use report::Report;
+
+use crate::verify::CaseError;
+use papilla_fingertip::simulation::body::{Body, SimulationError};
+use serde::Serialize;
+use std::cell::OnceCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+/// How much of the suite to run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Extent {
+    /// Every case, by its cheapest variants that can still break the promise: for a test run.
+    Quick,
+    /// Every variant.
+    #[default]
+    Usual,
+    /// Finer meshes and more random problems.
+    Long,
+}
+
+/// How much to run, and what several cases share.
+pub(crate) struct Suite {
+    extent: Extent,
+    /// The coarse fingertip, meshed when first asked for.
+    finger: OnceCell<Body>,
+}
+
+impl Suite {
+    fn quick(&self) -> bool {
+        self.extent == Extent::Quick
+    }
+
+    fn long(&self) -> bool {
+        self.extent == Extent::Long
+    }
+
+    fn finger(&self) -> Result<&Body, SimulationError> {
+        if let Some(body) = self.finger.get() {
+            return Ok(body);
+        }
+        let body = Body::usual(papilla_fingertip::mesh::fingertip::Density::Coarse)?;
+        Ok(self.finger.get_or_init(|| body))
+    }
+}
+
+/// A hard case.
+pub struct Case {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What it promises, one sentence.
+    pub promise: &'static str,
+    run: fn(&Suite) -> Result<Vec<Line>, CaseError>,
+}
+
+/// Every case.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "incompressible",
+        promise: "No locking from nu = .49 to .49999: Cook's membrane and a squeezed block give the \
+                  tip and the force of quadratic elements.",
+        run: incompressible::run,
+    },
+    Case {
+        name: "thin-layer",
+        promise: "Elements 50 times as wide as thick, in an epidermis of .02 mm, give the force of \
+                  quadratic ones and balance.",
+        run: bodies::thin_layer,
+    },
+    Case {
+        name: "elastic-bone",
+        promise: "Beside elastic bone 5e5 to 5e6 times as stiff as fat, the press tends to the one \
+                  on a rigid bone as 1 / E.",
+        run: bodies::elastic_bone,
+    },
+    Case {
+        name: "ogden",
+        promise: "alpha = 25 and negative mu, at the edge of stability and far beyond: finite, \
+                  flagged where outside the calibrated stretches, closed form within.",
+        run: ogden::run,
+    },
+    Case {
+        name: "equal-stretches",
+        promise: "Stress and tangent at principal stretches that differ by 0, 1e-16 ... 1e-6 are \
+                  those of the limit and of a law that knows no principal stretches.",
+        run: stretches::run,
+    },
+    Case {
+        name: "volume",
+        promise: "J from 1 down to .05 on distorted meshes follows the closed form from a single \
+                  increment; J below 0 is refused.",
+        run: volume::run,
+    },
+    Case {
+        name: "one-increment",
+        promise: "2 mm in one increment ends in the state that ten increments end in.",
+        run: indentation::one_increment,
+    },
+    Case {
+        name: "deep",
+        promise: "3 mm, near the bone: balances hold, no element inverts, quadratic elements agree.",
+        run: indentation::deep,
+    },
+    Case {
+        name: "tilt",
+        promise: "A plate at 0, 30, 60 and 80 degrees, and one that touches with a corner first, \
+                  balance and keep the finger's symmetry.",
+        run: indentation::tilt,
+    },
+    Case {
+        name: "sharp-wedge",
+        promise: "An edge of 2 mm across faces of 1 and .73 mm keeps its hold: it balances, to the \
+                  force of a finer mesh. Wedges with tips of .05 and .005 mm balance, or are \
+                  refused with the depth that was not reached; one that fits between nodes is \
+                  refused before anything is solved.",
+        run: edges::run,
+    },
+    Case {
+        name: "contact-lost",
+        promise: "Contact lost leaves a body at rest, contact regained gives the first state again.",
+        run: touch::lost_and_regained,
+    },
+    Case {
+        name: "grazing",
+        promise: "A graze of one face gives a force that rises smoothly from nothing.",
+        run: touch::grazing,
+    },
+    Case {
+        name: "first-gap",
+        promise: "First contact from a gap of 1e-9 mm and of 5 mm ends where contact from no gap \
+                  ends.",
+        run: touch::gaps,
+    },
+    Case {
+        name: "penetration",
+        promise: "An indenter that starts inside the body is refused, or pushed out to the state of \
+                  one that came from outside: never silent.",
+        run: touch::penetration,
+    },
+    Case {
+        name: "time-steps",
+        promise: "A ramp of 1e-6 s finds the instantaneous modulus, one of 1e6 s the long-term one, \
+                  in a bounded number of steps.",
+        run: history::durations,
+    },
+    Case {
+        name: "relaxation-times",
+        promise: "Tiny and huge relaxation times reach their limits, zero and nonsense are refused.",
+        run: history::relaxation_times,
+    },
+    Case {
+        name: "friction",
+        promise: "Coefficients 0, 1e-9, 1 and 10: no drag, Coulomb's drag, Coulomb's drag, a glued \
+                  block's force.",
+        run: friction::run,
+    },
+    Case {
+        name: "free-modes",
+        promise: "A body, or a part of one, that nothing holds is refused, and the motion that is \
+                  free is named.",
+        run: bodies::free_modes,
+    },
+    Case {
+        name: "mesh-files",
+        promise: "Inverted, duplicate and sliver elements, loose parts and absurd scales in a .msh \
+                  file are refused with line and cure.",
+        run: files::run,
+    },
+    Case {
+        name: "units",
+        promise: "Values off by a factor of 1000 and more are refused with the unit that was meant.",
+        run: units::run,
+    },
+    Case {
+        name: "snap-through",
+        promise: "A shallow arch below its limit load is where the controlled path says; above it, \
+                  it is on the far branch of that path or refused at the limit load.",
+        run: snap::run,
+    },
+    Case {
+        name: "differential",
+        promise: "Random small problems: loose and tight tolerances, one step and many, three \
+                  elimination orders, one and two threads, linear and quadratic elements agree; \
+                  a second run repeats bit for bit.",
+        run: differential::run,
+    },
+];
+
+/// Runs the cases that `wanted` accepts; `visit` is told of each before (`None`) and
+/// after (`Some(lines)`).
+pub fn run(
+    extent: Extent,
+    wanted: &dyn Fn(&Case) -> bool,
+    visit: &mut dyn FnMut(&Case, Option<&[Line]>),
+) -> Report {
+    let suite = Suite { extent, finger: OnceCell::new() };
+    let mut report = Report { extent, lines: Vec::new() };
+    for case in CASES.iter().filter(|c| wanted(c)) {
+        visit(case, None);
+        let before = report.lines.len();
+        report.lines.extend(case.lines(&suite));
+        visit(case, Some(&report.lines[before..]));
+    }
+    report
+}
+
+impl Case {
+    /// The lines of the case; an error or a panic of its own is a line that fails.
+    fn lines(&self, suite: &Suite) -> Vec<Line> {
+        let clock = Instant::now();
+        let broken = |what: String| vec![Line::broken("", what)];
+        let mut lines = match catch_unwind(AssertUnwindSafe(|| (self.run)(suite))) {
+            Ok(Ok(lines)) if lines.is_empty() => broken("gave no line".into()),
+            Ok(Ok(lines)) => lines,
+            Ok(Err(error)) => broken(error.to_string()),
+            Err(panic) => broken(format!("panicked: {}", panic_text(panic.as_ref()))),
+        };
+        let seconds = clock.elapsed().as_secs_f64();
+        for line in &mut lines {
+            (line.case, line.seconds) = (self.name, seconds);
+        }
+        lines
+    }
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
+}

@@ -1,0 +1,223 @@
+//! Checks of the whole solver against closed forms, published values and itself.
+//!
+//! One file a case; [`CASES`] is the registry. Every case solves real problems
+//! through the same [`papilla_fem::solve::Solver`] that presses fingers.
+
+pub(crate) mod bodies;
+mod check;
+pub(crate) mod cook;
+pub(crate) mod coulomb;
+mod density;
+mod disc;
+mod file;
+mod finger;
+mod half_plane;
+mod hertz;
+mod increments;
+pub(crate) mod locking;
+mod manufactured;
+mod mirror;
+mod ogden;
+mod patch;
+mod punch;
+pub(crate) mod relaxation;
+mod report;
+mod ring;
+mod solid_parts;
+mod tangent;
+mod uniaxial;
+
+pub use check::Check;
+pub use report::{Report, Row};
+
+use std::cell::OnceCell;
+
+/// Any error that a case may end with; it fails the case.
+pub(crate) type CaseError = Box<dyn std::error::Error + Send + Sync>;
+
+/// How much to run, and what several cases share.
+pub(crate) struct Context {
+    /// Smaller meshes, fewer presses.
+    quick: bool,
+    /// One flat indentation, solved when first asked for.
+    flat: OnceCell<finger::FlatIndentation>,
+}
+
+/// One verification case: a problem and the rows that it yields.
+pub struct Case {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// What its rows show, one sentence.
+    pub shows: &'static str,
+    /// Whether it has a form for a test run; without one, `--quick` leaves it out.
+    pub quick: bool,
+    run: fn(&Context) -> Result<Vec<Check>, CaseError>,
+}
+
+/// Every case, cheap and elementary ones first.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "patch",
+        shows: "Any element reproduces constant strain exactly on a distorted mesh, at small and \
+                at finite deformation.",
+        quick: true,
+        run: patch::run,
+    },
+    Case {
+        name: "uniaxial",
+        shows: "The material law and its stress: one element stretched and squeezed with free \
+                sides against the closed form.",
+        quick: true,
+        run: uniaxial::run,
+    },
+    Case {
+        name: "ogden",
+        shows: "Both published Ogden laws: one element uniaxially, planar and equibiaxially \
+                strained against the closed form.",
+        quick: true,
+        run: ogden::run,
+    },
+    Case {
+        name: "relaxation",
+        shows: "Prony series: a confined column relaxes under a held plate and creeps under a \
+                rising load as the closed forms say; energy is stored or dissipated, not lost.",
+        quick: true,
+        run: relaxation::run,
+    },
+    Case {
+        name: "tangent",
+        shows: "The assembled tangent is the derivative of the assembled residual, contact with a \
+                curved indenter included, so Newton's method converges as it should.",
+        quick: true,
+        run: tangent::run,
+    },
+    Case {
+        name: "convergence",
+        shows: "Errors fall with mesh size at the order theory gives each element, on a curved \
+                finite-strain solution manufactured with its body force.",
+        quick: true,
+        run: manufactured::run,
+    },
+    Case {
+        name: "cook",
+        shows: "Cook's membrane: bending and shear of a skewed mesh at large deflection, \
+                compressible and nearly incompressible.",
+        quick: true,
+        run: cook::run,
+    },
+    Case {
+        name: "ring",
+        shows: "A ring under internal pressure opens as Lame's solution says, in plane strain and \
+                nearly incompressible too.",
+        quick: true,
+        run: ring::run,
+    },
+    Case {
+        name: "disc",
+        shows: "A uniformly loaded disc sinks into a half-space as Boussinesq's solution says.",
+        quick: true,
+        run: disc::run,
+    },
+    Case {
+        name: "hertz",
+        shows: "Contact: a rigid sphere on a half-space at small load, force and contact radius.",
+        quick: true,
+        run: hertz::run,
+    },
+    Case {
+        name: "coulomb",
+        shows: "Friction: a block that is dragged slips with Coulomb's force and sticks as if \
+                glued.",
+        quick: true,
+        run: coulomb::run,
+    },
+    Case {
+        name: "cylinder",
+        shows: "Line contact in plane strain: a rigid cylinder along a half-plane, half-width \
+                and pressure for its force.",
+        quick: true,
+        run: half_plane::cylinder,
+    },
+    Case {
+        name: "wedge",
+        shows: "A blunt wedge on a half-plane: half-width and pressure for its force.",
+        quick: true,
+        run: half_plane::wedge,
+    },
+    Case {
+        name: "punch",
+        shows: "A flat punch: force on a half-space, pressure on a half-plane and its growth \
+                at the edge as elements shrink.",
+        quick: true,
+        run: punch::run,
+    },
+    Case {
+        name: "file",
+        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
+                code makes itself.",
+        quick: true,
+        run: file::run,
+    },
+    Case {
+        name: "locking",
+        shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
+                against quadratic elements, solid and in plane strain.",
+        quick: true,
+        run: locking::run,
+    },
+    Case {
+        name: "balances",
+        shows: "A fingertip press balances at every equilibrium: pressure integral, plate, \
+                supports, energy and work.",
+        quick: true,
+        run: finger::balances,
+    },
+    Case {
+        name: "finger",
+        shows: "The fingertip behaves as published fingertips do.",
+        quick: true,
+        run: finger::sanity,
+    },
+    Case {
+        name: "density",
+        shows: "The discretisation error of each mesh density: force, pressure and SED of a flat \
+                press against the next finer mesh.",
+        quick: false,
+        run: density::run,
+    },
+    Case {
+        name: "increments",
+        shows: "Pressure and SED of an elastic press do not depend on the number of increments.",
+        quick: true,
+        run: increments::run,
+    },
+    Case {
+        name: "solid-parts",
+        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and bone \
+                carries as a rigid one does.",
+        quick: false,
+        run: solid_parts::run,
+    },
+    Case {
+        name: "mirror",
+        shows: "A press rolled to the left is the mirror image of one rolled to the right.",
+        quick: true,
+        run: mirror::run,
+    },
+];
+
+/// Runs the cases that `wanted` accepts, `quick` ones in their small form and no others; `visit`
+/// is told of each before (`None`) and after (`Some(rows)`).
+pub fn run(
+    quick: bool,
+    wanted: &dyn Fn(&Case) -> bool,
+    visit: &mut dyn FnMut(&Case, Option<&[Row]>),
+) -> Report {
+    let context = Context { quick, flat: OnceCell::new() };
+    let mut report = Report { quick, ..Report::default() };
+    for case in CASES.iter().filter(|c| (c.quick || !quick) && wanted(c)) {
+        visit(case, None);
+        visit(case, Some(report.take(case.name, || (case.run)(&context))));
+    }
+    report
+}

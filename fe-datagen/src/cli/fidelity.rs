@@ -1,0 +1,91 @@
+//! `rungs`: finite elements as rungs of the ladder.
+
+use super::{CHECKS_FAILED, print};
+use papilla_fingertip::campaign::CampaignSpec;
+use papilla_validation::fidelity::{self, Ladder, Report};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Solve held-out presses of a campaign by every FE rung and by the reference.
+///
+/// Rungs: coarse and medium meshes, linear and quadratic elements, small and finite
+/// strain. Reference: linear elements on the fine mesh at finite strain; its own error
+/// is told by quadratic elements on the fine mesh (--check). All fields are read at the
+/// vertices of the medium atlas; times are processor seconds, the path to a state
+/// included. Writes rungs.json and one npz a rung; see docs/reports/fe-rungs.md.
+///
+/// Can be killed at any moment and started again: every press of every rung is one
+/// file in DIR/parts.
+#[derive(clap::Args)]
+#[command(
+    after_help = "A press of the fine mesh takes minutes and 3 GB; a state that a rung cannot solve \
+                        is left out everywhere and reported (exit code 3).\n\
+                        Example: fe-datagen rungs campaigns/heldout.toml --presses 3 --out out/rungs"
+)]
+pub(super) struct Args {
+    /// Campaign file (see campaigns/ and docs/reference/dataset.md).
+    campaign: PathBuf,
+    /// Held-out presses to solve, spread over the campaign's indenters.
+    #[arg(long)]
+    presses: usize,
+    /// Presses that the fine mesh with quadratic elements solves too.
+    #[arg(long, default_value_t = 1)]
+    check: usize,
+    /// Folder for rungs.json, the archives and what a restart needs.
+    #[arg(long)]
+    out: PathBuf,
+    /// Print the report as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let spec = CampaignSpec::read(&args.campaign)?;
+    let bar = super::progress("setting up", 1);
+    let ladder = Ladder::usual(args.check);
+    let tell = &mut |what: &str, done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+    };
+    let report = fidelity::run(&spec, &ladder, args.presses, &args.out, tell)?;
+    bar.finish_and_clear();
+    print(&report, args.json, || human(&report))?;
+    let clean = report.left_out.is_empty();
+    Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}
+
+fn human(r: &Report) -> String {
+    let mut text = format!(
+        "campaign {}: {} states\nrung                            unknowns   s a state   SED error: \
+         median     p95\n",
+        r.campaign,
+        r.states.len()
+    );
+    for rung in &r.rungs {
+        let mut seconds = rung.seconds.clone();
+        seconds.sort_by(f64::total_cmp);
+        let e = &rung.sed_relative_l2;
+        let _ = writeln!(
+            text,
+            "{:30} {:9} {:11.2} {:19.4} {:7.4}",
+            rung.name,
+            rung.unknowns,
+            seconds[seconds.len() / 2],
+            e.median,
+            e.p95
+        );
+        if let Some(own) = &rung.discretisation_error {
+            let _ = writeln!(text, "  its own error {:.4}: {}", own.sed_relative_l2, own.how);
+        }
+    }
+    for l in &r.left_out {
+        let _ = writeln!(
+            text,
+            "left out: press {} at {:.3} mm, {}: {}",
+            l.press, l.depth_mm, l.rung, l.why
+        );
+    }
+    text
+}

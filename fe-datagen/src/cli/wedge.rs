@@ -1,0 +1,53 @@
+//! `s2`: the wedge press of Chen, Shuai & Zhu.
+
+use super::{CHECKS_FAILED, choices, print};
+use papilla_fingertip::mesh::fingertip::Density;
+use papilla_output::atomic;
+use papilla_validation::wedge::reading::Reading;
+use papilla_validation::wedge::report::{Summary, readings_table, write};
+use papilla_validation::wedge::run as press;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Reproduce the wedge press of Chen, Shuai & Zhu (docs/reports/wedge.md).
+///
+/// Presses their wedge 1 mm into the section in 1 s and holds it for 10 s; writes
+/// their figures 2(a), 2(b) and 3 as .svg and .csv, and s2.json. Exits with 3 if
+/// something that they state does not hold.
+#[derive(clap::Args)]
+#[command(name = "s2", after_help = "Example: fe-datagen s2 --out out/s2")]
+pub(super) struct Args {
+    /// Folder for figures and numbers.
+    #[arg(long)]
+    out: PathBuf,
+    /// Density of the mesh.
+    #[arg(long, value_enum, default_value_t = choices::Density::Medium)]
+    density: choices::Density,
+    /// How to read what the paper leaves open.
+    #[arg(long, value_enum, default_value_t = choices::Reading::Taken)]
+    reading: choices::Reading,
+    /// Run every other reading too, for the table readings.md.
+    #[arg(long)]
+    all_readings: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let (taken, density) = (Reading::from(args.reading), Density::from(args.density));
+    let outcome = press(taken, density)?;
+    let summary = Summary::from(&outcome);
+    atomic::create_folder(&args.out)?;
+    write(&args.out, &outcome, &summary)?;
+    let reproduces = summary.reproduces();
+    print(&summary, args.json, || format!("{}written to {}", summary.human(), args.out.display()))?;
+    if args.all_readings {
+        let mut rows = vec![(taken, Ok(summary))];
+        for reading in Reading::ALL.into_iter().filter(|r| *r != taken) {
+            rows.push((reading, press(reading, density).map(|o| Summary::from(&o))));
+        }
+        atomic::write(&args.out.join("readings.md"), readings_table(&rows).as_bytes())?;
+    }
+    Ok(if reproduces { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+}
