@@ -4,6 +4,7 @@ use super::lab::{Pressed, press, scene, solve, tight};
 use super::{Hardness, Line, Suite};
 use crate::verify::{CaseError, Check};
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Solver, StepReport};
+use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
@@ -185,7 +186,8 @@ pub(super) fn penetration(_: &Suite) -> Result<Vec<Line>, CaseError> {
     let sphere = Sphere { radius_mm: 4.0 };
     let start = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
     let along = [0.0, 0.0, 1.0];
-    let found = first_touch_travel(&sphere, &start, along, &[[0.0, 0.0, 3.5], [0.0, 0.0, 5.0]]);
+    let found = first_touch_travel(&sphere, &start, along, &[[0.0, 0.0, 3.5], [0.0, 0.0, 5.0]])
+        .map_err(IndenterError::from);
     let words = &["starts 5.000e-1 mm inside the body", "move it back"];
     lines.push(Line::refused("looking for first touch from inside", found, words));
     Ok(lines)
