@@ -154,10 +154,6 @@ fn quick_leaves_the_shipped_ladder_alone() {
     let bare = Ladder::from_json(&text).unwrap();
     assert!(bare.sets.iter().all(|set| set.samples == 0 && set.about.starts_with("not measured")));
     assert!(bare.rungs[0].errors.is_empty() && bare.pareto_set.is_none());
-    assert!(
-        bare.bars.iter().filter(|bar| bar.measured.starts_with("not measured")).all(|b| !b.met)
-    );
-    assert!(bare.bars.iter().filter(|bar| !bar.met).count() >= 7, "{:?}", bare.bars);
 }
 
 #[test]

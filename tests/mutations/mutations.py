@@ -76,7 +76,7 @@ MUTATIONS = [
     ),
     Mutation(
         "a sparse map that drops each row's last term",
-        "engine/src/sparse/map.rs",
+        "crates/engine/src/sparse/map.rs",
         "let degree = rows().map(Iterator::count).max().unwrap_or(0);",
         "let degree = rows().map(Iterator::count).max().unwrap_or(0).max(2) - 1;",
         rust("--lib", "sparse"),

@@ -57,9 +57,6 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     if json {
         return print_json(&ladder);
     }
-    for bar in &ladder.bars {
-        println!("{:<7} {}: {}", if bar.met { "met" } else { "missed" }, bar.bar, bar.measured);
-    }
     for path in written {
         println!("wrote {}", path.display());
     }

@@ -5,7 +5,6 @@
 //! reported as not measured. The outcome is a [`Ladder`], from which [`report`] makes the
 //! table and [`plot`] the pictures.
 
-mod bars;
 pub mod fe;
 mod model;
 pub mod plot;
@@ -152,8 +151,7 @@ pub fn measure(
         sets: sets.iter().map(SampleSet::described).collect(),
         pareto_set: None,
         discretisation_error: fe.discretisation_error(),
-        rungs: models.iter().map(|model| model.rung.clone()).collect(),
-        bars: Vec::new(),
+        rungs: models,
     };
     ladder.rungs.extend(fe.rungs(&canvas)?);
     // FE can only be held against the reference, so the reference comes first here.
@@ -162,7 +160,6 @@ pub fn measure(
         |name: &&str| ladder.sets.iter().any(|set| set.name == **name && set.samples > 0);
     ladder.pareto_set = order.iter().find(|name| measured(name)).map(|name| (*name).to_owned());
     ladder.mark_front();
-    ladder.bars = bars::judge(&ladder, &models, &task.models)?;
     Ok(ladder)
 }
 

@@ -22,12 +22,6 @@ pub struct Footprint {
     pub memory_mib: Option<f64>,
 }
 
-/// A model with its rung.
-pub(super) struct Measured {
-    pub(super) rung: Rung,
-    pub(super) info: ModelInfo,
-}
-
 /// Measures the model at `path` on all sets.
 pub(super) fn measure(
     path: &Path,
@@ -36,7 +30,7 @@ pub(super) fn measure(
     timing: Timing,
     progress: &dyn Progress,
     footprint: &dyn Fn(&Path) -> Option<Footprint>,
-) -> Result<Measured, ExportError> {
+) -> Result<Rung, ExportError> {
     let onnx = read(path)?;
     let card = path.with_extension("json");
     let card = card.is_file().then(|| read_card(&card)).transpose()?;
@@ -57,7 +51,7 @@ pub(super) fn measure(
     let maps = timed_maps(canvas, sets, info, path)?;
     let tract = time(model.as_ref(), path, &maps, timing)?;
     let footprint = footprint(path);
-    let rung = Rung {
+    Ok(Rung {
         name: info.name.clone(),
         kind: Kind::of_network(&info.network),
         model: Some(info.name.clone()),
@@ -73,8 +67,7 @@ pub(super) fn measure(
         refused,
         zero_answer: Some(zero_answer),
         pareto: false,
-    };
-    Ok(Measured { rung, info: info.clone() })
+    })
 }
 
 fn read_card(path: &Path) -> Result<Card, ExportError> {

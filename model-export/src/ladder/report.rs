@@ -27,7 +27,6 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
             floor.how
         );
     }
-    bars(&mut text, ladder);
     costs(&mut text, ladder);
     for set in &ladder.sets {
         let _ = writeln!(text, "## Errors on {}\n", set.name);
@@ -45,15 +44,6 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
 fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
-fn bars(text: &mut String, ladder: &Ladder) {
-    text.push_str("## What was asked\n\n| asked | measured | |\n|---|---|---|\n");
-    for bar in &ladder.bars {
-        let met = if bar.met { "met" } else { "**missed**" };
-        let _ = writeln!(text, "| {} | {} | {met} |", bar.bar, bar.measured);
-    }
-    text.push('\n');
 }
 
 fn costs(text: &mut String, ladder: &Ladder) {

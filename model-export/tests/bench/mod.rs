@@ -16,7 +16,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-pub(crate) const TINY: &[u8] = include_bytes!("../../../engine/tests/assets/tiny.onnx");
+pub(crate) const TINY: &[u8] = include_bytes!("../../../crates/engine/tests/assets/tiny.onnx");
 /// The patch: one vertex on the centre of each pixel of these rows and columns.
 pub(crate) const FIRST: [usize; 2] = [80, 90];
 pub(crate) const SIDE: usize = 60;

@@ -29,8 +29,7 @@ fn ladder() -> Value {
     let sets = json!([{"name": "heldout-presses", "samples": 3}, {"name": "deep", "samples": 0}]);
     json!({"format": 1, "atlas_hash": atlas().hash(), "machine": "another", "sets": sets,
         "rungs": [rung("quick", Some("quick"), 4.0, 0.01), rung("slow", Some("slow"), 9.0, 0.02),
-                  rung("fe-medium", None, 30_000.0, 0.03)],
-        "bars": [{"bar": "a", "measured": "b", "met": true}]})
+                  rung("fe-medium", None, 30_000.0, 0.03)]})
 }
 
 async fn with(ladder: &Value, calibration_ms: u64) -> Result<Service, StartError> {
@@ -47,7 +46,6 @@ async fn tiers_are_chosen_by_the_ladder_and_it_is_published() {
     assert_eq!(tiers["tiers"][0]["relative_l2_median"], 0.01);
     assert_eq!(tiers["ladder"]["rungs"][2]["name"], "fe-medium");
     assert_eq!(tiers["ladder"]["rungs"][2]["seconds"]["p50"], 30.0);
-    assert_eq!(tiers["ladder"]["bars"][0]["met"], true);
     let mut socket = service.socket().await;
     let ready = socket.open(hello(&json!({"budget_us": 60_000_000}))).await;
     assert_eq!(ready["tier"], "quick", "the card says slow, the ladder says quick");

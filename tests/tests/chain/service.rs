@@ -105,7 +105,7 @@ pub(crate) fn infer(model: &dyn Model, pressure_pa: &[f32]) -> Vec<f32> {
 /// A model folder with the engine's small test network, made to belong to `atlas`; its only
 /// press is `sample`.
 pub(crate) fn tiny_models(atlas: &Atlas, sample: &Sample) -> TempDir {
-    let tiny = fs::read(folder("engine/tests/assets").join("tiny.onnx")).unwrap();
+    let tiny = fs::read(folder("crates/engine/tests/assets").join("tiny.onnx")).unwrap();
     // Same length, so that no length in the file changes.
     let onnx = replaced(&tiny, "ab".repeat(32).as_bytes(), atlas.hash().as_bytes());
     model_folder(atlas, sample, &onnx)

@@ -1,4 +1,4 @@
-//! One rung held against another, figure by figure.
+//! One row of the ladder held against another, figure by figure.
 
 use papilla_engine::card::Spread;
 use papilla_engine::ladder::SetErrors;
@@ -22,7 +22,7 @@ fn figures(errors: &SetErrors) -> Vec<(String, Option<f64>)> {
 }
 
 /// The figures in which `rung` is not better than `baseline`, and how many there are.
-pub(super) fn lost(rung: &SetErrors, baseline: &SetErrors) -> (Vec<String>, usize) {
+pub(crate) fn lost(rung: &SetErrors, baseline: &SetErrors) -> (Vec<String>, usize) {
     let pairs = figures(rung).into_iter().zip(figures(baseline));
     let both: Vec<(String, f64, f64)> =
         pairs.filter_map(|((name, ours), (_, theirs))| Some((name, ours?, theirs?))).collect();

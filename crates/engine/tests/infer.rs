@@ -135,7 +135,7 @@ fn a_model_of_several_datasets_names_them_if_their_hash_is_its_own() {
 
 #[test]
 fn the_named_tract_version_is_the_locked_one() {
-    let lock = include_str!("../../Cargo.lock");
+    let lock = include_str!("../../../Cargo.lock");
     let at = lock.find("name = \"tract-onnx\"\nversion = \"").unwrap();
     let version = lock[at..].split('"').nth(3).unwrap();
     let model = load(TINY, None).unwrap();

@@ -34,9 +34,6 @@ pub struct Ladder {
     pub discretisation_error: Option<Discretisation>,
     /// The rungs.
     pub rungs: Vec<Rung>,
-    /// What was asked of the ladder, and whether it is met.
-    #[serde(default)]
-    pub bars: Vec<Bar>,
 }
 
 /// One held-out set.
@@ -206,17 +203,6 @@ impl From<Metrics> for SetErrors {
             ssim: metrics.ssim,
         }
     }
-}
-
-/// What was asked of the ladder.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Bar {
-    /// What was asked.
-    pub bar: String,
-    /// What was measured.
-    pub measured: String,
-    /// Whether it is met; what was not measured is not met.
-    pub met: bool,
 }
 
 impl Ladder {

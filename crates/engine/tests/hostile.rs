@@ -241,7 +241,7 @@ fn raw_data(onnx: &[u8]) -> Vec<Range<usize>> {
 /// The smallest of the shipped networks of either kind.
 fn shipped() -> [(&'static str, Vec<u8>); 2] {
     ["nano", "s1-base4"].map(|name| {
-        let path = format!("{}/../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
+        let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
         (name, fs::read(path).unwrap())
     })
 }

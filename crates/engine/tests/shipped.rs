@@ -13,7 +13,7 @@ use papilla_proto::{
 use std::fs;
 
 fn read(name: &str) -> Vec<u8> {
-    fs::read(format!("{}/../models/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap()
+    fs::read(format!("{}/../../models/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap()
 }
 
 fn text(name: &str) -> String {
