@@ -121,7 +121,7 @@ fn paths_and_ogden_laws_are_expressed() {
 #[test]
 fn the_witness_says_when_there_is_none() {
     let done = Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
-        .arg("witness")
+        .arg("cross-check")
         .env("PATH", "")
         .output()
         .unwrap();

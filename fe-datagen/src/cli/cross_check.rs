@@ -1,4 +1,4 @@
-//! `witness`: the same problems in CalculiX.
+//! `cross-check`: the same problems in CalculiX.
 
 use super::{CHECKS_FAILED, print};
 use anyhow::{Context, bail};
@@ -15,7 +15,7 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(
     after_help = "Exit code 3 if any row is past its tolerance. docs/reports/calculix.md says what each row \
-                  shows.\nExample: fe-datagen witness --only sphere --keep out/calculix"
+                  shows.\nExample: fe-datagen cross-check --only sphere --keep out/calculix"
 )]
 pub(super) struct Args {
     /// CalculiX' solver [default: ccx on the PATH].

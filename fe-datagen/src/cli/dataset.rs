@@ -34,7 +34,7 @@ enum Command {
         /// Folder for the images.
         #[arg(long)]
         out: PathBuf,
-        /// 8 bits a pixel, as S1 used, instead of 16.
+        /// 8 bits a pixel, as the published U-Net took, instead of 16.
         #[arg(long)]
         eight_bit: bool,
         /// Print the index as JSON.

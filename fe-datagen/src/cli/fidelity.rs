@@ -1,4 +1,4 @@
-//! `rungs`: finite elements as rungs of the ladder.
+//! `fidelity`: finite elements as rows of the ladder.
 
 use super::{CHECKS_FAILED, print};
 use papilla_fingertip::campaign::CampaignSpec;
@@ -7,26 +7,26 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Solve held-out presses of a campaign by every FE rung and by the reference.
+/// Solve held-out indentations of a campaign at every fidelity level and by the reference.
 ///
-/// Rungs: coarse and medium meshes, linear and quadratic elements, small and finite
+/// Levels: coarse and medium meshes, linear and quadratic elements, small and finite
 /// strain. Reference: linear elements on the fine mesh at finite strain; its own error
 /// is told by quadratic elements on the fine mesh (--check). All fields are read at the
 /// vertices of the medium atlas; times are processor seconds, the path to a state
-/// included. Writes rungs.json and one npz a rung; see docs/reports/fe-rungs.md.
+/// included. Writes rungs.json and one npz a level; see docs/reports/fe-rungs.md.
 ///
-/// Can be killed at any moment and started again: every press of every rung is one
+/// Can be killed at any moment and started again: every indentation at every level is one
 /// file in DIR/parts.
 #[derive(clap::Args)]
 #[command(
-    after_help = "A press of the fine mesh takes minutes and 3 GB; a state that a rung cannot solve \
+    after_help = "An indentation of the fine mesh takes minutes and 3 GB; a state that a level cannot solve \
                         is left out everywhere and reported (exit code 3).\n\
-                        Example: fe-datagen rungs campaigns/heldout.toml --presses 3 --out out/rungs"
+                        Example: fe-datagen fidelity campaigns/heldout.toml --presses 3 --out out/rungs"
 )]
 pub(super) struct Args {
     /// Campaign file (see campaigns/ and docs/reference/dataset.md).
     campaign: PathBuf,
-    /// Held-out presses to solve, spread over the campaign's indenters.
+    /// Held-out indentations to solve, spread over the campaign's indenters.
     #[arg(long)]
     presses: usize,
     /// Presses that the fine mesh with quadratic elements solves too.
@@ -63,27 +63,27 @@ fn human(r: &Report) -> String {
         r.campaign,
         r.states.len()
     );
-    for rung in &r.rungs {
-        let mut seconds = rung.seconds.clone();
+    for level in &r.rungs {
+        let mut seconds = level.seconds.clone();
         seconds.sort_by(f64::total_cmp);
-        let e = &rung.sed_relative_l2;
+        let e = &level.sed_relative_l2;
         let _ = writeln!(
             text,
             "{:30} {:9} {:11.2} {:19.4} {:7.4}",
-            rung.name,
-            rung.unknowns,
+            level.name,
+            level.unknowns,
             seconds[seconds.len() / 2],
             e.median,
             e.p95
         );
-        if let Some(own) = &rung.discretisation_error {
+        if let Some(own) = &level.discretisation_error {
             let _ = writeln!(text, "  its own error {:.4}: {}", own.sed_relative_l2, own.how);
         }
     }
     for l in &r.left_out {
         let _ = writeln!(
             text,
-            "left out: press {} at {:.3} mm, {}: {}",
+            "left out: indentation {} at {:.3} mm, {}: {}",
             l.press, l.depth_mm, l.rung, l.why
         );
     }

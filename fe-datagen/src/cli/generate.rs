@@ -1,4 +1,4 @@
-//! `generate`: a campaign of presses into a dataset.
+//! `generate`: a campaign of indentations into a dataset.
 
 use super::{CHECKS_FAILED, print};
 use crate::campaign::{self, BoxError, IndentationSolver, RunOptions};
@@ -15,9 +15,9 @@ use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Run a campaign of presses, one per core, into a dataset.
+/// Run a campaign of indentations, one per core, into a dataset.
 ///
-/// Can be killed at any moment and started again: every press is one shard,
+/// Can be killed at any moment and started again: every indentation is one shard,
 /// written whole or not at all, and the bytes depend on the campaign alone.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen generate campaigns/s1.toml --out out/s1")]
@@ -42,13 +42,13 @@ struct BodySolver<'a> {
 }
 
 impl IndentationSolver for BodySolver<'_> {
-    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
+    fn solve(&mut self, indentation: &Indentation) -> Result<Vec<Sample>, BoxError> {
         let approach = Approach {
-            pose: press.pose,
-            offset_mm: press.offset_mm,
-            ..self.approaches[press.candidate].clone()
+            pose: indentation.pose,
+            offset_mm: indentation.offset_mm,
+            ..self.approaches[indentation.candidate].clone()
         };
-        let drive = Drive::Depths(press.depths_mm.clone());
+        let drive = Drive::Depths(indentation.depths_mm.clone());
         let (records, pressed) = self.body.press_balanced(
             &mut self.solver,
             &approach,

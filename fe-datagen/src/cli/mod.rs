@@ -21,7 +21,7 @@ use clap::{Parser, Subcommand};
 use std::io::Write as _;
 use std::process::ExitCode;
 
-/// A finite-element fingertip: solve presses, run campaigns, check the physics.
+/// A finite-element fingertip: solve scenes, run campaigns, check the physics.
 #[derive(Parser)]
 #[command(
     name = "fe-datagen",
@@ -42,15 +42,15 @@ enum Command {
     Schema(schema::Args),
     Generate(generate::Args),
     Operator(influence::Args),
-    Rungs(fidelity::Args),
+    Fidelity(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
-    Witness(cross_check::Args),
+    CrossCheck(cross_check::Args),
     Effects(effects::Args),
-    S2(wedge::Args),
+    Wedge(wedge::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -65,12 +65,12 @@ pub fn run() -> ExitCode {
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),
-        Command::Witness(args) => cross_check::run(&args),
+        Command::CrossCheck(args) => cross_check::run(&args),
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => influence::run(&args),
-        Command::Rungs(args) => fidelity::run(&args),
-        Command::S2(args) => wedge::run(&args),
+        Command::Fidelity(args) => fidelity::run(&args),
+        Command::Wedge(args) => wedge::run(&args),
     };
     match result {
         Ok(code) => code,

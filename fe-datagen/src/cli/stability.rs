@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 ///
 /// Prints one line a variant: how it ended, how hard it was (iterations, cuts, smallest J,
 /// condition, balances) and the check that came nearest to its tolerance. With --scenes,
-/// presses random scenes of a campaign's distribution instead.
+/// solves random scenes of a campaign's distribution instead.
 #[derive(clap::Args)]
 #[command(
     after_help = "Exit code 3 if any case breaks its promise. docs/reports/stability.md is the report.\n\

@@ -19,7 +19,7 @@ pub(super) struct Args {
     /// Run only this case; may be given several times.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
-    /// Smaller meshes and presses, without the cases that have no small form: for a test run.
+    /// Smaller meshes and indentations, without the cases that have no small form: for a test run.
     #[arg(long)]
     quick: bool,
     /// Also write the table as Markdown to this file.

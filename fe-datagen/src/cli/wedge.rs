@@ -1,21 +1,21 @@
-//! `s2`: the wedge press of Chen, Shuai & Zhu.
+//! `wedge`: the wedge of Chen, Shuai & Zhu.
 
 use super::{CHECKS_FAILED, choices, print};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_output::atomic;
 use papilla_validation::wedge::reading::Reading;
 use papilla_validation::wedge::report::{Summary, readings_table, write};
-use papilla_validation::wedge::run as press;
+use papilla_validation::wedge::run as simulate;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Reproduce the wedge press of Chen, Shuai & Zhu (docs/reports/wedge.md).
+/// Reproduce the wedge of Chen, Shuai & Zhu (docs/reports/wedge.md).
 ///
 /// Presses their wedge 1 mm into the section in 1 s and holds it for 10 s; writes
 /// their figures 2(a), 2(b) and 3 as .svg and .csv, and s2.json. Exits with 3 if
 /// something that they state does not hold.
 #[derive(clap::Args)]
-#[command(name = "s2", after_help = "Example: fe-datagen s2 --out out/s2")]
+#[command(after_help = "Example: fe-datagen wedge --out out/wedge")]
 pub(super) struct Args {
     /// Folder for figures and numbers.
     #[arg(long)]
@@ -36,7 +36,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (taken, density) = (Reading::from(args.reading), Density::from(args.density));
-    let outcome = press(taken, density)?;
+    let outcome = simulate(taken, density)?;
     let summary = Summary::from(&outcome);
     atomic::create_folder(&args.out)?;
     write(&args.out, &outcome, &summary)?;
@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if args.all_readings {
         let mut rows = vec![(taken, Ok(summary))];
         for reading in Reading::ALL.into_iter().filter(|r| *r != taken) {
-            rows.push((reading, press(reading, density).map(|o| Summary::from(&o))));
+            rows.push((reading, simulate(reading, density).map(|o| Summary::from(&o))));
         }
         atomic::write(&args.out.join("readings.md"), readings_table(&rows).as_bytes())?;
     }

@@ -18,7 +18,7 @@ pub(crate) struct Options {
     /// Folder of the models, with index.json and atlas.json.
     #[arg(long, default_value = "models", value_name = "FOLDER")]
     models: PathBuf,
-    /// Folders that `fe-datagen rungs` wrote: the reference and the solver's own rungs
+    /// Folders that `fe-datagen fidelity` wrote: the reference and the solver's own rungs
     /// [default: the folders in DATA/rungs].
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
     fe: Vec<PathBuf>,

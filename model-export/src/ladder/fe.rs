@@ -1,4 +1,4 @@
-//! FE rungs: folders that `fe-datagen rungs` wrote.
+//! FE rungs: folders that `fe-datagen fidelity` wrote.
 //!
 //! `rungs.json` lists states and rungs; each rung's `.npz` holds `pressure_pa` and
 //! `sed_dermis_j_per_m3`, float32 `[N, V]` on the vertices of the atlas. One rung of each

@@ -1,7 +1,7 @@
 //! The ladder: every way of getting a SED map, measured on the same held-out sets.
 //!
 //! Servable rungs are the models of `models/index.json`, run in the serving engine on one
-//! thread; FE rungs come from folders that `fe-datagen rungs` wrote. What is not there is
+//! thread; FE rungs come from folders that `fe-datagen fidelity` wrote. What is not there is
 //! reported as not measured. The outcome is a [`Ladder`], from which [`report`] makes the
 //! table and [`plot`] the pictures.
 
@@ -33,7 +33,7 @@ pub struct Task {
     pub data: PathBuf,
     /// Folder of the models, their index and atlas.
     pub models: PathBuf,
-    /// Folders that `fe-datagen rungs` wrote.
+    /// Folders that `fe-datagen fidelity` wrote.
     pub fe: Vec<PathBuf>,
     /// Whether to take a part of each set and shorter timings.
     pub quick: bool,
