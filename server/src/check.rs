@@ -6,8 +6,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::{
-    StartError, assets::Assets, config::Config, gate::Gate, golden, models::Catalogue, net, speed,
-    tls,
+    StartError,
+    config::Config,
+    core::{
+        catalogue::{Catalogue, assets::Assets, golden},
+        latency,
+    },
+    transport::{gate::Gate, net, tls},
 };
 
 /// Bytes one connection, one session, its effects and one posted map can hold at most; see
@@ -113,7 +118,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     let vertices = catalogue.atlas.vertex_count();
     report.good("atlas", format!("{vertices} vertices, {hash}"), json!({"hash": hash}));
     let start = Instant::now();
-    let measured = speed::calibrate(catalogue, config.calibration());
+    let measured = latency::calibrate(catalogue, config.calibration());
     if let Err(error) = &measured {
         report.bad("calibration", error.exit_code(), error);
     } else if config.calibration().is_zero() {

@@ -14,37 +14,20 @@
 //!
 //! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
 
-mod app;
-mod assets;
-mod bucket;
 mod check;
 mod codec;
 mod config;
-mod effects;
+mod core;
 mod error;
-mod front;
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]
 pub mod fuzz;
-mod gate;
-mod golden;
-mod http;
-mod metrics;
-mod models;
-mod negotiate;
-mod net;
-mod oip;
-mod pool;
 mod problem;
 mod progress;
-mod reload;
-mod replay;
 mod runtime;
-mod session;
-mod speed;
 mod start;
 mod telemetry;
-mod tls;
+mod transport;
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
@@ -59,15 +42,17 @@ use tokio::{
 };
 
 use crate::{
-    app::App,
-    front::Front,
-    gate::Gate,
-    metrics::Metrics,
-    net::{Line, Places},
-    pool::Pool,
+    core::{metrics::Metrics, scheduler::Pool},
     progress::Progress,
     runtime::IoRuntime,
     start::Opened,
+    transport::{
+        app::App,
+        front::Front,
+        gate::Gate,
+        net::{self, Line, Places},
+        tls,
+    },
 };
 
 /// A service that listens, and loads its models.
@@ -231,7 +216,7 @@ impl Server {
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
-        self.io.handle().spawn(reload::once(Arc::clone(&self.app)));
+        self.io.handle().spawn(core::reload::once(Arc::clone(&self.app)));
     }
 
     /// Ends the service: takes nothing new, answers every accepted frame, tells
@@ -263,5 +248,5 @@ impl Server {
 /// Method (lower case) and path of every HTTP route, as the OpenAPI document writes them.
 #[must_use]
 pub fn routes() -> Vec<(String, String)> {
-    http::route_list()
+    transport::http::route_list()
 }

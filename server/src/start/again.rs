@@ -8,8 +8,8 @@ use std::{sync::Arc, time::Duration};
 use tokio::{task::spawn_blocking, time::sleep};
 
 use crate::{
-    app::{App, begun},
-    speed,
+    core::latency,
+    transport::app::{App, begun},
 };
 
 /// Time between two tiers, so that it costs an idle machine next to nothing.
@@ -33,7 +33,7 @@ pub(super) async fn measure(app: Arc<App>) {
                 continue;
             }
             let catalogue = app.catalogue();
-            let measured = spawn_blocking(move || speed::again(&catalogue.tiers[place]));
+            let measured = spawn_blocking(move || latency::again(&catalogue.tiers[place]));
             if let Ok(Err(error)) = measured.await {
                 tracing::warn!(%error, "a tier cannot be measured again");
             }

@@ -9,17 +9,16 @@ use tokio::sync::{oneshot, watch};
 
 use crate::{
     SettingError, StartError,
-    app::App,
-    assets::Assets,
     config::Config,
-    front::Front,
-    gate::Gate,
-    http,
-    metrics::Metrics,
-    models::{Catalogue, Step},
-    pool::Pool,
+    core::{
+        catalogue::{Catalogue, Step, assets::Assets},
+        latency,
+        metrics::Metrics,
+        reload,
+        scheduler::Pool,
+    },
     progress::{Progress, Stage},
-    reload, speed,
+    transport::{app::App, front::Front, gate::Gate, http},
 };
 
 /// What there is before the models are.
@@ -117,5 +116,5 @@ fn load(
 fn measure(config: &Config, catalogue: &Catalogue, progress: &Progress) -> Result<(), StartError> {
     let names = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     progress.enter(Stage::Calibrating, names);
-    speed::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
+    latency::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
 }

@@ -1,0 +1,9 @@
+//! What renders: the scheduler, the catalogue of models and what is known of their times. It knows
+//! no transport.
+
+pub(crate) mod catalogue;
+pub(crate) mod effects;
+pub(crate) mod latency;
+pub(crate) mod metrics;
+pub(crate) mod reload;
+pub(crate) mod scheduler;

@@ -1,0 +1,83 @@
+//! The atlas: as it was shipped, as OBJ and glTF, and its mask.
+
+mod glb;
+
+use std::sync::Arc;
+
+use axum::{
+    extract::State,
+    http::{HeaderMap, Uri},
+};
+use papilla_proto::{
+    ErrorCode, Problem,
+    atlas::{Patch, Raster},
+};
+
+use super::{
+    Answer, Shared,
+    kept::{Fresh, What},
+    refuse,
+};
+use crate::{codec, core::catalogue::Catalogue, problem, transport::app::App};
+
+pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, What::Atlas, |catalogue| {
+        Ok(Fresh::new("application/json", catalogue.atlas_json.clone()))
+    })
+    .await
+}
+
+pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, What::AtlasObj, |catalogue| {
+        Ok(Fresh::new("model/obj", catalogue.atlas.to_obj()))
+    })
+    .await
+}
+
+/// Both patches as binary glTF, each with its mask as a texture.
+pub(super) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, What::AtlasGlb, |catalogue| {
+        let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
+        Ok(Fresh::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
+    })
+    .await
+}
+
+/// White where the patch is: the interface, or with `?patch=skin` the skin.
+pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    let patch = match uri.query() {
+        None | Some("" | "patch=interface") => Patch::Interface,
+        Some("patch=skin") => Patch::Skin,
+        Some(_) => {
+            let message = "the parameter is patch=interface or patch=skin";
+            return refuse(&app, Problem::new(ErrorCode::BadQuery, message).at("patch"));
+        }
+    };
+    serve(&app, &headers, What::Mask(patch), move |catalogue| {
+        let raster = match patch {
+            Patch::Skin => &catalogue.skin,
+            Patch::Interface => &catalogue.interface,
+        };
+        Ok(Fresh::new("image/png", png(raster)?))
+    })
+    .await
+}
+
+fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
+    let mut png = Vec::new();
+    codec::encode_mask(raster.mask(), &mut png)
+        .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
+    Ok(png)
+}
+
+async fn serve(
+    app: &App,
+    headers: &HeaderMap,
+    what: What,
+    make: impl FnOnce(&Catalogue) -> Result<Fresh, Problem> + Send + 'static,
+) -> Answer {
+    let catalogue = app.catalogue();
+    let of = Arc::clone(&catalogue);
+    let made = catalogue.kept.answer(headers, what, move || make(&of)).await;
+    made.or_else(|problem| refuse(app, problem))
+}

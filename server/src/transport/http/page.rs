@@ -1,0 +1,61 @@
+//! The page and its parts, from the binary.
+
+use std::sync::LazyLock;
+
+use axum::{
+    extract::State,
+    http::{HeaderMap, Uri},
+};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
+
+use super::{
+    Answer, Shared,
+    kept::{Fresh, Kept, What},
+    refuse,
+};
+use crate::{core::catalogue::assets::PAGE, transport::app::App};
+
+/// The description of the HTTP surface, written by hand.
+const OPENAPI: &str = include_str!("../../../openapi.json");
+
+/// Answers that last as long as the binary.
+static KEPT: LazyLock<Kept> = LazyLock::new(Kept::default);
+
+fn content_type(name: &str) -> &'static str {
+    match name.rsplit('.').next().unwrap_or_default() {
+        "html" => "text/html; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "mjs" | "js" => "text/javascript; charset=utf-8",
+        "json" => "application/json",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        "webp" => "image/webp",
+        "ico" => "image/x-icon",
+        "woff2" => "font/woff2",
+        _ => "application/octet-stream",
+    }
+}
+
+pub(super) async fn index(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, "index.html", &headers).await
+}
+
+pub(super) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    serve(&app, uri.path().trim_start_matches('/'), &headers).await
+}
+
+/// The description of the HTTP surface.
+pub(super) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
+    let make = || Ok(Fresh::new("application/json", OPENAPI));
+    KEPT.answer(&headers, What::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
+}
+
+async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
+    let Some(place) = PAGE.iter().position(|(file, _)| *file == name) else {
+        let message = format!("there is nothing at /{}", shortened(name));
+        return refuse(app, Problem::new(ErrorCode::NotFound, message));
+    };
+    let (name, bytes) = PAGE[place];
+    let make = move || Ok(Fresh::new(content_type(name), bytes));
+    KEPT.answer(headers, What::Page(place), make).await.or_else(|problem| refuse(app, problem))
+}

@@ -1,0 +1,172 @@
+//! The body of a session: frames in, answers out.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use papilla_proto::{
+    ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
+};
+
+use super::{
+    End, drained,
+    fresh::Freshness,
+    hello::{self, Terms},
+    line::{Event, Line},
+};
+use crate::{
+    codec::{Input, Output},
+    core::{
+        metrics::Transport,
+        scheduler::{Frame, Job, Slot, Stage},
+    },
+    problem,
+};
+
+/// An open session.
+pub(super) struct Session {
+    pub(super) number: u64,
+    pub(super) terms: Terms,
+    pub(super) fresh: Freshness,
+    pub(super) slot: Arc<Slot>,
+}
+
+/// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
+pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
+    let mut draining = false;
+    loop {
+        if draining && line.reply.is_settled() {
+            return drained();
+        }
+        match line.next(draining).await {
+            Err(end) => return end,
+            Ok(Event::Draining) => draining = true,
+            Ok(Event::Binary(frame, received)) => session.take(line, &frame, received, draining),
+            Ok(Event::Text(_)) if draining => line.reply.complain(problem::shutting_down(), None),
+            Ok(Event::Text(text)) => session.renew(line, &text).await,
+        }
+    }
+}
+
+impl Session {
+    /// Takes a hello for new terms, such as another tier.
+    async fn renew(&mut self, line: &mut Line, text: &Bytes) {
+        match hello::renew(&line.app, text, self.number).await {
+            Ok((terms, ready)) => {
+                self.fresh = Freshness::new(terms.stale_after_us);
+                self.terms = terms;
+                line.reply.say(&ServerMessage::Ready(ready));
+            }
+            Err(problem) => line.reply.complain(problem, None),
+        }
+    }
+
+    /// Takes one frame: into the slot, or back with an error.
+    fn take(&mut self, line: &Line, frame: &Bytes, received: Instant, draining: bool) {
+        let (reply, metrics) = (&line.reply, &line.app.metrics);
+        let job = if draining { Err(problem::shutting_down()) } else { self.job(frame, received) };
+        let job = match job {
+            Ok(job) => job,
+            Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
+        };
+        let Some(Frame { header, .. }) = &job.frame else { return };
+        let header = *header;
+        // In version 1 sequences mean nothing to the server.
+        let is_new = header.extension.is_some();
+        if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
+            metrics.of(Transport::Session).stale.inc();
+            return reply.short(&header, job.tier, FrameStatus::Stale, received);
+        }
+        if job.is_late() {
+            metrics.late(Transport::Session, Stage::Admission);
+            return reply.short(&header, job.tier, FrameStatus::Late, received);
+        }
+        reply.owe();
+        match line.app.entrance.submit(&self.slot, job) {
+            Ok(None) => {}
+            Ok(Some(Job { frame: Some(Frame { header, .. }), received, tier, .. })) => {
+                metrics.of(Transport::Session).superseded.inc();
+                reply.short(&header, tier, FrameStatus::Superseded, received);
+                reply.settle();
+            }
+            Ok(Some(Job { frame: None, .. })) => reply.settle(),
+            Err(_) => {
+                reply.refuse(problem::shutting_down(), Some(header.sequence));
+                reply.settle();
+            }
+        }
+    }
+
+    /// The job a frame asks for.
+    fn job(&self, frame: &Bytes, received: Instant) -> Result<Job, Problem> {
+        let header = FrameHeader::decode(frame).map_err(problem::of_frame)?;
+        self.check(&header)?;
+        let payload = frame.slice(header.header_len()..);
+        if payload.len() != header.payload_len() {
+            let (found, due) = (payload.len(), header.payload_len());
+            let message = format!("the payload has {found} bytes, {due} are due");
+            return Err(Problem::new(ErrorCode::WrongLength, message).at("payload"));
+        }
+        let scale = match self.terms.pressure_scale_pa {
+            // All bits zero, or minus zero: left to the hello.
+            Some(scale) if header.scale.abs() <= 0.0 => scale,
+            _ => header.scale,
+        };
+        let budget_us = match header.time_us {
+            0 => self.terms.budget_us,
+            us => Some(us),
+        };
+        Ok(Job {
+            tier: self.terms.tier,
+            payload,
+            input: Input::Samples { sample_type: header.sample_type, scale },
+            output: Output::Samples(self.terms.answer_sample_type),
+            frame: Some(Frame {
+                header,
+                takes_more: self.terms.takes_more,
+                effects: self.terms.effects.clone(),
+            }),
+            received,
+            deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
+        })
+    }
+
+    /// Whether a header is that of a frame this session takes.
+    fn check(&self, header: &FrameHeader) -> Result<(), Problem> {
+        let wrong_type =
+            |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
+        let version = if header.extension.is_some() { 2 } else { 1 };
+        if version != self.terms.version {
+            let agreed = self.terms.version;
+            let message = format!("the hello had version {agreed}, the frame has {version}");
+            return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
+        }
+        if header.kind != FrameKind::Pressure {
+            return wrong_type("kind", "clients send pressure, kind 1".to_owned());
+        }
+        if header.status != FrameStatus::Ok {
+            return wrong_type("status", "the status of a request is 0".to_owned());
+        }
+        let sample_type = self.terms.sample_type;
+        if header.sample_type != sample_type {
+            let message =
+                format!("the hello announced {sample_type:?}, not {:?}", header.sample_type);
+            return wrong_type("sample_type", message);
+        }
+        let window = header.window();
+        if header.extension.is_some() && !window.is_inside() {
+            let Window { x, y, width, height } = window;
+            let message =
+                format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("x"));
+        }
+        if header.extension.is_none() && window != Window::WHOLE {
+            let Window { width, height, .. } = window;
+            let message = format!("the frame is {width} x {height}, 224 x 224 is due");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
+        }
+        Ok(())
+    }
+}
