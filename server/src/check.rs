@@ -8,10 +8,7 @@ use serde_json::{Value, json};
 use crate::{
     StartError,
     config::Config,
-    core::{
-        catalogue::{Catalogue, assets::Assets, golden},
-        latency,
-    },
+    core::catalogue::{Catalogue, assets::Assets, calibrate, golden},
     transport::{gate::Gate, net, tls},
 };
 
@@ -118,7 +115,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     let vertices = catalogue.atlas.vertex_count();
     report.good("atlas", format!("{vertices} vertices, {hash}"), json!({"hash": hash}));
     let start = Instant::now();
-    let measured = latency::calibrate(catalogue, config.calibration());
+    let measured = calibrate::calibrate(catalogue, config.calibration());
     if let Err(error) = &measured {
         report.bad("calibration", error.exit_code(), error);
     } else if config.calibration().is_zero() {
@@ -146,7 +143,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             || "no golden answers".to_owned(),
             |golden| {
                 let (error, most) = (golden.relative_l2, golden.relative_l2_max);
-                format!("{} golden answers within {error:.3} of {most:.3}", golden.presses)
+                format!("{} golden answers within {error:.3} of {most:.3}", golden.states)
             },
         );
         let is_default = index == catalogue.default;

@@ -18,6 +18,7 @@ mod check;
 mod codec;
 mod config;
 mod core;
+mod drain;
 mod error;
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]
@@ -49,8 +50,8 @@ use crate::{
     transport::{
         app::App,
         front::Front,
-        gate::Gate,
-        net::{self, Line, Places},
+        gate::{Gate, Places},
+        net::{self, ConnectionContext},
         tls,
     },
 };
@@ -135,9 +136,9 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
         drain: Arc::clone(&drain),
     };
     opening.spawn_on(start::open(parts), io.handle());
-    let line = Line { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
+    let context = ConnectionContext { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
     let places = Places::new(config.max_connections.get(), config.tokens.is_some());
-    let accepting = io.handle().spawn(net::serve(listener, line, places));
+    let accepting = io.handle().spawn(net::serve(listener, context, places));
     Ok(Starting {
         address,
         drain: EndOnDrop(drain),
@@ -216,7 +217,7 @@ impl Server {
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
-        self.io.handle().spawn(core::reload::once(Arc::clone(&self.app)));
+        self.io.handle().spawn(core::reload::once(Arc::clone(&self.app.reloader)));
     }
 
     /// Ends the service: takes nothing new, answers every accepted frame, tells
@@ -248,5 +249,5 @@ impl Server {
 /// Method (lower case) and path of every HTTP route, as the OpenAPI document writes them.
 #[must_use]
 pub fn routes() -> Vec<(String, String)> {
-    transport::http::route_list()
+    transport::routes::list()
 }

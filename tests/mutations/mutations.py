@@ -59,7 +59,7 @@ MUTATIONS = [
         "server/src/core/scheduler/slot.rs",
         "state.scheduled = state.waiting.is_some();\n        state.scheduled",
         "state.scheduled = false;\n        state.scheduled",
-        rust("--lib", "pool::"),
+        rust("--lib", "scheduler::"),
     ),
     Mutation(
         "windows one row too low",

@@ -7,10 +7,7 @@ use std::{sync::Arc, time::Duration};
 
 use tokio::{task::spawn_blocking, time::sleep};
 
-use crate::{
-    core::latency,
-    transport::app::{App, begun},
-};
+use crate::{core::catalogue::calibrate, drain::begun, transport::app::App};
 
 /// Time between two tiers, so that it costs an idle machine next to nothing.
 const PAUSE: Duration = Duration::from_secs(10);
@@ -33,7 +30,7 @@ pub(super) async fn measure(app: Arc<App>) {
                 continue;
             }
             let catalogue = app.catalogue();
-            let measured = spawn_blocking(move || latency::again(&catalogue.tiers[place]));
+            let measured = spawn_blocking(move || calibrate::again(&catalogue.tiers[place]));
             if let Ok(Err(error)) = measured.await {
                 tracing::warn!(%error, "a tier cannot be measured again");
             }

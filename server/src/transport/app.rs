@@ -5,35 +5,31 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use arc_swap::ArcSwap;
 use papilla_proto::{ErrorCode, Problem};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
+use super::gate::{Gate, Principal};
 use crate::{
     config::{Config, Timeouts},
     core::{
+        buffers::Store,
         catalogue::Catalogue,
         metrics::{Metrics, Shed},
-        reload::{Changes, ReloadError, Reloader, Turn},
-        scheduler::{Entrance, Pool},
+        reload::Reloader,
+        scheduler::{Pool, PoolHandle},
     },
     problem,
     progress::Progress,
-    transport::{
-        gate::{Gate, Guest},
-        session::Store,
-    },
 };
 
 /// The shared state.
 pub(crate) struct App {
-    catalogue: ArcSwap<Catalogue>,
-    pub(crate) reloader: Reloader,
+    pub(crate) reloader: Arc<Reloader>,
     pub(crate) gate: Gate,
     /// Largest body of a request, bytes.
     pub(crate) body_max: usize,
     pub(crate) metrics: Arc<Metrics>,
-    pub(crate) entrance: Entrance,
+    pub(crate) pool: PoolHandle,
     pub(crate) timeouts: Timeouts,
     /// True once the server drains. Whoever must be waited for holds a receiver.
     pub(crate) drain: Arc<watch::Sender<bool>>,
@@ -57,14 +53,14 @@ impl App {
         drain: Arc<watch::Sender<bool>>,
         progress: Arc<Progress>,
     ) -> Self {
-        let entrance = pool.entrance(&metrics);
+        let (exchange, counted) = (pool.exchange(), Arc::clone(&metrics));
+        let reloader = Reloader::new(config, catalogue, exchange, counted, Arc::clone(&drain));
         Self {
-            catalogue: ArcSwap::new(catalogue),
-            reloader: Reloader::new(config, pool.exchange(), Arc::clone(&metrics)),
+            reloader: Arc::new(reloader),
             gate,
             body_max: config.max_body_bytes,
+            pool: pool.handle(&metrics),
             metrics,
-            entrance,
             timeouts: config.timeouts(),
             drain,
             progress,
@@ -79,15 +75,7 @@ impl App {
     /// What there is to render with now; it may be replaced at any time, so whoever needs it
     /// twice keeps it.
     pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
-        self.catalogue.load_full()
-    }
-
-    /// Loads the models anew; takes seconds, and ends early when the drain begins.
-    ///
-    /// # Errors
-    /// They cannot be served; nothing has changed then.
-    pub(crate) fn reload(&self, turn: Turn) -> Result<Changes, ReloadError> {
-        self.reloader.reload(turn, &self.catalogue, &|| self.is_draining())
+        self.reloader.catalogue()
     }
 
     /// Whether nobody is served: no session is open and no posted map is under way.
@@ -101,13 +89,13 @@ impl App {
         *self.drain.borrow()
     }
 
-    /// A place for one session of this guest.
+    /// A place for one session of this principal.
     ///
     /// # Errors
-    /// All are taken, or all that the guest may have, or the server drains.
-    pub(crate) fn admit_session(&self, guest: &Guest) -> Result<SessionPlace, Problem> {
+    /// All are taken, or all that the principal may have, or the server drains.
+    pub(crate) fn admit_session(&self, principal: &Principal) -> Result<SessionPlace, Problem> {
         let holder =
-            guest.holder.as_ref().and_then(|holder| Some((holder, holder.sessions.as_ref()?)));
+            principal.holder.as_ref().and_then(|holder| Some((holder, holder.sessions.as_ref()?)));
         let of_token = holder.map(|(holder, places)| {
             Arc::clone(places).try_acquire_owned().map_err(|_| {
                 self.metrics.shed(Shed::TokenSessions);
@@ -154,10 +142,4 @@ impl App {
 pub(crate) struct SessionPlace {
     _of_all: OwnedSemaphorePermit,
     _of_token: Option<OwnedSemaphorePermit>,
-}
-
-/// Waits for the drain to begin; at once if the server is gone.
-pub(crate) async fn begun(drain: &mut watch::Receiver<bool>) {
-    // The guard this returns holds a lock: let go of it before anything else.
-    let _ = drain.wait_for(|drain| *drain).await.is_ok();
 }

@@ -17,15 +17,11 @@ use tokio::{
 };
 use tower::ServiceExt;
 
-use crate::{
-    core::metrics::Metrics,
-    problem,
-    progress::Progress,
-    transport::{
-        app::begun,
-        http::{self, info},
-    },
+use super::{
+    answer::{json_answer, refusal::refused},
+    http::info,
 };
+use crate::{core::metrics::Metrics, drain::begun, problem, progress::Progress};
 
 /// The way to the routes, which are there once the models are loaded.
 pub(crate) struct Front {
@@ -62,9 +58,9 @@ impl Front {
         if let Some(router) = self.router.get() {
             return router.clone().oneshot(request.map(Body::new)).await;
         }
-        let refused = match request.uri().path() {
+        let problem = match request.uri().path() {
             "/healthz" => return Ok(info::healthz().await),
-            "/v2/health/live" => return Ok(http::json_answer(&json!({"live": true}))),
+            "/v2/health/live" => return Ok(json_answer(&json!({"live": true}))),
             "/readyz" => match self.progress.left() {
                 Some(left) => return Ok(info::starting(&self.metrics, &left)),
                 None => problem::shutting_down(),
@@ -84,7 +80,7 @@ impl Front {
                 }
             }
         };
-        Ok(http::refused(&self.metrics, request.uri(), refused))
+        Ok(refused(&self.metrics, request.uri(), problem))
     }
 
     fn starting(&self) -> Problem {

@@ -3,34 +3,24 @@
 //! axum's own `serve` sets neither TCP_NODELAY nor a time for the request's head, and does
 //! not bound the number of connections; so hyper is driven here.
 
-mod places;
-
-use std::{
-    io,
-    net::SocketAddr,
-    pin::Pin,
-    sync::Arc,
-    task::{Context, Poll, ready},
-    time::Duration,
-};
+use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tokio::{
-    io::{AsyncRead, AsyncWrite, ReadBuf},
+    io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpSocket, TcpStream},
     sync::watch,
-    time::{Sleep, sleep, timeout},
+    time::{sleep, timeout},
 };
 use tokio_rustls::TlsAcceptor;
 
-use self::places::Place;
-pub(crate) use self::places::{Places, Standing};
-use crate::{
-    config::Timeouts,
-    core::metrics::Metrics,
-    transport::{app::begun, front::Front, gate::Peer},
+use super::{
+    front::Front,
+    gate::{Peer, Place, Places, Standing},
+    stream::TimeoutStream,
 };
+use crate::{config::Timeouts, core::metrics::Metrics, drain::begun};
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
 pub(crate) const BUFFER_MAX: usize = 128 * 1024;
@@ -59,7 +49,7 @@ pub(crate) fn listen(address: SocketAddr) -> io::Result<TcpListener> {
 
 /// What every connection needs.
 #[derive(Clone)]
-pub(crate) struct Line {
+pub(crate) struct ConnectionContext {
     pub(crate) front: Arc<Front>,
     pub(crate) metrics: Arc<Metrics>,
     /// True once the server drains.
@@ -70,8 +60,8 @@ pub(crate) struct Line {
 }
 
 /// Accepts until the drain begins.
-pub(crate) async fn serve(listener: TcpListener, line: Line, places: Places) {
-    let mut drain = line.drain.subscribe();
+pub(crate) async fn serve(listener: TcpListener, context: ConnectionContext, places: Places) {
+    let mut drain = context.drain.subscribe();
     loop {
         let accepted = async {
             let permit = places.free().await;
@@ -94,22 +84,22 @@ pub(crate) async fn serve(listener: TcpListener, line: Line, places: Places) {
             tracing::debug!(%error, "TCP_NODELAY cannot be set");
         }
         let place = places.take(permit, peer.ip());
-        tokio::spawn(connection(stream, Peer(peer.ip()), line.clone(), place));
+        tokio::spawn(connection(stream, Peer(peer.ip()), context.clone(), place));
     }
 }
 
-async fn connection(stream: TcpStream, peer: Peer, line: Line, place: Place) {
-    line.metrics.connections_open.inc();
+async fn connection(stream: TcpStream, peer: Peer, context: ConnectionContext, place: Place) {
+    context.metrics.connections_open.inc();
     // Taken before anything is read: from here on the drain waits for this connection.
-    let drain = line.drain.subscribe();
-    let patience = line.timeouts.io;
-    let stream = Patient::new(stream, patience);
+    let drain = context.drain.subscribe();
+    let patience = context.timeouts.io;
+    let stream = TimeoutStream::new(stream, patience);
     let standing = &place.standing;
     let serving = async {
-        match &line.tls {
-            None => converse(stream, peer, standing, &line, drain).await,
+        match &context.tls {
+            None => converse(stream, peer, standing, &context, drain).await,
             Some(tls) => match timeout(patience, tls.accept(stream)).await {
-                Ok(Ok(stream)) => converse(stream, peer, standing, &line, drain).await,
+                Ok(Ok(stream)) => converse(stream, peer, standing, &context, drain).await,
                 Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
                 Err(_) => tracing::debug!("TLS handshake took too long"),
             },
@@ -119,19 +109,19 @@ async fn connection(stream: TcpStream, peer: Peer, line: Line, place: Place) {
         () = serving => {}
         () = standing.evicted() => tracing::debug!("a connection without a token gave way"),
     }
-    line.metrics.connections_open.dec();
+    context.metrics.connections_open.dec();
 }
 
 async fn converse<S>(
     stream: S,
     peer: Peer,
     standing: &Arc<Standing>,
-    line: &Line,
+    context: &ConnectionContext,
     mut drain: watch::Receiver<bool>,
 ) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let (front, standing) = (Arc::clone(&line.front), Arc::clone(standing));
+    let (front, standing) = (Arc::clone(&context.front), Arc::clone(standing));
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer);
         request.extensions_mut().insert(Arc::clone(&standing));
@@ -140,7 +130,7 @@ async fn converse<S>(
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
-        .header_read_timeout(line.timeouts.io)
+        .header_read_timeout(context.timeouts.io)
         .max_buf_size(BUFFER_MAX)
         .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();
@@ -159,84 +149,5 @@ async fn converse<S>(
                 connection.as_mut().graceful_shutdown();
             }
         }
-    }
-}
-
-/// A stream whose writes give up when the other side makes no room for a while.
-pub(crate) struct Patient {
-    stream: TcpStream,
-    patience: Duration,
-    /// Set while a write waits.
-    alarm: Option<Pin<Box<Sleep>>>,
-}
-
-impl Patient {
-    fn new(stream: TcpStream, patience: Duration) -> Self {
-        Self { stream, patience, alarm: None }
-    }
-
-    /// The stream, for whoever watches the clock without help.
-    pub(crate) fn into_stream(self) -> TcpStream {
-        self.stream
-    }
-
-    /// Passes a write's outcome on, and watches the clock while there is none.
-    fn timed<T>(
-        &mut self,
-        outcome: Poll<io::Result<T>>,
-        cx: &mut Context<'_>,
-    ) -> Poll<io::Result<T>> {
-        if outcome.is_ready() {
-            self.alarm = None;
-            return outcome;
-        }
-        let patience = self.patience;
-        let alarm = self.alarm.get_or_insert_with(|| Box::pin(sleep(patience)));
-        ready!(alarm.as_mut().poll(cx));
-        Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the client does not read")))
-    }
-}
-
-impl AsyncRead for Patient {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_read(cx, buffer)
-    }
-}
-
-impl AsyncWrite for Patient {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<io::Result<usize>> {
-        let outcome = Pin::new(&mut self.stream).poll_write(cx, bytes);
-        self.timed(outcome, cx)
-    }
-
-    fn poll_write_vectored(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-        bytes: &[io::IoSlice<'_>],
-    ) -> Poll<io::Result<usize>> {
-        let outcome = Pin::new(&mut self.stream).poll_write_vectored(cx, bytes);
-        self.timed(outcome, cx)
-    }
-
-    fn is_write_vectored(&self) -> bool {
-        self.stream.is_write_vectored()
-    }
-
-    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let outcome = Pin::new(&mut self.stream).poll_flush(cx);
-        self.timed(outcome, cx)
-    }
-
-    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
-        let outcome = Pin::new(&mut self.stream).poll_shutdown(cx);
-        self.timed(outcome, cx)
     }
 }

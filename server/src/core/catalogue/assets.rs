@@ -5,20 +5,10 @@ mod folder;
 
 use std::borrow::Cow;
 
-use sha2::{Digest, Sha256};
-
 use crate::{StartError, config::Config};
 
 /// The shipped models, cards, atlas and replay, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
-
-/// The page, likewise.
-pub(crate) const PAGE: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
-
-/// SHA-256 of `bytes`, 64 lower-case hexadecimal digits.
-pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
 
 /// Files by name.
 type Files = Vec<(String, Cow<'static, [u8]>)>;

@@ -10,7 +10,7 @@ use papilla_proto::atlas::Atlas;
 use serde_json::Value;
 
 use super::Tier;
-use crate::core::{catalogue::assets::sha256_hex, latency::Speed};
+use crate::core::{digest::sha256_hex, latency::Speed};
 
 /// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
 /// are of a model that is not served.

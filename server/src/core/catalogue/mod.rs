@@ -1,81 +1,31 @@
 //! The tiers this service can render with, their atlas, and the replay.
 
 pub(crate) mod assets;
+pub(crate) mod calibrate;
 pub(crate) mod golden;
 mod load;
 pub(crate) mod replay;
-
-use std::sync::{Arc, atomic::AtomicUsize};
+mod tier;
 
 use bytes::Bytes;
-use papilla_engine::{Model, Session, card::Index, ladder::Kind};
+use papilla_engine::card::Index;
 use papilla_proto::{
-    ErrorCode, Pattern, PixelMask, Problem,
+    ErrorCode, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
     error::shortened,
 };
-use serde_json::Value;
 
-use self::load::{ReadCard, judge, load_ladder, load_tier, text};
+pub(crate) use self::tier::Tier;
+use self::{
+    assets::Assets,
+    load::{ReadCard, judge, load_ladder, load_tier, text},
+    replay::Replay,
+};
 use crate::{
     StartError,
-    core::{
-        catalogue::{assets::Assets, replay::Replay},
-        effects,
-        latency::{Overhead, Speed, round_press},
-    },
-    transport::http::kept::Kept,
+    codec::{Output, Quantity},
+    core::{effects, kept::Kept, latency::Overhead, metrics::TierLabels},
 };
-
-/// One way of getting a SED map: a model, and what is known of it.
-#[derive(Clone)]
-pub(crate) struct Tier {
-    /// Name in the protocol.
-    pub(crate) name: String,
-    pub(crate) model: Arc<dyn Model>,
-    /// The card as it was shipped.
-    pub(crate) card: Value,
-    /// Effects it renders.
-    pub(crate) effects: Vec<String>,
-    pub(crate) atlas_hash: String,
-    /// Greatest pressure it was trained on, Pa.
-    pub(crate) pressure_max_pa: f32,
-    /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
-    pub(crate) pattern_max: Option<Pattern>,
-    /// Greatest SED it was trained on, J/m3.
-    pub(crate) sed_max_j_per_m3: f32,
-    /// What it is.
-    pub(crate) kind: Kind,
-    /// Median relative L2 error on [`Catalogue::judged_on`].
-    pub(crate) relative_l2_median: f64,
-    /// 95th percentile of that error on the card's own split.
-    pub(crate) relative_l2_p95: f64,
-    /// How long it takes here.
-    pub(crate) speed: Arc<Speed>,
-    /// Sessions that render with it now.
-    pub(crate) sessions: Arc<AtomicUsize>,
-    /// A reload found it gone: sessions that have it go on, nobody else gets it.
-    pub(crate) retired: bool,
-}
-
-impl Tier {
-    /// A session that has rendered a round press: the memory that frames will use has been
-    /// touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold press and answer.
-    ///
-    /// # Errors
-    /// The tier does not run.
-    pub(crate) fn warm_session(
-        &self,
-        pressure_pa: &mut [f32],
-        sed_j_per_m3: &mut [f32],
-    ) -> Result<Box<dyn Session>, StartError> {
-        let failed = |source| StartError::Engine { tier: self.name.clone(), source };
-        let mut session = self.model.session().map_err(failed)?;
-        round_press(self.pressure_max_pa, pressure_pa);
-        session.infer(pressure_pa, sed_j_per_m3).map_err(failed)?;
-        Ok(session)
-    }
-}
 
 /// How far loading has come.
 pub(crate) enum Step<'a> {
@@ -83,6 +33,22 @@ pub(crate) enum Step<'a> {
     Listed(&'a [String]),
     /// This one is.
     Loaded(&'a str),
+}
+
+/// What is told of a catalogue, and does not change while it lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Document {
+    Models,
+    Atlas,
+    AtlasObj,
+    AtlasGlb,
+    Mask(Patch),
+    /// The list of the replay's states.
+    States,
+    /// Vertex values of a state, by its number.
+    State(usize),
+    /// A state as a map.
+    StateMap(usize, Quantity, Output),
 }
 
 /// All there is to render with and to show.
@@ -109,7 +75,7 @@ pub(crate) struct Catalogue {
     /// What sessions with effects share.
     pub(crate) runtime: effects::Shared,
     /// Answers about all this.
-    pub(crate) kept: Kept,
+    pub(crate) kept: Kept<Document>,
 }
 
 impl Catalogue {
@@ -233,6 +199,12 @@ impl Catalogue {
         })
     }
 
+    /// What effects are placed on.
+    pub(crate) fn finger(&self) -> effects::Finger<'_> {
+        let Self { atlas, skin, interface, runtime, .. } = self;
+        effects::Finger { atlas, skin, interface, shared: runtime }
+    }
+
     /// Time of a tier from receipt to answer on an idle machine, us.
     pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
         self.tiers[tier].speed.typical_us().saturating_add(self.overhead.us())
@@ -263,6 +235,17 @@ impl Catalogue {
     /// The tiers on offer, each with its place.
     pub(crate) fn offered(&self) -> impl Iterator<Item = (usize, &Tier)> {
         self.tiers.iter().enumerate().filter(|(_, tier)| !tier.retired)
+    }
+
+    /// What metrics say of each tier, in the order of `tiers`.
+    pub(crate) fn tier_labels(&self) -> impl Iterator<Item = TierLabels<'_>> {
+        self.tiers.iter().enumerate().map(|(place, tier)| TierLabels {
+            name: &tier.name,
+            atlas_hash: &tier.atlas_hash,
+            onnx_sha256: &tier.model.info().onnx_sha256,
+            is_default: place == self.default,
+            is_offered: !tier.retired,
+        })
     }
 
     /// The names, for messages.

@@ -1,12 +1,12 @@
-//! A few FE presses shipped with the models, so that a visitor sees the error.
+//! A few states of FE simulations shipped with the models, so that a visitor sees the error.
 
 use papilla_proto::json;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// One press: where the plate was, and what the FE solver found.
+/// One state: where the plate was, and what the FE solver found.
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct Press {
+pub(crate) struct State {
     /// Name to show.
     pub(crate) name: String,
     /// Angles of the plate, as the dataset's manifest has them.
@@ -23,19 +23,20 @@ pub(crate) struct Press {
 /// `models/replay.json`.
 #[derive(Debug, Default, Deserialize)]
 pub(crate) struct Replay {
-    pub(crate) presses: Vec<Press>,
+    #[serde(rename = "presses")]
+    pub(crate) states: Vec<State>,
 }
 
 impl Replay {
     /// Reads and checks the file.
     ///
     /// # Errors
-    /// It is not the JSON that is due, or a press does not fit the atlas.
+    /// It is not the JSON that is due, or a state does not fit the atlas.
     pub(crate) fn parse(text: &[u8], vertex_count: usize) -> Result<Self, String> {
         let replay: Self = json::read(text).map_err(|e| e.to_string())?;
-        for (index, press) in replay.presses.iter().enumerate() {
+        for (index, state) in replay.states.iter().enumerate() {
             for (what, values) in
-                [("pressure_pa", &press.pressure_pa), ("sed_j_per_m3", &press.sed_j_per_m3)]
+                [("pressure_pa", &state.pressure_pa), ("sed_j_per_m3", &state.sed_j_per_m3)]
             {
                 let found = values.len();
                 if found != vertex_count {
@@ -67,8 +68,8 @@ mod tests {
     }
 
     #[test]
-    fn a_press_must_fit_the_atlas() {
-        assert_eq!(parse("[1, 2]", "[0, 3]").unwrap().presses.len(), 1);
+    fn a_state_must_fit_the_atlas() {
+        assert_eq!(parse("[1, 2]", "[0, 3]").unwrap().states.len(), 1);
         assert!(parse("[1]", "[0, 3]").unwrap_err().contains("pressure_pa"));
         assert!(parse("[1, 2]", "[0, 3, 4]").unwrap_err().contains("sed_j_per_m3"));
         assert!(parse("[1, -2]", "[0, 3]").unwrap_err().contains("negative"));

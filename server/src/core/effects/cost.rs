@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 use bytes::BytesMut;
 use papilla_proto::{
     HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
+    atlas::Raster,
     effects::{Actuator, ActuatorInput, Layout, Place},
 };
 use serde::Serialize;
 
-use super::Effects;
-use crate::core::{catalogue::Catalogue, latency::round_press};
+use super::{Effects, Finger};
+use crate::core::latency::probe_map;
 
 /// Runs of which the fastest counts.
 const RUNS: u64 = 12;
@@ -27,25 +28,25 @@ pub(crate) struct Cost {
     pub(crate) us: f64,
 }
 
-/// Times every effect on a round press against the bare map, and keeps it for `/v1/effects`.
-pub(crate) fn measure(catalogue: &Catalogue) {
+/// Times every effect on [`probe_map`] against the bare map, and keeps it for `/v1/effects`.
+pub(crate) fn measure(finger: Finger<'_>, pressure_max_pa: f32) {
     let bare = Hello { version: 2, effects: vec!["contact_window".to_owned()], ..Hello::default() };
     // An effect that cannot be set up here has no cost to tell of.
-    let of = |hello: &Hello| Effects::of(hello, catalogue).ok().flatten();
-    let Some(base_us) = of(&bare).map(|effects| us(effects, catalogue)) else { return };
+    let of = |hello: &Hello| Effects::of(hello, finger).ok().flatten();
+    let Some(base_us) = of(&bare).map(|effects| us(effects, pressure_max_pa)) else { return };
     let mut costs = Vec::new();
     for effect in RuntimeEffect::ALL {
-        let hello = hello(effect, catalogue);
-        let Some(us) = of(&hello).map(|effects| us(effects, catalogue)) else { continue };
+        let hello = hello(effect, finger.interface);
+        let Some(us) = of(&hello).map(|effects| us(effects, pressure_max_pa)) else { continue };
         let us = if effect == RuntimeEffect::ContactWindow { us } else { us - base_us };
         costs.push(Cost { effect, us: (10.0 * us).round() / 10.0 });
     }
-    let _ = catalogue.runtime.costs.set(costs);
+    let _ = finger.shared.costs.set(costs);
 }
 
 /// A hello for one effect (and for the window, which the base has too).
-fn hello(effect: RuntimeEffect, catalogue: &Catalogue) -> Hello {
-    let indices = catalogue.interface.indices();
+fn hello(effect: RuntimeEffect, interface: &Raster) -> Hello {
+    let indices = interface.indices();
     let place = |i: usize| {
         let index = indices[i * indices.len() / PLACES] as usize;
         Place::Px([index % MAP_SIDE_PX, index / MAP_SIDE_PX].map(|px| px as f32 + 0.5))
@@ -75,21 +76,20 @@ fn hello(effect: RuntimeEffect, catalogue: &Catalogue) -> Hello {
 }
 
 /// Time of one frame's effects, us: the least of several.
-fn us(mut effects: Effects, catalogue: &Catalogue) -> f64 {
-    let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
-    let [mut press, mut pressure_pa] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
-    round_press(pressure_max_pa, &mut press);
+fn us(mut effects: Effects, pressure_max_pa: f32) -> f64 {
+    let [mut contact_pa, mut pressure_pa] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
+    probe_map(pressure_max_pa, &mut contact_pa);
     let mut bytes = BytesMut::with_capacity(effects.size_hint());
     let mut least = Duration::MAX;
     for run in 0..RUNS {
-        pressure_pa.copy_from_slice(&press);
+        pressure_pa.copy_from_slice(&contact_pa);
         bytes.clear();
         bytes.resize(HEADER_LEN_V2, 0);
         let start = Instant::now();
         let time_us = run * 11_111;
         effects.before(&mut pressure_pa, time_us);
-        // The press stands in for its SED: the times do not depend on the values.
-        if effects.write(&pressure_pa, &press, 1.0, time_us, &mut bytes).is_ok() {
+        // The pressure stands in for its SED: the times do not depend on the values.
+        if effects.write(&pressure_pa, &contact_pa, 1.0, time_us, &mut bytes).is_ok() {
             least = least.min(start.elapsed());
         }
     }

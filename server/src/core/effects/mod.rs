@@ -23,6 +23,7 @@ use bytes::BytesMut;
 use papilla_proto::{
     ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
     SampleType, Window,
+    atlas::{Atlas, Raster},
     effects::{ActuatorInput, Section, SectionName},
 };
 
@@ -33,7 +34,22 @@ use self::{
     actuators::Actuators, afferents::Afferents, points::Points, relaxation::Relaxation,
     summary::Contact,
 };
-use crate::core::catalogue::Catalogue;
+/// The finger that effects are placed on, and what all sessions on it share.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Finger<'a> {
+    pub(crate) atlas: &'a Atlas,
+    pub(crate) skin: &'a Raster,
+    pub(crate) interface: &'a Raster,
+    pub(crate) shared: &'a Shared,
+}
+
+impl Finger<'_> {
+    /// Areas and places of its pixels.
+    fn geometry(&self) -> Arc<Geometry> {
+        let make = || Arc::new(Geometry::new(self.atlas, self.skin, self.interface));
+        Arc::clone(self.shared.geometry.get_or_init(make))
+    }
+}
 
 /// What all sessions on one catalogue share; made when it is first asked for.
 #[derive(Debug, Default)]
@@ -97,7 +113,7 @@ impl Effects {
     ///
     /// # Errors
     /// Parameters are unusable, missing, or of an effect that is not named.
-    pub(crate) fn of(hello: &Hello, catalogue: &Catalogue) -> Result<Option<Self>, Problem> {
+    pub(crate) fn of(hello: &Hello, finger: Finger<'_>) -> Result<Option<Self>, Problem> {
         let names = named(hello)?;
         let contact_pa = hello.contact_pa.unwrap_or(0.0);
         if !(contact_pa.is_finite() && contact_pa >= 0.0) {
@@ -109,12 +125,7 @@ impl Effects {
             return Ok(None);
         }
         let has = |effect| names.contains(&effect);
-        let geometry = || {
-            let shared = &catalogue.runtime.geometry;
-            Arc::clone(shared.get_or_init(|| {
-                Arc::new(Geometry::new(&catalogue.atlas, &catalogue.skin, &catalogue.interface))
-            }))
-        };
+        let geometry = || finger.geometry();
         let relaxation = has(RuntimeEffect::Relaxation)
             .then(|| Relaxation::new(&hello.relaxation.clone().unwrap_or_default()))
             .transpose()?;

@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     MAP_SIDE_PX, Summary,
-    atlas::{Atlas, Patch, PatchVertices, Raster},
+    atlas::{Patch, PatchVertices},
     effects::{
         Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place, PronyTerm,
         Relaxation as RelaxationParameters,
@@ -11,6 +11,7 @@ use papilla_proto::{
 use proptest::prelude::*;
 
 use super::*;
+use crate::core::catalogue::Catalogue;
 
 /// A plane patch, 0.1 mm a pixel, from pixel 20 to 200 both ways: x = 0.1 v, y = -0.1 u, z = -0.5.
 fn plane_atlas() -> Atlas {
@@ -64,9 +65,9 @@ fn areas_are_those_of_the_finger() {
 #[test]
 fn a_bare_map_has_no_effects_and_costs_nothing() {
     let catalogue = catalogue();
-    assert!(Effects::of(&hello(&["layers"]), &catalogue).unwrap().is_none());
+    assert!(Effects::of(&hello(&["layers"]), catalogue.finger()).unwrap().is_none());
     let hello = Hello { map: Some(true), ..hello(&[]) };
-    assert!(Effects::of(&hello, &catalogue).unwrap().is_none());
+    assert!(Effects::of(&hello, catalogue.finger()).unwrap().is_none());
     assert!(catalogue.runtime.geometry.get().is_none(), "nobody asked for areas");
 }
 
@@ -79,7 +80,7 @@ fn sections_lie_where_they_are_said_to_be() {
         contact_window: Some(ContactWindow { margin_px: 1 }),
         ..hello(&["contact_window", "summary", "points", "actuators"])
     };
-    let mut effects = Effects::of(&wish, &catalogue).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, catalogue.finger()).unwrap().unwrap();
     let found: Vec<_> = effects.sections.iter().map(|s| (s.name, s.offset, s.bytes)).collect();
     let due = [
         (SectionName::Summary, 48, 64),
@@ -107,7 +108,7 @@ fn sections_lie_where_they_are_said_to_be() {
 #[test]
 fn no_map_is_no_map() {
     let wish = Hello { map: Some(false), ..hello(&["summary"]) };
-    let mut effects = Effects::of(&wish, &catalogue()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
     assert_eq!((effects.sections.len(), effects.size_hint()), (1, 112));
     let map = vec![1.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
@@ -118,7 +119,7 @@ fn no_map_is_no_map() {
 #[test]
 fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
     let wish = hello(&["relaxation", "summary", "contact_window"]);
-    let mut effects = Effects::of(&wish, &catalogue()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
     let press = |effects: &mut Effects, pa: f32, time_us| {
         let mut map = vec![0.0; MAP_LEN];
         map[100 * MAP_SIDE_PX + 100] = pa;
@@ -144,7 +145,7 @@ fn afferents_show_rates_in_map_points_and_if_asked_actuators() {
         answer_sample_type: Some(SampleType::U16),
         ..hello(&["afferents", "points", "actuators", "summary"])
     };
-    let mut effects = Effects::of(&wish, &catalogue()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
     // 20 kPa at 80 kPa: 12 Hz.
     let map = vec![2500.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
@@ -181,7 +182,7 @@ fn wishes_that_contradict_themselves_are_refused() {
             "actuators",
         ),
     ] {
-        let problem = Effects::of(&wish, &catalogue).unwrap_err();
+        let problem = Effects::of(&wish, catalogue.finger()).unwrap_err();
         assert_eq!(problem.code, ErrorCode::BadEffect, "{problem}");
         assert_eq!(problem.field.as_deref(), Some(field), "{problem}");
     }
@@ -191,7 +192,7 @@ fn wishes_that_contradict_themselves_are_refused() {
 fn every_effect_has_a_cost() {
     let catalogue = catalogue();
     assert!(catalogue.runtime.costs().is_none());
-    measure(&catalogue);
+    measure(catalogue.finger(), 1.0);
     let costs = catalogue.runtime.costs().unwrap();
     let names: Vec<_> = costs.iter().map(|cost| cost.effect).collect();
     assert_eq!(names, RuntimeEffect::ALL);
@@ -226,7 +227,7 @@ proptest! {
             actuators: Some(Layout { gain: Some(gain), ..display() }),
             ..hello(&["relaxation", "afferents", "points", "actuators", "summary"])
         };
-        let Ok(Some(mut effects)) = Effects::of(&wish, &catalogue()) else { return Ok(()) };
+        let Ok(Some(mut effects)) = Effects::of(&wish, catalogue().finger()) else { return Ok(()) };
         for time_us in times_us {
             let mut map = vec![pressure_pa; MAP_LEN];
             let peak_pa = effects.before(&mut map, time_us).unwrap();

@@ -84,3 +84,53 @@ impl Shed {
         })
     }
 }
+
+/// How a map came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Transport {
+    /// Posted.
+    Http,
+    /// In a session.
+    Session,
+    /// Posted by a client of the Open Inference Protocol.
+    Oip,
+}
+
+/// Where a deadline was found to have passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Stage {
+    /// Before the map entered the slot.
+    Admission,
+    /// When a thread took it from the slot.
+    Dequeue,
+    /// Decoded, but what is left of the time is less than any inference takes.
+    Inference,
+    /// Rendered, but not yet sent.
+    Sending,
+}
+
+impl Stage {
+    pub(super) const ALL: [Self; 4] =
+        [Self::Admission, Self::Dequeue, Self::Inference, Self::Sending];
+
+    pub(super) fn word(self) -> Word {
+        Word(match self {
+            Self::Admission => "admission",
+            Self::Dequeue => "dequeue",
+            Self::Inference => "inference",
+            Self::Sending => "sending",
+        })
+    }
+}
+
+/// What the labels of a tier say.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TierLabels<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) atlas_hash: &'a str,
+    pub(crate) onnx_sha256: &'a str,
+    /// Whether clients get it unasked.
+    pub(crate) is_default: bool,
+    /// Whether new clients get it at all.
+    pub(crate) is_offered: bool,
+}

@@ -19,13 +19,11 @@ use prometheus_client::{
     registry::{Metric, Registry, Unit},
 };
 
-pub(crate) use labels::Shed;
 use labels::{
     CodeLabels, LateLabels, MapLabels, ModelLabels, ReloadLabels, RequestLabels, ShedLabels,
     StageLabels, Word,
 };
-
-use crate::core::{catalogue::Catalogue, scheduler::Stage};
+pub(crate) use labels::{Shed, Stage, TierLabels, Transport};
 
 /// Greatest number of tiers, counting every name since the start: handles have fixed places, so
 /// that the hot path takes no lock.
@@ -38,17 +36,6 @@ pub(crate) const BUCKETS_S: [f64; 18] = [
     50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 3e-3, 4e-3, 5.5e-3, 8e-3, 11.1e-3, 16e-3, 25e-3,
     50e-3, 100e-3, 200e-3, 500e-3, 2.0,
 ];
-
-/// How a map came in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Transport {
-    /// Posted.
-    Http,
-    /// In a session.
-    Session,
-    /// Posted by a client of the Open Inference Protocol.
-    Oip,
-}
 
 /// What became of a reload.
 const RELOADS: [&str; 3] = ["ok", "refused", "busy"];
@@ -165,8 +152,8 @@ impl Metrics {
             connections_open: registered(registry, "connections_open", "Open connections"),
             registry: Registry::default(),
         };
-        for stage in [Stage::Admission, Stage::Dequeue, Stage::Inference, Stage::Sending] {
-            let _ = metrics.late.get_or_create(&LateLabels { stage: word_of(stage) });
+        for stage in Stage::ALL {
+            let _ = metrics.late.get_or_create(&LateLabels { stage: stage.word() });
         }
         for shed in Shed::ALL {
             let _ = metrics.shed.get_or_create(&ShedLabels { reason: shed.word() });
@@ -181,23 +168,24 @@ impl Metrics {
         Arc::new(Self { registry: root, ..metrics })
     }
 
-    /// Gives every tier of the catalogue its timers, and lists its models.
-    pub(crate) fn name_tiers(&self, catalogue: &Catalogue) {
-        for (place, tier) in self.tiers.iter().zip(&catalogue.tiers) {
+    /// Gives every tier its timers, in this order, and lists the models on offer.
+    pub(crate) fn name_tiers<'a>(&self, tiers: impl IntoIterator<Item = TierLabels<'a>>) {
+        self.models.clear();
+        for (place, tier) in self.tiers.iter().zip(tiers) {
             place.get_or_init(|| {
                 tier_metrics(|stage| {
-                    let labels = StageLabels { tier: tier.name.clone(), stage };
+                    let labels = StageLabels { tier: tier.name.to_owned(), stage };
                     Timer(self.stages.get_or_create(&labels).clone())
                 })
             });
-        }
-        self.models.clear();
-        for (index, tier) in catalogue.offered() {
+            if !tier.is_offered {
+                continue;
+            }
             let labels = ModelLabels {
-                tier: tier.name.clone(),
-                atlas_hash: tier.atlas_hash.clone(),
-                onnx_sha256: tier.model.info().onnx_sha256.clone(),
-                default: Word(if index == catalogue.default { "true" } else { "false" }),
+                tier: tier.name.to_owned(),
+                atlas_hash: tier.atlas_hash.to_owned(),
+                onnx_sha256: tier.onnx_sha256.to_owned(),
+                default: Word(if tier.is_default { "true" } else { "false" }),
             };
             self.models.get_or_create(&labels).set(1);
         }
@@ -245,7 +233,7 @@ impl Metrics {
     /// Counts a late map.
     pub(crate) fn late(&self, transport: Transport, stage: Stage) {
         self.of(transport).late.inc();
-        self.late.get_or_create(&LateLabels { stage: word_of(stage) }).inc();
+        self.late.get_or_create(&LateLabels { stage: stage.word() }).inc();
     }
 
     /// Counts an error sent to a client.
@@ -259,15 +247,6 @@ impl Metrics {
         text::encode(&mut out, &self.registry)?;
         Ok(out)
     }
-}
-
-fn word_of(stage: Stage) -> Word {
-    Word(match stage {
-        Stage::Admission => "admission",
-        Stage::Dequeue => "dequeue",
-        Stage::Inference => "inference",
-        Stage::Sending => "sending",
-    })
 }
 
 /// A metric that is registered as it is made.

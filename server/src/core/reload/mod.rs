@@ -7,7 +7,7 @@ use std::sync::{Arc, atomic::Ordering};
 use arc_swap::ArcSwap;
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
-use tokio::sync::{Mutex, OwnedMutexGuard};
+use tokio::sync::{Mutex, OwnedMutexGuard, watch::Sender};
 
 pub(crate) use watch::{once, watch};
 
@@ -18,16 +18,19 @@ use crate::{
         catalogue::{
             Catalogue, Tier,
             assets::Assets,
+            calibrate,
             golden::{self, GoldenError},
         },
-        latency,
         metrics::{Metrics, TIERS_MAX},
         scheduler::Exchange,
     },
 };
 
-/// Reloads the models of a folder.
+/// Holds what there is to render with, and reloads the models of a folder.
 pub(crate) struct Reloader {
+    running: ArcSwap<Catalogue>,
+    /// True once the server drains.
+    drain: Arc<Sender<bool>>,
     config: Config,
     exchange: Exchange,
     metrics: Arc<Metrics>,
@@ -83,8 +86,21 @@ impl From<ReloadError> for Problem {
 }
 
 impl Reloader {
-    pub(crate) fn new(config: &Config, exchange: Exchange, metrics: Arc<Metrics>) -> Self {
-        Self { config: config.clone(), exchange, metrics, turn: Arc::default() }
+    pub(crate) fn new(
+        config: &Config,
+        catalogue: Arc<Catalogue>,
+        exchange: Exchange,
+        metrics: Arc<Metrics>,
+        drain: Arc<Sender<bool>>,
+    ) -> Self {
+        let running = ArcSwap::new(catalogue);
+        Self { running, drain, config: config.clone(), exchange, metrics, turn: Arc::default() }
+    }
+
+    /// What there is to render with now; it may be replaced at any time, so whoever needs it
+    /// twice keeps it.
+    pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
+        self.running.load_full()
     }
 
     /// The turn, if no reload is under way.
@@ -104,18 +120,14 @@ impl Reloader {
     }
 
     /// Loads the folder, checks every new model, hands the threads warm sessions of it and
-    /// then swaps the catalogue. Takes seconds; not for a thread that moves bytes.
+    /// then swaps the catalogue. Takes seconds, and ends early when the drain begins; not for a
+    /// thread that moves bytes.
     ///
     /// # Errors
     /// Anything that would keep the service from starting, a wrong golden answer, another
-    /// atlas, or it is to stop; nothing has changed then.
-    pub(crate) fn reload(
-        &self,
-        _turn: Turn,
-        running: &ArcSwap<Catalogue>,
-        is_to_stop: &dyn Fn() -> bool,
-    ) -> Result<Changes, ReloadError> {
-        let result = self.replace(running, is_to_stop);
+    /// atlas, or the drain began; nothing has changed then.
+    pub(crate) fn reload(&self, _turn: Turn) -> Result<Changes, ReloadError> {
+        let result = self.replace();
         self.metrics.reload(result.is_ok());
         match &result {
             Ok(changes) => tracing::info!(?changes, "models reloaded"),
@@ -124,17 +136,14 @@ impl Reloader {
         result
     }
 
-    fn replace(
-        &self,
-        running: &ArcSwap<Catalogue>,
-        is_to_stop: &dyn Fn() -> bool,
-    ) -> Result<Changes, ReloadError> {
+    fn replace(&self) -> Result<Changes, ReloadError> {
         if self.config.models.is_none() {
             return Err(ReloadError::Embedded);
         }
-        let assets = Assets::of_unless(&self.config, is_to_stop)?.ok_or(ReloadError::Draining)?;
-        let go_on = || if is_to_stop() { Err(ReloadError::Draining) } else { Ok(()) };
-        let old = running.load_full();
+        let assets = Assets::of_unless(&self.config, &|| self.is_draining())?
+            .ok_or(ReloadError::Draining)?;
+        let go_on = || if self.is_draining() { Err(ReloadError::Draining) } else { Ok(()) };
+        let old = self.catalogue();
         let new = Catalogue::load(&assets, self.config.default_tier.as_deref(), Some(&old))?;
         if new.atlas.hash() != old.atlas.hash() {
             let [found, running] = [&new, &old].map(|c| c.atlas.hash().to_owned());
@@ -152,17 +161,21 @@ impl Reloader {
             return Err(ReloadError::TooMany);
         }
         go_on()?;
-        latency::calibrate(&new, self.config.calibration())?;
+        calibrate::calibrate(&new, self.config.calibration())?;
         go_on()?;
         let new = Arc::new(new);
         let fresh = |place: usize| is_new(&new.tiers[place], &old);
         let sessions = self.exchange.prepare(&new, fresh)?;
         // From here on nothing fails. Threads first: whoever reads the new catalogue may
         // submit a job for a new tier at once.
-        self.metrics.name_tiers(&new);
+        self.metrics.name_tiers(new.tier_labels());
         self.exchange.hand_over(&new, sessions);
-        running.store(new);
+        self.running.store(new);
         Ok(changes)
+    }
+
+    fn is_draining(&self) -> bool {
+        *self.drain.borrow()
     }
 }
 

@@ -12,8 +12,8 @@ use tokio::{
     time::{Instant, timeout},
 };
 
-use super::Turn;
-use crate::transport::app::{App, begun};
+use super::{Reloader, Turn};
+use crate::drain::begun;
 
 /// A folder must be quiet for so long: files are copied one after the other.
 const QUIET: Duration = Duration::from_millis(700);
@@ -25,7 +25,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 ///
 /// # Errors
 /// The system cannot watch it.
-pub(crate) fn watch(app: Arc<App>, folder: &Path) -> notify::Result<()> {
+pub(crate) fn watch(reloader: Arc<Reloader>, folder: &Path) -> notify::Result<()> {
     // One place is enough: it says that something has changed since it was last emptied.
     let (changed, changes) = mpsc::channel(1);
     let mut watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
@@ -35,7 +35,7 @@ pub(crate) fn watch(app: Arc<App>, folder: &Path) -> notify::Result<()> {
         }
     })?;
     watcher.watch(folder, RecursiveMode::NonRecursive)?;
-    tokio::spawn(follow(app, changes, watcher));
+    tokio::spawn(follow(reloader, changes, watcher));
     Ok(())
 }
 
@@ -47,10 +47,14 @@ fn is_change(kind: EventKind) -> bool {
     }
 }
 
-async fn follow(app: Arc<App>, mut changes: mpsc::Receiver<()>, watcher: RecommendedWatcher) {
+async fn follow(
+    reloader: Arc<Reloader>,
+    mut changes: mpsc::Receiver<()>,
+    watcher: RecommendedWatcher,
+) {
     loop {
         // Held no longer than the wait: a drain waits for whoever holds one.
-        let mut drain = app.drain.subscribe();
+        let mut drain = reloader.drain.subscribe();
         tokio::select! {
             () = begun(&mut drain) => break,
             change = changes.recv() => if change.is_none() { break },
@@ -60,7 +64,7 @@ async fn follow(app: Arc<App>, mut changes: mpsc::Receiver<()>, watcher: Recomme
         while first.elapsed() < PATIENCE
             && matches!(timeout(QUIET, changes.recv()).await, Ok(Some(())))
         {}
-        once(Arc::clone(&app)).await;
+        once(Arc::clone(&reloader)).await;
     }
     // It lives as long as the loop.
     drop(watcher);
@@ -68,24 +72,24 @@ async fn follow(app: Arc<App>, mut changes: mpsc::Receiver<()>, watcher: Recomme
 
 /// Loads the models anew once it is its turn, unless the drain begins before. What came of it is in
 /// the log and in the metrics.
-pub(crate) async fn once(app: Arc<App>) {
-    if let Some(turn) = turn(&app).await {
+pub(crate) async fn once(reloader: Arc<Reloader>) {
+    if let Some(turn) = turn(&reloader).await {
         // Err: it panicked, and the log says so.
-        let _ = spawn_blocking(move || app.reload(turn)).await;
+        let _ = spawn_blocking(move || reloader.reload(turn)).await;
     }
 }
 
 /// The turn to reload: the one under way may have read the folder before it changed. None: the
 /// drain began.
-async fn turn(app: &App) -> Option<Turn> {
-    match app.reloader.try_begin() {
+async fn turn(reloader: &Reloader) -> Option<Turn> {
+    match reloader.try_begin() {
         Ok(turn) => Some(turn),
         Err(busy) => {
             tracing::info!("{busy}; the folder is read again after it");
-            let mut drain = app.drain.subscribe();
+            let mut drain = reloader.drain.subscribe();
             tokio::select! {
                 () = begun(&mut drain) => None,
-                turn = app.reloader.begin() => Some(turn),
+                turn = reloader.begin() => Some(turn),
             }
         }
     }

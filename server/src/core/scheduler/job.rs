@@ -10,7 +10,7 @@ use papilla_proto::{FrameHeader, FrameKind, Problem, Window};
 
 use crate::{
     codec::{Input, Output},
-    core::effects::Effects,
+    core::{effects::Effects, metrics::Stage},
 };
 
 /// One pressure map on its way to a thread.
@@ -18,38 +18,34 @@ use crate::{
 pub(crate) struct Job {
     /// Index of the tier in the catalogue.
     pub(crate) tier: usize,
-    /// The undecoded map: the payload alone, without a frame header.
+    /// The undecoded map: the payload alone, without a head of its transport.
     pub(crate) payload: Bytes,
     /// How to decode it.
     pub(crate) input: Input,
     /// How to encode the answer.
     pub(crate) output: Output,
-    /// What a session adds; None over HTTP.
-    pub(crate) frame: Option<Frame>,
     /// When the server had read the map.
     pub(crate) received: Instant,
     /// When the answer is worthless.
     pub(crate) deadline: Option<Instant>,
+    /// What is asked for beside the bare map.
+    pub(crate) options: JobOptions,
 }
 
-/// What a session adds to a job.
-#[derive(Debug)]
-pub(crate) struct Frame {
-    /// The request's header; its window is where the payload belongs.
-    pub(crate) header: FrameHeader,
+/// What a job may ask for beside the bare map.
+#[derive(Debug, Default)]
+pub(crate) struct JobOptions {
+    /// Bytes to be left free before the answer.
+    pub(crate) headroom: usize,
     /// Whether pressure above what the tier was trained on is taken and flagged.
     pub(crate) takes_more: bool,
+    /// The client's clock, us: effects that change with time go by it.
+    pub(crate) time_us: u64,
     /// The session's effects. Only the thread that renders the frame locks them, and a session
     /// has one frame with a thread at a time.
     pub(crate) effects: Option<Arc<Mutex<Effects>>>,
-}
-
-impl Frame {
-    /// A frame that asks for the bare map.
-    #[cfg(test)]
-    pub(crate) fn of(header: FrameHeader) -> Self {
-        Self { header, takes_more: false, effects: None }
-    }
+    /// How the sink tells one answer from another; handed back as it is.
+    pub(crate) header: Option<FrameHeader>,
 }
 
 impl Job {
@@ -62,19 +58,6 @@ impl Job {
 /// Whether `deadline` has passed.
 pub(crate) fn is_past(deadline: Option<Instant>) -> bool {
     deadline.is_some_and(|deadline| Instant::now() >= deadline)
-}
-
-/// Where a deadline was found to have passed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Stage {
-    /// Before the map entered the slot.
-    Admission,
-    /// When a thread took it from the slot.
-    Dequeue,
-    /// Decoded, but what is left of the time is less than any inference takes.
-    Inference,
-    /// Rendered, but not yet sent.
-    Sending,
 }
 
 /// Time spent in each stage.
@@ -90,15 +73,10 @@ pub(crate) struct Times {
     pub(crate) encode: Duration,
 }
 
-/// Room before the header of an answer for the framing of a session, bytes. A multiple of 16:
-/// sections begin at such.
-pub(crate) const FRONT: usize = 16;
-
 /// What became of a job.
 #[derive(Debug)]
 pub(crate) enum Outcome {
-    /// The map, encoded. Over a session [`FRONT`] bytes and those of the header are left free
-    /// before it.
+    /// The map, encoded, behind [`JobOptions::headroom`] free bytes.
     Map {
         /// The encoded answer.
         bytes: BytesMut,
@@ -115,7 +93,7 @@ pub(crate) enum Outcome {
 
 /// What the payload of an answer holds.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Drawn {
+pub(crate) struct OutputMeta {
     /// What the samples show.
     pub(crate) kind: FrameKind,
     /// The pixels that are sent.
@@ -124,7 +102,7 @@ pub(crate) struct Drawn {
     pub(crate) flags: u8,
 }
 
-impl Default for Drawn {
+impl Default for OutputMeta {
     fn default() -> Self {
         Self { kind: FrameKind::Sed, window: Window::WHOLE, flags: 0 }
     }
@@ -135,7 +113,7 @@ impl Default for Drawn {
 pub(crate) struct Done {
     /// Index of the tier.
     pub(crate) tier: usize,
-    /// The frame's header; None over HTTP.
+    /// That of [`JobOptions`].
     pub(crate) header: Option<FrameHeader>,
     /// When the server had read the map.
     pub(crate) received: Instant,
@@ -143,8 +121,8 @@ pub(crate) struct Done {
     pub(crate) deadline: Option<Instant>,
     /// Time by stage.
     pub(crate) times: Times,
-    /// What was drawn.
-    pub(crate) drawn: Drawn,
+    /// What the payload holds.
+    pub(crate) meta: OutputMeta,
     /// How it was encoded.
     pub(crate) output: Output,
     /// What became of it.

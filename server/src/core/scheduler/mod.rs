@@ -4,7 +4,6 @@
 //! slot into the bounded [`Queue`](queue::Queue); a thread takes it from there, decodes,
 //! checks, infers, encodes, and hands the [`Done`] to the slot's [`Sink`].
 
-mod buffer;
 mod exchange;
 mod job;
 mod queue;
@@ -17,9 +16,8 @@ use std::{
     time::Duration,
 };
 
-pub(crate) use buffer::Recycler;
 pub(crate) use exchange::Exchange;
-pub(crate) use job::{Done, Drawn, FRONT, Frame, Job, Outcome, Stage, is_past};
+pub(crate) use job::{Done, Job, JobOptions, Outcome, OutputMeta, is_past};
 pub(crate) use slot::{Sink, Slot};
 
 use self::{exchange::Inbox, queue::Queue, work::Worker};
@@ -39,7 +37,7 @@ pub(crate) struct Pool {
 
 /// The way into the pool.
 #[derive(Clone)]
-pub(crate) struct Entrance {
+pub(crate) struct PoolHandle {
     queue: Arc<Queue>,
     metrics: Arc<Metrics>,
 }
@@ -93,8 +91,8 @@ impl Pool {
         if ready == threads { Ok(pool) } else { Err(StartError::WorkerPanicked) }
     }
 
-    pub(crate) fn entrance(&self, metrics: &Arc<Metrics>) -> Entrance {
-        Entrance { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
+    pub(crate) fn handle(&self, metrics: &Arc<Metrics>) -> PoolHandle {
+        PoolHandle { queue: Arc::clone(&self.queue), metrics: Arc::clone(metrics) }
     }
 
     /// The way for new models into the threads.
@@ -119,7 +117,7 @@ impl Drop for Pool {
     }
 }
 
-impl Entrance {
+impl PoolHandle {
     /// Puts `job` into `slot` and sees to it that a thread comes for it.
     ///
     /// Returns the job whose place it took, if that had not been started.

@@ -7,7 +7,8 @@ use std::{
 
 use tokio::sync::mpsc;
 
-use super::{Done, Job, buffer::Recycler};
+use super::{Done, Job};
+use crate::core::buffers::Recycler;
 
 /// Where answers go, from the thread that rendered and on it.
 pub(crate) trait Sink: Send + Sync {

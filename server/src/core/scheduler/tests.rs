@@ -22,20 +22,21 @@ use serde_json::json;
 use tokio::sync::mpsc;
 
 use self::gated::{Act, Gate, Gated};
-use super::{Done, Entrance, FRONT, Frame, Job, Outcome, Pool, Recycler, Slot, Stage};
+use super::{Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot};
 use crate::{
     codec::{Input, Output},
     core::{
+        buffers::{HEADROOM, Recycler},
         catalogue::{Catalogue, Tier},
         latency::Speed,
-        metrics::Metrics,
+        metrics::{Metrics, Stage},
     },
 };
 
 /// A pool of one thread and the handles of its gate.
 struct Bench {
     pool: Pool,
-    entrance: Entrance,
+    handle: PoolHandle,
     metrics: Arc<Metrics>,
     begun: Receiver<()>,
     go: SyncSender<Act>,
@@ -84,10 +85,10 @@ fn bench() -> Bench {
     let atlas = Atlas::new(0.1, vec![[0, 1, 2], [0, 2, 3]], patch.clone(), patch).unwrap();
     let catalogue = Arc::new(Catalogue::bare(atlas, vec![tier]));
     let metrics = Metrics::new();
-    metrics.name_tiers(&catalogue);
+    metrics.name_tiers(catalogue.tier_labels());
     let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();
-    let entrance = pool.entrance(&metrics);
-    Bench { pool, entrance, metrics, begun, go }
+    let handle = pool.handle(&metrics);
+    Bench { pool, handle, metrics, begun, go }
 }
 
 /// A frame that is all `pressure_pa`.
@@ -98,9 +99,13 @@ fn job(sequence: u32, pressure_pa: f32, deadline: Option<Duration>) -> Job {
         payload: Bytes::from(pressure_pa.to_le_bytes().repeat(MAP_LEN)),
         input: Input::Samples { sample_type: SampleType::F32, scale: 1.0 },
         output: Output::Samples(SampleType::F32),
-        frame: Some(Frame::of(FrameHeader::pressure(sequence, 0, 0, SampleType::F32, 1.0))),
         received,
         deadline: deadline.map(|d| received + d),
+        options: JobOptions {
+            headroom: HEADROOM + HEADER_LEN,
+            header: Some(FrameHeader::pressure(sequence, 0, 0, SampleType::F32, 1.0)),
+            ..JobOptions::default()
+        },
     }
 }
 
@@ -133,13 +138,13 @@ fn wait(answers: &mut mpsc::Receiver<Done>) -> Done {
 fn a_newer_frame_replaces_the_unstarted_one_and_only_that() {
     let bench = bench();
     let (slot, mut answers) = client();
-    let submit = |n| bench.entrance.submit(&slot, job(n, 1.0, None));
+    let submit = |n| bench.handle.submit(&slot, job(n, 1.0, None));
     assert!(submit(1).unwrap().is_none());
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
     // 1 is started: it stays. 2 waits, and gives way to 3, and 3 to 4.
     assert!(submit(2).unwrap().is_none());
-    assert_eq!(submit(3).unwrap().unwrap().frame.unwrap().header.sequence, 2);
-    assert_eq!(submit(4).unwrap().unwrap().frame.unwrap().header.sequence, 3);
+    assert_eq!(submit(3).unwrap().unwrap().options.header.unwrap().sequence, 2);
+    assert_eq!(submit(4).unwrap().unwrap().options.header.unwrap().sequence, 3);
     bench.go.send(Act::Finish).unwrap();
     bench.go.send(Act::Finish).unwrap();
     assert_eq!(sequence(&wait(&mut answers)), 1);
@@ -152,10 +157,10 @@ fn slots_are_served_in_turn_however_fast_one_client_sends() {
     let bench = bench();
     let (greedy, mut greedy_answers) = client();
     let (modest, mut modest_answers) = client();
-    bench.entrance.submit(&greedy, job(1, 1.0, None)).unwrap();
+    bench.handle.submit(&greedy, job(1, 1.0, None)).unwrap();
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
-    bench.entrance.submit(&modest, job(7, 1.0, None)).unwrap();
-    bench.entrance.submit(&greedy, job(2, 1.0, None)).unwrap();
+    bench.handle.submit(&modest, job(7, 1.0, None)).unwrap();
+    bench.handle.submit(&greedy, job(2, 1.0, None)).unwrap();
     bench.go.send(Act::Finish).unwrap();
     assert_eq!(sequence(&wait(&mut greedy_answers)), 1);
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
@@ -172,9 +177,9 @@ fn late_frames_are_dropped_at_the_dequeue_without_work() {
     let bench = bench();
     let (first, mut first_answers) = client();
     let (second, mut second_answers) = client();
-    bench.entrance.submit(&first, job(1, 1.0, None)).unwrap();
+    bench.handle.submit(&first, job(1, 1.0, None)).unwrap();
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
-    bench.entrance.submit(&second, job(2, 1.0, Some(Duration::from_millis(5)))).unwrap();
+    bench.handle.submit(&second, job(2, 1.0, Some(Duration::from_millis(5)))).unwrap();
     sleep(Duration::from_millis(6));
     bench.go.send(Act::Finish).unwrap();
     wait(&mut first_answers);
@@ -187,17 +192,17 @@ fn late_frames_are_dropped_at_the_dequeue_without_work() {
 fn a_panic_costs_one_frame_and_nothing_else() {
     let bench = bench();
     let (slot, mut answers) = client();
-    bench.entrance.submit(&slot, job(1, 1.0, None)).unwrap();
+    bench.handle.submit(&slot, job(1, 1.0, None)).unwrap();
     bench.go.send(Act::Panic).unwrap();
     match wait(&mut answers).outcome {
         Outcome::Failed(problem) => assert_eq!(problem.code, ErrorCode::Internal),
         other => panic!("{other:?}"),
     }
     // The fresh session that takes its place has a free run, as for a warm-up.
-    bench.entrance.submit(&slot, job(2, 2.0, None)).unwrap();
+    bench.handle.submit(&slot, job(2, 2.0, None)).unwrap();
     match wait(&mut answers).outcome {
         Outcome::Map { bytes, .. } => {
-            assert_eq!(bytes[FRONT + HEADER_LEN..], 2f32.to_le_bytes().repeat(MAP_LEN));
+            assert_eq!(bytes[HEADROOM + HEADER_LEN..], 2f32.to_le_bytes().repeat(MAP_LEN));
         }
         other => panic!("{other:?}"),
     }
@@ -207,7 +212,7 @@ fn a_panic_costs_one_frame_and_nothing_else() {
 fn a_zero_map_asks_no_network() {
     let bench = bench();
     let (slot, mut answers) = client();
-    bench.entrance.submit(&slot, job(1, 0.0, None)).unwrap();
+    bench.handle.submit(&slot, job(1, 0.0, None)).unwrap();
     let done = wait(&mut answers);
     assert!(matches!(&done.outcome, Outcome::Map { bytes, .. } if bytes.iter().all(|&b| b == 0)));
     assert_eq!(done.times.infer, Duration::ZERO);
@@ -220,28 +225,28 @@ fn what_was_accepted_before_the_stop_is_answered_and_nothing_after() {
     let mut bench = bench();
     let (slot, mut answers) = client();
     let (other, mut other_answers) = client();
-    bench.entrance.submit(&slot, job(1, 1.0, None)).unwrap();
+    bench.handle.submit(&slot, job(1, 1.0, None)).unwrap();
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
-    bench.entrance.submit(&slot, job(2, 1.0, None)).unwrap();
-    bench.entrance.submit(&other, job(3, 1.0, None)).unwrap();
+    bench.handle.submit(&slot, job(2, 1.0, None)).unwrap();
+    bench.handle.submit(&other, job(3, 1.0, None)).unwrap();
     for _ in 0..3 {
         bench.go.send(Act::Finish).unwrap();
     }
     bench.pool.stop();
     assert_eq!((sequence(&wait(&mut answers)), sequence(&wait(&mut answers))), (1, 2));
     assert_eq!(sequence(&wait(&mut other_answers)), 3);
-    assert!(bench.entrance.submit(&slot, job(4, 1.0, None)).is_err());
-    assert!(bench.entrance.submit(&slot, job(5, 1.0, None)).is_err(), "the slot is idle again");
+    assert!(bench.handle.submit(&slot, job(4, 1.0, None)).is_err());
+    assert!(bench.handle.submit(&slot, job(5, 1.0, None)).is_err(), "the slot is idle again");
 }
 
 #[test]
 fn the_queue_is_bounded() {
     let bench = bench();
     let clients: Vec<_> = (0..6).map(|_| client()).collect();
-    bench.entrance.submit(&clients[0].0, job(0, 1.0, None)).unwrap();
+    bench.handle.submit(&clients[0].0, job(0, 1.0, None)).unwrap();
     bench.begun.recv_timeout(PATIENCE).expect("no inference began");
     let results: Vec<bool> = (1..6)
-        .map(|n| bench.entrance.submit(&clients[n].0, job(n as u32, 1.0, None)).is_ok())
+        .map(|n| bench.handle.submit(&clients[n].0, job(n as u32, 1.0, None)).is_ok())
         .collect();
     assert_eq!(results, [true, true, true, true, false]);
     for _ in 0..5 {
@@ -255,7 +260,7 @@ fn answers_reuse_their_memory() {
     let (slot, mut answers) = client();
     let mut places = std::collections::HashSet::new();
     for n in 0..10 {
-        bench.entrance.submit(&slot, job(n, 0.0, None)).unwrap();
+        bench.handle.submit(&slot, job(n, 0.0, None)).unwrap();
         match wait(&mut answers).outcome {
             Outcome::Map { bytes, .. } => places.insert(bytes.freeze().as_ptr()),
             other => panic!("{other:?}"),

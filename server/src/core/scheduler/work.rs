@@ -11,15 +11,18 @@ use papilla_engine::Session;
 use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
 
 use super::{
-    Done, Drawn, FRONT, Frame, Job, LOOK_AROUND, Outcome, Stage, Times,
-    buffer::Recycler,
+    Done, Job, JobOptions, LOOK_AROUND, Outcome, OutputMeta, Times,
     exchange::Inbox,
     queue::{Next, Queue},
 };
 use crate::{
     StartError,
-    codec::{self, Input, Map, Quantity},
-    core::{catalogue::Catalogue, metrics::Metrics},
+    codec::{self, Map, Quantity},
+    core::{
+        buffers::{HEADROOM, Recycler},
+        catalogue::Catalogue,
+        metrics::{Metrics, Stage},
+    },
     problem,
 };
 
@@ -126,7 +129,7 @@ impl Worker {
         &mut self,
         job: &mut Job,
         recycler: &mut Recycler,
-        Progress { times, drawn }: &mut Progress,
+        Progress { times, meta }: &mut Progress,
     ) -> Result<Outcome, Problem> {
         let start = Instant::now();
         // The frame's memory goes back to its session before the network is asked.
@@ -134,18 +137,17 @@ impl Worker {
         let (mut summary, range) = self.decode(job, &payload)?;
         drop(payload);
         let tier = &self.catalogue.tiers[job.tier];
-        let time_us = job.frame.as_ref().map_or(0, |frame| frame.header.client_time_us);
-        let effects = job.frame.as_ref().and_then(|frame| frame.effects.as_ref());
+        let &JobOptions { headroom, time_us, ref effects, .. } = &job.options;
         let mut effects =
-            effects.map(|effects| effects.lock().unwrap_or_else(PoisonError::into_inner));
+            effects.as_ref().map(|effects| effects.lock().unwrap_or_else(PoisonError::into_inner));
         if let Some(effects) = &mut effects {
             let peak_pa = effects.before(&mut self.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
-        drawn.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
         let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
         let is_unfamiliar = !summary.is_zero() && tier.pattern_max.is_some_and(is_beyond);
-        drawn.flags |= if is_unfamiliar { flags::UNFAMILIAR } else { 0 };
+        meta.flags |= if is_unfamiliar { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
@@ -153,7 +155,7 @@ impl Worker {
             // Nothing touches the finger: nothing is felt, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
-            drawn.flags |= flags::NO_CONTACT;
+            meta.flags |= flags::NO_CONTACT;
         } else if job.deadline.is_some_and(|deadline| {
             tier.speed.is_hopeless(deadline.saturating_duration_since(decoded))
         }) {
@@ -170,18 +172,17 @@ impl Worker {
         }
 
         let start = Instant::now();
-        let room = job.frame.as_ref().map_or(0, |frame| FRONT + frame.header.header_len());
         let sed_max = tier.sed_max_j_per_m3;
         let (bytes, scale) = if let Some(effects) = &mut effects {
-            let buffer = recycler.claim(FRONT + effects.size_hint());
-            buffer.resize(room, 0);
+            let buffer = recycler.claim(HEADROOM + effects.size_hint());
+            buffer.resize(headroom, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
             let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;
-            (drawn.kind, drawn.window) = (written.kind, written.window);
+            (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
-            let buffer = recycler.claim(room + job.output.size_hint());
-            buffer.resize(room, 0);
+            let buffer = recycler.claim(headroom + job.output.size_hint());
+            buffer.resize(headroom, 0);
             let map = Map {
                 quantity: Quantity::Sed,
                 values: &self.sed_j_per_m3,
@@ -201,16 +202,10 @@ impl Worker {
         job: &Job,
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
-        match (job.input, &job.frame) {
-            (Input::Samples { sample_type, scale }, Some(Frame { header, .. })) => header
-                .window()
-                .decode(sample_type, payload, scale, &mut self.pressure_pa)
-                .map_err(problem::of_samples)?,
-            (input, _) => codec::decode(input, payload, &mut self.pressure_pa)?,
-        }
+        codec::decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            takes_more: job.frame.as_ref().is_some_and(|frame| frame.takes_more),
+            takes_more: job.options.takes_more,
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);
@@ -222,17 +217,17 @@ impl Worker {
 #[derive(Debug, Default)]
 struct Progress {
     times: Times,
-    drawn: Drawn,
+    meta: OutputMeta,
 }
 
-fn finished(job: &Job, Progress { times, drawn }: Progress, outcome: Outcome) -> Done {
+fn finished(job: &Job, Progress { times, meta }: Progress, outcome: Outcome) -> Done {
     Done {
         tier: job.tier,
-        header: job.frame.as_ref().map(|frame| frame.header),
+        header: job.options.header,
         received: job.received,
         deadline: job.deadline,
         times,
-        drawn,
+        meta,
         output: job.output,
         outcome,
     }

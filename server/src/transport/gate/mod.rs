@@ -1,47 +1,46 @@
-//! Who may come in: tokens, origins and rates, asked of every request before its handler.
+//! Who may come in: tokens, origins, rates, and places for connections. Policy alone: it knows
+//! neither routes nor handlers.
 
 mod origin;
+mod places;
 mod rate;
 mod tokens;
 
-use std::{net::IpAddr, sync::Arc, time::Instant};
+use std::{net::IpAddr, sync::Arc};
 
-use axum::{
-    body::Body,
-    extract::{MatchedPath, Request, State},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
-    middleware::Next,
-    response::Response,
-};
+use axum::http::{HeaderMap, HeaderValue, header, request::Parts};
 use papilla_proto::{ErrorCode, Problem};
 
-pub(crate) use origin::cors;
-pub(crate) use rate::network_of;
-pub(crate) use tokens::{Holder, Tokens};
-
-use self::rate::{Key, Rates};
-use crate::{
-    config::{Config, SettingError},
-    core::metrics::Shed,
-    telemetry,
-    transport::{app::App, http, net::Standing},
+pub(crate) use self::{
+    origin::cors,
+    places::{Place, Places, Standing},
+    tokens::Holder,
 };
+use self::{
+    rate::{Key, Rates},
+    tokens::Tokens,
+};
+use crate::config::{Config, SettingError};
 
 /// Cookie that carries the token of a browser.
 const COOKIE: &str = "papilla_token";
 
-/// Routes that ask for no token: they tell nothing, or are what a browser loads before it can
-/// send one.
-const PUBLIC: [&str; 7] =
-    ["/", "/{file}", "/healthz", "/readyz", "/openapi.json", "/v2/health/live", "/v2/health/ready"];
-
-/// Whether a route asks for no token.
-fn is_public(route: &str) -> bool {
-    PUBLIC.contains(&route) || http::xr::PATHS.contains(&route)
+/// What a route asks of those who come in.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RouteAccess {
+    /// It asks for no token.
+    pub(crate) is_public: bool,
+    pub(crate) token_in_query: TokenInQuery,
 }
 
-/// Browsers cannot put a token into a header here.
-const WEBSOCKET: &str = "/v1/session";
+/// What becomes of a token in the query, where browsers cannot put it into a header (RFC 6750 2.3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TokenInQuery {
+    Ignored,
+    Taken,
+    /// The browser gets it as a cookie instead.
+    Exchanged,
+}
 
 /// The address at the other end of the connection.
 #[derive(Debug, Clone, Copy)]
@@ -49,7 +48,7 @@ pub(crate) struct Peer(pub(crate) IpAddr);
 
 /// Who sent a request.
 #[derive(Debug, Clone)]
-pub(crate) struct Guest {
+pub(crate) struct Principal {
     /// Whose token it is.
     pub(crate) holder: Option<Arc<Holder>>,
     /// Whether it may change what the service serves.
@@ -66,11 +65,11 @@ pub(crate) struct Gate {
     is_tls: bool,
 }
 
-/// What becomes of a request that is let in.
-enum Entry {
-    Pass,
-    /// The browser gets its token as a cookie and is sent to the page without it.
-    Welcome(HeaderValue),
+/// A request that is let in.
+pub(crate) struct Admitted {
+    pub(crate) principal: Principal,
+    /// Its token as a cookie: the browser is to go on without it in the query.
+    pub(crate) cookie: Option<HeaderValue>,
 }
 
 impl Gate {
@@ -99,17 +98,22 @@ impl Gate {
         }
     }
 
-    fn admit(&self, request: &mut Request, route: &str) -> Result<Entry, Problem> {
-        let headers = request.headers();
-        let peer = request.extensions().get::<Peer>().map(|peer| peer.0);
-        let query = if matches!(route, "/" | WEBSOCKET) { request.uri().query() } else { None };
+    /// Whether a request may come in, by its head. Of the connection, [`Peer`] and [`Standing`]
+    /// are among the head's extensions.
+    ///
+    /// # Errors
+    /// The refusal: too many requests, a stranger's page or host, no token.
+    pub(crate) fn admit(&self, head: &Parts, route: RouteAccess) -> Result<Admitted, Problem> {
+        let peer = head.extensions.get::<Peer>().map(|peer| peer.0);
+        let is_query_read = route.token_in_query != TokenInQuery::Ignored;
+        let query = head.uri.query().filter(|_| is_query_read);
         let in_query = query.and_then(token_in_query);
-        let shown = in_query.as_deref().or_else(|| token_in_headers(headers));
+        let shown = in_query.as_deref().or_else(|| token_in_headers(&head.headers));
         let holder = match (&self.tokens, shown) {
             (Some(tokens), Some(shown)) => tokens.holder(shown),
             _ => None,
         };
-        if let (Some(_), Some(standing)) = (&holder, request.extensions().get::<Arc<Standing>>()) {
+        if let (Some(_), Some(standing)) = (&holder, head.extensions.get::<Arc<Standing>>()) {
             standing.on_token();
         }
         let key = match (&holder, peer) {
@@ -120,23 +124,24 @@ impl Gate {
         if let (Some(rates), Some(key)) = (&self.rates, key) {
             rates.check(&key)?;
         }
-        origin::check_host(request, &self.origins, self.is_local)?;
-        origin::check(headers, &self.origins, self.is_local)?;
+        origin::check_host(head, &self.origins, self.is_local)?;
+        origin::check(&head.headers, &self.origins, self.is_local)?;
         let is_known = self.tokens.is_none() || holder.is_some();
-        if !is_known && (in_query.is_some() || !is_public(route)) {
+        if !is_known && (in_query.is_some() || !route.is_public) {
             let message = "a token is asked for here: Authorization: Bearer TOKEN";
             return Err(Problem::new(ErrorCode::Unauthorized, message).at("authorization"));
         }
-        let entry = match (&holder, &in_query) {
-            (Some(_), Some(token)) if route == "/" => Entry::Welcome(self.cookie(token)?),
-            _ => Entry::Pass,
+        let cookie = match (&holder, &in_query) {
+            (Some(_), Some(token)) if route.token_in_query == TokenInQuery::Exchanged => {
+                Some(self.cookie(token)?)
+            }
+            _ => None,
         };
         let is_admin = match &holder {
             Some(holder) => holder.is_admin,
             None => self.tokens.is_none() && peer.is_some_and(|peer| peer.is_loopback()),
         };
-        request.extensions_mut().insert(Guest { holder, is_admin });
-        Ok(entry)
+        Ok(Admitted { principal: Principal { holder, is_admin }, cookie })
     }
 
     fn cookie(&self, token: &str) -> Result<HeaderValue, Problem> {
@@ -145,42 +150,6 @@ impl Gate {
         HeaderValue::from_str(&cookie)
             .map_err(|_| Problem::new(ErrorCode::Unauthorized, "the token is no token"))
     }
-}
-
-/// Every request comes through here; what is refused never reaches its handler.
-pub(crate) async fn guard(
-    State(app): State<Arc<App>>,
-    mut request: Request,
-    next: Next,
-) -> Response {
-    let start = Instant::now();
-    let route = request.extensions().get::<MatchedPath>();
-    let route = route.and_then(|path| http::known_route(path.as_str())).unwrap_or("other");
-    let uri = request.uri().clone();
-    let span = telemetry::request_span(request.method(), route);
-    let response = match app.gate.admit(&mut request, route) {
-        Ok(Entry::Pass) => telemetry::within(&span, next.run(request)).await,
-        Ok(Entry::Welcome(cookie)) => welcome(cookie),
-        Err(problem) => {
-            if problem.code == ErrorCode::RateLimited {
-                app.metrics.shed(Shed::Rate);
-            }
-            http::refusal(&app, &uri, problem)
-        }
-    };
-    telemetry::answered(&span, response.status());
-    app.metrics.request(route, response.status().as_u16(), start.elapsed());
-    response
-}
-
-fn welcome(cookie: HeaderValue) -> Response {
-    let mut response = Response::new(Body::empty());
-    *response.status_mut() = StatusCode::SEE_OTHER;
-    let headers = response.headers_mut();
-    headers.insert(header::SET_COOKIE, cookie);
-    headers.insert(header::LOCATION, HeaderValue::from_static("/"));
-    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    response
 }
 
 /// RFC 6750 2.3: for browsers, which cannot put a header on a WebSocket.

@@ -5,9 +5,8 @@
 
 use std::net::IpAddr;
 
-use axum::{
-    extract::Request,
-    http::{HeaderMap, HeaderName, HeaderValue, Method, Version, header, uri::Authority},
+use axum::http::{
+    HeaderMap, HeaderName, HeaderValue, Method, Version, header, request::Parts, uri::Authority,
 };
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tower_http::cors::CorsLayer;
@@ -31,16 +30,12 @@ const EXPOSED: [&str; 9] = [
 ///
 /// # Errors
 /// The host is missing, doubled, or neither an address, `localhost` nor that of an allowed origin.
-pub(super) fn check_host(
-    request: &Request,
-    allowed: &[String],
-    is_local: bool,
-) -> Result<(), Problem> {
+pub(super) fn check_host(head: &Parts, allowed: &[String], is_local: bool) -> Result<(), Problem> {
     let bad = |message: &str| Err(Problem::new(ErrorCode::BadQuery, message).at("host"));
-    let mut hosts = request.headers().get_all(header::HOST).iter();
+    let mut hosts = head.headers.get_all(header::HOST).iter();
     let host = match (hosts.next(), hosts.next()) {
         (Some(host), None) => host.to_str().unwrap_or("?"),
-        (None, _) if request.version() < Version::HTTP_11 => return Ok(()),
+        (None, _) if head.version < Version::HTTP_11 => return Ok(()),
         (None, _) => return bad("the request names no host; RFC 9112 asks for one Host"),
         (Some(_), Some(_)) => return bad("the request names more than one host"),
     };
@@ -50,7 +45,7 @@ pub(super) fn check_host(
             || of_origin.into_iter().any(|(_, own)| name(own).eq_ignore_ascii_case(name(host)))
     };
     // A target in absolute form names a host as well, and goes before the header.
-    let named = [Some(host), request.uri().authority().map(Authority::as_str)];
+    let named = [Some(host), head.uri.authority().map(Authority::as_str)];
     match named.into_iter().flatten().find(|host| is_local && !is_allowed(host)) {
         None => Ok(()),
         Some(host) => {

@@ -171,7 +171,7 @@ fn warn_if_readable(_: &Path) {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::core::catalogue::assets::sha256_hex;
+    use crate::core::digest::sha256_hex;
 
     const A: &str = "0123456789abcdef";
 

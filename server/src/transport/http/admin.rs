@@ -6,12 +6,20 @@ use axum::{Extension, extract::State};
 use papilla_proto::{ErrorCode, Problem};
 use tokio::task::spawn_blocking;
 
-use super::{Answer, Shared, json_answer, refuse};
-use crate::{problem, transport::gate::Guest};
+use crate::{
+    problem,
+    transport::{
+        answer::{Answer, Shared, json_answer, refuse},
+        gate::Principal,
+    },
+};
 
 /// Loads the models anew; answers with what has changed.
-pub(super) async fn reload(State(app): Shared, Extension(guest): Extension<Guest>) -> Answer {
-    if !guest.is_admin {
+pub(crate) async fn reload(
+    State(app): Shared,
+    Extension(principal): Extension<Principal>,
+) -> Answer {
+    if !principal.is_admin {
         let message = "this asks for a token with admin = true, or, on a service without \
                        tokens, for a client on the same machine";
         return refuse(&app, Problem::new(ErrorCode::Forbidden, message));
@@ -23,8 +31,8 @@ pub(super) async fn reload(State(app): Shared, Extension(guest): Extension<Guest
         Ok(turn) => turn,
         Err(error) => return refuse(&app, error.into()),
     };
-    let reloading = Arc::clone(&app);
-    match spawn_blocking(move || reloading.reload(turn)).await {
+    let reloader = Arc::clone(&app.reloader);
+    match spawn_blocking(move || reloader.reload(turn)).await {
         Ok(Ok(changes)) => Ok(json_answer(&changes)),
         Ok(Err(error)) => refuse(&app, error.into()),
         Err(error) => refuse(&app, problem::internal("the reload broke off", &error)),

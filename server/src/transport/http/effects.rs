@@ -4,9 +4,9 @@ use axum::{extract::State, response::Response};
 use papilla_proto::RuntimeEffect;
 use serde_json::{Value, json};
 
-use super::{Shared, json_answer};
+use crate::transport::answer::{Shared, json_answer};
 
-pub(super) async fn list(State(app): Shared) -> Response {
+pub(crate) async fn list(State(app): Shared) -> Response {
     let catalogue = app.catalogue();
     let costs = catalogue.runtime.costs();
     let of_sessions = RuntimeEffect::ALL.into_iter().map(|effect| {

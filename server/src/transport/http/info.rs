@@ -12,14 +12,14 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use tokio::{sync::Semaphore, task::spawn_blocking};
 
-use super::{
-    Answer, Shared, answer, json_answer,
-    kept::{Fresh, What},
-    refuse,
-};
 use crate::{
-    core::{catalogue::Catalogue, metrics::Metrics},
+    core::{
+        catalogue::{Catalogue, Document},
+        kept::Fresh,
+        metrics::Metrics,
+    },
     problem, progress,
+    transport::answer::{Answer, Shared, answer, json_answer, kept, refusal::label, refuse},
 };
 
 /// Alive: the process answers.
@@ -28,7 +28,7 @@ pub(crate) async fn healthz() -> Response {
 }
 
 /// Ready: every thread has its models, every tier is measured, and the server does not drain.
-pub(super) async fn readyz(State(app): Shared) -> Answer {
+pub(crate) async fn readyz(State(app): Shared) -> Answer {
     if app.is_draining() {
         return refuse(&app, problem::shutting_down());
     }
@@ -53,13 +53,13 @@ pub(crate) fn starting(metrics: &Metrics, left: &progress::State) -> Response {
     *response.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
     let headers = response.headers_mut();
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-    problem::label(headers, problem.code, None);
+    label(headers, problem.code, None);
     response
 }
 
 /// One text at a time, and not on a thread that moves bytes: it takes milliseconds, and looks into
 /// the system's files.
-pub(super) async fn metrics(State(app): Shared) -> Answer {
+pub(crate) async fn metrics(State(app): Shared) -> Answer {
     static TURN: Semaphore = Semaphore::const_new(1);
     let failed = |error: &dyn std::fmt::Display| -> Problem {
         problem::internal("the metrics cannot be encoded", error)
@@ -71,7 +71,7 @@ pub(super) async fn metrics(State(app): Shared) -> Answer {
     Ok(answer("application/openmetrics-text; version=1.0.0; charset=utf-8", text))
 }
 
-pub(super) async fn tiers(State(app): Shared) -> Response {
+pub(crate) async fn tiers(State(app): Shared) -> Response {
     let catalogue = app.catalogue();
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
@@ -104,13 +104,13 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
     })
 }
 
-pub(super) async fn models(State(app): Shared, headers: HeaderMap) -> Answer {
+pub(crate) async fn models(State(app): Shared, headers: HeaderMap) -> Answer {
     let catalogue = app.catalogue();
     let of = Arc::clone(&catalogue);
     let make = move || {
         let cards: Vec<&Value> = of.offered().map(|(_, tier)| &tier.card).collect();
         Ok(Fresh::new("application/json", json!({"models": cards}).to_string()))
     };
-    let models = catalogue.kept.answer(&headers, What::Models, make).await;
+    let models = kept(&catalogue.kept, &headers, Document::Models, make).await;
     models.or_else(|problem| refuse(&app, problem))
 }

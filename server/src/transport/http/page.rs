@@ -8,18 +8,30 @@ use axum::{
 };
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 
-use super::{
-    Answer, Shared,
-    kept::{Fresh, Kept, What},
-    refuse,
+use crate::{
+    core::kept::{Fresh, Kept},
+    transport::{
+        answer::{Answer, Shared, kept, refuse},
+        app::App,
+    },
 };
-use crate::{core::catalogue::assets::PAGE, transport::app::App};
+
+/// The files of the page, as they were when the binary was built.
+const PAGE: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 
 /// The description of the HTTP surface, written by hand.
 const OPENAPI: &str = include_str!("../../../openapi.json");
 
+/// What is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Part {
+    /// A file of the page, by its place.
+    File(usize),
+    OpenApi,
+}
+
 /// Answers that last as long as the binary.
-static KEPT: LazyLock<Kept> = LazyLock::new(Kept::default);
+static KEPT: LazyLock<Kept<Part>> = LazyLock::new(Kept::default);
 
 fn content_type(name: &str) -> &'static str {
     match name.rsplit('.').next().unwrap_or_default() {
@@ -36,18 +48,18 @@ fn content_type(name: &str) -> &'static str {
     }
 }
 
-pub(super) async fn index(State(app): Shared, headers: HeaderMap) -> Answer {
+pub(crate) async fn index(State(app): Shared, headers: HeaderMap) -> Answer {
     serve(&app, "index.html", &headers).await
 }
 
-pub(super) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+pub(crate) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
     serve(&app, uri.path().trim_start_matches('/'), &headers).await
 }
 
 /// The description of the HTTP surface.
-pub(super) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
+pub(crate) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
     let make = || Ok(Fresh::new("application/json", OPENAPI));
-    KEPT.answer(&headers, What::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
+    kept(&KEPT, &headers, Part::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
 }
 
 async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
@@ -57,5 +69,5 @@ async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
     };
     let (name, bytes) = PAGE[place];
     let make = move || Ok(Fresh::new(content_type(name), bytes));
-    KEPT.answer(headers, What::Page(place), make).await.or_else(|problem| refuse(app, problem))
+    kept(&KEPT, headers, Part::File(place), make).await.or_else(|problem| refuse(app, problem))
 }

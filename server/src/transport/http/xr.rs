@@ -14,14 +14,19 @@ use axum::{
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tower_http::services::ServeDir;
 
-use super::{Shared, refuse};
-use crate::{problem, transport::app::App};
+use crate::{
+    problem,
+    transport::{
+        answer::{Shared, refuse},
+        app::App,
+    },
+};
 
 /// What a folder adds to the routes; none of it asks for a token, as the page does not.
 pub(crate) const PATHS: [&str; 3] = ["/xr", "/xr/", "/xr/{*path}"];
 
 /// The routes that serve `folder`. `ServeDir` refuses paths that lead out of it (`..`, roots, drive names).
-pub(super) fn routes(folder: &Path) -> Router<Arc<App>> {
+pub(crate) fn routes(folder: &Path) -> Router<Arc<App>> {
     let files = ServeDir::new(folder);
     let serve = get(move |state: Shared, request: Request| file(files, state, request));
     let [bare, index, below] = PATHS;

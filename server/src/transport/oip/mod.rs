@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use axum::{
     body::Body,
     extract::State,
-    http::{HeaderMap, HeaderValue, StatusCode, Uri, header},
-    response::{IntoResponse, Response},
+    http::{HeaderMap, Uri},
+    response::Response,
 };
 use bytes::Bytes;
 use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
@@ -24,14 +24,18 @@ use tokio::task::spawn_blocking;
 use self::{request::Wish, response::Tensor};
 use crate::{
     codec::{Input, Output},
-    core::{metrics::Transport, scheduler::Job},
+    core::{
+        metrics::Transport,
+        scheduler::{Job, JobOptions},
+    },
     problem,
     transport::{
-        app::App,
-        http::{
+        answer::{
             Shared, body, json_answer,
-            sed::{Rendered, count, through_pool},
+            refusal::OipProblem,
+            render::{Rendered, count, through_pool},
         },
+        app::App,
     },
 };
 
@@ -39,25 +43,6 @@ use crate::{
 const VERSION: &str = "1";
 const DATATYPE: &str = "FP32";
 const SHAPE: [usize; 4] = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
-
-/// The shape of an error in this protocol: `{"error": "message"}`.
-#[derive(Debug)]
-pub(crate) struct OipProblem(pub(crate) Problem);
-
-impl IntoResponse for OipProblem {
-    fn into_response(self) -> Response {
-        let Problem { code, message, field } = problem::bounded(self.0);
-        let place = field.as_ref().map(|field| format!(" ({field})")).unwrap_or_default();
-        let mut response = json_answer(&json!({"error": format!("{message}{place}")}));
-        *response.status_mut() =
-            StatusCode::from_u16(code.http_status()).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let headers = response.headers_mut();
-        headers.insert("x-papilla-code", HeaderValue::from_static(code.as_str()));
-        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        problem::label(headers, code, field.as_deref());
-        response
-    }
-}
 
 type Answer = Result<Response, OipProblem>;
 
@@ -155,11 +140,11 @@ async fn answer(
         payload,
         input: Input::Samples { sample_type: SampleType::F32, scale: 1.0 },
         output: Output::Samples(SampleType::F32),
-        frame: None,
         received,
         deadline,
+        options: JobOptions::default(),
     };
-    let Rendered { bytes, fared, .. } = through_pool(app, job, Transport::Oip).await?;
+    let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip).await?;
     let catalogue = app.catalogue();
     let name = catalogue.tiers[tier].name.clone();
     let tensor = Tensor { model: name.clone(), wish, sed: bytes.freeze() };
@@ -170,7 +155,7 @@ async fn answer(
         let text = spawn_blocking(move || tensor.json()).await;
         text.map_err(|error| problem::internal("the answer was not written", &error))??
     };
-    fared.label(response.headers_mut(), &name);
+    timings.label(response.headers_mut(), &name);
     Ok(response)
 }
 
@@ -188,7 +173,9 @@ async fn read(body: Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Pro
 /// For [`crate::fuzz`].
 #[cfg(any(test, fuzzing))]
 pub(crate) mod fuzz {
-    use super::{Bytes, HeaderMap, HeaderValue, Problem, request};
+    use axum::http::HeaderValue;
+
+    use super::{Bytes, HeaderMap, Problem, request};
 
     /// Reads a request as [`super::infer`] does; the bytes of its map.
     pub(crate) fn read(body: &Bytes, head_len: Option<HeaderValue>) -> Result<Bytes, Problem> {

@@ -7,7 +7,7 @@ use papilla_proto::Problem;
 use serde::Serialize;
 
 use super::{DATATYPE, SHAPE, VERSION, request::Wish};
-use crate::{problem, transport::http};
+use crate::{problem, transport::answer::answer};
 
 #[derive(Serialize)]
 struct Body<'a> {
@@ -47,7 +47,7 @@ impl Tensor {
     pub(super) fn json(&self) -> Result<Response, Problem> {
         let (samples, _) = self.sed.as_chunks::<4>();
         let data = samples.iter().map(|sample| f32::from_le_bytes(*sample)).collect();
-        Ok(http::answer("application/json", self.head(Some(data), None)?))
+        Ok(answer("application/json", self.head(Some(data), None)?))
     }
 
     /// The numbers as bytes behind the JSON.
@@ -57,7 +57,7 @@ impl Tensor {
         let mut body = BytesMut::with_capacity(head.len() + self.sed.len());
         body.put_slice(&head);
         body.put_slice(&self.sed);
-        let mut response = http::answer("application/octet-stream", body.freeze());
+        let mut response = answer("application/octet-stream", body.freeze());
         let headers = response.headers_mut();
         headers.insert("inference-header-content-length", HeaderValue::from(head.len()));
         Ok(response)

@@ -11,16 +11,18 @@ use papilla_proto::{
 };
 
 use super::{
-    End, drained,
+    End,
+    connection::{Connection, Event},
+    drained,
     fresh::Freshness,
     hello::{self, Terms},
-    line::{Event, Line},
 };
 use crate::{
     codec::{Input, Output},
     core::{
-        metrics::Transport,
-        scheduler::{Frame, Job, Slot, Stage},
+        buffers::HEADROOM,
+        metrics::{Stage, Transport},
+        scheduler::{Job, JobOptions, Slot},
     },
     problem,
 };
@@ -34,45 +36,48 @@ pub(super) struct Session {
 }
 
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
-pub(super) async fn serve(line: &mut Line, mut session: Session) -> End {
+pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> End {
     let mut draining = false;
     loop {
-        if draining && line.reply.is_settled() {
+        if draining && connection.reply.is_settled() {
             return drained();
         }
-        match line.next(draining).await {
+        match connection.next(draining).await {
             Err(end) => return end,
             Ok(Event::Draining) => draining = true,
-            Ok(Event::Binary(frame, received)) => session.take(line, &frame, received, draining),
-            Ok(Event::Text(_)) if draining => line.reply.complain(problem::shutting_down(), None),
-            Ok(Event::Text(text)) => session.renew(line, &text).await,
+            Ok(Event::Binary(frame, received)) => {
+                session.take(connection, &frame, received, draining)
+            }
+            Ok(Event::Text(_)) if draining => {
+                connection.reply.complain(problem::shutting_down(), None)
+            }
+            Ok(Event::Text(text)) => session.renew(connection, &text).await,
         }
     }
 }
 
 impl Session {
     /// Takes a hello for new terms, such as another tier.
-    async fn renew(&mut self, line: &mut Line, text: &Bytes) {
-        match hello::renew(&line.app, text, self.number).await {
+    async fn renew(&mut self, connection: &mut Connection, text: &Bytes) {
+        match hello::renew(&connection.app, text, self.number).await {
             Ok((terms, ready)) => {
                 self.fresh = Freshness::new(terms.stale_after_us);
                 self.terms = terms;
-                line.reply.say(&ServerMessage::Ready(ready));
+                connection.reply.say(&ServerMessage::Ready(ready));
             }
-            Err(problem) => line.reply.complain(problem, None),
+            Err(problem) => connection.reply.complain(problem, None),
         }
     }
 
     /// Takes one frame: into the slot, or back with an error.
-    fn take(&mut self, line: &Line, frame: &Bytes, received: Instant, draining: bool) {
-        let (reply, metrics) = (&line.reply, &line.app.metrics);
+    fn take(&mut self, connection: &Connection, frame: &Bytes, received: Instant, draining: bool) {
+        let (reply, metrics) = (&connection.reply, &connection.app.metrics);
         let job = if draining { Err(problem::shutting_down()) } else { self.job(frame, received) };
         let job = match job {
             Ok(job) => job,
             Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
         };
-        let Some(Frame { header, .. }) = &job.frame else { return };
-        let header = *header;
+        let Some(header) = job.options.header else { return };
         // In version 1 sequences mean nothing to the server.
         let is_new = header.extension.is_some();
         if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
@@ -83,18 +88,19 @@ impl Session {
             metrics.late(Transport::Session, Stage::Admission);
             return reply.short(&header, job.tier, FrameStatus::Late, received);
         }
-        reply.owe();
-        match line.app.entrance.submit(&self.slot, job) {
+        reply.begin();
+        match connection.app.pool.submit(&self.slot, job) {
             Ok(None) => {}
-            Ok(Some(Job { frame: Some(Frame { header, .. }), received, tier, .. })) => {
-                metrics.of(Transport::Session).superseded.inc();
-                reply.short(&header, tier, FrameStatus::Superseded, received);
-                reply.settle();
+            Ok(Some(Job { tier, received, options: JobOptions { header, .. }, .. })) => {
+                if let Some(header) = header {
+                    metrics.of(Transport::Session).superseded.inc();
+                    reply.short(&header, tier, FrameStatus::Superseded, received);
+                }
+                reply.finish();
             }
-            Ok(Some(Job { frame: None, .. })) => reply.settle(),
             Err(_) => {
                 reply.refuse(problem::shutting_down(), Some(header.sequence));
-                reply.settle();
+                reply.finish();
             }
         }
     }
@@ -121,15 +127,21 @@ impl Session {
         Ok(Job {
             tier: self.terms.tier,
             payload,
-            input: Input::Samples { sample_type: header.sample_type, scale },
+            input: Input::Window {
+                window: header.window(),
+                sample_type: header.sample_type,
+                scale,
+            },
             output: Output::Samples(self.terms.answer_sample_type),
-            frame: Some(Frame {
-                header,
-                takes_more: self.terms.takes_more,
-                effects: self.terms.effects.clone(),
-            }),
             received,
             deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
+            options: JobOptions {
+                headroom: HEADROOM + header.header_len(),
+                takes_more: self.terms.takes_more,
+                time_us: header.client_time_us,
+                effects: self.terms.effects.clone(),
+                header: Some(header),
+            },
         })
     }
 

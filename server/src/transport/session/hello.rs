@@ -16,12 +16,14 @@ use papilla_proto::{
 use tokio::{task::spawn_blocking, time::timeout};
 
 use super::{
-    End, close, drained,
-    line::{Event, Line},
+    End, close,
+    connection::{Connection, Event},
+    drained,
+    reply::tier_number,
 };
 use crate::{
     codec::{Output, scale_of},
-    core::{catalogue::Tier, effects::Effects, scheduler::FRONT},
+    core::{buffers::HEADROOM, catalogue::Tier, effects::Effects},
     problem,
     transport::app::App,
 };
@@ -50,8 +52,8 @@ pub(super) struct Terms {
     /// What was asked for beside the bare map.
     pub(super) effects: Option<Arc<Mutex<Effects>>>,
     /// What the client is told of them.
-    told: Told,
-    _seat: Seat,
+    info: ReadyInfo,
+    _permit: Permit,
 }
 
 impl Terms {
@@ -59,7 +61,7 @@ impl Terms {
     pub(super) fn answer_len_max(&self) -> usize {
         let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
         let effects = self.effects.as_ref();
-        FRONT
+        HEADROOM
             + effects.map_or(plain, |effects| {
                 effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
             })
@@ -67,13 +69,13 @@ impl Terms {
 }
 
 /// Waits for a hello that can be met, and answers ready.
-pub(super) async fn agree(line: &mut Line, number: u64) -> Result<Terms, End> {
-    let patience = line.app.timeouts.io;
+pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Terms, End> {
+    let patience = connection.app.timeouts.io;
     let result = timeout(patience, async {
         for _ in 0..ATTEMPTS {
-            match attempt(line).await? {
+            match attempt(connection).await? {
                 Ok(agreed) => return Ok(agreed),
-                Err(problem) => line.reply.complain(problem, None),
+                Err(problem) => connection.reply.complain(problem, None),
             }
         }
         let message = format!("{ATTEMPTS} messages and no hello that can be met");
@@ -86,15 +88,15 @@ pub(super) async fn agree(line: &mut Line, number: u64) -> Result<Terms, End> {
             return Err(End::Refused(Problem::new(ErrorCode::Timeout, message), close::POLICY));
         }
     };
-    let ready = ready(&line.app, number, &terms);
+    let ready = ready(&connection.app, number, &terms);
     tracing::debug!(session = number, ?hello, tier = %ready.tier, "session ready");
-    line.reply.say(&ServerMessage::Ready(ready));
+    connection.reply.say(&ServerMessage::Ready(ready));
     Ok(terms)
 }
 
 /// One message; a problem is one the session survives.
-async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End> {
-    let text = match line.next(false).await? {
+async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), Problem>, End> {
+    let text = match connection.next(false).await? {
         Event::Draining => return Err(drained()),
         Event::Text(text) => text,
         Event::Binary(..) => {
@@ -103,7 +105,7 @@ async fn attempt(line: &mut Line) -> Result<Result<(Terms, Hello), Problem>, End
         }
     };
     match parse(&text).await {
-        Ok(ClientMessage::Hello(hello)) => Ok(meet(&line.app, hello).await),
+        Ok(ClientMessage::Hello(hello)) => Ok(meet(&connection.app, hello).await),
         Ok(_) => Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
         Err(MessageError::Hello(error)) => Ok(Err(error.into())),
         Err(MessageError::Unknown(error)) => {
@@ -154,16 +156,16 @@ pub(super) async fn renew(
 }
 
 /// A place in the count of a tier's sessions; given back when it is dropped.
-struct Seat(Arc<AtomicUsize>);
+struct Permit(Arc<AtomicUsize>);
 
-impl Seat {
+impl Permit {
     fn take(tier: &Tier) -> Self {
         tier.sessions.fetch_add(1, Ordering::Relaxed);
         Self(Arc::clone(&tier.sessions))
     }
 }
 
-impl Drop for Seat {
+impl Drop for Permit {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
@@ -171,7 +173,7 @@ impl Drop for Seat {
 
 /// What `ready` says of the effects of a session.
 #[derive(Default)]
-struct Told {
+struct ReadyInfo {
     names: Vec<RuntimeEffect>,
     sections: Vec<Section>,
     /// Greatest value that the map shows.
@@ -240,8 +242,8 @@ fn meet_now(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
-    let effects = if hello.version > 1 { Effects::of(hello, &catalogue)? } else { None };
-    let told = effects.as_ref().map_or_else(Told::default, |effects| Told {
+    let effects = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
+    let info = effects.as_ref().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
         names: effects.names.clone(),
         sections: effects.sections.clone(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
@@ -256,8 +258,8 @@ fn meet_now(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         takes_more: hello.out_of_range == Some(OutOfRange::Flag),
         stale_after_us: hello.stale_after_us,
         effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
-        told,
-        _seat: Seat::take(tier),
+        info,
+        _permit: Permit::take(tier),
     })
 }
 
@@ -266,16 +268,16 @@ fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     let tier = &catalogue.tiers[terms.tier];
     let predicted_latency_us = catalogue
         .predicted_latency_us(terms.tier)
-        .saturating_add(catalogue.runtime.cost_us(&terms.told.names));
+        .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
     let is_new = terms.version > 1;
-    let value_max = terms.told.value_max.unwrap_or(tier.sed_max_j_per_m3);
+    let value_max = terms.info.value_max.unwrap_or(tier.sed_max_j_per_m3);
     let bare_map = || {
         let output = Output::Samples(terms.answer_sample_type);
         let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);
         vec![Section { name: SectionName::Map, offset, bytes }]
     };
     let sections = || match &terms.effects {
-        Some(_) => terms.told.sections.clone(),
+        Some(_) => terms.info.sections.clone(),
         None => bare_map(),
     };
     Ready {
@@ -294,12 +296,7 @@ fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
         tier_number: is_new.then(|| tier_number(terms.tier)),
         answer_sample_type: is_new.then_some(terms.answer_sample_type),
-        session_effects: is_new.then(|| terms.told.names.clone()),
+        session_effects: is_new.then(|| terms.info.names.clone()),
         sections: is_new.then(sections),
     }
-}
-
-/// The number by which answers name a tier.
-pub(super) fn tier_number(tier: usize) -> u16 {
-    u16::try_from(tier).unwrap_or(u16::MAX)
 }

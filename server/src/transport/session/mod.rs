@@ -3,14 +3,13 @@
 //! The handshake is axum's; the framing is our own (`wire`), since a library would fill memory with
 //! zeros before it reads, and copy every map before it writes.
 
+mod connection;
 mod frames;
 mod fresh;
 mod hello;
 mod limits;
-mod line;
 mod outbox;
 mod reply;
-mod store;
 mod wire;
 
 use std::sync::Arc;
@@ -26,14 +25,14 @@ use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
 use tokio::sync::watch;
 use tungstenite::handshake::derive_accept_key;
 
-pub(crate) use self::store::Store;
-use self::{fresh::Freshness, line::Line};
+use self::{connection::Connection, fresh::Freshness};
 use crate::{
     core::scheduler::Slot,
-    problem::{self, HttpProblem},
+    problem,
     transport::{
+        answer::{Answer, HttpProblem},
         app::{App, SessionPlace},
-        gate::Guest,
+        gate::Principal,
     },
 };
 
@@ -49,11 +48,11 @@ mod close {
 /// Takes the upgrade, or says why not.
 pub(crate) async fn open(
     State(app): State<Arc<App>>,
-    Extension(guest): Extension<Guest>,
+    Extension(principal): Extension<Principal>,
     headers: HeaderMap,
     on_upgrade: Option<Extension<OnUpgrade>>,
     upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
-) -> Result<Response, HttpProblem> {
+) -> Answer {
     let refuse = |problem: Problem| {
         app.metrics.error(problem.code);
         HttpProblem(problem)
@@ -68,7 +67,7 @@ pub(crate) async fn open(
     let (Some(key), Some(Extension(on_upgrade))) = (key, on_upgrade) else {
         return Err(not_a_handshake(&"the connection cannot be upgraded"));
     };
-    let place = app.admit_session(&guest).map_err(refuse)?;
+    let place = app.admit_session(&principal).map_err(refuse)?;
     // Taken before the upgrade: from here on the drain waits for this session.
     let drain = app.drain.subscribe();
     let accept = derive_accept_key(key.as_bytes());
@@ -96,9 +95,9 @@ async fn run(
     app.metrics.sessions.inc();
     app.metrics.sessions_open.inc();
     let number = app.session_number();
-    let mut line = Line::new(upgraded, Arc::clone(&app), drain);
-    let end = converse(&mut line, number).await;
-    line.reply.end();
+    let mut connection = Connection::new(upgraded, Arc::clone(&app), drain);
+    let end = converse(&mut connection, number).await;
+    connection.reply.end();
     match &end {
         End::Client(_) => tracing::debug!(session = number, "the client ended the session"),
         End::Broken(reason) | End::Garbled(reason) => {
@@ -106,25 +105,27 @@ async fn run(
         }
         End::Refused(problem, _) => tracing::debug!(session = number, %problem, "session ended"),
     }
-    line.part(&end).await;
-    line.inbound.end(&app.store);
+    connection.close(&end).await;
+    connection.inbound.end(&app.store);
     app.metrics.sessions_open.dec();
 }
 
-async fn converse(line: &mut Line, number: u64) -> End {
-    let terms = match hello::agree(line, number).await {
+async fn converse(connection: &mut Connection, number: u64) -> End {
+    let terms = match hello::agree(connection, number).await {
         Ok(terms) => terms,
         Err(end) => return end,
     };
-    line.inbound.expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &line.app.store);
-    let reply = Arc::clone(&line.reply);
+    connection
+        .inbound
+        .expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
+    let reply = Arc::clone(&connection.reply);
     let session = frames::Session {
         number,
         fresh: Freshness::new(terms.stale_after_us),
-        slot: Arc::new(Slot::new(line.app.store.answers(terms.answer_len_max()), reply)),
+        slot: Arc::new(Slot::new(connection.app.store.answers(terms.answer_len_max()), reply)),
         terms,
     };
-    frames::serve(line, session).await
+    frames::serve(connection, session).await
 }
 
 /// Why a session ends.

@@ -14,15 +14,15 @@ use papilla_proto::{
 };
 
 use super::{
-    hello::tier_number,
     outbox::Outbox,
     wire::{self, OUT_HEAD_MAX, opcode},
 };
 use crate::{
     codec::Output,
     core::{
-        metrics::Transport,
-        scheduler::{Done, FRONT, Outcome, Recycler, Sink, Stage, is_past},
+        buffers::{HEADROOM, Recycler},
+        metrics::{Stage, Transport},
+        scheduler::{Done, Outcome, Sink, is_past},
     },
     problem,
     transport::app::App,
@@ -51,12 +51,12 @@ impl Reply {
     }
 
     /// One frame more will be answered; before a thread gets to know of it.
-    pub(super) fn owe(&self) {
+    pub(super) fn begin(&self) {
         self.outstanding.fetch_add(1, Ordering::SeqCst);
     }
 
     /// One frame less will be.
-    pub(super) fn settle(&self) {
+    pub(super) fn finish(&self) {
         self.outstanding.fetch_sub(1, Ordering::SeqCst);
         if self.is_awaited.load(Ordering::SeqCst) {
             self.out.call.notify_one();
@@ -117,7 +117,7 @@ impl Reply {
         if let Some(extension) = &mut header.extension {
             extension.queue_us = us(done.times.queue);
             extension.infer_us = us(done.times.infer);
-            extension.flags = done.drawn.flags;
+            extension.flags = done.meta.flags;
         }
         let (bytes, scale) = match done.outcome {
             Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
@@ -134,8 +134,8 @@ impl Reply {
         };
         let mut head = header.answer(FrameStatus::Ok, us(done.received.elapsed()), scale);
         if header.extension.is_some() {
-            head = numbered(head.windowed(done.drawn.window), done.tier);
-            head.kind = done.drawn.kind;
+            head = numbered(head.windowed(done.meta.window), done.tier);
+            head.kind = done.meta.kind;
         }
         if let Output::Samples(sample_type) = done.output {
             head.sample_type = sample_type;
@@ -151,18 +151,18 @@ impl Reply {
 
     /// Writes the heads into the room before the samples, and sends it all.
     fn send(&self, mut bytes: BytesMut, head: &FrameHeader) {
-        let (frame, len) = wire::out_head(opcode::BINARY, bytes.len() - FRONT);
-        bytes[FRONT - len..FRONT].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
+        let (frame, len) = wire::out_head(opcode::BINARY, bytes.len() - HEADROOM);
+        bytes[HEADROOM - len..HEADROOM].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
         let head = head.encode();
-        bytes[FRONT..FRONT + head.len()].copy_from_slice(&head);
-        self.out.send(&bytes.freeze().slice(FRONT - len..));
+        bytes[HEADROOM..HEADROOM + head.len()].copy_from_slice(&head);
+        self.out.send(&bytes.freeze().slice(HEADROOM - len..));
     }
 }
 
 impl Sink for Reply {
     fn deliver(&self, done: Done) {
         self.answer(done);
-        self.settle();
+        self.finish();
     }
 
     fn is_gone(&self) -> bool {
@@ -182,4 +182,9 @@ fn numbered(header: FrameHeader, tier: usize) -> FrameHeader {
 
 fn us(time: Duration) -> u32 {
     u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
+}
+
+/// The number by which answers name a tier.
+pub(super) fn tier_number(tier: usize) -> u16 {
+    u16::try_from(tier).unwrap_or(u16::MAX)
 }

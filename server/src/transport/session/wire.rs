@@ -7,7 +7,7 @@ use std::{mem, ops::Range};
 
 use bytes::{Buf, Bytes, BytesMut};
 
-use super::store::{Frames, Store};
+use crate::core::buffers::{Frames, HEADROOM, Store};
 
 /// Largest message read, bytes. Five times a frame, so that a frame that is too long is read,
 /// refused and survived; beyond this the connection is closed.
@@ -289,6 +289,8 @@ fn unmask(bytes: &mut [u8], mut mask: [u8; 4], offset: usize) {
 
 /// Most bytes of the head of a server's frame.
 pub(super) const OUT_HEAD_MAX: usize = 10;
+
+const _: () = assert!(HEAD_MAX <= HEADROOM && OUT_HEAD_MAX <= HEADROOM);
 
 /// The head of a server's frame, whole and unmasked, at the end of the array, and its length.
 pub(super) fn out_head(opcode: u8, payload_len: usize) -> ([u8; OUT_HEAD_MAX], usize) {

@@ -13,30 +13,36 @@ use papilla_proto::{
     atlas::{Patch, Raster},
 };
 
-use super::{
-    Answer, Shared,
-    kept::{Fresh, What},
-    refuse,
+use crate::{
+    codec,
+    core::{
+        catalogue::{Catalogue, Document},
+        kept::Fresh,
+    },
+    problem,
+    transport::{
+        answer::{Answer, Shared, kept, refuse},
+        app::App,
+    },
 };
-use crate::{codec, core::catalogue::Catalogue, problem, transport::app::App};
 
-pub(super) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, What::Atlas, |catalogue| {
+pub(crate) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, Document::Atlas, |catalogue| {
         Ok(Fresh::new("application/json", catalogue.atlas_json.clone()))
     })
     .await
 }
 
-pub(super) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, What::AtlasObj, |catalogue| {
+pub(crate) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, Document::AtlasObj, |catalogue| {
         Ok(Fresh::new("model/obj", catalogue.atlas.to_obj()))
     })
     .await
 }
 
 /// Both patches as binary glTF, each with its mask as a texture.
-pub(super) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
-    serve(&app, &headers, What::AtlasGlb, |catalogue| {
+pub(crate) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
+    serve(&app, &headers, Document::AtlasGlb, |catalogue| {
         let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
         Ok(Fresh::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
     })
@@ -44,7 +50,7 @@ pub(super) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
 }
 
 /// White where the patch is: the interface, or with `?patch=skin` the skin.
-pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+pub(crate) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
     let patch = match uri.query() {
         None | Some("" | "patch=interface") => Patch::Interface,
         Some("patch=skin") => Patch::Skin,
@@ -53,7 +59,7 @@ pub(super) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
             return refuse(&app, Problem::new(ErrorCode::BadQuery, message).at("patch"));
         }
     };
-    serve(&app, &headers, What::Mask(patch), move |catalogue| {
+    serve(&app, &headers, Document::Mask(patch), move |catalogue| {
         let raster = match patch {
             Patch::Skin => &catalogue.skin,
             Patch::Interface => &catalogue.interface,
@@ -73,11 +79,11 @@ fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
 async fn serve(
     app: &App,
     headers: &HeaderMap,
-    what: What,
+    document: Document,
     make: impl FnOnce(&Catalogue) -> Result<Fresh, Problem> + Send + 'static,
 ) -> Answer {
     let catalogue = app.catalogue();
     let of = Arc::clone(&catalogue);
-    let made = catalogue.kept.answer(headers, what, move || make(&of)).await;
+    let made = kept(&catalogue.kept, headers, document, move || make(&of)).await;
     made.or_else(|problem| refuse(app, problem))
 }

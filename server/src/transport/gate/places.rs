@@ -20,7 +20,7 @@ use std::{
 
 use tokio::sync::{AcquireError, Notify, OwnedSemaphorePermit, Semaphore};
 
-use crate::transport::gate::network_of;
+use super::rate::network_of;
 
 /// Share of the places that newcomers may have.
 const NEWCOMERS_SHARE: usize = 2;

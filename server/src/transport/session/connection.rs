@@ -26,15 +26,13 @@ use super::{
     wire::{self, Fault, Inbound, MESSAGE_MAX, Message, Received, opcode},
 };
 use crate::{
+    drain::begun,
     problem,
-    transport::{
-        app::{App, begun},
-        net::Patient,
-    },
+    transport::{app::App, stream::TimeoutStream},
 };
 
 /// The connection and what it takes to speak over it.
-pub(super) struct Line {
+pub(super) struct Connection {
     stream: Stream,
     pub(super) inbound: Inbound,
     pub(super) reply: Arc<Reply>,
@@ -64,9 +62,9 @@ pub(super) enum Event {
     Draining,
 }
 
-impl Line {
+impl Connection {
     pub(super) fn new(upgraded: Upgraded, app: Arc<App>, drain: watch::Receiver<bool>) -> Self {
-        let (stream, inbound) = match upgraded.downcast::<TokioIo<Patient>>() {
+        let (stream, inbound) = match upgraded.downcast::<TokioIo<TimeoutStream>>() {
             Ok(parts) => {
                 let stream = Arc::new(parts.io.into_inner().into_stream());
                 (Stream::Plain(stream), Inbound::new(&parts.read_buf))
@@ -101,7 +99,7 @@ impl Line {
                     Ok(Some(received)) => {
                         self.limits.on_frame();
                         if let Received::Message(message) = received
-                            && let Some(event) = self.hear(message)?
+                            && let Some(event) = self.on_message(message)?
                         {
                             return Ok(event);
                         }
@@ -127,17 +125,17 @@ impl Line {
                     }
                 }
                 () = begun(&mut self.drain), if !draining => return Ok(Event::Draining),
-                () = &mut self.alarm => self.look()?,
+                () = &mut self.alarm => self.on_idle()?,
                 () = &mut self.pause, if resume_at.is_some() => {}
                 // In a future of its own: room is made only where there will be a read.
                 read = async { self.stream.read(self.inbound.room()).await },
-                    if resume_at.is_none() => self.came(read)?,
+                    if resume_at.is_none() => self.on_read(read)?,
             }
         }
     }
 
     /// What a message means; none: it is dealt with.
-    fn hear(&mut self, message: Message) -> Result<Option<Event>, End> {
+    fn on_message(&mut self, message: Message) -> Result<Option<Event>, End> {
         let received = Instant::now();
         (self.heard, self.is_asked) = (received.into(), false);
         Ok(match message {
@@ -171,7 +169,7 @@ impl Line {
     }
 
     /// What a read means.
-    fn came(&mut self, read: io::Result<usize>) -> Result<(), End> {
+    fn on_read(&mut self, read: io::Result<usize>) -> Result<(), End> {
         match read {
             Ok(0) if self.inbound.is_amid() => {
                 Err(End::Garbled("the connection ended in the middle of a message".to_owned()))
@@ -186,7 +184,7 @@ impl Line {
     }
 
     /// Whether the client is still there.
-    fn look(&mut self) -> Result<(), End> {
+    fn on_idle(&mut self) -> Result<(), End> {
         let idle = self.app.timeouts.idle;
         let silence = self.heard.elapsed();
         if silence >= idle {
@@ -232,7 +230,7 @@ impl Line {
     }
 
     /// Says why the session ends, closes, and waits a moment for the client to close too.
-    pub(super) async fn part(&mut self, end: &End) {
+    pub(super) async fn close(&mut self, end: &End) {
         let (code, reason) = match end {
             End::Broken(_) => return,
             // There may be nobody left to read it.

@@ -1,20 +1,17 @@
 //! Measuring tiers beside the frames: at the start, at a reload, and again while nobody is served.
 
-use std::{
-    sync::atomic::Ordering,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use bytes::BytesMut;
-use papilla_proto::{MAP_LEN, MAP_SIDE_PX, SampleType, check_pressure};
+use papilla_proto::{MAP_LEN, SampleType, check_pressure};
 
-use super::us;
+use super::{Catalogue, Tier};
 use crate::{
     StartError,
     codec::{self, Input, Map, Output, Quantity},
     core::{
-        catalogue::{Catalogue, Tier},
         effects,
+        latency::{probe_map, us},
     },
 };
 
@@ -24,15 +21,6 @@ const RUNS_MAX: usize = 300;
 const RUNS_MIN: usize = 2;
 /// What handing a frame from socket to thread and back adds, us; seen on a virtual machine.
 const HAND_OVER_US: u64 = 120;
-/// A round press, half as hard as the tier was trained for.
-pub(crate) fn round_press(pressure_max_pa: f32, pressure_pa: &mut [f32]) {
-    let half = MAP_SIDE_PX as f32 / 2.0;
-    for (i, pressure_pa) in pressure_pa.iter_mut().enumerate() {
-        let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
-        let squared = ((row - half).powi(2) + (column - half).powi(2)) / (0.4 * half).powi(2);
-        *pressure_pa = 0.5 * pressure_max_pa * (1.0 - squared).max(0.0);
-    }
-}
 
 /// Measures on this thread every tier that was not measured yet, in about `time` altogether: an
 /// equal share each, but never less than [`RUNS_MIN`] runs after one that warms it.
@@ -70,9 +58,10 @@ pub(crate) fn calibrate_noting(
         note(&tier.name);
     }
     if let Some(codec_us) = codec_us() {
-        catalogue.overhead.0.store(codec_us + HAND_OVER_US, Ordering::Relaxed);
+        catalogue.overhead.set_us(codec_us + HAND_OVER_US);
     }
-    effects::measure(catalogue);
+    let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
+    effects::measure(catalogue.finger(), pressure_max_pa);
     tracing::info!(
         tiers = found.join(", "),
         overhead_us = catalogue.overhead.us(),
@@ -110,7 +99,7 @@ fn runs(tier: &Tier, share: Duration) -> Result<Vec<Duration>, StartError> {
 /// Time of decoding, checking and encoding one f32 map, us: the least of several.
 fn codec_us() -> Option<u64> {
     let mut map = vec![0.0; MAP_LEN];
-    round_press(1e4, &mut map);
+    probe_map(1e4, &mut map);
     let payload: Vec<u8> = map.iter().flat_map(|value| value.to_le_bytes()).collect();
     let mut buffer = BytesMut::with_capacity(payload.len());
     let samples = Output::Samples(SampleType::F32);

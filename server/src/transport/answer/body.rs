@@ -11,7 +11,7 @@ use http_body_util::BodyExt;
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tokio::time::timeout;
 
-use crate::problem::CODING;
+use super::refusal::CODING;
 
 /// So much more than is taken is read and thrown away, so that a client that is still sending
 /// gets to read why it is refused.

@@ -1,6 +1,4 @@
-//! How long each tier takes on this machine: calibrated at the start, then measured in every run.
-
-mod calibrate;
+//! How long a tier takes on this machine: numbers and durations, as calibration and frames give them.
 
 use std::{
     sync::OnceLock,
@@ -9,8 +7,7 @@ use std::{
 };
 
 use papilla_engine::ladder::Percentiles;
-
-pub(crate) use calibrate::{again, calibrate, calibrate_noting, round_press};
+use papilla_proto::MAP_SIDE_PX;
 
 /// What decoding, encoding and handing over add where no calibration has measured it, us.
 const OVERHEAD_US: u64 = 500;
@@ -55,7 +52,7 @@ impl Speed {
     }
 
     /// Takes the times of the calibration in place of what was expected.
-    fn calibrate(&self, times: &mut [Duration]) {
+    pub(crate) fn calibrate(&self, times: &mut [Duration]) {
         times.sort_unstable();
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return };
         let middle = times[times.len() / 2];
@@ -68,7 +65,7 @@ impl Speed {
 
     /// Takes the times of a second look, if no frame has been measured yet and they are shorter: a
     /// machine may be busier than it was, but no tier is faster than it can be.
-    fn correct(&self, times: &mut [Duration]) {
+    pub(crate) fn correct(&self, times: &mut [Duration]) {
         times.sort_unstable();
         let (Some(first), Some(middle)) = (times.first(), times.get(times.len() / 2)) else {
             return;
@@ -80,7 +77,7 @@ impl Speed {
     }
 
     /// Whether a frame has been measured.
-    fn is_used(&self) -> bool {
+    pub(crate) fn is_used(&self) -> bool {
         self.runs.load(Ordering::Relaxed) > 0
     }
 
@@ -124,7 +121,8 @@ impl Speed {
     }
 }
 
-fn us(time: Duration) -> u64 {
+/// Whole microseconds, at least one.
+pub(crate) fn us(time: Duration) -> u64 {
     u64::try_from(time.as_micros()).unwrap_or(u64::MAX).max(1)
 }
 
@@ -141,6 +139,22 @@ impl Default for Overhead {
 impl Overhead {
     pub(crate) fn us(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// Takes what a calibration has found.
+    pub(crate) fn set_us(&self, us: u64) {
+        self.0.store(us, Ordering::Relaxed);
+    }
+}
+
+/// The map that everything is timed on: a round contact with half of the pressure that a tier was
+/// trained for.
+pub(crate) fn probe_map(pressure_max_pa: f32, pressure_pa: &mut [f32]) {
+    let half = MAP_SIDE_PX as f32 / 2.0;
+    for (i, pressure_pa) in pressure_pa.iter_mut().enumerate() {
+        let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
+        let squared = ((row - half).powi(2) + (column - half).powi(2)) / (0.4 * half).powi(2);
+        *pressure_pa = 0.5 * pressure_max_pa * (1.0 - squared).max(0.0);
     }
 }
 

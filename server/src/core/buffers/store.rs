@@ -11,19 +11,19 @@ use std::{
 
 use papilla_proto::{HEADER_LEN_V2, MAP_LEN};
 
-use super::wire::HEAD_MAX;
-use crate::core::scheduler::{FRONT, Recycler};
+use super::{HEADROOM, Recycler};
 
 /// Buffers of frames: one that is read into, one with a thread, one in the slot, one that gives
 /// way to it.
-pub(super) type Frames = Recycler<4>;
+pub(crate) type Frames = Recycler<4>;
 
 /// Buffers of answers.
-pub(super) type Answers = Recycler;
+pub(crate) type Answers = Recycler;
 
-/// Room of every buffer, bytes: that of a whole float32 map, so that any session can use it.
+/// Room of every buffer, bytes: that of a whole float32 map with the heads around it, so that any
+/// session can use it.
 /// What a session does not touch the system does not provide.
-const ROOM: usize = FRONT + HEAD_MAX + HEADER_LEN_V2 + 4 * MAP_LEN;
+const ROOM: usize = 2 * HEADROOM + HEADER_LEN_V2 + 4 * MAP_LEN;
 
 /// The buffers that nobody uses.
 #[derive(Debug)]
@@ -51,26 +51,26 @@ impl Store {
     }
 
     /// Buffers for frames of at most `bytes`.
-    pub(super) fn frames(&self, bytes: usize) -> Frames {
+    pub(crate) fn frames(&self, bytes: usize) -> Frames {
         let mut frames = self.kept().frames.pop().unwrap_or_default();
         frames.make_room(bytes.max(ROOM));
         frames
     }
 
     /// Buffers for answers of at most `bytes`.
-    pub(super) fn answers(&self, bytes: usize) -> Answers {
+    pub(crate) fn answers(&self, bytes: usize) -> Answers {
         let mut answers = self.kept().answers.pop().unwrap_or_default();
         answers.make_room(bytes.max(ROOM));
         answers
     }
 
     /// Takes buffers back.
-    pub(super) fn keep_frames(&self, frames: &mut Frames) {
+    pub(crate) fn keep_frames(&self, frames: &mut Frames) {
         keep(&mut self.kept().frames, frames, self.places);
     }
 
     /// Takes buffers back.
-    pub(super) fn keep_answers(&self, answers: &mut Answers) {
+    pub(crate) fn keep_answers(&self, answers: &mut Answers) {
         keep(&mut self.kept().answers, answers, self.places);
     }
 }

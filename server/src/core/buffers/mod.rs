@@ -1,6 +1,14 @@
 //! Answer buffers that go out to the socket and come back without an allocation.
 
+mod store;
+
 use bytes::BytesMut;
+
+pub(crate) use self::store::{Frames, Store};
+
+/// Bytes kept free before an answer for the heads of its transport. A multiple of 16: sections
+/// begin at such.
+pub(crate) const HEADROOM: usize = 16;
 
 /// Buffers in turn. Three are enough for answers: one may still be on its way out, one behind it,
 /// while the next is filled.
