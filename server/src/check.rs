@@ -154,7 +154,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             "onnx_sha256": tier.model.info().onnx_sha256,
             "atlas_hash": tier.atlas_hash,
             "golden": golden,
-            "calibrated_us": tier.speed.calibrated_us(),
+            "calibrated_us": tier.latency.calibrated_us(),
             "predicted_latency_us": predicted_us,
         });
         report.good(&what, format!("{predicted_us} us, {answers}{default}"), values);

@@ -2,15 +2,18 @@
 //! maps out, inside a latency budget.
 //!
 //! ```text
-//! net ──► http ──┐                        ┌── worker (own sessions, own buffers)
-//!    └──► session ─► slot (latest wins) ─► queue ─┼── worker
-//!                                                 └── worker
+//! transport: net ─► front ─► routes ─┬─► http, oip ─┐
+//!                                    └─► session ───┴─► slot (latest wins)
+//! core:      scheduler: slot ─► queue ─► thread (own engine sessions, own buffers) ─► answer
+//! codec:     samples, npy, PNG, JSON
 //! ```
 //!
-//! **Invariant:** tokio only moves bytes; decoding, inference and encoding run on the pool's
-//! own threads. It does so on threads of the service's own (`runtime`), so that whoever
-//! starts and drains it is not starved by clients. **Invariant:** every queue is bounded and every wait is timed.
-//! **Invariant:** a frame that was accepted is answered exactly once.
+//! Each layer knows those below it alone, and no module imports another in a circle.
+//!
+//! **Invariant:** tokio only moves bytes, on threads of the service's own (`runtime`): clients
+//! cannot starve the task that starts and drains it. Decoding, inference and encoding run on the
+//! pool's threads. **Invariant:** every queue is bounded and every wait is timed. **Invariant:** a
+//! frame that was accepted is answered exactly once.
 //!
 //! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
 

@@ -19,7 +19,7 @@ const PROBE_EVERY: u32 = 16;
 
 /// How long the inference of a tier takes on this machine.
 #[derive(Debug)]
-pub(crate) struct Speed {
+pub(crate) struct Latency {
     fastest_us: AtomicU64,
     /// The last runs; what was expected or calibrated stands where there were fewer.
     window_us: [AtomicU64; WINDOW],
@@ -29,7 +29,7 @@ pub(crate) struct Speed {
     calibrated_us: OnceLock<Percentiles>,
 }
 
-impl Default for Speed {
+impl Default for Latency {
     fn default() -> Self {
         Self {
             fastest_us: AtomicU64::new(u64::MAX),
@@ -41,7 +41,7 @@ impl Default for Speed {
     }
 }
 
-impl Speed {
+impl Latency {
     /// What to expect before any run: the shipped time.
     pub(crate) fn expect(&self, time: Duration) {
         self.fill(us(time));
@@ -168,47 +168,47 @@ mod tests {
 
     #[test]
     fn a_calibration_replaces_what_was_shipped() {
-        let speed = Speed::default();
-        assert_eq!((speed.typical_us(), speed.is_hopeless(ms(1))), (0, false));
-        speed.expect(Duration::from_micros(900));
-        assert_eq!((speed.typical_us(), speed.calibrated_us()), (900, None));
+        let latency = Latency::default();
+        assert_eq!((latency.typical_us(), latency.is_hopeless(ms(1))), (0, false));
+        latency.expect(Duration::from_micros(900));
+        assert_eq!((latency.typical_us(), latency.calibrated_us()), (900, None));
         let mut times: Vec<Duration> = (1..=100).rev().map(Duration::from_micros).collect();
-        speed.calibrate(&mut times);
-        assert_eq!(speed.typical_us(), 51);
-        assert_eq!(speed.calibrated_us(), Some(Percentiles { p50: 51.0, p99: 100.0 }));
+        latency.calibrate(&mut times);
+        assert_eq!(latency.typical_us(), 51);
+        assert_eq!(latency.calibrated_us(), Some(Percentiles { p50: 51.0, p99: 100.0 }));
     }
 
     /// The machine was busy while the tier was measured: 40 ms, where it takes 10.
     #[test]
     fn a_disturbed_calibration_does_not_last() {
-        let speed = Speed::default();
-        speed.calibrate(&mut [ms(40); 3]);
-        assert_eq!(speed.typical_us(), 40_000);
+        let latency = Latency::default();
+        latency.calibrate(&mut [ms(40); 3]);
+        assert_eq!(latency.typical_us(), 40_000);
         // With 15 ms left frames seem hopeless, and one in a few is tried.
-        let tried = (0..64).filter(|_| !speed.is_hopeless(ms(15))).count();
+        let tried = (0..64).filter(|_| !latency.is_hopeless(ms(15))).count();
         assert_eq!(tried, 4);
-        speed.learn(ms(10));
-        assert!((0..64).all(|_| !speed.is_hopeless(ms(15))));
-        assert!((0..8).all(|_| speed.is_hopeless(ms(4))), "half of 10 ms is not there");
-        assert!((0..64).all(|_| speed.is_hopeless(Duration::ZERO)), "the deadline has passed");
+        latency.learn(ms(10));
+        assert!((0..64).all(|_| !latency.is_hopeless(ms(15))));
+        assert!((0..8).all(|_| latency.is_hopeless(ms(4))), "half of 10 ms is not there");
+        assert!((0..64).all(|_| latency.is_hopeless(Duration::ZERO)), "the deadline has passed");
         // Real frames take the place of the calibration, and a hiccup does not count.
-        (0..WINDOW).for_each(|_| speed.learn(ms(10)));
-        speed.learn(ms(2000));
-        assert_eq!(speed.typical_us(), 10_000);
+        (0..WINDOW).for_each(|_| latency.learn(ms(10)));
+        latency.learn(ms(2000));
+        assert_eq!(latency.typical_us(), 10_000);
     }
 
     #[test]
     fn a_second_look_finds_what_a_busy_start_has_hidden() {
-        let speed = Speed::default();
-        speed.calibrate(&mut [ms(40); 3]);
-        speed.correct(&mut [ms(50), ms(60)]);
-        assert_eq!(speed.typical_us(), 40_000, "busier than at the start");
-        speed.correct(&mut [ms(9), ms(10)]);
-        assert_eq!(speed.typical_us(), 10_000);
-        assert!(!speed.is_hopeless(ms(5)), "half of 9 ms is there");
+        let latency = Latency::default();
+        latency.calibrate(&mut [ms(40); 3]);
+        latency.correct(&mut [ms(50), ms(60)]);
+        assert_eq!(latency.typical_us(), 40_000, "busier than at the start");
+        latency.correct(&mut [ms(9), ms(10)]);
+        assert_eq!(latency.typical_us(), 10_000);
+        assert!(!latency.is_hopeless(ms(5)), "half of 9 ms is there");
         // Frames know better.
-        (0..WINDOW).for_each(|_| speed.learn(ms(12)));
-        speed.correct(&mut [ms(8), ms(8)]);
-        assert_eq!(speed.typical_us(), 12_000);
+        (0..WINDOW).for_each(|_| latency.learn(ms(12)));
+        latency.correct(&mut [ms(8), ms(8)]);
+        assert_eq!(latency.typical_us(), 12_000);
     }
 }

@@ -16,22 +16,22 @@ use tokio::{
 /// A stream whose writes give up when the other side makes no room for a while.
 pub(crate) struct TimeoutStream {
     stream: TcpStream,
-    patience: Duration,
+    timeout: Duration,
     /// Set while a write waits.
     alarm: Option<Pin<Box<Sleep>>>,
 }
 
 impl TimeoutStream {
-    pub(crate) fn new(stream: TcpStream, patience: Duration) -> Self {
-        Self { stream, patience, alarm: None }
+    pub(crate) fn new(stream: TcpStream, timeout: Duration) -> Self {
+        Self { stream, timeout, alarm: None }
     }
 
-    /// The stream, for whoever watches the clock without help.
+    /// The stream without its timer.
     pub(crate) fn into_stream(self) -> TcpStream {
         self.stream
     }
 
-    /// Passes a write's outcome on, and watches the clock while there is none.
+    /// Passes a write's outcome on; while there is none, the timer runs.
     fn timed<T>(
         &mut self,
         outcome: Poll<io::Result<T>>,
@@ -41,8 +41,8 @@ impl TimeoutStream {
             self.alarm = None;
             return outcome;
         }
-        let patience = self.patience;
-        let alarm = self.alarm.get_or_insert_with(|| Box::pin(sleep(patience)));
+        let timeout = self.timeout;
+        let alarm = self.alarm.get_or_insert_with(|| Box::pin(sleep(timeout)));
         ready!(alarm.as_mut().poll(cx));
         Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the client does not read")))
     }

@@ -46,15 +46,15 @@ pub(crate) fn calibrate_noting(
         return Ok(());
     }
     let begun = Instant::now();
-    let is_new = |tier: &&Tier| tier.speed.calibrated_us().is_none();
+    let is_new = |tier: &&Tier| tier.latency.calibrated_us().is_none();
     let mut new: Vec<&Tier> = catalogue.tiers.iter().filter(is_new).collect();
-    new.sort_by_key(|tier| tier.speed.typical_us());
+    new.sort_by_key(|tier| tier.latency.typical_us());
     let share = time / u32::try_from(new.len()).unwrap_or(u32::MAX).max(1);
     let mut found = Vec::with_capacity(new.len());
     for tier in new {
         let mut times = runs(tier, share)?;
-        tier.speed.calibrate(&mut times);
-        found.push(format!("{} {} us", tier.name, tier.speed.typical_us()));
+        tier.latency.calibrate(&mut times);
+        found.push(format!("{} {} us", tier.name, tier.latency.typical_us()));
         note(&tier.name);
     }
     if let Some(codec_us) = codec_us() {
@@ -76,8 +76,8 @@ pub(crate) fn calibrate_noting(
 /// # Errors
 /// It does not run.
 pub(crate) fn again(tier: &Tier) -> Result<(), StartError> {
-    if !tier.speed.is_used() {
-        tier.speed.correct(&mut runs(tier, Duration::ZERO)?);
+    if !tier.latency.is_used() {
+        tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use papilla_proto::atlas::Atlas;
 use serde_json::Value;
 
 use super::Tier;
-use crate::core::{digest::sha256_hex, latency::Speed};
+use crate::core::{digest::sha256_hex, latency::Latency};
 
 /// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
 /// are of a model that is not served.
@@ -40,8 +40,8 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
     for tier in tiers.iter() {
         if let Some(ms) = ladder.rung_of(&tier.name).and_then(|rung| rung.time_ms()) {
             // A tier that goes on over a reload shares its times, which it has learnt here.
-            if Arc::strong_count(&tier.speed) == 1 {
-                tier.speed.expect(milliseconds(ms));
+            if Arc::strong_count(&tier.latency) == 1 {
+                tier.latency.expect(milliseconds(ms));
             }
         }
     }
@@ -100,13 +100,13 @@ pub(super) fn load_tier(
     if info.name != name {
         return Err(format!("the model calls itself '{}'", info.name).into());
     }
-    let speed = same.map_or_else(
+    let latency = same.map_or_else(
         || {
-            let speed = Speed::default();
-            speed.expect(milliseconds(card.latency_ms.p50));
-            Arc::new(speed)
+            let latency = Latency::default();
+            latency.expect(milliseconds(card.latency_ms.p50));
+            Arc::new(latency)
         },
-        |tier| Arc::clone(&tier.speed),
+        |tier| Arc::clone(&tier.latency),
     );
     Ok(Tier {
         name: name.to_owned(),
@@ -115,12 +115,12 @@ pub(super) fn load_tier(
         effects: info.effects.clone(),
         atlas_hash: info.atlas_hash.clone(),
         pressure_max_pa: info.pressure_max_pa,
-        pattern_max: card.pattern_max,
+        input_statistics_max: card.pattern_max,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         relative_l2_median: card.metrics.relative_l2.median,
         relative_l2_p95: card.metrics.relative_l2.p95,
         card: shipped,
-        speed,
+        latency,
         retired: false,
         model,
     })

@@ -35,7 +35,7 @@ pub(crate) enum Step<'a> {
     Loaded(&'a str),
 }
 
-/// What is told of a catalogue, and does not change while it lasts.
+/// Which answer about a catalogue is kept: those that do not change while it lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Document {
     Models,
@@ -207,7 +207,7 @@ impl Catalogue {
 
     /// Time of a tier from receipt to answer on an idle machine, us.
     pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
-        self.tiers[tier].speed.typical_us().saturating_add(self.overhead.us())
+        self.tiers[tier].latency.typical_us().saturating_add(self.overhead.us())
     }
 
     /// Whether a tier is expected to meet a budget; none without one.
@@ -270,7 +270,7 @@ impl Catalogue {
         fitting()
             .filter(|(index, _)| self.meets(*index, Some(budget_us)) == Some(true))
             .min_by(|(_, a), (_, b)| a.relative_l2_median.total_cmp(&b.relative_l2_median))
-            .or_else(|| fitting().min_by_key(|(_, tier)| tier.speed.typical_us()))
+            .or_else(|| fitting().min_by_key(|(_, tier)| tier.latency.typical_us()))
             .map(|(index, _)| index)
     }
 }

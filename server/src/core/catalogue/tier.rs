@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::{
     StartError,
-    core::latency::{Speed, probe_map},
+    core::latency::{Latency, probe_map},
 };
 
 /// One way of getting a SED map: a model, and what is known of it.
@@ -25,7 +25,7 @@ pub(crate) struct Tier {
     /// Greatest pressure it was trained on, Pa.
     pub(crate) pressure_max_pa: f32,
     /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
-    pub(crate) pattern_max: Option<Pattern>,
+    pub(crate) input_statistics_max: Option<Pattern>,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
     /// What it is.
@@ -35,7 +35,7 @@ pub(crate) struct Tier {
     /// 95th percentile of that error on the card's own split.
     pub(crate) relative_l2_p95: f64,
     /// How long it takes here.
-    pub(crate) speed: Arc<Speed>,
+    pub(crate) latency: Arc<Latency>,
     /// Sessions that render with it now.
     pub(crate) sessions: Arc<AtomicUsize>,
     /// A reload found it gone: sessions that have it go on, nobody else gets it.

@@ -87,7 +87,7 @@ pub(crate) enum Outcome {
     Late(Stage),
     /// Something was wrong with the map, or with us.
     Failed(Problem),
-    /// Nobody is there for an answer; nothing was rendered.
+    /// The client was gone; nothing was rendered.
     Gone,
 }
 

@@ -143,8 +143,8 @@ impl PoolHandle {
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct NotTaken;
 
-/// Longest wait of a thread for work before it looks around; every wait is timed.
-const LOOK_AROUND: Duration = Duration::from_millis(500);
+/// Longest wait of a thread for work before it checks its inbox; every wait is timed.
+const POP_TIMEOUT: Duration = Duration::from_millis(500);
 
 #[cfg(test)]
 mod tests;

@@ -15,14 +15,14 @@ pub(crate) trait Sink: Send + Sync {
     /// Takes an answer; must not wait.
     fn deliver(&self, done: Done);
 
-    /// Whether nobody is there for it.
+    /// Whether its client is gone.
     fn is_gone(&self) -> bool;
 
     /// Takes the buffers of the slot, which is no more.
     fn take_back(&self, recycler: &mut Recycler);
 }
 
-/// Somebody who waits for answers: as many as the channel has places are kept.
+/// A task that awaits answers: as many are kept as the channel has places.
 impl Sink for mpsc::Sender<Done> {
     fn deliver(&self, done: Done) {
         // Err: whoever waited is gone, or (never, with places for all) does not fetch them.
@@ -122,7 +122,7 @@ impl Slot {
         state.scheduled
     }
 
-    /// Whether nobody is there for the answer.
+    /// Whether the client is gone.
     pub(super) fn is_abandoned(&self) -> bool {
         self.sink.is_gone()
     }

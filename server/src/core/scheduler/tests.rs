@@ -28,7 +28,7 @@ use crate::{
     core::{
         buffers::{HEADROOM, Recycler},
         catalogue::{Catalogue, Tier},
-        latency::Speed,
+        latency::Latency,
         metrics::{Metrics, Stage},
     },
 };
@@ -68,11 +68,11 @@ fn bench() -> Bench {
         effects: Vec::new(),
         atlas_hash: String::new(),
         pressure_max_pa: 100.0,
-        pattern_max: None,
+        input_statistics_max: None,
         sed_max_j_per_m3: 100.0,
         kind: Kind::Network,
         relative_l2_median: 0.1,
-        speed: Arc::new(Speed::default()),
+        latency: Arc::new(Latency::default()),
         sessions: Arc::new(AtomicUsize::new(0)),
         relative_l2_p95: 0.0,
         retired: false,

@@ -11,7 +11,7 @@ use papilla_engine::Session;
 use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
 
 use super::{
-    Done, Job, JobOptions, LOOK_AROUND, Outcome, OutputMeta, Times,
+    Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
     exchange::Inbox,
     queue::{Next, Queue},
 };
@@ -59,7 +59,7 @@ impl Worker {
     /// Serves the queue until it is closed and empty.
     pub(super) fn run(&mut self, queue: &Queue, inbox: &Inbox) {
         loop {
-            let next = queue.pop(LOOK_AROUND);
+            let next = queue.pop(POP_TIMEOUT);
             // After the wait: a job for a new tier comes only once its session is there.
             inbox.collect(&mut self.catalogue, &mut self.sessions);
             let slot = match next {
@@ -146,8 +146,9 @@ impl Worker {
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
         let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
-        let is_unfamiliar = !summary.is_zero() && tier.pattern_max.is_some_and(is_beyond);
-        meta.flags |= if is_unfamiliar { flags::UNFAMILIAR } else { 0 };
+        let is_out_of_distribution =
+            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_beyond);
+        meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
@@ -157,7 +158,7 @@ impl Worker {
             self.metrics.zero_maps.inc();
             meta.flags |= flags::NO_CONTACT;
         } else if job.deadline.is_some_and(|deadline| {
-            tier.speed.is_hopeless(deadline.saturating_duration_since(decoded))
+            tier.latency.is_hopeless(deadline.saturating_duration_since(decoded))
         }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
@@ -168,7 +169,7 @@ impl Worker {
                 },
             )?;
             times.infer = decoded.elapsed();
-            tier.speed.learn(times.infer);
+            tier.latency.learn(times.infer);
         }
 
         let start = Instant::now();

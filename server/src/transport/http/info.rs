@@ -95,11 +95,11 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
         "effects": tier.effects,
         "atlas_hash": tier.atlas_hash,
         "pressure_max_pa": tier.pressure_max_pa,
-        "pattern_max": tier.pattern_max,
+        "pattern_max": tier.input_statistics_max,
         "sed_max_j_per_m3": tier.sed_max_j_per_m3,
         "relative_l2_median": tier.relative_l2_median,
         "predicted_latency_us": catalogue.predicted_latency_us(index),
-        "calibrated_us": tier.speed.calibrated_us(),
+        "calibrated_us": tier.latency.calibrated_us(),
         "sessions": tier.sessions.load(Ordering::Relaxed),
     })
 }

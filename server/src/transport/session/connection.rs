@@ -1,4 +1,4 @@
-//! The connection of a session: what comes in, what is left to write, and the clock.
+//! The connection of a session: reads messages, writes answers, and closes it when it is idle.
 
 use std::{
     io,
@@ -38,10 +38,10 @@ pub(super) struct Connection {
     pub(super) reply: Arc<Reply>,
     pub(super) app: Arc<App>,
     drain: watch::Receiver<bool>,
-    /// When the client was last heard, and whether it has been asked since if it is there.
+    /// When the client's last message came, and whether it was pinged since.
     heard: TokioInstant,
-    is_asked: bool,
-    /// Goes off when it may be time to ask, or to give up.
+    is_pinged: bool,
+    /// Goes off when a ping or the end may be due.
     alarm: Pin<Box<Sleep>>,
     limits: Limits,
     /// Goes off when the next turn begins.
@@ -79,7 +79,7 @@ impl Connection {
         let heard = TokioInstant::now();
         let alarm = Box::pin(sleep_until(heard + app.timeouts.idle / 3));
         let (limits, pause) = (Limits::new(heard.into_std()), Box::pin(sleep_until(heard)));
-        Self { stream, inbound, reply, app, drain, heard, is_asked: false, alarm, limits, pause }
+        Self { stream, inbound, reply, app, drain, heard, is_pinged: false, alarm, limits, pause }
     }
 
     /// The next event. A silent client is pinged after a third of the idle time,
@@ -134,10 +134,10 @@ impl Connection {
         }
     }
 
-    /// What a message means; none: it is dealt with.
+    /// Handles a message; an event if the session has to act on it.
     fn on_message(&mut self, message: Message) -> Result<Option<Event>, End> {
         let received = Instant::now();
-        (self.heard, self.is_asked) = (received.into(), false);
+        (self.heard, self.is_pinged) = (received.into(), false);
         Ok(match message {
             Message::Text(text) if str::from_utf8(&text).is_ok() => {
                 self.limits.on_text(received);
@@ -168,7 +168,7 @@ impl Connection {
         self.limits.on_control(now).map_err(|problem| End::Refused(problem, close::POLICY))
     }
 
-    /// What a read means.
+    /// Counts a read; the end of the session if the connection has ended.
     fn on_read(&mut self, read: io::Result<usize>) -> Result<(), End> {
         match read {
             Ok(0) if self.inbound.is_amid() => {
@@ -183,7 +183,7 @@ impl Connection {
         }
     }
 
-    /// Whether the client is still there.
+    /// Pings a client that is silent, and ends the session of one that stays so.
     fn on_idle(&mut self) -> Result<(), End> {
         let idle = self.app.timeouts.idle;
         let silence = self.heard.elapsed();
@@ -191,11 +191,11 @@ impl Connection {
             let message = format!("the client was silent for {idle:?}");
             return Err(End::Refused(Problem::new(ErrorCode::Timeout, message), close::POLICY));
         }
-        if silence >= idle / 3 && !self.is_asked {
-            self.is_asked = true;
+        if silence >= idle / 3 && !self.is_pinged {
+            self.is_pinged = true;
             self.reply.out.send(&wire::frame(opcode::PING, &[]));
         }
-        let next = self.heard + if self.is_asked { idle } else { idle / 3 };
+        let next = self.heard + if self.is_pinged { idle } else { idle / 3 };
         self.alarm.as_mut().reset(next);
         Ok(())
     }

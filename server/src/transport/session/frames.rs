@@ -1,4 +1,4 @@
-//! The body of a session: frames in, answers out.
+//! Frames of an open session: each is checked and put into its slot, or refused.
 
 use std::{
     sync::Arc,
@@ -15,7 +15,8 @@ use super::{
     connection::{Connection, Event},
     drained,
     fresh::Freshness,
-    hello::{self, Terms},
+    hello,
+    terms::Terms,
 };
 use crate::{
     codec::{Input, Output},
@@ -46,10 +47,10 @@ pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> 
             Err(end) => return end,
             Ok(Event::Draining) => draining = true,
             Ok(Event::Binary(frame, received)) => {
-                session.take(connection, &frame, received, draining)
+                session.take(connection, &frame, received, draining);
             }
             Ok(Event::Text(_)) if draining => {
-                connection.reply.complain(problem::shutting_down(), None)
+                connection.reply.complain(problem::shutting_down(), None);
             }
             Ok(Event::Text(text)) => session.renew(connection, &text).await,
         }

@@ -1,4 +1,4 @@
-//! How much of what a client sends is worked off at a time, so that nobody else waits for it.
+//! How much of one client's input is handled at a time, so that other sessions do not wait for it.
 
 use std::time::{Duration, Instant};
 

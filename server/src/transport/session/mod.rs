@@ -10,6 +10,7 @@ mod hello;
 mod limits;
 mod outbox;
 mod reply;
+mod terms;
 mod wire;
 
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Answers: made and sent by the thread that rendered, or by the task if there was nothing to render.
+//! Answers of a session: made and sent by the thread that rendered, or by the task if there was nothing to render.
 
 use std::{
     sync::{
@@ -28,7 +28,7 @@ use crate::{
     transport::app::App,
 };
 
-/// The voice of a session.
+/// What a session sends: answers, messages and errors, in the order in which they are ready.
 pub(super) struct Reply {
     pub(super) out: Outbox,
     /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
@@ -50,12 +50,12 @@ impl Reply {
         }
     }
 
-    /// One frame more will be answered; before a thread gets to know of it.
+    /// A frame is accepted: called before a thread gets it.
     pub(super) fn begin(&self) {
         self.outstanding.fetch_add(1, Ordering::SeqCst);
     }
 
-    /// One frame less will be.
+    /// An accepted frame is answered.
     pub(super) fn finish(&self) {
         self.outstanding.fetch_sub(1, Ordering::SeqCst);
         if self.is_awaited.load(Ordering::SeqCst) {
@@ -69,11 +69,12 @@ impl Reply {
         self.outstanding.load(Ordering::SeqCst) == 0
     }
 
-    /// Nobody is there any more.
+    /// The session is over: what is not rendered yet need not be.
     pub(super) fn end(&self) {
         self.is_over.store(true, Ordering::Release);
     }
 
+    /// Sends a JSON message.
     pub(super) fn say(&self, message: &ServerMessage) {
         match serde_json::to_string(message) {
             Ok(text) => self.out.send(&wire::frame(opcode::TEXT, text.as_bytes())),
