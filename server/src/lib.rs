@@ -104,9 +104,9 @@ impl Drop for EndOnDrop {
 
 /// Listens, and begins to load the models.
 ///
-/// From here on connections are taken: `/healthz` answers, `/readyz` says how far the start has come,
-/// and other requests wait for the models, no longer than a client may take (`io_timeout_s`). Must be
-/// called within a tokio runtime.
+/// From here on connections are taken: `/healthz` answers, `/readyz` says how far the start has
+/// come, and other requests wait for the models, no longer than a client may take (`io_timeout_s`).
+/// Must be called within a tokio runtime.
 ///
 /// # Errors
 /// Settings do not go together, or the address cannot be bound; each says what to do.

@@ -1,4 +1,4 @@
-//! How long a tier takes on this machine: numbers and durations, as calibration and frames give them.
+//! How long a tier takes on this machine, as calibration and frames measure it.
 
 use std::{
     sync::OnceLock,
@@ -90,8 +90,8 @@ impl Latency {
         self.hopeless.store(0, Ordering::Relaxed);
     }
 
-    /// Whether no run can be expected to end within `left`: it is less than half the fastest run, so
-    /// that one lucky run on an idle machine does not condemn a frame that could be in time.
+    /// Whether no run can be expected to end within `left`: it is less than half the fastest run,
+    /// so that one lucky run on an idle machine does not condemn a frame that could be in time.
     ///
     /// Now and then the answer is no all the same: a tier whose frames are all dropped would never
     /// be measured again, and a time that was taken on a busy machine would stand for good.

@@ -1,7 +1,7 @@
 //! From settings to a service that renders, behind a port that is open already: load, warm, serve,
 //! measure.
 
-mod again;
+mod remeasure;
 
 use std::{sync::Arc, thread};
 
@@ -85,7 +85,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     measuring.await.map_err(|_| StartError::WorkerPanicked)??;
     progress.enter(Stage::Ready, Vec::new());
     if !config.calibration().is_zero() {
-        tokio::spawn(again::measure(Arc::clone(&app)));
+        tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
     Ok(Opened { app, pool, tiers, default_tier })
 }

@@ -30,7 +30,7 @@ pub(crate) struct Front {
     metrics: Arc<Metrics>,
     drain: Arc<watch::Sender<bool>>,
     /// Longest wait of a request for the routes.
-    patience: Duration,
+    wait_max: Duration,
 }
 
 impl Front {
@@ -38,9 +38,9 @@ impl Front {
         progress: Arc<Progress>,
         metrics: Arc<Metrics>,
         drain: Arc<watch::Sender<bool>>,
-        patience: Duration,
+        wait_max: Duration,
     ) -> Self {
-        Self { router: SetOnce::new(), progress, metrics, drain, patience }
+        Self { router: SetOnce::new(), progress, metrics, drain, wait_max }
     }
 
     /// From here on the routes answer.
@@ -69,7 +69,7 @@ impl Front {
             _ => {
                 let mut drain = self.drain.subscribe();
                 tokio::select! {
-                    router = timeout(self.patience, self.router.wait()) => match router {
+                    router = timeout(self.wait_max, self.router.wait()) => match router {
                         Ok(router) => {
                             drop(drain);
                             return router.clone().oneshot(request.map(Body::new)).await;
@@ -94,9 +94,9 @@ mod tests {
 
     use super::*;
 
-    fn front(patience: Duration) -> Front {
+    fn front(wait_max: Duration) -> Front {
         let drain = Arc::new(watch::Sender::new(false));
-        Front::new(Arc::default(), Metrics::new(), drain, patience)
+        Front::new(Arc::default(), Metrics::new(), drain, wait_max)
     }
 
     async fn status(front: &Front, path: &str) -> StatusCode {

@@ -1,6 +1,7 @@
 //! What moves bytes: connections, HTTP, WebSocket sessions and the Open Inference Protocol.
 //!
-//! `net` -> `front` -> `routes` (set once the models are there) -> `gate` -> `http`, `session`, `oip`.
+//! A request goes from `net` through `front`, which holds it until the models are loaded, to
+//! `routes`. There `gate` decides whether it may come in, and `http`, `session` or `oip` answers.
 
 mod answer;
 pub(crate) mod app;

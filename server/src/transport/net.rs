@@ -28,9 +28,9 @@ pub(crate) const BUFFER_MAX: usize = 128 * 1024;
 /// Pause after a failed accept: the usual cause, no free file descriptors, passes.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(50);
 
-/// Room of the system for each direction of a connection, bytes: more than the largest frame (196 KiB).
-/// Linux begins with 128 KiB, so that a sender of f32 maps waits for room in the middle of a frame;
-/// about one in a hundred then came 20 ms late, when the delayed acknowledgement ran out.
+/// Room of the system for each direction of a connection, bytes: more than the largest frame (196
+/// KiB). Linux begins with 128 KiB, so that a sender of f32 maps waits for room in the middle of a
+/// frame; about one in a hundred then came 20 ms late, when the delayed acknowledgement ran out.
 pub(crate) const SOCKET_BUFFER: u32 = 512 * 1024;
 
 /// Connections that may wait to be accepted.
@@ -92,13 +92,13 @@ async fn connection(stream: TcpStream, peer: Peer, context: ConnectionContext, p
     context.metrics.connections_open.inc();
     // Taken before anything is read: from here on the drain waits for this connection.
     let drain = context.drain.subscribe();
-    let patience = context.timeouts.io;
-    let stream = TimeoutStream::new(stream, patience);
+    let wait_max = context.timeouts.io;
+    let stream = TimeoutStream::new(stream, wait_max);
     let standing = &place.standing;
     let serving = async {
         match &context.tls {
             None => converse(stream, peer, standing, &context, drain).await,
-            Some(tls) => match timeout(patience, tls.accept(stream)).await {
+            Some(tls) => match timeout(wait_max, tls.accept(stream)).await {
                 Ok(Ok(stream)) => converse(stream, peer, standing, &context, drain).await,
                 Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
                 Err(_) => tracing::debug!("TLS handshake took too long"),

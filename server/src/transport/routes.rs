@@ -162,3 +162,20 @@ fn welcome(cookie: HeaderValue) -> Response {
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     response
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A route that is renamed must not lose what the gate knows of it.
+    #[test]
+    fn whatever_has_a_rule_of_its_own_is_a_route() {
+        for path in PUBLIC.iter().chain(&["/v1/session"]) {
+            assert!(known(path).is_some(), "{path}");
+        }
+        let exchanging =
+            PATHS.iter().filter(|path| access(path).token_in_query != TokenInQuery::Ignored);
+        assert_eq!(exchanging.count(), 2);
+        assert!(!access("other").is_public);
+    }
+}

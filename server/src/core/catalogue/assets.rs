@@ -1,6 +1,6 @@
 //! Files the service is made of: embedded in the binary, or read from a folder.
 
-mod apart;
+mod detached;
 mod folder;
 
 use std::borrow::Cow;

@@ -33,7 +33,8 @@ pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), Sta
     calibrate_noting(catalogue, time, &mut |_| ())
 }
 
-/// The same, the tiers that are expected to be the fastest first; `note` is told each when it is done.
+/// The same, the tiers that are expected to be the fastest first; `note` is told each when it is
+/// done.
 ///
 /// # Errors
 /// A tier does not run.
@@ -75,7 +76,7 @@ pub(crate) fn calibrate_noting(
 ///
 /// # Errors
 /// It does not run.
-pub(crate) fn again(tier: &Tier) -> Result<(), StartError> {
+pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
     if !tier.latency.is_used() {
         tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
     }

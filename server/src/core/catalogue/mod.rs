@@ -24,7 +24,7 @@ use self::{
 use crate::{
     StartError,
     codec::{Output, Quantity},
-    core::{effects, kept::Kept, latency::Overhead, metrics::TierLabels},
+    core::{cache::Cache, effects, latency::Overhead, metrics::TierLabels},
 };
 
 /// How far loading has come.
@@ -75,7 +75,7 @@ pub(crate) struct Catalogue {
     /// What sessions with effects share.
     pub(crate) runtime: effects::Shared,
     /// Answers about all this.
-    pub(crate) kept: Kept<Document>,
+    pub(crate) cache: Cache<Document>,
 }
 
 impl Catalogue {
@@ -96,7 +96,7 @@ impl Catalogue {
             judged_on: None,
             overhead: Overhead::default(),
             runtime: effects::Shared::default(),
-            kept: Kept::default(),
+            cache: Cache::default(),
         }
     }
 
@@ -195,7 +195,7 @@ impl Catalogue {
             judged_on,
             overhead,
             runtime: effects::Shared::default(),
-            kept: Kept::default(),
+            cache: Cache::default(),
         })
     }
 

@@ -43,8 +43,8 @@ pub(crate) struct Tier {
 }
 
 impl Tier {
-    /// A session that has rendered [`probe_map`]: the memory that frames will use has been
-    /// touched. `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map and its answer.
+    /// A session that has rendered [`probe_map`]: the memory that frames will use has been touched.
+    /// `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map and its answer.
     ///
     /// # Errors
     /// The tier does not run.

@@ -205,8 +205,8 @@ impl Effects {
         self.sections.last().map_or(HEADER_LEN_V2, |s| (s.offset + s.bytes) as usize)
     }
 
-    /// What acts before the network: turns the pressure that was sent into that which the
-    /// elastic map is to be asked about. The greatest pressure that results; none if nothing changed.
+    /// What acts before the network: turns the pressure that was sent into that which the elastic
+    /// map is to be asked about. The greatest pressure that results; none if nothing changed.
     pub(crate) fn before(&mut self, pressure_pa: &mut [f32], time_us: u64) -> Option<f32> {
         self.relaxation.as_mut().map(|relaxation| relaxation.step(pressure_pa, time_us))
     }

@@ -19,7 +19,7 @@ use crate::drain::begun;
 const QUIET: Duration = Duration::from_millis(700);
 
 /// A folder that never gets quiet is read after so long all the same.
-const PATIENCE: Duration = Duration::from_secs(10);
+const WAIT_MAX: Duration = Duration::from_secs(10);
 
 /// Watches `folder` until the drain begins.
 ///
@@ -61,7 +61,7 @@ async fn follow(
         }
         drop(drain);
         let first = Instant::now();
-        while first.elapsed() < PATIENCE
+        while first.elapsed() < WAIT_MAX
             && matches!(timeout(QUIET, changes.recv()).await, Ok(Some(())))
         {}
         once(Arc::clone(&reloader)).await;

@@ -119,17 +119,17 @@ fn sequence(done: &Done) -> u32 {
 }
 
 /// Far more than a busy machine needs: a lost answer must fail a test, not hold it up for ever.
-const PATIENCE: Duration = Duration::from_secs(120);
+const WAIT_MAX: Duration = Duration::from_secs(120);
 
 fn wait(answers: &mut mpsc::Receiver<Done>) -> Done {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + WAIT_MAX;
     loop {
         match answers.try_recv() {
             Ok(done) => return done,
             Err(mpsc::error::TryRecvError::Disconnected) => panic!("nobody will answer any more"),
             Err(mpsc::error::TryRecvError::Empty) => {}
         }
-        assert!(Instant::now() < end, "no answer came in {PATIENCE:?}");
+        assert!(Instant::now() < end, "no answer came in {WAIT_MAX:?}");
         sleep(Duration::from_millis(1));
     }
 }
@@ -140,7 +140,7 @@ fn a_newer_frame_replaces_the_unstarted_one_and_only_that() {
     let (slot, mut answers) = client();
     let submit = |n| bench.handle.submit(&slot, job(n, 1.0, None));
     assert!(submit(1).unwrap().is_none());
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     // 1 is started: it stays. 2 waits, and gives way to 3, and 3 to 4.
     assert!(submit(2).unwrap().is_none());
     assert_eq!(submit(3).unwrap().unwrap().options.header.unwrap().sequence, 2);
@@ -158,12 +158,12 @@ fn slots_are_served_in_turn_however_fast_one_client_sends() {
     let (greedy, mut greedy_answers) = client();
     let (modest, mut modest_answers) = client();
     bench.handle.submit(&greedy, job(1, 1.0, None)).unwrap();
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     bench.handle.submit(&modest, job(7, 1.0, None)).unwrap();
     bench.handle.submit(&greedy, job(2, 1.0, None)).unwrap();
     bench.go.send(Act::Finish).unwrap();
     assert_eq!(sequence(&wait(&mut greedy_answers)), 1);
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     bench.go.send(Act::Finish).unwrap();
     // The modest client's frame came before the greedy one's second.
     assert_eq!(sequence(&wait(&mut modest_answers)), 7);
@@ -178,7 +178,7 @@ fn late_frames_are_dropped_at_the_dequeue_without_work() {
     let (first, mut first_answers) = client();
     let (second, mut second_answers) = client();
     bench.handle.submit(&first, job(1, 1.0, None)).unwrap();
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     bench.handle.submit(&second, job(2, 1.0, Some(Duration::from_millis(5)))).unwrap();
     sleep(Duration::from_millis(6));
     bench.go.send(Act::Finish).unwrap();
@@ -226,7 +226,7 @@ fn what_was_accepted_before_the_stop_is_answered_and_nothing_after() {
     let (slot, mut answers) = client();
     let (other, mut other_answers) = client();
     bench.handle.submit(&slot, job(1, 1.0, None)).unwrap();
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     bench.handle.submit(&slot, job(2, 1.0, None)).unwrap();
     bench.handle.submit(&other, job(3, 1.0, None)).unwrap();
     for _ in 0..3 {
@@ -244,7 +244,7 @@ fn the_queue_is_bounded() {
     let bench = bench();
     let clients: Vec<_> = (0..6).map(|_| client()).collect();
     bench.handle.submit(&clients[0].0, job(0, 1.0, None)).unwrap();
-    bench.begun.recv_timeout(PATIENCE).expect("no inference began");
+    bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
     let results: Vec<bool> = (1..6)
         .map(|n| bench.handle.submit(&clients[n].0, job(n as u32, 1.0, None)).is_ok())
         .collect();

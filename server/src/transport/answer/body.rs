@@ -20,16 +20,16 @@ const DISCARD_MAX: usize = 6 << 20;
 /// The whole body.
 ///
 /// # Errors
-/// Larger than `bytes_max`, slower than `patience`, or cut off.
+/// Larger than `bytes_max`, slower than `wait_max`, or cut off.
 pub(crate) async fn read(
     body: Body,
     bytes_max: usize,
-    patience: Duration,
+    wait_max: Duration,
 ) -> Result<Bytes, Problem> {
-    match timeout(patience, collect(body, bytes_max)).await {
+    match timeout(wait_max, collect(body, bytes_max)).await {
         Ok(result) => result,
         Err(_) => {
-            let message = format!("the body did not arrive within {patience:?}");
+            let message = format!("the body did not arrive within {wait_max:?}");
             Err(Problem::new(ErrorCode::Timeout, message))
         }
     }

@@ -1,7 +1,7 @@
 //! What the protocols over HTTP share: bodies, answers, refusals, and posted maps.
 
 pub(crate) mod body;
-mod kept;
+mod cached;
 pub(crate) mod refusal;
 pub(crate) mod render;
 
@@ -16,7 +16,7 @@ use axum::{
 use papilla_proto::Problem;
 use serde::Serialize;
 
-pub(crate) use self::{kept::kept, refusal::HttpProblem};
+pub(crate) use self::{cached::cached, refusal::HttpProblem};
 use super::app::App;
 use crate::problem;
 

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Longest wait for the pool; only a fault of our own can take so long.
-const POOL_PATIENCE: Duration = Duration::from_secs(60);
+const POOL_WAIT_MAX: Duration = Duration::from_secs(60);
 
 /// Counts what became of a posted map; late ones were counted where they were found late.
 pub(crate) fn count(app: &App, transport: Transport, result: &Result<Response, Problem>) {
@@ -92,7 +92,7 @@ async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
     if app.pool.submit(&Arc::new(slot), job).is_err() {
         return Err(problem::shutting_down());
     }
-    match timeout(POOL_PATIENCE, answers.recv()).await {
+    match timeout(POOL_WAIT_MAX, answers.recv()).await {
         Ok(Some(done)) => Ok(done),
         Ok(None) => Err(problem::internal("the pool dropped the map", &"no answer")),
         Err(_) => Err(problem::internal("the pool did not answer", &"timeout")),

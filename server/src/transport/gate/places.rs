@@ -1,8 +1,8 @@
 //! Places for connections, and whose they are.
 //!
 //! Where tokens are asked for, a connection is a newcomer until a request on it has shown one.
-//! Newcomers have half of the places, few for each address, and beyond that the oldest of them gives
-//! way to the next: so nobody without a token keeps a holder of one from coming in.
+//! Newcomers have half of the places, few for each address, and beyond that the oldest of them
+//! gives way to the next: so nobody without a token keeps a holder of one from coming in.
 //!
 //! ```text
 //! accepted ──► newcomer ──(a token is shown)──► holder

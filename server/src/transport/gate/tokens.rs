@@ -36,7 +36,7 @@ struct Entry {
     admin: bool,
 }
 
-/// Whoever has a token.
+/// The holder of a token.
 #[derive(Debug)]
 pub(crate) struct Holder {
     pub(crate) name: Arc<str>,

@@ -14,12 +14,12 @@ use tokio::{sync::Semaphore, task::spawn_blocking};
 
 use crate::{
     core::{
+        cache::Content,
         catalogue::{Catalogue, Document},
-        kept::Fresh,
         metrics::Metrics,
     },
     problem, progress,
-    transport::answer::{Answer, Shared, answer, json_answer, kept, refusal::label, refuse},
+    transport::answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
 };
 
 /// Alive: the process answers.
@@ -109,8 +109,8 @@ pub(crate) async fn models(State(app): Shared, headers: HeaderMap) -> Answer {
     let of = Arc::clone(&catalogue);
     let make = move || {
         let cards: Vec<&Value> = of.offered().map(|(_, tier)| &tier.card).collect();
-        Ok(Fresh::new("application/json", json!({"models": cards}).to_string()))
+        Ok(Content::new("application/json", json!({"models": cards}).to_string()))
     };
-    let models = kept(&catalogue.kept, &headers, Document::Models, make).await;
+    let models = cached(&catalogue.cache, &headers, Document::Models, make).await;
     models.or_else(|problem| refuse(&app, problem))
 }

@@ -9,9 +9,9 @@ use axum::{
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 
 use crate::{
-    core::kept::{Fresh, Kept},
+    core::cache::{Cache, Content},
     transport::{
-        answer::{Answer, Shared, kept, refuse},
+        answer::{Answer, Shared, cached, refuse},
         app::App,
     },
 };
@@ -22,7 +22,7 @@ const PAGE: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/page.rs"));
 /// The description of the HTTP surface, written by hand.
 const OPENAPI: &str = include_str!("../../../openapi.json");
 
-/// What is kept.
+/// Keys of the cache.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Part {
     /// A file of the page, by its place.
@@ -31,7 +31,7 @@ enum Part {
 }
 
 /// Answers that last as long as the binary.
-static KEPT: LazyLock<Kept<Part>> = LazyLock::new(Kept::default);
+static CACHE: LazyLock<Cache<Part>> = LazyLock::new(Cache::default);
 
 fn content_type(name: &str) -> &'static str {
     match name.rsplit('.').next().unwrap_or_default() {
@@ -58,8 +58,8 @@ pub(crate) async fn file(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
 
 /// The description of the HTTP surface.
 pub(crate) async fn openapi(State(app): Shared, headers: HeaderMap) -> Answer {
-    let make = || Ok(Fresh::new("application/json", OPENAPI));
-    kept(&KEPT, &headers, Part::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
+    let make = || Ok(Content::new("application/json", OPENAPI));
+    cached(&CACHE, &headers, Part::OpenApi, make).await.or_else(|problem| refuse(&app, problem))
 }
 
 async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
@@ -68,6 +68,6 @@ async fn serve(app: &App, name: &str, headers: &HeaderMap) -> Answer {
         return refuse(app, Problem::new(ErrorCode::NotFound, message));
     };
     let (name, bytes) = PAGE[place];
-    let make = move || Ok(Fresh::new(content_type(name), bytes));
-    kept(&KEPT, headers, Part::File(place), make).await.or_else(|problem| refuse(app, problem))
+    let make = move || Ok(Content::new(content_type(name), bytes));
+    cached(&CACHE, headers, Part::File(place), make).await.or_else(|problem| refuse(app, problem))
 }

@@ -13,12 +13,12 @@ use serde_json::{Value, json};
 use crate::{
     codec::{self, Map, Output, Quantity},
     core::{
+        cache::Content,
         catalogue::{Catalogue, Document},
-        kept::Fresh,
     },
     problem,
     transport::{
-        answer::{Answer, Shared, kept, refuse},
+        answer::{Answer, Shared, cached, refuse},
         negotiate,
     },
 };
@@ -32,9 +32,9 @@ pub(crate) async fn list(State(app): Shared, headers: HeaderMap) -> Answer {
         });
         let states: Vec<Value> = states.collect();
         let text = json!({"atlas_hash": of.atlas.hash(), "presses": states}).to_string();
-        Ok(Fresh::new("application/json", text))
+        Ok(Content::new("application/json", text))
     };
-    let made = kept(&catalogue.kept, &headers, Document::States, make).await;
+    let made = cached(&catalogue.cache, &headers, Document::States, make).await;
     made.or_else(|problem| refuse(&app, problem))
 }
 
@@ -62,10 +62,10 @@ pub(crate) async fn one(State(app): Shared, uri: Uri, headers: HeaderMap) -> Ans
     };
     let of = Arc::clone(&catalogue);
     let make = move || match serde_json::to_vec(&of.replay.states[state]) {
-        Ok(bytes) => Ok(Fresh::new("application/json", bytes)),
+        Ok(bytes) => Ok(Content::new("application/json", bytes)),
         Err(error) => Err(problem::internal("the press cannot be encoded", &error)),
     };
-    let made = kept(&catalogue.kept, &headers, Document::State(state), make).await;
+    let made = cached(&catalogue.cache, &headers, Document::State(state), make).await;
     made.or_else(|problem| refuse(&app, problem))
 }
 
@@ -89,7 +89,7 @@ async fn map(State(app): Shared, uri: &Uri, headers: &HeaderMap, quantity: Quant
     let of = Arc::clone(&catalogue);
     let make = move || rasterised(&of, state, quantity, output);
     let document = Document::StateMap(state, quantity, output);
-    let made = kept(&catalogue.kept, headers, document, make).await;
+    let made = cached(&catalogue.cache, headers, document, make).await;
     made.or_else(|problem| refuse(&app, problem))
 }
 
@@ -98,7 +98,7 @@ fn rasterised(
     state: usize,
     quantity: Quantity,
     output: Output,
-) -> Result<Fresh, Problem> {
+) -> Result<Content, Problem> {
     let state = &catalogue.replay.states[state];
     let (raster, vertex_values, white) = match quantity {
         Quantity::Pressure => (&catalogue.skin, &state.pressure_pa, "x-pressure-max-pa"),
@@ -113,5 +113,5 @@ fn rasterised(
     let map = Map { quantity, values: &values, value_max: f32::MIN_POSITIVE, source: "fe" };
     let scale = codec::encode(output, map, &mut bytes)?;
     let white = (output == Output::Png).then_some((white, scale));
-    Ok(Fresh { white, is_negotiated: true, ..Fresh::new(output.content_type(), bytes) })
+    Ok(Content { white, is_negotiated: true, ..Content::new(output.content_type(), bytes) })
 }

@@ -1,4 +1,5 @@
-//! `/xr`: the files of a folder, for a page that is built elsewhere (`clients/web`, `npm run build`).
+//! `/xr`: the files of a folder, for a page that is built elsewhere (`clients/web`, `npm run
+//! build`).
 //!
 //! Not in the list of routes: without a folder there is nothing there.
 
@@ -25,7 +26,8 @@ use crate::{
 /// What a folder adds to the routes; none of it asks for a token, as the page does not.
 pub(crate) const PATHS: [&str; 3] = ["/xr", "/xr/", "/xr/{*path}"];
 
-/// The routes that serve `folder`. `ServeDir` refuses paths that lead out of it (`..`, roots, drive names).
+/// The routes that serve `folder`. `ServeDir` refuses paths that lead out of it (`..`, roots, drive
+/// names).
 pub(crate) fn routes(folder: &Path) -> Router<Arc<App>> {
     let files = ServeDir::new(folder);
     let serve = get(move |state: Shared, request: Request| file(files, state, request));

@@ -239,7 +239,7 @@ impl Connection {
             End::Refused(problem, code) => {
                 self.app.metrics.error(problem.code);
                 let error = SessionError::new(problem::bounded(problem.clone()), None, true);
-                self.reply.say(&ServerMessage::Error(error));
+                self.reply.send_message(&ServerMessage::Error(error));
                 (*code, problem.code.as_str())
             }
         };

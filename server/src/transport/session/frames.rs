@@ -50,7 +50,7 @@ pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> 
                 session.take(connection, &frame, received, draining);
             }
             Ok(Event::Text(_)) if draining => {
-                connection.reply.complain(problem::shutting_down(), None);
+                connection.reply.send_error(problem::shutting_down(), None);
             }
             Ok(Event::Text(text)) => session.renew(connection, &text).await,
         }
@@ -64,9 +64,9 @@ impl Session {
             Ok((terms, ready)) => {
                 self.fresh = Freshness::new(terms.stale_after_us);
                 self.terms = terms;
-                connection.reply.say(&ServerMessage::Ready(ready));
+                connection.reply.send_message(&ServerMessage::Ready(ready));
             }
-            Err(problem) => connection.reply.complain(problem, None),
+            Err(problem) => connection.reply.send_error(problem, None),
         }
     }
 
@@ -83,11 +83,11 @@ impl Session {
         let is_new = header.extension.is_some();
         if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
             metrics.of(Transport::Session).stale.inc();
-            return reply.short(&header, job.tier, FrameStatus::Stale, received);
+            return reply.send_status(&header, job.tier, FrameStatus::Stale, received);
         }
         if job.is_late() {
             metrics.late(Transport::Session, Stage::Admission);
-            return reply.short(&header, job.tier, FrameStatus::Late, received);
+            return reply.send_status(&header, job.tier, FrameStatus::Late, received);
         }
         reply.begin();
         match connection.app.pool.submit(&self.slot, job) {
@@ -95,7 +95,7 @@ impl Session {
             Ok(Some(Job { tier, received, options: JobOptions { header, .. }, .. })) => {
                 if let Some(header) = header {
                     metrics.of(Transport::Session).superseded.inc();
-                    reply.short(&header, tier, FrameStatus::Superseded, received);
+                    reply.send_status(&header, tier, FrameStatus::Superseded, received);
                 }
                 reply.finish();
             }

@@ -21,12 +21,12 @@ const ATTEMPTS: usize = 8;
 
 /// Waits for a hello that can be met, and answers ready.
 pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Terms, End> {
-    let patience = connection.app.timeouts.io;
-    let result = timeout(patience, async {
+    let wait_max = connection.app.timeouts.io;
+    let result = timeout(wait_max, async {
         for _ in 0..ATTEMPTS {
             match attempt(connection).await? {
                 Ok(agreed) => return Ok(agreed),
-                Err(problem) => connection.reply.complain(problem, None),
+                Err(problem) => connection.reply.send_error(problem, None),
             }
         }
         let message = format!("{ATTEMPTS} messages and no hello that can be met");
@@ -35,13 +35,13 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
     let (terms, hello) = match result.await {
         Ok(agreed) => agreed?,
         Err(_) => {
-            let message = format!("no hello within {patience:?}");
+            let message = format!("no hello within {wait_max:?}");
             return Err(End::Refused(Problem::new(ErrorCode::Timeout, message), close::POLICY));
         }
     };
     let ready = ready(&connection.app, number, &terms);
     tracing::debug!(session = number, ?hello, tier = %ready.tier, "session ready");
-    connection.reply.say(&ServerMessage::Ready(ready));
+    connection.reply.send_message(&ServerMessage::Ready(ready));
     Ok(terms)
 }
 

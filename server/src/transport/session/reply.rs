@@ -1,4 +1,5 @@
-//! Answers of a session: made and sent by the thread that rendered, or by the task if there was nothing to render.
+//! Answers of a session: made and sent by the thread that rendered, or by the task if there was
+//! nothing to render.
 
 use std::{
     sync::{
@@ -75,7 +76,7 @@ impl Reply {
     }
 
     /// Sends a JSON message.
-    pub(super) fn say(&self, message: &ServerMessage) {
+    pub(super) fn send_message(&self, message: &ServerMessage) {
         match serde_json::to_string(message) {
             Ok(text) => self.out.send(&wire::frame(opcode::TEXT, text.as_bytes())),
             Err(error) => tracing::error!(%error, "a message cannot be encoded"),
@@ -83,20 +84,20 @@ impl Reply {
     }
 
     /// Tells the client of an error the session survives.
-    pub(super) fn complain(&self, problem: Problem, sequence: Option<u32>) {
+    pub(super) fn send_error(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.error(problem.code);
         let problem = problem::bounded(problem);
-        self.say(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
+        self.send_message(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
     }
 
     /// Refuses a frame.
     pub(super) fn refuse(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.of(Transport::Session).error.inc();
-        self.complain(problem, sequence);
+        self.send_error(problem, sequence);
     }
 
     /// Answers with a header alone.
-    pub(super) fn short(
+    pub(super) fn send_status(
         &self,
         header: &FrameHeader,
         tier: usize,
@@ -125,7 +126,7 @@ impl Reply {
             outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
                 let stage = if let Outcome::Late(stage) = outcome { stage } else { Stage::Sending };
                 self.app.metrics.late(Transport::Session, stage);
-                return self.short(&header, done.tier, FrameStatus::Late, done.received);
+                return self.send_status(&header, done.tier, FrameStatus::Late, done.received);
             }
             Outcome::Failed(problem) => return self.refuse(problem, Some(header.sequence)),
             Outcome::Gone => {

@@ -3,11 +3,16 @@
 //! Bytes are read straight into a buffer of the session, freed of their mask while the rest of the
 //! frame is still on its way, and handed on without a copy. Nothing here waits or reads by itself.
 
+mod outgoing;
+
 use std::{mem, ops::Range};
 
 use bytes::{Buf, Bytes, BytesMut};
 
+pub(super) use self::outgoing::{OUT_HEAD_MAX, frame, out_head};
 use crate::core::buffers::{Frames, HEADROOM, Store};
+
+const _: () = assert!(HEAD_MAX <= HEADROOM && OUT_HEAD_MAX <= HEADROOM);
 
 /// Largest message read, bytes. Five times a frame, so that a frame that is too long is read,
 /// refused and survived; beyond this the connection is closed.
@@ -285,35 +290,6 @@ fn unmask(bytes: &mut [u8], mut mask: [u8; 4], offset: usize) {
         *word = (u32::from_ne_bytes(*word) ^ key).to_ne_bytes();
     }
     rest.iter_mut().zip(mask).for_each(|(byte, mask)| *byte ^= mask);
-}
-
-/// Most bytes of the head of a server's frame.
-pub(super) const OUT_HEAD_MAX: usize = 10;
-
-const _: () = assert!(HEAD_MAX <= HEADROOM && OUT_HEAD_MAX <= HEADROOM);
-
-/// The head of a server's frame, whole and unmasked, at the end of the array, and its length.
-pub(super) fn out_head(opcode: u8, payload_len: usize) -> ([u8; OUT_HEAD_MAX], usize) {
-    let mut head = [0; OUT_HEAD_MAX];
-    let length = (payload_len as u64).to_be_bytes();
-    let (short, extra) = match payload_len {
-        0..=125 => (payload_len as u8, 0),
-        126..=0xffff => (126, 2),
-        _ => (127, 8),
-    };
-    head[OUT_HEAD_MAX - extra..].copy_from_slice(&length[8 - extra..]);
-    head[OUT_HEAD_MAX - extra - 1] = short;
-    head[OUT_HEAD_MAX - extra - 2] = 0x80 | opcode;
-    (head, 2 + extra)
-}
-
-/// A server's frame of its own memory.
-pub(super) fn frame(opcode: u8, payload: &[u8]) -> Bytes {
-    let (head, len) = out_head(opcode, payload.len());
-    let mut frame = BytesMut::with_capacity(len + payload.len());
-    frame.extend_from_slice(&head[OUT_HEAD_MAX - len..]);
-    frame.extend_from_slice(payload);
-    frame.freeze()
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use papilla_engine::card::Index;
 
 use super::{
     Files,
-    apart::{Apart, STRANDED_MAX, apart},
+    detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
 
@@ -23,7 +23,7 @@ const FILE_BYTES_MAX: u64 = 256 << 20;
 /// Most bytes of all files that are read.
 const FOLDER_BYTES_MAX: u64 = 1 << 30;
 /// Longest time for reading the folder.
-const PATIENCE: Duration = Duration::from_secs(20);
+const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
 const BASE: [&str; 4] = ["index.json", "atlas.json", "replay.json", "ladder.json"];
@@ -43,11 +43,11 @@ pub(super) fn read(
     let reading = move || {
         Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() }.read()
     };
-    match apart(reading, PATIENCE, is_to_stop) {
+    match detached(reading, WAIT_MAX, is_to_stop) {
         Ok(result) => result.map(Some),
-        Err(Apart::Stopped) => Ok(None),
-        Err(Apart::Late) => {
-            let seconds = PATIENCE.as_secs();
+        Err(Unfinished::Stopped) => Ok(None),
+        Err(Unfinished::Late) => {
+            let seconds = WAIT_MAX.as_secs();
             match at.lock().unwrap_or_else(PoisonError::into_inner).take() {
                 Some(file) => {
                     let reason = format!("it could not be read within {seconds} s");
@@ -56,11 +56,11 @@ pub(super) fn read(
                 None => Err(unreadable(io::Error::other(format!("no answer within {seconds} s")))),
             }
         }
-        Err(Apart::Stranded) => {
+        Err(Unfinished::Stranded) => {
             let message = format!("{STRANDED_MAX} earlier readings hang still");
             Err(unreadable(io::Error::other(message)))
         }
-        Err(Apart::Broken(source)) => Err(unreadable(source)),
+        Err(Unfinished::Broken(source)) => Err(unreadable(source)),
     }
 }
 

@@ -16,26 +16,26 @@ use papilla_proto::{
 use crate::{
     codec,
     core::{
+        cache::Content,
         catalogue::{Catalogue, Document},
-        kept::Fresh,
     },
     problem,
     transport::{
-        answer::{Answer, Shared, kept, refuse},
+        answer::{Answer, Shared, cached, refuse},
         app::App,
     },
 };
 
 pub(crate) async fn json(State(app): Shared, headers: HeaderMap) -> Answer {
     serve(&app, &headers, Document::Atlas, |catalogue| {
-        Ok(Fresh::new("application/json", catalogue.atlas_json.clone()))
+        Ok(Content::new("application/json", catalogue.atlas_json.clone()))
     })
     .await
 }
 
 pub(crate) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
     serve(&app, &headers, Document::AtlasObj, |catalogue| {
-        Ok(Fresh::new("model/obj", catalogue.atlas.to_obj()))
+        Ok(Content::new("model/obj", catalogue.atlas.to_obj()))
     })
     .await
 }
@@ -44,7 +44,7 @@ pub(crate) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
 pub(crate) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
     serve(&app, &headers, Document::AtlasGlb, |catalogue| {
         let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
-        Ok(Fresh::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
+        Ok(Content::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
     })
     .await
 }
@@ -64,7 +64,7 @@ pub(crate) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
             Patch::Skin => &catalogue.skin,
             Patch::Interface => &catalogue.interface,
         };
-        Ok(Fresh::new("image/png", png(raster)?))
+        Ok(Content::new("image/png", png(raster)?))
     })
     .await
 }
@@ -80,10 +80,10 @@ async fn serve(
     app: &App,
     headers: &HeaderMap,
     document: Document,
-    make: impl FnOnce(&Catalogue) -> Result<Fresh, Problem> + Send + 'static,
+    make: impl FnOnce(&Catalogue) -> Result<Content, Problem> + Send + 'static,
 ) -> Answer {
     let catalogue = app.catalogue();
     let of = Arc::clone(&catalogue);
-    let made = kept(&catalogue.kept, headers, document, move || make(&of)).await;
+    let made = cached(&catalogue.cache, headers, document, move || make(&of)).await;
     made.or_else(|problem| refuse(app, problem))
 }

@@ -1,5 +1,5 @@
-//! Work that may never end, such as reading from a drive that does not answer: on a thread of its own,
-//! which it may keep.
+//! Work that may never end, such as reading from a drive that does not answer: on a thread of its
+//! own, which it may keep.
 
 use std::{
     io,
@@ -18,9 +18,9 @@ const LOOK_AROUND: Duration = Duration::from_millis(50);
 /// Most readings that have been given up and hang still; then there are no more.
 pub(super) const STRANDED_MAX: usize = 4;
 
-/// Why work apart came to nothing.
+/// Why there is no result.
 #[derive(Debug)]
-pub(super) enum Apart {
+pub(super) enum Unfinished {
     /// It was to stop.
     Stopped,
     /// It took too long.
@@ -34,15 +34,15 @@ pub(super) enum Apart {
 /// Readings that were given up and hang still.
 static STRANDED: AtomicUsize = AtomicUsize::new(0);
 
-/// Does `work` on a thread of its own and waits for it, but not beyond `patience` or once it is to
+/// Does `work` on a thread of its own and waits for it, but not beyond `wait_max` or once it is to
 /// stop. What is given up then goes on by itself; the end of the process does not wait for it.
-pub(super) fn apart<T: Send + 'static>(
+pub(super) fn detached<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
-    patience: Duration,
+    wait_max: Duration,
     is_to_stop: &dyn Fn() -> bool,
-) -> Result<T, Apart> {
+) -> Result<T, Unfinished> {
     if STRANDED.load(Ordering::Relaxed) >= STRANDED_MAX {
-        return Err(Apart::Stranded);
+        return Err(Unfinished::Stranded);
     }
     let (done, result) = mpsc::sync_channel(1);
     let over = Arc::new(AtomicBool::new(false));
@@ -53,15 +53,17 @@ pub(super) fn apart<T: Send + 'static>(
         // Err: nobody waits any more.
         let _ = done.send(work());
     });
-    thread.map_err(Apart::Broken)?;
+    thread.map_err(Unfinished::Broken)?;
     let fault = loop {
         match result.recv_timeout(LOOK_AROUND) {
             Ok(value) => return Ok(value),
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(Apart::Broken(io::Error::other("the reading panicked")));
+                return Err(Unfinished::Broken(io::Error::other("the reading panicked")));
             }
-            Err(RecvTimeoutError::Timeout) if is_to_stop() => break Apart::Stopped,
-            Err(RecvTimeoutError::Timeout) if begun.elapsed() >= patience => break Apart::Late,
+            Err(RecvTimeoutError::Timeout) if is_to_stop() => break Unfinished::Stopped,
+            Err(RecvTimeoutError::Timeout) if begun.elapsed() >= wait_max => {
+                break Unfinished::Late;
+            }
             Err(RecvTimeoutError::Timeout) => {}
         }
     };
@@ -91,14 +93,14 @@ fn take_off(over: &AtomicBool) {
 mod tests {
     use super::*;
 
-    const PATIENCE: Duration = Duration::from_secs(60);
+    const WAIT_MAX: Duration = Duration::from_secs(60);
 
     #[test]
     fn what_never_ends_is_given_up_and_blocks_what_comes_later_only_in_numbers() {
         let never = || false;
-        assert_eq!(apart(|| 7, PATIENCE, &never).unwrap(), 7);
-        let panicked = apart(|| assert_eq!(1, 2), PATIENCE, &never);
-        assert!(matches!(panicked, Err(Apart::Broken(_))), "{panicked:?}");
+        assert_eq!(detached(|| 7, WAIT_MAX, &never).unwrap(), 7);
+        let panicked = detached(|| assert_eq!(1, 2), WAIT_MAX, &never);
+        assert!(matches!(panicked, Err(Unfinished::Broken(_))), "{panicked:?}");
         let mut held = Vec::new();
         for turn in 0..STRANDED_MAX {
             let (end, ended) = mpsc::channel::<()>();
@@ -106,23 +108,23 @@ mod tests {
                 let _ = ended.recv();
             };
             let fault = if turn == 0 {
-                apart(work, PATIENCE, &|| true)
+                detached(work, WAIT_MAX, &|| true)
             } else {
-                apart(work, Duration::ZERO, &never)
+                detached(work, Duration::ZERO, &never)
             };
             let due = if turn == 0 { "Stopped" } else { "Late" };
             assert_eq!(format!("{:?}", fault.unwrap_err()), due);
             if turn + 1 < STRANDED_MAX {
-                assert_eq!(apart(|| 7, PATIENCE, &never).unwrap(), 7, "a later one is blocked");
+                assert_eq!(detached(|| 7, WAIT_MAX, &never).unwrap(), 7, "a later one is blocked");
             }
             held.push(end);
         }
-        let refused = apart(|| 7, PATIENCE, &never);
-        assert!(matches!(refused, Err(Apart::Stranded)), "{refused:?}");
+        let refused = detached(|| 7, WAIT_MAX, &never);
+        assert!(matches!(refused, Err(Unfinished::Stranded)), "{refused:?}");
         // The drive answers at last.
         drop(held);
         let begun = Instant::now();
-        while apart(|| 7, PATIENCE, &never).is_err() {
+        while detached(|| 7, WAIT_MAX, &never).is_err() {
             assert!(begun.elapsed() < Duration::from_secs(60), "they are counted for ever");
             thread::sleep(Duration::from_millis(5));
         }

@@ -16,7 +16,7 @@ const PAUSE: Duration = Duration::from_secs(10);
 const ROUNDS: usize = 3;
 
 /// Measures one tier after the other, each time while nobody is served, until the drain begins.
-pub(super) async fn measure(app: Arc<App>) {
+pub(super) async fn until_drain(app: Arc<App>) {
     for _ in 0..ROUNDS {
         let mut place = 0;
         while place < app.catalogue().tiers.len() {
@@ -30,7 +30,7 @@ pub(super) async fn measure(app: Arc<App>) {
                 continue;
             }
             let catalogue = app.catalogue();
-            let measured = spawn_blocking(move || calibrate::again(&catalogue.tiers[place]));
+            let measured = spawn_blocking(move || calibrate::remeasure(&catalogue.tiers[place]));
             if let Ok(Err(error)) = measured.await {
                 tracing::warn!(%error, "a tier cannot be measured again");
             }

@@ -1,4 +1,4 @@
-//! The HTTP form of an answer that is kept: compressed for who takes that, and 304 for who has it.
+//! The HTTP form of an answer from the cache: compressed, or 304, where the client takes that.
 
 use std::hash::Hash;
 
@@ -11,7 +11,7 @@ use papilla_proto::Problem;
 
 use super::answer;
 use crate::{
-    core::kept::{Fresh, Kept, Made},
+    core::cache::{Cache, Cached, Content},
     transport::negotiate,
 };
 
@@ -19,21 +19,21 @@ use crate::{
 ///
 /// # Errors
 /// Those of `make`; the next one who asks has it made anew.
-pub(crate) async fn kept<K: Eq + Hash>(
-    kept: &Kept<K>,
+pub(crate) async fn cached<K: Eq + Hash>(
+    cache: &Cache<K>,
     headers: &HeaderMap,
     key: K,
-    make: impl FnOnce() -> Result<Fresh, Problem> + Send + 'static,
+    make: impl FnOnce() -> Result<Content, Problem> + Send + 'static,
 ) -> Result<Response, Problem> {
-    Ok(respond(&*kept.get(key, make).await?, headers))
+    Ok(respond(&*cache.get(key, make).await?, headers))
 }
 
 /// An answer the client may keep, but must ask about: 304 if it has these bytes.
-fn respond(made: &Made, headers: &HeaderMap) -> Response {
-    let packed = made.packed.as_ref().filter(|_| negotiate::takes_gzip(headers));
-    let tag = match packed {
-        Some(_) => format!("\"{}-gzip\"", made.tag),
-        None => format!("\"{}\"", made.tag),
+fn respond(cached: &Cached, headers: &HeaderMap) -> Response {
+    let gzip = cached.gzip.as_ref().filter(|_| negotiate::takes_gzip(headers));
+    let tag = match gzip {
+        Some(_) => format!("\"{}-gzip\"", cached.tag),
+        None => format!("\"{}\"", cached.tag),
     };
     let asked = headers.get(header::IF_NONE_MATCH).and_then(|value| value.to_str().ok());
     let mut response = if asked.is_some_and(|asked| names(asked, &tag)) {
@@ -41,19 +41,20 @@ fn respond(made: &Made, headers: &HeaderMap) -> Response {
         *response.status_mut() = StatusCode::NOT_MODIFIED;
         response
     } else {
-        answer(made.fresh.content_type, packed.unwrap_or(&made.fresh.bytes).clone())
+        answer(cached.content.content_type, gzip.unwrap_or(&cached.content.bytes).clone())
     };
     let has_body = response.status() == StatusCode::OK;
     let headers = response.headers_mut();
     if let Ok(tag) = HeaderValue::from_str(&tag) {
         headers.insert(header::ETAG, tag);
     }
-    if packed.is_some() && has_body {
+    if gzip.is_some() && has_body {
         headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
     }
-    let vary = if made.fresh.is_negotiated { "accept, accept-encoding" } else { "accept-encoding" };
+    let vary =
+        if cached.content.is_negotiated { "accept, accept-encoding" } else { "accept-encoding" };
     headers.insert(header::VARY, HeaderValue::from_static(vary));
-    if let Some((name, white)) = made.fresh.white
+    if let Some((name, white)) = cached.content.white
         && let Ok(white) = HeaderValue::from_str(&white.to_string())
     {
         headers.insert(name, white);
