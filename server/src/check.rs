@@ -6,8 +6,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::{
-    StartError, assets::Assets, config::Config, gate::Gate, golden, models::Catalogue, net, speed,
-    tls,
+    StartError,
+    config::Config,
+    core::catalogue::{Catalogue, assets::Assets, calibrate, golden},
+    transport::{gate::Gate, net, tls},
 };
 
 /// Bytes one connection, one session, its effects and one posted map can hold at most; see
@@ -113,7 +115,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     let vertices = catalogue.atlas.vertex_count();
     report.good("atlas", format!("{vertices} vertices, {hash}"), json!({"hash": hash}));
     let start = Instant::now();
-    let measured = speed::calibrate(catalogue, config.calibration());
+    let measured = calibrate::calibrate(catalogue, config.calibration());
     if let Err(error) = &measured {
         report.bad("calibration", error.exit_code(), error);
     } else if config.calibration().is_zero() {
@@ -141,7 +143,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             || "no golden answers".to_owned(),
             |golden| {
                 let (error, most) = (golden.relative_l2, golden.relative_l2_max);
-                format!("{} golden answers within {error:.3} of {most:.3}", golden.presses)
+                format!("{} golden answers within {error:.3} of {most:.3}", golden.states)
             },
         );
         let is_default = index == catalogue.default;
@@ -152,7 +154,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             "onnx_sha256": tier.model.info().onnx_sha256,
             "atlas_hash": tier.atlas_hash,
             "golden": golden,
-            "calibrated_us": tier.speed.calibrated_us(),
+            "calibrated_us": tier.latency.calibrated_us(),
             "predicted_latency_us": predicted_us,
         });
         report.good(&what, format!("{predicted_us} us, {answers}{default}"), values);

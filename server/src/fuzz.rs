@@ -9,8 +9,10 @@ use papilla_proto::{MAP_LEN, Problem, SampleType};
 
 use crate::{
     codec::{self, Input, Map, Output, Quantity},
-    negotiate::{self, Query},
-    oip::fuzz::read as read_oip,
+    transport::{
+        negotiate::{self, Query},
+        oip::fuzz::read as read_oip,
+    },
 };
 
 /// Full white of the images, Pa.

@@ -2,49 +2,36 @@
 //! maps out, inside a latency budget.
 //!
 //! ```text
-//! net ──► http ──┐                        ┌── worker (own sessions, own buffers)
-//!    └──► session ─► slot (latest wins) ─► queue ─┼── worker
-//!                                                 └── worker
+//! transport: net ─► front ─► routes ─┬─► http, oip ─┐
+//!                                    └─► session ───┴─► slot (latest wins)
+//! core:      scheduler: slot ─► queue ─► thread (own engine sessions, own buffers) ─► answer
+//! codec:     samples, npy, PNG, JSON
 //! ```
 //!
-//! **Invariant:** tokio only moves bytes; decoding, inference and encoding run on the pool's
-//! own threads. It does so on threads of the service's own (`runtime`), so that whoever
-//! starts and drains it is not starved by clients. **Invariant:** every queue is bounded and every wait is timed.
-//! **Invariant:** a frame that was accepted is answered exactly once.
+//! Each layer knows those below it alone, and no module imports another in a circle.
+//!
+//! **Invariant:** tokio only moves bytes, on threads of the service's own (`runtime`): clients
+//! cannot starve the task that starts and drains it. Decoding, inference and encoding run on the
+//! pool's threads. **Invariant:** every queue is bounded and every wait is timed. **Invariant:** a
+//! frame that was accepted is answered exactly once.
 //!
 //! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
 
-mod app;
-mod assets;
-mod bucket;
 mod check;
 mod codec;
 mod config;
-mod effects;
+mod core;
+mod drain;
 mod error;
-mod front;
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]
 pub mod fuzz;
-mod gate;
-mod golden;
-mod http;
-mod metrics;
-mod models;
-mod negotiate;
-mod net;
-mod oip;
-mod pool;
 mod problem;
 mod progress;
-mod reload;
-mod replay;
 mod runtime;
-mod session;
-mod speed;
 mod start;
 mod telemetry;
-mod tls;
+mod transport;
 
 use std::{net::SocketAddr, sync::Arc, time::Duration};
 
@@ -59,15 +46,17 @@ use tokio::{
 };
 
 use crate::{
-    app::App,
-    front::Front,
-    gate::Gate,
-    metrics::Metrics,
-    net::{Line, Places},
-    pool::Pool,
+    core::{metrics::Metrics, scheduler::Pool},
     progress::Progress,
     runtime::IoRuntime,
     start::Opened,
+    transport::{
+        app::App,
+        front::Front,
+        gate::{Gate, Places},
+        net::{self, ConnectionContext},
+        tls,
+    },
 };
 
 /// A service that listens, and loads its models.
@@ -115,9 +104,9 @@ impl Drop for EndOnDrop {
 
 /// Listens, and begins to load the models.
 ///
-/// From here on connections are taken: `/healthz` answers, `/readyz` says how far the start has come,
-/// and other requests wait for the models, no longer than a client may take (`io_timeout_s`). Must be
-/// called within a tokio runtime.
+/// From here on connections are taken: `/healthz` answers, `/readyz` says how far the start has
+/// come, and other requests wait for the models, no longer than a client may take (`io_timeout_s`).
+/// Must be called within a tokio runtime.
 ///
 /// # Errors
 /// Settings do not go together, or the address cannot be bound; each says what to do.
@@ -150,9 +139,9 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
         drain: Arc::clone(&drain),
     };
     opening.spawn_on(start::open(parts), io.handle());
-    let line = Line { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
+    let context = ConnectionContext { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
     let places = Places::new(config.max_connections.get(), config.tokens.is_some());
-    let accepting = io.handle().spawn(net::serve(listener, line, places));
+    let accepting = io.handle().spawn(net::serve(listener, context, places));
     Ok(Starting {
         address,
         drain: EndOnDrop(drain),
@@ -231,7 +220,7 @@ impl Server {
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
-        self.io.handle().spawn(reload::once(Arc::clone(&self.app)));
+        self.io.handle().spawn(core::reload::once(Arc::clone(&self.app.reloader)));
     }
 
     /// Ends the service: takes nothing new, answers every accepted frame, tells
@@ -263,5 +252,5 @@ impl Server {
 /// Method (lower case) and path of every HTTP route, as the OpenAPI document writes them.
 #[must_use]
 pub fn routes() -> Vec<(String, String)> {
-    http::route_list()
+    transport::routes::list()
 }

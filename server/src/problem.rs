@@ -1,28 +1,6 @@
-//! Every refusal as one typed JSON answer: `{"error": {code, message, field}}`.
+//! The refusals of the service, whatever carries them: typed, in words of bounded length.
 
-use axum::{
-    body::Body,
-    http::{HeaderMap, HeaderValue, StatusCode, header},
-    response::{IntoResponse, Response},
-};
 use papilla_proto::{ErrorCode, FrameError, MapError, Problem, SampleError, error::shortened};
-use serde::Serialize;
-
-/// A problem on its way to an HTTP client.
-#[derive(Debug)]
-pub(crate) struct HttpProblem(pub(crate) Problem);
-
-/// The shape of an HTTP error body.
-#[derive(Serialize)]
-struct ErrorBody<'a> {
-    error: &'a Problem,
-}
-
-impl<T: Into<Problem>> From<T> for HttpProblem {
-    fn from(problem: T) -> Self {
-        Self(problem.into())
-    }
-}
 
 /// Most characters of a message.
 const MESSAGE_MAX: usize = 1000;
@@ -37,48 +15,6 @@ pub(crate) fn bounded(mut problem: Problem) -> Problem {
     }
     problem.field = problem.field.map(|field| shortened(&field));
     problem
-}
-
-impl IntoResponse for HttpProblem {
-    fn into_response(self) -> Response {
-        let problem = bounded(self.0);
-        let status = StatusCode::from_u16(problem.code.http_status())
-            .unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-        let body = serde_json::to_vec(&ErrorBody { error: &problem }).unwrap_or_default();
-        let mut response = Response::new(Body::from(body));
-        *response.status_mut() = status;
-        let headers = response.headers_mut();
-        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/json"));
-        headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
-        label(headers, problem.code, problem.field.as_deref());
-        response
-    }
-}
-
-/// The field of a body that is compressed.
-pub(crate) const CODING: &str = "content-encoding";
-
-/// What clients are told of a refusal beside its body.
-pub(crate) fn label(headers: &mut HeaderMap, code: ErrorCode, field: Option<&str>) {
-    match code {
-        ErrorCode::WrongType if field == Some(CODING) => {
-            // RFC 9110 12.5.3: what would be taken.
-            headers.insert(header::ACCEPT_ENCODING, HeaderValue::from_static("identity"));
-        }
-        ErrorCode::Overloaded | ErrorCode::ShuttingDown | ErrorCode::RateLimited => {
-            headers.insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
-        }
-        ErrorCode::Unauthorized => {
-            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
-        }
-        ErrorCode::UpgradeRequired => {
-            // RFC 9110 15.5.22 and RFC 6455 4.4: to what, and in which version.
-            headers.insert(header::CONNECTION, HeaderValue::from_static("upgrade"));
-            headers.insert(header::UPGRADE, HeaderValue::from_static("websocket"));
-            headers.insert(header::SEC_WEBSOCKET_VERSION, HeaderValue::from_static("13"));
-        }
-        _ => {}
-    }
 }
 
 /// The problem a frame header makes.

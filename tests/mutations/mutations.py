@@ -55,10 +55,10 @@ MUTATIONS = [
     ),
     Mutation(
         "a frame that came while another was rendered is lost",
-        "server/src/pool/slot.rs",
+        "server/src/core/scheduler/slot.rs",
         "state.scheduled = state.waiting.is_some();\n        state.scheduled",
         "state.scheduled = false;\n        state.scheduled",
-        rust("--lib", "pool::"),
+        rust("--lib", "scheduler::"),
     ),
     Mutation(
         "windows one row too low",

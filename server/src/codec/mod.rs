@@ -7,7 +7,7 @@ mod png;
 use std::fmt::Display;
 
 use bytes::{BufMut, BytesMut};
-use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType};
+use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType, Window};
 
 pub(crate) use npy::is_npy;
 pub(crate) use png::{encode_mask, is_png};
@@ -19,6 +19,15 @@ use crate::problem;
 pub(crate) enum Input {
     /// Bare samples; `scale` in Pa per unit for u16 and u8.
     Samples {
+        /// Type of each sample.
+        sample_type: SampleType,
+        /// Pa per unit.
+        scale: f32,
+    },
+    /// Bare samples of a part of the map; the rest is zero.
+    Window {
+        /// Where they belong.
+        window: Window,
         /// Type of each sample.
         sample_type: SampleType,
         /// Pa per unit.
@@ -78,6 +87,9 @@ pub(crate) fn decode(input: Input, bytes: &[u8], pressure_pa: &mut [f32]) -> Res
     match input {
         Input::Samples { sample_type, scale } => {
             sample_type.decode(bytes, scale, pressure_pa).map_err(problem::of_samples)
+        }
+        Input::Window { window, sample_type, scale } => {
+            window.decode(sample_type, bytes, scale, pressure_pa).map_err(problem::of_samples)
         }
         Input::Npy => npy::decode(bytes, pressure_pa),
         Input::Png { pressure_max_pa } => png::decode(bytes, pressure_max_pa, pressure_pa),

@@ -1,7 +1,7 @@
 //! From settings to a service that renders, behind a port that is open already: load, warm, serve,
 //! measure.
 
-mod again;
+mod remeasure;
 
 use std::{sync::Arc, thread};
 
@@ -9,17 +9,15 @@ use tokio::sync::{oneshot, watch};
 
 use crate::{
     SettingError, StartError,
-    app::App,
-    assets::Assets,
     config::Config,
-    front::Front,
-    gate::Gate,
-    http,
-    metrics::Metrics,
-    models::{Catalogue, Step},
-    pool::Pool,
+    core::{
+        catalogue::{Catalogue, Step, assets::Assets, calibrate},
+        metrics::Metrics,
+        reload,
+        scheduler::Pool,
+    },
     progress::{Progress, Stage},
-    reload, speed,
+    transport::{app::App, front::Front, gate::Gate, routes},
 };
 
 /// What there is before the models are.
@@ -78,16 +76,16 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let app = App::new(&config, catalogue, metrics, &pool, gate, drain, Arc::clone(&progress));
     let app = Arc::new(app);
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
-        reload::watch(Arc::clone(&app), folder).map_err(|error| {
+        reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {
             let reason = format!("{} cannot be watched: {error}", folder.display());
             SettingError { field: "watch_models", reason }
         })?;
     }
-    front.open(http::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref()));
+    front.open(routes::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref()));
     measuring.await.map_err(|_| StartError::WorkerPanicked)??;
     progress.enter(Stage::Ready, Vec::new());
     if !config.calibration().is_zero() {
-        tokio::spawn(again::measure(Arc::clone(&app)));
+        tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
     Ok(Opened { app, pool, tiers, default_tier })
 }
@@ -105,7 +103,7 @@ fn load(
     })?;
     let catalogue = Arc::new(catalogue);
     progress.enter(Stage::Warming, Vec::new());
-    metrics.name_tiers(&catalogue);
+    metrics.name_tiers(catalogue.tier_labels());
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() + config.max_requests.get();
     let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
@@ -117,5 +115,5 @@ fn load(
 fn measure(config: &Config, catalogue: &Catalogue, progress: &Progress) -> Result<(), StartError> {
     let names = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     progress.enter(Stage::Calibrating, names);
-    speed::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
+    calibrate::calibrate_noting(catalogue, config.calibration(), &mut |tier| progress.done(tier))
 }

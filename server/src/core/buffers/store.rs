@@ -1,0 +1,125 @@
+//! Memory of sessions that are over, for those to come.
+//!
+//! Given back to the allocator, the buffers of a session would lie in the arena of whichever thread
+//! opened it; each arena then grows to all sessions that thread ever had at once. Kept here, they
+//! are never more than the sessions that were open at the same time.
+
+use std::{
+    mem,
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use papilla_proto::{HEADER_LEN_V2, MAP_LEN};
+
+use super::{HEADROOM, Recycler};
+
+/// Buffers of frames: one that is read into, one with a thread, one in the slot, one that gives
+/// way to it.
+pub(crate) type Frames = Recycler<4>;
+
+/// Buffers of answers.
+pub(crate) type Answers = Recycler;
+
+/// Room of every buffer, bytes: that of a whole float32 map with the heads around it, so that any
+/// session can use it.
+/// What a session does not touch the system does not provide.
+const ROOM: usize = 2 * HEADROOM + HEADER_LEN_V2 + 4 * MAP_LEN;
+
+/// The buffers that nobody uses.
+#[derive(Debug)]
+pub(crate) struct Store {
+    kept: Mutex<Kept>,
+    /// Most of each kind: one for every session there may be.
+    places: usize,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    frames: Vec<Frames>,
+    answers: Vec<Answers>,
+}
+
+impl Store {
+    /// An empty store for the buffers of at most `places` sessions.
+    pub(crate) fn new(places: usize) -> Self {
+        Self { kept: Mutex::default(), places }
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        // Every change below leaves the lists whole, so a poisoned lock is usable.
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Buffers for frames of at most `bytes`.
+    pub(crate) fn frames(&self, bytes: usize) -> Frames {
+        let mut frames = self.kept().frames.pop().unwrap_or_default();
+        frames.make_room(bytes.max(ROOM));
+        frames
+    }
+
+    /// Buffers for answers of at most `bytes`.
+    pub(crate) fn answers(&self, bytes: usize) -> Answers {
+        let mut answers = self.kept().answers.pop().unwrap_or_default();
+        answers.make_room(bytes.max(ROOM));
+        answers
+    }
+
+    /// Takes buffers back.
+    pub(crate) fn keep_frames(&self, frames: &mut Frames) {
+        keep(&mut self.kept().frames, frames, self.places);
+    }
+
+    /// Takes buffers back.
+    pub(crate) fn keep_answers(&self, answers: &mut Answers) {
+        keep(&mut self.kept().answers, answers, self.places);
+    }
+}
+
+fn keep<const N: usize>(kept: &mut Vec<Recycler<N>>, back: &mut Recycler<N>, places: usize) {
+    // Buffers that never had room are those of a session that came to nothing.
+    if back.has_room() && kept.len() < places {
+        kept.push(mem::take(back));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    /// Where the buffers of `sessions` lie that are open at the same time.
+    fn places(store: &Store, sessions: usize) -> HashSet<usize> {
+        let mut open: Vec<_> =
+            (0..sessions).map(|_| (store.frames(100), store.answers(300_000))).collect();
+        let mut places = HashSet::new();
+        for (frames, answers) in &mut open {
+            places.extend((0..4).map(|_| frames.lend(100).as_ptr() as usize));
+            places.extend((0..3).map(|_| answers.claim(300_000).as_ptr() as usize));
+        }
+        for (mut frames, mut answers) in open {
+            store.keep_frames(&mut frames);
+            store.keep_answers(&mut answers);
+        }
+        places
+    }
+
+    #[test]
+    fn sessions_to_come_use_the_memory_of_those_that_are_over() {
+        let store = Store::new(5);
+        let first = places(&store, 5);
+        assert_eq!(first.len(), 35);
+        for sessions in [1, 5, 3, 5] {
+            assert!(places(&store, sessions).is_subset(&first), "{sessions} sessions");
+        }
+    }
+
+    #[test]
+    fn no_more_is_kept_than_there_may_be_sessions() {
+        let store = Store::new(2);
+        places(&store, 6);
+        store.keep_frames(&mut Frames::default());
+        let kept = store.kept();
+        assert_eq!((kept.frames.len(), kept.answers.len()), (2, 2));
+    }
+}

@@ -1,0 +1,81 @@
+//! Files the service is made of: embedded in the binary, or read from a folder.
+
+mod detached;
+mod folder;
+
+use std::borrow::Cow;
+
+use crate::{StartError, config::Config};
+
+/// The shipped models, cards, atlas and replay, as they were when the binary was built.
+const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
+
+/// Files by name.
+type Files = Vec<(String, Cow<'static, [u8]>)>;
+
+/// The files of a model folder by name.
+#[derive(Debug)]
+pub(crate) struct Assets {
+    /// Where they are from, for messages.
+    pub(crate) origin: String,
+    /// What to do if one is missing.
+    advice: &'static str,
+    files: Files,
+}
+
+impl Assets {
+    /// The files that `config` names: its folder's, or else those built into the binary.
+    ///
+    /// # Errors
+    /// The folder or one of its files cannot be read.
+    pub(crate) fn of(config: &Config) -> Result<Self, StartError> {
+        // Never stopped, so there always are some.
+        Self::of_unless(config, &|| false).map(|assets| assets.unwrap_or_else(Self::embedded))
+    }
+
+    /// The same, given up once it is to stop: None then.
+    ///
+    /// # Errors
+    /// As [`of`](Self::of).
+    pub(crate) fn of_unless(
+        config: &Config,
+        is_to_stop: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, StartError> {
+        let Some(folder) = &config.models else { return Ok(Some(Self::embedded())) };
+        let files = folder::read(folder, is_to_stop)?;
+        Ok(files.map(|files| Self {
+            origin: folder.display().to_string(),
+            advice: "a folder of models holds index.json, atlas.json, and NAME.onnx and NAME.json \
+                     of every model in the index",
+            files,
+        }))
+    }
+
+    /// The files built into the binary.
+    fn embedded() -> Self {
+        let files = MODELS.iter().map(|&(name, bytes)| (name.to_owned(), Cow::Borrowed(bytes)));
+        Self {
+            origin: "the binary".to_owned(),
+            advice: "build with the shipped files in models/, or name a folder of models with \
+                     --models DIR",
+            files: files.collect(),
+        }
+    }
+
+    /// The bytes of the file called `name`.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn require(&self, name: &str) -> Result<&[u8], StartError> {
+        self.get(name).ok_or_else(|| StartError::Missing {
+            file: name.to_owned(),
+            origin: self.origin.clone(),
+            advice: self.advice,
+        })
+    }
+
+    /// The bytes of the file called `name`.
+    pub(crate) fn get(&self, name: &str) -> Option<&[u8]> {
+        self.files.iter().find(|(n, _)| n == name).map(|(_, bytes)| bytes.as_ref())
+    }
+}

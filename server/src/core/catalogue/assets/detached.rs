@@ -1,0 +1,132 @@
+//! Work that may never end, such as reading from a drive that does not answer: on a thread of its
+//! own, which it may keep.
+
+use std::{
+    io,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+        mpsc::{self, RecvTimeoutError},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+/// How often whoever waits looks whether to go on.
+const LOOK_AROUND: Duration = Duration::from_millis(50);
+
+/// Most readings that have been given up and hang still; then there are no more.
+pub(super) const STRANDED_MAX: usize = 4;
+
+/// Why there is no result.
+#[derive(Debug)]
+pub(super) enum Unfinished {
+    /// It was to stop.
+    Stopped,
+    /// It took too long.
+    Late,
+    /// Too many that were given up hang still.
+    Stranded,
+    /// Its thread could not be started, or panicked.
+    Broken(io::Error),
+}
+
+/// Readings that were given up and hang still.
+static STRANDED: AtomicUsize = AtomicUsize::new(0);
+
+/// Does `work` on a thread of its own and waits for it, but not beyond `wait_max` or once it is to
+/// stop. What is given up then goes on by itself; the end of the process does not wait for it.
+pub(super) fn detached<T: Send + 'static>(
+    work: impl FnOnce() -> T + Send + 'static,
+    wait_max: Duration,
+    is_to_stop: &dyn Fn() -> bool,
+) -> Result<T, Unfinished> {
+    if STRANDED.load(Ordering::Relaxed) >= STRANDED_MAX {
+        return Err(Unfinished::Stranded);
+    }
+    let (done, result) = mpsc::sync_channel(1);
+    let over = Arc::new(AtomicBool::new(false));
+    let end = End(Arc::clone(&over));
+    let begun = Instant::now();
+    let thread = thread::Builder::new().name("papilla-read".to_owned()).spawn(move || {
+        let _end = end;
+        // Err: nobody waits any more.
+        let _ = done.send(work());
+    });
+    thread.map_err(Unfinished::Broken)?;
+    let fault = loop {
+        match result.recv_timeout(LOOK_AROUND) {
+            Ok(value) => return Ok(value),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Unfinished::Broken(io::Error::other("the reading panicked")));
+            }
+            Err(RecvTimeoutError::Timeout) if is_to_stop() => break Unfinished::Stopped,
+            Err(RecvTimeoutError::Timeout) if begun.elapsed() >= wait_max => {
+                break Unfinished::Late;
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+    };
+    STRANDED.fetch_add(1, Ordering::Relaxed);
+    take_off(&over);
+    Err(fault)
+}
+
+/// The end of a reading's thread, however it comes.
+struct End(Arc<AtomicBool>);
+
+impl Drop for End {
+    fn drop(&mut self) {
+        take_off(&self.0);
+    }
+}
+
+/// Called by the thread that ends and by whoever gives it up and has counted it: the second of the
+/// two takes it off the count.
+fn take_off(over: &AtomicBool) {
+    if over.swap(true, Ordering::AcqRel) {
+        STRANDED.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WAIT_MAX: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn what_never_ends_is_given_up_and_blocks_what_comes_later_only_in_numbers() {
+        let never = || false;
+        assert_eq!(detached(|| 7, WAIT_MAX, &never).unwrap(), 7);
+        let panicked = detached(|| assert_eq!(1, 2), WAIT_MAX, &never);
+        assert!(matches!(panicked, Err(Unfinished::Broken(_))), "{panicked:?}");
+        let mut held = Vec::new();
+        for turn in 0..STRANDED_MAX {
+            let (end, ended) = mpsc::channel::<()>();
+            let work = move || {
+                let _ = ended.recv();
+            };
+            let fault = if turn == 0 {
+                detached(work, WAIT_MAX, &|| true)
+            } else {
+                detached(work, Duration::ZERO, &never)
+            };
+            let due = if turn == 0 { "Stopped" } else { "Late" };
+            assert_eq!(format!("{:?}", fault.unwrap_err()), due);
+            if turn + 1 < STRANDED_MAX {
+                assert_eq!(detached(|| 7, WAIT_MAX, &never).unwrap(), 7, "a later one is blocked");
+            }
+            held.push(end);
+        }
+        let refused = detached(|| 7, WAIT_MAX, &never);
+        assert!(matches!(refused, Err(Unfinished::Stranded)), "{refused:?}");
+        // The drive answers at last.
+        drop(held);
+        let begun = Instant::now();
+        while detached(|| 7, WAIT_MAX, &never).is_err() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "they are counted for ever");
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Reading a folder of models that may hold anything: within a time and a size.
+
+use std::{
+    borrow::Cow,
+    collections::HashSet,
+    fs::{self, File, FileType, Metadata},
+    io::{self, Read},
+    path::Path,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
+
+use papilla_engine::card::Index;
+
+use super::{
+    Files,
+    detached::{STRANDED_MAX, Unfinished, detached},
+};
+use crate::StartError;
+
+/// Most bytes of one file.
+const FILE_BYTES_MAX: u64 = 256 << 20;
+/// Most bytes of all files that are read.
+const FOLDER_BYTES_MAX: u64 = 1 << 30;
+/// Longest time for reading the folder.
+const WAIT_MAX: Duration = Duration::from_secs(20);
+
+/// The files of every service; an index names the models beside them.
+const BASE: [&str; 4] = ["index.json", "atlas.json", "replay.json", "ladder.json"];
+
+/// The files of `folder` that a service is made of: [`BASE`] and those of the models that its index
+/// names. Strangers that cannot be read are named in the log. None: it was to stop.
+///
+/// # Errors
+/// The folder or one of these files cannot be read, is no file, too large, or not read in time.
+pub(super) fn read(
+    folder: &Path,
+    is_to_stop: &dyn Fn() -> bool,
+) -> Result<Option<Files>, StartError> {
+    let unreadable = |source| StartError::Folder { folder: folder.to_owned(), source };
+    let at = Arc::new(Mutex::new(None));
+    let (place, progress) = (folder.to_owned(), Arc::clone(&at));
+    let reading = move || {
+        Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() }.read()
+    };
+    match detached(reading, WAIT_MAX, is_to_stop) {
+        Ok(result) => result.map(Some),
+        Err(Unfinished::Stopped) => Ok(None),
+        Err(Unfinished::Late) => {
+            let seconds = WAIT_MAX.as_secs();
+            match at.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                Some(file) => {
+                    let reason = format!("it could not be read within {seconds} s");
+                    Err(unusable(folder, file, reason))
+                }
+                None => Err(unreadable(io::Error::other(format!("no answer within {seconds} s")))),
+            }
+        }
+        Err(Unfinished::Stranded) => {
+            let message = format!("{STRANDED_MAX} earlier readings hang still");
+            Err(unreadable(io::Error::other(message)))
+        }
+        Err(Unfinished::Broken(source)) => Err(unreadable(source)),
+    }
+}
+
+/// A folder that is being read.
+struct Folder<'a> {
+    path: &'a Path,
+    /// Bytes that may still be read.
+    left: u64,
+    /// The file that is being read.
+    at: &'a Mutex<Option<String>>,
+    files: Files,
+}
+
+impl Folder<'_> {
+    fn read(mut self) -> Result<Files, StartError> {
+        let listed = names(self.path)
+            .map_err(|source| StartError::Folder { folder: self.path.to_owned(), source })?;
+        let mut wanted: HashSet<String> = BASE.map(str::to_owned).into();
+        for name in BASE {
+            self.take(name, &listed)?;
+        }
+        for name in self.models() {
+            for file in [format!("{name}.onnx"), format!("{name}.json")] {
+                if wanted.insert(file.clone()) {
+                    self.take(&file, &listed)?;
+                }
+            }
+        }
+        for stranger in listed.iter().filter(|name| !wanted.contains(*name)) {
+            if let Err(reason) = open(&self.path.join(stranger)) {
+                tracing::warn!(file = stranger, reason, "passed over: no model's file");
+            }
+        }
+        Ok(self.files)
+    }
+
+    /// The models that the index names; none if it is missing or damaged, which is found later.
+    fn models(&self) -> Vec<String> {
+        let index = self.files.iter().find(|(name, _)| name == "index.json");
+        index
+            .and_then(|(_, bytes)| std::str::from_utf8(bytes).ok())
+            .and_then(|text| Index::from_json(text).ok())
+            .map_or_else(Vec::new, |index| index.models)
+    }
+
+    /// Reads the file called `name` if the folder has it.
+    fn take(&mut self, name: &str, listed: &HashSet<String>) -> Result<(), StartError> {
+        let path = self.path.join(name);
+        *self.at.lock().unwrap_or_else(PoisonError::into_inner) = Some(name.to_owned());
+        // A link to nothing is a file that is missing.
+        if !listed.contains(name) || matches!(path.try_exists(), Ok(false)) {
+            return Ok(());
+        }
+        let bytes = self.contents(&path);
+        let bytes = bytes.map_err(|reason| unusable(self.path, name.to_owned(), reason))?;
+        self.files.push((name.to_owned(), Cow::Owned(bytes)));
+        Ok(())
+    }
+
+    fn contents(&mut self, path: &Path) -> Result<Vec<u8>, String> {
+        let (file, data) = open(path)?;
+        let most = FILE_BYTES_MAX.min(self.left);
+        let too_large = |bytes: u64| {
+            format!(
+                "it has {} MiB; {} MiB of a file and {} of a folder are read",
+                bytes.div_ceil(1 << 20),
+                FILE_BYTES_MAX >> 20,
+                FOLDER_BYTES_MAX >> 20,
+            )
+        };
+        if data.len() > most {
+            return Err(too_large(data.len()));
+        }
+        let mut bytes = Vec::with_capacity(usize::try_from(data.len()).unwrap_or_default());
+        // It may grow meanwhile.
+        file.take(most + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+        if bytes.len() as u64 > most {
+            return Err(too_large(bytes.len() as u64));
+        }
+        self.left -= bytes.len() as u64;
+        Ok(bytes)
+    }
+}
+
+fn unusable(folder: &Path, file: String, reason: String) -> StartError {
+    StartError::Unusable { file, origin: folder.display().to_string(), reason }
+}
+
+/// The names of the `.onnx` and `.json` files of `folder`.
+fn names(folder: &Path) -> io::Result<HashSet<String>> {
+    let mut names = HashSet::new();
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        let wanted = Path::new(&name).extension().is_some_and(|e| e == "onnx" || e == "json");
+        match (wanted, name.into_string()) {
+            (true, Ok(name)) => {
+                names.insert(name);
+            }
+            (true, Err(name)) => {
+                tracing::warn!(file = ?name, "passed over: its name is not UTF-8");
+            }
+            (false, _) => {}
+        }
+    }
+    Ok(names)
+}
+
+/// Opens a file that is one; what else lies there could keep whoever opens it for ever.
+fn open(path: &Path) -> Result<(File, Metadata), String> {
+    let data = fs::metadata(path).map_err(|error| error.to_string())?;
+    if !data.is_file() {
+        return Err(format!("it is {}, no file", kind(data.file_type())));
+    }
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let data = file.metadata().map_err(|error| error.to_string())?;
+    // Something else may have taken its place.
+    if !data.is_file() {
+        return Err(format!("it is {}, no file", kind(data.file_type())));
+    }
+    Ok((file, data))
+}
+
+#[cfg(unix)]
+fn kind(of: FileType) -> &'static str {
+    use std::os::unix::fs::FileTypeExt;
+    if of.is_dir() {
+        "a folder"
+    } else if of.is_fifo() {
+        "a named pipe"
+    } else if of.is_socket() {
+        "a socket"
+    } else {
+        "a device"
+    }
+}
+
+#[cfg(not(unix))]
+fn kind(of: FileType) -> &'static str {
+    if of.is_dir() { "a folder" } else { "a device" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_of_an_index_do_not_leave_the_folder() {
+        let above = tempfile::tempdir().unwrap();
+        let folder = above.path().join("models");
+        fs::create_dir(&folder).unwrap();
+        fs::write(above.path().join("x.onnx"), b"outside").unwrap();
+        fs::write(folder.join("in.onnx"), b"inside").unwrap();
+        let index = r#"{"default": "in", "models": ["in", "../x"]}"#;
+        fs::write(folder.join("index.json"), index).unwrap();
+        let files = read(&folder, &|| false).unwrap().unwrap();
+        let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["index.json", "in.onnx"]);
+        assert!(read(&folder, &|| true).unwrap().is_none_or(|files| files.len() == 2));
+    }
+}

@@ -1,0 +1,130 @@
+//! Measuring tiers beside the frames: at the start, at a reload, and again while nobody is served.
+
+use std::time::{Duration, Instant};
+
+use bytes::BytesMut;
+use papilla_proto::{MAP_LEN, SampleType, check_pressure};
+
+use super::{Catalogue, Tier};
+use crate::{
+    StartError,
+    codec::{self, Input, Map, Output, Quantity},
+    core::{
+        effects,
+        latency::{probe_map, us},
+    },
+};
+
+/// Runs of one tier after which its times are known well enough.
+const RUNS_MAX: usize = 300;
+/// Timed runs of a tier however slow it is.
+const RUNS_MIN: usize = 2;
+/// What handing a frame from socket to thread and back adds, us; seen on a virtual machine.
+const HAND_OVER_US: u64 = 120;
+
+/// Measures on this thread every tier that was not measured yet, in about `time` altogether: an
+/// equal share each, but never less than [`RUNS_MIN`] runs after one that warms it.
+///
+/// With no time, the shipped times stand.
+///
+/// # Errors
+/// A tier does not run.
+pub(crate) fn calibrate(catalogue: &Catalogue, time: Duration) -> Result<(), StartError> {
+    calibrate_noting(catalogue, time, &mut |_| ())
+}
+
+/// The same, the tiers that are expected to be the fastest first; `note` is told each when it is
+/// done.
+///
+/// # Errors
+/// A tier does not run.
+pub(crate) fn calibrate_noting(
+    catalogue: &Catalogue,
+    time: Duration,
+    note: &mut dyn FnMut(&str),
+) -> Result<(), StartError> {
+    if time.is_zero() {
+        return Ok(());
+    }
+    let begun = Instant::now();
+    let is_new = |tier: &&Tier| tier.latency.calibrated_us().is_none();
+    let mut new: Vec<&Tier> = catalogue.tiers.iter().filter(is_new).collect();
+    new.sort_by_key(|tier| tier.latency.typical_us());
+    let share = time / u32::try_from(new.len()).unwrap_or(u32::MAX).max(1);
+    let mut found = Vec::with_capacity(new.len());
+    for tier in new {
+        let mut times = runs(tier, share)?;
+        tier.latency.calibrate(&mut times);
+        found.push(format!("{} {} us", tier.name, tier.latency.typical_us()));
+        note(&tier.name);
+    }
+    if let Some(codec_us) = codec_us() {
+        catalogue.overhead.set_us(codec_us + HAND_OVER_US);
+    }
+    let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
+    effects::measure(catalogue.finger(), pressure_max_pa);
+    tracing::info!(
+        tiers = found.join(", "),
+        overhead_us = catalogue.overhead.us(),
+        took_ms = begun.elapsed().as_millis(),
+        "calibrated"
+    );
+    Ok(())
+}
+
+/// Measures a tier again that no frame has measured yet.
+///
+/// # Errors
+/// It does not run.
+pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
+    if !tier.latency.is_used() {
+        tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
+    }
+    Ok(())
+}
+
+fn runs(tier: &Tier, share: Duration) -> Result<Vec<Duration>, StartError> {
+    let failed = |source| StartError::Engine { tier: tier.name.clone(), source };
+    let [mut pressure_pa, mut sed_j_per_m3] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
+    let begun = Instant::now();
+    let mut session = tier.warm_session(&mut pressure_pa, &mut sed_j_per_m3)?;
+    let mut times = Vec::new();
+    while times.len() < RUNS_MIN || (times.len() < RUNS_MAX && begun.elapsed() < share) {
+        let start = Instant::now();
+        session.infer(&pressure_pa, &mut sed_j_per_m3).map_err(failed)?;
+        times.push(start.elapsed());
+    }
+    Ok(times)
+}
+
+/// Time of decoding, checking and encoding one f32 map, us: the least of several.
+fn codec_us() -> Option<u64> {
+    let mut map = vec![0.0; MAP_LEN];
+    probe_map(1e4, &mut map);
+    let payload: Vec<u8> = map.iter().flat_map(|value| value.to_le_bytes()).collect();
+    let mut buffer = BytesMut::with_capacity(payload.len());
+    let samples = Output::Samples(SampleType::F32);
+    let input = Input::Samples { sample_type: SampleType::F32, scale: 1.0 };
+    let mut least: Option<Duration> = None;
+    for _ in 0..8 {
+        let start = Instant::now();
+        codec::decode(input, &payload, &mut map).ok()?;
+        check_pressure(&map, 1e4).ok()?;
+        buffer.clear();
+        let sed = Map { quantity: Quantity::Sed, values: &map, value_max: 1e4, source: "" };
+        codec::encode(samples, sed, &mut buffer).ok()?;
+        let time = start.elapsed();
+        least = Some(least.map_or(time, |least| least.min(time)));
+    }
+    least.map(us)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_codec_can_be_timed() {
+        assert!(codec_us().is_some_and(|us| us > 0));
+    }
+}

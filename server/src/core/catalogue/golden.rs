@@ -1,0 +1,108 @@
+//! Golden answers: what a model makes of FE states whose SED is known.
+//!
+//! A model that loads, belongs to its card and answers with finite values can still be the wrong
+//! one: other units, another orientation, an engine that computes it wrongly. So it is asked for
+//! the states of `replay.json`, and its answers are held against the FE solver's.
+
+use papilla_engine::EngineError;
+use papilla_proto::{MAP_LEN, atlas::Raster};
+use serde::Serialize;
+
+use super::{Catalogue, Tier};
+
+/// A state may err by so many times the 95th percentile of the card's test states: rare ones do,
+/// while a wrong scale or orientation errs by about 1.
+const TIMES_P95: f64 = 3.0;
+
+/// And by so much in any case, so that a nearly exact model is not held to its rounding.
+const ERROR_MIN: f64 = 0.05;
+
+/// The state a model does worst.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct Golden {
+    /// Number of states compared.
+    #[serde(rename = "presses")]
+    pub(crate) states: usize,
+    /// Name of the worst.
+    #[serde(rename = "press")]
+    pub(crate) state: String,
+    /// Its relative L2 error.
+    pub(crate) relative_l2: f64,
+    /// The error it may have.
+    pub(crate) relative_l2_max: f64,
+}
+
+/// Why a model is not to be trusted.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum GoldenError {
+    /// It does not run.
+    #[error("it does not run: {0}")]
+    Engine(#[from] EngineError),
+    /// The state does not fit the atlas.
+    #[error("press '{state}' does not fit the atlas: {reason}")]
+    State { state: String, reason: String },
+    /// It answers wrongly.
+    #[error(
+        "its answer to press '{}' is off by {:.3} of the FE solver's (relative L2), {:.3} is the \
+         most its card allows", .0.state, .0.relative_l2, .0.relative_l2_max
+    )]
+    Wrong(Golden),
+}
+
+/// Asks `tier` for every state of the catalogue's replay; None if there are none.
+///
+/// # Errors
+/// It does not run, or an answer is further off than its card allows.
+pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>, GoldenError> {
+    let mut session = tier.model.session()?;
+    let [mut pressure_pa, mut due, mut found] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
+    let states = &catalogue.replay.states;
+    let mut worst: Option<Golden> = None;
+    for state in states {
+        let fill = |raster: &Raster, values: &[f32], map: &mut [f32]| {
+            raster.rasterise(values, map).map_err(|error| GoldenError::State {
+                state: state.name.clone(),
+                reason: error.to_string(),
+            })
+        };
+        fill(&catalogue.skin, &state.pressure_pa, &mut pressure_pa)?;
+        fill(&catalogue.interface, &state.sed_j_per_m3, &mut due)?;
+        session.infer(&pressure_pa, &mut found)?;
+        let relative_l2 = relative_l2(&found, &due, catalogue.interface.mask());
+        if worst.as_ref().is_none_or(|worst| relative_l2 > worst.relative_l2) {
+            worst = Some(Golden {
+                states: states.len(),
+                state: state.name.clone(),
+                relative_l2,
+                relative_l2_max: (TIMES_P95 * tier.relative_l2_p95).max(ERROR_MIN),
+            });
+        }
+    }
+    match worst {
+        Some(worst) if worst.relative_l2 > worst.relative_l2_max => Err(GoldenError::Wrong(worst)),
+        worst => Ok(worst),
+    }
+}
+
+/// `|found - due| / |due|` over the pixels of the mask; 0 where nothing is due and found.
+fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
+    let (mut difference, mut size) = (0.0, 0.0);
+    for ((found, due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
+        difference += f64::from(found - due).powi(2);
+        size += f64::from(*due).powi(2);
+    }
+    if difference > 0.0 { (difference / size.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_is_relative_and_of_the_patch_alone() {
+        let mask = [true, true, false];
+        assert!((relative_l2(&[3.0, 4.0, 9.0], &[6.0, 8.0, 0.0], &mask) - 0.5).abs() < 1e-12);
+        assert!(relative_l2(&[0.0; 3], &[0.0; 3], &mask).abs() < 1e-12);
+        assert!(relative_l2(&[1.0, 0.0, 0.0], &[0.0; 3], &mask) > 1e100);
+    }
+}

@@ -1,0 +1,127 @@
+//! Reading single files of a model folder.
+
+use std::{sync::Arc, time::Duration};
+
+use papilla_engine::{
+    Card, Ladder,
+    ladder::{Kind, SET_NAMES},
+};
+use papilla_proto::atlas::Atlas;
+use serde_json::Value;
+
+use super::Tier;
+use crate::core::{digest::sha256_hex, latency::Latency};
+
+/// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
+/// are of a model that is not served.
+pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<Ladder, String> {
+    let mut ladder = Ladder::from_json(text(json)?).map_err(|error| error.to_string())?;
+    if ladder.atlas_hash != atlas.hash() {
+        let (measured, ours) = (&ladder.atlas_hash, atlas.hash());
+        return Err(format!("measured on atlas {measured}, but atlas.json is {ours}"));
+    }
+    ladder.rungs.retain(|rung| {
+        let Some(tier) = tiers.iter().find(|t| rung.model.as_ref() == Some(&t.name)) else {
+            return rung.model.is_none();
+        };
+        let same = |hash: &String| *hash == tier.model.info().onnx_sha256;
+        let fresh = rung.onnx_sha256.as_ref().is_none_or(same);
+        if !fresh {
+            tracing::warn!(tier = %tier.name, "ladder.json has figures of another file; measure it anew");
+        }
+        fresh
+    });
+    Ok(ladder)
+}
+
+/// Gives the tiers the shipped times, and the errors of the first set that all were measured
+/// on; the name of that set.
+pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
+    for tier in tiers.iter() {
+        if let Some(ms) = ladder.rung_of(&tier.name).and_then(|rung| rung.time_ms()) {
+            // A tier that goes on over a reload shares its times, which it has learnt here.
+            if Arc::strong_count(&tier.latency) == 1 {
+                tier.latency.expect(milliseconds(ms));
+            }
+        }
+    }
+    let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
+    let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
+    let set = SET_NAMES.into_iter().find(complete)?;
+    for tier in tiers.iter_mut() {
+        if let Some(error) = error(tier, set) {
+            tier.relative_l2_median = error;
+        }
+    }
+    Some(set.to_owned())
+}
+
+fn milliseconds(ms: f64) -> Duration {
+    Duration::try_from_secs_f64(ms / 1e3).unwrap_or_default()
+}
+
+pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
+    std::str::from_utf8(bytes).map_err(|error| error.to_string())
+}
+
+/// A card, and the same as it was shipped.
+pub(super) struct ReadCard {
+    card: Card,
+    shipped: Value,
+}
+
+impl ReadCard {
+    pub(super) fn parse(json: &[u8]) -> Result<Self, String> {
+        let json = text(json)?;
+        let card = Card::from_json(json).map_err(|error| error.to_string())?;
+        let shipped = serde_json::from_str(json).map_err(|error| error.to_string())?;
+        Ok(Self { card, shipped })
+    }
+}
+
+pub(super) fn load_tier(
+    name: &str,
+    onnx: &[u8],
+    ReadCard { card, shipped }: ReadCard,
+    running: Option<&Tier>,
+) -> Result<Tier, Box<dyn std::error::Error>> {
+    let same = running.filter(|tier| {
+        let hash = &tier.model.info().onnx_sha256;
+        *hash == card.onnx_sha256 && *hash == sha256_hex(onnx)
+    });
+    let model = match same {
+        Some(tier) => {
+            card.require_model(tier.model.info())?;
+            Arc::clone(&tier.model)
+        }
+        None => papilla_engine::load(onnx, Some(&card))?,
+    };
+    let info = model.info();
+    if info.name != name {
+        return Err(format!("the model calls itself '{}'", info.name).into());
+    }
+    let latency = same.map_or_else(
+        || {
+            let latency = Latency::default();
+            latency.expect(milliseconds(card.latency_ms.p50));
+            Arc::new(latency)
+        },
+        |tier| Arc::clone(&tier.latency),
+    );
+    Ok(Tier {
+        name: name.to_owned(),
+        kind: Kind::of_network(&info.network),
+        sessions: running.map(|tier| Arc::clone(&tier.sessions)).unwrap_or_default(),
+        effects: info.effects.clone(),
+        atlas_hash: info.atlas_hash.clone(),
+        pressure_max_pa: info.pressure_max_pa,
+        input_statistics_max: card.pattern_max,
+        sed_max_j_per_m3: info.sed_max_j_per_m3,
+        relative_l2_median: card.metrics.relative_l2.median,
+        relative_l2_p95: card.metrics.relative_l2.p95,
+        card: shipped,
+        latency,
+        retired: false,
+        model,
+    })
+}

@@ -1,0 +1,276 @@
+//! The tiers this service can render with, their atlas, and the replay.
+
+pub(crate) mod assets;
+pub(crate) mod calibrate;
+pub(crate) mod golden;
+mod load;
+pub(crate) mod replay;
+mod tier;
+
+use bytes::Bytes;
+use papilla_engine::card::Index;
+use papilla_proto::{
+    ErrorCode, PixelMask, Problem,
+    atlas::{Atlas, Patch, Raster},
+    error::shortened,
+};
+
+pub(crate) use self::tier::Tier;
+use self::{
+    assets::Assets,
+    load::{ReadCard, judge, load_ladder, load_tier, text},
+    replay::Replay,
+};
+use crate::{
+    StartError,
+    codec::{Output, Quantity},
+    core::{cache::Cache, effects, latency::Overhead, metrics::TierLabels},
+};
+
+/// How far loading has come.
+pub(crate) enum Step<'a> {
+    /// These models will be loaded.
+    Listed(&'a [String]),
+    /// This one is.
+    Loaded(&'a str),
+}
+
+/// Which answer about a catalogue is kept: those that do not change while it lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Document {
+    Models,
+    Atlas,
+    AtlasObj,
+    AtlasGlb,
+    Mask(Patch),
+    /// The list of the replay's states.
+    States,
+    /// Vertex values of a state, by its number.
+    State(usize),
+    /// A state as a map.
+    StateMap(usize, Quantity, Output),
+}
+
+/// All there is to render with and to show.
+///
+/// **Invariant:** a tier keeps its place in `tiers` for the life of the process, whatever is
+/// reloaded: jobs and sessions name tiers by their place.
+pub(crate) struct Catalogue {
+    /// In the index's order.
+    pub(crate) tiers: Vec<Tier>,
+    /// Index of the tier to take unasked.
+    pub(crate) default: usize,
+    pub(crate) atlas: Atlas,
+    pub(crate) atlas_json: Bytes,
+    pub(crate) skin: Raster,
+    /// The pixels of `skin`.
+    pub(crate) skin_mask: PixelMask,
+    pub(crate) interface: Raster,
+    pub(crate) replay: Replay,
+    /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
+    pub(crate) ladder_json: String,
+    /// The set by which tiers are compared; none: each by its card.
+    pub(crate) judged_on: Option<String>,
+    pub(crate) overhead: Overhead,
+    /// What sessions with effects share.
+    pub(crate) runtime: effects::Shared,
+    /// Answers about all this.
+    pub(crate) cache: Cache<Document>,
+}
+
+impl Catalogue {
+    /// These tiers on this atlas, and nothing else.
+    #[cfg(test)]
+    pub(crate) fn bare(atlas: Atlas, tiers: Vec<Tier>) -> Self {
+        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
+        Self {
+            tiers,
+            default: 0,
+            atlas_json: Bytes::new(),
+            skin_mask: PixelMask::from(skin.mask()),
+            skin,
+            interface,
+            atlas,
+            replay: Replay::default(),
+            ladder_json: "null".to_owned(),
+            judged_on: None,
+            overhead: Overhead::default(),
+            runtime: effects::Shared::default(),
+            cache: Cache::default(),
+        }
+    }
+
+    /// Loads and checks everything. A tier whose file is that of `running` is not loaded again:
+    /// the two share the model, its times and its count of sessions.
+    ///
+    /// # Errors
+    /// A file is missing, unreadable, or at odds with another.
+    pub(crate) fn load(
+        assets: &Assets,
+        default: Option<&str>,
+        running: Option<&Self>,
+    ) -> Result<Self, StartError> {
+        Self::load_noting(assets, default, running, &mut |_| ())
+    }
+
+    /// The same; `note` is told what comes.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub(crate) fn load_noting(
+        assets: &Assets,
+        default: Option<&str>,
+        running: Option<&Self>,
+        note: &mut dyn FnMut(Step<'_>),
+    ) -> Result<Self, StartError> {
+        let origin = || assets.origin.clone();
+        let read = |name: &str| assets.require(name);
+        let bad = |file: &str, error: &dyn std::fmt::Display| StartError::Unusable {
+            file: file.to_owned(),
+            origin: origin(),
+            reason: error.to_string(),
+        };
+        let index = text(read("index.json")?)
+            .and_then(|json| Index::from_json(json).map_err(|e| e.to_string()))
+            .map_err(|e| bad("index.json", &e))?;
+        for (place, name) in index.models.iter().enumerate() {
+            if index.models[..place].contains(name) {
+                return Err(bad("index.json", &format!("the model '{name}' is listed twice")));
+            }
+        }
+        let atlas_json = Bytes::copy_from_slice(read("atlas.json")?);
+        let atlas = text(&atlas_json)
+            .and_then(|json| Atlas::from_json(json).map_err(|e| e.to_string()))
+            .map_err(|e| bad("atlas.json", &e))?;
+        note(Step::Listed(&index.models));
+        let mut tiers = Vec::with_capacity(index.models.len());
+        for name in &index.models {
+            let (onnx, file) = (format!("{name}.onnx"), format!("{name}.json"));
+            let bytes = read(&onnx)?;
+            let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
+            let running =
+                running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
+            let tier = load_tier(name, bytes, card, running).map_err(|e| bad(&onnx, &e))?;
+            if tier.atlas_hash != atlas.hash() {
+                let (model, ours) = (&tier.atlas_hash, atlas.hash());
+                return Err(bad(
+                    &onnx,
+                    &format!("trained on atlas {model}, but atlas.json is {ours}"),
+                ));
+            }
+            tiers.push(tier);
+            note(Step::Loaded(name));
+        }
+        let wanted = default.unwrap_or(&index.default);
+        let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
+            StartError::UnknownDefault { name: wanted.to_owned(), known: index.models.join(", ") }
+        })?;
+        let replay = match assets.get("replay.json") {
+            Some(json) => {
+                Replay::parse(json, atlas.vertex_count()).map_err(|e| bad("replay.json", &e))?
+            }
+            None => Replay::default(),
+        };
+        let ladder = match assets.get("ladder.json") {
+            Some(json) => {
+                Some(load_ladder(json, &atlas, &tiers).map_err(|e| bad("ladder.json", &e))?)
+            }
+            None => None,
+        };
+        let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
+        let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
+        let (skin, interface) =
+            (Raster::new(&atlas, Patch::Skin), Raster::new(&atlas, Patch::Interface));
+        let overhead = Overhead::default();
+        Ok(Self {
+            tiers,
+            default,
+            atlas,
+            atlas_json,
+            skin_mask: PixelMask::from(skin.mask()),
+            skin,
+            interface,
+            replay,
+            ladder_json,
+            judged_on,
+            overhead,
+            runtime: effects::Shared::default(),
+            cache: Cache::default(),
+        })
+    }
+
+    /// What effects are placed on.
+    pub(crate) fn finger(&self) -> effects::Finger<'_> {
+        let Self { atlas, skin, interface, runtime, .. } = self;
+        effects::Finger { atlas, skin, interface, shared: runtime }
+    }
+
+    /// Time of a tier from receipt to answer on an idle machine, us.
+    pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
+        self.tiers[tier].latency.typical_us().saturating_add(self.overhead.us())
+    }
+
+    /// Whether a tier is expected to meet a budget; none without one.
+    pub(crate) fn meets(&self, tier: usize, budget_us: Option<u32>) -> Option<bool> {
+        budget_us.map(|budget| self.predicted_latency_us(tier) <= u64::from(budget))
+    }
+
+    /// Index of the tier called `name`.
+    pub(crate) fn find(&self, name: &str) -> Option<usize> {
+        self.tiers.iter().position(|tier| tier.name == name && !tier.retired)
+    }
+
+    /// Index of the tier called `name`.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(crate) fn tier_named(&self, name: &str) -> Result<usize, Problem> {
+        self.find(name).ok_or_else(|| {
+            let name = shortened(name);
+            let message = format!("no tier '{name}'; there are {}", self.names());
+            Problem::new(ErrorCode::UnknownTier, message).at("tier")
+        })
+    }
+
+    /// The tiers on offer, each with its place.
+    pub(crate) fn offered(&self) -> impl Iterator<Item = (usize, &Tier)> {
+        self.tiers.iter().enumerate().filter(|(_, tier)| !tier.retired)
+    }
+
+    /// What metrics say of each tier, in the order of `tiers`.
+    pub(crate) fn tier_labels(&self) -> impl Iterator<Item = TierLabels<'_>> {
+        self.tiers.iter().enumerate().map(|(place, tier)| TierLabels {
+            name: &tier.name,
+            atlas_hash: &tier.atlas_hash,
+            onnx_sha256: &tier.model.info().onnx_sha256,
+            is_default: place == self.default,
+            is_offered: !tier.retired,
+        })
+    }
+
+    /// The names, for messages.
+    pub(crate) fn names(&self) -> String {
+        self.offered().map(|(_, t)| t.name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The tier for a client that named none.
+    ///
+    /// Without a budget: the default. With one: of the tiers that render
+    /// `effects` and are expected to meet it the most accurate, or else the fastest.
+    pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
+        let renders = |tier: &Tier| effects.iter().all(|e| tier.effects.contains(e));
+        let fitting = || self.offered().filter(|(_, tier)| renders(tier));
+        let Some(budget_us) = budget_us else {
+            return if renders(&self.tiers[self.default]) {
+                Some(self.default)
+            } else {
+                fitting().next().map(|(index, _)| index)
+            };
+        };
+        fitting()
+            .filter(|(index, _)| self.meets(*index, Some(budget_us)) == Some(true))
+            .min_by(|(_, a), (_, b)| a.relative_l2_median.total_cmp(&b.relative_l2_median))
+            .or_else(|| fitting().min_by_key(|(_, tier)| tier.latency.typical_us()))
+            .map(|(index, _)| index)
+    }
+}

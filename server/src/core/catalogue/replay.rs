@@ -1,0 +1,79 @@
+//! A few states of FE simulations shipped with the models, so that a visitor sees the error.
+
+use papilla_proto::json;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// One state: where the plate was, and what the FE solver found.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct State {
+    /// Name to show.
+    pub(crate) name: String,
+    /// Angles of the plate, as the dataset's manifest has them.
+    #[serde(default)]
+    pub(crate) pose: Value,
+    /// Depth, mm.
+    pub(crate) depth_mm: f32,
+    /// Pressure on the skin at each atlas vertex, Pa.
+    pub(crate) pressure_pa: Vec<f32>,
+    /// FE strain energy density at each atlas vertex, J/m3.
+    pub(crate) sed_j_per_m3: Vec<f32>,
+}
+
+/// `models/replay.json`.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct Replay {
+    #[serde(rename = "presses")]
+    pub(crate) states: Vec<State>,
+}
+
+impl Replay {
+    /// Reads and checks the file.
+    ///
+    /// # Errors
+    /// It is not the JSON that is due, or a state does not fit the atlas.
+    pub(crate) fn parse(text: &[u8], vertex_count: usize) -> Result<Self, String> {
+        let replay: Self = json::read(text).map_err(|e| e.to_string())?;
+        for (index, state) in replay.states.iter().enumerate() {
+            for (what, values) in
+                [("pressure_pa", &state.pressure_pa), ("sed_j_per_m3", &state.sed_j_per_m3)]
+            {
+                let found = values.len();
+                if found != vertex_count {
+                    return Err(format!(
+                        "press {index} has {found} values of {what}, the atlas {vertex_count} vertices"
+                    ));
+                }
+                if !values.iter().all(|v| v.is_finite() && *v >= 0.0) {
+                    return Err(format!(
+                        "press {index} has a {what} that is negative or not finite"
+                    ));
+                }
+            }
+        }
+        Ok(replay)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(pressure: &str, sed: &str) -> Result<Replay, String> {
+        let json = format!(
+            r#"{{"presses": [{{"name": "flat", "pose": {{"pitch_deg": 0}}, "depth_mm": 1,
+                "pressure_pa": {pressure}, "sed_j_per_m3": {sed}}}]}}"#
+        );
+        Replay::parse(json.as_bytes(), 2)
+    }
+
+    #[test]
+    fn a_state_must_fit_the_atlas() {
+        assert_eq!(parse("[1, 2]", "[0, 3]").unwrap().states.len(), 1);
+        assert!(parse("[1]", "[0, 3]").unwrap_err().contains("pressure_pa"));
+        assert!(parse("[1, 2]", "[0, 3, 4]").unwrap_err().contains("sed_j_per_m3"));
+        assert!(parse("[1, -2]", "[0, 3]").unwrap_err().contains("negative"));
+        assert!(parse("[1, 1e39]", "[0, 3]").is_err());
+        assert!(Replay::parse(b"{", 2).is_err());
+    }
+}

@@ -1,0 +1,97 @@
+//! What each effect costs on this machine.
+
+use std::time::{Duration, Instant};
+
+use bytes::BytesMut;
+use papilla_proto::{
+    HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
+    atlas::Raster,
+    effects::{Actuator, ActuatorInput, Layout, Place},
+};
+use serde::Serialize;
+
+use super::{Effects, Finger};
+use crate::core::latency::probe_map;
+
+/// Runs of which the fastest counts.
+const RUNS: u64 = 12;
+
+/// Points and actuators that the measurement takes.
+const PLACES: usize = 64;
+
+/// What an effect adds to a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Cost {
+    #[serde(rename = "name")]
+    pub(crate) effect: RuntimeEffect,
+    /// Time, us; below zero where it saves more than it takes.
+    pub(crate) us: f64,
+}
+
+/// Times every effect on [`probe_map`] against the bare map, and keeps it for `/v1/effects`.
+pub(crate) fn measure(finger: Finger<'_>, pressure_max_pa: f32) {
+    let bare = Hello { version: 2, effects: vec!["contact_window".to_owned()], ..Hello::default() };
+    // An effect that cannot be set up here has no cost to tell of.
+    let of = |hello: &Hello| Effects::of(hello, finger).ok().flatten();
+    let Some(base_us) = of(&bare).map(|effects| us(effects, pressure_max_pa)) else { return };
+    let mut costs = Vec::new();
+    for effect in RuntimeEffect::ALL {
+        let hello = hello(effect, finger.interface);
+        let Some(us) = of(&hello).map(|effects| us(effects, pressure_max_pa)) else { continue };
+        let us = if effect == RuntimeEffect::ContactWindow { us } else { us - base_us };
+        costs.push(Cost { effect, us: (10.0 * us).round() / 10.0 });
+    }
+    let _ = finger.shared.costs.set(costs);
+}
+
+/// A hello for one effect (and for the window, which the base has too).
+fn hello(effect: RuntimeEffect, interface: &Raster) -> Hello {
+    let indices = interface.indices();
+    let place = |i: usize| {
+        let index = indices[i * indices.len() / PLACES] as usize;
+        Place::Px([index % MAP_SIDE_PX, index / MAP_SIDE_PX].map(|px| px as f32 + 0.5))
+    };
+    let places = || (0..PLACES).filter(|_| !indices.is_empty()).map(place);
+    let mut hello = Hello {
+        version: 2,
+        effects: vec!["contact_window".to_owned(), effect.as_str().to_owned()],
+        ..Hello::default()
+    };
+    match effect {
+        RuntimeEffect::Points => hello.points = Some(places().collect()),
+        RuntimeEffect::Actuators => {
+            let actuator = |at| Actuator { at, radius_mm: None, gain: None, threshold: None };
+            hello.actuators = Some(Layout {
+                actuators: places().map(actuator).collect(),
+                input: ActuatorInput::Sed,
+                radius_mm: Some(1.0),
+                gain: Some(1.0),
+                threshold: 0.0,
+                max: 1.0,
+            });
+        }
+        _ => {}
+    }
+    hello
+}
+
+/// Time of one frame's effects, us: the least of several.
+fn us(mut effects: Effects, pressure_max_pa: f32) -> f64 {
+    let [mut contact_pa, mut pressure_pa] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
+    probe_map(pressure_max_pa, &mut contact_pa);
+    let mut bytes = BytesMut::with_capacity(effects.size_hint());
+    let mut least = Duration::MAX;
+    for run in 0..RUNS {
+        pressure_pa.copy_from_slice(&contact_pa);
+        bytes.clear();
+        bytes.resize(HEADER_LEN_V2, 0);
+        let start = Instant::now();
+        let time_us = run * 11_111;
+        effects.before(&mut pressure_pa, time_us);
+        // The pressure stands in for its SED: the times do not depend on the values.
+        if effects.write(&pressure_pa, &contact_pa, 1.0, time_us, &mut bytes).is_ok() {
+            least = least.min(start.elapsed());
+        }
+    }
+    least.as_nanos() as f64 / 1e3
+}

@@ -1,0 +1,296 @@
+//! What a session asks for beside the SED map; one file an effect.
+//!
+//! All of it runs on the inference threads, in this order: `relaxation` before the network,
+//! `afferents` after it, and then whatever reads their results. **Invariant:** what the hello did
+//! not name is neither computed nor allocated; what it named allocates at the hello and never
+//! in a frame.
+
+mod actuators;
+mod afferents;
+mod cost;
+mod geometry;
+mod points;
+mod relaxation;
+mod summary;
+mod window;
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, OnceLock};
+
+use bytes::BytesMut;
+use papilla_proto::{
+    ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
+    SampleType, Window,
+    atlas::{Atlas, Raster},
+    effects::{ActuatorInput, Section, SectionName},
+};
+
+pub(crate) use cost::{Cost, measure};
+pub(crate) use geometry::Geometry;
+
+use self::{
+    actuators::Actuators, afferents::Afferents, points::Points, relaxation::Relaxation,
+    summary::Contact,
+};
+/// The finger that effects are placed on, and what all sessions on it share.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Finger<'a> {
+    pub(crate) atlas: &'a Atlas,
+    pub(crate) skin: &'a Raster,
+    pub(crate) interface: &'a Raster,
+    pub(crate) shared: &'a Shared,
+}
+
+impl Finger<'_> {
+    /// Areas and places of its pixels.
+    fn geometry(&self) -> Arc<Geometry> {
+        let make = || Arc::new(Geometry::new(self.atlas, self.skin, self.interface));
+        Arc::clone(self.shared.geometry.get_or_init(make))
+    }
+}
+
+/// What all sessions on one catalogue share; made when it is first asked for.
+#[derive(Debug, Default)]
+pub(crate) struct Shared {
+    geometry: OnceLock<Arc<Geometry>>,
+    costs: OnceLock<Vec<Cost>>,
+}
+
+impl Shared {
+    /// What each effect costs here; none without a calibration.
+    pub(crate) fn costs(&self) -> Option<&[Cost]> {
+        self.costs.get().map(Vec::as_slice)
+    }
+
+    /// What these effects add to a frame, us.
+    pub(crate) fn cost_us(&self, effects: &[RuntimeEffect]) -> u64 {
+        let costs = self.costs.get().into_iter().flatten();
+        let us: f64 = costs.filter(|cost| effects.contains(&cost.effect)).map(|cost| cost.us).sum();
+        us.ceil() as u64
+    }
+}
+
+/// The effects of one session and their state.
+#[derive(Debug)]
+pub(crate) struct Effects {
+    /// Those that were asked for, in the order in which they act.
+    pub(crate) names: Vec<RuntimeEffect>,
+    /// What the payload of an answer holds.
+    pub(crate) sections: Vec<Section>,
+    sample_type: SampleType,
+    contact_pa: f32,
+    map: bool,
+    relaxation: Option<Relaxation>,
+    afferents: Option<Afferents>,
+    margin_px: Option<u16>,
+    summary: Option<Arc<Geometry>>,
+    points: Option<Points>,
+    actuators: Option<(ActuatorInput, Actuators)>,
+}
+
+/// What [`Effects::write`] put into an answer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Written {
+    /// What the samples show.
+    pub(crate) kind: FrameKind,
+    /// The pixels whose samples were written.
+    pub(crate) window: Window,
+    /// Unit of scaled samples.
+    pub(crate) scale: f32,
+}
+
+/// A refusal of an effect's parameters.
+fn unusable(field: &str, message: impl Into<String>) -> Problem {
+    Problem::new(ErrorCode::BadEffect, message).at(field)
+}
+
+impl Effects {
+    /// The effects that a hello of version 2 asks for; none if it asks for the bare map.
+    ///
+    /// Takes some milliseconds if there are points or actuators to be placed.
+    ///
+    /// # Errors
+    /// Parameters are unusable, missing, or of an effect that is not named.
+    pub(crate) fn of(hello: &Hello, finger: Finger<'_>) -> Result<Option<Self>, Problem> {
+        let names = named(hello)?;
+        let contact_pa = hello.contact_pa.unwrap_or(0.0);
+        if !(contact_pa.is_finite() && contact_pa >= 0.0) {
+            let message = format!("{contact_pa} Pa is no pressure; name 0 or more");
+            return Err(unusable("contact_pa", message));
+        }
+        let map = hello.map.unwrap_or(true);
+        if names.is_empty() && map {
+            return Ok(None);
+        }
+        let has = |effect| names.contains(&effect);
+        let geometry = || finger.geometry();
+        let relaxation = has(RuntimeEffect::Relaxation)
+            .then(|| Relaxation::new(&hello.relaxation.clone().unwrap_or_default()))
+            .transpose()?;
+        let afferents = has(RuntimeEffect::Afferents)
+            .then(|| Afferents::new(hello.afferents.unwrap_or_default()))
+            .transpose()?;
+        let points = match &hello.points {
+            Some(places) => Some(Points::new(places, &geometry())?),
+            None => None,
+        };
+        let actuators = match &hello.actuators {
+            Some(layout) => {
+                if layout.input == ActuatorInput::Sa1Rate && afferents.is_none() {
+                    let message = "input 'sa1_rate' needs the effect 'afferents'";
+                    return Err(unusable("actuators", message));
+                }
+                Some((layout.input, Actuators::new(layout, &geometry())?))
+            }
+            None => None,
+        };
+        let summary = has(RuntimeEffect::Summary).then(geometry);
+        let margin_px = has(RuntimeEffect::ContactWindow)
+            .then(|| hello.contact_window.unwrap_or_default().margin_px);
+        let sample_type = hello.answer_sample_type.unwrap_or(hello.sample_type);
+        let mut effects = Self {
+            names,
+            sections: Vec::new(),
+            sample_type,
+            contact_pa,
+            map,
+            relaxation,
+            afferents,
+            margin_px,
+            summary,
+            points,
+            actuators,
+        };
+        effects.sections = effects.sections();
+        Ok(Some(effects))
+    }
+
+    fn sections(&self) -> Vec<Section> {
+        let floats = |count: usize| 4 * count;
+        let parts = [
+            (SectionName::Summary, self.summary.as_ref().map(|_| SUMMARY_LEN)),
+            (SectionName::Points, self.points.as_ref().map(|points| floats(points.len()))),
+            (
+                SectionName::Actuators,
+                self.actuators.as_ref().map(|(_, actuators)| floats(actuators.len())),
+            ),
+            (SectionName::Map, self.map.then(|| MAP_LEN * self.sample_type.bytes())),
+        ];
+        let mut offset = HEADER_LEN_V2;
+        let mut sections = Vec::new();
+        for (name, bytes) in parts {
+            let Some(bytes) = bytes else { continue };
+            sections.push(Section { name, offset: offset as u32, bytes: bytes as u32 });
+            offset = (offset + bytes).next_multiple_of(16);
+        }
+        sections
+    }
+
+    /// What the map of an answer shows.
+    pub(crate) fn kind(&self) -> FrameKind {
+        if self.afferents.is_some() { FrameKind::Sa1Rate } else { FrameKind::Sed }
+    }
+
+    /// The greatest value to expect of what the map shows, where SED reaches `sed_max_j_per_m3`.
+    pub(crate) fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
+        self.afferents
+            .as_ref()
+            .map_or(sed_max_j_per_m3, |afferents| afferents.value_max(sed_max_j_per_m3))
+    }
+
+    /// Most bytes of an answer, its header included.
+    pub(crate) fn size_hint(&self) -> usize {
+        self.sections.last().map_or(HEADER_LEN_V2, |s| (s.offset + s.bytes) as usize)
+    }
+
+    /// What acts before the network: turns the pressure that was sent into that which the elastic
+    /// map is to be asked about. The greatest pressure that results; none if nothing changed.
+    pub(crate) fn before(&mut self, pressure_pa: &mut [f32], time_us: u64) -> Option<f32> {
+        self.relaxation.as_mut().map(|relaxation| relaxation.step(pressure_pa, time_us))
+    }
+
+    /// What acts after the network: appends every section to `bytes`, which holds the header.
+    ///
+    /// `pressure_pa` is what [`before`](Self::before) left, `sed_max_j_per_m3` the SED that
+    /// scaled samples map to their greatest unit.
+    pub(crate) fn write(
+        &mut self,
+        pressure_pa: &[f32],
+        sed_j_per_m3: &[f32],
+        sed_max_j_per_m3: f32,
+        time_us: u64,
+        bytes: &mut BytesMut,
+    ) -> Result<Written, Problem> {
+        let value_max = self.value_max(sed_max_j_per_m3);
+        if let Some(afferents) = &mut self.afferents {
+            afferents.step(sed_j_per_m3, time_us);
+        }
+        let rate_hz = self.afferents.as_ref().map(Afferents::rate_hz);
+        let shown = rate_hz.unwrap_or(sed_j_per_m3);
+        let sent_pa = self.relaxation.as_ref().map_or(pressure_pa, Relaxation::sent_pa);
+        if let Some(geometry) = &self.summary {
+            let contact = Contact { pressure_pa: sent_pa, above_pa: self.contact_pa };
+            let summary = summary::of(geometry, contact, sed_j_per_m3, rate_hz);
+            bytes.extend_from_slice(&summary.encode());
+        }
+        if let Some(points) = &self.points {
+            pad(bytes);
+            points.write(shown, bytes);
+        }
+        if let Some((input, actuators)) = &self.actuators {
+            pad(bytes);
+            let input = match input {
+                ActuatorInput::Sed => sed_j_per_m3,
+                ActuatorInput::Sa1Rate => shown,
+            };
+            actuators.write(input, bytes);
+        }
+        let kind = self.kind();
+        if !self.map {
+            return Ok(Written { kind, window: Window::EMPTY, scale: 1.0 });
+        }
+        pad(bytes);
+        let window = self
+            .margin_px
+            .map_or(Window::WHOLE, |margin| Window::around(sent_pa, self.contact_pa, margin));
+        let scale = window::encode(window, self.sample_type, shown, value_max, bytes)?;
+        Ok(Written { kind, window, scale })
+    }
+}
+
+/// Zeros up to the next multiple of 16, where a section begins.
+fn pad(bytes: &mut BytesMut) {
+    bytes.resize(bytes.len().next_multiple_of(16), 0);
+}
+
+/// The run-time effects that a hello names, in the order in which they act.
+fn named(hello: &Hello) -> Result<Vec<RuntimeEffect>, Problem> {
+    let names: Vec<RuntimeEffect> = RuntimeEffect::ALL
+        .into_iter()
+        .filter(|effect| hello.effects.iter().any(|name| name == effect.as_str()))
+        .collect();
+    for (effect, given, due) in [
+        (RuntimeEffect::ContactWindow, hello.contact_window.is_some(), false),
+        (RuntimeEffect::Points, hello.points.is_some(), true),
+        (RuntimeEffect::Actuators, hello.actuators.is_some(), true),
+        (RuntimeEffect::Afferents, hello.afferents.is_some(), false),
+        (RuntimeEffect::Relaxation, hello.relaxation.is_some(), false),
+    ] {
+        let named = names.contains(&effect);
+        if given && !named {
+            let message = format!("'{effect}' has parameters, but 'effects' does not name it");
+            return Err(unusable(effect.as_str(), message));
+        }
+        if named && due && !given {
+            let message = format!("the effect '{effect}' needs the member '{effect}'");
+            return Err(unusable(effect.as_str(), message));
+        }
+    }
+    if names.contains(&RuntimeEffect::ContactWindow) && hello.map == Some(false) {
+        let message = "'contact_window' cuts the map, but 'map' is false";
+        return Err(unusable("contact_window", message));
+    }
+    Ok(names)
+}

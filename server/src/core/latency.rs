@@ -1,0 +1,214 @@
+//! How long a tier takes on this machine, as calibration and frames measure it.
+
+use std::{
+    sync::OnceLock,
+    sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering},
+    time::Duration,
+};
+
+use papilla_engine::ladder::Percentiles;
+use papilla_proto::MAP_SIDE_PX;
+
+/// What decoding, encoding and handing over add where no calibration has measured it, us.
+const OVERHEAD_US: u64 = 500;
+
+/// Runs whose median is the typical time of a tier.
+const WINDOW: usize = 32;
+/// Of so many frames in a row that seem hopeless one is rendered all the same.
+const PROBE_EVERY: u32 = 16;
+
+/// How long the inference of a tier takes on this machine.
+#[derive(Debug)]
+pub(crate) struct Latency {
+    fastest_us: AtomicU64,
+    /// The last runs; what was expected or calibrated stands where there were fewer.
+    window_us: [AtomicU64; WINDOW],
+    runs: AtomicUsize,
+    /// Frames that seemed hopeless since the last run.
+    hopeless: AtomicU32,
+    calibrated_us: OnceLock<Percentiles>,
+}
+
+impl Default for Latency {
+    fn default() -> Self {
+        Self {
+            fastest_us: AtomicU64::new(u64::MAX),
+            window_us: [const { AtomicU64::new(0) }; WINDOW],
+            runs: AtomicUsize::new(0),
+            hopeless: AtomicU32::new(0),
+            calibrated_us: OnceLock::new(),
+        }
+    }
+}
+
+impl Latency {
+    /// What to expect before any run: the shipped time.
+    pub(crate) fn expect(&self, time: Duration) {
+        self.fill(us(time));
+    }
+
+    fn fill(&self, us: u64) {
+        self.window_us.iter().for_each(|place| place.store(us, Ordering::Relaxed));
+    }
+
+    /// Takes the times of the calibration in place of what was expected.
+    pub(crate) fn calibrate(&self, times: &mut [Duration]) {
+        times.sort_unstable();
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return };
+        let middle = times[times.len() / 2];
+        let high = times.get(times.len() * 99 / 100).unwrap_or(last);
+        self.fastest_us.fetch_min(us(*first), Ordering::Relaxed);
+        self.fill(us(middle));
+        let _ =
+            self.calibrated_us.set(Percentiles { p50: us(middle) as f64, p99: us(*high) as f64 });
+    }
+
+    /// Takes the times of a second look, if no frame has been measured yet and they are shorter: a
+    /// machine may be busier than it was, but no tier is faster than it can be.
+    pub(crate) fn correct(&self, times: &mut [Duration]) {
+        times.sort_unstable();
+        let (Some(first), Some(middle)) = (times.first(), times.get(times.len() / 2)) else {
+            return;
+        };
+        self.fastest_us.fetch_min(us(*first), Ordering::Relaxed);
+        if !self.is_used() && us(*middle) < self.typical_us() {
+            self.fill(us(*middle));
+        }
+    }
+
+    /// Whether a frame has been measured.
+    pub(crate) fn is_used(&self) -> bool {
+        self.runs.load(Ordering::Relaxed) > 0
+    }
+
+    /// Takes note of one run.
+    pub(crate) fn learn(&self, time: Duration) {
+        let us = us(time);
+        self.fastest_us.fetch_min(us, Ordering::Relaxed);
+        let run = self.runs.fetch_add(1, Ordering::Relaxed);
+        self.window_us[run % WINDOW].store(us, Ordering::Relaxed);
+        self.hopeless.store(0, Ordering::Relaxed);
+    }
+
+    /// Whether no run can be expected to end within `left`: it is less than half the fastest run,
+    /// so that one lucky run on an idle machine does not condemn a frame that could be in time.
+    ///
+    /// Now and then the answer is no all the same: a tier whose frames are all dropped would never
+    /// be measured again, and a time that was taken on a busy machine would stand for good.
+    pub(crate) fn is_hopeless(&self, left: Duration) -> bool {
+        if left.is_zero() {
+            return true;
+        }
+        let is_enough = match self.fastest_us.load(Ordering::Relaxed) {
+            u64::MAX => true,
+            fastest_us => left > Duration::from_micros(fastest_us / 2),
+        };
+        !is_enough && self.hopeless.fetch_add(1, Ordering::Relaxed) % PROBE_EVERY != PROBE_EVERY - 1
+    }
+
+    /// The median of the last runs, us.
+    pub(crate) fn typical_us(&self) -> u64 {
+        let mut window = [0; WINDOW];
+        for (time, place) in window.iter_mut().zip(&self.window_us) {
+            *time = place.load(Ordering::Relaxed);
+        }
+        *window.select_nth_unstable(WINDOW / 2).1
+    }
+
+    /// What the calibration found, us; none if there was none.
+    pub(crate) fn calibrated_us(&self) -> Option<Percentiles> {
+        self.calibrated_us.get().copied()
+    }
+}
+
+/// Whole microseconds, at least one.
+pub(crate) fn us(time: Duration) -> u64 {
+    u64::try_from(time.as_micros()).unwrap_or(u64::MAX).max(1)
+}
+
+/// What decoding, encoding and handing over add to an inference, us.
+#[derive(Debug)]
+pub(crate) struct Overhead(AtomicU64);
+
+impl Default for Overhead {
+    fn default() -> Self {
+        Self(AtomicU64::new(OVERHEAD_US))
+    }
+}
+
+impl Overhead {
+    pub(crate) fn us(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    /// Takes what a calibration has found.
+    pub(crate) fn set_us(&self, us: u64) {
+        self.0.store(us, Ordering::Relaxed);
+    }
+}
+
+/// The map that everything is timed on: a round contact with half of the pressure that a tier was
+/// trained for.
+pub(crate) fn probe_map(pressure_max_pa: f32, pressure_pa: &mut [f32]) {
+    let half = MAP_SIDE_PX as f32 / 2.0;
+    for (i, pressure_pa) in pressure_pa.iter_mut().enumerate() {
+        let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
+        let squared = ((row - half).powi(2) + (column - half).powi(2)) / (0.4 * half).powi(2);
+        *pressure_pa = 0.5 * pressure_max_pa * (1.0 - squared).max(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn a_calibration_replaces_what_was_shipped() {
+        let latency = Latency::default();
+        assert_eq!((latency.typical_us(), latency.is_hopeless(ms(1))), (0, false));
+        latency.expect(Duration::from_micros(900));
+        assert_eq!((latency.typical_us(), latency.calibrated_us()), (900, None));
+        let mut times: Vec<Duration> = (1..=100).rev().map(Duration::from_micros).collect();
+        latency.calibrate(&mut times);
+        assert_eq!(latency.typical_us(), 51);
+        assert_eq!(latency.calibrated_us(), Some(Percentiles { p50: 51.0, p99: 100.0 }));
+    }
+
+    /// The machine was busy while the tier was measured: 40 ms, where it takes 10.
+    #[test]
+    fn a_disturbed_calibration_does_not_last() {
+        let latency = Latency::default();
+        latency.calibrate(&mut [ms(40); 3]);
+        assert_eq!(latency.typical_us(), 40_000);
+        // With 15 ms left frames seem hopeless, and one in a few is tried.
+        let tried = (0..64).filter(|_| !latency.is_hopeless(ms(15))).count();
+        assert_eq!(tried, 4);
+        latency.learn(ms(10));
+        assert!((0..64).all(|_| !latency.is_hopeless(ms(15))));
+        assert!((0..8).all(|_| latency.is_hopeless(ms(4))), "half of 10 ms is not there");
+        assert!((0..64).all(|_| latency.is_hopeless(Duration::ZERO)), "the deadline has passed");
+        // Real frames take the place of the calibration, and a hiccup does not count.
+        (0..WINDOW).for_each(|_| latency.learn(ms(10)));
+        latency.learn(ms(2000));
+        assert_eq!(latency.typical_us(), 10_000);
+    }
+
+    #[test]
+    fn a_second_look_finds_what_a_busy_start_has_hidden() {
+        let latency = Latency::default();
+        latency.calibrate(&mut [ms(40); 3]);
+        latency.correct(&mut [ms(50), ms(60)]);
+        assert_eq!(latency.typical_us(), 40_000, "busier than at the start");
+        latency.correct(&mut [ms(9), ms(10)]);
+        assert_eq!(latency.typical_us(), 10_000);
+        assert!(!latency.is_hopeless(ms(5)), "half of 9 ms is there");
+        // Frames know better.
+        (0..WINDOW).for_each(|_| latency.learn(ms(12)));
+        latency.correct(&mut [ms(8), ms(8)]);
+        assert_eq!(latency.typical_us(), 12_000);
+    }
+}

@@ -1,0 +1,290 @@
+//! What the service counts and times, in the Prometheus text format.
+//!
+//! Handles that the hot path uses are made once per tier, so that counting a
+//! frame looks nothing up and allocates nothing.
+
+mod labels;
+mod process;
+
+use std::{
+    sync::atomic::{AtomicI64, AtomicU64},
+    sync::{Arc, OnceLock},
+    time::Duration,
+};
+
+use papilla_proto::ErrorCode;
+use prometheus_client::{
+    encoding::text,
+    metrics::{counter::Counter, family::Family, gauge::Gauge, histogram::Histogram, info::Info},
+    registry::{Metric, Registry, Unit},
+};
+
+use labels::{
+    CodeLabels, LateLabels, MapLabels, ModelLabels, ReloadLabels, RequestLabels, ShedLabels,
+    StageLabels, Word,
+};
+pub(crate) use labels::{Shed, Stage, TierLabels, Transport};
+
+/// Greatest number of tiers, counting every name since the start: handles have fixed places, so
+/// that the hot path takes no lock.
+pub(crate) const TIERS_MAX: usize = 64;
+
+/// Buckets of every stage, seconds: from a memory copy to a dropped session.
+///
+/// Dense around the budgets that matter: 1 ms (force loop), 5.5 ms (tap), 11.1 ms (90 Hz).
+pub(crate) const BUCKETS_S: [f64; 18] = [
+    50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 3e-3, 4e-3, 5.5e-3, 8e-3, 11.1e-3, 16e-3, 25e-3,
+    50e-3, 100e-3, 200e-3, 500e-3, 2.0,
+];
+
+/// What became of a reload.
+const RELOADS: [&str; 3] = ["ok", "refused", "busy"];
+
+type Stages = Family<StageLabels, Histogram, fn() -> Histogram>;
+type Requests = Family<RequestLabels, Histogram, fn() -> Histogram>;
+
+/// A histogram of one stage of one tier.
+#[derive(Debug, Clone)]
+pub(crate) struct Timer(Histogram);
+
+impl Timer {
+    pub(crate) fn observe(&self, time: Duration) {
+        self.0.observe(time.as_secs_f64());
+    }
+}
+
+/// The timers of one tier.
+#[derive(Debug)]
+pub(crate) struct TierMetrics {
+    /// Waiting for a thread.
+    pub(crate) queue: Timer,
+    /// Decoding and checking.
+    pub(crate) decode: Timer,
+    /// In the network.
+    pub(crate) infer: Timer,
+    /// Encoding the answer.
+    pub(crate) encode: Timer,
+    /// Handing the answer of a session to the socket.
+    pub(crate) send: Timer,
+    /// From receipt until the answer was handed to the socket.
+    pub(crate) total: Timer,
+}
+
+/// The counts of one transport.
+#[derive(Debug)]
+pub(crate) struct TransportMetrics {
+    /// Answered with a map.
+    pub(crate) ok: Counter,
+    /// Replaced by a newer frame.
+    pub(crate) superseded: Counter,
+    /// Answered late.
+    pub(crate) late: Counter,
+    /// Answered stale.
+    pub(crate) stale: Counter,
+    /// Refused.
+    pub(crate) error: Counter,
+    /// Not rendered, since its session had ended.
+    pub(crate) gone: Counter,
+}
+
+/// Everything that is counted.
+#[derive(Debug)]
+pub(crate) struct Metrics {
+    registry: Registry,
+    stages: Stages,
+    /// In the catalogue's order.
+    tiers: [OnceLock<TierMetrics>; TIERS_MAX],
+    /// Stands in for a tier without a place, which no catalogue has; in no registry.
+    stray: TierMetrics,
+    requests: Requests,
+    models: Family<ModelLabels, Gauge>,
+    shed: Family<ShedLabels, Counter>,
+    reloads: Family<ReloadLabels, Counter>,
+    http: TransportMetrics,
+    session: TransportMetrics,
+    oip: TransportMetrics,
+    late: Family<LateLabels, Counter>,
+    errors: Family<CodeLabels, Counter>,
+    /// Zero maps, answered without inference.
+    pub(crate) zero_maps: Counter,
+    /// Slots that wait for a thread.
+    pub(crate) queue_length: Gauge<i64, AtomicI64>,
+    /// Open sessions.
+    pub(crate) sessions_open: Gauge<i64, AtomicI64>,
+    /// Sessions ever opened.
+    pub(crate) sessions: Counter<u64, AtomicU64>,
+    /// Open connections.
+    pub(crate) connections_open: Gauge<i64, AtomicI64>,
+}
+
+impl Metrics {
+    /// All metrics at zero; no tiers yet.
+    pub(crate) fn new() -> Arc<Self> {
+        let mut root = Registry::default();
+        root.register_collector(Box::new(process::Process::default()));
+        let registry = root.sub_registry_with_prefix("papilla");
+        let version = vec![("version", env!("CARGO_PKG_VERSION"))];
+        registry.register("build", "The running version", Info::new(version));
+        let maps = registered(registry, "maps", "Pressure maps by transport and outcome");
+        let stages = Stages::new_with_constructor(|| Histogram::new(BUCKETS_S));
+        let help = "Time a map spends in each stage; total is from receipt to the socket";
+        registry.register_with_unit("stage", help, Unit::Seconds, stages.clone());
+        let requests = Requests::new_with_constructor(|| Histogram::new(BUCKETS_S));
+        let help = "Time of a request, from its head to the head of the answer";
+        registry.register_with_unit("request", help, Unit::Seconds, requests.clone());
+        let metrics = Self {
+            stray: tier_metrics(|_| Timer(Histogram::new(BUCKETS_S))),
+            tiers: std::array::from_fn(|_| OnceLock::new()),
+            stages,
+            requests,
+            models: registered(registry, "model", "Models on offer; the value is always 1"),
+            shed: registered(registry, "shed", "Work turned away, by reason"),
+            reloads: registered(registry, "reloads", "Reloads of the models, by outcome"),
+            http: transport_metrics(&maps, "http"),
+            session: transport_metrics(&maps, "session"),
+            oip: transport_metrics(&maps, "oip"),
+            late: registered(registry, "late", "Late maps by the stage that found them so"),
+            errors: registered(registry, "errors", "Errors sent to clients by code"),
+            zero_maps: registered(registry, "zero_maps", "Zero maps, answered without inference"),
+            queue_length: registered(registry, "queue_length", "Slots that wait for a thread"),
+            sessions_open: registered(registry, "sessions_open", "Open sessions"),
+            sessions: registered(registry, "sessions", "Sessions ever opened"),
+            connections_open: registered(registry, "connections_open", "Open connections"),
+            registry: Registry::default(),
+        };
+        for stage in Stage::ALL {
+            let _ = metrics.late.get_or_create(&LateLabels { stage: stage.word() });
+        }
+        for shed in Shed::ALL {
+            let _ = metrics.shed.get_or_create(&ShedLabels { reason: shed.word() });
+        }
+        // Counted from nothing, so that the first one is a rise and not a new line.
+        for outcome in RELOADS {
+            let _ = metrics.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) });
+        }
+        for code in ErrorCode::ALL {
+            let _ = metrics.errors.get_or_create(&CodeLabels { code: Word(code.as_str()) });
+        }
+        Arc::new(Self { registry: root, ..metrics })
+    }
+
+    /// Gives every tier its timers, in this order, and lists the models on offer.
+    pub(crate) fn name_tiers<'a>(&self, tiers: impl IntoIterator<Item = TierLabels<'a>>) {
+        self.models.clear();
+        for (place, tier) in self.tiers.iter().zip(tiers) {
+            place.get_or_init(|| {
+                tier_metrics(|stage| {
+                    let labels = StageLabels { tier: tier.name.to_owned(), stage };
+                    Timer(self.stages.get_or_create(&labels).clone())
+                })
+            });
+            if !tier.is_offered {
+                continue;
+            }
+            let labels = ModelLabels {
+                tier: tier.name.to_owned(),
+                atlas_hash: tier.atlas_hash.to_owned(),
+                onnx_sha256: tier.onnx_sha256.to_owned(),
+                default: Word(if tier.is_default { "true" } else { "false" }),
+            };
+            self.models.get_or_create(&labels).set(1);
+        }
+    }
+
+    /// The timers of the tier at `place`.
+    pub(crate) fn tier(&self, place: usize) -> &TierMetrics {
+        self.tiers.get(place).and_then(OnceLock::get).unwrap_or(&self.stray)
+    }
+
+    /// Takes note of a request.
+    pub(crate) fn request(&self, route: &'static str, status: u16, time: Duration) {
+        let labels = RequestLabels { route: Word(route), status };
+        self.requests.get_or_create(&labels).observe(time.as_secs_f64());
+    }
+
+    /// Counts work that was turned away.
+    pub(crate) fn shed(&self, shed: Shed) {
+        self.shed.get_or_create(&ShedLabels { reason: shed.word() }).inc();
+    }
+
+    /// Counts a reload that was done, or changed nothing.
+    pub(crate) fn reload(&self, is_ok: bool) {
+        self.count_reload(RELOADS[usize::from(!is_ok)]);
+    }
+
+    /// Counts a reload that came while another was under way.
+    pub(crate) fn reload_busy(&self) {
+        self.count_reload(RELOADS[2]);
+    }
+
+    fn count_reload(&self, outcome: &'static str) {
+        self.reloads.get_or_create(&ReloadLabels { outcome: Word(outcome) }).inc();
+    }
+
+    /// The counts of `transport`.
+    pub(crate) fn of(&self, transport: Transport) -> &TransportMetrics {
+        match transport {
+            Transport::Http => &self.http,
+            Transport::Session => &self.session,
+            Transport::Oip => &self.oip,
+        }
+    }
+
+    /// Counts a late map.
+    pub(crate) fn late(&self, transport: Transport, stage: Stage) {
+        self.of(transport).late.inc();
+        self.late.get_or_create(&LateLabels { stage: stage.word() }).inc();
+    }
+
+    /// Counts an error sent to a client.
+    pub(crate) fn error(&self, code: ErrorCode) {
+        self.errors.get_or_create(&CodeLabels { code: Word(code.as_str()) }).inc();
+    }
+
+    /// The text a scraper reads.
+    pub(crate) fn encode(&self) -> Result<String, std::fmt::Error> {
+        let mut out = String::with_capacity(16 * 1024);
+        text::encode(&mut out, &self.registry)?;
+        Ok(out)
+    }
+}
+
+/// A metric that is registered as it is made.
+fn registered<M: Metric + Clone + Default>(
+    registry: &mut Registry,
+    name: &'static str,
+    help: &'static str,
+) -> M {
+    let metric = M::default();
+    registry.register(name, help, metric.clone());
+    metric
+}
+
+fn tier_metrics(timer: impl Fn(&'static str) -> Timer) -> TierMetrics {
+    TierMetrics {
+        queue: timer("queue"),
+        decode: timer("decode"),
+        infer: timer("infer"),
+        encode: timer("encode"),
+        send: timer("send"),
+        total: timer("total"),
+    }
+}
+
+fn transport_metrics(
+    maps: &Family<MapLabels, Counter>,
+    transport: &'static str,
+) -> TransportMetrics {
+    let count = |outcome| {
+        let labels = MapLabels { transport: Word(transport), outcome: Word(outcome) };
+        maps.get_or_create(&labels).clone()
+    };
+    TransportMetrics {
+        ok: count("ok"),
+        superseded: count("superseded"),
+        late: count("late"),
+        stale: count("stale"),
+        error: count("error"),
+        gone: count("gone"),
+    }
+}

@@ -1,0 +1,228 @@
+//! Models that change while the service runs: load, check, warm, swap; or change nothing.
+
+mod watch;
+
+use std::sync::{Arc, atomic::Ordering};
+
+use arc_swap::ArcSwap;
+use papilla_proto::{ErrorCode, Problem};
+use serde::Serialize;
+use tokio::sync::{Mutex, OwnedMutexGuard, watch::Sender};
+
+pub(crate) use watch::{once, watch};
+
+use crate::{
+    StartError,
+    config::Config,
+    core::{
+        catalogue::{
+            Catalogue, Tier,
+            assets::Assets,
+            calibrate,
+            golden::{self, GoldenError},
+        },
+        metrics::{Metrics, TIERS_MAX},
+        scheduler::Exchange,
+    },
+};
+
+/// Holds what there is to render with, and reloads the models of a folder.
+pub(crate) struct Reloader {
+    running: ArcSwap<Catalogue>,
+    /// True once the server drains.
+    drain: Arc<Sender<bool>>,
+    config: Config,
+    exchange: Exchange,
+    metrics: Arc<Metrics>,
+    /// One reload at a time.
+    turn: Arc<Mutex<()>>,
+}
+
+/// The turn of one reload; the next begins when it is dropped.
+pub(crate) struct Turn(#[expect(dead_code, reason = "held, not read")] OwnedMutexGuard<()>);
+
+/// What a reload changed, by tier names.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Changes {
+    /// The tier clients get unasked.
+    pub(crate) default: String,
+    pub(crate) added: Vec<String>,
+    /// Same name, other file.
+    pub(crate) changed: Vec<String>,
+    pub(crate) removed: Vec<String>,
+    pub(crate) unchanged: Vec<String>,
+}
+
+/// Why nothing was changed.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ReloadError {
+    #[error("the models in the binary cannot change; start the service with --models DIR")]
+    Embedded,
+    #[error("another reload is under way")]
+    Busy,
+    #[error("the server drains")]
+    Draining,
+    #[error(transparent)]
+    Load(#[from] StartError),
+    #[error("tier {tier}: {source}")]
+    Golden { tier: String, source: GoldenError },
+    #[error("atlas.json is another atlas ({found}, not {running}); restart the service for it")]
+    OtherAtlas { found: String, running: String },
+    #[error("tier {tier} no longer renders {effect}, which open sessions were promised")]
+    BrokenPromise { tier: String, effect: String },
+    #[error("more than {TIERS_MAX} tier names since the start; restart the service")]
+    TooMany,
+}
+
+impl From<ReloadError> for Problem {
+    fn from(error: ReloadError) -> Self {
+        let code = match error {
+            ReloadError::Busy => ErrorCode::Overloaded,
+            ReloadError::Draining => ErrorCode::ShuttingDown,
+            _ => ErrorCode::BadModel,
+        };
+        Self::new(code, format!("{error}; the models that run were left as they are"))
+    }
+}
+
+impl Reloader {
+    pub(crate) fn new(
+        config: &Config,
+        catalogue: Arc<Catalogue>,
+        exchange: Exchange,
+        metrics: Arc<Metrics>,
+        drain: Arc<Sender<bool>>,
+    ) -> Self {
+        let running = ArcSwap::new(catalogue);
+        Self { running, drain, config: config.clone(), exchange, metrics, turn: Arc::default() }
+    }
+
+    /// What there is to render with now; it may be replaced at any time, so whoever needs it
+    /// twice keeps it.
+    pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
+        self.running.load_full()
+    }
+
+    /// The turn, if no reload is under way.
+    ///
+    /// # Errors
+    /// One is, which is counted.
+    pub(crate) fn try_begin(&self) -> Result<Turn, ReloadError> {
+        Arc::clone(&self.turn).try_lock_owned().map(Turn).map_err(|_| {
+            self.metrics.reload_busy();
+            ReloadError::Busy
+        })
+    }
+
+    /// The turn, once no reload is under way.
+    pub(crate) async fn begin(&self) -> Turn {
+        Turn(Arc::clone(&self.turn).lock_owned().await)
+    }
+
+    /// Loads the folder, checks every new model, hands the threads warm sessions of it and
+    /// then swaps the catalogue. Takes seconds, and ends early when the drain begins; not for a
+    /// thread that moves bytes.
+    ///
+    /// # Errors
+    /// Anything that would keep the service from starting, a wrong golden answer, another
+    /// atlas, or the drain began; nothing has changed then.
+    pub(crate) fn reload(&self, _turn: Turn) -> Result<Changes, ReloadError> {
+        let result = self.replace();
+        self.metrics.reload(result.is_ok());
+        match &result {
+            Ok(changes) => tracing::info!(?changes, "models reloaded"),
+            Err(error) => tracing::error!(%error, "models not reloaded; nothing has changed"),
+        }
+        result
+    }
+
+    fn replace(&self) -> Result<Changes, ReloadError> {
+        if self.config.models.is_none() {
+            return Err(ReloadError::Embedded);
+        }
+        let assets = Assets::of_unless(&self.config, &|| self.is_draining())?
+            .ok_or(ReloadError::Draining)?;
+        let go_on = || if self.is_draining() { Err(ReloadError::Draining) } else { Ok(()) };
+        let old = self.catalogue();
+        let new = Catalogue::load(&assets, self.config.default_tier.as_deref(), Some(&old))?;
+        if new.atlas.hash() != old.atlas.hash() {
+            let [found, running] = [&new, &old].map(|c| c.atlas.hash().to_owned());
+            return Err(ReloadError::OtherAtlas { found, running });
+        }
+        for tier in new.tiers.iter().filter(|tier| is_new(tier, &old)) {
+            let name = || tier.name.clone();
+            go_on()?;
+            golden::check(&new, tier)
+                .map_err(|source| ReloadError::Golden { tier: name(), source })?;
+            keeps_promises(tier, &old)?;
+        }
+        let (new, changes) = succeed(new, &old);
+        if new.tiers.len() > TIERS_MAX {
+            return Err(ReloadError::TooMany);
+        }
+        go_on()?;
+        calibrate::calibrate(&new, self.config.calibration())?;
+        go_on()?;
+        let new = Arc::new(new);
+        let fresh = |place: usize| is_new(&new.tiers[place], &old);
+        let sessions = self.exchange.prepare(&new, fresh)?;
+        // From here on nothing fails. Threads first: whoever reads the new catalogue may
+        // submit a job for a new tier at once.
+        self.metrics.name_tiers(new.tier_labels());
+        self.exchange.hand_over(&new, sessions);
+        self.running.store(new);
+        Ok(changes)
+    }
+
+    fn is_draining(&self) -> bool {
+        *self.drain.borrow()
+    }
+}
+
+/// Whether `old` has no such tier or another model under its name.
+fn is_new(tier: &Tier, old: &Catalogue) -> bool {
+    let same = |t: &&Tier| t.name == tier.name && Arc::ptr_eq(&t.model, &tier.model);
+    old.tiers.iter().find(same).is_none()
+}
+
+/// Open sessions were told which effects they get.
+fn keeps_promises(tier: &Tier, old: &Catalogue) -> Result<(), ReloadError> {
+    let in_use = |t: &&Tier| t.name == tier.name && t.sessions.load(Ordering::Relaxed) > 0;
+    let Some(before) = old.tiers.iter().find(in_use) else { return Ok(()) };
+    match before.effects.iter().find(|effect| !tier.effects.contains(effect)) {
+        None => Ok(()),
+        Some(effect) => {
+            let (tier, effect) = (tier.name.clone(), effect.clone());
+            Err(ReloadError::BrokenPromise { tier, effect })
+        }
+    }
+}
+
+/// Puts the tiers of `new` where `old` has those of the same name, and new ones behind; what
+/// only `old` has stays in its place, retired.
+fn succeed(mut new: Catalogue, old: &Catalogue) -> (Catalogue, Changes) {
+    let default = new.tiers[new.default].name.clone();
+    let mut coming = std::mem::take(&mut new.tiers);
+    let mut changes = Changes { default: default.clone(), ..Changes::default() };
+    for before in &old.tiers {
+        let name = before.name.clone();
+        let Some(index) = coming.iter().position(|tier| tier.name == name) else {
+            if !before.retired {
+                changes.removed.push(name);
+            }
+            new.tiers.push(Tier { retired: true, ..before.clone() });
+            continue;
+        };
+        let tier = coming.remove(index);
+        match (before.retired, is_new(&tier, old)) {
+            (true, _) => changes.added.push(name),
+            (false, true) => changes.changed.push(name),
+            (false, false) => changes.unchanged.push(name),
+        }
+        new.tiers.push(tier);
+    }
+    changes.added.extend(coming.iter().map(|tier| tier.name.clone()));
+    new.tiers.append(&mut coming);
+    new.default = new.find(&default).unwrap_or_default();
+    (new, changes)
+}

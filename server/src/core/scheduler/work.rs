@@ -1,0 +1,235 @@
+//! One inference thread: decode, check, infer, encode.
+
+use std::{
+    mem,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{Arc, PoisonError},
+    time::{Duration, Instant},
+};
+
+use papilla_engine::Session;
+use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
+
+use super::{
+    Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
+    exchange::Inbox,
+    queue::{Next, Queue},
+};
+use crate::{
+    StartError,
+    codec::{self, Map, Quantity},
+    core::{
+        buffers::{HEADROOM, Recycler},
+        catalogue::Catalogue,
+        metrics::{Metrics, Stage},
+    },
+    problem,
+};
+
+/// Everything a thread owns; nothing is allocated after `prepare`.
+pub(super) struct Worker {
+    catalogue: Arc<Catalogue>,
+    metrics: Arc<Metrics>,
+    /// One per tier, in the catalogue's order.
+    sessions: Vec<Box<dyn Session>>,
+    pressure_pa: Vec<f32>,
+    sed_j_per_m3: Vec<f32>,
+}
+
+impl Worker {
+    /// Makes and warms a session of every tier.
+    pub(super) fn prepare(
+        catalogue: &Arc<Catalogue>,
+        metrics: Arc<Metrics>,
+    ) -> Result<Self, StartError> {
+        let mut worker = Self {
+            sessions: Vec::with_capacity(catalogue.tiers.len()),
+            catalogue: Arc::clone(catalogue),
+            metrics,
+            pressure_pa: vec![0.0; MAP_LEN],
+            sed_j_per_m3: vec![0.0; MAP_LEN],
+        };
+        for tier in &catalogue.tiers {
+            let session = tier.warm_session(&mut worker.pressure_pa, &mut worker.sed_j_per_m3)?;
+            worker.sessions.push(session);
+        }
+        Ok(worker)
+    }
+
+    /// Serves the queue until it is closed and empty.
+    pub(super) fn run(&mut self, queue: &Queue, inbox: &Inbox) {
+        loop {
+            let next = queue.pop(POP_TIMEOUT);
+            // After the wait: a job for a new tier comes only once its session is there.
+            inbox.collect(&mut self.catalogue, &mut self.sessions);
+            let slot = match next {
+                Next::Slot(slot) => slot,
+                Next::Nothing => continue,
+                Next::Closed => return,
+            };
+            self.metrics.queue_length.set(queue.len());
+            let abandoned = slot.is_abandoned();
+            let Some((mut job, mut recycler)) = slot.take() else { continue };
+            let done = if abandoned {
+                finished(&job, Progress::default(), Outcome::Gone)
+            } else {
+                self.serve(&mut job, &mut recycler)
+            };
+            if slot.finish(done, recycler) {
+                queue.push_again(slot);
+            }
+        }
+    }
+
+    /// Renders one job; a panic below becomes an error of this job alone.
+    fn serve(&mut self, job: &mut Job, recycler: &mut Recycler) -> Done {
+        let mut progress = Progress::default();
+        progress.times.queue = job.received.elapsed();
+        let outcome = if job.is_late() {
+            Outcome::Late(Stage::Dequeue)
+        } else {
+            let rendered =
+                catch_unwind(AssertUnwindSafe(|| self.render(job, recycler, &mut progress)));
+            rendered.unwrap_or_else(|_| self.recover(job.tier))
+        };
+        let (tier, times) = (self.metrics.tier(job.tier), progress.times);
+        tier.queue.observe(times.queue);
+        if let Outcome::Map { .. } = outcome {
+            tier.decode.observe(times.decode);
+            tier.encode.observe(times.encode);
+            if times.infer > Duration::ZERO {
+                tier.infer.observe(times.infer);
+            }
+        }
+        finished(job, progress, outcome)
+    }
+
+    /// A fresh session takes the place of one that panicked.
+    fn recover(&mut self, index: usize) -> Outcome {
+        let tier = &self.catalogue.tiers[index];
+        if let Ok(session) = tier.model.session() {
+            self.sessions[index] = session;
+        }
+        Outcome::Failed(problem::internal("the inference panicked", &tier.name))
+    }
+
+    fn render(
+        &mut self,
+        job: &mut Job,
+        recycler: &mut Recycler,
+        progress: &mut Progress,
+    ) -> Outcome {
+        match self.try_render(job, recycler, progress) {
+            Ok(outcome) => outcome,
+            Err(problem) => Outcome::Failed(problem),
+        }
+    }
+
+    fn try_render(
+        &mut self,
+        job: &mut Job,
+        recycler: &mut Recycler,
+        Progress { times, meta }: &mut Progress,
+    ) -> Result<Outcome, Problem> {
+        let start = Instant::now();
+        // The frame's memory goes back to its session before the network is asked.
+        let payload = mem::take(&mut job.payload);
+        let (mut summary, range) = self.decode(job, &payload)?;
+        drop(payload);
+        let tier = &self.catalogue.tiers[job.tier];
+        let &JobOptions { headroom, time_us, ref effects, .. } = &job.options;
+        let mut effects =
+            effects.as_ref().map(|effects| effects.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(effects) = &mut effects {
+            let peak_pa = effects.before(&mut self.pressure_pa, time_us);
+            summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
+        }
+        meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
+        let is_out_of_distribution =
+            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_beyond);
+        meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
+        let decoded = Instant::now();
+        times.decode = decoded - start;
+
+        if summary.is_zero() {
+            // Nothing touches the finger: nothing is felt, and no network is asked.
+            self.sed_j_per_m3.fill(0.0);
+            self.metrics.zero_maps.inc();
+            meta.flags |= flags::NO_CONTACT;
+        } else if job.deadline.is_some_and(|deadline| {
+            tier.latency.is_hopeless(deadline.saturating_duration_since(decoded))
+        }) {
+            return Ok(Outcome::Late(Stage::Inference));
+        } else {
+            self.sessions[job.tier].infer(&self.pressure_pa, &mut self.sed_j_per_m3).map_err(
+                |error| {
+                    let error = format_args!("{}.onnx: {error}", tier.name);
+                    problem::internal("the inference failed", &error)
+                },
+            )?;
+            times.infer = decoded.elapsed();
+            tier.latency.learn(times.infer);
+        }
+
+        let start = Instant::now();
+        let sed_max = tier.sed_max_j_per_m3;
+        let (bytes, scale) = if let Some(effects) = &mut effects {
+            let buffer = recycler.claim(HEADROOM + effects.size_hint());
+            buffer.resize(headroom, 0);
+            let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
+            let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;
+            (meta.kind, meta.window) = (written.kind, written.window);
+            (buffer.split(), written.scale)
+        } else {
+            let buffer = recycler.claim(headroom + job.output.size_hint());
+            buffer.resize(headroom, 0);
+            let map = Map {
+                quantity: Quantity::Sed,
+                values: &self.sed_j_per_m3,
+                value_max: sed_max,
+                source: &tier.name,
+            };
+            let scale = codec::encode(job.output, map, buffer)?;
+            (buffer.split(), scale)
+        };
+        times.encode = start.elapsed();
+        Ok(Outcome::Map { bytes, scale })
+    }
+
+    /// Decodes and checks the pressure; what lies off the skin is taken off.
+    fn decode(
+        &mut self,
+        job: &Job,
+        payload: &[u8],
+    ) -> Result<(MapSummary, PressureRange), Problem> {
+        codec::decode(job.input, payload, &mut self.pressure_pa)?;
+        let range = PressureRange {
+            trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
+            takes_more: job.options.takes_more,
+        };
+        range.check(&self.pressure_pa).map_err(problem::of_map)?;
+        let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);
+        Ok((summary, range))
+    }
+}
+
+/// How far a job has come.
+#[derive(Debug, Default)]
+struct Progress {
+    times: Times,
+    meta: OutputMeta,
+}
+
+fn finished(job: &Job, Progress { times, meta }: Progress, outcome: Outcome) -> Done {
+    Done {
+        tier: job.tier,
+        header: job.options.header,
+        received: job.received,
+        deadline: job.deadline,
+        times,
+        meta,
+        output: job.output,
+        outcome,
+    }
+}

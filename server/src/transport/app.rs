@@ -1,0 +1,145 @@
+//! What every route and session shares.
+
+use std::{
+    sync::Arc,
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use papilla_proto::{ErrorCode, Problem};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
+
+use super::gate::{Gate, Principal};
+use crate::{
+    config::{Config, Timeouts},
+    core::{
+        buffers::Store,
+        catalogue::Catalogue,
+        metrics::{Metrics, Shed},
+        reload::Reloader,
+        scheduler::{Pool, PoolHandle},
+    },
+    problem,
+    progress::Progress,
+};
+
+/// The shared state.
+pub(crate) struct App {
+    pub(crate) reloader: Arc<Reloader>,
+    pub(crate) gate: Gate,
+    /// Largest body of a request, bytes.
+    pub(crate) body_max: usize,
+    pub(crate) metrics: Arc<Metrics>,
+    pub(crate) pool: PoolHandle,
+    pub(crate) timeouts: Timeouts,
+    /// True once the server drains. Whoever must be waited for holds a receiver.
+    pub(crate) drain: Arc<watch::Sender<bool>>,
+    /// How far the start has come.
+    pub(crate) progress: Arc<Progress>,
+    /// Memory of sessions that are over.
+    pub(crate) store: Store,
+    sessions: Arc<Semaphore>,
+    requests: Arc<Semaphore>,
+    requests_max: usize,
+    next_session: AtomicU64,
+}
+
+impl App {
+    pub(crate) fn new(
+        config: &Config,
+        catalogue: Arc<Catalogue>,
+        metrics: Arc<Metrics>,
+        pool: &Pool,
+        gate: Gate,
+        drain: Arc<watch::Sender<bool>>,
+        progress: Arc<Progress>,
+    ) -> Self {
+        let (exchange, counted) = (pool.exchange(), Arc::clone(&metrics));
+        let reloader = Reloader::new(config, catalogue, exchange, counted, Arc::clone(&drain));
+        Self {
+            reloader: Arc::new(reloader),
+            gate,
+            body_max: config.max_body_bytes,
+            pool: pool.handle(&metrics),
+            metrics,
+            timeouts: config.timeouts(),
+            drain,
+            progress,
+            store: Store::new(config.max_sessions.get()),
+            sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
+            requests: Arc::new(Semaphore::new(config.max_requests.get())),
+            requests_max: config.max_requests.get(),
+            next_session: AtomicU64::new(1),
+        }
+    }
+
+    /// What there is to render with now; it may be replaced at any time, so whoever needs it
+    /// twice keeps it.
+    pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
+        self.reloader.catalogue()
+    }
+
+    /// Whether nobody is served: no session is open and no posted map is under way.
+    pub(crate) fn is_idle(&self) -> bool {
+        let is_any_posted = self.requests.available_permits() < self.requests_max;
+        self.metrics.sessions_open.get() == 0 && !is_any_posted
+    }
+
+    /// Whether new work is refused.
+    pub(crate) fn is_draining(&self) -> bool {
+        *self.drain.borrow()
+    }
+
+    /// A place for one session of this principal.
+    ///
+    /// # Errors
+    /// All are taken, or all that the principal may have, or the server drains.
+    pub(crate) fn admit_session(&self, principal: &Principal) -> Result<SessionPlace, Problem> {
+        let holder =
+            principal.holder.as_ref().and_then(|holder| Some((holder, holder.sessions.as_ref()?)));
+        let of_token = holder.map(|(holder, places)| {
+            Arc::clone(places).try_acquire_owned().map_err(|_| {
+                self.metrics.shed(Shed::TokenSessions);
+                let message = format!("token '{}' has all the sessions it may have", holder.name);
+                Problem::new(ErrorCode::Overloaded, message)
+            })
+        });
+        let of_token = of_token.transpose()?;
+        let of_all = self.admit(&self.sessions, "session", Shed::Sessions)?;
+        Ok(SessionPlace { _of_all: of_all, _of_token: of_token })
+    }
+
+    /// A place for one posted map.
+    ///
+    /// # Errors
+    /// All are taken, or the server drains.
+    pub(crate) fn admit_request(&self) -> Result<OwnedSemaphorePermit, Problem> {
+        self.admit(&self.requests, "request", Shed::Requests)
+    }
+
+    fn admit(
+        &self,
+        places: &Arc<Semaphore>,
+        what: &str,
+        shed: Shed,
+    ) -> Result<OwnedSemaphorePermit, Problem> {
+        if self.is_draining() {
+            return Err(problem::shutting_down());
+        }
+        Arc::clone(places).try_acquire_owned().map_err(|_| {
+            self.metrics.shed(shed);
+            let message = format!("every {what} place is taken; try again in a moment");
+            Problem::new(ErrorCode::Overloaded, message)
+        })
+    }
+
+    /// A number no other session of this run has.
+    pub(crate) fn session_number(&self) -> u64 {
+        self.next_session.fetch_add(1, Ordering::Relaxed)
+    }
+}
+
+/// A place for one session; given back when it is dropped.
+pub(crate) struct SessionPlace {
+    _of_all: OwnedSemaphorePermit,
+    _of_token: Option<OwnedSemaphorePermit>,
+}

@@ -1,0 +1,31 @@
+//! `GET /v1/effects`: what a session can ask for, and what that costs here.
+
+use axum::{extract::State, response::Response};
+use papilla_proto::RuntimeEffect;
+use serde_json::{Value, json};
+
+use crate::transport::answer::{Shared, json_answer};
+
+pub(crate) async fn list(State(app): Shared) -> Response {
+    let catalogue = app.catalogue();
+    let costs = catalogue.runtime.costs();
+    let of_sessions = RuntimeEffect::ALL.into_iter().map(|effect| {
+        let cost = costs.and_then(|costs| costs.iter().find(|cost| cost.effect == effect));
+        json!({
+            "name": effect,
+            "of": "session",
+            "what": effect.what(),
+            "cost_us": cost.map(|cost| cost.us),
+        })
+    });
+    let mut names: Vec<&String> = catalogue.tiers.iter().flat_map(|tier| &tier.effects).collect();
+    names.sort_unstable();
+    names.dedup();
+    let of_tiers = names.into_iter().map(|name| {
+        let renders = catalogue.tiers.iter().filter(|tier| tier.effects.contains(name));
+        let tiers: Vec<&String> = renders.map(|tier| &tier.name).collect();
+        json!({"name": name, "of": "tier", "tiers": tiers})
+    });
+    let effects: Vec<Value> = of_sessions.chain(of_tiers).collect();
+    json_answer(&json!({"effects": effects}))
+}

@@ -1,0 +1,116 @@
+//! What the service says of itself.
+
+use std::sync::{Arc, atomic::Ordering};
+
+use axum::{
+    extract::State,
+    http::{HeaderMap, HeaderValue, StatusCode, header},
+    response::Response,
+};
+use papilla_proto::Problem;
+use serde::Serialize;
+use serde_json::{Value, json};
+use tokio::{sync::Semaphore, task::spawn_blocking};
+
+use crate::{
+    core::{
+        cache::Content,
+        catalogue::{Catalogue, Document},
+        metrics::Metrics,
+    },
+    problem, progress,
+    transport::answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
+};
+
+/// Alive: the process answers.
+pub(crate) async fn healthz() -> Response {
+    json_answer(&json!({"status": "ok"}))
+}
+
+/// Ready: every thread has its models, every tier is measured, and the server does not drain.
+pub(crate) async fn readyz(State(app): Shared) -> Answer {
+    if app.is_draining() {
+        return refuse(&app, problem::shutting_down());
+    }
+    Ok(match app.progress.left() {
+        Some(left) => starting(&app.metrics, &left),
+        None => json_answer(&json!({"status": "ready"})),
+    })
+}
+
+/// What `/readyz` answers while the start goes on: a refusal that says what is left.
+pub(crate) fn starting(metrics: &Metrics, left: &progress::State) -> Response {
+    #[derive(Serialize)]
+    struct Starting<'a> {
+        error: &'a Problem,
+        status: &'static str,
+        #[serde(flatten)]
+        left: &'a progress::State,
+    }
+    let problem = left.problem();
+    metrics.error(problem.code);
+    let mut response = json_answer(&Starting { error: &problem, status: "starting", left });
+    *response.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+    let headers = response.headers_mut();
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
+    label(headers, problem.code, None);
+    response
+}
+
+/// One text at a time, and not on a thread that moves bytes: it takes milliseconds, and looks into
+/// the system's files.
+pub(crate) async fn metrics(State(app): Shared) -> Answer {
+    static TURN: Semaphore = Semaphore::const_new(1);
+    let failed = |error: &dyn std::fmt::Display| -> Problem {
+        problem::internal("the metrics cannot be encoded", error)
+    };
+    let _turn = TURN.acquire().await.map_err(|error| failed(&error))?;
+    let metrics = Arc::clone(&app.metrics);
+    let text = spawn_blocking(move || metrics.encode()).await.map_err(|error| failed(&error))?;
+    let text = text.map_err(|error| failed(&error))?;
+    Ok(answer("application/openmetrics-text; version=1.0.0; charset=utf-8", text))
+}
+
+pub(crate) async fn tiers(State(app): Shared) -> Response {
+    let catalogue = app.catalogue();
+    let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
+    // The ladder is long and never changes: its JSON is put in as it is.
+    let text = format!(
+        r#"{{"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
+        json!(catalogue.tiers[catalogue.default].name),
+        json!(catalogue.judged_on),
+        catalogue.ladder_json,
+        catalogue.overhead.us(),
+        json!(tiers),
+    );
+    answer("application/json", text)
+}
+
+fn tier(catalogue: &Catalogue, index: usize) -> Value {
+    let tier = &catalogue.tiers[index];
+    json!({
+        "name": tier.name,
+        "kind": tier.kind,
+        "default": index == catalogue.default,
+        "effects": tier.effects,
+        "atlas_hash": tier.atlas_hash,
+        "pressure_max_pa": tier.pressure_max_pa,
+        "pattern_max": tier.input_statistics_max,
+        "sed_max_j_per_m3": tier.sed_max_j_per_m3,
+        "relative_l2_median": tier.relative_l2_median,
+        "predicted_latency_us": catalogue.predicted_latency_us(index),
+        "calibrated_us": tier.latency.calibrated_us(),
+        "sessions": tier.sessions.load(Ordering::Relaxed),
+    })
+}
+
+pub(crate) async fn models(State(app): Shared, headers: HeaderMap) -> Answer {
+    let catalogue = app.catalogue();
+    let of = Arc::clone(&catalogue);
+    let make = move || {
+        let cards: Vec<&Value> = of.offered().map(|(_, tier)| &tier.card).collect();
+        Ok(Content::new("application/json", json!({"models": cards}).to_string()))
+    };
+    let models = cached(&catalogue.cache, &headers, Document::Models, make).await;
+    models.or_else(|problem| refuse(&app, problem))
+}

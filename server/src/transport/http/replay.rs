@@ -1,0 +1,117 @@
+//! `/v1/presses`: the replay, states of FE simulations to hold the networks against.
+
+use std::sync::Arc;
+
+use axum::{
+    extract::State,
+    http::{HeaderMap, Uri},
+};
+use bytes::BytesMut;
+use papilla_proto::{ErrorCode, MAP_LEN, Problem, error::shortened};
+use serde_json::{Value, json};
+
+use crate::{
+    codec::{self, Map, Output, Quantity},
+    core::{
+        cache::Content,
+        catalogue::{Catalogue, Document},
+    },
+    problem,
+    transport::{
+        answer::{Answer, Shared, cached, refuse},
+        negotiate,
+    },
+};
+
+pub(crate) async fn list(State(app): Shared, headers: HeaderMap) -> Answer {
+    let catalogue = app.catalogue();
+    let of = Arc::clone(&catalogue);
+    let make = move || {
+        let states = of.replay.states.iter().enumerate().map(|(id, state)| {
+            json!({"id": id, "name": state.name, "pose": state.pose, "depth_mm": state.depth_mm})
+        });
+        let states: Vec<Value> = states.collect();
+        let text = json!({"atlas_hash": of.atlas.hash(), "presses": states}).to_string();
+        Ok(Content::new("application/json", text))
+    };
+    let made = cached(&catalogue.cache, &headers, Document::States, make).await;
+    made.or_else(|problem| refuse(&app, problem))
+}
+
+/// The number of the state in the path, `/v1/presses/{press}`.
+///
+/// Taken from the raw path: axum's own extractor would refuse broken percent-encoding in
+/// words that are not our JSON.
+fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
+    let states = &catalogue.replay.states;
+    let asked = uri.path().split('/').nth(3).unwrap_or_default();
+    let found = asked.parse().ok().filter(|id: &usize| *id < states.len());
+    found.ok_or_else(|| {
+        let asked = shortened(asked);
+        let message = format!("no press '{asked}'; there are {}, counted from 0", states.len());
+        Problem::new(ErrorCode::NotFound, message)
+    })
+}
+
+/// Vertex values, as the atlas orders them.
+pub(crate) async fn one(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    let catalogue = app.catalogue();
+    let state = match find(&catalogue, &uri) {
+        Ok(state) => state,
+        Err(problem) => return refuse(&app, problem),
+    };
+    let of = Arc::clone(&catalogue);
+    let make = move || match serde_json::to_vec(&of.replay.states[state]) {
+        Ok(bytes) => Ok(Content::new("application/json", bytes)),
+        Err(error) => Err(problem::internal("the press cannot be encoded", &error)),
+    };
+    let made = cached(&catalogue.cache, &headers, Document::State(state), make).await;
+    made.or_else(|problem| refuse(&app, problem))
+}
+
+/// The pressure as a map, ready to be posted.
+pub(crate) async fn pressure(app: Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, &uri, &headers, Quantity::Pressure).await
+}
+
+/// The FE solver's SED as a map.
+pub(crate) async fn sed(app: Shared, uri: Uri, headers: HeaderMap) -> Answer {
+    map(app, &uri, &headers, Quantity::Sed).await
+}
+
+async fn map(State(app): Shared, uri: &Uri, headers: &HeaderMap, quantity: Quantity) -> Answer {
+    let catalogue = app.catalogue();
+    let asked = find(&catalogue, uri).and_then(|state| Ok((state, negotiate::output(headers)?)));
+    let (state, output) = match asked {
+        Ok(asked) => asked,
+        Err(problem) => return refuse(&app, problem),
+    };
+    let of = Arc::clone(&catalogue);
+    let make = move || rasterised(&of, state, quantity, output);
+    let document = Document::StateMap(state, quantity, output);
+    let made = cached(&catalogue.cache, headers, document, make).await;
+    made.or_else(|problem| refuse(&app, problem))
+}
+
+fn rasterised(
+    catalogue: &Catalogue,
+    state: usize,
+    quantity: Quantity,
+    output: Output,
+) -> Result<Content, Problem> {
+    let state = &catalogue.replay.states[state];
+    let (raster, vertex_values, white) = match quantity {
+        Quantity::Pressure => (&catalogue.skin, &state.pressure_pa, "x-pressure-max-pa"),
+        Quantity::Sed => (&catalogue.interface, &state.sed_j_per_m3, "x-sed-max-j-per-m3"),
+    };
+    let mut values = vec![0.0; MAP_LEN];
+    raster
+        .rasterise(vertex_values, &mut values)
+        .map_err(|error| problem::internal("the press does not fit the atlas", &error))?;
+    let mut bytes = BytesMut::with_capacity(output.size_hint());
+    // No common scale: each picture uses the whole range of gray.
+    let map = Map { quantity, values: &values, value_max: f32::MIN_POSITIVE, source: "fe" };
+    let scale = codec::encode(output, map, &mut bytes)?;
+    let white = (output == Output::Png).then_some((white, scale));
+    Ok(Content { white, is_negotiated: true, ..Content::new(output.content_type(), bytes) })
+}

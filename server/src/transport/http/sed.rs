@@ -1,0 +1,66 @@
+//! `POST /v1/sed`: one pressure map in, one SED map out.
+
+use std::time::{Duration, Instant};
+
+use axum::{
+    body::Body,
+    extract::State,
+    http::{HeaderMap, HeaderValue, Uri},
+    response::Response,
+};
+use papilla_proto::Problem;
+
+use crate::{
+    codec::Output,
+    core::{
+        metrics::Transport,
+        scheduler::{Job, JobOptions},
+    },
+    transport::{
+        answer::{
+            Answer, Shared, answer, body, refuse,
+            render::{Rendered, count, through_pool},
+        },
+        app::App,
+        negotiate::{self, Query},
+    },
+};
+
+pub(crate) async fn post(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
+    let result = render(&app, &uri, &headers, body).await;
+    count(&app, Transport::Http, &result);
+    result.or_else(|problem| refuse(&app, problem))
+}
+
+async fn render(
+    app: &App,
+    uri: &Uri,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Response, Problem> {
+    // The body first: a client that is still sending would not read our answer.
+    let payload = body::read(body, app.body_max, app.timeouts.io).await?;
+    let received = Instant::now();
+    body::require_plain(headers)?;
+    let query = Query::parse(uri.query().unwrap_or_default())?;
+    let input = negotiate::input(headers, &query, &payload)?;
+    let output = negotiate::output(headers)?;
+    let catalogue = app.catalogue();
+    let tier = match &query.tier {
+        Some(name) => catalogue.tier_named(name)?,
+        None => catalogue.choose(query.budget(), &[]).unwrap_or(catalogue.default),
+    };
+    let deadline = query.budget().map(|us| received + Duration::from_micros(us.into()));
+    let job =
+        Job { tier, payload, input, output, received, deadline, options: JobOptions::default() };
+    // Held until the answer is there: it bounds the queue.
+    let _place = app.admit_request()?;
+    let Rendered { bytes, scale, timings } = through_pool(app, job, Transport::Http).await?;
+    let mut response = answer(output.content_type(), bytes.freeze());
+    let headers = response.headers_mut();
+    timings.label(headers, &catalogue.tiers[tier].name);
+    if let (Output::Png, Ok(white)) = (output, HeaderValue::from_str(&scale.to_string())) {
+        headers.insert("x-sed-max-j-per-m3", white);
+    }
+    Ok(response)
+}

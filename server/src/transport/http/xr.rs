@@ -1,0 +1,87 @@
+//! `/xr`: the files of a folder, for a page that is built elsewhere (`clients/web`, `npm run
+//! build`).
+//!
+//! Not in the list of routes: without a folder there is nothing there.
+
+use std::{io::ErrorKind, path::Path, sync::Arc};
+
+use axum::{
+    Router,
+    extract::{Request, State},
+    http::{HeaderValue, StatusCode, Uri, header, uri::PathAndQuery},
+    response::{IntoResponse, Redirect, Response},
+    routing::get,
+};
+use papilla_proto::{ErrorCode, Problem, error::shortened};
+use tower_http::services::ServeDir;
+
+use crate::{
+    problem,
+    transport::{
+        answer::{Shared, refuse},
+        app::App,
+    },
+};
+
+/// What a folder adds to the routes; none of it asks for a token, as the page does not.
+pub(crate) const PATHS: [&str; 3] = ["/xr", "/xr/", "/xr/{*path}"];
+
+/// The routes that serve `folder`. `ServeDir` refuses paths that lead out of it (`..`, roots, drive
+/// names).
+pub(crate) fn routes(folder: &Path) -> Router<Arc<App>> {
+    let files = ServeDir::new(folder);
+    let serve = get(move |state: Shared, request: Request| file(files, state, request));
+    let [bare, index, below] = PATHS;
+    Router::new()
+        // Without the slash the page's relative addresses would miss the folder.
+        .route(bare, get(|| async { Redirect::permanent("/xr/") }))
+        .route(index, serve.clone())
+        .route(below, serve)
+}
+
+async fn file(mut files: ServeDir, State(app): Shared, mut request: Request) -> Response {
+    let asked = request.uri().clone();
+    let Some(below) = below(&asked) else { return missing(&app, asked.path()) };
+    *request.uri_mut() = Uri::from(below);
+    let found = match files.try_call(request).await {
+        Ok(found) => found,
+        // No file can have this name.
+        Err(error)
+            if matches!(error.kind(), ErrorKind::InvalidFilename | ErrorKind::InvalidInput) =>
+        {
+            return missing(&app, asked.path());
+        }
+        Err(error) => return broken(&app, &error),
+    };
+    let mut response = match found.status() {
+        StatusCode::NOT_FOUND => return missing(&app, asked.path()),
+        status if status.is_server_error() => return broken(&app, &status),
+        _ => found.into_response(),
+    };
+    let headers = response.headers_mut();
+    // A folder without its slash: `ServeDir` names the way as it sees it.
+    let location = headers.get(header::LOCATION).and_then(|location| location.to_str().ok());
+    if let Some(location) = location.and_then(|way| format!("/xr{way}").parse().ok()) {
+        headers.insert(header::LOCATION, location);
+    }
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    response
+}
+
+/// What `ServeDir` is asked for; none for a path with an empty part, which is no file's and whose
+/// redirect would name another host.
+fn below(asked: &Uri) -> Option<PathAndQuery> {
+    let whole = asked.path_and_query()?.as_str().strip_prefix("/xr")?;
+    if asked.path().contains("//") { None } else { whole.parse().ok() }
+}
+
+fn broken(app: &App, error: &dyn std::fmt::Display) -> Response {
+    refuse(app, problem::internal("the file cannot be read", error)).into_response()
+}
+
+fn missing(app: &App, path: &str) -> Response {
+    let problem =
+        Problem::new(ErrorCode::NotFound, format!("there is nothing at {}", shortened(path)));
+    refuse(app, problem).into_response()
+}

@@ -1,0 +1,189 @@
+//! The Open Inference Protocol, version 2, over HTTP: existing clients work unmodified.
+//!
+//! <https://github.com/open-inference/open-inference-protocol>; the one extension is
+//! `binary_tensor_data`. Every tier is a model of version 1 with one input, `pressure_pa`, and
+//! one output, `sed_j_per_m3`, both FP32 `[1, 1, 224, 224]`.
+
+mod request;
+mod response;
+
+use std::time::{Duration, Instant};
+
+use axum::{
+    body::Body,
+    extract::State,
+    http::{HeaderMap, Uri},
+    response::Response,
+};
+use bytes::Bytes;
+use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
+use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType, error::shortened};
+use serde_json::json;
+use tokio::task::spawn_blocking;
+
+use self::{request::Wish, response::Tensor};
+use crate::{
+    codec::{Input, Output},
+    core::{
+        metrics::Transport,
+        scheduler::{Job, JobOptions},
+    },
+    problem,
+    transport::{
+        answer::{
+            Shared, body, json_answer,
+            refusal::OipProblem,
+            render::{Rendered, count, through_pool},
+        },
+        app::App,
+    },
+};
+
+/// The only version of every model.
+const VERSION: &str = "1";
+const DATATYPE: &str = "FP32";
+const SHAPE: [usize; 4] = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
+
+type Answer = Result<Response, OipProblem>;
+
+fn refuse(app: &App, problem: Problem) -> Answer {
+    app.metrics.error(problem.code);
+    Err(OipProblem(problem))
+}
+
+pub(crate) async fn server() -> Response {
+    json_answer(&json!({
+        "name": "papilla",
+        "version": env!("CARGO_PKG_VERSION"),
+        "extensions": ["binary_tensor_data"],
+    }))
+}
+
+pub(crate) async fn live() -> Response {
+    json_answer(&json!({"live": true}))
+}
+
+pub(crate) async fn ready(State(app): Shared) -> Answer {
+    if app.is_draining() {
+        return refuse(&app, problem::shutting_down());
+    }
+    match app.progress.left() {
+        Some(left) => refuse(&app, left.problem()),
+        None => Ok(json_answer(&json!({"ready": true}))),
+    }
+}
+
+pub(crate) async fn model(State(app): Shared, uri: Uri) -> Answer {
+    let catalogue = app.catalogue();
+    let place = match named(&app, &uri) {
+        Ok(place) => place,
+        Err(problem) => return refuse(&app, problem),
+    };
+    let tier = &catalogue.tiers[place];
+    let tensor = |name| json!([{"name": name, "datatype": DATATYPE, "shape": SHAPE}]);
+    Ok(json_answer(&json!({
+        "name": tier.name,
+        "versions": [VERSION],
+        "platform": "onnx",
+        "inputs": tensor(INPUT_NAME),
+        "outputs": tensor(OUTPUT_NAME),
+    })))
+}
+
+pub(crate) async fn model_ready(State(app): Shared, uri: Uri) -> Answer {
+    match named(&app, &uri) {
+        Ok(_) if app.is_draining() => refuse(&app, problem::shutting_down()),
+        Ok(_) => Ok(json_answer(&json!({"ready": true}))),
+        Err(problem) => refuse(&app, problem),
+    }
+}
+
+/// The place of the tier that `/v2/models/{model}[/versions/{version}]` names.
+fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
+    let mut parts = uri.path().split('/').skip(3);
+    let model = parts.next().unwrap_or_default();
+    let place = app.catalogue().tier_named(model)?;
+    match (parts.next(), parts.next()) {
+        (Some("versions"), Some(version)) if version != VERSION => {
+            let version = shortened(version);
+            let message = format!("model {model} has no version '{version}', only {VERSION}");
+            Err(Problem::new(ErrorCode::UnknownTier, message).at("version"))
+        }
+        _ => Ok(place),
+    }
+}
+
+pub(crate) async fn infer(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
+    let result = answer(&app, &uri, &headers, body).await;
+    count(&app, Transport::Oip, &result);
+    result.or_else(|problem| refuse(&app, problem))
+}
+
+async fn answer(
+    app: &App,
+    uri: &Uri,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Response, Problem> {
+    // The body first: a client that is still sending would not read our answer.
+    let body = body::read(body, app.body_max, app.timeouts.io).await?;
+    body::require_plain(headers)?;
+    let received = Instant::now();
+    let tier = named(app, uri)?;
+    // Held until the answer is written: it bounds the work below as well.
+    let _place = app.admit_request()?;
+    let head_len = request::head_len(headers, body.len())?;
+    let (wish, payload) = read(body, head_len).await?;
+    let deadline = wish.timeout_us.map(|us| received + Duration::from_micros(us));
+    let job = Job {
+        tier,
+        payload,
+        input: Input::Samples { sample_type: SampleType::F32, scale: 1.0 },
+        output: Output::Samples(SampleType::F32),
+        received,
+        deadline,
+        options: JobOptions::default(),
+    };
+    let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip).await?;
+    let catalogue = app.catalogue();
+    let name = catalogue.tiers[tier].name.clone();
+    let tensor = Tensor { model: name.clone(), wish, sed: bytes.freeze() };
+    let mut response = if tensor.wish.is_binary_wanted {
+        tensor.binary()?
+    } else {
+        // Fifty thousand numbers in digits: not for a thread that moves bytes.
+        let text = spawn_blocking(move || tensor.json()).await;
+        text.map_err(|error| problem::internal("the answer was not written", &error))??
+    };
+    timings.label(response.headers_mut(), &name);
+    Ok(response)
+}
+
+/// Reads the request; long JSON elsewhere than on a thread that moves bytes.
+async fn read(body: Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Problem> {
+    const SHORT: usize = 4096;
+    if head_len.unwrap_or(body.len()) <= SHORT {
+        return request::read(&body, head_len);
+    }
+    spawn_blocking(move || request::read(&body, head_len))
+        .await
+        .map_err(|error| problem::internal("the request was not read", &error))?
+}
+
+/// For [`crate::fuzz`].
+#[cfg(any(test, fuzzing))]
+pub(crate) mod fuzz {
+    use axum::http::HeaderValue;
+
+    use super::{Bytes, HeaderMap, Problem, request};
+
+    /// Reads a request as [`super::infer`] does; the bytes of its map.
+    pub(crate) fn read(body: &Bytes, head_len: Option<HeaderValue>) -> Result<Bytes, Problem> {
+        let mut headers = HeaderMap::new();
+        if let Some(value) = head_len {
+            headers.insert("inference-header-content-length", value);
+        }
+        let head_len = request::head_len(&headers, body.len())?;
+        request::read(body, head_len).map(|(_, payload)| payload)
+    }
+}

@@ -1,0 +1,185 @@
+//! Frames of an open session: each is checked and put into its slot, or refused.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use papilla_proto::{
+    ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
+};
+
+use super::{
+    End,
+    connection::{Connection, Event},
+    drained,
+    fresh::Freshness,
+    hello,
+    terms::Terms,
+};
+use crate::{
+    codec::{Input, Output},
+    core::{
+        buffers::HEADROOM,
+        metrics::{Stage, Transport},
+        scheduler::{Job, JobOptions, Slot},
+    },
+    problem,
+};
+
+/// An open session.
+pub(super) struct Session {
+    pub(super) number: u64,
+    pub(super) terms: Terms,
+    pub(super) fresh: Freshness,
+    pub(super) slot: Arc<Slot>,
+}
+
+/// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
+pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> End {
+    let mut draining = false;
+    loop {
+        if draining && connection.reply.is_settled() {
+            return drained();
+        }
+        match connection.next(draining).await {
+            Err(end) => return end,
+            Ok(Event::Draining) => draining = true,
+            Ok(Event::Binary(frame, received)) => {
+                session.take(connection, &frame, received, draining);
+            }
+            Ok(Event::Text(_)) if draining => {
+                connection.reply.send_error(problem::shutting_down(), None);
+            }
+            Ok(Event::Text(text)) => session.renew(connection, &text).await,
+        }
+    }
+}
+
+impl Session {
+    /// Takes a hello for new terms, such as another tier.
+    async fn renew(&mut self, connection: &mut Connection, text: &Bytes) {
+        match hello::renew(&connection.app, text, self.number).await {
+            Ok((terms, ready)) => {
+                self.fresh = Freshness::new(terms.stale_after_us);
+                self.terms = terms;
+                connection.reply.send_message(&ServerMessage::Ready(ready));
+            }
+            Err(problem) => connection.reply.send_error(problem, None),
+        }
+    }
+
+    /// Takes one frame: into the slot, or back with an error.
+    fn take(&mut self, connection: &Connection, frame: &Bytes, received: Instant, draining: bool) {
+        let (reply, metrics) = (&connection.reply, &connection.app.metrics);
+        let job = if draining { Err(problem::shutting_down()) } else { self.job(frame, received) };
+        let job = match job {
+            Ok(job) => job,
+            Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
+        };
+        let Some(header) = job.options.header else { return };
+        // In version 1 sequences mean nothing to the server.
+        let is_new = header.extension.is_some();
+        if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
+            metrics.of(Transport::Session).stale.inc();
+            return reply.send_status(&header, job.tier, FrameStatus::Stale, received);
+        }
+        if job.is_late() {
+            metrics.late(Transport::Session, Stage::Admission);
+            return reply.send_status(&header, job.tier, FrameStatus::Late, received);
+        }
+        reply.begin();
+        match connection.app.pool.submit(&self.slot, job) {
+            Ok(None) => {}
+            Ok(Some(Job { tier, received, options: JobOptions { header, .. }, .. })) => {
+                if let Some(header) = header {
+                    metrics.of(Transport::Session).superseded.inc();
+                    reply.send_status(&header, tier, FrameStatus::Superseded, received);
+                }
+                reply.finish();
+            }
+            Err(_) => {
+                reply.refuse(problem::shutting_down(), Some(header.sequence));
+                reply.finish();
+            }
+        }
+    }
+
+    /// The job a frame asks for.
+    fn job(&self, frame: &Bytes, received: Instant) -> Result<Job, Problem> {
+        let header = FrameHeader::decode(frame).map_err(problem::of_frame)?;
+        self.check(&header)?;
+        let payload = frame.slice(header.header_len()..);
+        if payload.len() != header.payload_len() {
+            let (found, due) = (payload.len(), header.payload_len());
+            let message = format!("the payload has {found} bytes, {due} are due");
+            return Err(Problem::new(ErrorCode::WrongLength, message).at("payload"));
+        }
+        let scale = match self.terms.pressure_scale_pa {
+            // All bits zero, or minus zero: left to the hello.
+            Some(scale) if header.scale.abs() <= 0.0 => scale,
+            _ => header.scale,
+        };
+        let budget_us = match header.time_us {
+            0 => self.terms.budget_us,
+            us => Some(us),
+        };
+        Ok(Job {
+            tier: self.terms.tier,
+            payload,
+            input: Input::Window {
+                window: header.window(),
+                sample_type: header.sample_type,
+                scale,
+            },
+            output: Output::Samples(self.terms.answer_sample_type),
+            received,
+            deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
+            options: JobOptions {
+                headroom: HEADROOM + header.header_len(),
+                takes_more: self.terms.takes_more,
+                time_us: header.client_time_us,
+                effects: self.terms.effects.clone(),
+                header: Some(header),
+            },
+        })
+    }
+
+    /// Whether a header is that of a frame this session takes.
+    fn check(&self, header: &FrameHeader) -> Result<(), Problem> {
+        let wrong_type =
+            |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
+        let version = if header.extension.is_some() { 2 } else { 1 };
+        if version != self.terms.version {
+            let agreed = self.terms.version;
+            let message = format!("the hello had version {agreed}, the frame has {version}");
+            return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
+        }
+        if header.kind != FrameKind::Pressure {
+            return wrong_type("kind", "clients send pressure, kind 1".to_owned());
+        }
+        if header.status != FrameStatus::Ok {
+            return wrong_type("status", "the status of a request is 0".to_owned());
+        }
+        let sample_type = self.terms.sample_type;
+        if header.sample_type != sample_type {
+            let message =
+                format!("the hello announced {sample_type:?}, not {:?}", header.sample_type);
+            return wrong_type("sample_type", message);
+        }
+        let window = header.window();
+        if header.extension.is_some() && !window.is_inside() {
+            let Window { x, y, width, height } = window;
+            let message =
+                format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("x"));
+        }
+        if header.extension.is_none() && window != Window::WHOLE {
+            let Window { width, height, .. } = window;
+            let message = format!("the frame is {width} x {height}, 224 x 224 is due");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,138 @@
+//! How much of one client's input is handled at a time, so that other sessions do not wait for it.
+
+use std::time::{Duration, Instant};
+
+use papilla_proto::{ErrorCode, Problem};
+
+use crate::transport::bucket::{Bucket, Rate};
+
+/// Length of a turn. What a session may do in it takes a fraction of it, and a client that sends
+/// without a pause waits for the next one with its bytes in its own buffers.
+const TURN: Duration = Duration::from_millis(2);
+
+/// Frames of the WebSocket worked off in a turn: 4000 a second, four times a force loop's. Beyond
+/// that nearly all are superseded, and over TLS four such clients took both threads.
+const FRAMES_MAX: u32 = 8;
+
+/// Bytes read in a turn: 262 MB/s, a third more than 1000 float32 maps a second.
+const BYTES_MAX: usize = 512 << 10;
+
+/// Reads of the connection in a turn, whatever they bring.
+const READS_MAX: u32 = 128;
+
+/// Pings, pongs and closes a second that a session may send, and how many at once.
+const CONTROL_PER_S: u32 = 200;
+const CONTROL_BURST: u32 = 400;
+
+/// Text messages a second that a session may send (hellos: each may place points and take memory),
+/// and how many at once.
+const TEXT_PER_S: u32 = 4;
+const TEXT_BURST: u32 = 8;
+
+/// What a session has done in this turn, and what it may still do.
+#[derive(Debug)]
+pub(super) struct Limits {
+    begun: Instant,
+    frames: u32,
+    reads: u32,
+    bytes: usize,
+    control: Bucket,
+    text: Bucket,
+    /// Nothing is read before.
+    paused_until: Option<Instant>,
+}
+
+impl Limits {
+    pub(super) fn new(now: Instant) -> Self {
+        let full = Bucket::full(now);
+        let (control, text) = (full, full);
+        Self { begun: now, frames: 0, reads: 0, bytes: 0, control, text, paused_until: None }
+    }
+
+    /// When the session may go on; none: at once.
+    pub(super) fn resume_at(&mut self, now: Instant) -> Option<Instant> {
+        if let Some(until) = self.paused_until.filter(|until| *until > now) {
+            return Some(until);
+        }
+        self.paused_until = None;
+        let end = self.begun + TURN;
+        if now >= end {
+            (self.begun, self.frames, self.reads, self.bytes) = (now, 0, 0, 0);
+            return None;
+        }
+        let is_over =
+            self.frames >= FRAMES_MAX || self.reads >= READS_MAX || self.bytes >= BYTES_MAX;
+        is_over.then_some(end)
+    }
+
+    pub(super) fn on_read(&mut self, bytes: usize) {
+        self.reads += 1;
+        self.bytes += bytes;
+    }
+
+    pub(super) fn on_frame(&mut self) {
+        self.frames += 1;
+    }
+
+    /// A ping or a pong.
+    ///
+    /// # Errors
+    /// More than a session may send.
+    pub(super) fn on_control(&mut self, now: Instant) -> Result<(), Problem> {
+        let rate = Rate::new(CONTROL_PER_S, CONTROL_BURST);
+        self.control.take(rate, now).map_err(|_| {
+            let message = format!("more than {CONTROL_PER_S} control frames a second");
+            Problem::new(ErrorCode::RateLimited, message)
+        })
+    }
+
+    /// A text message; beyond the rate, the session pauses after it.
+    pub(super) fn on_text(&mut self, now: Instant) {
+        if let Err(wait) = self.text.take(Rate::new(TEXT_PER_S, TEXT_BURST), now) {
+            self.paused_until = Some(now + wait);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_ends_with_its_frames_and_the_next_begins_in_time() {
+        let start = Instant::now();
+        let mut limits = Limits::new(start);
+        for _ in 0..FRAMES_MAX {
+            assert_eq!(limits.resume_at(start), None);
+            limits.on_frame();
+        }
+        assert_eq!(limits.resume_at(start), Some(start + TURN));
+        assert_eq!(limits.resume_at(start + TURN), None);
+        assert_eq!(limits.resume_at(start + TURN), None);
+    }
+
+    #[test]
+    fn a_turn_ends_with_its_bytes_or_reads_too() {
+        let start = Instant::now();
+        let mut limits = Limits::new(start);
+        limits.on_read(BYTES_MAX);
+        assert!(limits.resume_at(start).is_some());
+        let mut limits = Limits::new(start);
+        (0..READS_MAX).for_each(|_| limits.on_read(1));
+        assert!(limits.resume_at(start).is_some());
+    }
+
+    #[test]
+    fn control_frames_beyond_their_rate_are_refused_and_texts_pause_the_session() {
+        let start = Instant::now();
+        let mut limits = Limits::new(start);
+        let taken = (0..1000).take_while(|_| limits.on_control(start).is_ok()).count();
+        assert_eq!(taken, CONTROL_BURST as usize);
+        (0..TEXT_BURST).for_each(|_| limits.on_text(start));
+        assert_eq!(limits.resume_at(start), None);
+        limits.on_text(start);
+        let resume = limits.resume_at(start).unwrap();
+        assert_eq!(resume - start, Duration::from_secs(1) / TEXT_PER_S);
+        assert_eq!(limits.resume_at(resume), None);
+    }
+}

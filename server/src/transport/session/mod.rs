@@ -1,0 +1,148 @@
+//! `GET /v1/session`: a WebSocket on which frames go in and SED maps come out.
+//!
+//! The handshake is axum's; the framing is our own (`wire`), since a library would fill memory with
+//! zeros before it reads, and copy every map before it writes.
+
+mod connection;
+mod frames;
+mod fresh;
+mod hello;
+mod limits;
+mod outbox;
+mod reply;
+mod terms;
+mod wire;
+
+use std::sync::Arc;
+
+use axum::{
+    body::Body,
+    extract::{Extension, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
+    http::{HeaderMap, StatusCode, header},
+    response::Response,
+};
+use hyper::upgrade::{OnUpgrade, Upgraded};
+use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
+use tokio::sync::watch;
+use tungstenite::handshake::derive_accept_key;
+
+use self::{connection::Connection, fresh::Freshness};
+use crate::{
+    core::scheduler::Slot,
+    problem,
+    transport::{
+        answer::{Answer, HttpProblem},
+        app::{App, SessionPlace},
+        gate::Principal,
+    },
+};
+
+/// RFC 6455 close codes.
+mod close {
+    pub(super) const NORMAL: u16 = 1000;
+    pub(super) const GOING_AWAY: u16 = 1001;
+    pub(super) const PROTOCOL: u16 = 1002;
+    pub(super) const POLICY: u16 = 1008;
+    pub(super) const TOO_BIG: u16 = 1009;
+}
+
+/// Takes the upgrade, or says why not.
+pub(crate) async fn open(
+    State(app): State<Arc<App>>,
+    Extension(principal): Extension<Principal>,
+    headers: HeaderMap,
+    on_upgrade: Option<Extension<OnUpgrade>>,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+) -> Answer {
+    let refuse = |problem: Problem| {
+        app.metrics.error(problem.code);
+        HttpProblem(problem)
+    };
+    let not_a_handshake = |why: &dyn std::fmt::Display| {
+        let message = format!("a WebSocket handshake is due here: {why}");
+        refuse(Problem::new(ErrorCode::UpgradeRequired, message))
+    };
+    // axum checks the handshake; the connection itself is taken over below.
+    let _ = upgrade.map_err(|rejection| not_a_handshake(&rejection))?;
+    let key = headers.get(header::SEC_WEBSOCKET_KEY);
+    let (Some(key), Some(Extension(on_upgrade))) = (key, on_upgrade) else {
+        return Err(not_a_handshake(&"the connection cannot be upgraded"));
+    };
+    let place = app.admit_session(&principal).map_err(refuse)?;
+    // Taken before the upgrade: from here on the drain waits for this session.
+    let drain = app.drain.subscribe();
+    let accept = derive_accept_key(key.as_bytes());
+    tokio::spawn(async move {
+        match on_upgrade.await {
+            Ok(upgraded) => run(upgraded, app, drain, place).await,
+            Err(error) => tracing::debug!(%error, "upgrade failed"),
+        }
+    });
+    let switching = Response::builder()
+        .status(StatusCode::SWITCHING_PROTOCOLS)
+        .header(header::CONNECTION, "upgrade")
+        .header(header::UPGRADE, "websocket")
+        .header(header::SEC_WEBSOCKET_ACCEPT, accept)
+        .body(Body::empty());
+    switching.map_err(|error| HttpProblem(problem::internal("the handshake failed", &error)))
+}
+
+async fn run(
+    upgraded: Upgraded,
+    app: Arc<App>,
+    drain: watch::Receiver<bool>,
+    _place: SessionPlace,
+) {
+    app.metrics.sessions.inc();
+    app.metrics.sessions_open.inc();
+    let number = app.session_number();
+    let mut connection = Connection::new(upgraded, Arc::clone(&app), drain);
+    let end = converse(&mut connection, number).await;
+    connection.reply.end();
+    match &end {
+        End::Client(_) => tracing::debug!(session = number, "the client ended the session"),
+        End::Broken(reason) | End::Garbled(reason) => {
+            tracing::debug!(session = number, reason, "session broken");
+        }
+        End::Refused(problem, _) => tracing::debug!(session = number, %problem, "session ended"),
+    }
+    connection.close(&end).await;
+    connection.inbound.end(&app.store);
+    app.metrics.sessions_open.dec();
+}
+
+async fn converse(connection: &mut Connection, number: u64) -> End {
+    let terms = match hello::agree(connection, number).await {
+        Ok(terms) => terms,
+        Err(end) => return end,
+    };
+    connection
+        .inbound
+        .expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
+    let reply = Arc::clone(&connection.reply);
+    let session = frames::Session {
+        number,
+        fresh: Freshness::new(terms.stale_after_us),
+        slot: Arc::new(Slot::new(connection.app.store.answers(terms.answer_len_max()), reply)),
+        terms,
+    };
+    frames::serve(connection, session).await
+}
+
+/// Why a session ends.
+#[derive(Debug)]
+enum End {
+    /// The client closed, with this code.
+    Client(Option<u16>),
+    /// The client does not take what it is sent, or the connection broke.
+    Broken(String),
+    /// What came is not WebSocket, or the connection broke in the middle of it.
+    Garbled(String),
+    /// The server says so, with this error and this close code.
+    Refused(Problem, u16),
+}
+
+/// The end of a session because the server drains.
+fn drained() -> End {
+    End::Refused(problem::shutting_down(), close::GOING_AWAY)
+}

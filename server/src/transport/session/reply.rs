@@ -1,0 +1,192 @@
+//! Answers of a session: made and sent by the thread that rendered, or by the task if there was
+//! nothing to render.
+
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, AtomicUsize, Ordering},
+    },
+    time::{Duration, Instant},
+};
+
+use bytes::BytesMut;
+use papilla_proto::{
+    Extension, FrameHeader, FrameStatus, HEADER_LEN_V2, Problem, ServerMessage, SessionError,
+};
+
+use super::{
+    outbox::Outbox,
+    wire::{self, OUT_HEAD_MAX, opcode},
+};
+use crate::{
+    codec::Output,
+    core::{
+        buffers::{HEADROOM, Recycler},
+        metrics::{Stage, Transport},
+        scheduler::{Done, Outcome, Sink, is_past},
+    },
+    problem,
+    transport::app::App,
+};
+
+/// What a session sends: answers, messages and errors, in the order in which they are ready.
+pub(super) struct Reply {
+    pub(super) out: Outbox,
+    /// Frames accepted and not yet answered: none, one with a thread, one in the slot.
+    outstanding: AtomicUsize,
+    /// Whether the task waits for the last of them.
+    is_awaited: AtomicBool,
+    is_over: AtomicBool,
+    app: Arc<App>,
+}
+
+impl Reply {
+    pub(super) fn new(out: Outbox, app: Arc<App>) -> Self {
+        Self {
+            out,
+            outstanding: AtomicUsize::new(0),
+            is_awaited: AtomicBool::new(false),
+            is_over: AtomicBool::new(false),
+            app,
+        }
+    }
+
+    /// A frame is accepted: called before a thread gets it.
+    pub(super) fn begin(&self) {
+        self.outstanding.fetch_add(1, Ordering::SeqCst);
+    }
+
+    /// An accepted frame is answered.
+    pub(super) fn finish(&self) {
+        self.outstanding.fetch_sub(1, Ordering::SeqCst);
+        if self.is_awaited.load(Ordering::SeqCst) {
+            self.out.call.notify_one();
+        }
+    }
+
+    /// Whether every accepted frame is answered; if not, the task is called when it is.
+    pub(super) fn is_settled(&self) -> bool {
+        self.is_awaited.store(true, Ordering::SeqCst);
+        self.outstanding.load(Ordering::SeqCst) == 0
+    }
+
+    /// The session is over: what is not rendered yet need not be.
+    pub(super) fn end(&self) {
+        self.is_over.store(true, Ordering::Release);
+    }
+
+    /// Sends a JSON message.
+    pub(super) fn send_message(&self, message: &ServerMessage) {
+        match serde_json::to_string(message) {
+            Ok(text) => self.out.send(&wire::frame(opcode::TEXT, text.as_bytes())),
+            Err(error) => tracing::error!(%error, "a message cannot be encoded"),
+        }
+    }
+
+    /// Tells the client of an error the session survives.
+    pub(super) fn send_error(&self, problem: Problem, sequence: Option<u32>) {
+        self.app.metrics.error(problem.code);
+        let problem = problem::bounded(problem);
+        self.send_message(&ServerMessage::Error(SessionError::new(problem, sequence, false)));
+    }
+
+    /// Refuses a frame.
+    pub(super) fn refuse(&self, problem: Problem, sequence: Option<u32>) {
+        self.app.metrics.of(Transport::Session).error.inc();
+        self.send_error(problem, sequence);
+    }
+
+    /// Answers with a header alone.
+    pub(super) fn send_status(
+        &self,
+        header: &FrameHeader,
+        tier: usize,
+        status: FrameStatus,
+        received: Instant,
+    ) {
+        let total_us = us(received.elapsed());
+        let head = numbered(header.answer(status, total_us, 1.0), tier).encode();
+        let mut message = [0; OUT_HEAD_MAX + HEADER_LEN_V2];
+        let (frame, len) = wire::out_head(opcode::BINARY, head.len());
+        message[..len].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
+        message[len..len + head.len()].copy_from_slice(&head);
+        self.out.send_copy(&message[..len + head.len()]);
+    }
+
+    /// Sends what a thread made of a frame.
+    fn answer(&self, done: Done) {
+        let Some(mut header) = done.header else { return };
+        if let Some(extension) = &mut header.extension {
+            extension.queue_us = us(done.times.queue);
+            extension.infer_us = us(done.times.infer);
+            extension.flags = done.meta.flags;
+        }
+        let (bytes, scale) = match done.outcome {
+            Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
+            outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
+                let stage = if let Outcome::Late(stage) = outcome { stage } else { Stage::Sending };
+                self.app.metrics.late(Transport::Session, stage);
+                return self.send_status(&header, done.tier, FrameStatus::Late, done.received);
+            }
+            Outcome::Failed(problem) => return self.refuse(problem, Some(header.sequence)),
+            Outcome::Gone => {
+                self.app.metrics.of(Transport::Session).gone.inc();
+                return;
+            }
+        };
+        let mut head = header.answer(FrameStatus::Ok, us(done.received.elapsed()), scale);
+        if header.extension.is_some() {
+            head = numbered(head.windowed(done.meta.window), done.tier);
+            head.kind = done.meta.kind;
+        }
+        if let Output::Samples(sample_type) = done.output {
+            head.sample_type = sample_type;
+        }
+        // Counted before it is sent: whoever has the answer finds it in the metrics.
+        self.app.metrics.of(Transport::Session).ok.inc();
+        let timers = self.app.metrics.tier(done.tier);
+        let start = Instant::now();
+        self.send(bytes, &head);
+        timers.send.observe(start.elapsed());
+        timers.total.observe(done.received.elapsed());
+    }
+
+    /// Writes the heads into the room before the samples, and sends it all.
+    fn send(&self, mut bytes: BytesMut, head: &FrameHeader) {
+        let (frame, len) = wire::out_head(opcode::BINARY, bytes.len() - HEADROOM);
+        bytes[HEADROOM - len..HEADROOM].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
+        let head = head.encode();
+        bytes[HEADROOM..HEADROOM + head.len()].copy_from_slice(&head);
+        self.out.send(&bytes.freeze().slice(HEADROOM - len..));
+    }
+}
+
+impl Sink for Reply {
+    fn deliver(&self, done: Done) {
+        self.answer(done);
+        self.finish();
+    }
+
+    fn is_gone(&self) -> bool {
+        self.is_over.load(Ordering::Acquire)
+    }
+
+    fn take_back(&self, recycler: &mut Recycler) {
+        self.app.store.keep_answers(recycler);
+    }
+}
+
+/// The header with the tier's number, where there is room for it.
+fn numbered(header: FrameHeader, tier: usize) -> FrameHeader {
+    let number = |extension| Extension { tier: tier_number(tier), ..extension };
+    FrameHeader { extension: header.extension.map(number), ..header }
+}
+
+fn us(time: Duration) -> u32 {
+    u32::try_from(time.as_micros()).unwrap_or(u32::MAX)
+}
+
+/// The number by which answers name a tier.
+pub(super) fn tier_number(tier: usize) -> u16 {
+    u16::try_from(tier).unwrap_or(u16::MAX)
+}

@@ -1,0 +1,193 @@
+//! The terms of a session: what its hello asked for, on the tier that meets it.
+
+use std::sync::{
+    Arc, Mutex, PoisonError,
+    atomic::{AtomicUsize, Ordering},
+};
+
+use papilla_proto::{
+    ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
+    SampleType,
+    effects::{OutOfRange, Section, SectionName},
+    error::shortened,
+};
+
+use super::reply::tier_number;
+use crate::{
+    codec::{Output, scale_of},
+    core::{buffers::HEADROOM, catalogue::Tier, effects::Effects},
+    transport::app::App,
+};
+
+/// What hello and ready agreed on.
+pub(super) struct Terms {
+    /// Index of the tier in the catalogue.
+    pub(super) tier: usize,
+    /// Deadline of frames that name none, us.
+    pub(super) budget_us: Option<u32>,
+    /// Version of the frames, both ways.
+    pub(super) version: u32,
+    /// Sample type of the client's frames.
+    pub(super) sample_type: SampleType,
+    /// Sample type of the answers.
+    pub(super) answer_sample_type: SampleType,
+    /// Pa per unit of frames whose header says 0.
+    pub(super) pressure_scale_pa: Option<f32>,
+    /// Whether pressure above what the tier was trained on is taken and flagged.
+    pub(super) takes_more: bool,
+    /// Longest delay on the way of a frame that is not stale, us.
+    pub(super) stale_after_us: Option<u32>,
+    /// What was asked for beside the bare map.
+    pub(super) effects: Option<Arc<Mutex<Effects>>>,
+    /// What the client is told of them.
+    info: ReadyInfo,
+    _permit: Permit,
+}
+
+impl Terms {
+    /// Most bytes of an answer, its heads included.
+    pub(super) fn answer_len_max(&self) -> usize {
+        let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
+        let effects = self.effects.as_ref();
+        HEADROOM
+            + effects.map_or(plain, |effects| {
+                effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
+            })
+    }
+}
+
+/// A place in the count of a tier's sessions; given back when it is dropped.
+struct Permit(Arc<AtomicUsize>);
+
+impl Permit {
+    fn take(tier: &Tier) -> Self {
+        tier.sessions.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(&tier.sessions))
+    }
+}
+
+impl Drop for Permit {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// What `ready` says of the effects of a session.
+#[derive(Default)]
+struct ReadyInfo {
+    names: Vec<RuntimeEffect>,
+    sections: Vec<Section>,
+    /// Greatest value that the map shows.
+    value_max: Option<f32>,
+}
+
+fn check_version(hello: &Hello) -> Result<(), Problem> {
+    let refuse = |message: String, field: &str| {
+        Err(Problem::new(ErrorCode::UnknownVersion, message).at(field))
+    };
+    if !PROTOCOL_VERSIONS.map(u32::from).contains(&hello.version) {
+        let message = format!("version {} is not spoken here, 1 and 2 are", hello.version);
+        return refuse(message, "version");
+    }
+    match hello.member_of_version_2() {
+        Some(member) if hello.version < 2 => {
+            refuse(format!("'{member}' needs version 2 of the protocol"), member)
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The effects of the session that a hello names; all others are the tier's.
+fn runtime_effect(name: &str) -> Option<RuntimeEffect> {
+    name.parse().ok()
+}
+
+/// The terms of a session that sends this hello.
+///
+/// # Errors
+/// It cannot be met; the problem names the member.
+pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
+    check_version(hello)?;
+    let is_of_tier = |name: &&String| hello.version == 1 || runtime_effect(name).is_none();
+    let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
+    let budget_us = hello.budget_us.filter(|&us| us > 0);
+    let catalogue = app.catalogue();
+    let index = match &hello.tier {
+        Some(name) => catalogue.tier_named(name)?,
+        None => catalogue.choose(budget_us, &wanted).unwrap_or(catalogue.default),
+    };
+    let tier = &catalogue.tiers[index];
+    if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
+        let (effect, rendered) = (shortened(effect), tier.effects.join(", "));
+        let hint = runtime_effect(&effect).map_or("", |_| "; effects of sessions need version 2");
+        let message = format!("tier {} renders {rendered}, but not '{effect}'{hint}", tier.name);
+        return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
+    }
+    if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != tier.atlas_hash) {
+        let (hash, ours) = (shortened(hash), &tier.atlas_hash);
+        let message = format!("the client has atlas {hash}, tier {} has {ours}", tier.name);
+        return Err(Problem::new(ErrorCode::AtlasMismatch, message).at("atlas_hash"));
+    }
+    if let Some(scale) = hello.pressure_scale_pa.filter(|s| !(s.is_finite() && *s > 0.0)) {
+        let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
+        return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
+    }
+    let effects = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
+    let info = effects.as_ref().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
+        names: effects.names.clone(),
+        sections: effects.sections.clone(),
+        value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
+    });
+    Ok(Terms {
+        tier: index,
+        budget_us,
+        version: hello.version,
+        sample_type: hello.sample_type,
+        answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
+        pressure_scale_pa: hello.pressure_scale_pa,
+        takes_more: hello.out_of_range == Some(OutOfRange::Flag),
+        stale_after_us: hello.stale_after_us,
+        effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
+        info,
+        _permit: Permit::take(tier),
+    })
+}
+
+/// What the client is told of its terms.
+pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
+    let catalogue = app.catalogue();
+    let tier = &catalogue.tiers[terms.tier];
+    let predicted_latency_us = catalogue
+        .predicted_latency_us(terms.tier)
+        .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
+    let is_new = terms.version > 1;
+    let value_max = terms.info.value_max.unwrap_or(tier.sed_max_j_per_m3);
+    let bare_map = || {
+        let output = Output::Samples(terms.answer_sample_type);
+        let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);
+        vec![Section { name: SectionName::Map, offset, bytes }]
+    };
+    let sections = || match &terms.effects {
+        Some(_) => terms.info.sections.clone(),
+        None => bare_map(),
+    };
+    Ready {
+        version: terms.version,
+        session: number,
+        tier: tier.name.clone(),
+        effects: tier.effects.clone(),
+        atlas_hash: tier.atlas_hash.clone(),
+        predicted_latency_us,
+        budget_us: terms.budget_us,
+        meets_budget: terms.budget_us.map(|us| predicted_latency_us <= u64::from(us)),
+        width: MAP_SIDE_PX as u32,
+        height: MAP_SIDE_PX as u32,
+        sample_type: terms.sample_type,
+        pressure_max_pa: tier.pressure_max_pa,
+        sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
+        tier_number: is_new.then(|| tier_number(terms.tier)),
+        answer_sample_type: is_new.then_some(terms.answer_sample_type),
+        session_effects: is_new.then(|| terms.info.names.clone()),
+        sections: is_new.then(sections),
+    }
+}
