@@ -3,7 +3,7 @@
 use std::{
     path::Path,
     sync::{Arc, LazyLock},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use axum::{
@@ -16,6 +16,7 @@ use axum::{
     routing::{MethodRouter, get, post},
 };
 use papilla_proto::{ErrorCode, Problem, error::shortened};
+use tokio::time::sleep;
 
 use super::{
     answer::{Shared, refusal::refused},
@@ -127,6 +128,10 @@ async fn method_not_allowed(State(app): Shared, method: Method, uri: Uri) -> Res
     refused(&app.metrics, &uri, Problem::new(ErrorCode::MethodNotAllowed, message))
 }
 
+/// Pause before a request beyond the rate is refused: refusing costs time as well, and a client that
+/// sends requests without a pause would take it from its neighbours.
+const REFUSAL_PAUSE: Duration = Duration::from_millis(20);
+
 /// Every request comes through here; what is refused never reaches its handler.
 async fn guard(State(app): Shared, request: Request, next: Next) -> Response {
     let start = Instant::now();
@@ -143,6 +148,8 @@ async fn guard(State(app): Shared, request: Request, next: Next) -> Response {
         Err(problem) => {
             if problem.code == ErrorCode::RateLimited {
                 app.metrics.shed(Shed::Rate);
+                // Requests sent ahead on the connection wait behind this one.
+                sleep(REFUSAL_PAUSE).await;
             }
             refused(&app.metrics, &head.uri, problem)
         }

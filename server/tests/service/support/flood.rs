@@ -11,9 +11,7 @@ use std::{
     time::Duration,
 };
 
-use super::raw::HANDSHAKE;
-
-/// What a flooding client sends after the handshake: `opening` once, `block` again and again.
+/// What a flooding client sends: `opening` once, `block` again and again.
 #[derive(Clone)]
 pub(crate) struct Flood {
     pub(crate) opening: Vec<u8>,
@@ -92,7 +90,7 @@ fn flood_once(
         let mut unread = vec![0; 1 << 16];
         while matches!(reading.read(&mut unread), Ok(1..)) {}
     });
-    let _ = stream.write_all(&[HANDSHAKE.as_bytes(), &flood.opening].concat());
+    let _ = stream.write_all(&flood.opening);
     let mut at = 0;
     while !is_stopped.load(Ordering::Relaxed) && sent.load(Ordering::Relaxed) < budget_bytes {
         match stream.write(&flood.block[at..]) {
