@@ -14,9 +14,8 @@ import pytest
 from papilla_trainer import dataset as reader
 from papilla_trainer.dataset import Dataset
 
-SCHEMA = json.loads(
-    (Path(__file__).parents[3] / "docs" / "reference" / "dataset.schema.json").read_text(encoding="utf-8")
-)
+REFERENCE = Path(__file__).parents[3] / "docs" / "reference"
+SCHEMA = json.loads((REFERENCE / "dataset.schema.json").read_text(encoding="utf-8"))
 DTYPES = {"f32": np.float32, "f64": np.float64, "u32": np.uint32}
 
 
