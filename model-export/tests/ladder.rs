@@ -115,15 +115,13 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
     let read = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
     let page = read("out/ladder.md");
     for word in [
-        "not measured",
+        "Not measured",
         "there is no dataset 'broad'",
         "](ladder.svg)",
         "](ladder-zone.svg)",
         "| tiny | network |",
         "the truth",
         "good to 1.00 %",
-        "**missed**",
-        "| met |",
     ] {
         assert!(page.replace("**tiny**", "tiny").contains(word), "{word}: {page}");
     }
