@@ -280,6 +280,33 @@ def terminate_under(kind: str, certificate: str | None, service: subprocess.Pope
     return took
 
 
+def markdown(found: dict) -> str:
+    """The report of a run (docs/reports/neighbours.md)."""
+    cpus = Path("/proc/cpuinfo").read_text()
+    name = next((line.split(":")[1].strip() for line in cpus.splitlines() if line.startswith("model name")), "?")
+    lines = [
+        "# A neighbour beside floods",
+        "",
+        f"Written by `tests/soak/run --hostile --markdown docs/reports/neighbours.md`, {time.strftime('%Y-%m-%d')}, {name},",
+        f"{multiprocessing.cpu_count()} cores, which service, flooding clients and judge share.",
+        "",
+        f"Four clients of a kind send without a pause beside one session of {RATE_HZ} Hz (`nano`, a window of 128 x 128,",
+        "u8) and a balancer that asks for `/healthz` on connections of its own. *Idle*: four idle sessions in their",
+        "place, just before. A kind is sound if p99 is at most twice the idle one plus 5 ms, no frame is lost and every",
+        "`/healthz` comes within 100 ms. Times in ms.",
+        "",
+        "| transport | four clients send | MB/s taken | idle p99 | p50 | p99 | max | `/healthz` max | lost | sound |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in found["rows"]:
+        cells = [row["transport"], row["kind"], row["sent_mb_per_s"], row["idle_p99_ms"], row["p50_ms"], row["p99_ms"]]
+        cells += [row["max_ms"], row["health_max_ms"], row["lost"], "yes" if row["sound"] else "**no**"]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    for end in found["ends"]:
+        lines += ["", f"SIGTERM beside endless windows ({end['transport']}): ended after {end['end_s']} s, code {end['exit_code']}."]
+    return "\n".join([*lines, *found["notes"], ""])
+
+
 def run(minutes: float) -> dict:
     """All kinds in turn, plain and over TLS; `sound` says whether every one held."""
     rows, ends, notes = [], [], []

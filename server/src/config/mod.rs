@@ -166,7 +166,7 @@ pub struct Config {
 
     /// Requests a second that one client (its token, or its address) may send, sessions opened
     /// included; further ones are answered 429. 0: any.
-    #[arg(long, env = "PAPILLA_RATE_PER_S", value_parser = |text: &str| range::parse::<u32>(text, &range::RATE_PER_S), default_value = "5000", value_name = "N")]
+    #[arg(long, env = "PAPILLA_RATE_PER_S", value_parser = |text: &str| range::parse::<u32>(text, &range::RATE_PER_S), default_value = "1000", value_name = "N")]
     pub rate_per_s: u32,
 
     /// Requests a client may send at once before the rate holds [default: one second's worth].
@@ -215,7 +215,7 @@ impl Default for Config {
             max_requests: n(64),
             max_connections: n(256),
             max_body_bytes: 2 << 20,
-            rate_per_s: 5000,
+            rate_per_s: 1000,
             rate_burst: None,
             io_timeout_s: 10,
             idle_timeout_s: 60,
