@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from service import RELEASE, ROOT  # noqa: E402
 
 HOST, PORT = "127.0.0.1", 7323
-# Its requests count in no client's rate.
-BALANCER = "127.0.0.2"
+# The rate of requests is an address's.
+BALANCER, NEIGHBOUR = "127.0.0.2", "127.0.0.3"
 CLIENTS = 4
 RATE_HZ = 90
 HANDSHAKE = (
@@ -155,11 +155,13 @@ def read_message(stream: socket.socket, buffer: bytearray) -> tuple[int, bytes]:
 
 
 def judged(certificate: str | None, seconds: float, out: multiprocessing.Queue) -> None:
-    """A session of 90 Hz: times of its round trips, s."""
-    stream, buffer = connect(trusting(certificate)), bytearray()
+    """A session of 90 Hz from an address of its own: times of its round trips, s."""
+    stream, buffer = connect(trusting(certificate), NEIGHBOUR), bytearray()
     stream.sendall(HANDSHAKE)
     while b"\r\n\r\n" not in buffer:
         buffer.extend(stream.recv(4096))
+    if b" 101 " not in buffer[:16]:
+        raise ConnectionError(f"no session: {bytes(buffer[:200])}")
     del buffer[: buffer.index(b"\r\n\r\n") + 4]
     stream.sendall(hello())
     read_message(stream, buffer)
