@@ -68,6 +68,44 @@ impl ContactSurface {
         mean_area.sqrt()
     }
 
+    /// Pressure per deformed area at each node, MPa, of the tractions at points (MPa per
+    /// undeformed area) where `surface` is at the positions `x`.
+    #[must_use]
+    pub(crate) fn pressure_mpa(
+        &self,
+        rule: ContactRule,
+        traction_mpa: &[f64],
+        surface: &Surface,
+        x: &[[f64; 3]],
+    ) -> Vec<f64> {
+        let points = self.points(rule);
+        let places = match rule {
+            ContactRule::Nodal => return self.nodal_pressure_mpa(traction_mpa, surface, x),
+            ContactRule::Gauss => surface.kind.contact_points(),
+            ContactRule::GaussOrder3 => surface.kind.quadrature(),
+        };
+        let deformed = ContactPoints::faces(surface, &places, x, self.nodes()).area_mm2;
+        let true_mpa: Vec<f64> = traction_mpa
+            .iter()
+            .zip(&points.area_mm2)
+            .zip(&deformed)
+            .map(|((t, undeformed), deformed)| t * undeformed / deformed)
+            .collect();
+        points.mean_at_nodes(&true_mpa, &deformed, self.nodes())
+    }
+
+    fn nodal_pressure_mpa(
+        &self,
+        traction_mpa: &[f64],
+        surface: &Surface,
+        x: &[[f64; 3]],
+    ) -> Vec<f64> {
+        let mut deformed = vec![0.0; x.len()];
+        surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
+        let nodes = self.nodes().iter().zip(self.area_mm2()).zip(traction_mpa);
+        nodes.map(|((&n, &area), t)| t * area / deformed[n as usize]).collect()
+    }
+
     /// Where contact is found.
     #[must_use]
     pub const fn points(&self, rule: ContactRule) -> &ContactPoints {

@@ -44,6 +44,8 @@ pub struct ContactPoints {
     end: Vec<u32>,
     pub(super) node: Vec<u32>,
     value: Vec<f64>,
+    /// As `value`, linear between neighbouring nodes.
+    hat: Vec<f64>,
     /// Share of the undeformed area, mm2.
     pub area_mm2: Vec<f64>,
 }
@@ -78,6 +80,7 @@ impl ContactPoints {
         Self {
             end: (1..=nodes.len() as u32).collect(),
             value: vec![1.0; nodes.len()],
+            hat: vec![1.0; nodes.len()],
             node: nodes,
             area_mm2,
         }
@@ -92,15 +95,37 @@ impl ContactPoints {
         nodes: &[u32],
     ) -> Self {
         let mut points = Self::default();
+        let hats: Vec<_> = rule.iter().map(|&(xi, _)| surface.kind.hats(xi)).collect();
+        let mut visit = 0;
         surface.integrate(rule, &|n| positions[n as usize], &mut |face, value, area| {
+            let hat = &hats[visit % rule.len()];
+            visit += 1;
             if face.iter().any(|n| nodes.binary_search(n).is_ok()) {
                 points.node.extend(face);
                 points.value.extend(value);
+                points.hat.extend(&hat[..value.len()]);
                 points.end.push(points.node.len() as u32);
                 points.area_mm2.push(norm(area));
             }
         });
         points
+    }
+
+    /// Mean of a quantity over the points around each of the sorted `nodes`, `weight` their
+    /// share of it: `sum_q w_q phi_a(q) v_q / sum_q w_q phi_a(q)` with functions that are
+    /// linear between neighbouring nodes, so that what is positive stays so.
+    #[must_use]
+    pub fn mean_at_nodes(&self, value: &[f64], weight: &[f64], nodes: &[u32]) -> Vec<f64> {
+        let (mut sum, mut total) = (vec![0.0; nodes.len()], vec![0.0; nodes.len()]);
+        for (point, (v, w)) in value.iter().zip(weight).enumerate() {
+            let range = self.range(point);
+            for (n, phi) in self.node[range.clone()].iter().zip(&self.hat[range]) {
+                let Ok(at) = nodes.binary_search(n) else { continue };
+                sum[at] += w * phi * v;
+                total[at] += w * phi;
+            }
+        }
+        sum.iter().zip(&total).map(|(s, t)| if *t > 0.0 { s / t } else { 0.0 }).collect()
     }
 
     /// Number of points.
@@ -118,9 +143,14 @@ impl ContactPoints {
     /// What carries a point.
     #[must_use]
     pub fn support(&self, point: usize) -> Support<'_> {
-        let start = if point == 0 { 0 } else { self.end[point - 1] as usize };
-        let range = start..self.end[point] as usize;
+        let range = self.range(point);
         Support { nodes: &self.node[range.clone()], values: &self.value[range] }
+    }
+
+    /// Where the entries of a point are.
+    fn range(&self, point: usize) -> std::ops::Range<usize> {
+        let start = if point == 0 { 0 } else { self.end[point - 1] as usize };
+        start..self.end[point] as usize
     }
 
     /// What carries each point, and its area, mm2.

@@ -7,6 +7,7 @@
 //! quadratic elements are sampled at the vertex itself. In the plane a face is an
 //! edge and its area the length.
 
+mod fitted;
 mod quarters;
 
 use super::sample::{Deformed, Sample};
@@ -108,7 +109,10 @@ impl SedRecovery {
     /// Nodal means of values at [`Self::samples`].
     #[must_use]
     pub fn average(&self, values: &[f64]) -> Vec<f64> {
-        self.terms.iter().map(|t| t.iter().map(|&(s, w)| w * values[s]).sum()).collect()
+        self.terms
+            .iter()
+            .map(|t| t.iter().map(|&(s, w)| w * values[s]).sum::<f64>().max(0.0))
+            .collect()
     }
 
     /// SED in MPa (= mJ/mm3) at the nodes.

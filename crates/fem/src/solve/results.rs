@@ -113,18 +113,17 @@ impl<'a> Solver<'a> {
     }
 
     /// True (Cauchy) pressure at every mesh node, MPa: the nominal traction
-    /// times undeformed over deformed nodal area of the contact surface.
+    /// times undeformed over deformed area.
     #[must_use]
     pub fn pressure_mpa(&self, surface: &crate::mesh::Surface) -> Vec<f64> {
         let problem = self.newton.problem;
         let x = self.deformed();
-        let mut deformed = vec![0.0; x.len()];
-        surface.add_nodal_areas(&|n| x[n as usize], &mut deformed);
         let mut pressure = vec![0.0; x.len()];
         if let Some(contact) = &problem.contact {
-            let traction = self.traction_mpa();
-            for ((&n, &area), t) in contact.nodes().iter().zip(contact.area_mm2()).zip(traction) {
-                pressure[n as usize] = t * area / deformed[n as usize];
+            let traction = &self.newton.current.traction_mpa;
+            let found = contact.pressure_mpa(self.contact_rule(), traction, surface, &x);
+            for (&n, p) in contact.nodes().iter().zip(found) {
+                pressure[n as usize] = p;
             }
         }
         pressure

@@ -159,6 +159,7 @@ impl CampaignSpec {
             indenter: candidate.indenter.clone(),
             motion: Motion::to_depth(1.0, 1, Pose::default()),
             friction: self.friction,
+            contact: None,
             effects: self.effects.clone(),
             outputs: None,
             folder: self.folder.clone(),

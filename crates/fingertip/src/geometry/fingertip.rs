@@ -125,6 +125,30 @@ impl FingertipShape {
         }
     }
 
+    /// Parameter of the point of the skin that lies on the line from the finger's axis through
+    /// `p` (mm).
+    #[must_use]
+    pub fn parameter_of(&self, p: [f64; 3]) -> SurfaceParameter {
+        let (y, x) = (p[1] / (0.5 * self.width_mm), p[0] - self.cap_length_mm);
+        if x < 0.0 {
+            let d = [x / self.cap_length_mm, y, p[2] / (0.5 * self.height_mm)];
+            let size = papilla_fem::tensor::norm(d);
+            SurfaceParameter::Cap(d.map(|v| v / size))
+        } else {
+            let b = if p[2] < 0.0 { self.palmar_half_height(p[0]) } else { 0.5 * self.height_mm };
+            let z = p[2] / b;
+            let size = y.hypot(z);
+            let t = (x / (self.length_mm - self.cap_length_mm)).min(1.0);
+            SurfaceParameter::Body([y / size, z / size], t)
+        }
+    }
+
+    /// The point of the skin that belongs to `p`, see [`Self::parameter_of`], mm.
+    #[must_use]
+    pub fn on_skin(&self, p: [f64; 3]) -> [f64; 3] {
+        self.skin(self.parameter_of(p))
+    }
+
     fn palmar_half_height(&self, x: f64) -> f64 {
         let t = (x - self.cap_length_mm) / (self.length_mm - self.cap_length_mm);
         0.5 * self.height_mm - self.crease_depth_mm * smoothstep(t)
@@ -262,6 +286,23 @@ mod tests {
         let c = (shape.cap_length_mm - 5.0) / shape.cap_length_mm;
         let half_width = 0.5 * shape.width_mm * (1.0 - c * c).sqrt();
         assert!((2.0 * half_width - 14.5).abs() < 0.02, "{half_width}");
+    }
+
+    #[test]
+    fn points_of_the_skin_have_their_parameter() {
+        let shape = FingertipShape::default();
+        for k in 0..24 {
+            let a = f64::from(k) / 24.0 * 2.0 * PI;
+            let (s, c) = a.sin_cos();
+            for t in [0.0, 0.3, 1.0] {
+                let p = shape.skin(SurfaceParameter::Body([s, -c], t));
+                let q = shape.on_skin(p);
+                assert!((0..3).all(|i| (p[i] - q[i]).abs() < 1e-12), "{p:?} {q:?}");
+                let p = shape.skin(SurfaceParameter::Cap([-0.6, 0.8 * s, -0.8 * c]));
+                let q = shape.on_skin(p);
+                assert!((0..3).all(|i| (p[i] - q[i]).abs() < 1e-12), "{p:?} {q:?}");
+            }
+        }
     }
 
     #[test]

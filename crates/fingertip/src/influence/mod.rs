@@ -119,5 +119,12 @@ pub fn body(
     materials: &TissueTable,
 ) -> Result<Body, SimulationError> {
     let plan = Plan { law: Law::Linear, ..Plan::usual() };
-    Body::fingertip(&Default::default(), solids(materials, &plan)?, density, order, plan.parts)
+    Body::fingertip(
+        &Default::default(),
+        solids(materials, &plan)?,
+        density,
+        order,
+        plan.parts,
+        None,
+    )
 }

@@ -8,6 +8,7 @@
 //! whatever else is solid.
 
 use super::extrude::Cells;
+use super::grading::Grading;
 use super::half_cube::{Grid, GridSize};
 use super::nail;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
@@ -37,6 +38,19 @@ pub enum Order {
     Linear,
     /// `Hex27` on the same nodes: a quarter of the cells on the skin.
     Quadratic,
+    /// `Hex27` in layers that are thin beside the interface, lattice lines drawn together where
+    /// the indenter touches: for SED that a finer mesh hardly changes.
+    Graded,
+}
+
+impl Order {
+    /// Lattice intervals along an edge of an element.
+    const fn step(self) -> u32 {
+        match self {
+            Self::Linear => 1,
+            Self::Quadratic | Self::Graded => 2,
+        }
+    }
 }
 
 /// Which parts are meshed as solids. What is not is rigid: its surface is there,
@@ -85,6 +99,7 @@ impl Density {
         };
         match order {
             Order::Linear => Resolution { grid, epidermis: &[0.0, 1.0], dermis, fat },
+            Order::Graded => self.graded(),
             Order::Quadratic => Resolution {
                 grid,
                 epidermis: &[0.0, 0.5, 1.0],
@@ -99,6 +114,32 @@ impl Density {
                 },
             },
         }
+    }
+}
+
+impl Density {
+    /// Two elements through the epidermis and a dermis whose first is .08 mm thick: SED at
+    /// the interface of a plane section is then within 1 to 3 % of that of many more layers.
+    fn graded(self) -> Resolution {
+        let (grid, dermis): (_, &'static [f64]) = match self {
+            Self::Coarse => (
+                GridSize { across: 16, side: 8, cap: 8, body: 8 },
+                &[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0],
+            ),
+            Self::Medium => (
+                GridSize { across: 24, side: 12, cap: 14, body: 10 },
+                &[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0],
+            ),
+            Self::Fine => (
+                GridSize { across: 40, side: 20, cap: 24, body: 16 },
+                &[0.0, 0.03, 0.06, 0.13, 0.2, 0.35, 0.5, 0.75, 1.0],
+            ),
+        };
+        let fat: &'static [f64] = match self {
+            Self::Fine => &[0.0, 0.12, 0.25, 0.4, 0.6, 0.8, 1.0],
+            _ => &[0.0, 0.2, 0.4, 0.7, 1.0],
+        };
+        Resolution { grid, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
     }
 }
 
@@ -136,7 +177,7 @@ pub struct FingertipMesh {
 /// three quarters, about 112 degrees from the palmar line.
 const PATCH_SIDE_QUARTERS: u32 = 3;
 
-/// Meshes a fingertip.
+/// Meshes a fingertip, lattice lines drawn together by `grading` if there is one.
 ///
 /// # Errors
 /// Refuses a shape whose lengths contradict each other; see [`FingertipShapeError`].
@@ -145,16 +186,23 @@ pub fn build(
     density: Density,
     order: Order,
     parts: Parts,
+    grading: Option<&Grading>,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
     let resolution = density.resolution(order);
     let size = resolution.grid;
-    let step = if order == Order::Linear { 1 } else { 2 };
+    let step = order.step();
     let cap_row_mm = shape.cap_length_mm * std::f64::consts::FRAC_PI_4 / f64::from(size.cap);
     let first = cap_row_mm / (shape.length_mm - shape.cap_length_mm);
-    let grid = size.build(step, first);
+    let mut grid = size.build(step, first);
     let step = step as usize;
     let n = grid.parameters.len();
+    let under_nail = (0..n as u32)
+        .filter(|&s| shape.under_nail(shape.skin(grid.parameters[s as usize])))
+        .collect();
+    if let Some(grading) = grading {
+        grading.slide(shape, &mut grid, step);
+    }
     let (nodes, tissue) = extrude(shape, &grid, &resolution, parts.bone)?;
     let mut mesh = Mesh { nodes, ..Mesh::default() };
     let cells = Cells { cells: &grid.cells, step };
@@ -165,7 +213,6 @@ pub fn build(
     let bone_layer = tissue.iter().filter(|&&t| t != Tissue::Bone).count();
     let bone = (bone_layer * n) as u32;
     mesh.node_sets.insert("bone".into(), (bone..bone + n as u32).collect());
-    let under_nail = (0..n as u32).filter(|&s| shape.under_nail(mesh.nodes[s as usize])).collect();
     mesh.node_sets.insert("nail".into(), under_nail);
     let rows = size.cap + size.body;
     let in_base_plane = |layers: std::ops::Range<usize>| {

@@ -2,6 +2,7 @@
 
 mod extrude;
 pub mod fingertip;
+pub mod grading;
 mod half_cube;
 mod mirror;
 mod nail;

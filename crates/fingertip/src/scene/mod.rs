@@ -25,6 +25,7 @@ pub use outputs::Output;
 
 use crate::indenter::IndenterError;
 use error::require;
+use papilla_fem::contact::ContactRule;
 use papilla_sdf::IndenterSpec;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,6 +48,10 @@ pub struct Scene {
     /// Friction, for the effect of that name.
     #[serde(default)]
     pub friction: Friction,
+    /// Where on the skin contact is found; by the indenter's width and the mesh if not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub contact: Option<ContactRule>,
     /// What the scene asks for; the surface-pressure study's analysis if not given.
     #[serde(default = "effects::usual")]
     pub effects: Vec<EffectName>,

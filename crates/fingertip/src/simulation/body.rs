@@ -4,6 +4,7 @@ use super::record::{Checks, IncrementRecord};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
+use crate::mesh::grading::{Contact, Grading};
 use crate::mesh::section::SectionMeshError;
 use crate::scene::error::{indenter_field, material_field};
 use crate::scene::{Located, Pose, Scene, SceneError, TissueError};
@@ -150,6 +151,8 @@ pub struct Body {
     pub patch: Option<RecordedPatch>,
     /// Whether the body is a plane section in x and y.
     pub plane: bool,
+    /// The contact that its mesh is graded for.
+    pub graded_for: Option<Contact>,
 }
 
 /// What is read off a fingertip at each equilibrium.
@@ -180,8 +183,10 @@ impl Body {
         density: Density,
         order: Order,
         parts: Parts,
+        contact: Option<Contact>,
     ) -> Result<Self, SimulationError> {
-        let FingertipMesh { mesh, patch } = build(shape, density, order, parts)?;
+        let grading = contact.as_ref().map(|c| Grading::new(shape, c));
+        let FingertipMesh { mesh, patch } = build(shape, density, order, parts, grading.as_ref())?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
@@ -191,7 +196,8 @@ impl Body {
         for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
-        Self::with_patch(mesh, materials, fixed, patch, false)
+        let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
+        Ok(Self { graded_for: contact, ..body })
     }
 
     /// A body with layers, of which pressure and SED are read at vertices.
@@ -203,13 +209,13 @@ impl Body {
         plane: bool,
     ) -> Result<Self, SimulationError> {
         let side = |tissue: Tissue| {
-            SedRecovery::new(&mesh, "interface", tissue.region(), &patch.interface)
+            SedRecovery::fitted(&mesh, "interface", tissue.region(), &patch.interface)
                 .map_err(NoTissue::from)
         };
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
         let patch = Some(RecordedPatch { patch, dermis, epidermis });
-        Ok(Self { problem, contact: "skin".into(), patch, plane })
+        Ok(Self { problem, contact: "skin".into(), patch, plane, graded_for: None })
     }
 
     /// Any mesh, held on the surfaces or node sets `held` and touched on the
@@ -236,7 +242,7 @@ impl Body {
         }
         let plane = mesh.is_planar();
         let problem = Problem::new(mesh, materials, fixed, Some(contact))?;
-        Ok(Self { problem, contact: contact.into(), patch: None, plane })
+        Ok(Self { problem, contact: contact.into(), patch: None, plane, graded_for: None })
     }
 
     /// The atlas of the body's patch; `None` for a body without one and for a section.

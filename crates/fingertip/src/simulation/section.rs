@@ -32,7 +32,7 @@ impl Body {
     ) -> Result<Self, SimulationError> {
         let kind = match spec.order {
             Order::Linear => ElementKind::Quad4,
-            Order::Quadratic => ElementKind::Quad9,
+            Order::Quadratic | Order::Graded => ElementKind::Quad9,
         };
         let section = build(spec.shape, parts, spec.density, kind, spec.extent)?;
         let (fixed, mesh) = (section.fixed(), section.mesh);

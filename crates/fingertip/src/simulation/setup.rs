@@ -53,21 +53,27 @@ impl Simulation {
             pose: scene.motion.pose(),
             offset_mm: scene.motion.offset_mm,
             friction: plan.friction,
-            contact: None,
+            contact: scene.contact,
         };
-        let body = body(scene, &plan)?;
         let drive = drive(&scene.motion);
+        let body = body(scene, &plan, &approach, &drive)?;
         // An indenter that never touches is found now, not after files are written.
         body.indenter(&approach, &drive)?;
         Ok(Self { plan, body, approach, drive })
     }
 }
 
-fn body(scene: &Scene, plan: &Plan) -> Result<Body, SimulationError> {
+fn body(
+    scene: &Scene,
+    plan: &Plan,
+    approach: &Approach,
+    drive: &Drive,
+) -> Result<Body, SimulationError> {
     let materials = solids(&scene.materials, plan)?;
     match &scene.geometry {
         Geometry::Fingertip { density, order, shape } => {
-            Body::fingertip(shape, materials, *density, *order, plan.parts)
+            let contact = (*order == Order::Graded).then(|| approach.contact_with(shape, drive));
+            Body::fingertip(shape, materials, *density, *order, plan.parts, contact.flatten())
         }
         Geometry::Block { size_mm, elements, layers, order } => {
             let lattice = block_lattice(*size_mm, *elements, layers, *order);
@@ -105,7 +111,7 @@ impl Body {
         let plan = Plan::usual();
         let materials = solids(&TissueTable::default(), &plan)?;
         let shape = FingertipShape::default();
-        Self::fingertip(&shape, materials, density, Order::default(), plan.parts)
+        Self::fingertip(&shape, materials, density, Order::default(), plan.parts, None)
     }
 }
 
@@ -117,7 +123,7 @@ fn block_lattice(
 ) -> BlockLattice {
     let (step, kind) = match order {
         Order::Linear => (1, ElementKind::Hex8),
-        Order::Quadratic => (2, ElementKind::Hex27),
+        Order::Quadratic | Order::Graded => (2, ElementKind::Hex27),
     };
     let mut z = vec![0.0];
     let mut regions = Vec::new();

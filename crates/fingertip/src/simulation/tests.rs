@@ -23,7 +23,7 @@ fn press(parts: Parts, table: &TissueTable, shape: &FingertipShape) -> Vec<Incre
     let solve = || -> Result<_, SimulationError> {
         let plan = Plan { parts, ..Plan::usual() };
         let materials = solids(table, &plan)?;
-        let body = Body::fingertip(shape, materials, Density::Coarse, Order::Linear, parts)?;
+        let body = Body::fingertip(shape, materials, Density::Coarse, Order::Linear, parts, None)?;
         let mut solver = body.solver(Options::default())?;
         let mut records = Vec::new();
         let drive = Drive::Depths(vec![0.25, 0.5]);
@@ -126,7 +126,7 @@ fn coarse_finger() -> Body {
     let materials = solids(&TissueTable::default(), &Plan::usual()).unwrap();
     let shape = FingertipShape::default();
     let (density, parts) = (Density::Coarse, Parts::default());
-    Body::fingertip(&shape, materials, density, Order::Linear, parts).unwrap()
+    Body::fingertip(&shape, materials, density, Order::Linear, parts, None).unwrap()
 }
 
 /// Largest part of force and energy that a balance may miss.

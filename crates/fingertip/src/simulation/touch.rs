@@ -1,8 +1,10 @@
 //! An indenter in its pose, brought to where it first touches the skin, and how it touches there.
 
-use super::body::{Body, SimulationError};
+use super::body::{Body, SimulationError, rotation};
 use super::drive::{Approach, Drive, FORCE_TRAVEL_MAX_MM};
+use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
+use crate::mesh::grading::{Coming, Contact};
 use papilla_fem::contact::{ContactRule, ContactSurface};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::MovingIndenter;
@@ -15,6 +17,29 @@ const UNSEEN_MAX: f64 = 0.4;
 /// Least width of an indenter with nodal contact, in distances of nodes: rows of them slip off a
 /// narrower one.
 const NODAL_WIDTH_MIN: f64 = 2.5;
+/// Depth that a lattice is graded for where a force says how deep the indenter goes, mm.
+const GRADED_DEPTH_MM: f64 = 1.5;
+
+impl Approach {
+    /// Where the indenter first touches the undeformed finger and how deep it goes; `None` if it
+    /// passes it.
+    #[must_use]
+    pub fn contact_with(&self, finger: &FingertipShape, drive: &Drive) -> Option<Contact> {
+        let depth_mm = match drive {
+            Drive::Depths(depths) => depths.last().copied().unwrap_or(0.0),
+            Drive::Forces(_) => GRADED_DEPTH_MM,
+            Drive::Path(points) => points.iter().map(|p| p.depth_mm).fold(0.0, f64::max),
+        };
+        let coming = Coming {
+            shape: &self.shape,
+            rotation: rotation(self.pose),
+            top_mm: self.top_mm,
+            offset_mm: self.offset_mm,
+            depth_mm,
+        };
+        Contact::new(finger, &coming)
+    }
+}
 
 impl Body {
     /// The indenter at first touch, on its way.
@@ -29,25 +54,11 @@ impl Body {
         let rotation = self.rotation(approach.pose);
         let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
         let (x, y, normal) = (axis(0), axis(1), axis(2));
-        let along = |p: &[f64; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
-        let first = first_touch(&self.problem.mesh, &self.contact, along);
-        let [a, b] = approach.offset_mm;
-        let mut start = Placement {
-            rotation,
-            origin_mm: std::array::from_fn(|i| {
-                first[i] - approach.top_mm * normal[i] + a * x[i] + b * y[i]
-            }),
-        };
         let contact = self.contact_rule(approach);
-        let points = self.contact_points_mm(contact);
-        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)
-            .map_err(IndenterError::from)?;
-        // A plate's face is there already, to rounding.
-        if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
-            for i in 0..3 {
-                start.origin_mm[i] += travel * normal[i];
-            }
-        }
+        let start = match &self.graded_for {
+            Some(contact) => contact.start,
+            None => self.start(approach, contact)?,
+        };
         self.sees(approach.shape.as_ref(), &start)?;
         let offset = |depth: f64, shift: [f64; 2]| -> [f64; 3] {
             std::array::from_fn(|i| depth * normal[i] + shift[0] * x[i] + shift[1] * y[i])
@@ -64,9 +75,42 @@ impl Body {
         Ok(MovingIndenter { shape: approach.shape.clone(), start, path, contact })
     }
 
+    /// The indenter where it first touches a point of the mesh that can touch.
+    fn start(
+        &self,
+        approach: &Approach,
+        contact: ContactRule,
+    ) -> Result<Placement, SimulationError> {
+        let rotation = self.rotation(approach.pose);
+        let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
+        let (x, y, normal) = (axis(0), axis(1), axis(2));
+        let along = |p: &[f64; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2];
+        let first = first_touch(&self.problem.mesh, &self.contact, along);
+        let [a, b] = approach.offset_mm;
+        let mut start = Placement {
+            rotation,
+            origin_mm: std::array::from_fn(|i| {
+                first[i] - approach.top_mm * normal[i] + a * x[i] + b * y[i]
+            }),
+        };
+        let points = self.contact_points_mm(contact);
+        let travel = first_touch_travel(approach.shape.as_ref(), &start, normal, &points)
+            .map_err(IndenterError::from)?;
+        // A plate's face is there already, to rounding.
+        if travel.abs() > 1e-12 * points.iter().map(|p| norm(*p)).fold(0.0, f64::max) {
+            for i in 0..3 {
+                start.origin_mm[i] += travel * normal[i];
+            }
+        }
+        Ok(start)
+    }
+
     /// Where on the skin contact is to be found: at Gauss points if the indenter is too narrow for
     /// nodes; at nodes if it is not, or so narrow that faces would lose it too.
     fn contact_rule(&self, approach: &Approach) -> ContactRule {
+        if self.graded_for.is_some() {
+            return approach.contact.unwrap_or(ContactRule::GaussOrder3);
+        }
         let spacings = self.spacings(approach);
         approach.contact.unwrap_or(match (1.0..NODAL_WIDTH_MIN).contains(&spacings) {
             true => ContactRule::Gauss,

@@ -63,6 +63,7 @@ impl FidelityLevel {
         let order = match self.order {
             Order::Linear => "linear",
             Order::Quadratic => "quadratic",
+            Order::Graded => "graded",
         };
         let strain = match self.kinematics {
             Strain::Small => "small",

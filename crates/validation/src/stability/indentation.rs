@@ -79,8 +79,14 @@ pub(super) fn deep(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     let plan = Plan::usual();
     let materials = solids(&TissueTable::default(), &plan)?;
     let shape = FingertipShape::default();
-    let body =
-        Body::fingertip(&shape, materials, Density::Coarse, Order::Quadratic, Parts::default())?;
+    let body = Body::fingertip(
+        &shape,
+        materials,
+        Density::Coarse,
+        Order::Quadratic,
+        Parts::default(),
+        None,
+    )?;
     let quadratic = press_body(&body, &approach, &drive, Options::default())?;
     let source = "Hex27 on the same nodes";
     let force = Check::relative("force", linear.force_n(), quadratic.force_n(), 0.1, source);

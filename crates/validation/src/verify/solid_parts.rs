@@ -18,7 +18,7 @@ fn press(parts: Parts) -> Result<IncrementRecord, CaseError> {
     let plan = Plan { parts, ..Plan::usual() };
     let materials = solids(&TissueTable::default(), &plan)?;
     let shape = FingertipShape::default();
-    let body = Body::fingertip(&shape, materials, Density::Coarse, Order::Linear, parts)?;
+    let body = Body::fingertip(&shape, materials, Density::Coarse, Order::Linear, parts, None)?;
     let mut solver = body.solver(Options::default())?;
     let (approach, drive) = (Approach::plate(Pose::default()), Drive::Depths(DEPTHS_MM.into()));
     let mut last = None;
