@@ -2,8 +2,8 @@
 
 use crate::record::{Checks, Sample};
 
-/// Largest relative difference that force and energy balances may show (the
-/// integral of p dA, plate against support reaction, energy against work).
+/// Largest relative difference that force and energy may show (plate against support reaction,
+/// energy against work), and the largest share of the contact beyond the recorded skin.
 pub const BALANCE_RELATIVE_MAX: f64 = 5e-3;
 /// Largest relative out-of-balance force of a converged equilibrium.
 pub const RESIDUAL_RELATIVE_MAX: f64 = 1e-5;

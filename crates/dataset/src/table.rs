@@ -89,7 +89,7 @@ impl StatsReport {
         let rows = [
             ("residual / internal force", c.residual_relative, RESIDUAL_RELATIVE_MAX),
             (
-                "contact force against integral of p dA",
+                "contact beyond the recorded skin",
                 c.contact_force_vs_pressure_integral,
                 BALANCE_RELATIVE_MAX,
             ),

@@ -285,17 +285,16 @@ fn human(s: &Summary, out: &Path) -> String {
         s.effort.solve_s,
     );
     text +=
-        "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   int p dA   energy\n";
+        "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   energy against work\n";
     for i in &s.increments {
         let force = papilla_fem::tensor::norm(i.force_n);
         text += &format!(
-            "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:9.2} % {:6.2} %{}\n",
+            "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:19.2} %{}\n",
             i.depth_mm,
             force,
             i.pressure_pa_max / 1e3,
             i.sed_dermis_j_per_m3_max.map_or("-".into(), |v| format!("{v:.2}")),
             i.checks.newton_iterations,
-            100.0 * i.checks.contact_force_vs_pressure_integral,
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );

@@ -45,7 +45,11 @@ impl Pressed {
         let c = &self.record.checks;
         let row = |what: &str, value, most| Check::vanishes(what, value, most, "equilibrium");
         vec![
-            row("pressure integral", c.contact_force_vs_pressure_integral, BALANCE_RELATIVE_MAX),
+            row(
+                "contact beyond the recorded skin",
+                c.contact_force_vs_pressure_integral,
+                BALANCE_RELATIVE_MAX,
+            ),
             row("plate against supports", c.plate_vs_support_reaction, BALANCE_RELATIVE_MAX),
             row("energy against work", c.energy_vs_work, BALANCE_RELATIVE_MAX),
             row("residual", c.residual_relative, RESIDUAL_RELATIVE_MAX),
