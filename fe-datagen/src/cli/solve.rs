@@ -10,6 +10,7 @@ use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
@@ -159,7 +160,7 @@ fn press(
             let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
             Pressed { record: record.clone(), report: *report, pressure_mpa_max }
         };
-    let (pressed, solved) =
+    let Balanced { kept: pressed, pressed: solved, .. } =
         body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
     bar.finish_and_clear();
     if let (Err(_), Some(out), true) = (&solved, out, written.is_ok()) {

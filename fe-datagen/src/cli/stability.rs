@@ -1,6 +1,6 @@
 //! `stability`: the named suite of hard cases, and random scenes by the thousand.
 
-use super::{CHECKS_FAILED, print};
+use super::{CHECKS_FAILED, choices, print};
 use crate::campaign::progress;
 use anyhow::Context as _;
 use indicatif::ProgressBar;
@@ -47,12 +47,15 @@ pub(super) struct Args {
     /// Also write the report as Markdown to this file.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Press this many random scenes of --campaign at density coarse, to their deepest state.
+    /// Press this many random scenes of --campaign, to their deepest state.
     #[arg(long, value_name = "N", requires = "out")]
     scenes: Option<NonZero<usize>>,
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 5)]
     seed: u64,
+    /// Mesh of the random scenes.
+    #[arg(long, value_enum, default_value_t = choices::Density::Coarse)]
+    density: choices::Density,
     /// Scenes solved at a time.
     #[arg(long, default_value = "1")]
     threads: NonZero<usize>,
@@ -71,7 +74,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
             let spec = CampaignSpec::read(&args.campaign)?;
-            let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
+            let options = ScenesOptions {
+                count,
+                seed: args.seed,
+                density: args.density.into(),
+                threads: args.threads,
+            };
             let bar = OnceLock::new();
             let begun = |reused| {
                 bar.get_or_init(|| progress::bar(count.get(), reused, !args.json));

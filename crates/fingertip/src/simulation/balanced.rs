@@ -6,29 +6,51 @@ use super::drive::{Approach, Drive};
 use super::record::IncrementRecord;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Solver, StepReport};
+use serde::{Deserialize, Serialize};
 
 /// How often the way between stored depths is made finer for the work integral.
 const REFINEMENTS: [u32; 3] = [1, 2, 4];
 /// Most equilibria for one stored state of a path over time, for the same.
 const PATH_REFINEMENT_MAX: u32 = 16;
 
+/// One of the ways on which an indentation was solved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    /// Where on the skin contact was found.
+    pub contact: ContactRule,
+    /// How fine the path was, see [`Body::press`].
+    pub refinement: u32,
+    /// Largest `energy_vs_work` of its states; absent without one.
+    pub energy_vs_work: Option<f64>,
+    /// Why it ended before its last state.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stopped: Option<String>,
+}
+
 /// What an indentation ended with.
+pub struct Balanced<T> {
+    /// What was kept of each state, those before an error among them.
+    pub kept: Vec<T>,
+    /// Every way taken; the last is the one that was kept.
+    pub attempts: Vec<Attempt>,
+    /// Whether the last way led to the end.
+    pub pressed: Result<(), SimulationError>,
+}
+
+/// What one way ended with.
 struct Taken<T> {
     kept: Vec<T>,
     depths_mm: Vec<f64>,
     pressed: Result<(), SimulationError>,
-    /// Largest difference of energy and work over the accepted one; NaN if one is NaN.
+    /// Largest `energy_vs_work` over the accepted one; NaN if one is NaN.
     excess: f64,
 }
 
 impl<T> Taken<T> {
     /// Whether every state was found and one misses its energy.
     fn loses_energy(&self) -> bool {
-        self.pressed.is_ok() && !self.balances()
-    }
-
-    fn balances(&self) -> bool {
-        self.excess <= 1.0
+        // NaN does.
+        self.pressed.is_ok() && !(self.excess <= 1.0)
     }
 }
 
@@ -39,10 +61,7 @@ impl Body {
     /// to the error of time integration), the work integral is better. Where that does not help,
     /// or there is no equilibrium, nodes have slipped off the indenter, and energy with them: it
     /// is solved again with Gauss-point contact, if it is wide enough for that; and at more points
-    /// of them, if energy is lost there too. States before an error are kept.
-    ///
-    /// # Errors
-    /// As [`Self::press`], beside what was kept.
+    /// of them, if energy is lost there too.
     pub fn press_balanced<T>(
         &self,
         solver: &mut Solver<'_>,
@@ -50,9 +69,11 @@ impl Body {
         drive: &Drive,
         energy_vs_work_max: f64,
         keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
-    ) -> (Vec<T>, Result<(), SimulationError>) {
-        let mut press =
-            |approach: &Approach| self.refined(solver, approach, drive, energy_vs_work_max, keep);
+    ) -> Balanced<T> {
+        let mut attempts = Vec::new();
+        let mut press = |approach: &Approach| {
+            self.refined(solver, approach, drive, energy_vs_work_max, keep, &mut attempts)
+        };
         let with = |rule| Approach { contact: Some(rule), ..approach.clone() };
         let mut way = approach.clone();
         let mut taken = press(&way);
@@ -71,7 +92,7 @@ impl Body {
             );
             taken = press(&with(ContactRule::GaussOrder3));
         }
-        (taken.kept, taken.pressed)
+        Balanced { kept: taken.kept, attempts, pressed: taken.pressed }
     }
 
     /// Presses on finer paths until the energy balances, or no finer one is left.
@@ -82,6 +103,7 @@ impl Body {
         drive: &Drive,
         energy_vs_work_max: f64,
         keep: &mut dyn FnMut(usize, &Solver<'_>, &IncrementRecord, &StepReport) -> T,
+        attempts: &mut Vec<Attempt>,
     ) -> Taken<T> {
         let mut once = |drive: &Drive, refinement: u32| {
             let (mut kept, mut depths_mm, mut excess) = (Vec::new(), Vec::new(), 0.0f64);
@@ -90,6 +112,12 @@ impl Body {
                 excess = if found <= excess { excess } else { found };
                 depths_mm.push(record.depth_mm);
                 kept.push(keep(kept.len(), s, record, r));
+            });
+            attempts.push(Attempt {
+                contact: solver.contact_rule(),
+                refinement,
+                energy_vs_work: (!kept.is_empty()).then_some(excess * energy_vs_work_max),
+                stopped: pressed.as_ref().err().map(ToString::to_string),
             });
             Taken { kept, depths_mm, pressed, excess }
         };

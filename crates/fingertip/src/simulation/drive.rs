@@ -164,7 +164,7 @@ impl Body {
             solver.turn();
             let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
             // An indenter that rests does no work.
-            let rests = p.depth_mm == from.depth_mm && p.shift_mm == from.shift_mm;
+            let rests = *p == DrivePoint { time_s: p.time_s, ..from };
             let parts = if rests { 1 } else { refinement as usize };
             let mut effort = Effort::default();
             for i in 1..parts {

@@ -1,5 +1,6 @@
 //! Indentations of the coarse fingertip with bone and nail as solids.
 
+use super::balanced::Balanced;
 use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
 use super::laws::solids;
@@ -138,7 +139,7 @@ fn fit_at(approach: &Approach, depth_mm: f64) -> IncrementRecord {
     let mut solver = body.solver(Options::default()).unwrap();
     let drive = Drive::Depths(vec![depth_mm]);
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.clone();
-    let (kept, pressed) =
+    let Balanced { kept, pressed, .. } =
         body.press_balanced(&mut solver, approach, &drive, BALANCE_RELATIVE_MAX, keep);
     pressed.unwrap();
     let found = kept.last().unwrap();
@@ -200,7 +201,8 @@ fn energy_lost_at_gauss_points_takes_more_of_them() {
     let mut solver = body.solver(Options::default()).unwrap();
     let drive = Drive::Depths(vec![0.05]);
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.contact;
-    let (kept, pressed) = body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
+    let Balanced { kept, pressed, .. } =
+        body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
     pressed.unwrap();
     assert_eq!(kept, [ContactRule::GaussOrder3]);
 }
@@ -236,7 +238,8 @@ fn a_coarse_path_is_taken_again_in_smaller_steps() {
         body.press(&mut solver, &approach, &drive, 1, visit).unwrap();
         let limit = BALANCE_RELATIVE_MAX.min(0.5 * once[0].checks.energy_vs_work);
         let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.clone();
-        let (kept, pressed) = body.press_balanced(&mut solver, &approach, &drive, limit, keep);
+        let Balanced { kept, pressed, .. } =
+            body.press_balanced(&mut solver, &approach, &drive, limit, keep);
         pressed.unwrap();
         assert_eq!(kept.len(), once.len());
         for (coarse, fine) in once.iter().zip(&kept) {

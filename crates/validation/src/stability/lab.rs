@@ -6,6 +6,7 @@ use papilla_dataset::{BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIV
 use papilla_fem::solve::{Effort, Loading, Options, Problem, SolveError, Solver, StepReport};
 use papilla_fingertip::scene::{Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
@@ -96,7 +97,7 @@ pub(super) fn press_body(
 ) -> Result<Pressed, SimulationError> {
     let mut solver = body.solver(options)?;
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, s: &StepReport| (r.clone(), *s);
-    let (kept, pressed) =
+    let Balanced { kept, pressed, .. } =
         body.press_balanced(&mut solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
     pressed?;
     let effort = kept.iter().fold(Effort::default(), |sum, (_, r)| sum.plus(&r.effort));

@@ -98,3 +98,20 @@ impl Line {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The page is written by minutes of solving; its words are those of this file.
+    #[test]
+    fn the_committed_page_begins_as_a_new_one_would() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reports/stability.md");
+        let page = std::fs::read_to_string(root).unwrap();
+        assert!(page.starts_with(INTRODUCTION), "fe-datagen stability --markdown {root}");
+        for case in CASES {
+            let head = format!("## `{}`\n\n{} (", case.name, case.promise);
+            assert!(page.contains(&head), "{head}");
+        }
+    }
+}
