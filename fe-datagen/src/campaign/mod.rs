@@ -8,7 +8,6 @@
 
 mod assemble;
 mod error;
-pub(crate) mod progress;
 mod report;
 mod run;
 mod state;

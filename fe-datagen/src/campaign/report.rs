@@ -1,6 +1,6 @@
 //! What a finished campaign says of itself.
 
-use super::progress::clock;
+use crate::progress::clock;
 use papilla_dataset::{DroppedSample, FailedIndentation};
 use serde::Serialize;
 use std::fmt;

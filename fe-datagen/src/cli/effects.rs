@@ -1,6 +1,7 @@
 //! `effects`: what each effect of a scene changes and costs.
 
 use super::print;
+use crate::progress::Progress;
 use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_output::atomic;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
@@ -30,15 +31,16 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
-    let bar = super::progress("solving", papilla_fingertip::scene::effects::EFFECTS.len() + 1);
+    let all = papilla_fingertip::scene::effects::EFFECTS.len() + 1;
+    let progress = Progress::new("variants", all, 0, args.json);
     let mut begun = false;
     let study = effect_study::run(&scene, &mut |what| {
-        bar.set_message(what.to_owned());
+        progress.set_message(what);
         if std::mem::replace(&mut begun, true) {
-            bar.inc(1);
+            progress.inc();
         }
     })?;
-    bar.finish_and_clear();
+    drop(progress);
     let table = markdown(&study);
     if let Some(out) = &args.out {
         atomic::create_folder(out)?;

@@ -1,6 +1,7 @@
 //! `fidelity`: finite elements as rows of the ladder.
 
 use super::{CHECKS_FAILED, print};
+use crate::progress::Progress;
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_validation::fidelity::{self, Ladder, Report};
 use std::fmt::Write as _;
@@ -42,15 +43,15 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let spec = CampaignSpec::read(&args.campaign)?;
-    let bar = super::progress("setting up", 1);
+    let progress = Progress::new("solutions", 1, 0, args.json);
     let ladder = Ladder::usual(args.check);
     let tell = &mut |what: &str, done: usize, all: usize| {
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-        bar.set_message(what.to_owned());
+        progress.set_length(all);
+        progress.set_position(done);
+        progress.set_message(what);
     };
     let report = fidelity::run(&spec, &ladder, args.presses, &args.out, tell)?;
-    bar.finish_and_clear();
+    drop(progress);
     print(&report, args.json, || human(&report))?;
     let clean = report.left_out.is_empty();
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })

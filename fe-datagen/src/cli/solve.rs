@@ -2,6 +2,7 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::body_file::write_vtu;
+use crate::progress::Progress;
 use anyhow::Context as _;
 use ndarray::Array2;
 use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, Raster};
@@ -102,7 +103,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
     let (pressed, solved) =
-        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out))?;
+        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out), args.json)?;
     let records: Vec<_> = pressed.iter().map(|p| p.record.clone()).collect();
     if let Some(atlas) = &atlas {
         write_maps(&args.out, &scene, atlas, &records)?;
@@ -145,9 +146,10 @@ fn press(
     setup: &Simulation,
     solver: &mut Solver<'_>,
     out: Option<&PathBuf>,
+    quiet: bool,
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
     let Simulation { body, approach, drive, .. } = setup;
-    let bar = super::progress("pressing", drive.len());
+    let progress = Progress::new("states", drive.len(), 0, quiet);
     let mut written = Ok(());
     let file = |state: usize| format!("state-{state:03}.vtu");
     let keep =
@@ -155,14 +157,15 @@ fn press(
             if let (Some(out), true) = (out, written.is_ok()) {
                 written = write_vtu(&out.join(file(state)), body, s);
             }
-            bar.set_position(state as u64 + 1);
+            progress.set_position(state + 1);
+            progress.set_message(format!("{:.3} mm deep", record.depth_mm));
             let surface = &body.problem.mesh.surfaces[&body.contact];
             let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
             Pressed { record: record.clone(), report: *report, pressure_mpa_max }
         };
     let Balanced { kept: pressed, pressed: solved, .. } =
         body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
-    bar.finish_and_clear();
+    drop(progress);
     if let (Err(_), Some(out), true) = (&solved, out, written.is_ok()) {
         written = write_vtu(&out.join(LAST_STATE), body, solver);
     }

@@ -46,7 +46,7 @@ pub struct ScenesOptions {
 
 /// What a run tells of how far it is.
 #[derive(Clone, Copy)]
-pub struct Progress<'a> {
+pub struct Watch<'a> {
     /// Called once with the scenes that an earlier run has solved.
     pub begun: &'a dyn Fn(usize),
     /// Called after each scene.
@@ -149,7 +149,7 @@ pub fn run(
     spec: &CampaignSpec,
     folder: &Path,
     options: &ScenesOptions,
-    Progress { begun, solved }: Progress<'_>,
+    Watch { begun, solved }: Watch<'_>,
 ) -> Result<ScenesReport, ScenesError> {
     let spec = drawn(spec, options.count, options.seed, options.density);
     spec.validate()?;
