@@ -119,7 +119,7 @@ fn paths_and_ogden_laws_are_expressed() {
 }
 
 #[test]
-fn the_witness_says_when_there_is_none() {
+fn the_cross_check_says_when_there_is_no_calculix() {
     let done = Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
         .arg("cross-check")
         .env("PATH", "")

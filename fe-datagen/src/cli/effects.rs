@@ -6,6 +6,7 @@ use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_output::atomic;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
 use papilla_validation::effect_study::{self, Change, Outcome, Study, Switched};
+use papilla_validation::processor::today_here;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -56,8 +57,9 @@ fn markdown(study: &Study) -> String {
     let base = &study.base;
     let names: Vec<_> = study.effects.iter().map(EffectName::as_str).collect();
     let mut text = format!(
-        "As it stands ({}): {:.4} N, peak pressure {:.0} Pa, peak SED {:.1} J/m3; {} unknowns, \
+        "{}.\n\nAs it stands ({}): {:.4} N, peak pressure {:.0} Pa, peak SED {:.1} J/m3; {} unknowns, \
          {:.1} s, {} Newton iterations.\n\n",
+        today_here(),
         if names.is_empty() { "no effect".into() } else { names.join(", ") },
         base.force_n,
         base.pressure_pa_max,

@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// Held-out indentations to solve, spread over the campaign's indenters.
     #[arg(long)]
     presses: usize,
-    /// Presses that the fine mesh with quadratic elements solves too.
+    /// Indentations that the fine mesh with quadratic elements solves too.
     #[arg(long, default_value_t = 1)]
     check: usize,
     /// Folder for rungs.json, the archives and what a restart needs.
@@ -59,12 +59,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn human(r: &Report) -> String {
     let mut text = format!(
-        "campaign {}: {} states\nrung                            unknowns   s a state   SED error: \
+        "campaign {}: {} states\nlevel                           unknowns   s a state   SED error: \
          median     p95\n",
         r.campaign,
         r.states.len()
     );
-    for level in &r.rungs {
+    for level in &r.levels {
         let mut seconds = level.seconds.clone();
         seconds.sort_by(f64::total_cmp);
         let e = &level.sed_relative_l2;
@@ -85,7 +85,7 @@ fn human(r: &Report) -> String {
         let _ = writeln!(
             text,
             "left out: indentation {} at {:.3} mm, {}: {}",
-            l.press, l.depth_mm, l.rung, l.why
+            l.press, l.depth_mm, l.level, l.why
         );
     }
     text

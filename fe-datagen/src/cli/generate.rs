@@ -27,7 +27,7 @@ pub(super) struct Args {
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
-    /// Presses solved at a time [default: one per core].
+    /// Indentations solved at a time [default: one per core].
     #[arg(long)]
     threads: Option<NonZero<usize>>,
     /// Print the report as JSON.

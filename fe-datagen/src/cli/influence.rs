@@ -1,4 +1,4 @@
-//! `operator`: the finger's own linear operator.
+//! `operator`: the finger's own influence operator.
 
 use super::choices::Density;
 use super::print;
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     print(&card, args.json, || {
         let q = &card.quality;
         format!(
-            "operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
+            "influence operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
              residual at most {:.1e}, \
              reciprocity to {:.1e}\natlas {}\nwrote {}",
             card.vertices,

@@ -2,6 +2,7 @@
 
 use super::line::{comparison, first_line};
 use super::{CASES, End, Extent, Line};
+use crate::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -48,7 +49,7 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = String::from(INTRODUCTION);
-        let _ = writeln!(out, "\n{}.\n", self.summary());
+        let _ = writeln!(out, "\n{}. {}.\n", self.summary(), today_here());
         for case in CASES {
             let lines: Vec<_> = self.of(case.name).collect();
             let Some(first) = lines.first() else { continue };

@@ -19,7 +19,7 @@ pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let (coarse, medium, fine) = (coarse?, medium?, fine?);
     let changes = medium.changes_to(&fine).into_iter().zip(coarse.changes_to(&medium));
     let row = |(what, (change, before)): (&str, (f64, f64))| {
-        let quantity = format!("medium against fine, 1 mm: {what}, relative L2");
+        let quantity = format!("medium against fine, 1 mm: {what}, relative change");
         Check::at_most(quantity, change, before, SOURCE)
     };
     Ok(QUANTITIES.into_iter().zip(changes).map(row).collect())
@@ -68,7 +68,7 @@ fn press(density: Density) -> Result<Pressed, CaseError> {
     let patch = &finger.patch.as_ref().ok_or("the fingertip has no patch")?.patch;
     let at = |nodes: &[u32]| nodes.iter().map(|&n| finger.problem.mesh.nodes[n as usize]).collect();
     Ok(Pressed {
-        record: last.ok_or("the press gave no record")?,
+        record: last.ok_or("no state was recorded")?,
         skin: at(&patch.skin),
         interface: at(&patch.interface),
         triangles: patch.triangles.clone(),

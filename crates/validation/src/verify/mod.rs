@@ -14,7 +14,7 @@ mod file;
 mod half_plane;
 mod hertz;
 mod increments;
-pub(crate) mod locking;
+mod locking;
 mod manufactured;
 mod mirror;
 mod ogden;

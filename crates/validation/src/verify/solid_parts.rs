@@ -11,7 +11,7 @@ use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
 
-/// Depths of the coarse press, mm; the last is judged.
+/// Depths on the coarse mesh, mm; the last is judged.
 const DEPTHS_MM: [f64; 3] = [0.25, 0.5, 1.0];
 
 fn press(parts: Parts) -> Result<IncrementRecord, CaseError> {
