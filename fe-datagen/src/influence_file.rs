@@ -53,13 +53,13 @@ const ARRAYS: [(&str, &str); 5] = [
     ),
     (
         "vertex_face",
-        "i32 [V, M]: SED as a press records it is sum_m vertex_weight[v, m] SED[vertex_face[v, m]]",
+        "i32 [V, M]: SED as an indentation records it is sum_m vertex_weight[v, m] SED[vertex_face[v, m]]",
     ),
     ("vertex_weight", "f32 [V, M], summing to 1; 0 where a vertex has fewer than M faces"),
 ];
 
 impl Card {
-    /// The card of an operator.
+    /// The card of an influence operator.
     #[must_use]
     pub fn new(
         operator: &InfluenceOperator,

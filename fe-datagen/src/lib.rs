@@ -7,3 +7,4 @@ mod body_file;
 pub mod campaign;
 pub mod cli;
 pub mod influence_file;
+mod progress;

@@ -7,10 +7,10 @@ use papilla_validation::calculix::{Ccx, cross_check};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-fn export(scene: &Path, out: &Path) -> Output {
+fn export(scene: &Path, folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
         .args(["export", "--format", "inp", "--out"])
-        .args([out, scene])
+        .args([folder, scene])
         .output()
         .unwrap()
 }
@@ -28,8 +28,8 @@ fn data<'a>(deck: &'a str, keyword: &str) -> Vec<&'a str> {
 #[test]
 fn a_scene_becomes_a_whole_deck() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("block.inp");
-    let done = export(&shipped("layered-block.toml"), &out);
+    let out = folder.path().join("deck/layered-block.inp");
+    let done = export(&shipped("layered-block.toml"), &folder.path().join("deck"));
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let deck = std::fs::read_to_string(&out).unwrap();
     assert_eq!(data(&deck, "*NODE, NSET=NBODY").len(), 25 * 25 * 10);
@@ -85,7 +85,7 @@ fn what_calculix_cannot_express_is_refused() {
     for (effects, motion, rest, word) in cases {
         let text = format!("effects = {effects}\n{BLOCK}[motion]\n{motion}\n{rest}\n");
         std::fs::write(&scene, text).unwrap();
-        let done = export(&scene, &out);
+        let done = export(&scene, folder.path());
         let message = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(done.status.code(), Some(1), "{message}");
         assert!(message.contains(word), "{message} should name {word}");
@@ -103,7 +103,7 @@ fn paths_and_ogden_laws_are_expressed() {
         "effects = [\"finite_strain\", \"layers\", \"hyperelastic\"]\n{BLOCK}[motion]\npath = {path}\n"
     );
     std::fs::write(&scene, text).unwrap();
-    let done = export(&scene, &out);
+    let done = export(&scene, folder.path());
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let deck = std::fs::read_to_string(&out).unwrap();
     let points = |name: &str| -> Vec<(f64, f64)> {
@@ -119,7 +119,7 @@ fn paths_and_ogden_laws_are_expressed() {
 }
 
 #[test]
-fn the_witness_says_when_there_is_none() {
+fn the_cross_check_says_when_there_is_no_calculix() {
     let done = Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
         .arg("cross-check")
         .env("PATH", "")

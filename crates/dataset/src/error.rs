@@ -45,7 +45,7 @@ pub enum DatasetError {
         expected: String,
     },
     /// There is nothing in it.
-    #[error("{path} lists no press: generate the campaign first")]
+    #[error("{path} lists no indentation: generate the campaign first")]
     Empty {
         /// The manifest.
         path: PathBuf,

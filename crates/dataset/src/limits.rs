@@ -2,13 +2,13 @@
 
 use crate::record::{Checks, Sample};
 
-/// Largest relative difference that force and energy balances may show (the
-/// integral of p dA, plate against support reaction, energy against work).
+/// Largest relative difference that force and energy may show (plate against support reaction,
+/// energy against work), and the largest share of the contact beyond the recorded skin.
 pub const BALANCE_RELATIVE_MAX: f64 = 5e-3;
 /// Largest relative out-of-balance force of a converged equilibrium.
 pub const RESIDUAL_RELATIVE_MAX: f64 = 1e-5;
 /// Deepest penetration of the skin into the plate, mm: 0.5 % of the deepest
-/// press, a twentieth of the epidermis.
+/// indentation, a twentieth of the epidermis.
 pub const PENETRATION_MM_MAX: f64 = 0.01;
 
 /// Why a record must not enter a dataset of `vertex_count` vertices; `None`

@@ -79,7 +79,7 @@ pub enum Split {
 /// Ids of the indentations of each split, rising.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Splits {
-    /// Training presses.
+    /// Training indentations.
     pub train: Vec<usize>,
     /// Held-out indentations.
     pub test: Vec<usize>,

@@ -22,7 +22,7 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`] when a file is absent or damaged, of an unknown format,
-    /// without any press, or when the atlas is another one than the manifest's.
+    /// without any indentation, or when the atlas is another one than the manifest's.
     pub fn open(folder: &Path) -> Result<Self, DatasetError> {
         let path = folder.join("manifest.json");
         // The format first: another one may have other fields.

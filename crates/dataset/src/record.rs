@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Checks {
     /// Norm of the out-of-balance force over the norm of the internal force.
     pub residual_relative: f64,
-    /// |integral of p dA - plate reaction| over the plate reaction.
+    /// |integral of the recorded p dA - plate reaction| over the plate reaction: the contact beyond
+    /// the recorded skin. Where all of it is recorded the two are equal by construction.
     pub contact_force_vs_pressure_integral: f64,
     /// |plate reaction - support reaction| over the plate reaction.
     pub plate_vs_support_reaction: f64,

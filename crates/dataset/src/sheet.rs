@@ -7,7 +7,7 @@ use papilla_output::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX};
 use papilla_output::map_image::{MapView, Quantity, white_of};
 use std::path::Path;
 
-/// Presses shown at most, spread over the campaign.
+/// Indentations shown at most, spread over the campaign.
 const ROWS_MAX: usize = 8;
 /// Depths shown per indentation at most, the deepest among them.
 const PAIRS_MAX: usize = 4;

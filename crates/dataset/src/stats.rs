@@ -63,7 +63,7 @@ pub struct StatsReport {
     pub dataset_sha256: String,
     /// Vertices of each patch.
     pub vertex_count: usize,
-    /// Presses with a shard.
+    /// Indentations with a shard.
     pub presses: usize,
     /// Samples in all.
     pub samples: usize,
@@ -73,7 +73,7 @@ pub struct StatsReport {
     pub samples_test: usize,
     /// Bytes of all shards.
     pub shard_bytes: u64,
-    /// Presses by name of the indenter.
+    /// Indentations by name of the indenter.
     pub indenters: BTreeMap<String, usize>,
     /// Pitch over the indentations, degrees.
     pub pitch_deg: Range,
@@ -137,7 +137,7 @@ pub fn stats(folder: &Path, sheet: Option<&Path>) -> Result<StatsReport, Dataset
     report(&dataset, depths, shard_bytes, sheet)
 }
 
-/// Depths that differ from press to press would make a line a sample: those are
+/// Depths that differ from one indentation to the next would make a line a sample: those are
 /// grouped by the nearest quarter of a millimetre.
 fn grouped(depths: BTreeMap<i64, Vec<Row>>) -> BTreeMap<i64, Vec<Row>> {
     if depths.len() <= DEPTHS_MAX {

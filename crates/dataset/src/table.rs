@@ -10,7 +10,7 @@ impl fmt::Display for StatsReport {
         writeln!(f, "dataset   {} ({})", self.folder.display(), self.software)?;
         writeln!(
             f,
-            "          {} presses, {} samples ({} train, {} test), {} vertices, {:.1} MB of shards",
+            "          {} indentations, {} samples ({} train, {} test), {} vertices, {:.1} MB of shards",
             self.presses,
             self.samples,
             self.samples_train,
@@ -39,11 +39,11 @@ impl fmt::Display for StatsReport {
         self.write_depths(f)?;
         self.write_checks(f)?;
         for press in &self.failed {
-            writeln!(f, "FAILED    press {}: {}", press.id, press.error)?;
+            writeln!(f, "FAILED    indentation {}: {}", press.id, press.error)?;
         }
         for sample in &self.dropped {
             let depth = sample.depth_mm.unwrap_or(f64::NAN);
-            writeln!(f, "DROPPED   press {} at {depth} mm: {}", sample.press, sample.reason)?;
+            writeln!(f, "DROPPED   indentation {} at {depth} mm: {}", sample.press, sample.reason)?;
         }
         match &self.contact_sheet {
             Some(path) => writeln!(f, "\nwrote     {}", path.display()),
@@ -54,7 +54,7 @@ impl fmt::Display for StatsReport {
 
 impl StatsReport {
     fn write_depths(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "\nper depth: smallest / median / largest over the presses")?;
+        writeln!(f, "\nper depth: smallest / median / largest over the indentations")?;
         writeln!(
             f,
             "{:>9} {:>7} {:>22} {:>27} {:>27} {:>24}",
@@ -89,7 +89,7 @@ impl StatsReport {
         let rows = [
             ("residual / internal force", c.residual_relative, RESIDUAL_RELATIVE_MAX),
             (
-                "contact force against integral of p dA",
+                "contact beyond the recorded skin",
                 c.contact_force_vs_pressure_integral,
                 BALANCE_RELATIVE_MAX,
             ),

@@ -58,3 +58,4 @@ pub mod material;
 pub mod mesh;
 pub mod solve;
 pub mod tensor;
+pub mod testing;

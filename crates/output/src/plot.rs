@@ -1,9 +1,15 @@
 //! Charts as SVG: lines and labelled points on linear or logarithmic axes.
 
+mod labels;
+mod scale;
+mod ticks;
+
 use super::OutputError;
+use labels::Labels;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{Pos, VPos};
+use scale::Scale;
 use std::path::Path;
 
 /// One axis.
@@ -34,7 +40,7 @@ impl Axis {
 pub enum Mark {
     /// A line through its points.
     Line,
-    /// A dot at each point, the series' name beside it.
+    /// A dot at each point, the series' name beside it where there is room.
     Dots,
 }
 
@@ -93,14 +99,8 @@ fn draw(area: &Area<'_>, chart: &Chart) -> Drawn {
     let of = |pick: fn(&(f64, f64)) -> f64| -> Vec<f64> {
         chart.series.iter().flat_map(|s| s.points.iter().map(pick)).collect()
     };
-    let (x, y) = (range(&chart.x, &of(|p| p.0)), range(&chart.y, &of(|p| p.1)));
-    let (xl, yl) = ((x.0..x.1).log_scale(), (y.0..y.1).log_scale());
-    match (chart.x.log, chart.y.log) {
-        (false, false) => draw_on(area, chart, x.0..x.1, y.0..y.1)?,
-        (true, false) => draw_on(area, chart, xl, y.0..y.1)?,
-        (false, true) => draw_on(area, chart, x.0..x.1, yl)?,
-        (true, true) => draw_on(area, chart, xl, yl)?,
-    }
+    let scale = |axis: &Axis, pick| Scale::new(range(axis, &of(pick)), axis.log);
+    draw_on(area, chart, scale(&chart.x, |p| p.0), scale(&chart.y, |p| p.1))?;
     area.present()?;
     Ok(())
 }
@@ -120,13 +120,7 @@ fn range(axis: &Axis, values: &[f64]) -> (f64, f64) {
     (if low >= 0.0 { 0.0 } else { low - margin }, high + margin)
 }
 
-fn draw_on<X, Y>(area: &Area<'_>, chart: &Chart, x: X, y: Y) -> Drawn
-where
-    X: AsRangedCoord<Value = f64>,
-    Y: AsRangedCoord<Value = f64>,
-    X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
+fn draw_on(area: &Area<'_>, chart: &Chart, x: Scale, y: Scale) -> Drawn {
     area.fill(&WHITE)?;
     let mut context = ChartBuilder::on(area)
         .caption(&chart.title, ("sans-serif", 20))
@@ -134,33 +128,34 @@ where
         .x_label_area_size(44)
         .y_label_area_size(76)
         .build_cartesian_2d(x, y)?;
-    let number = |v: &f64| {
-        if *v == 0.0 || (1e-3..1e5).contains(&v.abs()) {
-            let text = format!("{v:.4}");
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            format!("{v:.0e}")
-        }
-    };
     context
         .configure_mesh()
         .light_line_style(RGBColor(240, 240, 240))
         .x_desc(&chart.x.label)
         .y_desc(&chart.y.label)
-        .x_label_formatter(&number)
-        .y_label_formatter(&number)
+        .x_label_formatter(&|v| ticks::text(*v))
+        .y_label_formatter(&|v| ticks::text(*v))
         .label_style(("sans-serif", 14))
         .draw()?;
+    let (xs, ys) = context.plotting_area().get_pixel_range();
+    let mut labels = Labels::new([xs.start, ys.start, xs.end, ys.end]);
+    for series in chart.series.iter().filter(|s| s.mark == Mark::Dots) {
+        let points = series.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
+        points.for_each(|p| labels.dot(context.backend_coord(p)));
+    }
     for (i, series) in chart.series.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
         let finite = |p: &(f64, f64)| p.0.is_finite() && p.1.is_finite();
         let points = series.points.iter().copied().filter(finite);
         if series.mark == Mark::Dots {
-            let name = |at| {
-                let text = Text::new(series.name.clone(), (8, -7), ("sans-serif", 14));
-                EmptyElement::at(at) + Circle::new((0, 0), 5, colour.filled()) + text
-            };
-            context.draw_series(points.map(name))?;
+            for at in points {
+                let (from, side) = labels.place(&series.name, context.backend_coord(&at));
+                let style = ("sans-serif", labels::TEXT_PX).into_text_style(area);
+                let style = style.pos(Pos::new(side, VPos::Center));
+                let text = Text::new(series.name.clone(), from, style);
+                let dot = Circle::new((0, 0), labels::DOT_PX, colour.filled());
+                context.draw_series([EmptyElement::at(at) + dot + text])?;
+            }
             continue;
         }
         context
@@ -184,6 +179,51 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Where texts of an SVG begin and end, px, and what they say; a letter is taken as .6 em.
+    fn texts(svg: &str) -> Vec<(f64, f64, String)> {
+        let of = |tag: &str, name: &str| -> f64 {
+            let value = tag.split(&format!("{name}=\"")).nth(1).unwrap();
+            value.split('"').next().unwrap().parse().unwrap()
+        };
+        let read = |part: &str| {
+            let (tag, rest) = part.split_once('>').unwrap();
+            let tag = format!(" {tag}");
+            let said = rest.split('<').next().unwrap().trim().to_owned();
+            let width = 0.6 * of(&tag, "font-size") * said.chars().count() as f64;
+            let x = of(&tag, " x");
+            let middle = tag.contains("\"middle\"");
+            let left = if middle { x - 0.5 * width } else { x };
+            let left = if tag.contains("\"end\"") { x - width } else { left };
+            (left, left + width, said)
+        };
+        svg.split("<text ").skip(1).map(read).collect()
+    }
+
+    #[test]
+    fn no_name_of_a_dot_is_cut_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.svg");
+        let names = ["a rather long name beside its dot", "another one, at the other end"];
+        let series = |(i, name): (usize, &str)| Series {
+            name: name.into(),
+            points: vec![(1.0 + 2.0 * i as f64, 1.0), (2.0, 1.01)],
+            mark: Mark::Dots,
+        };
+        let chart = Chart {
+            title: "heading".into(),
+            x: Axis::log("x"),
+            y: Axis::linear("y"),
+            series: names.into_iter().enumerate().map(series).collect(),
+        };
+        write_svg(&path, &chart).unwrap();
+        let found = texts(&std::fs::read_to_string(&path).unwrap());
+        let of = found.iter().filter(|(.., said)| names.contains(&said.as_str()));
+        assert_eq!(of.clone().count(), 4);
+        for (left, right, said) in of {
+            assert!(*left >= 0.0 && *right <= f64::from(SIZE_PX.0), "{said}: {left} to {right}");
+        }
+    }
 
     #[test]
     fn every_series_and_axis_is_named_in_the_file() {

@@ -33,7 +33,7 @@ pub enum CampaignError {
     #[error("cannot set up the solver: {0}")]
     Simulation(#[source] BoxError),
     /// Every indentation failed; there is no dataset.
-    #[error("all {presses} presses failed, the first with: {first}")]
+    #[error("all {presses} indentations failed, the first with: {first}")]
     NothingSolved {
         /// Number of indentations.
         presses: usize,

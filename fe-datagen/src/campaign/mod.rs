@@ -1,6 +1,6 @@
 //! Campaigns: many indentations of one finger, solved in parallel into a dataset.
 //!
-//! A campaign is a TOML file ([`CampaignSpec`]). [`run`] solves its presses,
+//! A campaign is a TOML file ([`CampaignSpec`]). [`run`] solves its indentations,
 //! one per core, and writes the dataset that [`papilla_dataset`] describes. It can be
 //! killed at any instant and started again: every indentation is one shard, written
 //! atomically, with a record in `DIR/progress` written after it. The dataset's
@@ -8,7 +8,6 @@
 
 mod assemble;
 mod error;
-pub(crate) mod progress;
 mod report;
 mod run;
 mod state;

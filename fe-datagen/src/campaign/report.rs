@@ -1,6 +1,6 @@
 //! What a finished campaign says of itself.
 
-use super::progress::clock;
+use crate::progress::clock;
 use papilla_dataset::{DroppedSample, FailedIndentation};
 use serde::Serialize;
 use std::fmt;
@@ -16,9 +16,9 @@ pub struct CampaignReport {
     pub folder: PathBuf,
     /// Indentations of the campaign.
     pub presses: usize,
-    /// Presses solved by this run.
+    /// Indentations solved by this run.
     pub solved: usize,
-    /// Presses taken over from an earlier run.
+    /// Indentations taken over from an earlier run.
     pub reused: usize,
     /// Samples in the dataset.
     pub samples: usize,
@@ -53,7 +53,7 @@ impl fmt::Display for CampaignReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "campaign {}: {} of {} samples from {} presses ({} solved now, {} taken over) in {}",
+            "campaign {}: {} of {} samples from {} indentations ({} solved now, {} taken over) in {}",
             self.name,
             self.samples,
             self.samples_due,
@@ -64,7 +64,7 @@ impl fmt::Display for CampaignReport {
         )?;
         writeln!(
             f,
-            "  pressure up to {:.0} Pa, SED up to {:.1} J/m3, {:.1} s of solver per press, {} threads",
+            "  pressure up to {:.0} Pa, SED up to {:.1} J/m3, {:.1} s of solver per indentation, {} threads",
             self.pressure_max_pa,
             self.sed_max_j_per_m3,
             self.solver_seconds / self.presses.max(1) as f64,
@@ -75,13 +75,13 @@ impl fmt::Display for CampaignReport {
             let p = &press.pose;
             writeln!(
                 f,
-                "  FAILED press {} ({}; pitch {:.2}, roll {:.2}, yaw {:.2} deg): {}",
+                "  FAILED indentation {} ({}; pitch {:.2}, roll {:.2}, yaw {:.2} deg): {}",
                 press.id, press.indenter, p.pitch_deg, p.roll_deg, p.yaw_deg, press.error
             )?;
         }
         for sample in &self.dropped {
             let depth = sample.depth_mm.unwrap_or(f64::NAN);
-            writeln!(f, "  DROPPED press {} at {depth} mm: {}", sample.press, sample.reason)?;
+            writeln!(f, "  DROPPED indentation {} at {depth} mm: {}", sample.press, sample.reason)?;
         }
         Ok(())
     }

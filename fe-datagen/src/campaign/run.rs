@@ -2,8 +2,8 @@
 
 use super::assemble::manifest;
 use super::state::{IndentationState, Outcome, Workspace};
-use super::{BoxError, CampaignError, CampaignReport, progress};
-use indicatif::ProgressBar;
+use super::{BoxError, CampaignError, CampaignReport};
+use crate::progress::Progress;
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::Sample;
@@ -20,7 +20,7 @@ use std::time::Instant;
 /// Solves one indentation after another; each worker thread has its own.
 pub trait IndentationSolver {
     /// Indentations to each of the depths and returns one equilibrium per depth, with
-    /// values at the vertices of the campaign's atlas. Equal presses have to give
+    /// values at the vertices of the campaign's atlas. Equal indentations have to give
     /// equal records (`seconds` apart), whatever was solved before.
     ///
     /// # Errors
@@ -31,11 +31,11 @@ pub trait IndentationSolver {
 /// How to run, as opposed to what.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
-    /// Presses solved at a time; `None`: one per core.
+    /// Indentations solved at a time; `None`: one per core.
     pub threads: Option<NonZero<usize>>,
-    /// Show a progress bar on standard error (if it is a terminal).
+    /// Show on standard error how far it is.
     pub progress: bool,
-    /// Try presses again that failed in an earlier run.
+    /// Try indentations again that failed in an earlier run.
     pub retry_failed: bool,
 }
 
@@ -74,14 +74,14 @@ pub fn run<S: IndentationSolver>(
     let reused = done.len();
     let cores = options.threads.or_else(|| std::thread::available_parallelism().ok());
     let threads = cores.map_or(1, NonZero::get).min(todo.len().max(1));
-    let bar = progress::bar(spec.presses, reused, options.progress);
+    let progress = Progress::new("indentations", spec.presses, reused, !options.progress);
     let queue = Queue {
         vertex_count: atlas.vertex_count(),
         workspace: &workspace,
         todo: &todo,
         next: AtomicUsize::new(0),
         stop: AtomicBool::new(false),
-        bar: &bar,
+        progress: &progress,
         results: Mutex::new(Vec::new()),
     };
     std::thread::scope(|scope| {
@@ -94,8 +94,9 @@ pub fn run<S: IndentationSolver>(
             }
         }
     });
-    bar.finish_and_clear();
-    for result in queue.results.into_inner().unwrap_or_else(|poison| poison.into_inner()) {
+    let results = queue.results;
+    drop(progress);
+    for result in results.into_inner().unwrap_or_else(|poison| poison.into_inner()) {
         done.push(result?);
     }
     done.sort_by_key(|state| state.press.id);
@@ -136,12 +137,12 @@ struct Queue<'a> {
     todo: &'a [Indentation],
     next: AtomicUsize,
     stop: AtomicBool,
-    bar: &'a ProgressBar,
+    progress: &'a Progress,
     results: Mutex<Vec<Result<IndentationState, CampaignError>>>,
 }
 
 impl Queue<'_> {
-    /// One worker: takes the next press until none is left or one worker met
+    /// One worker: takes the next indentation until none is left or one worker met
     /// an error that stops all.
     fn work<S: IndentationSolver>(&self, build: &(impl Fn() -> Result<S, BoxError> + Sync)) {
         let mut solver = None;
@@ -153,7 +154,7 @@ impl Queue<'_> {
                 Ok(state) => self.push(Ok(state)),
                 Err(error) => self.fail(error),
             }
-            self.bar.inc(1);
+            self.progress.inc();
         }
     }
 
@@ -179,7 +180,7 @@ impl Queue<'_> {
         };
         let start = Instant::now();
         let id = press.id;
-        // One bad press must not cost the others; a solver that panicked may be
+        // One bad indentation must not cost the others; a solver that panicked may be
         // in any state and is not used again.
         let solved = match catch_unwind(AssertUnwindSafe(|| ready.solve(press))) {
             Ok(solved) => {
@@ -195,11 +196,11 @@ impl Queue<'_> {
         };
         match &outcome {
             Outcome::Failed { error } => {
-                tracing::warn!(press = id, seconds, error, "press failed");
-                self.bar.println(format!("press {id} failed: {error}"));
+                tracing::warn!(press = id, seconds, error, "indentation failed");
+                self.progress.suspend(|| eprintln!("indentation {id} failed: {error}"));
             }
             Outcome::Solved { samples, .. } => {
-                tracing::info!(press = id, seconds, samples, "press solved");
+                tracing::info!(press = id, seconds, samples, "indentation solved");
             }
         }
         let state = IndentationState { press: press.clone(), seconds, outcome };

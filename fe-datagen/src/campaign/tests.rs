@@ -5,21 +5,17 @@ use super::*;
 use papilla_atlas::Atlas;
 use papilla_dataset::testing::{atlas, posed_record};
 use papilla_dataset::{Dataset, ImageOptions, Sample, Split, images, stats, verify};
-use papilla_fingertip::campaign::{
-    CampaignSpec, Candidate, DepthRange, Indentation, PoseRanges, indentations,
-};
-use papilla_fingertip::mesh::fingertip::Density;
-use papilla_fingertip::scene::effects::usual;
-use papilla_fingertip::scene::{Friction, Pose, TissueTable};
+use papilla_fingertip::campaign::testing::{several, spec};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::scene::Pose;
 use papilla_output::map_image::Bits;
-use papilla_sdf::{IndenterSpec, Plate, Sphere};
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What goes wrong, in which press counted over all workers.
+/// What goes wrong, in which indentation counted over all workers.
 #[derive(Clone, Copy, PartialEq)]
 enum Trouble {
     None,
@@ -52,45 +48,6 @@ impl IndentationSolver for Formula<'_> {
         }
         Ok(records)
     }
-}
-
-fn spec() -> CampaignSpec {
-    CampaignSpec {
-        name: "test".into(),
-        seed: 3,
-        presses: 7,
-        depths_mm: vec![0.25, 0.5],
-        depths: None,
-        test_fraction: 0.3,
-        density: Density::Coarse,
-        effects: usual(),
-        materials: TissueTable::default(),
-        friction: Friction::default(),
-        indenter: Some(IndenterSpec::default()),
-        indenters: Vec::new(),
-        pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
-        offset_mm: [[0.0; 2]; 2],
-        folder: PathBuf::new(),
-    }
-}
-
-fn candidate(name: &str, share: u32, indenter: IndenterSpec) -> Candidate {
-    let name = name.into();
-    Candidate { name, share, indenter, pose: None, offset_mm: None, depths: None }
-}
-
-/// Three indenters, one with a turn, an offset and depths of its own.
-fn several() -> CampaignSpec {
-    let ball = Candidate {
-        pose: Some(PoseRanges { pitch_deg: [10.0, 20.0], roll_deg: [0.0; 2], yaw_deg: [5.0; 2] }),
-        offset_mm: Some([[-2.0, 2.0], [1.0, 1.0]]),
-        depths: Some(DepthRange { deepest_mm: [1.0, 1.5], states: 3 }),
-        ..candidate("ball", 2, IndenterSpec::Sphere(Sphere::default()))
-    };
-    let plate = candidate("plate", 1, IndenterSpec::default());
-    let small = Plate { size_mm: [6.0, 6.0], edge_radius_mm: 0.5 };
-    let small = candidate("small plate", 1, IndenterSpec::Plate(small));
-    CampaignSpec { presses: 64, indenter: None, indenters: vec![plate, ball, small], ..spec() }
 }
 
 fn go(folder: &Path, threads: usize, trouble: Trouble) -> Result<CampaignReport, CampaignError> {
@@ -153,7 +110,7 @@ fn a_killed_campaign_goes_on() {
     std::fs::write(killed.path().join("shards/.partial-x7"), b"half").unwrap();
     std::fs::write(killed.path().join("shards/press-00005.npz"), b"torn").unwrap();
     let report = go(killed.path(), 2, Trouble::None).unwrap();
-    assert_eq!((report.reused, report.solved), (3, 4), "three presses were finished");
+    assert_eq!((report.reused, report.solved), (3, 4), "three indentations were finished");
     go(whole.path(), 1, Trouble::None).unwrap();
     assert!(files(killed.path()) == files(whole.path()));
     // A third run finds nothing left to do.

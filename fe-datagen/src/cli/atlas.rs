@@ -11,13 +11,13 @@ use std::process::ExitCode;
 /// Flatten the fingertip's skin and interface into an atlas and report angle
 /// and area errors beside those of conformal maps.
 #[derive(clap::Args)]
-#[command(after_help = "Example: fe-datagen atlas --out out/atlas.json")]
+#[command(after_help = "Example: fe-datagen atlas --out out/atlas")]
 pub(super) struct Args {
     /// Mesh density whose surface is flattened: coarse, medium or fine.
     #[arg(long, default_value = "medium", value_parser = density)]
     density: Density,
-    /// Write the atlas here.
-    #[arg(long)]
+    /// Folder for atlas.json.
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the report as JSON.
     #[arg(long)]
@@ -36,8 +36,9 @@ fn density(name: &str) -> Result<Density, String> {
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let body = Body::usual(args.density)?;
     let (atlas, report) = body.atlas().context("a fingertip has an atlas patch")??;
-    if let Some(path) = &args.out {
-        atomic::write(path, atlas.to_json()?.as_bytes())?;
+    if let Some(folder) = &args.out {
+        atomic::create_folder(folder)?;
+        atomic::write(&folder.join("atlas.json"), atlas.to_json()?.as_bytes())?;
     }
     print(&report, args.json, || human(&report))?;
     Ok(ExitCode::SUCCESS)

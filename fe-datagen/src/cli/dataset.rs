@@ -45,8 +45,8 @@ enum Command {
     Replay {
         /// The dataset's folder.
         folder: PathBuf,
-        /// The file to write.
-        #[arg(long)]
+        /// Folder for replay.json.
+        #[arg(long, value_name = "DIR")]
         out: PathBuf,
         /// Number of samples.
         #[arg(long, default_value_t = 6)]
@@ -79,7 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             })?;
         }
         Command::Replay { folder, out, count, json } => {
-            let names = dataset::replay(folder, *count, out)?;
+            let names = dataset::replay(folder, *count, &out.join("replay.json"))?;
             print(&names, *json, || names.join("\n"))?;
         }
         Command::Verify { folder, json } => {

@@ -1,10 +1,12 @@
 //! `effects`: what each effect of a scene changes and costs.
 
 use super::print;
+use crate::progress::Progress;
 use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_output::atomic;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
 use papilla_validation::effect_study::{self, Change, Outcome, Study, Switched};
+use papilla_validation::processor::today_here;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -30,15 +32,16 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
-    let bar = super::progress("solving", papilla_fingertip::scene::effects::EFFECTS.len() + 1);
+    let all = papilla_fingertip::scene::effects::EFFECTS.len() + 1;
+    let progress = Progress::new("variants", all, 0, args.json);
     let mut begun = false;
     let study = effect_study::run(&scene, &mut |what| {
-        bar.set_message(what.to_owned());
+        progress.set_message(what);
         if std::mem::replace(&mut begun, true) {
-            bar.inc(1);
+            progress.inc();
         }
     })?;
-    bar.finish_and_clear();
+    drop(progress);
     let table = markdown(&study);
     if let Some(out) = &args.out {
         atomic::create_folder(out)?;
@@ -54,8 +57,9 @@ fn markdown(study: &Study) -> String {
     let base = &study.base;
     let names: Vec<_> = study.effects.iter().map(EffectName::as_str).collect();
     let mut text = format!(
-        "As it stands ({}): {:.4} N, peak pressure {:.0} Pa, peak SED {:.1} J/m3; {} unknowns, \
+        "{}.\n\nAs it stands ({}): {:.4} N, peak pressure {:.0} Pa, peak SED {:.1} J/m3; {} unknowns, \
          {:.1} s, {} Newton iterations.\n\n",
+        today_here(),
         if names.is_empty() { "no effect".into() } else { names.join(", ") },
         base.force_n,
         base.pressure_pa_max,

@@ -1,6 +1,7 @@
 //! `export`: a scene as an input deck of another solver.
 
 use super::choices::{LinearHex, QuadraticHex};
+use anyhow::Context as _;
 use papilla_fingertip::scene::Scene;
 use papilla_output::atomic;
 use papilla_validation::calculix::{ElementTypes, SceneDeck};
@@ -13,16 +14,16 @@ use std::process::ExitCode;
 /// prints displacement, reactions, strain, stress and contact at the stored
 /// states. What CalculiX cannot express is an error.
 #[derive(clap::Args)]
-#[command(after_help = "Run it with `ccx -i FILE` without the ending.\n\
-                  Example: fe-datagen export scenes/layered-block.toml --format inp --out block.inp")]
+#[command(after_help = "Run it with `ccx -i DIR/SCENE`.\n\
+                  Example: fe-datagen export scenes/layered-block.toml --format inp --out out/deck")]
 pub(super) struct Args {
     /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
     /// Format of the deck.
     #[arg(long, value_enum)]
     format: Format,
-    /// File to write.
-    #[arg(long)]
+    /// Folder for the deck, which has the scene's name.
+    #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Type that stands for Hex8.
     #[arg(long, value_enum, default_value_t = LinearHex::C3d8)]
@@ -44,12 +45,15 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let types = ElementTypes { linear: args.linear.into(), quadratic: args.quadratic.into() };
     let title = args.scene.display().to_string();
     let deck = exported.deck(&title, types);
-    atomic::write(&args.out, deck.to_text()?.as_bytes())?;
+    let stem = args.scene.file_stem().context("a scene file has a name")?;
+    let path = args.out.join(stem).with_extension("inp");
+    atomic::create_folder(&args.out)?;
+    atomic::write(&path, deck.to_text()?.as_bytes())?;
     println!(
         "{} nodes, {} elements: {}",
         deck.nodes().len(),
         deck.mesh.element_count(),
-        args.out.display()
+        path.display()
     );
     Ok(ExitCode::SUCCESS)
 }

@@ -1,6 +1,7 @@
 //! `fidelity`: finite elements as rows of the ladder.
 
 use super::{CHECKS_FAILED, print};
+use crate::progress::Progress;
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_validation::fidelity::{self, Ladder, Report};
 use std::fmt::Write as _;
@@ -29,7 +30,7 @@ pub(super) struct Args {
     /// Held-out indentations to solve, spread over the campaign's indenters.
     #[arg(long)]
     presses: usize,
-    /// Presses that the fine mesh with quadratic elements solves too.
+    /// Indentations that the fine mesh with quadratic elements solves too.
     #[arg(long, default_value_t = 1)]
     check: usize,
     /// Folder for rungs.json, the archives and what a restart needs.
@@ -42,15 +43,15 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let spec = CampaignSpec::read(&args.campaign)?;
-    let bar = super::progress("setting up", 1);
+    let progress = Progress::new("solutions", 1, 0, args.json);
     let ladder = Ladder::usual(args.check);
     let tell = &mut |what: &str, done: usize, all: usize| {
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
-        bar.set_message(what.to_owned());
+        progress.set_length(all);
+        progress.set_position(done);
+        progress.set_message(what);
     };
     let report = fidelity::run(&spec, &ladder, args.presses, &args.out, tell)?;
-    bar.finish_and_clear();
+    drop(progress);
     print(&report, args.json, || human(&report))?;
     let clean = report.left_out.is_empty();
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
@@ -58,12 +59,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn human(r: &Report) -> String {
     let mut text = format!(
-        "campaign {}: {} states\nrung                            unknowns   s a state   SED error: \
+        "campaign {}: {} states\nlevel                           unknowns   s a state   SED error: \
          median     p95\n",
         r.campaign,
         r.states.len()
     );
-    for level in &r.rungs {
+    for level in &r.levels {
         let mut seconds = level.seconds.clone();
         seconds.sort_by(f64::total_cmp);
         let e = &level.sed_relative_l2;
@@ -84,7 +85,7 @@ fn human(r: &Report) -> String {
         let _ = writeln!(
             text,
             "left out: indentation {} at {:.3} mm, {}: {}",
-            l.press, l.depth_mm, l.rung, l.why
+            l.press, l.depth_mm, l.level, l.why
         );
     }
     text

@@ -27,7 +27,7 @@ pub(super) struct Args {
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
-    /// Presses solved at a time [default: one per core].
+    /// Indentations solved at a time [default: one per core].
     #[arg(long)]
     threads: Option<NonZero<usize>>,
     /// Print the report as JSON.
@@ -49,15 +49,15 @@ impl IndentationSolver for BodySolver<'_> {
             ..self.approaches[indentation.candidate].clone()
         };
         let drive = Drive::Depths(indentation.depths_mm.clone());
-        let (records, pressed) = self.body.press_balanced(
+        let found = self.body.press_balanced(
             &mut self.solver,
             &approach,
             &drive,
             BALANCE_RELATIVE_MAX,
             &mut |_, _, record, _| acceptance::sample(record),
         );
-        pressed?;
-        Ok(records)
+        found.pressed?;
+        Ok(found.kept)
     }
 }
 

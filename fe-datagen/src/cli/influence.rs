@@ -1,8 +1,9 @@
-//! `operator`: the finger's own linear operator.
+//! `operator`: the finger's own influence operator.
 
 use super::choices::Density;
 use super::print;
 use crate::influence_file::{self, Card};
+use crate::progress::Progress;
 use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::Order;
 use papilla_fingertip::scene::TissueTable;
@@ -43,16 +44,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let density = args.density.into();
     let body = influence::body(density, order, &materials)?;
     let vertices = body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
-    let bar = super::progress("solving for vertices", vertices);
-    let operator = influence::build(&body, &mut |done| bar.set_position(done as u64))?;
-    bar.finish_and_clear();
+    let progress = Progress::new("vertices", vertices, 0, args.json);
+    let operator = influence::build(&body, &mut |done| progress.set_position(done))?;
+    drop(progress);
     let seconds = processor::thread_s() - begun_s;
     let card = Card::new(&operator, density, order, &materials, seconds);
     influence_file::write(&args.out, &operator, &card)?;
     print(&card, args.json, || {
         let q = &card.quality;
         format!(
-            "operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
+            "influence operator of {} vertices ({} unknowns) in {seconds:.1} s of processor time: \
              residual at most {:.1e}, \
              reciprocity to {:.1e}\natlas {}\nwrote {}",
             card.vertices,

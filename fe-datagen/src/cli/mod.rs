@@ -107,15 +107,3 @@ fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
         None => Ok(()),
     }
 }
-
-/// A bar on standard error with rate and time left.
-fn progress(what: &'static str, length: usize) -> indicatif::ProgressBar {
-    let style = indicatif::ProgressStyle::with_template(
-        "{msg} [{bar:30}] {pos}/{len} {per_sec} {eta} left",
-    );
-    let bar = indicatif::ProgressBar::new(length as u64).with_message(what);
-    match style {
-        Ok(style) => bar.with_style(style.progress_chars("=> ")),
-        Err(_) => bar,
-    }
-}

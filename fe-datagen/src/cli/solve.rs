@@ -2,6 +2,7 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::body_file::write_vtu;
+use crate::progress::Progress;
 use anyhow::Context as _;
 use ndarray::Array2;
 use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, Raster};
@@ -10,6 +11,7 @@ use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
@@ -101,7 +103,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
     let (pressed, solved) =
-        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out))?;
+        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out), args.json)?;
     let records: Vec<_> = pressed.iter().map(|p| p.record.clone()).collect();
     if let Some(atlas) = &atlas {
         write_maps(&args.out, &scene, atlas, &records)?;
@@ -144,9 +146,10 @@ fn press(
     setup: &Simulation,
     solver: &mut Solver<'_>,
     out: Option<&PathBuf>,
+    quiet: bool,
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
     let Simulation { body, approach, drive, .. } = setup;
-    let bar = super::progress("pressing", drive.len());
+    let progress = Progress::new("states", drive.len(), 0, quiet);
     let mut written = Ok(());
     let file = |state: usize| format!("state-{state:03}.vtu");
     let keep =
@@ -154,14 +157,15 @@ fn press(
             if let (Some(out), true) = (out, written.is_ok()) {
                 written = write_vtu(&out.join(file(state)), body, s);
             }
-            bar.set_position(state as u64 + 1);
+            progress.set_position(state + 1);
+            progress.set_message(format!("{:.3} mm deep", record.depth_mm));
             let surface = &body.problem.mesh.surfaces[&body.contact];
             let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
             Pressed { record: record.clone(), report: *report, pressure_mpa_max }
         };
-    let (pressed, solved) =
+    let Balanced { kept: pressed, pressed: solved, .. } =
         body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
-    bar.finish_and_clear();
+    drop(progress);
     if let (Err(_), Some(out), true) = (&solved, out, written.is_ok()) {
         written = write_vtu(&out.join(LAST_STATE), body, solver);
     }
@@ -285,17 +289,16 @@ fn human(s: &Summary, out: &Path) -> String {
         s.effort.solve_s,
     );
     text +=
-        "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   int p dA   energy\n";
+        "depth mm   force N   pressure kPa   SED dermis J/m3   iterations   energy against work\n";
     for i in &s.increments {
         let force = papilla_fem::tensor::norm(i.force_n);
         text += &format!(
-            "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:9.2} % {:6.2} %{}\n",
+            "{:8.3} {:9.4} {:14.3} {:>17} {:12} {:19.2} %{}\n",
             i.depth_mm,
             force,
             i.pressure_pa_max / 1e3,
             i.sed_dermis_j_per_m3_max.map_or("-".into(), |v| format!("{v:.2}")),
             i.checks.newton_iterations,
-            100.0 * i.checks.contact_force_vs_pressure_integral,
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );

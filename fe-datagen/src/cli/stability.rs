@@ -1,12 +1,11 @@
 //! `stability`: the named suite of hard cases, and random scenes by the thousand.
 
-use super::{CHECKS_FAILED, print};
-use crate::campaign::progress;
+use super::{CHECKS_FAILED, choices, print};
+use crate::progress::Progress;
 use anyhow::Context as _;
-use indicatif::ProgressBar;
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_output::atomic;
-use papilla_validation::stability::scenes::{self, Progress, ScenesOptions};
+use papilla_validation::stability::scenes::{self, ScenesOptions, Watch};
 use papilla_validation::stability::{self, CASES, Extent};
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
@@ -47,12 +46,15 @@ pub(super) struct Args {
     /// Also write the report as Markdown to this file.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
-    /// Press this many random scenes of --campaign at density coarse, to their deepest state.
+    /// Press this many random scenes of --campaign, to their deepest state.
     #[arg(long, value_name = "N", requires = "out")]
     scenes: Option<NonZero<usize>>,
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 5)]
     seed: u64,
+    /// Mesh of the random scenes.
+    #[arg(long, value_enum, default_value_t = choices::Density::Coarse)]
+    density: choices::Density,
     /// Scenes solved at a time.
     #[arg(long, default_value = "1")]
     threads: NonZero<usize>,
@@ -71,15 +73,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
             let spec = CampaignSpec::read(&args.campaign)?;
-            let options = ScenesOptions { count, seed: args.seed, threads: args.threads };
-            let bar = OnceLock::new();
-            let begun = |reused| {
-                bar.get_or_init(|| progress::bar(count.get(), reused, !args.json));
+            let options = ScenesOptions {
+                count,
+                seed: args.seed,
+                density: args.density.into(),
+                threads: args.threads,
             };
-            let solved = || bar.get().into_iter().for_each(|b: &ProgressBar| b.inc(1));
-            let told = Progress { begun: &begun, solved: &solved };
+            let progress = OnceLock::new();
+            let begun = |reused| {
+                progress.get_or_init(|| Progress::new("scenes", count.get(), reused, args.json));
+            };
+            let solved = || progress.get().into_iter().for_each(Progress::inc);
+            let told = Watch { begun: &begun, solved: &solved };
             let report = scenes::run(&spec, out, &options, told)?;
-            bar.get().into_iter().for_each(ProgressBar::finish_and_clear);
+            drop(progress);
             if let Some(path) = &args.markdown {
                 write(path, &report.markdown())?;
             }
@@ -100,17 +107,18 @@ fn suite(args: &Args) -> anyhow::Result<ExitCode> {
         (_, true) => Extent::Long,
         _ => Extent::Usual,
     };
-    let bar = super::progress("cases", CASES.iter().filter(|c| wanted(c)).count());
-    let report = stability::run(extent, &wanted, &mut |_, lines| {
-        let Some(lines) = lines else { return };
-        bar.suspend(|| {
+    let all = CASES.iter().filter(|c| wanted(c)).count();
+    let progress = Progress::new("cases", all, 0, args.json);
+    let report = stability::run(extent, &wanted, &mut |case, lines| {
+        let Some(lines) = lines else { return progress.set_message(case.name) };
+        progress.suspend(|| {
             for line in lines.iter().filter(|_| !args.json) {
                 println!("{}", line.text());
             }
         });
-        bar.inc(1);
+        progress.inc();
     });
-    bar.finish_and_clear();
+    drop(progress);
     if let Some(folder) = &args.out {
         atomic::create_folder(folder)?;
         atomic::write_json(&folder.join("stability.json"), &report)?;

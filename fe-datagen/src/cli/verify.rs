@@ -1,6 +1,7 @@
 //! `verify`: the solver against closed forms, published values and itself.
 
 use super::{CHECKS_FAILED, print};
+use crate::progress::Progress;
 use anyhow::Context;
 use papilla_validation::verify::{self, CASES, Row};
 use std::path::PathBuf;
@@ -36,26 +37,23 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let wanted = |c: &verify::Case| {
         (c.quick || !args.quick) && (args.only.is_empty() || args.only.iter().any(|n| n == c.name))
     };
-    let bar = indicatif::ProgressBar::new(CASES.iter().filter(|c| wanted(c)).count() as u64);
-    bar.set_style(indicatif::ProgressStyle::with_template(
-        "{wide_bar} {pos}/{len} {msg} {elapsed}",
-    )?);
-    bar.enable_steady_tick(std::time::Duration::from_millis(250));
+    let all = CASES.iter().filter(|c| wanted(c)).count();
+    let progress = Progress::new("cases", all, 0, args.json);
     if !args.json {
         println!("{}", Row::heading());
     }
     let report = verify::run(args.quick, &wanted, &mut |case, rows| match rows {
-        None => bar.set_message(case.name),
+        None => progress.set_message(case.name),
         Some(rows) => {
-            bar.suspend(|| {
+            progress.suspend(|| {
                 for row in rows.iter().filter(|_| !args.json) {
                     println!("{}", row.line());
                 }
             });
-            bar.inc(1);
+            progress.inc();
         }
     });
-    bar.finish_and_clear();
+    drop(progress);
     if let Some(path) = &args.markdown {
         std::fs::write(path, report.markdown())
             .with_context(|| format!("cannot write {}", path.display()))?;

@@ -110,7 +110,7 @@ pub struct Relaxing<L> {
 }
 
 impl<L: Isochoric> Relaxing<L> {
-    /// `law` with the memory of `history` over a step of `dt_s`.
+    /// `law` with the history variables `history` over a step of `dt_s`.
     pub fn new(law: L, prony: &Prony, history: History<'_>, dt_s: f64) -> Self {
         let (scale, pull) = prony.step(history, dt_s);
         Self { law, scale, pull: full(&pull) }
@@ -130,7 +130,7 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
 
     /// `c U + B : (Cbar - I) / 2`; of small strain `c U + B : dev e`.
     fn energy(&self, k: &Kinematics) -> f64 {
-        let memory = if L::FINITE {
+        let branches = if L::FINITE {
             // Cbar - I = J^(-2/3) (2 E - (J^(2/3) - 1) I).
             let (m, e) = (k.j_pow_minus_two_thirds(), k.green_strain());
             let grown = (2.0 / 3.0 * k.j_minus_1.ln_1p()).exp_m1();
@@ -139,13 +139,13 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
         } else {
             double_dot(&self.pull, &deviatoric_strain(&k.h))
         };
-        self.scale * self.law.energy(k) + memory
+        self.scale * self.law.energy(k) + branches
     }
 
     /// `P = c P_L + J^(-2/3) (F B - 1/3 (F B : F) F^-T)`.
     fn first_piola(&self, k: &Kinematics) -> Mat3 {
         let elastic = self.law.first_piola(k);
-        let memory = if L::FINITE {
+        let branches = if L::FINITE {
             let fb = product(&k.f, &self.pull);
             let third = double_dot(&fb, &k.f) / 3.0;
             let (m, g) = (k.j_pow_minus_two_thirds(), k.f_inverse());
@@ -158,7 +158,9 @@ impl<L: Isochoric> Isochoric for Relaxing<L> {
             }
             b
         };
-        std::array::from_fn(|i| std::array::from_fn(|j| self.scale * elastic[i][j] + memory[i][j]))
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| self.scale * elastic[i][j] + branches[i][j])
+        })
     }
 
     fn tangent(&self, k: &Kinematics) -> Tensor4 {

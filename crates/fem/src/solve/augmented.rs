@@ -37,7 +37,7 @@ impl Solver<'_> {
                 loading: &self.loading,
                 load_fraction: fraction,
                 multipliers,
-                memory: HistoryVariables { history: &trial.memory, dt_s },
+                variables: HistoryVariables { history: &trial.history, dt_s },
                 friction: rubs.then_some(&trial.friction),
             };
             self.newton.equilibrate(tolerance, fixed, u, independent)?;

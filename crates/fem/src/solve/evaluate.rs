@@ -11,7 +11,7 @@ use crate::linear::SymmetricMatrix;
 /// What an evaluation at one displacement found.
 #[derive(Clone, Debug, Default)]
 pub struct Evaluation {
-    /// Elastic energy, mJ; of a body with memory the potential of the step.
+    /// Elastic energy, mJ; of a viscoelastic body the potential of the step.
     pub stored_mj: f64,
     /// Energy in the penalty that stands for contact where there are no multipliers, mJ.
     pub contact_mj: f64,
@@ -57,8 +57,8 @@ pub struct Trial<'a> {
     pub penalty: f64,
     /// Part of the loading that acts, 0 to 1.
     pub load_fraction: f64,
-    /// History of materials with memory at the start of the step, and its length, s.
-    pub memory: HistoryVariables<'a>,
+    /// History of viscoelastic materials at the start of the step, and its length, s.
+    pub variables: HistoryVariables<'a>,
     /// Tangential contact; `None` without friction.
     pub friction: Option<&'a FrictionTrial>,
 }
@@ -133,9 +133,9 @@ fn elements(
                 dense.as_mut_slice()
             });
             let material = &problem.materials[block.region[e]];
-            let memory =
+            let variables =
                 problem.history_layout.as_ref().map_or(HistoryVariables::default(), |layout| {
-                    layout.of(trial.memory.history, trial.memory.dt_s, b, e)
+                    layout.of(trial.variables.history, trial.variables.dt_s, b, e)
                 });
             let own = independent.next().map(|&theta_minus_1| IndependentDilatation {
                 theta_minus_1,
@@ -144,7 +144,7 @@ fn elements(
             let keeps = own.is_some();
             let g = geometry.element(e);
             let state = material
-                .evaluate_with(g, &local[..n], memory, own, &mut force[..n], stiffness)
+                .evaluate_with(g, &local[..n], variables, own, &mut force[..n], stiffness)
                 .map_err(|i| StepError::Inverted { block: b, element: e, j: i.j })?;
             out.stored_mj += state.energy_mj;
             if state.j_min < out.j_min {

@@ -7,7 +7,7 @@ use crate::element::HistoryVariables;
 use crate::element::geometry::displacement_gradient;
 use crate::tensor::Kinematics;
 
-/// Deformation at the quadrature points of the elements that have memory.
+/// Deformation at the quadrature points of the elements that have history variables.
 fn visit_points(
     problem: &Problem,
     layout: &HistoryLayout,
@@ -34,13 +34,13 @@ pub(super) fn advance(
     history: &mut [f64],
 ) {
     visit_points(problem, layout, u, &mut |b, e, q, k| {
-        let solid = &problem.materials[problem.mesh.blocks[b].region[e]];
-        let (first, len) = (layout.range(b, e).start, solid.history_len());
-        solid.advance(k, dt_s, &mut history[first + q * len..first + (q + 1) * len]);
+        let model = &problem.materials[problem.mesh.blocks[b].region[e]];
+        let (first, len) = (layout.range(b, e).start, model.history_len());
+        model.advance(k, dt_s, &mut history[first + q * len..first + (q + 1) * len]);
     });
 }
 
-/// Energy of a body with memory, mJ.
+/// Energy of a viscoelastic body, mJ.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergySplit {
     /// What can be got back.
@@ -57,20 +57,20 @@ pub(super) fn energies(problem: &Problem, history: &[f64], u: &[[f64; 3]]) -> En
         let mut force = vec![[0.0; 3]; n];
         for e in 0..block.len() {
             let local: Vec<_> = block.element(e).iter().map(|&a| u[a as usize]).collect();
-            let solid = &problem.materials[block.region[e]];
+            let model = &problem.materials[block.region[e]];
             let g = geometry.element(e);
-            let len = solid.history_len();
+            let len = model.history_len();
             let own = problem.history_layout.as_ref().map_or(&[][..], |m| &history[m.range(b, e)]);
-            let memory = HistoryVariables { history: own, dt_s: 0.0 };
+            let variables = HistoryVariables { history: own, dt_s: 0.0 };
             // An equilibrium has no inverted element; NaN would show one.
-            let theta = solid
-                .evaluate(g, &local, memory, &mut force, None)
+            let theta = model
+                .evaluate(g, &local, variables, &mut force, None)
                 .map_or([f64::NAN; 4], |s| s.theta_minus_1);
             for (q, gradients) in g.gradients.chunks_exact(n).enumerate() {
                 let k = Kinematics::new(displacement_gradient(&local, gradients));
                 let t: f64 = g.basis[q].iter().zip(theta).map(|(b, t)| b * t).sum();
                 let point = &own[q * len..(q + 1) * len];
-                split.stored_mj += g.weights[q] * solid.stored_mpa(&k, t, point);
+                split.stored_mj += g.weights[q] * model.stored_mpa(&k, t, point);
                 split.dissipated_mj += g.weights[q] * point.last().copied().unwrap_or(0.0);
             }
         }

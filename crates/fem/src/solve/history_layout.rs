@@ -1,4 +1,4 @@
-//! Where the memory of materials that have one lies.
+//! Where the history variables of viscoelastic materials lie.
 
 use crate::element::{BlockGeometry, HistoryVariables, Materials};
 use crate::mesh::Mesh;
@@ -13,7 +13,7 @@ pub struct HistoryLayout {
 }
 
 impl HistoryLayout {
-    /// `None` if no element's material has memory.
+    /// `None` if no element's material has history variables.
     pub(super) fn new(
         mesh: &Mesh,
         geometry: &[BlockGeometry],
@@ -39,7 +39,7 @@ impl HistoryLayout {
         self.start[block][element]..self.start[block][element + 1]
     }
 
-    /// An element's memory in `history`.
+    /// An element's history variables in `history`.
     #[inline]
     #[must_use]
     pub fn of<'a>(

@@ -86,7 +86,7 @@ pub struct Loading {
     pub prescribed_mm: Vec<(usize, f64)>,
     /// Indenter.
     pub indenter: Option<MovingIndenter>,
-    /// Time that the whole load takes, s. Only materials with memory see it.
+    /// Time that the whole load takes, s. Only viscoelastic materials see it.
     pub duration_s: f64,
     /// Coulomb coefficient between skin and indenter; 0 is no friction.
     pub friction: f64,

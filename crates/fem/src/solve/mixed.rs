@@ -30,9 +30,9 @@ const LINEAR_MIN: f64 = 1e-10;
 pub(super) fn at_rest(problem: &Problem) -> Vec<Dilatation> {
     let blocks = &problem.mesh.blocks;
     let pays = blocks.iter().flat_map(|b| &b.region).any(|&region| {
-        let solid = &problem.materials[region];
-        solid.is_finite_strain()
-            && solid.bulk_modulus_mpa() > STIFF_RATIO * solid.shear_modulus_mpa()
+        let model = &problem.materials[region];
+        model.is_finite_strain()
+            && model.bulk_modulus_mpa() > STIFF_RATIO * model.shear_modulus_mpa()
     });
     if pays { vec![[0.0; 4]; blocks.iter().map(|b| b.len()).sum()] } else { Vec::new() }
 }
@@ -125,42 +125,9 @@ pub(super) fn forcing(forcing: f64, share: f64, target: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::{Elastic, ElementKind, Materials};
-    use crate::material::{NeoHookean, moduli};
-    use crate::mesh::block::even;
-    use crate::mesh::lattice::{REGION, intervals, lattice};
-    use crate::mesh::supports::hold;
-    use crate::solve::{Loading, MovingIndenter, Options, Solver};
-    use papilla_sdf::{Placement, RoundedPlate};
-    use std::sync::Arc;
-
-    /// A quarter of a 10 x 10 x 5 mm block bonded below and squeezed by 0.75 mm with a smooth
-    /// plate; of planar elements half of a 10 x 5 mm section. The number is the axis of the
-    /// squeeze.
-    fn squeezed(kind: ElementKind, cells: usize, nu: f64) -> (Problem, Loading, usize) {
-        let n = intervals(kind) * cells;
-        let mesh = lattice(kind, [even(5.0, n), even(5.0, n), even(5.0, n)], |p| p);
-        let up = kind.dimension() - 1;
-        let (held, touched) = [("y_min", "y_max"), ("z_min", "z_max")][up - 1];
-        let mut sides = vec![("x_min", [true, false, false]), (held, [true; 3])];
-        // Upside down: the plate presses with its local +z face.
-        let rotation = if kind.is_planar() {
-            [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
-        } else {
-            sides.push(("y_min", [false, true, false]));
-            [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
-        };
-        let fixed = hold(&mesh, &sides);
-        let [mu_mpa, bulk_mpa] = moduli(0.1, nu);
-        let model = Elastic::shared(NeoHookean { mu_mpa }, bulk_mpa);
-        let materials = Materials::new(vec![model; REGION.index() + 1]);
-        let problem = Problem::new(mesh, materials, fixed, Some(touched)).unwrap();
-        let plate = Arc::new(RoundedPlate { half_mm: [20.0, 20.0, 2.0], edge_radius_mm: 0.5 });
-        let along = |v: f64| std::array::from_fn(|i| if i == up { v } else { 0.0 });
-        let start = Placement { rotation, origin_mm: along(7.0) };
-        let indenter = MovingIndenter::straight(plate, start, along(-0.75));
-        (problem, Loading { indenter: Some(indenter), ..Loading::default() }, up)
-    }
+    use crate::element::ElementKind;
+    use crate::solve::{Loading, Options, Solver};
+    use crate::testing::squeezed_block;
 
     fn tight() -> Options {
         Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-7, ..Options::default() }
@@ -169,7 +136,7 @@ mod tests {
     #[test]
     fn equilibria_are_those_of_the_condensed_element() {
         for kind in [ElementKind::Hex8, ElementKind::Quad9] {
-            let (problem, loading, _) = squeezed(kind, 3, 0.48);
+            let (problem, loading, _) = squeezed_block(kind, 3, 0.48).unwrap();
             let mut found = Vec::new();
             for keeps in [false, true] {
                 let mut solver = Solver::new(&problem, tight()).unwrap();
@@ -210,7 +177,7 @@ mod tests {
     #[test]
     fn rubbing_bodies_end_where_the_potential_leads() {
         for friction in [0.5, 10.0] {
-            let (problem, loading, up) = squeezed(ElementKind::Hex8, 3, 0.48);
+            let (problem, loading, up) = squeezed_block(ElementKind::Hex8, 3, 0.48).unwrap();
             let loading = Loading { friction, ..loading };
             let force = [false, true].map(|keeps| {
                 let mut solver = Solver::new(&problem, Options::default()).unwrap();
@@ -231,7 +198,7 @@ mod tests {
     #[test]
     fn nearly_incompressible_bodies_take_few_iterations() {
         for nu in [0.4999, 0.49999, 0.499_999] {
-            let (problem, loading, _) = squeezed(ElementKind::Quad4, 8, nu);
+            let (problem, loading, _) = squeezed_block(ElementKind::Quad4, 8, nu).unwrap();
             let mut solver = Solver::new(&problem, Options::default()).unwrap();
             solver.start(loading);
             assert!(!solver.state.independent.is_empty());

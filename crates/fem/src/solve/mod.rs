@@ -60,7 +60,7 @@ pub struct Options {
     /// below which friction has settled.
     pub friction_tolerance: f64,
     /// How far linear extrapolation over a time step may miss, over the largest
-    /// displacement; bodies with memory only.
+    /// displacement; viscoelastic bodies only.
     pub time_error: f64,
 }
 
@@ -153,7 +153,7 @@ pub enum SolveError {
         /// Error of the last try.
         cause: StepError,
     },
-    /// Materials with memory asked for ever more and shorter time steps.
+    /// Viscoelastic materials asked for ever more and shorter time steps.
     #[error("no end in sight at load fraction {reached:.6} after {steps} load steps")]
     StepsExhausted {
         /// Last load fraction in equilibrium.

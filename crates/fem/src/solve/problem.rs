@@ -14,7 +14,7 @@ pub struct Problem {
     pub geometry: Vec<BlockGeometry>,
     /// What each region is made of.
     pub materials: Materials,
-    /// Where each element's memory is; `None` if no material has any.
+    /// Where each element's history variables are; `None` if no material has any.
     pub history_layout: Option<HistoryLayout>,
     /// Prescribed degrees of freedom, `3 node + component`.
     pub fixed: Vec<bool>,

@@ -76,11 +76,11 @@ impl<'a> Solver<'a> {
     }
 
     /// History of an element's quadrature points at the equilibrium; empty for
-    /// materials without memory.
+    /// elastic materials.
     #[must_use]
     pub fn history_of(&self, block: usize, element: usize) -> &[f64] {
         let layout = self.newton.problem.history_layout.as_ref();
-        layout.map_or(&[], |m| &self.state.memory[m.range(block, element)])
+        layout.map_or(&[], |m| &self.state.history[m.range(block, element)])
     }
 
     /// Tangential traction of the indenter on each contact node, MPa per

@@ -13,8 +13,8 @@ pub(super) struct State {
     /// Dilatation of each element that is kept as an unknown of its own; empty if none is.
     pub independent: Vec<Dilatation>,
     pub multipliers: Vec<f64>,
-    /// History of materials with memory; empty if there are none.
-    pub memory: Vec<f64>,
+    /// History of viscoelastic materials; empty if there are none.
+    pub history: Vec<f64>,
     /// Tangential contact; no points without friction.
     pub friction: FrictionTrial,
 }
@@ -38,7 +38,7 @@ pub struct StepReport {
     pub gap_error_mm: f64,
     /// Energy that can be got back, mJ.
     pub stored_mj: f64,
-    /// Energy that materials with memory and friction have turned into heat, mJ.
+    /// Energy that viscoelastic materials and friction have turned into heat, mJ.
     pub dissipated_mj: f64,
     /// Smallest `J`.
     pub j_min: f64,

@@ -19,12 +19,12 @@ pub struct Solver<'a> {
     /// Equilibrium before the last, for extrapolation.
     pub(super) before: Option<State>,
     pub(super) work: Work,
-    /// Load fraction that a time step may take; `None` for bodies without memory.
+    /// Load fraction that a time step may take; `None` for elastic bodies.
     pub(super) time_step: Option<f64>,
 }
 
 impl<'a> Solver<'a> {
-    /// HistoryVariables for solving `problem`.
+    /// Buffers for solving `problem`.
     ///
     /// # Errors
     /// [`SolveError::Factor`] if the factor does not fit in memory,
@@ -54,7 +54,7 @@ impl<'a> Solver<'a> {
             u: vec![[0.0; 3]; problem.mesh.nodes.len()],
             independent: mixed::at_rest(problem),
             multipliers: vec![0.0; contact_points],
-            memory: vec![0.0; problem.history_layout.as_ref().map_or(0, |m| m.len)],
+            history: vec![0.0; problem.history_layout.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
         };
         if self.loading.friction > 0.0 {
@@ -157,12 +157,12 @@ impl<'a> Solver<'a> {
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
     fn settle(&mut self) {
-        let State { fraction, u, independent, multipliers, memory, friction } = &self.state;
+        let State { fraction, u, independent, multipliers, history, friction } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,
             load_fraction: *fraction,
             multipliers,
-            memory: HistoryVariables { history: memory, dt_s: 0.0 },
+            variables: HistoryVariables { history, dt_s: 0.0 },
             friction: (!friction.points.is_empty()).then_some(friction),
         };
         // It was in equilibrium: nothing in it is inverted.
@@ -180,9 +180,9 @@ impl<'a> Solver<'a> {
 
     fn report(&self, since: &Effort) -> StepReport {
         let e = &self.newton.current;
-        // The potential of a body without memory is its stored energy.
+        // The potential of an elastic body is its stored energy.
         let energy = if self.newton.problem.history_layout.is_some() {
-            history::energies(self.newton.problem, &self.state.memory, &self.state.u)
+            history::energies(self.newton.problem, &self.state.history, &self.state.u)
         } else {
             EnergySplit { stored_mj: e.stored_mj, dissipated_mj: 0.0 }
         };
@@ -223,7 +223,7 @@ impl<'a> Solver<'a> {
         let dt_s = self.seconds(next);
         trial.fraction = next;
         if let Some(layout) = &problem.history_layout {
-            history::advance(problem, layout, &trial.u, dt_s, &mut trial.memory);
+            history::advance(problem, layout, &trial.u, dt_s, &mut trial.history);
         }
         friction::update(&mut trial.friction, &self.newton.current);
         friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);

@@ -1,4 +1,4 @@
-//! How far a time step goes in bodies with memory.
+//! How far a time step goes in viscoelastic bodies.
 
 use super::stepping::Solver;
 

@@ -6,6 +6,7 @@
 mod error;
 mod sampling;
 mod spec;
+pub mod testing;
 #[cfg(test)]
 mod tests;
 

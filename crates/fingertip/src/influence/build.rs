@@ -107,7 +107,7 @@ fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, InfluenceError>
         multipliers_mpa: &multipliers,
         penalty: 1.0,
         load_fraction: 0.0,
-        memory: Default::default(),
+        variables: Default::default(),
         friction: None,
     };
     let mut out = Evaluation::default();

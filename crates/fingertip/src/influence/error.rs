@@ -1,4 +1,4 @@
-//! What can stop the operator.
+//! What can stop the influence operator.
 
 use super::strain::StrainError;
 use crate::simulation::body::SimulationError;
@@ -20,7 +20,7 @@ pub enum InfluenceError {
         "the body has no atlas patch: the influence operator maps skin to interface of a fingertip"
     )]
     NoPatch,
-    /// A law of finite strain has no one operator.
+    /// A law of finite strain has no one influence operator.
     #[error(
         "the body's law is of finite strain, so its response to pressure is not linear: build the \
          body without the effect 'finite_strain'"

@@ -93,8 +93,9 @@ const FORCE_TRIES_MAX: u32 = 60;
 impl Body {
     /// Presses and calls `visit` with the solver at each stored equilibrium and
     /// its record. There are more equilibria than stored depths, for the work integral;
-    /// `refinement` 2 halves their distance, and so on. The stored states do
-    /// not depend on it.
+    /// `refinement` 2 halves their distance, and so on; of a path over time it is the number of
+    /// equilibria for each state that is reached by moving. The stored states do not depend on
+    /// it (those of a path to the error of time integration); forces ignore it.
     ///
     /// # Errors
     /// [`SimulationError::Solve`] names the state that found no equilibrium; records
@@ -121,7 +122,7 @@ impl Body {
         match drive {
             Drive::Depths(depths) => self.to_depths(solver, depths, refinement, visit),
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
-            Drive::Path(points) => self.along(solver, points, visit),
+            Drive::Path(points) => self.along(solver, points, refinement, visit),
         }
     }
 
@@ -153,14 +154,26 @@ impl Body {
         &self,
         solver: &mut Solver<'_>,
         points: &[DrivePoint],
+        refinement: u32,
         visit: Visit<'_>,
     ) -> Result<(), SimulationError> {
         let end = points.last().map_or(1.0, |p| p.time_s);
+        let mut from = DrivePoint::default();
         for p in points {
             let clock = Instant::now();
             solver.turn();
             let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
-            let report = solver.advance_to(p.time_s / end).map_err(at)?;
+            // An indenter that rests does no work.
+            let rests = *p == DrivePoint { time_s: p.time_s, ..from };
+            let parts = if rests { 1 } else { refinement as usize };
+            let mut effort = Effort::default();
+            for i in 1..parts {
+                let between_s = from.towards(p, i, parts).time_s;
+                effort = effort.plus(&solver.advance_to(between_s / end).map_err(at)?.effort);
+            }
+            from = *p;
+            let mut report = solver.advance_to(p.time_s / end).map_err(at)?;
+            report.effort = report.effort.plus(&effort);
             let mut record = self.record(solver, p.depth_mm, &report)?;
             record.time_s = p.time_s;
             record.seconds = clock.elapsed().as_secs_f64();

@@ -24,7 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod balanced;
+pub mod balanced;
 pub mod body;
 pub mod drive;
 pub mod fields;

@@ -1,5 +1,6 @@
 //! Indentations of the coarse fingertip with bone and nail as solids.
 
+use super::balanced::Balanced;
 use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive};
 use super::laws::solids;
@@ -138,7 +139,7 @@ fn fit_at(approach: &Approach, depth_mm: f64) -> IncrementRecord {
     let mut solver = body.solver(Options::default()).unwrap();
     let drive = Drive::Depths(vec![depth_mm]);
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.clone();
-    let (kept, pressed) =
+    let Balanced { kept, pressed, .. } =
         body.press_balanced(&mut solver, approach, &drive, BALANCE_RELATIVE_MAX, keep);
     pressed.unwrap();
     let found = kept.last().unwrap();
@@ -200,9 +201,53 @@ fn energy_lost_at_gauss_points_takes_more_of_them() {
     let mut solver = body.solver(Options::default()).unwrap();
     let drive = Drive::Depths(vec![0.05]);
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.contact;
-    let (kept, pressed) = body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
+    let Balanced { kept, pressed, .. } =
+        body.press_balanced(&mut solver, &approach, &drive, 1e-12, keep);
     pressed.unwrap();
     assert_eq!(kept, [ContactRule::GaussOrder3]);
+}
+
+/// A block under a ball, relaxing or not, moved as `motion` says.
+fn ball_on_block(effects: &str, motion: &str) -> Scene {
+    let text = format!(
+        "effects = [\"finite_strain\", \"layers\"{effects}]\n[geometry]\nkind = \"block\"\n\
+         size_mm = [6.0, 6.0]\nelements = [6, 6]\n\
+         layers = [{{ tissue = \"dermis\", thickness_mm = 2.0, elements = 3 }}]\n\
+         [materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.48\n\
+         prony = {{ share = [0.3], time_s = [0.4] }}\n\
+         [indenter]\nshape = \"sphere\"\nradius_mm = 4.0\n[motion]\n{motion}"
+    );
+    Scene::parse(Path::new("ball.toml"), text).unwrap()
+}
+
+/// Few increments of a path over time, or one of a force, are a coarse work integral and no lost
+/// energy: the path is taken again in smaller steps, and ends in the same states.
+#[test]
+fn a_coarse_path_is_taken_again_in_smaller_steps() {
+    let hold = "increments = 2\npath = [{ time_s = 0.1, depth_mm = 0.3 }, { time_s = 1.0, depth_mm = 0.3 }]";
+    for (effects, motion, same) in [
+        (", \"viscoelastic\"", hold, 1e-2),
+        ("", hold, 1e-6),
+        ("", "increments = 1\nforce_n = 0.02", 1e-3),
+    ] {
+        let Simulation { body, approach, drive, .. } =
+            Simulation::new(&ball_on_block(effects, motion)).unwrap();
+        let mut solver = body.solver(Options::default()).unwrap();
+        let mut once = Vec::new();
+        let visit = &mut |_: &Solver<'_>, r: &IncrementRecord, _: &StepReport| once.push(r.clone());
+        body.press(&mut solver, &approach, &drive, 1, visit).unwrap();
+        let limit = BALANCE_RELATIVE_MAX.min(0.5 * once[0].checks.energy_vs_work);
+        let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, _: &StepReport| r.clone();
+        let Balanced { kept, pressed, .. } =
+            body.press_balanced(&mut solver, &approach, &drive, limit, keep);
+        pressed.unwrap();
+        assert_eq!(kept.len(), once.len());
+        for (coarse, fine) in once.iter().zip(&kept) {
+            assert!(fine.checks.energy_vs_work <= limit, "{motion}: {:?}", fine.checks);
+            let (a, b) = (norm(coarse.force_n), norm(fine.force_n));
+            assert!((a / b - 1.0).abs() <= same, "{motion}: {a} N, in smaller steps {b} N");
+        }
+    }
 }
 
 #[test]

@@ -120,10 +120,10 @@ impl RigidIndenter {
                 flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm))
             }
             RigidShape::Cylinder { radius_mm, half_length_mm } => {
-                let mut bar = flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm));
-                bar.half_mm[1] = half_length_mm;
-                bar.angle_deg[1] = 0.0;
-                bar
+                let mut cylinder = flat([radius_mm; 2], radius_mm, 0.0, self.reach_deg(radius_mm));
+                cylinder.half_mm[1] = half_length_mm;
+                cylinder.angle_deg[1] = 0.0;
+                cylinder
             }
         };
         let sizes = [rolled.half_mm[0], rolled.half_mm[1], rolled.radius_mm];

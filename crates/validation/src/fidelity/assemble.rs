@@ -22,17 +22,17 @@ pub(super) fn assemble(
     solved: &[Solved],
     folder: &Path,
 ) -> Result<Report, FidelityError> {
-    let ranked = ladder.rungs.len() + 1;
-    let (rungs, check) = solved.split_at(ranked.min(solved.len()));
+    let ranked = ladder.levels.len() + 1;
+    let (levels, check) = solved.split_at(ranked.min(solved.len()));
     let mut left_out = Vec::new();
     let mut places = Vec::new();
-    let presses = rungs.first().map_or(0, |(_, parts)| parts.len());
+    let presses = levels.first().map_or(0, |(_, parts)| parts.len());
     for p in 0..presses {
-        for d in 0..rungs[0].1[p].record.press.depths_mm.len() {
+        for d in 0..levels[0].1[p].record.press.depths_mm.len() {
             let mut sound = true;
-            for (rung, parts) in rungs {
+            for (level, parts) in levels {
                 if let Some(why) = unsound(&parts[p], d) {
-                    left_out.push(left(*rung, &parts[p], d, why));
+                    left_out.push(left(*level, &parts[p], d, why));
                     sound = false;
                 }
             }
@@ -43,19 +43,19 @@ pub(super) fn assemble(
     }
     if places.is_empty() {
         let first = left_out.first().map_or_else(String::new, |l| {
-            format!("{}, press {} at {} mm: {}", l.rung, l.press, l.depth_mm, l.why)
+            format!("{}, indentation {} at {} mm: {}", l.level, l.press, l.depth_mm, l.why)
         });
         return Err(FidelityError::NothingSolved { first });
     }
     let v = target.vertices();
-    let (_, reference) = &rungs[rungs.len() - 1];
+    let (_, reference) = &levels[levels.len() - 1];
     let mut entries = Vec::new();
-    for (k, (rung, parts)) in rungs.iter().enumerate() {
+    for (k, (level, parts)) in levels.iter().enumerate() {
         let rows = rows(parts, &places, v);
-        let file = format!("{}.npz", rung.name());
+        let file = format!("{}.npz", level.name());
         archive(places.len(), v, &rows)?.write(&folder.join(&file))?;
-        let is_reference = k + 1 == rungs.len();
-        let mut entry = entry(*rung, parts, &places, v, reference, file);
+        let is_reference = k + 1 == levels.len();
+        let mut entry = entry(*level, parts, &places, v, reference, file);
         entry.reference = is_reference;
         if let (true, Some(check)) = (is_reference, check.first()) {
             entry.discretisation_error = discretisation(parts, check, v, &mut left_out);
@@ -78,7 +78,7 @@ pub(super) fn assemble(
         atlas_hash: target.atlas_hash.clone(),
         campaign: spec.name.clone(),
         states: states.collect(),
-        rungs: entries,
+        levels: entries,
         left_out,
     };
     atomic::write_json(&folder.join("rungs.json"), &report)?;
@@ -93,9 +93,9 @@ fn unsound(part: &Part, d: usize) -> Option<String> {
     }
 }
 
-fn left(rung: FidelityLevel, part: &Part, d: usize, why: String) -> LeftOut {
+fn left(level: FidelityLevel, part: &Part, d: usize, why: String) -> LeftOut {
     let press = &part.record.press;
-    LeftOut { press: press.id, depth_mm: press.depths_mm[d], rung: rung.name(), why }
+    LeftOut { press: press.id, depth_mm: press.depths_mm[d], level: level.name(), why }
 }
 
 fn row(values: &[f32], d: usize, v: usize) -> &[f32] {
@@ -122,7 +122,7 @@ fn difference(a: &Part, b: &Part, d: usize, v: usize, of: Field) -> f64 {
 }
 
 fn entry(
-    rung: FidelityLevel,
+    level: FidelityLevel,
     parts: &[Part],
     places: &[(usize, usize)],
     v: usize,
@@ -134,10 +134,10 @@ fn entry(
     };
     let record = &parts[0].record;
     LevelEntry {
-        name: rung.name(),
-        density: rung.density,
-        order: rung.order,
-        kinematics: rung.kinematics,
+        name: level.name(),
+        density: level.density,
+        order: level.order,
+        kinematics: level.kinematics,
         unknowns: record.unknowns,
         factor_entries: record.factor_entries,
         reference: false,
@@ -153,7 +153,7 @@ fn entry(
 /// How far the reference's parts are from the check's.
 fn discretisation(
     parts: &[Part],
-    (rung, check): &Solved,
+    (level, check): &Solved,
     v: usize,
     left_out: &mut Vec<LeftOut>,
 ) -> Option<DiscretisationError> {
@@ -161,7 +161,7 @@ fn discretisation(
     for (a, b) in parts.iter().zip(check) {
         for d in 0..b.record.press.depths_mm.len() {
             if let Some(why) = unsound(b, d) {
-                left_out.push(left(*rung, b, d, why));
+                left_out.push(left(*level, b, d, why));
             } else if unsound(a, d).is_none() {
                 sed.push(difference(a, b, d, v, |p| &p.sed_j_per_m3));
                 pressure.push(difference(a, b, d, v, |p| &p.pressure_pa));
@@ -182,8 +182,8 @@ fn discretisation(
         seconds_median: Quantiles::of(seconds.into_iter()).median,
         how: format!(
             "median over {states} states of {} of the relative L2 difference of SED from {}",
-            count(presses.len(), "press", "presses"),
-            rung.name(),
+            count(presses.len(), "indentation", "indentations"),
+            level.name(),
         ),
         presses,
     })

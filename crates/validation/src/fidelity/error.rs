@@ -15,10 +15,10 @@ pub enum FidelityError {
     #[error(transparent)]
     Campaign(#[from] SpecError),
     /// A fidelity level's finger cannot be set up.
-    #[error("{rung}: {source}")]
+    #[error("{level}: {source}")]
     FidelityLevel {
         /// Name of the fidelity level.
-        rung: String,
+        level: String,
         /// Why.
         source: Box<SimulationError>,
     },
@@ -26,17 +26,17 @@ pub enum FidelityError {
     #[error(transparent)]
     Atlas(#[from] BuildAtlasError),
     /// A fidelity level's body is not a fingertip.
-    #[error("the body of {rung} has no atlas patch")]
+    #[error("the body of {level} has no atlas patch")]
     NoPatch {
         /// Name of the fidelity level.
-        rung: String,
+        level: String,
     },
     /// An indenter cannot be built.
     #[error(transparent)]
     Indenter(#[from] IndenterError),
     /// Not enough indentations are held out.
     #[error(
-        "campaign {campaign} holds out {found} presses, {wanted} are asked for: ask for fewer, or \
+        "campaign {campaign} holds out {found} indentations, {wanted} are asked for: ask for fewer, or \
          raise its test_fraction"
     )]
     TooFew {

@@ -79,33 +79,33 @@ pub struct Ladder {
     /// Density whose atlas every field is read on.
     pub atlas: Density,
     /// Fidelity levels, cheap ones first.
-    pub rungs: Vec<FidelityLevel>,
+    pub levels: Vec<FidelityLevel>,
     /// What they are compared with.
     pub reference: FidelityLevel,
     /// A still better one for a few indentations, to tell the reference's own error.
     pub check: Option<FidelityLevel>,
-    /// How many presses it solves.
+    /// How many indentations it solves.
     pub checked: usize,
 }
 
 impl Ladder {
     /// Coarse and medium meshes, linear and quadratic elements, small and finite strain,
-    /// against linear elements on the fine mesh; `checked` presses also by quadratic
+    /// against linear elements on the fine mesh; `checked` indentations also by quadratic
     /// elements on the fine mesh.
     #[must_use]
     pub fn usual(checked: usize) -> Self {
         use Strain::{Finite, Small};
-        let mut rungs = Vec::new();
+        let mut levels = Vec::new();
         for density in [Density::Coarse, Density::Medium] {
             for order in [Order::Linear, Order::Quadratic] {
-                rungs.extend(
+                levels.extend(
                     [Small, Finite].map(|strain| FidelityLevel::new(density, order, strain)),
                 );
             }
         }
         Self {
             atlas: Density::Medium,
-            rungs,
+            levels,
             reference: FidelityLevel::new(Density::Fine, Order::Linear, Finite),
             check: Some(FidelityLevel::new(Density::Fine, Order::Quadratic, Finite)),
             checked,
@@ -113,10 +113,12 @@ impl Ladder {
     }
 
     /// Every fidelity level in the order of solving, with the number of indentations it solves.
-    fn all(&self, presses: usize) -> Vec<(FidelityLevel, usize)> {
-        let mut all: Vec<_> = self.rungs.iter().map(|&r| (r, presses)).collect();
-        all.push((self.reference, presses));
-        all.extend(self.check.filter(|_| self.checked > 0).map(|r| (r, self.checked.min(presses))));
+    fn all(&self, indentations: usize) -> Vec<(FidelityLevel, usize)> {
+        let mut all: Vec<_> = self.levels.iter().map(|&r| (r, indentations)).collect();
+        all.push((self.reference, indentations));
+        all.extend(
+            self.check.filter(|_| self.checked > 0).map(|r| (r, self.checked.min(indentations))),
+        );
         all
     }
 }
@@ -143,18 +145,18 @@ pub fn run(
     let plan = ladder.all(chosen.len());
     let all = plan.iter().map(|(_, n)| n).sum();
     let (mut parts, mut done) = (Vec::new(), 0);
-    for (rung, presses) in plan {
-        let name = rung.name();
+    for (level, presses) in plan {
+        let name = level.name();
         let mut prepared = None;
-        let mut of_rung = Vec::new();
+        let mut of_level = Vec::new();
         for press in &chosen[..presses] {
-            progress(&format!("{name}, press {}", press.id), done, all);
+            progress(&format!("{name}, indentation {}", press.id), done, all);
             let part = match store.load(&name, press) {
                 Some(part) => part,
                 None => {
                     let ready = match prepared.take() {
                         Some(ready) => ready,
-                        None => Prepared::new(spec, rung, &target)?,
+                        None => Prepared::new(spec, level, &target)?,
                     };
                     let part = ready.part(spec, press, &target)?;
                     prepared = Some(ready);
@@ -162,10 +164,10 @@ pub fn run(
                     part
                 }
             };
-            of_rung.push(part);
+            of_level.push(part);
             done += 1;
         }
-        parts.push((rung, of_rung));
+        parts.push((level, of_level));
     }
     progress("assembling", done, all);
     assemble::assemble(spec, ladder, &target, &parts, folder)

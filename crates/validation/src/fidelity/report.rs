@@ -11,7 +11,7 @@ pub(super) const FORMAT: u32 = 1;
 /// One state that every fidelity level solved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StateEntry {
-    /// Press of the campaign.
+    /// Indentation of the campaign.
     pub press: usize,
     /// Name of its indenter.
     pub indenter: String,
@@ -27,12 +27,13 @@ pub struct StateEntry {
 /// A state that is missing because a fidelity level has no sound solution of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LeftOut {
-    /// Press of the campaign.
+    /// Indentation of the campaign.
     pub press: usize,
     /// Depth, mm.
     pub depth_mm: f64,
     /// The fidelity level.
-    pub rung: String,
+    #[serde(rename = "rung")]
+    pub level: String,
     /// What happened.
     pub why: String,
 }
@@ -55,7 +56,7 @@ pub struct DiscretisationError {
     pub sed_relative_l2_p95: f64,
     /// The same of pressure.
     pub pressure_relative_l2: f64,
-    /// Presses and states that were checked.
+    /// Indentations and states that were checked.
     pub presses: Vec<usize>,
     /// States.
     pub states: usize,
@@ -113,7 +114,8 @@ pub struct Report {
     /// States, row by row of every archive.
     pub states: Vec<StateEntry>,
     /// Fidelity levels.
-    pub rungs: Vec<LevelEntry>,
+    #[serde(rename = "rungs")]
+    pub levels: Vec<LevelEntry>,
     /// States that are in no archive.
     pub left_out: Vec<LeftOut>,
 }

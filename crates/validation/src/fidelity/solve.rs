@@ -30,9 +30,9 @@ pub(super) struct Target {
 impl Target {
     /// Vertices of the atlas of a density.
     pub(super) fn new(spec: &CampaignSpec, density: Density) -> Result<Self, FidelityError> {
-        let rung = FidelityLevel::new(density, Order::Linear, Strain::Finite);
-        let body = setup(spec, rung)?.body;
-        let no_patch = || FidelityError::NoPatch { rung: rung.name() };
+        let level = FidelityLevel::new(density, Order::Linear, Strain::Finite);
+        let body = setup(spec, level)?.body;
+        let no_patch = || FidelityError::NoPatch { level: level.name() };
         let (atlas, _) = body.atlas().ok_or_else(no_patch)??;
         let (skin, interface, _) = surfaces(&body).ok_or_else(no_patch)?;
         Ok(Self { atlas_hash: atlas.hash().to_owned(), body, skin, interface })
@@ -55,9 +55,9 @@ fn surfaces(body: &Body) -> Option<Surfaces> {
 }
 
 /// The campaign's finger as a fidelity level has it.
-fn setup(spec: &CampaignSpec, rung: FidelityLevel) -> Result<Simulation, FidelityError> {
+fn setup(spec: &CampaignSpec, level: FidelityLevel) -> Result<Simulation, FidelityError> {
     let failed = |source: SimulationError| FidelityError::FidelityLevel {
-        rung: rung.name(),
+        level: level.name(),
         source: Box::new(source),
     };
     let candidates = spec.candidates();
@@ -67,14 +67,14 @@ fn setup(spec: &CampaignSpec, rung: FidelityLevel) -> Result<Simulation, Fidelit
     let scene = spec.scene(first);
     let geometry = match scene.geometry {
         Geometry::Fingertip { shape, .. } => {
-            Geometry::Fingertip { density: rung.density, order: rung.order, shape }
+            Geometry::Fingertip { density: level.density, order: level.order, shape }
         }
         other => other,
     };
     let finite = EffectName::named("finite_strain");
     let mut effects: Vec<_> =
         scene.effects.iter().copied().filter(|e| Some(*e) != finite).collect();
-    if rung.kinematics == Strain::Finite {
+    if level.kinematics == Strain::Finite {
         effects.extend(finite);
     }
     let scene = Scene { geometry, effects, ..scene };
@@ -96,15 +96,15 @@ pub(super) struct Prepared {
 impl Prepared {
     pub(super) fn new(
         spec: &CampaignSpec,
-        rung: FidelityLevel,
+        level: FidelityLevel,
         target: &Target,
     ) -> Result<Self, FidelityError> {
         let begun_s = processor::thread_s();
-        let Simulation { body, plan, .. } = setup(spec, rung)?;
+        let Simulation { body, plan, .. } = setup(spec, level)?;
         let setup_s = processor::thread_s() - begun_s;
-        let name = rung.name();
+        let name = level.name();
         let Some((skin, interface, triangles)) = surfaces(&body) else {
-            return Err(FidelityError::NoPatch { rung: name });
+            return Err(FidelityError::NoPatch { level: name });
         };
         let nodes = &body.patch.as_ref().map_or(&[][..], |p| &p.patch.interface);
         let dermis = SedRecovery::by_quarters(
@@ -114,7 +114,7 @@ impl Prepared {
             nodes,
         )
         .map_err(|e| FidelityError::FidelityLevel {
-            rung: rung.name(),
+            level: level.name(),
             source: Box::new(NoTissue::from(e).into()),
         })?;
         Ok(Self {
@@ -156,7 +156,7 @@ impl Prepared {
             ..Part::default()
         };
         let failed = |e: SimulationError| FidelityError::FidelityLevel {
-            rung: self.name.clone(),
+            level: self.name.clone(),
             source: Box::new(e),
         };
         let (approach, depths_mm) =
@@ -170,14 +170,14 @@ impl Prepared {
             self.keep(&mut part, record, seconds);
         });
         if let Err(error) = pressed {
-            tracing::warn!(rung = self.name, press = press.id, %error, "press failed");
+            tracing::warn!(level = self.name, press = press.id, %error, "indentation failed");
             part.record.error = Some(error.to_string());
         }
         tracing::info!(
-            rung = self.name,
+            level = self.name,
             press = press.id,
             seconds = processor::thread_s() - begun_s,
-            "press solved"
+            "indentation solved"
         );
         Ok(part)
     }

@@ -125,15 +125,15 @@ impl Store {
         Ok(Self { folder, vertices, _lock: lock })
     }
 
-    fn path(&self, rung: &str, id: usize, extension: &str) -> PathBuf {
-        self.folder.join(format!("{rung}-press-{id:05}.{extension}"))
+    fn path(&self, level: &str, id: usize, extension: &str) -> PathBuf {
+        self.folder.join(format!("{level}-press-{id:05}.{extension}"))
     }
 
     /// What an earlier run left of an indentation: a readable record whose archive has the
     /// recorded hash.
-    pub(super) fn load(&self, rung: &str, press: &Indentation) -> Option<Part> {
-        let record: Record = atomic::read_json(&self.path(rung, press.id, "json")).ok()?;
-        let path = self.path(rung, press.id, "npz");
+    pub(super) fn load(&self, level: &str, press: &Indentation) -> Option<Part> {
+        let record: Record = atomic::read_json(&self.path(level, press.id, "json")).ok()?;
+        let path = self.path(level, press.id, "npz");
         let bytes = std::fs::read(&path).ok()?;
         if record.press != *press || sha256_hex(&bytes) != record.sha256 {
             return None;
@@ -149,13 +149,13 @@ impl Store {
     }
 
     /// Stores a part: the archive first, then the record that vouches for it.
-    pub(super) fn write(&self, rung: &str, part: &Part) -> Result<(), OutputError> {
+    pub(super) fn write(&self, level: &str, part: &Part) -> Result<(), OutputError> {
         let id = part.record.press.id;
         let states = part.record.seconds.len();
         let npz = archive(states, self.vertices, part)?;
-        let bytes = npz.write(&self.path(rung, id, "npz"))?;
+        let bytes = npz.write(&self.path(level, id, "npz"))?;
         let record = Record { sha256: sha256_hex(&bytes), ..part.record.clone() };
-        atomic::write_json(&self.path(rung, id, "json"), &record)
+        atomic::write_json(&self.path(level, id, "json"), &record)
     }
 }
 

@@ -45,7 +45,7 @@ fn ladder() -> Ladder {
     let quadratic = FidelityLevel::new(Density::Coarse, Order::Quadratic, Strain::Finite);
     Ladder {
         atlas: Density::Coarse,
-        rungs: vec![FidelityLevel::new(Density::Coarse, Order::Linear, Strain::Small), quadratic],
+        levels: vec![FidelityLevel::new(Density::Coarse, Order::Linear, Strain::Small), quadratic],
         reference: COARSE,
         check: Some(quadratic),
         checked: 1,
@@ -61,7 +61,7 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     assert!(report.left_out.is_empty(), "{:?}", report.left_out);
     let shapes: Vec<_> = report.states.iter().map(|s| s.shape.as_str()).collect();
     assert!(shapes.contains(&"plate") && shapes.contains(&"sphere"), "{shapes:?}");
-    let [small, quadratic, reference] = &report.rungs[..] else { panic!("{:?}", report.rungs) };
+    let [small, quadratic, reference] = &report.levels[..] else { panic!("{:?}", report.levels) };
     assert!(reference.reference && !quadratic.reference);
     assert!(reference.sed_relative_l2.p95 == 0.0);
     let own = reference.discretisation_error.as_ref().unwrap();
@@ -71,9 +71,9 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     // of the quadratic fidelity level only force is asked.
     assert!(small.sed_relative_l2.median > 1e-4 && small.sed_relative_l2.p95 < 0.3);
     assert!(quadratic.sed_relative_l2.median.is_finite());
-    for rung in &report.rungs {
-        assert!(rung.seconds.chunks(2).all(|s| 0.0 < s[0] && s[0] < s[1]), "path included");
-        let path = folder.path().join(&rung.file);
+    for level in &report.levels {
+        assert!(level.seconds.chunks(2).all(|s| 0.0 < s[0] && s[0] < s[1]), "path included");
+        let path = folder.path().join(&level.file);
         let bytes = std::fs::read(&path).unwrap();
         let mut npz = NpzArrays::new(&path, &bytes).unwrap();
         let sed = npz.get::<f32, Ix2>("sed_dermis_j_per_m3").unwrap();
@@ -91,7 +91,7 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     std::fs::remove_file(&lost).unwrap();
     let again = run();
     assert_eq!(again.states, report.states);
-    assert_eq!(again.rungs[0].sed_relative_l2, report.rungs[0].sed_relative_l2);
+    assert_eq!(again.levels[0].sed_relative_l2, report.levels[0].sed_relative_l2);
     // The folder is this campaign's.
     let other = CampaignSpec { seed: 6, ..spec() };
     let error = super::run(&other, &ladder(), 1, folder.path(), &mut |_, _, _| ()).unwrap_err();
@@ -113,7 +113,7 @@ fn presses_that_are_not_held_out_are_not_taken() {
 fn names_say_density_order_and_strain() {
     assert_eq!(COARSE.name(), "fe-coarse-linear-finite");
     let usual = Ladder::usual(1);
-    assert_eq!((usual.rungs.len(), usual.all(3).len()), (8, 10));
+    assert_eq!((usual.levels.len(), usual.all(3).len()), (8, 10));
     assert_eq!(usual.reference.name(), "fe-fine-linear-finite");
     assert_eq!(Ladder::usual(0).all(3).len(), 9);
 }

@@ -31,7 +31,7 @@ const ORDERS_APART: f64 = 0.08;
 /// By this factor at least.
 const ORDERS_CLOSER: f64 = 0.7;
 
-/// A layered block under a sphere, a plate or a bar, at an angle and aside; `per` times as many
+/// A layered block under a sphere, a plate or a cylinder, at an angle and aside; `per` times as many
 /// elements each way as the coarse mesh.
 fn random_scene(seed: u64, order: &str, per: u32) -> String {
     let mut d = Draw { seed, count: 0 };

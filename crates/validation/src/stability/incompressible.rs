@@ -3,10 +3,10 @@
 use super::lab::solve;
 use super::{Hardness, Line, Suite};
 use crate::verify::cook::membrane;
-use crate::verify::locking::squeezed;
 use crate::verify::{CaseError, Check};
 use papilla_fem::element::ElementKind;
 use papilla_fem::solve::Options;
+use papilla_fem::testing::squeezed_block;
 
 const RATIOS: [f64; 4] = [0.49, 0.499, 0.4999, 0.49999];
 
@@ -28,8 +28,8 @@ pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
         ] {
             let found = squeeze_n(kind, cells, nu);
             let reference = squeeze_n(twin, twin_cells, nu);
-            let variant = format!("press, {name}, nu {nu}");
-            lines.push(line(variant, "force of the press", 0.03, source, found, reference));
+            let variant = format!("indentation, {name}, nu {nu}");
+            lines.push(line(variant, "force of the indentation", 0.03, source, found, reference));
         }
     }
     Ok(lines)
@@ -64,7 +64,7 @@ fn cook_mm(kind: ElementKind, cells: usize, nu: f64) -> Found {
 }
 
 fn squeeze_n(kind: ElementKind, cells: usize, nu: f64) -> Found {
-    let (problem, loading, up) = squeezed(kind, cells, nu)?;
+    let (problem, loading, up) = squeezed_block(kind, cells, nu)?;
     let (solver, report) = solve(&problem, loading, Options::default(), 1)?;
     Ok((solver.balance().contact_force_n[up].abs(), (&report).into()))
 }

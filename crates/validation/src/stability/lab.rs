@@ -6,6 +6,7 @@ use papilla_dataset::{BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIV
 use papilla_fem::solve::{Effort, Loading, Options, Problem, SolveError, Solver, StepReport};
 use papilla_fingertip::scene::{Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
@@ -45,7 +46,11 @@ impl Pressed {
         let c = &self.record.checks;
         let row = |what: &str, value, most| Check::vanishes(what, value, most, "equilibrium");
         vec![
-            row("pressure integral", c.contact_force_vs_pressure_integral, BALANCE_RELATIVE_MAX),
+            row(
+                "contact beyond the recorded skin",
+                c.contact_force_vs_pressure_integral,
+                BALANCE_RELATIVE_MAX,
+            ),
             row("plate against supports", c.plate_vs_support_reaction, BALANCE_RELATIVE_MAX),
             row("energy against work", c.energy_vs_work, BALANCE_RELATIVE_MAX),
             row("residual", c.residual_relative, RESIDUAL_RELATIVE_MAX),
@@ -92,7 +97,7 @@ pub(super) fn press_body(
 ) -> Result<Pressed, SimulationError> {
     let mut solver = body.solver(options)?;
     let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, s: &StepReport| (r.clone(), *s);
-    let (kept, pressed) =
+    let Balanced { kept, pressed, .. } =
         body.press_balanced(&mut solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
     pressed?;
     let effort = kept.iter().fold(Effort::default(), |sum, (_, r)| sum.plus(&r.effort));

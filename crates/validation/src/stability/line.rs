@@ -70,8 +70,7 @@ impl Hardness {
     /// Of an indentation, with the balances of its last state.
     pub(super) fn of_press(record: &IncrementRecord, report: &StepReport) -> Self {
         let c = &record.checks;
-        let worst =
-            [c.contact_force_vs_pressure_integral, c.plate_vs_support_reaction, c.energy_vs_work];
+        let worst = [c.plate_vs_support_reaction, c.energy_vs_work];
         // f64::max would drop a NaN.
         let worse = |a: f64, b: f64| if a.is_nan() || a >= b { a } else { b };
         Self {

@@ -99,7 +99,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "elastic-bone",
-        promise: "Beside elastic bone 5e5 to 5e6 times as stiff as fat, the press tends to the one \
+        promise: "Beside elastic bone 5e5 to 5e6 times as stiff as fat, the indentation tends to the one \
                   on a rigid bone as 1 / E.",
         run: bodies::elastic_bone,
     },

@@ -2,6 +2,7 @@
 
 use super::line::{comparison, first_line};
 use super::{CASES, End, Extent, Line};
+use crate::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -48,7 +49,7 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = String::from(INTRODUCTION);
-        let _ = writeln!(out, "\n{}.\n", self.summary());
+        let _ = writeln!(out, "\n{}. {}.\n", self.summary(), today_here());
         for case in CASES {
             let lines: Vec<_> = self.of(case.name).collect();
             let Some(first) = lines.first() else { continue };
@@ -96,5 +97,22 @@ impl Line {
             end.replace('|', "\\|"),
             check.replace('|', "\\|"),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The page is written by minutes of solving; its words are those of this file.
+    #[test]
+    fn the_committed_page_begins_as_a_new_one_would() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reports/stability.md");
+        let page = std::fs::read_to_string(root).unwrap();
+        assert!(page.starts_with(INTRODUCTION), "fe-datagen stability --markdown {root}");
+        for case in CASES {
+            let head = format!("## `{}`\n\n{} (", case.name, case.promise);
+            assert!(page.contains(&head), "{head}");
+        }
     }
 }

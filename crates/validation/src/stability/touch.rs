@@ -96,8 +96,13 @@ fn cycle(
         ),
     ];
     let same = vec![
-        Check::vanishes("displacement, L2", difference(after, before), 1e-6, "the first press"),
-        Check::relative("force", again.force_n(), first.force_n(), 1e-6, "the first press"),
+        Check::vanishes(
+            "displacement, L2",
+            difference(after, before),
+            1e-6,
+            "the first indentation",
+        ),
+        Check::relative("force", again.force_n(), first.force_n(), 1e-6, "the first indentation"),
     ];
     Ok(vec![
         Line::converged(format!("{name}: lifted off"), apart.hardness(), rest),
@@ -166,7 +171,7 @@ fn against_touch(gaps: &[(&str, f64)]) -> Result<Vec<Line>, CaseError> {
     let mut lines = Vec::new();
     for &(name, gap) in gaps {
         let (found, report, force) = from_gap(&body, &approach, gap)?;
-        let source = "the press from first touch";
+        let source = "the indentation from first touch";
         let checks = vec![
             Check::vanishes("displacement, L2", difference(&found, &due), 1e-6, source),
             Check::relative("force", force, due_n, 1e-6, source),

@@ -89,7 +89,7 @@ pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f6
         multipliers_mpa: &[],
         penalty: 1.0,
         load_fraction: 0.0,
-        memory: HistoryVariables::default(),
+        variables: HistoryVariables::default(),
         friction: None,
     };
     let mut out = Evaluation::default();

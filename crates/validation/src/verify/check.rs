@@ -66,6 +66,17 @@ impl Check {
         Self::new(quantity.into(), [value, 0.0, value.abs(), tolerance], source)
     }
 
+    /// A value accepted up to `most`.
+    pub(crate) fn at_most(
+        quantity: impl Into<String>,
+        value: f64,
+        most: f64,
+        source: &'static str,
+    ) -> Self {
+        let difference = if value <= most { 0.0 } else { value - most };
+        Self::new(quantity.into(), [value, most, difference, 0.0], source)
+    }
+
     /// A value accepted anywhere from `low` to `high`.
     pub(crate) fn within(
         quantity: impl Into<String>,
@@ -98,6 +109,8 @@ mod tests {
         assert!(!Check::relative("", nan, 1.0, 1.0, "").pass);
         assert!(!Check::absolute("", nan, 1.0, 1.0, "").pass);
         assert!(!Check::vanishes("", nan, 1.0, "").pass);
+        assert!(!Check::at_most("", nan, 1.0, "").pass);
+        assert!(!Check::at_most("", 1.0, nan, "").pass);
         assert!(!Check::within("", nan, [0.0, 1.0], "").pass);
         assert!(!Check::failed(&std::fmt::Error).pass);
     }
@@ -106,6 +119,7 @@ mod tests {
     fn a_band_accepts_its_ends_and_no_more() {
         for (value, pass) in [(1.0, true), (2.0, true), (0.999, false), (2.001, false)] {
             assert_eq!(Check::within("", value, [1.0, 2.0], "").pass, pass, "{value}");
+            assert_eq!(Check::at_most("", value, 2.0, "").pass, value <= 2.0, "{value}");
         }
     }
 }

@@ -50,5 +50,5 @@ fn press(folder: &Path, text: &str) -> Result<[f64; 3], CaseError> {
         let peak = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
         last = Some([papilla_fem::tensor::norm(r.force_n), peak, report.stored_mj]);
     })?;
-    last.ok_or_else(|| "the press gave no record".into())
+    last.ok_or_else(|| "no state was recorded".into())
 }

@@ -1,4 +1,4 @@
-//! An elastic press ends in the same state however many steps led there.
+//! An elastic indentation ends in the same state however many steps led there.
 
 use super::{CaseError, Check, Context};
 use papilla_fem::solve::{Loading, Options, StepReport};

@@ -1,4 +1,4 @@
-//! Presses rolled to either side are mirror images.
+//! Indentations rolled to either side are mirror images.
 
 use super::{CaseError, Check, Context};
 use papilla_fem::solve::Options;
@@ -62,5 +62,5 @@ fn press(finger: &Body, roll_deg: f64, depth_mm: f64) -> Result<IncrementRecord,
             last = Some(record.clone());
         },
     )?;
-    last.ok_or_else(|| "the press gave no record".into())
+    last.ok_or_else(|| "no state was recorded".into())
 }

@@ -1,6 +1,7 @@
 //! The table of all rows.
 
 use super::{CASES, CaseError, Check};
+use crate::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 use std::time::Instant;
@@ -26,10 +27,11 @@ Written by
 cargo run --release -p fe-datagen -- verify --markdown docs/reports/verification.md
 ```
 
-which solves every problem below with the solver that presses fingers and exits with code 3 if a row is past its
-tolerance. `--quick` runs smaller meshes and leaves out `density` and `solid-parts` (part of `./test`), `--only NAME` one
-case, `--json` prints the rows for a program. *Difference* is relative where the reference is a nonzero value in mm, N or MPa; absolute for orders; the
-distance from the band for accepted bands (tolerance 0). Units: mm, N, MPa.
+which solves every problem below with the solver of the fingertip and exits with code 3 if a row is
+past its tolerance. `--quick` runs smaller meshes and leaves out `density` and `solid-parts` (part of
+`./test`), `--only NAME` one case, `--json` prints the rows for a program. *Difference* is relative
+where the reference is a nonzero value in mm, N or MPa; absolute for orders; the excess where a value
+is accepted up to the reference (tolerance 0). Units: mm, N, MPa.
 
 ";
 
@@ -143,7 +145,7 @@ impl Report {
             }
             out.push('\n');
         }
-        let _ = writeln!(out, "{}.", self.summary());
+        let _ = writeln!(out, "{}. {}.", self.summary(), today_here());
         out
     }
 }
@@ -157,5 +159,24 @@ fn number(v: f64) -> String {
     } else {
         let digits = (5 - v.abs().log10().floor() as i32).clamp(0, 7) as usize;
         format!("{v:.digits$}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The page is written by minutes of solving; its words are those of this code.
+    #[test]
+    fn the_committed_page_begins_as_a_new_one_would() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reports/verification.md");
+        let page = std::fs::read_to_string(path).unwrap();
+        assert!(page.starts_with(INTRODUCTION), "fe-datagen verify --markdown {path}");
+        for case in CASES {
+            let head = format!("## `{}`\n\n{} (", case.name, case.shows);
+            assert!(page.contains(&head), "{head}");
+        }
+        let heads = page.lines().filter(|l| l.starts_with("## ")).count();
+        assert_eq!(heads, CASES.len(), "a case that is no more");
     }
 }

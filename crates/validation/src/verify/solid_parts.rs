@@ -11,7 +11,7 @@ use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
 
-/// Depths of the coarse press, mm; the last is judged.
+/// Depths on the coarse mesh, mm; the last is judged.
 const DEPTHS_MM: [f64; 3] = [0.25, 0.5, 1.0];
 
 fn press(parts: Parts) -> Result<IncrementRecord, CaseError> {
@@ -29,19 +29,18 @@ fn press(parts: Parts) -> Result<IncrementRecord, CaseError> {
 pub(super) fn run(_: &Context) -> Result<Vec<Check>, CaseError> {
     let rigid = norm(press(Parts::default())?.force_n);
     let mut rows = Vec::new();
-    // Under a flat plate on the pad the nail carries little, and bone hardly gives way.
-    for (name, parts, low) in [
-        ("bone", Parts { bone: true, nail: false }, 0.98),
-        ("bone and nail", Parts { bone: true, nail: true }, 0.98),
+    for (name, parts) in [
+        ("bone", Parts { bone: true, nail: false }),
+        ("bone and nail", Parts { bone: true, nail: true }),
     ] {
         let record = press(parts)?;
         let c = &record.checks;
         let ratio = norm(record.force_n) / rigid;
-        rows.push(Check::within(
+        rows.push(Check::at_most(
             format!("coarse, 1 mm, elastic {name}: force over the rigid one's"),
             ratio,
-            [low, 1.0],
-            "what gives way carries less; the rigid limit is 1",
+            1.0,
+            "what gives way carries less",
         ));
         for (what, value, tolerance) in [
             ("plate against supports", c.plate_vs_support_reaction, 1e-5),

@@ -89,7 +89,7 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
             multipliers_mpa: &multipliers,
             penalty: 3.0,
             load_fraction: 1.0,
-            memory: HistoryVariables::default(),
+            variables: HistoryVariables::default(),
             friction: None,
         };
         let mut out = Evaluation::default();

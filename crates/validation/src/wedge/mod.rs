@@ -16,7 +16,7 @@ use papilla_fem::solve::{Effort, Options, Solver, StepReport};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::{Geometry, Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::SimulationError;
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use reading::Reading;
 use std::time::Instant;
@@ -51,6 +51,8 @@ pub struct State {
     pub time_s: f64,
     /// Force on the whole finger per mm of length, N.
     pub force_n_per_mm: f64,
+    /// Farthest to the side that the skin touches the wedge, mm, deformed; 0 without contact.
+    pub contact_half_width_mm: f64,
     /// Figure 2(a), from A to the bone.
     pub depth_line: Vec<DepthPoint>,
     /// Points of it left out: there the tip crushes the mesh.
@@ -96,6 +98,13 @@ pub fn scene(reading: Reading, density: Density) -> Result<Scene, WedgeError> {
     Ok(scene)
 }
 
+/// See [`State::contact_half_width_mm`].
+fn contact_half_width_mm(body: &Body, solver: &Solver<'_>) -> f64 {
+    let pressure = solver.pressure_mpa(&body.problem.mesh.surfaces[&body.contact]);
+    let touching = solver.deformed().into_iter().zip(pressure).filter(|(_, p)| *p > 0.0);
+    touching.map(|(x, _)| x[0].abs()).fold(0.0, f64::max)
+}
+
 /// Presses and reads the figures' lines.
 ///
 /// # Errors
@@ -123,6 +132,7 @@ pub fn run(reading: Reading, density: Density) -> Result<Outcome, WedgeError> {
                 time_s: record.time_s,
                 // The other half carries as much.
                 force_n_per_mm: 2.0 * record.force_n[1].abs(),
+                contact_half_width_mm: contact_half_width_mm(body, s),
                 depth_line,
                 left_out,
                 lateral,

@@ -19,7 +19,7 @@ pub(super) struct Fixed<'a> {
     pub loading: &'a Loading,
     pub load_fraction: f64,
     pub multipliers: &'a [f64],
-    pub memory: HistoryVariables<'a>,
+    pub variables: HistoryVariables<'a>,
     pub friction: Option<&'a FrictionTrial>,
 }
 
@@ -31,7 +31,7 @@ impl<'a> Fixed<'a> {
             multipliers_mpa: self.multipliers,
             penalty,
             load_fraction: self.load_fraction,
-            memory: self.memory,
+            variables: self.variables,
             friction: self.friction,
         }
     }

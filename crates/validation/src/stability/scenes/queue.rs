@@ -1,7 +1,7 @@
 //! Scenes that threads take one after another.
 
 use super::record::Record;
-use super::{Ending, SceneRecord, ScenesError};
+use super::{Ending, How, SceneRecord, ScenesError};
 use crate::acceptance::fault;
 use crate::processor;
 use crate::stability::panic_text;
@@ -9,49 +9,41 @@ use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::campaign::{CampaignSpec, Indentation};
 use papilla_fingertip::indenter::IndenterError;
+use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+/// The finger that all scenes are of, and a campaign's indenters.
+pub(super) struct Finger {
+    pub body: Body,
+    /// How each of the campaign's indenters is pressed, but for pose and offset.
+    approaches: Vec<Approach>,
+}
+
 /// The scenes to solve, on one finger.
 pub(super) struct Queue<'a> {
-    pub body: &'a Body,
-    /// How each of the campaign's indenters is pressed, but for pose and offset.
-    pub approaches: Vec<Approach>,
+    pub finger: &'a Finger,
     pub todo: &'a [Indentation],
     pub next: AtomicUsize,
     pub record: &'a Record,
     pub solved: &'a (dyn Fn() + Sync),
 }
 
-/// See [`Queue::approaches`]; `first` is that of one of them.
-pub(super) fn approaches(
-    spec: &CampaignSpec,
-    first: &Approach,
-) -> Result<Vec<Approach>, ScenesError> {
-    let built = spec.candidates().into_iter().map(|c| {
-        let shape = c
-            .indenter
-            .build(&spec.folder)
-            .map_err(IndenterError::from)
-            .map_err(SimulationError::from)?;
-        Ok(Approach { shape, top_mm: c.indenter.top_mm(), ..first.clone() })
-    });
-    built.collect()
-}
-
 impl Queue<'_> {
     /// Solves scenes until none is left.
     pub(super) fn work(&self) -> Result<Vec<SceneRecord>, ScenesError> {
-        let mut solver = self.body.solver(Options::default())?;
+        let body = &self.finger.body;
+        let mut solver = body.solver(Options::default())?;
         let mut done = Vec::new();
         while let Some(press) = self.todo.get(self.next.fetch_add(1, Ordering::Relaxed)) {
-            let found = self.solve(&mut solver, press);
+            let found = self.finger.solve(&mut solver, press);
             if matches!(found.ending, Ending::Panicked(_)) {
                 // It may be in any state.
-                solver = self.body.solver(Options::default())?;
+                solver = body.solver(Options::default())?;
             }
             self.record.add(&found)?;
             done.push(found);
@@ -59,8 +51,27 @@ impl Queue<'_> {
         }
         Ok(done)
     }
+}
 
-    fn solve(&self, solver: &mut Solver<'_>, press: &Indentation) -> SceneRecord {
+impl Finger {
+    /// Sets up the finger of a campaign.
+    pub(super) fn new(spec: &CampaignSpec) -> Result<Self, ScenesError> {
+        let candidates = spec.candidates();
+        let Simulation { body, approach, .. } = Simulation::new(&spec.scene(&candidates[0]))?;
+        let built = candidates.into_iter().map(|c| {
+            let shape = c
+                .indenter
+                .build(&spec.folder)
+                .map_err(IndenterError::from)
+                .map_err(SimulationError::from)?;
+            Ok(Approach { shape, top_mm: c.indenter.top_mm(), ..approach.clone() })
+        });
+        let approaches = built.collect::<Result<_, ScenesError>>()?;
+        Ok(Self { body, approaches })
+    }
+
+    /// Presses one scene to its deepest state.
+    pub(super) fn solve(&self, solver: &mut Solver<'_>, press: &Indentation) -> SceneRecord {
         let began_s = processor::thread_s();
         let (pose, offset_mm) = (press.pose, press.offset_mm);
         let approach = Approach { pose, offset_mm, ..self.approaches[press.candidate].clone() };
@@ -72,10 +83,11 @@ impl Queue<'_> {
         let solved = catch_unwind(AssertUnwindSafe(|| {
             self.body.press_balanced(solver, &approach, &drive, BALANCE_RELATIVE_MAX, keep)
         }));
-        let (mut iterations, mut cuts, mut j_min) = (0, 0, None);
+        let (mut iterations, mut cuts, mut j_min, mut ways) = (0, 0, None, Vec::new());
         let ending = match solved {
             Err(panic) => Ending::Panicked(panic_text(panic.as_ref()).into()),
-            Ok((kept, pressed)) => {
+            Ok(Balanced { kept, attempts, pressed }) => {
+                ways = attempts;
                 if let Some((_, j, effort)) = kept.last() {
                     (iterations, cuts) = (effort.newton_iterations, effort.cuts);
                     j_min = Some(*j);
@@ -95,6 +107,11 @@ impl Queue<'_> {
             cuts,
             j_min,
             seconds: processor::thread_s() - began_s,
+            how: How::Recorded {
+                version: concat!("papilla-validation ", env!("CARGO_PKG_VERSION")).into(),
+                contact: ways.last().filter(|way| way.stopped.is_none()).map(|way| way.contact),
+                attempts: ways,
+            },
         }
     }
 }

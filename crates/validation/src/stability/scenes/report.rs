@@ -1,31 +1,75 @@
 //! What became of the scenes.
 
-use super::ending::{Ending, SceneRecord};
+use super::ending::{Ending, How, SceneRecord};
+use super::record::{Head, MendedOn};
 use super::{Row, share, table};
 use serde::Serialize;
 use std::fmt::{self, Write as _};
 
-/// The scenes of a run, counted.
-#[derive(Clone, Debug, Serialize)]
-pub struct ScenesReport {
-    /// Name of the campaign and seed.
-    pub drawn_from: String,
-    /// Scenes solved in this run and before.
-    pub scenes: usize,
-    /// Those in the record before.
-    pub reused: usize,
+/// Endings, counted; lists hold number of the scene and what.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Count {
     /// In equilibrium with every balance kept.
     pub balanced: usize,
-    /// In equilibrium with a balance missed: number and what.
+    /// In equilibrium with a balance missed.
     pub unbalanced: Vec<(usize, String)>,
     /// Typed errors.
     pub refused: Vec<(usize, String)>,
     /// Panics.
     pub panicked: Vec<(usize, String)>,
-    /// Upper bound of the share of all such scenes that does not balance, at 95 % confidence.
+}
+
+/// The scenes of a run, counted.
+#[derive(Clone, Debug, Serialize)]
+pub struct ScenesReport {
+    /// Which scenes.
+    pub of: Head,
+    /// Scenes solved in this run and before.
+    pub scenes: usize,
+    /// Those in the record before.
+    pub reused: usize,
+    /// As they end now.
+    pub now: Count,
+    /// Scenes for which nothing had been mended.
+    pub counted: usize,
+    /// As those ended when first run.
+    pub first_run: Count,
+    /// Upper bound of the share of all such scenes that does not balance, at 95 % confidence, from
+    /// [`Self::first_run`].
     pub failing_at_most: f64,
+    /// Scenes of which version, contact rule and attempts are recorded.
+    pub recorded: usize,
+    /// Those of them that were solved more than once before they were kept.
+    pub retried: usize,
     /// How hard they were.
     pub indenters: Vec<Row>,
+}
+
+impl Count {
+    fn add(&mut self, line: &SceneRecord) {
+        let list = match &line.ending {
+            Ending::Balanced => {
+                self.balanced += 1;
+                return;
+            }
+            Ending::Unbalanced(text) => (&mut self.unbalanced, text),
+            Ending::Refused(text) => (&mut self.refused, text),
+            Ending::Panicked(text) => (&mut self.panicked, text),
+        };
+        list.0.push((line.press.id, list.1.clone()));
+    }
+
+    fn lists(&self) -> [(&'static str, &[(usize, String)]); 3] {
+        [
+            ("converged, a balance missed", &self.unbalanced),
+            ("refused with a typed error", &self.refused),
+            ("panicked", &self.panicked),
+        ]
+    }
+
+    fn failed(&self) -> usize {
+        self.lists().iter().map(|(_, list)| list.len()).sum()
+    }
 }
 
 /// Share of the scenes that have to converge.
@@ -36,43 +80,66 @@ impl ScenesReport {
     /// errors.
     #[must_use]
     pub fn passed(&self) -> bool {
-        let refused = self.refused.len() as f64;
-        self.unbalanced.is_empty()
-            && self.panicked.is_empty()
+        let Count { unbalanced, refused, panicked, .. } = &self.now;
+        let refused = refused.len() as f64;
+        unbalanced.is_empty()
+            && panicked.is_empty()
             && refused <= (1.0 - CONVERGED_SHARE) * self.scenes as f64 + 1e-9
     }
 }
 
 impl ScenesReport {
-    /// docs/reports/stability-scenes.md.
+    /// Its page in docs/reports.
     #[must_use]
     pub fn markdown(&self) -> String {
+        let Self { of, scenes, now, counted, first_run, .. } = self;
         let mut out = format!(
-            "# Random scenes\n\nWritten by `fe-datagen stability --scenes {} --seed ... --markdown \
-             docs/reports/stability-scenes.md` ([stability.md](stability.md)): {}.\n\n\
-             | | scenes |\n|---|---|\n| converged, every balance kept | {} |\n| converged, a balance missed | {} |\n\
-             | refused with a typed error | {} |\n| panicked | {} |\n\n\
-             The bar (99.9 % converge, each of them balances, no panic) is {}. Of all scenes drawn like \
-             these, at most {:.3} % do not balance, at 95 % confidence (Clopper and Pearson's bound, which \
-             takes the scenes for independent).\n\n\
-             Iterations are those of the path that was kept, seconds of processor time those of every path taken: where work and \
-             energy part, a press is taken again on a finer one.\n\n",
-            self.scenes,
-            self.drawn_from,
-            self.balanced,
-            self.unbalanced.len(),
-            self.refused.len(),
-            self.panicked.len(),
-            if self.passed() { "met by these" } else { "**not met by these**" },
+            "# Random scenes\n\n\
+             `fe-datagen stability --scenes {scenes} --seed {}` ([the suite](stability.md)): {of}.\n\n\
+             | | as they end now | when first run, of the {counted} nothing had been mended for |\n\
+             |---|---|---|\n| scenes | {scenes} | {counted} |\n\
+             | converged, every balance kept | {} | {} |\n",
+            of.seed, now.balanced, first_run.balanced
+        );
+        for ((what, now), (_, first)) in now.lists().into_iter().zip(first_run.lists()) {
+            let _ = writeln!(out, "| {what} | {} | {} |", now.len(), first.len());
+        }
+        let verdict = if self.passed() { "met" } else { "**not met**" };
+        let _ = write!(
+            out,
+            "\nThe criterion (99.9 % converge, each of them balances, no panic) is {verdict} as they \
+             end now.\nOf all scenes drawn like these, at most **{:.3} %** fail when first run, at 95 % \
+             confidence\n(Clopper and Pearson's bound of {} among {counted}, which takes the scenes for \
+             independent).\n",
             100.0 * self.failing_at_most,
+            first_run.failed(),
+        );
+        if let Some(MendedOn { scenes, failed }) = of.mended_on {
+            let _ = writeln!(
+                out,
+                "Not counted are the first {scenes}: {failed} of them failed, the solver was mended on \
+                 them, and their first\nlines are lost."
+            );
+        }
+        let _ = write!(
+            out,
+            "\nVersion, contact rule and attempts are recorded for {} of {scenes} scenes, of which {} took \
+             more than one\nattempt; the other lines say `unrecorded`.\n\n\
+             Iterations are those of the path that was kept, seconds of processor time those of every \
+             path taken.\n\n",
+            self.recorded, self.retried
         );
         out += &table::markdown(&self.indenters);
-        let lists = [&self.unbalanced, &self.refused, &self.panicked];
-        if lists.iter().any(|l| !l.is_empty()) {
-            out += "\n| scene | what |\n|---|---|\n";
+        let failures: Vec<_> = [("first run", first_run), ("now", now)]
+            .into_iter()
+            .flat_map(|(when, count)| count.lists().map(|(_, list)| (when, list)))
+            .flat_map(|(when, list)| list.iter().map(move |failure| (when, failure)))
+            .collect();
+        if !failures.is_empty() {
+            out += "\n| scene | when | what |\n|---|---|---|\n";
         }
-        for (scene, text) in lists.into_iter().flatten() {
-            let _ = writeln!(out, "| {scene} | {} |", text.replace('|', "\\|"));
+        for (when, (scene, text)) in failures {
+            let _ = writeln!(out, "| {scene} | {when} | {} |", text.replace('|', "\\|"));
         }
         out
     }
@@ -82,15 +149,16 @@ impl fmt::Display for ScenesReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{}: {} scenes ({} from an earlier run), {} converged and balanced, {} out of balance, {} typed \
-             errors, {} panics: at most {:.3} % of all such scenes do not balance, at 95 % confidence",
-            self.drawn_from,
+            "{}: {} scenes ({} from an earlier run), {} converged and balanced, {} failed; when first run \
+             {} of the {} nothing had been mended for: at most {:.3} % of all such scenes fail, at 95 % \
+             confidence",
+            self.of,
             self.scenes,
             self.reused,
-            self.balanced,
-            self.unbalanced.len(),
-            self.refused.len(),
-            self.panicked.len(),
+            self.now.balanced,
+            self.now.failed(),
+            self.first_run.failed(),
+            self.counted,
             100.0 * self.failing_at_most,
         )?;
         for row in &self.indenters {
@@ -101,11 +169,7 @@ impl fmt::Display for ScenesReport {
                  (at most {most}), least J {j_min}, {mean_s} s (at most {max_s})"
             )?;
         }
-        for (what, list) in [
-            ("out of balance", &self.unbalanced),
-            ("typed error", &self.refused),
-            ("panic", &self.panicked),
-        ] {
+        for (what, list) in self.now.lists() {
             for (scene, text) in list {
                 writeln!(f, "  scene {scene}: {what}: {text}")?;
             }
@@ -114,39 +178,43 @@ impl fmt::Display for ScenesReport {
     }
 }
 
-/// Counts endings.
-pub(super) fn count(drawn_from: String, records: Vec<SceneRecord>, reused: usize) -> ScenesReport {
-    let scenes = records.len();
-    let mut report = ScenesReport {
-        drawn_from,
-        scenes,
-        reused,
-        balanced: 0,
-        unbalanced: Vec::new(),
-        refused: Vec::new(),
-        panicked: Vec::new(),
-        failing_at_most: 1.0,
-        indenters: table::rows(&records),
+/// Counts endings; `records` are the lines of each scene, oldest first.
+pub(super) fn count(of: Head, records: &[Vec<SceneRecord>], reused: usize) -> ScenesReport {
+    let (mut now, mut first_run) = (Count::default(), Count::default());
+    let mended_on = of.mended_on.map_or(0, |m| m.scenes);
+    let mut sorted: Vec<_> = records.iter().filter(|lines| !lines.is_empty()).collect();
+    sorted.sort_by_key(|lines| lines[0].press.id);
+    let lasts: Vec<_> = sorted.iter().filter_map(|lines| lines.last()).collect();
+    lasts.iter().for_each(|line| now.add(line));
+    let counted: Vec<_> = sorted.iter().filter(|l| l[0].press.id >= mended_on).collect();
+    counted.iter().for_each(|lines| first_run.add(&lines[0]));
+    let attempts = |line: &&&SceneRecord| match &line.how {
+        How::Unrecorded => 0,
+        How::Recorded { attempts, .. } => attempts.len().max(1),
     };
-    for SceneRecord { press, ending, .. } in records {
-        match ending {
-            Ending::Balanced => report.balanced += 1,
-            Ending::Unbalanced(text) => report.unbalanced.push((press.id, text)),
-            Ending::Refused(text) => report.refused.push((press.id, text)),
-            Ending::Panicked(text) => report.panicked.push((press.id, text)),
-        }
+    ScenesReport {
+        of,
+        scenes: lasts.len(),
+        reused,
+        now,
+        counted: counted.len(),
+        failing_at_most: share::failing_at_most(first_run.failed(), counted.len()),
+        first_run,
+        recorded: lasts.iter().filter(|l| attempts(l) > 0).count(),
+        retried: lasts.iter().filter(|l| attempts(l) > 1).count(),
+        indenters: table::rows(&lasts),
     }
-    for list in [&mut report.unbalanced, &mut report.refused, &mut report.panicked] {
-        list.sort_by_key(|(scene, _)| *scene);
-    }
-    report.failing_at_most = share::failing_at_most(scenes - report.balanced, scenes);
-    report
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use papilla_fingertip::campaign::Indentation;
+    use papilla_fingertip::mesh::fingertip::Density;
+
+    pub(in super::super) fn head(seed: u64) -> Head {
+        Head { campaign: "broad".into(), seed, density: Density::Coarse, mended_on: None }
+    }
 
     pub(in super::super) fn record(id: usize, ending: Ending) -> SceneRecord {
         let press = Indentation {
@@ -158,7 +226,15 @@ pub(super) mod tests {
             offset_mm: [0.0; 2],
             depths_mm: vec![1.0],
         };
-        SceneRecord { press, ending, newton_iterations: 7, cuts: 0, j_min: Some(0.5), seconds: 1.0 }
+        SceneRecord {
+            press,
+            ending,
+            newton_iterations: 7,
+            cuts: 0,
+            j_min: Some(0.5),
+            seconds: 1.0,
+            how: How::Unrecorded,
+        }
     }
 
     #[test]
@@ -169,7 +245,8 @@ pub(super) mod tests {
             all[500..500 + unbalanced]
                 .iter_mut()
                 .for_each(|r| r.ending = Ending::Unbalanced("x".into()));
-            count("test".into(), all, 0).passed()
+            let lines: Vec<_> = all.into_iter().map(|line| vec![line]).collect();
+            count(head(5), &lines, 0).passed()
         };
         assert!(of(0, 0) && of(1, 0) && !of(2, 0) && !of(0, 1));
     }

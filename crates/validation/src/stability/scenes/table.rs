@@ -29,9 +29,9 @@ pub struct Row {
 }
 
 /// One row an indenter, in the order of the campaign.
-pub(super) fn rows(records: &[SceneRecord]) -> Vec<Row> {
+pub(super) fn rows(records: &[&SceneRecord]) -> Vec<Row> {
     let mut by_candidate = BTreeMap::<usize, Vec<&SceneRecord>>::new();
-    for record in records {
+    for &record in records {
         by_candidate.entry(record.press.candidate).or_default().push(record);
     }
     by_candidate.into_values().filter_map(|records| row(&records)).collect()
@@ -71,7 +71,7 @@ impl Row {
     }
 }
 
-/// The rows as a table of docs/reports/stability-scenes.md.
+/// The rows as a table of the page in docs/reports.
 pub(super) fn markdown(rows: &[Row]) -> String {
     let mut out = String::from(
         "| indenter | scenes | balanced | with cuts | iterations, median | most | smallest J | s a scene | slowest |\n\
@@ -108,7 +108,7 @@ mod tests {
             of(2, 1, 6, Ending::Balanced),
             none,
         ];
-        let rows = rows(&all);
+        let rows = rows(&all.iter().collect::<Vec<_>>());
         assert_eq!(rows.len(), 2);
         assert_eq!((rows[0].indenter.as_str(), rows[0].scenes), ("indenter 0", 1));
         let expected = Row {
