@@ -2,6 +2,7 @@
 
 mod atlas;
 mod choices;
+mod convergence;
 mod cross_check;
 mod dataset;
 mod effects;
@@ -45,6 +46,7 @@ enum Command {
     Fidelity(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
+    Convergence(convergence::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
@@ -62,6 +64,7 @@ pub fn run() -> ExitCode {
         Command::Schema(args) => schema::run(&args),
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
+        Command::Convergence(args) => convergence::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),

@@ -17,8 +17,9 @@ pub enum ContactRule {
     /// space can control, so that multipliers would not settle: a stiff penalty takes their place.
     #[serde(rename = "faces")]
     Gauss,
-    /// As [`Self::Gauss`], at more points on flat faces, three by three: a rounded edge that
-    /// lies along the rows of the fewer points can still jump from one to the next.
+    /// As [`Self::Gauss`], at three by three points of flat faces: quadratic faces follow a rounded
+    /// edge, and one that lies along the rows of fewer points cannot jump from one to the next.
+    /// A softer penalty leaves gaps of a micrometre or two: SED is the same, iterations are half.
     #[serde(rename = "faces_finely")]
     GaussOrder3,
 }
@@ -28,6 +29,15 @@ impl ContactRule {
     #[must_use]
     pub const fn has_multipliers(self) -> bool {
         !self.is_gauss()
+    }
+
+    /// Penalty in shear moduli of what is pressed over the distance of contact nodes.
+    #[must_use]
+    pub const fn penalty_factor(self) -> f64 {
+        match self {
+            Self::Nodal | Self::GaussOrder3 => 200.0,
+            Self::Gauss => 2000.0,
+        }
     }
 
     /// Whether contact is at Gauss points of the faces, not at nodes.

@@ -6,6 +6,7 @@ pub mod gmsh;
 pub mod lattice;
 pub mod nearest;
 pub mod probe;
+pub mod reader;
 pub mod recovery;
 pub mod sample;
 pub mod supports;

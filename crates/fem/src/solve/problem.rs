@@ -101,16 +101,13 @@ impl Problem {
         Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
     }
 
-    /// Contact penalty from material and mesh, MPa/mm: a few hundred times the
-    /// largest shear modulus of what is soft over the contact nodes' spacing, so
-    /// that extrapolated multipliers need one update. Larger values cost the
-    /// preconditioned iterations more than they save. Where there are no multipliers
-    /// it is ten times that, which leaves gaps of some micrometres.
+    /// Contact penalty from material and mesh, MPa/mm: [`ContactRule::penalty_factor`] times the
+    /// largest shear modulus of what is soft over the contact nodes' spacing. Larger values cost
+    /// the preconditioned iterations more than they save.
     #[must_use]
     pub fn penalty_mpa_per_mm(&self, rule: ContactRule) -> f64 {
-        let factor = if rule.has_multipliers() { 200.0 } else { 2000.0 };
         let Some(contact) = &self.contact else { return 1.0 };
-        factor * self.reference_modulus_mpa() / contact.spacing_mm()
+        rule.penalty_factor() * self.reference_modulus_mpa() / contact.spacing_mm()
     }
 
     /// Shear modulus, MPa, by which is measured what an indenter meets, see

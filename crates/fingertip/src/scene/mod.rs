@@ -23,7 +23,9 @@ pub use motion::{Motion, PathPoint, Pose};
 pub use origin::{Located, Origin, Place};
 pub use outputs::Output;
 
+use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
+use crate::mesh::fingertip::{Density, Order};
 use error::require;
 use papilla_fem::contact::ContactRule;
 use papilla_sdf::IndenterSpec;
@@ -84,6 +86,28 @@ pub fn schema() -> schemars::Schema {
 const FRICTION_MAX: f64 = 10.0;
 
 impl Scene {
+    /// The default finger on the coarse mesh and the 20 mm plate that presses it by 1 mm, with the
+    /// surface-pressure study's analysis.
+    #[must_use]
+    pub fn usual() -> Self {
+        Self {
+            geometry: Geometry::Fingertip {
+                density: Density::Coarse,
+                order: Order::default(),
+                shape: FingertipShape::default(),
+            },
+            materials: TissueTable::default(),
+            indenter: IndenterSpec::default(),
+            motion: Motion::to_depth(1.0, 1, Pose::default()),
+            friction: Friction::default(),
+            contact: None,
+            effects: effects::usual(),
+            outputs: None,
+            folder: PathBuf::new(),
+            origin: Origin::default(),
+        }
+    }
+
     /// Reads and checks a scene file.
     ///
     /// # Errors

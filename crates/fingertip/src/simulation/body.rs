@@ -151,8 +151,11 @@ pub struct Body {
     pub patch: Option<RecordedPatch>,
     /// Whether the body is a plane section in x and y.
     pub plane: bool,
-    /// The contact that its mesh is graded for.
-    pub graded_for: Option<Contact>,
+    /// Where the indenter first touches the undeformed finger, whatever the mesh; where none is given
+    /// it is where it first touches the mesh.
+    pub first_touch: Option<Contact>,
+    /// Whether its lattice is drawn together under that contact.
+    pub graded: bool,
 }
 
 /// What is read off a fingertip at each equilibrium.
@@ -197,7 +200,7 @@ impl Body {
             fixed[3 * n as usize..3 * n as usize + 3].fill(true);
         }
         let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
-        Ok(Self { graded_for: contact, ..body })
+        Ok(Self { graded: order == Order::Graded, first_touch: contact, ..body })
     }
 
     /// A body with layers, of which pressure and SED are read at vertices.
@@ -215,7 +218,7 @@ impl Body {
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
         let patch = Some(RecordedPatch { patch, dermis, epidermis });
-        Ok(Self { problem, contact: "skin".into(), patch, plane, graded_for: None })
+        Ok(Self { problem, contact: "skin".into(), patch, plane, first_touch: None, graded: false })
     }
 
     /// Any mesh, held on the surfaces or node sets `held` and touched on the
@@ -242,7 +245,14 @@ impl Body {
         }
         let plane = mesh.is_planar();
         let problem = Problem::new(mesh, materials, fixed, Some(contact))?;
-        Ok(Self { problem, contact: contact.into(), patch: None, plane, graded_for: None })
+        Ok(Self {
+            problem,
+            contact: contact.into(),
+            patch: None,
+            plane,
+            first_touch: None,
+            graded: false,
+        })
     }
 
     /// The atlas of the body's patch; `None` for a body without one and for a section.

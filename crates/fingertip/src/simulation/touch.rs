@@ -55,7 +55,7 @@ impl Body {
         let axis = |k: usize| [rotation[0][k], rotation[1][k], rotation[2][k]];
         let (x, y, normal) = (axis(0), axis(1), axis(2));
         let contact = self.contact_rule(approach);
-        let start = match &self.graded_for {
+        let start = match &self.first_touch {
             Some(contact) => contact.start,
             None => self.start(approach, contact)?,
         };
@@ -108,7 +108,7 @@ impl Body {
     /// Where on the skin contact is to be found: at Gauss points if the indenter is too narrow for
     /// nodes; at nodes if it is not, or so narrow that faces would lose it too.
     fn contact_rule(&self, approach: &Approach) -> ContactRule {
-        if self.graded_for.is_some() {
+        if self.graded {
             return approach.contact.unwrap_or(ContactRule::GaussOrder3);
         }
         let spacings = self.spacings(approach);
