@@ -150,7 +150,7 @@ fn press(
 ) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
     let Simulation { body, approach, drive, .. } = setup;
     let progress = Progress::new("states", drive.len(), 0, quiet);
-    let mut written = Ok(());
+    let (mut written, mut worst) = (Ok(()), 0.0f64);
     let file = |state: usize| format!("state-{state:03}.vtu");
     let keep =
         &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
@@ -159,6 +159,11 @@ fn press(
             }
             progress.set_position(state + 1);
             progress.set_message(format!("{:.3} mm deep", record.depth_mm));
+            worst = if state == 0 { 0.0 } else { worst }.max(record.checks.energy_vs_work);
+            if state + 1 == drive.len() && worst > BALANCE_RELATIVE_MAX {
+                progress.set_position(0);
+                progress.set_message("energy and work part: taken again in smaller steps");
+            }
             let surface = &body.problem.mesh.surfaces[&body.contact];
             let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
             Pressed { record: record.clone(), report: *report, pressure_mpa_max }

@@ -227,7 +227,7 @@ fn a_coarse_path_is_taken_again_in_smaller_steps() {
     let hold = "increments = 2\npath = [{ time_s = 0.1, depth_mm = 0.3 }, { time_s = 1.0, depth_mm = 0.3 }]";
     for (effects, motion, same) in [
         (", \"viscoelastic\"", hold, 1e-2),
-        ("", hold, 1e-6),
+        ("", hold, 1e-3),
         ("", "increments = 1\nforce_n = 0.02", 1e-3),
     ] {
         let Simulation { body, approach, drive, .. } =
