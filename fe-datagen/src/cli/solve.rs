@@ -307,7 +307,7 @@ fn human(s: &Summary, out: &Path) -> String {
             100.0 * i.checks.energy_vs_work,
             i.fault.as_ref().map_or(String::new(), |f| format!("  FAILED: {f}")),
         );
-        if i.contact.is_gauss() {
+        if i.contact == ContactRule::Gauss {
             text += "         contact within faces: the indenter is too narrow for their nodes\n";
         }
         if i.outside_calibration > 0.0 {

@@ -79,12 +79,10 @@ impl ContactSurface {
         x: &[[f64; 3]],
     ) -> Vec<f64> {
         let points = self.points(rule);
-        let places = match rule {
-            ContactRule::Nodal => return self.nodal_pressure_mpa(traction_mpa, surface, x),
-            ContactRule::Gauss => surface.kind.contact_points(),
-            ContactRule::GaussOrder3 => surface.kind.quadrature(),
+        let Some(deformed) = self.deformed_points(rule, surface, x) else {
+            return self.nodal_pressure_mpa(traction_mpa, surface, x);
         };
-        let deformed = ContactPoints::faces(surface, &places, x, self.nodes()).area_mm2;
+        let deformed = deformed.area_mm2;
         let true_mpa: Vec<f64> = traction_mpa
             .iter()
             .zip(&points.area_mm2)
@@ -92,6 +90,22 @@ impl ContactSurface {
             .map(|((t, undeformed), deformed)| t * undeformed / deformed)
             .collect();
         points.mean_at_nodes(&true_mpa, &deformed, self.nodes())
+    }
+
+    /// The Gauss points of a rule where `surface` is at the positions `x`; `None` at nodes.
+    #[must_use]
+    pub(crate) fn deformed_points(
+        &self,
+        rule: ContactRule,
+        surface: &Surface,
+        x: &[[f64; 3]],
+    ) -> Option<ContactPoints> {
+        let places = match rule {
+            ContactRule::Nodal => return None,
+            ContactRule::Gauss => surface.kind.contact_points(),
+            ContactRule::GaussOrder3 => surface.kind.quadrature(),
+        };
+        Some(ContactPoints::faces(surface, &places, x, self.nodes()))
     }
 
     fn nodal_pressure_mpa(

@@ -138,6 +138,14 @@ impl ContactPoints {
         sum.iter().zip(&total).map(|(s, t)| if *t > 0.0 { s / t } else { 0.0 }).collect()
     }
 
+    /// A nodal quantity at a point, linear between neighbouring nodes.
+    #[must_use]
+    pub(crate) fn linear_at(&self, point: usize, nodal: &[f64]) -> f64 {
+        let range = self.range(point);
+        let nodes = self.node[range.clone()].iter();
+        nodes.zip(&self.hat[range]).map(|(&n, hat)| hat * nodal[n as usize]).sum()
+    }
+
     /// Number of points.
     #[must_use]
     pub fn len(&self) -> usize {

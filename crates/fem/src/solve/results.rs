@@ -3,7 +3,7 @@
 use super::evaluate::Balance;
 use super::problem::Problem;
 use super::stepping::Solver;
-use crate::contact::{ContactRule, Support};
+use crate::contact::ContactRule;
 use crate::linear::DofMap;
 use papilla_sdf::Distance;
 
@@ -129,8 +129,8 @@ impl<'a> Solver<'a> {
         pressure
     }
 
-    /// Force that a nodal pressure (MPa) exerts on the deformed surface, N: Gauss
-    /// quadrature of the interpolated field, which acts along the indenter's normal.
+    /// Force that a nodal pressure (MPa) exerts on the deformed surface, N, along the indenter's
+    /// normal: at the points of contact, or by Gauss quadrature where these are the nodes.
     #[must_use]
     pub fn force_of_pressure_n(
         &self,
@@ -138,13 +138,28 @@ impl<'a> Solver<'a> {
         pressure: &[f64],
     ) -> [f64; 3] {
         let x = self.deformed();
-        let push = self.push_directions(surface, pressure, &x);
-        let traction: Vec<[f64; 3]> =
-            push.iter().zip(pressure).map(|(d, p)| d.map(|v| v * p)).collect();
+        let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
         let mut total = [0.0; 3];
+        let contact = self.newton.problem.contact.as_ref();
+        if let Some(points) =
+            contact.and_then(|c| c.deformed_points(self.contact_rule(), surface, &x))
+        {
+            for (q, (support, area)) in points.iter().enumerate() {
+                let force_n = area * points.linear_at(q, pressure);
+                if force_n > 0.0 {
+                    let push = normal(support.of(|n| x[n]));
+                    total = std::array::from_fn(|i| total[i] + force_n * push[i]);
+                }
+            }
+            return total;
+        }
+        let mut traction = vec![[0.0; 3]; x.len()];
+        for n in surface.nodes().into_iter().map(|n| n as usize).filter(|&n| pressure[n] > 0.0) {
+            traction[n] = normal(x[n]).map(|v| v * pressure[n]);
+        }
         let rule = surface.kind.quadrature();
-        surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, normal| {
-            let area = crate::tensor::norm(normal);
+        surface.integrate(&rule, &|n| x[n as usize], &mut |face, value, area| {
+            let area = crate::tensor::norm(area);
             for (&n, v) in face.iter().zip(value) {
                 for i in 0..3 {
                     total[i] += v * area * traction[n as usize][i];
@@ -152,46 +167,6 @@ impl<'a> Solver<'a> {
             }
         });
         total
-    }
-
-    /// Direction in which the indenter pushes, at every mesh node of the surface that it
-    /// presses: its normal, or the mean of its normals at contact points around, weighted
-    /// by their forces (shorter than 1 where these differ).
-    fn push_directions(
-        &self,
-        surface: &crate::mesh::Surface,
-        pressure: &[f64],
-        x: &[[f64; 3]],
-    ) -> Vec<[f64; 3]> {
-        let mut push = vec![[0.0; 3]; x.len()];
-        let (Some(contact), Some(_)) = (&self.newton.problem.contact, &self.loading.indenter)
-        else {
-            return push;
-        };
-        let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
-        let rule = self.contact_rule();
-        if !rule.is_gauss() {
-            for n in surface.nodes().into_iter().map(|n| n as usize) {
-                if pressure[n] > 0.0 {
-                    push[n] = normal(x[n]);
-                }
-            }
-            return push;
-        }
-        let points = contact.points(rule);
-        let of_point = |(support, t): (Support<'_>, f64)| {
-            let [nx, ny, nz] = normal(support.of(|n| x[n])).map(|v| v * t);
-            [t, nx, ny, nz]
-        };
-        let tractions = self.newton.current.traction_mpa.iter().copied();
-        let found: Vec<_> = points.iter().map(|(s, _)| s).zip(tractions).map(of_point).collect();
-        let nodal = points.to_nodes(&found, contact.nodes(), contact.area_mm2());
-        for (&n, [t, v @ ..]) in contact.nodes().iter().zip(nodal) {
-            if t > 0.0 {
-                push[n as usize] = v.map(|v| v / t);
-            }
-        }
-        push
     }
 
     /// Deformed node positions, mm.

@@ -13,6 +13,7 @@ use super::half_cube::{Grid, GridSize};
 use super::nail;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::tissue::Tissue;
+use papilla_fem::element::BlockGeometry;
 use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -177,11 +178,39 @@ pub struct FingertipMesh {
 /// three quarters, about 112 degrees from the palmar line.
 const PATCH_SIDE_QUARTERS: u32 = 3;
 
-/// Meshes a fingertip, lattice lines drawn together by `grading` if there is one.
+/// Parts of their way that nodes slide, tried in turn until no element folds.
+const STRENGTHS: [f64; 5] = [1.0, 0.8, 0.6, 0.4, 0.0];
+
+/// Meshes a fingertip, lattice lines drawn together by `grading` if there is one: as far as no
+/// element folds.
 ///
 /// # Errors
 /// Refuses a shape whose lengths contradict each other; see [`FingertipShapeError`].
 pub fn build(
+    shape: &FingertipShape,
+    density: Density,
+    order: Order,
+    parts: Parts,
+    grading: Option<&Grading>,
+) -> Result<FingertipMesh, FingertipShapeError> {
+    let Some(grading) = grading else {
+        return build_drawn(shape, density, order, parts, None);
+    };
+    let whole = |m: &Mesh| {
+        m.blocks.iter().all(|b| BlockGeometry::new(b.kind, &m.nodes, &b.connectivity).is_ok())
+    };
+    let mut built = build_drawn(shape, density, order, parts, Some(grading))?;
+    for strength in &STRENGTHS[1..] {
+        if whole(&built.mesh) {
+            break;
+        }
+        tracing::info!(strength, "lattice lines are drawn together less: elements would fold");
+        built = build_drawn(shape, density, order, parts, Some(&grading.weaker(*strength)))?;
+    }
+    Ok(built)
+}
+
+fn build_drawn(
     shape: &FingertipShape,
     density: Density,
     order: Order,

@@ -14,7 +14,7 @@ const DENSITIES: [Density; 3] = [Density::Coarse, Density::Medium, Density::Fine
 const ORDERS: [Order; 2] = [Order::Linear, Order::Quadratic];
 
 fn finger(density: Density, order: Order, parts: Parts) -> FingertipMesh {
-    build(&FingertipShape::default(), density, order, parts).unwrap()
+    build(&FingertipShape::default(), density, order, parts, None).unwrap()
 }
 
 /// Unknowns when what is rigid is held, as the sets' documentation says.
@@ -258,8 +258,8 @@ fn the_nail_is_a_plate_of_its_thickness_in_one_piece() {
 #[test]
 fn a_nail_that_covers_nothing_is_refused() {
     let shape = FingertipShape { nail_mm: [0.1, 0.1], ..FingertipShape::default() };
-    assert!(build(&shape, Density::Coarse, Order::Linear, RIGID).is_ok());
-    let refused = build(&shape, Density::Coarse, Order::Linear, SOLID).unwrap_err();
+    assert!(build(&shape, Density::Coarse, Order::Linear, RIGID, None).is_ok());
+    let refused = build(&shape, Density::Coarse, Order::Linear, SOLID, None).unwrap_err();
     assert_eq!(refused, FingertipShapeError::NailTooSmall);
 }
 
@@ -323,7 +323,8 @@ fn the_patch_is_a_disc() {
 fn the_fingertip_flattens_at_every_density() {
     for density in [Density::Coarse, Density::Medium, Density::Fine] {
         let finger =
-            build(&FingertipShape::default(), density, Order::Linear, Parts::default()).unwrap();
+            build(&FingertipShape::default(), density, Order::Linear, Parts::default(), None)
+                .unwrap();
         let at = |nodes: &[u32]| nodes.iter().map(|&n| finger.mesh.nodes[n as usize]).collect();
         let (skin, interface): (Vec<_>, Vec<_>) =
             (at(&finger.patch.skin), at(&finger.patch.interface));
@@ -346,7 +347,7 @@ fn the_fingertip_flattens_at_every_density() {
 fn a_vertex_takes_the_quarters_round_it() {
     let of = |order| {
         let shape = Default::default();
-        let finger = build(&shape, Density::Coarse, order, Parts::default()).unwrap();
+        let finger = build(&shape, Density::Coarse, order, Parts::default(), None).unwrap();
         let nodes = &finger.patch.interface;
         let mesh = &finger.mesh;
         SedRecovery::by_quarters(mesh, "interface", Tissue::Dermis.region(), nodes).unwrap()

@@ -21,6 +21,8 @@ use papilla_fem::tensor::norm;
 const REACH_MM: f64 = 10.0;
 /// Part of the reach within which they slide all their way.
 const WHOLE: f64 = 0.6;
+/// Distance from what is held over which nodes come to a rest, mm.
+const HELD_FADE_MM: f64 = 4.0;
 
 /// How nodes of the skin slide.
 #[derive(Clone, Debug)]
@@ -140,7 +142,7 @@ impl Grading {
     pub fn moved(&self, shape: &FingertipShape, p: [f64; 3]) -> [f64; 3] {
         let from = self.chart(p);
         let r: [f64; 3] = std::array::from_fn(|i| p[i] - self.centre[i]);
-        let fade = self.strength * fade(norm(r) / REACH_MM);
+        let fade = self.strength * fade(norm(r) / REACH_MM) * free(shape, p);
         if fade <= 0.0 {
             return p;
         }
@@ -178,8 +180,23 @@ impl Grading {
     }
 }
 
+/// 1 where nodes may slide all their way, 0 at the height of the nail plate and at the base plane,
+/// where they are held.
+fn free(shape: &FingertipShape, p: [f64; 3]) -> f64 {
+    let below_nail = (0.25 * shape.height_mm - p[2]) / HELD_FADE_MM;
+    let before_base = (shape.length_mm - p[0]) / HELD_FADE_MM;
+    smoothstep(below_nail) * smoothstep(before_base)
+}
+
 /// 1 near the first touch, 0 at the reach, smooth between.
 fn fade(part: f64) -> f64 {
-    let t = ((1.0 - part) / (1.0 - WHOLE)).clamp(0.0, 1.0);
+    smoothstep((1.0 - part) / (1.0 - WHOLE))
+}
+
+fn smoothstep(t: f64) -> f64 {
+    let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
+
+#[cfg(test)]
+mod tests;

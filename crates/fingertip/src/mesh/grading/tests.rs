@@ -1,0 +1,129 @@
+use super::*;
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build};
+use papilla_fem::element::BlockGeometry;
+use papilla_sdf::{IndenterSpec, Placement};
+use std::path::Path;
+
+/// An indenter that comes to the default finger in a pose.
+fn contact(indenter: &str, angles_deg: [f64; 3], offset_mm: [f64; 2], depth_mm: f64) -> Contact {
+    let spec: IndenterSpec = toml::from_str(indenter).unwrap();
+    let shape = spec.build(Path::new("")).unwrap();
+    let [pitch, roll, yaw] = angles_deg;
+    let rotation = Placement::turned(pitch, roll, yaw, [0.0; 3]).rotation;
+    let top_mm = spec.top_mm();
+    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm, depth_mm };
+    Contact::new(&FingertipShape::default(), &coming).unwrap()
+}
+
+fn mesh(density: Density, contact: &Contact) -> FingertipMesh {
+    let shape = FingertipShape::default();
+    let grading = Grading::new(&shape, contact);
+    build(&shape, density, Order::Graded, Parts::default(), Some(&grading)).unwrap()
+}
+
+/// Distances of skin nodes to their nearest neighbour within `within_mm` of the first touch.
+fn spacing_near(mesh: &FingertipMesh, contact: &Contact, within_mm: f64) -> Vec<f64> {
+    let at: Vec<[f64; 3]> = mesh.patch.skin.iter().map(|&n| mesh.mesh.nodes[n as usize]).collect();
+    let away = |p: &[f64; 3], q: &[f64; 3]| norm(std::array::from_fn(|i| p[i] - q[i]));
+    at.iter()
+        .filter(|p| away(p, &contact.first) < within_mm)
+        .map(|p| at.iter().map(|q| away(p, q)).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min))
+        .collect()
+}
+
+const PLATE: &str = "shape = 'plate'\nsize_mm = [20.0, 20.0]\nedge_radius_mm = 1.0";
+const BALL: &str = "shape = 'sphere'\nradius_mm = 6.0";
+const BAR: &str = "shape = 'cylinder'\nradius_mm = 1.0\nlength_mm = 30.0\nend_radius_mm = 0.5";
+const PUNCH: &str = "shape = 'punch'\nradius_mm = 2.0\nrim_radius_mm = 0.5\nheight_mm = 8.0";
+const DOT: &str = "shape = 'dots'\ncount = [1, 1]\npitch_mm = 5.0\nbase_mm = 1.6\nheight_mm = 0.5\n\
+                   plate_mm = [20.0, 20.0]";
+const GRATING: &str = "shape = 'grating'\nridges = 6\nridge_mm = 2.0\ngroove_mm = 2.0\n\
+                       height_mm = 1.5\nedge_radius_mm = 0.7\nlength_mm = 24.0";
+
+/// Of every indenter, in poses at the limits of the campaigns, no element folds.
+#[test]
+fn no_element_folds() {
+    let poses = [
+        ([0.0, 0.0, 0.0], [0.0, 0.0]),
+        ([45.0, 30.0, 0.0], [0.0, 0.0]),
+        ([40.0, -25.0, 70.0], [2.0, -2.0]),
+        ([10.0, 25.0, -45.0], [-2.0, 2.0]),
+    ];
+    for indenter in [PLATE, BALL, BAR, PUNCH, DOT, GRATING] {
+        for (angles, offset) in poses {
+            let contact = contact(indenter, angles, offset, 1.5);
+            let mesh = mesh(Density::Coarse, &contact).mesh;
+            for block in &mesh.blocks {
+                let found = BlockGeometry::new(block.kind, &mesh.nodes, &block.connectivity);
+                assert!(found.is_ok(), "{indenter} {angles:?}: {:?}", found.err());
+            }
+        }
+    }
+}
+
+/// A narrow indenter has nodes closer together under it than a plate has, on the same lattice.
+#[test]
+fn lines_are_drawn_to_where_the_indenter_is_narrow() {
+    let median = |indenter| {
+        let contact = contact(indenter, [0.0; 3], [0.0; 2], 1.0);
+        let mesh = mesh(Density::Coarse, &contact);
+        let mut near = spacing_near(&mesh, &contact, 1.0);
+        near.sort_by(f64::total_cmp);
+        near[near.len() / 2]
+    };
+    let (plate, bar, dot) = (median(PLATE), median(BAR), median(DOT));
+    assert!(bar < 0.5 * plate, "bar {bar}, plate {plate}");
+    assert!(dot < 0.5 * plate, "dot {dot}, plate {plate}");
+}
+
+/// What is held, the connectivity and the number of unknowns do not depend on the contact.
+#[test]
+fn the_lattice_keeps_its_connectivity_and_supports() {
+    let [a, b] = [BALL, BAR].map(|indenter| {
+        mesh(Density::Coarse, &contact(indenter, [30.0, 10.0, 20.0], [1.0, 0.0], 1.5)).mesh
+    });
+    assert_eq!(a.blocks[0].connectivity, b.blocks[0].connectivity);
+    assert_eq!(a.node_sets, b.node_sets);
+    let shape = FingertipShape::default();
+    for &n in &a.node_sets["nail"] {
+        assert_eq!(a.nodes[n as usize], b.nodes[n as usize]);
+        assert!(shape.under_nail(a.nodes[n as usize]));
+    }
+}
+
+/// A ball that comes straight along the normal of a body of revolution touches where the
+/// smooth skin says, to the tolerance of the search.
+#[test]
+fn first_touch_is_that_of_the_smooth_skin() {
+    // The equator's section is an ellipse; with no crease the skin beyond it is a cylinder.
+    let finger = FingertipShape { crease_depth_mm: 0.0, ..FingertipShape::default() };
+    let spec: IndenterSpec = toml::from_str(BALL).unwrap();
+    let shape = spec.build(Path::new("")).unwrap();
+    let rotation = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]).rotation;
+    let top_mm = spec.top_mm();
+    // Along the cylinder's lowest line every point ties: the touch is at z = -h/2 and y = 0.
+    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm: [0.0; 2], depth_mm: 1.0 };
+    let found = Contact::new(&finger, &coming).unwrap();
+    assert!(found.first[1].abs() < 1e-4, "{:?}", found.first);
+    assert!((found.first[2] + 0.5 * finger.height_mm).abs() < 1e-9, "{:?}", found.first);
+    // The ball's centre is a radius below.
+    let centre = found.start.origin_mm[2];
+    assert!((centre + 0.5 * finger.height_mm + 6.0).abs() < 1e-6, "{centre}");
+    // Beside the axis by 1 mm: the centre's height over the ellipse, by Newton's method in the plane.
+    let beside = Contact::new(&finger, &Coming { offset_mm: [0.0, 1.0], ..coming }).unwrap();
+    let (a, b) = (0.5 * finger.width_mm, 0.5 * finger.height_mm);
+    // On the parallel curve at distance 6: x = a sin t + 6 n_x = 1.
+    let place = |t: f64| {
+        let (s, c) = t.sin_cos();
+        let n = [s / a, c / b];
+        let size = n[0].hypot(n[1]);
+        [a * s + 6.0 * n[0] / size, b * c + 6.0 * n[1] / size]
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if place(middle)[0] < 1.0 { low = middle } else { high = middle }
+    }
+    let due = -place(low)[1];
+    assert!((beside.start.origin_mm[2] - due).abs() < 1e-5, "{:?} {due}", beside.start.origin_mm);
+}
