@@ -89,13 +89,23 @@ impl Geometry {
     pub(super) fn validate(&self) -> Result<(), SceneError> {
         match self {
             Self::Fingertip { shape, .. } => Ok(shape.validate()?),
-            Self::Block { size_mm, elements, layers, .. } => {
+            Self::Block { size_mm, elements, layers, order } => {
+                even_lattice(*order)?;
                 validate_block(size_mm, elements, layers)
             }
-            Self::Section { shape, .. } => Ok(shape.validate()?),
+            Self::Section { shape, order, .. } => {
+                even_lattice(*order)?;
+                Ok(shape.validate()?)
+            }
             Self::Mesh { .. } => Ok(()),
         }
     }
+}
+
+/// Only the fingertip's lattice can be drawn together.
+fn even_lattice(order: Order) -> Result<(), SceneError> {
+    let rule = "is for kind = \"fingertip\": take \"linear\" or \"quadratic\"";
+    require(order != Order::Graded, "geometry.order", &"graded", rule)
 }
 
 fn validate_block(

@@ -131,6 +131,11 @@ fn what_is_no_scene_names_line_and_cure() {
             &["did you mean `thickness_mm`"],
         ),
         (BLOCK.replace("[4.0, 4.0]", "[4.0]"), 3, &["geometry.size_mm", "length 2"]),
+        (
+            BLOCK.replace("size_mm = [4.0, 4.0]", "order = \"graded\"\nsize_mm = [4.0, 4.0]"),
+            3,
+            &["geometry.order", "fingertip"],
+        ),
     ]);
     let error = parse("[motion]\ndepth_mm = 1.0\n").unwrap_err().to_string();
     assert!(error.starts_with("bad.toml: missing field `geometry`: add it"), "{error}");
