@@ -5,10 +5,10 @@
 //! transport: net ─► front ─► routes ─┬─► http, oip ─┐
 //!                                    └─► session ───┴─► slot (latest wins)
 //! core:      scheduler: slot ─► queue ─► thread (own engine sessions, own buffers) ─► answer
-//! codec:     samples, npy, PNG, JSON
 //! ```
 //!
-//! Each layer knows those below it alone, and no module imports another in a circle.
+//! Crates of their own lie below: `papilla-codec` reads and writes maps, `papilla-session-effects`
+//! computes what sessions ask for beside them, `papilla-engine` runs the networks. Each layer knows those below it alone, and no module imports another in a circle.
 //!
 //! **Invariant:** tokio only moves bytes, on threads of the service's own (`runtime`): clients
 //! cannot starve the task that starts and drains it. Decoding, inference and encoding run on the
@@ -18,7 +18,6 @@
 //! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
 
 mod check;
-mod codec;
 mod config;
 mod core;
 mod drain;

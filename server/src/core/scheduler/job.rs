@@ -6,12 +6,11 @@ use std::{
 };
 
 use bytes::{Bytes, BytesMut};
+use papilla_codec::{Input, Output};
 use papilla_proto::{FrameHeader, FrameKind, Problem, Window};
+use papilla_session_effects::Effects;
 
-use crate::{
-    codec::{Input, Output},
-    core::{effects::Effects, metrics::Stage},
-};
+use crate::core::metrics::Stage;
 
 /// One pressure map on its way to a thread.
 #[derive(Debug)]

@@ -7,6 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use papilla_codec::{Map, Quantity, decode, encode};
 use papilla_engine::Session;
 use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
 
@@ -17,7 +18,6 @@ use super::{
 };
 use crate::{
     StartError,
-    codec::{self, Map, Quantity},
     core::{
         buffers::{HEADROOM, Recycler},
         catalogue::Catalogue,
@@ -178,7 +178,9 @@ impl Worker {
             let buffer = recycler.claim(HEADROOM + effects.size_hint());
             buffer.resize(headroom, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
-            let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;
+            let written = effects
+                .write(pressure_pa, sed, sed_max, time_us, buffer)
+                .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
             (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
@@ -190,7 +192,8 @@ impl Worker {
                 value_max: sed_max,
                 source: &tier.name,
             };
-            let scale = codec::encode(job.output, map, buffer)?;
+            let scale = encode(job.output, map, buffer)
+                .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
         };
         times.encode = start.elapsed();
@@ -203,7 +206,7 @@ impl Worker {
         job: &Job,
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
-        codec::decode(job.input, payload, &mut self.pressure_pa)?;
+        decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
             takes_more: job.options.takes_more,

@@ -6,6 +6,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use papilla_codec::{Input, Output};
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
 };
@@ -19,7 +20,6 @@ use super::{
     terms::Terms,
 };
 use crate::{
-    codec::{Input, Output},
     core::{
         buffers::HEADROOM,
         metrics::{Stage, Transport},

@@ -5,17 +5,18 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
+use papilla_codec::{Output, scale_of};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
     SampleType,
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
 };
+use papilla_session_effects::Effects;
 
 use super::reply::tier_number;
 use crate::{
-    codec::{Output, scale_of},
-    core::{buffers::HEADROOM, catalogue::Tier, effects::Effects},
+    core::{buffers::HEADROOM, catalogue::Tier},
     transport::app::App,
 };
 
@@ -134,8 +135,8 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
     }
     let effects = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
     let info = effects.as_ref().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
-        names: effects.names.clone(),
-        sections: effects.sections.clone(),
+        names: effects.names().to_vec(),
+        sections: effects.sections().to_vec(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
     });
     Ok(Terms {
