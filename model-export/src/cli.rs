@@ -8,8 +8,8 @@ mod patterns;
 
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
-use model_export::{ExportError, read, read_text, table};
 use papilla_engine::{Backend, Card, Model};
+use papilla_model_export::{ExportError, read, read_text, table};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

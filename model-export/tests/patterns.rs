@@ -6,9 +6,9 @@
 mod bench;
 
 use bench::{Bench, DEPTHS, press, read_card};
-use model_export::dataset::Dataset;
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX, ladder::Kind};
+use papilla_model_export::dataset::Dataset;
 use papilla_proto::Pattern;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -240,8 +240,8 @@ def long() -> list[Step]:
         ),
         Step(
             "calculix-long",
-            "every press in CalculiX",
-            '"$BIN/fe-datagen" witness',
+            "every simulation in CalculiX",
+            '"$BIN/fe-datagen" cross-check',
             after=("stability-long",),
         ),
         Step(

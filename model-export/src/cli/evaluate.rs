@@ -1,12 +1,12 @@
 //! `model-export evaluate`.
 
 use super::{bar, load_card, load_model, print_json};
-use model_export::dataset::Dataset;
-use model_export::evaluate::{self, Evaluation, Subject};
-use model_export::reference::{Recorded, TOLERANCE};
-use model_export::{ExportError, picture, write};
 use papilla_engine::card::{Card, Latency, Spread};
 use papilla_engine::{Backend, Model, ModelInfo};
+use papilla_model_export::dataset::Dataset;
+use papilla_model_export::evaluate::{self, Evaluation, Subject};
+use papilla_model_export::reference::{Recorded, TOLERANCE};
+use papilla_model_export::{ExportError, picture, write};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -2,10 +2,10 @@
 
 use super::{bar, load_card, print_json};
 use anyhow::bail;
-use model_export::dataset::Dataset;
-use model_export::{read_text, write};
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, ladder::Kind};
+use papilla_model_export::dataset::Dataset;
+use papilla_model_export::{read_text, write};
 use papilla_proto::Pattern;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use model_export::dataset::Dataset;
+use papilla_model_export::dataset::Dataset;
 use papilla_proto::{
     MAP_LEN, SampleType,
     atlas::{Atlas, Patch, Raster},

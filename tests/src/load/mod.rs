@@ -70,7 +70,7 @@ pub enum LoadError {
     NoPresses(String),
     /// The dataset cannot be read.
     #[error(transparent)]
-    Dataset(#[from] model_export::ExportError),
+    Dataset(#[from] papilla_model_export::ExportError),
     /// A press does not fit its atlas.
     #[error(transparent)]
     Atlas(#[from] AtlasError),

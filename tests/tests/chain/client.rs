@@ -2,10 +2,10 @@
 
 use std::{io::Cursor, time::Duration};
 
-use model_export::metrics::quantile;
 use ndarray::Array2;
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use papilla_engine::Model;
+use papilla_model_export::metrics::quantile;
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX,
     SampleType,
