@@ -18,6 +18,23 @@
 //! | [`json`] | reading JSON from outside, and why it is refused |
 //! | [`error`] | error codes and their HTTP status |
 //!
+//! ```
+//! use papilla_proto::{FrameHeader, MAP_SIDE_PX, SampleType, Window};
+//!
+//! // What of a map carries pressure, and a frame of version 2 for it: 90 us to answer.
+//! let mut pressure_pa = vec![0.0_f32; MAP_SIDE_PX * MAP_SIDE_PX];
+//! pressure_pa[100 * MAP_SIDE_PX + 112] = 8e3;
+//! let window = Window::around(&pressure_pa, 0.0, 2);
+//! let header = FrameHeader::pressure(1, 0, 90, SampleType::F32, 1.0).windowed(window);
+//! assert_eq!((header.header_len(), header.payload_len()), (48, 5 * 5 * 4));
+//!
+//! let mut payload = vec![0; header.payload_len()];
+//! window.encode(header.sample_type, &pressure_pa, header.scale, &mut payload)?;
+//! let frame = [&header.encode()[..], &payload].concat();
+//! assert_eq!(FrameHeader::decode(&frame)?, header);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! The protocol in prose, with examples: `docs/reference/protocol.md`.
 
 pub mod effects;

@@ -15,7 +15,20 @@
 //! pool's threads. **Invariant:** every queue is bounded and every wait is timed. **Invariant:** a
 //! frame that was accepted is answered exactly once.
 //!
-//! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
+//! [`start`](fn@start) runs the whole service inside a process; the binary does little more:
+//!
+//! ```
+//! let arguments = ["papilla-server", "--bind", "127.0.0.1:0", "--threads", "1"];
+//! let config = papilla_server::Cli::read(arguments.map(Into::into))?.settings;
+//! config.validate()?;
+//! # async fn serve(config: papilla_server::Config) -> Result<(), Box<dyn std::error::Error>> {
+//! let server = papilla_server::start(&config).await?;
+//! println!("{} tiers on {}", server.tiers().len(), server.address());
+//! server.drain().await?;
+//! # Ok(())
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod check;
 mod config;

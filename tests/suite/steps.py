@@ -105,7 +105,7 @@ def fast() -> list[Step]:
             "examples in the crates' documentation",
             f"cargo test --workspace --doc {FEATURES} -q -- --skip clients/rust/src/lib.rs",
             after=("rust",),
-            tests_min=7,
+            tests_min=17,
         ),
         Step(
             "data",

@@ -7,9 +7,10 @@
 //! that its weights are finite, that it belongs to its card, and that it answers a
 //! trial map with finite, non-negative values.
 //!
-//! ```no_run
+//! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let onnx = std::fs::read("models/s1-base8.onnx")?;
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+//! let onnx = std::fs::read("models/nano.onnx")?;
 //! let model = papilla_engine::load(&onnx, None)?;
 //! let mut session = model.session()?; // one per inference thread
 //! let pressure_pa = vec![0.0; papilla_engine::MAP_LEN];
