@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`atlas`] | the two unwrapped patches, their rasteriser and hash |
 //! | [`map`] | the 224 x 224 map: length, checks |
-//! | [`pattern`] | two numbers that tell a map no press makes |
+//! | [`input_statistics`] | two numbers that tell a map out of distribution |
 //! | [`sample`] | f32 / f16 / u16 / u8 samples and their quantisation error |
 //! | [`window`] | a rectangle of the map: finding, decoding and encoding one |
 //! | [`frame`] | the header in front of every binary frame |
@@ -40,9 +40,9 @@
 pub mod effects;
 pub mod error;
 pub mod frame;
+pub mod input_statistics;
 pub mod map;
 pub mod message;
-pub mod pattern;
 pub mod sample;
 pub mod summary;
 pub mod window;
@@ -58,12 +58,12 @@ pub use error::{ErrorCode, Problem};
 pub use frame::{
     Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
 };
+pub use input_statistics::InputStatistics;
 pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
     keep_inside,
 };
 pub use message::{ClientMessage, Hello, MessageError, Ready, ServerMessage, SessionError};
-pub use pattern::Pattern;
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;

@@ -161,7 +161,7 @@ pub fn load_with(
     Ok(model)
 }
 
-/// One smooth press, half as hard as the model was trained for, through a new session.
+/// One smooth contact, half as hard as the model was trained for, through a new session.
 fn infer_trial_map(model: &dyn Model) -> Result<(), EngineError> {
     let centre = MAP_SIDE_PX as f32 / 2.0;
     let pressure_pa: Vec<f32> = (0..MAP_LEN)

@@ -45,7 +45,7 @@ struct Point {
     reference: bool,
 }
 
-/// The sets that get a panel: the reference, where all rungs meet, and the held-out presses;
+/// The sets that get a panel: the reference, where all rungs meet, and the held-out indentations;
 /// without either, the first set that was measured.
 fn panels(ladder: &Ladder) -> Vec<&str> {
     let measured = |set: &&papilla_engine::ladder::Set| set.samples > 0;

@@ -9,7 +9,9 @@ use std::{
 
 use papilla_codec::{Map, Quantity, decode, encode};
 use papilla_engine::Session;
-use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
+use papilla_proto::{
+    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
+};
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
@@ -145,20 +147,21 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
+        let is_outside =
+            |trained| InputStatistics::of(&self.pressure_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
-            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_beyond);
+            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
         meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
         if summary.is_zero() {
-            // Nothing touches the finger: nothing is felt, and no network is asked.
+            // Nothing touches the finger: SED is zero, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
             meta.flags |= flags::NO_CONTACT;
         } else if job.deadline.is_some_and(|deadline| {
-            tier.latency.is_hopeless(deadline.saturating_duration_since(decoded))
+            tier.latency.will_miss(deadline.saturating_duration_since(decoded))
         }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
@@ -209,7 +212,7 @@ impl Worker {
         decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            takes_more: job.options.takes_more,
+            accepts_out_of_range: job.options.accepts_out_of_range,
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);

@@ -35,7 +35,7 @@ pub(super) struct Terms {
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
     /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(super) takes_more: bool,
+    pub(super) accepts_out_of_range: bool,
     /// Longest delay on the way of a frame that is not stale, us.
     pub(super) stale_after_us: Option<u32>,
     /// What was asked for beside the bare map.
@@ -146,7 +146,7 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         sample_type: hello.sample_type,
         answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        takes_more: hello.out_of_range == Some(OutOfRange::Flag),
+        accepts_out_of_range: hello.out_of_range == Some(OutOfRange::Flag),
         stale_after_us: hello.stale_after_us,
         effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
         info,
