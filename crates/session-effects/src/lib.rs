@@ -41,6 +41,7 @@
 mod actuators;
 mod afferents;
 mod cost;
+mod finger;
 mod geometry;
 mod points;
 mod relaxation;
@@ -50,66 +51,22 @@ mod window;
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use bytes::BytesMut;
 use papilla_proto::{
     ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
     SampleError, SampleType, Window,
-    atlas::{Atlas, Raster},
     effects::{ActuatorInput, Section, SectionName},
 };
 
 pub use cost::{Cost, measure};
+pub use finger::{Finger, Shared};
 
 use self::{
     actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,
     relaxation::Relaxation, summary::Contact,
 };
-
-/// The finger that effects are placed on, and what all sessions on it share.
-#[derive(Debug, Clone, Copy)]
-pub struct Finger<'a> {
-    /// Both surfaces.
-    pub atlas: &'a Atlas,
-    /// Pixels of the skin.
-    pub skin: &'a Raster,
-    /// Pixels of the interface.
-    pub interface: &'a Raster,
-    /// What is made once for all sessions.
-    pub shared: &'a Shared,
-}
-
-impl Finger<'_> {
-    /// Areas and places of its pixels.
-    fn geometry(&self) -> Arc<Geometry> {
-        let make = || Arc::new(Geometry::new(self.atlas, self.skin, self.interface));
-        Arc::clone(self.shared.geometry.get_or_init(make))
-    }
-}
-
-/// What all sessions on one catalogue share; made when it is first asked for.
-#[derive(Debug, Default)]
-pub struct Shared {
-    geometry: OnceLock<Arc<Geometry>>,
-    costs: OnceLock<Vec<Cost>>,
-}
-
-impl Shared {
-    /// What each effect costs here; none without a calibration.
-    #[must_use]
-    pub fn costs(&self) -> Option<&[Cost]> {
-        self.costs.get().map(Vec::as_slice)
-    }
-
-    /// What these effects add to a frame, us.
-    #[must_use]
-    pub fn cost_us(&self, effects: &[RuntimeEffect]) -> u64 {
-        let costs = self.costs.get().into_iter().flatten();
-        let us: f64 = costs.filter(|cost| effects.contains(&cost.effect)).map(|cost| cost.us).sum();
-        us.ceil() as u64
-    }
-}
 
 /// The effects of one session and their state.
 #[derive(Debug)]

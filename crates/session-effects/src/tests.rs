@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     MAP_SIDE_PX, Summary,
-    atlas::{Patch, PatchVertices},
+    atlas::{Atlas, Patch, PatchVertices, Raster},
     effects::{
         Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place, PronyTerm,
         Relaxation as RelaxationParameters,

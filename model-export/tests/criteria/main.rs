@@ -57,7 +57,7 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure() {
     let ladder = ladder();
     let theirs = errors(baseline(&ladder), PRESSES);
     let is_fast =
-        |row: &&Rung| row.kind != Kind::S1Network && row.time_ms().is_some_and(|ms| ms <= 1.0);
+        |row: &&Rung| row.kind != Kind::PublishedUNet && row.time_ms().is_some_and(|ms| ms <= 1.0);
     let fast = ladder.rungs.iter().filter(is_fast).filter(|row| row.errors.contains_key(PRESSES));
     let lost: Vec<_> =
         fast.map(|row| (&row.name, compare::lost(errors(row, PRESSES), theirs))).collect();
