@@ -24,7 +24,7 @@ FILE_MAX = 450
 MEDIAN_MAX = 130
 PLACE = re.compile(r"(<!-- tests/suite/crates\.py -->\n).*?(<!-- end -->\n)", re.DOTALL)
 Arrows = dict[str, set[str]]
-SOURCE = re.compile(r"\.(rs|py|pyi|c?js|mjs|ts|cs|gd|cpp|hpp|h|css|html|sh)$|/(run|test|bench|docs-test|cycles|generate)$")
+SOURCE = re.compile(r"\.(rs|py|pyi|c?js|mjs|ts|cs|gd|cpp|hpp|h|css|html|sh)$|/(run|wire|test|bench|docs-test|cycles|generate)$")
 
 
 def folders(metadata: dict) -> Arrows:

@@ -8,25 +8,14 @@ use papilla_proto::{
     atlas::Raster,
     effects::{Actuator, ActuatorInput, Layout, Place},
 };
-use serde::Serialize;
 
-use super::{Effects, Finger};
+use super::{Cost, Effects, Finger};
 
 /// Runs of which the fastest counts.
 const RUNS: u64 = 12;
 
 /// Points and actuators that the measurement takes.
 const PLACES: usize = 64;
-
-/// What an effect adds to a frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cost {
-    /// The effect.
-    #[serde(rename = "name")]
-    pub effect: RuntimeEffect,
-    /// Time, us; below zero where it saves more than it takes.
-    pub us: f64,
-}
 
 /// Times every effect on a contact, 224 x 224 values in Pa, against the bare map; keeps the costs
 /// in what the sessions on this finger share ([`Shared::costs`](super::Shared::costs)).

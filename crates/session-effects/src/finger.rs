@@ -6,8 +6,9 @@ use papilla_proto::{
     RuntimeEffect,
     atlas::{Atlas, Raster},
 };
+use serde::Serialize;
 
-use super::{Cost, Geometry};
+use super::Geometry;
 
 /// The finger that effects are placed on, and what all sessions on it share.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +29,16 @@ impl Finger<'_> {
         let make = || Arc::new(Geometry::new(self.atlas, self.skin, self.interface));
         Arc::clone(self.shared.geometry.get_or_init(make))
     }
+}
+
+/// What an effect adds to a frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cost {
+    /// The effect.
+    #[serde(rename = "name")]
+    pub effect: RuntimeEffect,
+    /// Time, us; below zero where it saves more than it takes.
+    pub us: f64,
 }
 
 /// What all sessions on one catalogue share; made when it is first asked for.

@@ -60,8 +60,8 @@ use papilla_proto::{
     effects::{ActuatorInput, Section, SectionName},
 };
 
-pub use cost::{Cost, measure};
-pub use finger::{Finger, Shared};
+pub use cost::measure;
+pub use finger::{Cost, Finger, Shared};
 
 use self::{
     actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,

@@ -22,7 +22,9 @@ use std::{
     sync::atomic::{AtomicBool, AtomicU64, Ordering},
 };
 
-use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, SampleType, Window};
+use papilla_proto::{
+    FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, RuntimeEffect, SampleType, Window,
+};
 use serde_json::{Value, json};
 use support::{GAIN, Service, bytes_of, model_folder, ramp};
 
@@ -260,7 +262,7 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
 
 /// Every effect at once, windows both ways.
 fn every_effect(service: &Service, engines_own: u64) {
-    let effects = ["relaxation", "afferents", "contact_window", "summary", "points", "actuators"];
+    let effects = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
     let hello = json!({
         "type": "hello", "version": 2, "effects": effects, "tier": "quick",
         "points": [{"px": [110.0, 65.0]}],
