@@ -19,7 +19,7 @@ use std::time::Instant;
 
 /// Solves one indentation after another; each worker thread has its own.
 pub trait IndentationSolver {
-    /// Presses to each of the depths and returns one equilibrium per depth, with
+    /// Indentations to each of the depths and returns one equilibrium per depth, with
     /// values at the vertices of the campaign's atlas. Equal presses have to give
     /// equal records (`seconds` apart), whatever was solved before.
     ///
