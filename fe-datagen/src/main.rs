@@ -8,7 +8,7 @@ use tracing_subscriber::util::SubscriberInitExt as _;
 
 fn main() -> ExitCode {
     let filter = match std::env::var("RUST_LOG") {
-        Ok(text) => match of_every_crate(&text).parse() {
+        Ok(text) => match text.parse() {
             Ok(filter) => filter,
             Err(error) => {
                 eprintln!("error: RUST_LOG is '{text}', which is not a filter: {error}");
@@ -19,12 +19,5 @@ fn main() -> ExitCode {
     };
     let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
     tracing_subscriber::registry().with(log).init();
-    fe_datagen::cli::run()
-}
-
-/// A filter of this program's name is one for the crates that it is made of.
-fn of_every_crate(filter: &str) -> String {
-    let also = filter.split(',').filter(|d| d.contains("fe_datagen"));
-    let also = also.map(|d| d.replace("fe_datagen", "papilla"));
-    std::iter::once(filter.to_owned()).chain(also).collect::<Vec<_>>().join(",")
+    papilla_fe_datagen::cli::run()
 }

@@ -30,7 +30,7 @@ fn a_solve_that_is_given_up_tells_its_story_and_leaves_its_last_state() {
     let out = folder.path().join("out");
     let found = Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
         .args(["solve".as_ref(), scene.as_os_str(), "--out".as_ref(), out.as_os_str()])
-        .env("RUST_LOG", "fe_datagen=debug")
+        .env("RUST_LOG", "papilla=debug")
         .env("NO_COLOR", "1")
         .output()
         .unwrap();

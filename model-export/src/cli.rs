@@ -8,8 +8,8 @@ mod patterns;
 
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
-use model_export::{ExportError, read, read_text, table};
 use papilla_engine::{Backend, Card, Model};
+use papilla_model_export::{ExportError, read, read_text, table};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,7 +26,7 @@ Checks, evaluates and describes exported Papilla models.
 
 A model maps the pressure on a fingertip (Pa) to the strain energy density (SED, J/m3) under
 its skin; the trainer writes it as ONNX. This program measures it in the engine that
-will serve it, on presses that no training saw, and writes its card.";
+will serve it, on indentations that no training saw, and writes its card.";
 
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
@@ -58,7 +58,7 @@ enum Command {
     /// answered with finite, non-negative values; with --atlas and --card, that they belong to it.
     #[command(after_long_help = EXIT_CODES)]
     Check(check::Options),
-    /// Measure a model on the held-out presses of a dataset and write its card.
+    /// Measure a model on the held-out indentations of a dataset and write its card.
     ///
     /// Every sample of the split is drawn from the shards, inferred in the serving engine on one
     /// thread and compared with the finite-element truth over the interface's pixels: relative
@@ -81,14 +81,14 @@ enum Command {
     Index(index::Options),
     /// Note in the cards how rough and how heavy the maps of the training were.
     ///
-    /// The server flags maps beyond that as `unfamiliar`: no press makes them, and what a model
+    /// The server flags maps beyond that as `unfamiliar`: no indentation makes them, and what a model
     /// answers then may mean nothing. Cards of models that were not trained on the datasets given,
     /// or on others beside them, are left as they are; so are those of physics, fitted to no maps.
     #[command(after_long_help = EXIT_CODES)]
     Patterns(patterns::Options),
     /// Measure the ladder: error against time of every model and of FE itself.
     ///
-    /// Every model of the index is run on all held-out sets (held-out presses, held-out shapes,
+    /// Every model of the index is run on all held-out sets (held-out indentations, held-out shapes,
     /// deeper than any training, the published campaign, the states of the FE reference); FE rungs
     /// are held against the reference. Written: a page with tables and pictures, the figures as
     /// JSON, and the same as MODELS/ladder.json, by which the server chooses.

@@ -1,4 +1,4 @@
-//! Reads a dataset: `manifest.json`, `atlas.json` and one `.npz` shard per press.
+//! Reads a dataset: `manifest.json`, `atlas.json` and one `.npz` shard per indentation.
 //!
 //! Shards hold values at the atlas's vertices; maps are rasterised from them here.
 
@@ -21,7 +21,8 @@ struct Manifest {
     atlas_hash: String,
     effects: Vec<String>,
     vertex_count: usize,
-    presses: Vec<Press>,
+    #[serde(rename = "presses")]
+    indentations: Vec<Indentation>,
     splits: Splits,
     dataset_sha256: String,
 }
@@ -32,9 +33,9 @@ struct Splits {
     test: Vec<usize>,
 }
 
-/// One press of the manifest.
+/// One indentation of the manifest.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Press {
+pub struct Indentation {
     /// Number within the campaign.
     pub id: usize,
     /// Its shard, relative to the manifest.
@@ -51,7 +52,7 @@ pub struct Press {
     pub yaw_deg: f64,
 }
 
-/// The samples of one press, values at the vertices.
+/// The samples of one indentation, values at the vertices.
 #[derive(Clone, Debug)]
 pub struct Shard {
     /// Pressure on the skin, Pa; `[D, V]`.
@@ -122,12 +123,12 @@ impl Dataset {
         &self.manifest.effects
     }
 
-    /// The presses of a split (`train` or `test`), in the manifest's order.
+    /// The indentations of a split (`train` or `test`), in the manifest's order.
     ///
     /// # Errors
     /// [`ExportError::EmptySplit`] if there are none, [`ExportError::Dataset`] for another
-    /// name, or a press that is not in the manifest.
-    pub fn presses(&self, split: &str) -> Result<Vec<&Press>, ExportError> {
+    /// name, or an indentation that is not in the manifest.
+    pub fn indentations(&self, split: &str) -> Result<Vec<&Indentation>, ExportError> {
         let path = self.folder.join("manifest.json");
         let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
         let ids = match split {
@@ -135,40 +136,41 @@ impl Dataset {
             "test" => &self.manifest.splits.test,
             _ => return Err(bad(format!("no split '{split}'; there are 'train' and 'test'"))),
         };
-        let presses = ids
+        let indentations = ids
             .iter()
             .map(|id| {
-                let press = self.manifest.presses.iter().find(|press| press.id == *id);
-                press.ok_or_else(|| bad(format!("press {id} of the split is not listed")))
+                let indentation =
+                    self.manifest.indentations.iter().find(|indentation| indentation.id == *id);
+                indentation.ok_or_else(|| bad(format!("press {id} of the split is not listed")))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        if presses.iter().all(|press| press.samples == 0) {
+        if indentations.iter().all(|indentation| indentation.samples == 0) {
             return Err(ExportError::EmptySplit { path, split: split.to_owned() });
         }
-        Ok(presses)
+        Ok(indentations)
     }
 
-    /// All presses, of whichever split, in the manifest's order.
+    /// All indentations, of whichever split, in the manifest's order.
     #[must_use]
-    pub fn every_press(&self) -> Vec<&Press> {
-        self.manifest.presses.iter().collect()
+    pub fn every_indentation(&self) -> Vec<&Indentation> {
+        self.manifest.indentations.iter().collect()
     }
 
-    /// Path of the shard of a press.
+    /// Path of the shard of an indentation.
     #[must_use]
-    pub fn shard_path(&self, press: &Press) -> PathBuf {
-        self.folder.join(&press.file)
+    pub fn shard_path(&self, indentation: &Indentation) -> PathBuf {
+        self.folder.join(&indentation.file)
     }
 
-    /// Reads the shard of a press and checks its hash, shapes and values.
+    /// Reads the shard of an indentation and checks its hash, shapes and values.
     ///
     /// # Errors
     /// [`ExportError::Io`], [`ExportError::Dataset`].
-    pub fn load(&self, press: &Press) -> Result<Shard, ExportError> {
-        let path = self.shard_path(press);
+    pub fn load(&self, indentation: &Indentation) -> Result<Shard, ExportError> {
+        let path = self.shard_path(indentation);
         let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
         let bytes = read(&path)?;
-        if sha256_hex(&bytes) != press.sha256 {
+        if sha256_hex(&bytes) != indentation.sha256 {
             return Err(bad(
                 "its hash is not the manifest's: it is damaged or of another run".into()
             ));
@@ -180,7 +182,7 @@ impl Dataset {
             sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
         };
-        let expected = (press.samples, self.manifest.vertex_count);
+        let expected = (indentation.samples, self.manifest.vertex_count);
         for (name, array) in
             [("pressure_pa", &shard.pressure_pa), ("sed_dermis_j_per_m3", &shard.sed_j_per_m3)]
         {
@@ -191,7 +193,7 @@ impl Dataset {
                 return Err(bad(format!("{name} holds {value}")));
             }
         }
-        if shard.depth_mm.len() != press.samples {
+        if shard.depth_mm.len() != indentation.samples {
             return Err(bad(format!("depth_mm has {} values", shard.depth_mm.len())));
         }
         Ok(shard)
@@ -205,12 +207,12 @@ impl Dataset {
     /// [`ExportError::Atlas`].
     pub fn draw_pressure(
         &self,
-        press: &Press,
+        indentation: &Indentation,
         shard: &Shard,
         index: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(press, &self.skin, &shard.pressure_pa.row(index).to_vec(), map)
+        self.draw(indentation, &self.skin, &shard.pressure_pa.row(index).to_vec(), map)
     }
 
     /// Draws its SED on the interface, J/m3.
@@ -219,22 +221,22 @@ impl Dataset {
     /// [`ExportError::Atlas`].
     pub fn draw_sed(
         &self,
-        press: &Press,
+        indentation: &Indentation,
         shard: &Shard,
         index: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(press, &self.interface, &shard.sed_j_per_m3.row(index).to_vec(), map)
+        self.draw(indentation, &self.interface, &shard.sed_j_per_m3.row(index).to_vec(), map)
     }
 
     fn draw(
         &self,
-        press: &Press,
+        indentation: &Indentation,
         raster: &Raster,
         values: &[f32],
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        let refused = |source| ExportError::Atlas { path: self.shard_path(press), source };
+        let refused = |source| ExportError::Atlas { path: self.shard_path(indentation), source };
         raster.rasterise(values, map).map_err(refused)
     }
 }
@@ -251,24 +253,25 @@ pub(crate) fn read_array<T: ReadableElement, D: ndarray::Dimension>(
 
 impl Manifest {
     fn check_identity(&self) -> Result<(), String> {
-        for (i, press) in self.presses.iter().enumerate() {
+        for (i, indentation) in self.indentations.iter().enumerate() {
             // A manifest must not make the program read files elsewhere.
-            if Path::new(&press.file).components().any(|c| !matches!(c, Component::Normal(_))) {
+            if Path::new(&indentation.file).components().any(|c| !matches!(c, Component::Normal(_)))
+            {
                 return Err(format!(
                     "press {}: '{}' is no path inside the dataset",
-                    press.id, press.file
+                    indentation.id, indentation.file
                 ));
             }
-            if self.presses[..i].iter().any(|other| other.id == press.id) {
-                return Err(format!("press {} is listed twice", press.id));
+            if self.indentations[..i].iter().any(|other| other.id == indentation.id) {
+                return Err(format!("press {} is listed twice", indentation.id));
             }
         }
         if let Some(id) = self.splits.test.iter().find(|id| self.splits.train.contains(id)) {
             return Err(format!("press {id} is in both splits: the test would not be held out"));
         }
-        let mut by_id: Vec<&Press> = self.presses.iter().collect();
-        by_id.sort_by_key(|press| press.id);
-        let hashes: String = by_id.iter().map(|press| press.sha256.as_str()).collect();
+        let mut by_id: Vec<&Indentation> = self.indentations.iter().collect();
+        by_id.sort_by_key(|indentation| indentation.id);
+        let hashes: String = by_id.iter().map(|indentation| indentation.sha256.as_str()).collect();
         if sha256_hex(hashes.as_bytes()) != self.dataset_sha256 {
             return Err("dataset_sha256 does not follow from the shards listed".to_owned());
         }

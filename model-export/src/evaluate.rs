@@ -1,7 +1,7 @@
 //! Runs a model over a split of a dataset in the engine that will serve it.
 
 use crate::ExportError;
-use crate::dataset::{Dataset, Press, Shard};
+use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::reference::relative_difference;
 use papilla_engine::card::{Card, Latency, Metrics};
@@ -16,9 +16,10 @@ const WARM_UP: usize = 3;
 /// One sample of the split and how well the model met it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Sample {
-    /// Id of the press.
-    pub press: usize,
-    /// Index within the press.
+    /// Id of the indentation.
+    #[serde(rename = "press")]
+    pub indentation: usize,
+    /// Index within the indentation.
     pub index: usize,
     /// Depth of the plate, mm.
     pub depth_mm: f32,
@@ -59,12 +60,12 @@ impl Maps {
     fn draw(
         &mut self,
         dataset: &Dataset,
-        press: &Press,
+        indentation: &Indentation,
         shard: &Shard,
         index: usize,
     ) -> Result<(), ExportError> {
-        dataset.draw_pressure(press, shard, index, &mut self.pressure_pa)?;
-        dataset.draw_sed(press, shard, index, &mut self.truth_j_per_m3)
+        dataset.draw_pressure(indentation, shard, index, &mut self.pressure_pa)?;
+        dataset.draw_sed(indentation, shard, index, &mut self.truth_j_per_m3)
     }
 }
 
@@ -106,7 +107,7 @@ impl Evaluation {
             effects: info.effects.clone(),
             network: info.network.clone(),
             pressure_range_pa: [0.0, info.pressure_max_pa],
-            pattern_max: None,
+            input_statistics_max: None,
             sed_max_j_per_m3: info.sed_max_j_per_m3,
             dataset_sha256: info.dataset_sha256.clone(),
             training: info.training.clone(),
@@ -147,11 +148,11 @@ pub fn run(
     let mut difference = None;
     let mut samples = Vec::new();
     let mut maps = Maps::default();
-    for press in dataset.presses(split)? {
-        let path = dataset.shard_path(press);
-        let shard = dataset.load(press)?;
-        for index in 0..press.samples {
-            maps.draw(dataset, press, &shard, index)?;
+    for indentation in dataset.indentations(split)? {
+        let path = dataset.shard_path(indentation);
+        let shard = dataset.load(indentation)?;
+        for index in 0..indentation.samples {
+            maps.draw(dataset, indentation, &shard, index)?;
             let infer_ms = bench.infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;
             if let Some(second) = &mut second {
                 let mut answer = vec![0.0; MAP_LEN];
@@ -170,12 +171,12 @@ pub fn run(
                 reason: "it is zero",
             })?;
             samples.push(Sample {
-                press: press.id,
+                indentation: indentation.id,
                 index,
                 depth_mm: shard.depth_mm[index],
-                pitch_deg: press.pitch_deg,
-                roll_deg: press.roll_deg,
-                yaw_deg: press.yaw_deg,
+                pitch_deg: indentation.pitch_deg,
+                roll_deg: indentation.roll_deg,
+                yaw_deg: indentation.yaw_deg,
                 metrics,
                 infer_ms,
             });
@@ -207,9 +208,13 @@ pub fn maps_of(
     sample: &Sample,
 ) -> Result<Maps, ExportError> {
     let mut maps = Maps::default();
-    for press in dataset.presses(split)?.into_iter().filter(|press| press.id == sample.press) {
-        let shard = dataset.load(press)?;
-        maps.draw(dataset, press, &shard, sample.index)?;
+    for indentation in dataset
+        .indentations(split)?
+        .into_iter()
+        .filter(|indentation| indentation.id == sample.indentation)
+    {
+        let shard = dataset.load(indentation)?;
+        maps.draw(dataset, indentation, &shard, sample.index)?;
         Bench::new(subject.model, subject.path)?
             .infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;
     }

@@ -1,10 +1,27 @@
 //! Checks, evaluates and describes exported Papilla models.
 //!
 //! The trainer (Python, in `trainer/`) ends at the `.onnx` file. From there on everything
-//! is here: [`evaluate`] runs the serving engine on every held-out press of a dataset
+//! is here: [`evaluate`] runs the serving engine on every held-out indentation of a dataset
 //! and compares with the finite-element truth by the [`metrics`]; the outcome is the
 //! model's [card](papilla_engine::card) and [pictures](picture) of its best, median and worst
 //! sample. The dataset is read from its files alone: nothing here knows how it was made.
+//!
+//! ```
+//! use papilla_model_export::metrics::{Ground, SampleMetrics};
+//!
+//! // A plane interface, 0.1 mm a pixel; SED of one pixel is a tenth too low.
+//! let place = |i| [0.1 * (i / 224) as f32, 0.1 * (i % 224) as f32, 0.0];
+//! let position_mm: Vec<_> = (0..224 * 224).map(place).collect();
+//! let [mask, nail_base] = [true, false].map(|of| vec![of; position_mm.len()]);
+//! let ground = Ground { mask, nail_base, position_mm };
+//! let mut truth = vec![0.0; ground.mask.len()];
+//! truth[112 * 224..][..4].fill(100.0);
+//! let mut predicted = truth.clone();
+//! predicted[112 * 224] = 90.0;
+//! let metrics = SampleMetrics::measure(&predicted, &truth, &ground).expect("truth is above 0");
+//! assert!((metrics.relative_l2 - 0.05).abs() < 1e-12);
+//! assert!((metrics.total_energy_error - 0.025).abs() < 1e-12);
+//! ```
 
 pub mod dataset;
 mod error;

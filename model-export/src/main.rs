@@ -11,8 +11,8 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error
-                .downcast_ref::<model_export::ExportError>()
-                .map_or(1, model_export::ExportError::exit_code);
+                .downcast_ref::<papilla_model_export::ExportError>()
+                .map_or(1, papilla_model_export::ExportError::exit_code);
             if arguments.json {
                 let report =
                     serde_json::json!({"error": {"message": error.to_string(), "exit_code": code}});

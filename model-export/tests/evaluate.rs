@@ -88,7 +88,7 @@ fn what_does_not_belong_together_is_refused() {
     assert!(stderr.contains("differs from reference.npz"), "{stderr}");
     assert!(!bench.path("models/tiny.json").exists());
 
-    // A card of training presses, or of another dataset.
+    // A card of training indentations, or of another dataset.
     bench.refused(1, &[&evaluate[..], &["--split", "train"]].concat());
     let manifest = fs::read_to_string(bench.path("data/manifest.json")).unwrap();
     let trained = sha256_of(&manifest);
@@ -104,7 +104,7 @@ fn what_does_not_belong_together_is_refused() {
     let stderr = bench.refused(1, &["evaluate", "models/stranger.onnx", "data"]);
     assert!(stderr.contains("atlas"), "{stderr}");
 
-    // A damaged shard, a press in both splits, a path that leads outside.
+    // A damaged shard, an indentation in both splits, a path that leads outside.
     let shard = bench.path("data/shards/1.npz");
     let mut bytes = fs::read(&shard).unwrap();
     bytes[40] ^= 1;

@@ -17,7 +17,7 @@ use std::io::Cursor;
 const COMMAND: [&str; 7] = ["ladder", "--data", "sets", "--fe", "fe", "--out", "out/ladder"];
 
 /// The bench with its dataset as `sets/s1` and `sets/deep`, an index, and FE rungs: the reference
-/// has the held-out press' truth, `fe-medium-linear-finite` a tenth more.
+/// has the held-out indentations' truth, `fe-medium-linear-finite` a tenth more.
 fn bench() -> Bench {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("sets/deep/shards")).unwrap();

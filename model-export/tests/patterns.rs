@@ -5,11 +5,11 @@
 
 mod bench;
 
-use bench::{Bench, DEPTHS, press, read_card};
-use model_export::dataset::Dataset;
+use bench::{Bench, DEPTHS, contact, read_card};
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX, ladder::Kind};
-use papilla_proto::Pattern;
+use papilla_model_export::dataset::Dataset;
+use papilla_proto::InputStatistics;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -24,16 +24,16 @@ fn a_card_notes_the_roughest_and_heaviest_map() {
     let note = ["patterns", "models", "--dataset", "data"];
     bench.done(&evaluate);
     bench.done(&["index", "models", "--default", "tiny"]);
-    assert_eq!(read_card(&bench.path("models/tiny.json")).pattern_max, None);
+    assert_eq!(read_card(&bench.path("models/tiny.json")).input_statistics_max, None);
     assert!(bench.done(&note).contains("tiny: roughness up to"));
-    let noted = read_card(&bench.path("models/tiny.json")).pattern_max.unwrap();
-    let maps = [0.9, 1.0].into_iter().flat_map(|force| DEPTHS.map(|depth| press(force * depth)));
-    let due = maps.map(|map| Pattern::of(&map)).reduce(Pattern::max).unwrap();
+    let noted = read_card(&bench.path("models/tiny.json")).input_statistics_max.unwrap();
+    let maps = [0.9, 1.0].into_iter().flat_map(|force| DEPTHS.map(|depth| contact(force * depth)));
+    let due = maps.map(|map| InputStatistics::of(&map)).reduce(InputStatistics::max).unwrap();
     assert!((noted.roughness / due.roughness - 1.0).abs() < 1e-4, "{noted:?} {due:?}");
     assert!((noted.load_mpa_px / due.load_mpa_px - 1.0).abs() < 1e-4, "{noted:?} {due:?}");
     // Measured anew on the same data, the model keeps it.
     bench.done(&evaluate);
-    assert_eq!(read_card(&bench.path("models/tiny.json")).pattern_max, Some(noted));
+    assert_eq!(read_card(&bench.path("models/tiny.json")).input_statistics_max, Some(noted));
 
     // Other data tell nothing of this model.
     let card = fs::read_to_string(bench.path("models/tiny.json")).unwrap();
@@ -42,7 +42,7 @@ fn a_card_notes_the_roughest_and_heaviest_map() {
     assert!(bench.refused(1, &note).contains("trained on these datasets alone"));
 }
 
-/// Maps that no press makes, 10 kPa where they are not 0.
+/// Maps that no indentation makes, 10 kPa where they are not 0.
 fn odd_maps(skin: &[bool]) -> Vec<(String, Vec<f32>)> {
     let drawn = |at: &dyn Fn(usize, usize) -> f32| -> Vec<f32> {
         let pixel =
@@ -63,13 +63,13 @@ fn odd_maps(skin: &[bool]) -> Vec<(String, Vec<f32>)> {
 #[test]
 fn shipped_networks_tell_odd_maps_from_held_out_presses() {
     let dataset = Dataset::open(&root().join("data/heldout")).unwrap();
-    let mut presses = Vec::new();
-    for press in dataset.every_press() {
-        let shard = dataset.load(press).unwrap();
-        for index in 0..press.samples {
+    let mut indentations = Vec::new();
+    for indentation in dataset.every_indentation() {
+        let shard = dataset.load(indentation).unwrap();
+        for index in 0..indentation.samples {
             let mut map = vec![0.0; MAP_LEN];
-            dataset.draw_pressure(press, &shard, index, &mut map).unwrap();
-            presses.push(Pattern::of(&map));
+            dataset.draw_pressure(indentation, &shard, index, &mut map).unwrap();
+            indentations.push(InputStatistics::of(&map));
         }
     }
     let odd = odd_maps(dataset.skin.mask());
@@ -77,15 +77,16 @@ fn shipped_networks_tell_odd_maps_from_held_out_presses() {
     for name in Index::from_json(&index).unwrap().models {
         let card = read_card(&root().join(format!("models/{name}.json")));
         let is_network = Kind::of_network(&card.network).is_network();
-        assert_eq!(card.pattern_max.is_some(), is_network, "{name}");
-        let Some(trained) = card.pattern_max else { continue };
+        assert_eq!(card.input_statistics_max.is_some(), is_network, "{name}");
+        let Some(trained) = card.input_statistics_max else { continue };
         for (what, map) in &odd {
-            assert!(Pattern::of(map).is_beyond(trained), "{name}: {what}");
+            assert!(InputStatistics::of(map).is_out_of_distribution(trained), "{name}: {what}");
         }
         // Edges and gratings are rougher than all that plates alone have taught.
         if card.datasets().len() > 1 {
-            let flagged = presses.iter().filter(|pattern| pattern.is_beyond(trained)).count();
-            assert_eq!((flagged, presses.len()), (0, 192), "{name}");
+            let flagged =
+                indentations.iter().filter(|of| of.is_out_of_distribution(trained)).count();
+            assert_eq!((flagged, indentations.len()), (0, 192), "{name}");
         }
     }
 }

@@ -224,10 +224,10 @@ pub struct PronyTerm {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moduli {
-    /// Those at once: a press that is held goes on sinking in, SED grows.
+    /// Those at once: an indenter that is held goes on sinking in, SED grows.
     #[default]
     Instantaneous,
-    /// Those of long holds: a press is stiffer at first.
+    /// Those of long holds: the finger is stiffer at first.
     LongTerm,
 }
 

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`atlas`] | the two unwrapped patches, their rasteriser and hash |
 //! | [`map`] | the 224 x 224 map: length, checks |
-//! | [`pattern`] | two numbers that tell a map no press makes |
+//! | [`input_statistics`] | two numbers that tell a map out of distribution |
 //! | [`sample`] | f32 / f16 / u16 / u8 samples and their quantisation error |
 //! | [`window`] | a rectangle of the map: finding, decoding and encoding one |
 //! | [`frame`] | the header in front of every binary frame |
@@ -18,14 +18,31 @@
 //! | [`json`] | reading JSON from outside, and why it is refused |
 //! | [`error`] | error codes and their HTTP status |
 //!
+//! ```
+//! use papilla_proto::{FrameHeader, MAP_SIDE_PX, SampleType, Window};
+//!
+//! // What of a map carries pressure, and a frame of version 2 for it: 90 us to answer.
+//! let mut pressure_pa = vec![0.0_f32; MAP_SIDE_PX * MAP_SIDE_PX];
+//! pressure_pa[100 * MAP_SIDE_PX + 112] = 8e3;
+//! let window = Window::around(&pressure_pa, 0.0, 2);
+//! let header = FrameHeader::pressure(1, 0, 90, SampleType::F32, 1.0).windowed(window);
+//! assert_eq!((header.header_len(), header.payload_len()), (48, 5 * 5 * 4));
+//!
+//! let mut payload = vec![0; header.payload_len()];
+//! window.encode(header.sample_type, &pressure_pa, header.scale, &mut payload)?;
+//! let frame = [&header.encode()[..], &payload].concat();
+//! assert_eq!(FrameHeader::decode(&frame)?, header);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! The protocol in prose, with examples: `docs/reference/protocol.md`.
 
 pub mod effects;
 pub mod error;
 pub mod frame;
+pub mod input_statistics;
 pub mod map;
 pub mod message;
-pub mod pattern;
 pub mod sample;
 pub mod summary;
 pub mod window;
@@ -41,12 +58,12 @@ pub use error::{ErrorCode, Problem};
 pub use frame::{
     Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
 };
+pub use input_statistics::InputStatistics;
 pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
     keep_inside,
 };
 pub use message::{ClientMessage, Hello, MessageError, Ready, ServerMessage, SessionError};
-pub use pattern::Pattern;
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;

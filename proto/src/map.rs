@@ -85,7 +85,7 @@ pub struct PressureRange {
     /// Greatest pressure the model was trained on, Pa.
     pub trained_max_pa: f32,
     /// Whether pressures beyond are taken, up to [`FLAGGED_HEADROOM`] times as much.
-    pub takes_more: bool,
+    pub accepts_out_of_range: bool,
 }
 
 impl MapSummary {
@@ -98,7 +98,8 @@ impl MapSummary {
 
 impl PressureRange {
     fn limit_pa(self) -> f32 {
-        self.trained_max_pa * if self.takes_more { FLAGGED_HEADROOM } else { PRESSURE_HEADROOM }
+        self.trained_max_pa
+            * if self.accepts_out_of_range { FLAGGED_HEADROOM } else { PRESSURE_HEADROOM }
     }
 
     /// Whether a map with this peak is an extrapolation.
@@ -188,7 +189,7 @@ pub(crate) const LANES: usize = 16;
 /// # Errors
 /// The first sample at fault, in row-major order.
 pub fn check_pressure(map_pa: &[f32], pressure_max_pa: f32) -> Result<MapSummary, MapError> {
-    PressureRange { trained_max_pa: pressure_max_pa, takes_more: false }.check(map_pa)
+    PressureRange { trained_max_pa: pressure_max_pa, accepts_out_of_range: false }.check(map_pa)
 }
 
 #[cfg(test)]
@@ -223,7 +224,7 @@ mod tests {
     #[test]
     fn pressure_beyond_the_range_is_taken_where_it_is_flagged_and_up_to_ten_times() {
         let mut map = vec![1.0; MAP_LEN];
-        let range = PressureRange { trained_max_pa: 100.0, takes_more: true };
+        let range = PressureRange { trained_max_pa: 100.0, accepts_out_of_range: true };
         for (pressure_pa, taken, left) in
             [(100.0, true, false), (102.0, true, true), (999.0, true, true), (1001.0, false, true)]
         {

@@ -5,20 +5,32 @@
 //! transport: net ─► front ─► routes ─┬─► http, oip ─┐
 //!                                    └─► session ───┴─► slot (latest wins)
 //! core:      scheduler: slot ─► queue ─► thread (own engine sessions, own buffers) ─► answer
-//! codec:     samples, npy, PNG, JSON
 //! ```
 //!
-//! Each layer knows those below it alone, and no module imports another in a circle.
+//! Crates of their own lie below: `papilla-codec` reads and writes maps, `papilla-session-effects`
+//! computes what sessions ask for beside them, `papilla-engine` runs the networks. Each layer knows those below it alone, and no module imports another in a circle.
 //!
 //! **Invariant:** tokio only moves bytes, on threads of the service's own (`runtime`): clients
 //! cannot starve the task that starts and drains it. Decoding, inference and encoding run on the
 //! pool's threads. **Invariant:** every queue is bounded and every wait is timed. **Invariant:** a
 //! frame that was accepted is answered exactly once.
 //!
-//! [`start`](fn@start) runs the whole service inside a process; the binary does little more.
+//! [`start`](fn@start) runs the whole service inside a process; the binary does little more:
+//!
+//! ```
+//! let arguments = ["papilla-server", "--bind", "127.0.0.1:0", "--threads", "1"];
+//! let config = papilla_server::Cli::read(arguments.map(Into::into))?.settings;
+//! config.validate()?;
+//! # async fn serve(config: papilla_server::Config) -> Result<(), Box<dyn std::error::Error>> {
+//! let server = papilla_server::start(&config).await?;
+//! println!("{} tiers on {}", server.tiers().len(), server.address());
+//! server.drain().await?;
+//! # Ok(())
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod check;
-mod codec;
 mod config;
 mod core;
 mod drain;

@@ -1,6 +1,6 @@
 //! The refusals of the service, whatever carries them: typed, in words of bounded length.
 
-use papilla_proto::{ErrorCode, FrameError, MapError, Problem, SampleError, error::shortened};
+use papilla_proto::{ErrorCode, FrameError, MapError, Problem, error::shortened};
 
 /// Most characters of a message.
 const MESSAGE_MAX: usize = 1000;
@@ -24,12 +24,6 @@ pub(crate) fn of_frame(error: FrameError) -> Problem {
         Some(field) => problem.at(field),
         None => problem,
     }
-}
-
-/// The problem a payload makes.
-pub(crate) fn of_samples(error: SampleError) -> Problem {
-    let field = if error.code() == ErrorCode::BadScale { "scale" } else { "payload" };
-    Problem::new(error.code(), error.to_string()).at(field)
 }
 
 /// The problem a map makes.

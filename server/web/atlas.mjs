@@ -1,17 +1,6 @@
 // The atlas as flat typed arrays, and the geometry the page needs from it.
 
-import { Raster } from './raster.js';
-
-/** A surface patch of the finger unwrapped into the 224 x 224 map. */
-class Patch {
-  constructor(triangles, json) {
-    /** x, y, z per vertex, mm. */
-    this.positionsMm = Float32Array.from(json.positions_mm.flat());
-    /** u, v per vertex, pixels. */
-    this.uvPx = Float32Array.from(json.uv_px.flat());
-    this.raster = new Raster(triangles, this.uvPx);
-  }
-}
+import { Patch } from './raster.js';
 
 /**
  * Atlas of the finger: both patches share triangles, whose normals point out of the finger; vertex i

@@ -10,7 +10,7 @@ const DOT_PX = 5;
 /** Least distance of two numbers on the time axis. */
 const TICK_PX = 46;
 const KINDS = {
-  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'S1’s network', fe: 'finite elements',
+  closed_form: 'closed form', operator: 'operator', network: 'network', s1_network: 'published U-Net', fe: 'finite elements',
 };
 
 const byId = (id) => document.getElementById(id);

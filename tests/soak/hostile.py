@@ -15,6 +15,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -197,27 +199,43 @@ def health(certificate: str | None, stop: multiprocessing.Event, out: multiproce
     out.put(times)
 
 
-def beside(kind: str, certificate: str | None, seconds: float) -> dict:
+@contextmanager
+def floods(kind: str, certificate: str | None) -> Iterator[tuple[multiprocessing.Event, multiprocessing.Value]]:
+    """CLIENTS clients of a kind, at it for half a second already; the event that ends them and the
+    bytes that they have sent.
+    """
     stop, sent = multiprocessing.Event(), multiprocessing.Value("q", 0)
-    floods = [multiprocessing.Process(target=flood, args=(kind, certificate, stop, sent)) for _ in range(CLIENTS)]
-    found, times = multiprocessing.Queue(), multiprocessing.Queue()
-    others = [
-        multiprocessing.Process(target=judged, args=(certificate, seconds, found)),
-        multiprocessing.Process(target=health, args=(certificate, stop, times)),
-    ]
-    for process in floods:
+    clients = [multiprocessing.Process(target=flood, args=(kind, certificate, stop, sent)) for _ in range(CLIENTS)]
+    for process in clients:
         process.start()
     time.sleep(0.5)
-    for process in others:
-        process.start()
     try:
-        trips, lost = found.get(timeout=seconds + 120)
+        yield stop, sent
     finally:
         stop.set()
-    healths = times.get(timeout=120)
-    for process in floods + others:
+        join(clients)
+
+
+def join(processes: list[multiprocessing.Process]) -> None:
+    """Waits for processes that were told to stop, and kills those that do not."""
+    for process in processes:
         process.join(timeout=10)
         process.kill()
+
+
+def beside(kind: str, certificate: str | None, seconds: float) -> dict:
+    found, times = multiprocessing.Queue(), multiprocessing.Queue()
+    with floods(kind, certificate) as (stop, sent):
+        others = [
+            multiprocessing.Process(target=judged, args=(certificate, seconds, found)),
+            multiprocessing.Process(target=health, args=(certificate, stop, times)),
+        ]
+        for process in others:
+            process.start()
+        trips, lost = found.get(timeout=seconds + 120)
+        stop.set()
+        healths = times.get(timeout=120)
+    join(others)
     trips.sort()
     at = lambda share: round(1000 * trips[min(len(trips) - 1, int(share * len(trips)))], 2)  # noqa: E731
     return {
@@ -263,23 +281,14 @@ def serve(arguments: list[str], certificate: str | None) -> subprocess.Popen:
 
 def terminate_under(kind: str, certificate: str | None, service: subprocess.Popen) -> float:
     """Seconds from SIGTERM to the end of the service, beside floods of a kind."""
-    stop, sent = multiprocessing.Event(), multiprocessing.Value("q", 0)
-    floods = [multiprocessing.Process(target=flood, args=(kind, certificate, stop, sent)) for _ in range(CLIENTS)]
-    for process in floods:
-        process.start()
-    time.sleep(1)
-    start = time.monotonic()
-    service.terminate()
-    try:
-        service.wait(timeout=60)
-    except subprocess.TimeoutExpired:
-        service.kill()
-    took = time.monotonic() - start
-    stop.set()
-    for process in floods:
-        process.join(timeout=10)
-        process.kill()
-    return took
+    with floods(kind, certificate):
+        start = time.monotonic()
+        service.terminate()
+        try:
+            service.wait(timeout=60)
+        except subprocess.TimeoutExpired:
+            service.kill()
+        return time.monotonic() - start
 
 
 def markdown(found: dict) -> str:
@@ -304,8 +313,8 @@ def markdown(found: dict) -> str:
         cells = [row["transport"], row["kind"], row["sent_mb_per_s"], row["idle_p99_ms"], row["p50_ms"], row["p99_ms"]]
         cells += [row["max_ms"], row["health_max_ms"], row["lost"], "yes" if row["sound"] else "**no**"]
         lines.append(f"| {' | '.join(map(str, cells))} |")
-    for end in found["ends"]:
-        lines += ["", f"SIGTERM beside endless windows ({end['transport']}): ended after {end['end_s']} s, code {end['exit_code']}."]
+    for row in found["ends"]:
+        lines += ["", f"SIGTERM beside endless windows ({row['transport']}): ended after {row['end_s']} s, code {row['exit_code']}."]
     return "\n".join([*lines, *found["notes"], ""])
 
 
@@ -340,5 +349,5 @@ def run(minutes: float) -> dict:
                 service.kill()
                 service.wait()
     # 15 s is the drain's own limit.
-    sound = all(row["sound"] for row in rows) and all(end["end_s"] <= 17 and end["exit_code"] == 0 for end in ends)
+    sound = all(row["sound"] for row in rows) and all(row["end_s"] <= 17 and row["exit_code"] == 0 for row in ends)
     return {"rows": rows, "ends": ends, "notes": notes, "sound": sound}

@@ -2,12 +2,11 @@
 
 use std::{io, time::Duration};
 
+use papilla_client::dial;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
     time::timeout,
 };
-
-use crate::dial::dial;
 
 /// Longest wait for an answer, s.
 const PATIENCE_S: u64 = 60;

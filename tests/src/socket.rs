@@ -6,6 +6,7 @@ use futures_util::{
     SinkExt, StreamExt,
     stream::{SplitSink, SplitStream},
 };
+use papilla_client::dial;
 use papilla_proto::{
     ClientMessage, FrameError, FrameHeader, Hello, Ready, ServerMessage, SessionError,
 };
@@ -14,8 +15,6 @@ use tokio_tungstenite::{
     WebSocketStream, client_async,
     tungstenite::{self, Bytes, Message},
 };
-
-use crate::dial::dial;
 
 /// Longest wait for the server's ready, s.
 const PATIENCE_S: u64 = 30;

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Draws the workspace's crates and what each is built with, from `cargo metadata`.
+"""Draws the workspace's crates and what each is built with, from `cargo metadata`; measures them.
 
-    tests/suite/crates.py [--write]
+    tests/suite/crates.py [--write | --sizes]
 
-Without --write compares the picture in ARCHITECTURE.md with the workspace. Exit code 1 if it is out
-of date or if crates need each other in a circle; dependencies of tests alone are not drawn.
+Without --write compares the picture in ARCHITECTURE.md with the workspace. --sizes prints each
+crate's lines. Exit code 1 if the picture is out of date, if crates need each other in a circle
+(dependencies of tests alone are not drawn), or if a size is above its limit: CRATE_MAX lines in the
+`src` of a crate, FILE_MAX in a file of any language, MEDIAN_MAX in the median Rust file.
 """
 
 import json
@@ -13,11 +15,16 @@ import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+from statistics import median_low
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "ARCHITECTURE.md"
+CRATE_MAX = 13_000
+FILE_MAX = 450
+MEDIAN_MAX = 130
 PLACE = re.compile(r"(<!-- tests/suite/crates\.py -->\n).*?(<!-- end -->\n)", re.DOTALL)
 Arrows = dict[str, set[str]]
+SOURCE = re.compile(r"\.(rs|py|pyi|c?js|mjs|ts|cs|gd|cpp|hpp|h|css|html|sh)$|/(run|wire|test|bench|docs-test|cycles|generate)$")
 
 
 def folders(metadata: dict) -> Arrows:
@@ -59,12 +66,53 @@ def picture(arrows: Arrows) -> str:
     return "```mermaid\ngraph TD\n" + "\n".join(lines) + "\n```\n"
 
 
+def lines() -> dict[str, int]:
+    """Lines of every source file that is written by hand."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    files = sorted(name for name in listed if SOURCE.search(name) and (ROOT / name).is_file())
+    return {name: len((ROOT / name).read_text().splitlines()) for name in files}
+
+
+def table(crates: list[str], found: dict[str, int]) -> str:
+    """Lines of each crate's Rust files as a Markdown table."""
+    rows = ["| crate | lines in `src` | in its other targets | files | largest | median |", "|---|---|---|---|---|---|"]
+    for crate in sorted(crates):
+        rust = {name: n for name, n in found.items() if name.startswith(f"{crate}/") and name.endswith(".rs")}
+        library = sum(n for name, n in rust.items() if name.startswith(f"{crate}/src/"))
+        largest = max(rust, key=lambda name: rust[name])
+        cells = [f"`{crate}`", library, sum(rust.values()) - library, len(rust)]
+        cells += [f"{rust[largest]} `{largest.removeprefix(f'{crate}/')}`", median_low(rust.values())]
+        rows.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(rows)
+
+
+def too_large(crates: list[str], found: dict[str, int]) -> list[str]:
+    """A line for each limit that is passed."""
+    rust = [n for name, n in found.items() if name.endswith(".rs")]
+    wrong = [f"{name} has {n} lines, {FILE_MAX} are the most" for name, n in found.items() if n > FILE_MAX]
+    for crate in crates:
+        n = sum(n for name, n in found.items() if name.startswith(f"{crate}/src/") and name.endswith(".rs"))
+        if n > CRATE_MAX:
+            wrong.append(f"{crate}/src has {n} lines, {CRATE_MAX} are the most")
+    if median_low(rust) > MEDIAN_MAX:
+        wrong.append(f"the median Rust file has {median_low(rust)} lines, {MEDIAN_MAX} are the most")
+    return wrong
+
+
 def main() -> int:
     command = ["cargo", "metadata", "--format-version", "1", "--no-deps", "--offline"]
     arrows = folders(json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout))
     if found := circle(arrows):
         print(f"a circle of crates: {' -> '.join(found)}")
         return 1
+    found = lines()
+    if wrong := too_large(list(arrows), found):
+        print("\n".join(wrong))
+        return 1
+    if "--sizes" in sys.argv[1:]:
+        print(table(list(arrows), found))
+        return 0
     text = PAGE.read_text()
     new, count = PLACE.subn(lambda place: place[1] + picture(arrows) + place[2], text)
     if count != 1:
@@ -75,7 +123,8 @@ def main() -> int:
     elif new != text:
         print(f"the picture in {PAGE.name} is out of date: tests/suite/crates.py --write")
         return 1
-    print(f"{len(arrows)} crates, no circle")
+    rust = [n for name, n in found.items() if name.endswith(".rs")]
+    print(f"{len(arrows)} crates, no circle; {len(rust)} Rust files, median {median_low(rust)}, largest {max(rust)} lines")
     return 0
 
 

@@ -52,6 +52,20 @@ class Crates(unittest.TestCase):
         self.assertEqual(crates.direct(arrows), {"a": {"b"}, "b": {"c"}, "c": set()})
 
 
+class Sizes(unittest.TestCase):
+    def faults(self, found: dict[str, int]) -> list[str]:
+        return [fault.split(" has ")[0] for fault in crates.too_large(["a", "b"], found)]
+
+    def test_a_crate_a_file_and_the_median_may_be_as_large_as_their_limits(self) -> None:
+        files = {f"a/src/{n}.rs": crates.MEDIAN_MAX for n in range(crates.CRATE_MAX // crates.MEDIAN_MAX)}
+        self.assertEqual(self.faults(files | {"b/page.css": crates.FILE_MAX}), [])
+        # Tests beside `src` are programs of their own.
+        self.assertEqual(self.faults(files | {"a/tests/more.rs": 1}), [])
+        self.assertEqual(self.faults(files | {"a/src/more.rs": 1}), ["a/src"])
+        self.assertEqual(self.faults(files | {"b/page.css": crates.FILE_MAX + 1}), ["b/page.css"])
+        self.assertEqual(len(self.faults({"a/src/x.rs": crates.MEDIAN_MAX + 1})), 1)
+
+
 if __name__ == "__main__":
     done = unittest.main(exit=False, verbosity=0).result
     print(f"checks: {done.testsRun - len(done.failures) - len(done.errors)}")

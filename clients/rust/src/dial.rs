@@ -9,7 +9,10 @@ use tokio::net::{TcpSocket, TcpStream, lookup_host};
 const SOCKET_BUFFER: u32 = 512 * 1024;
 
 /// Connects to `server` (host and port): buffers for a whole frame, `TCP_NODELAY` set.
-pub(crate) async fn dial(server: &str) -> io::Result<TcpStream> {
+///
+/// # Errors
+/// The name has no address, or nobody listens.
+pub async fn dial(server: &str) -> io::Result<TcpStream> {
     let mut last = io::Error::new(io::ErrorKind::NotFound, "the name has no address");
     for address in lookup_host(server).await? {
         let socket = if address.is_ipv4() { TcpSocket::new_v4() } else { TcpSocket::new_v6() }?;

@@ -20,6 +20,7 @@ mod session;
 mod skin;
 
 pub use answer::{Answer, Status};
+pub use dial::dial;
 pub use error::PapillaError;
 pub use http::{Rendered, atlas, get, sed};
 pub use papilla_proto as proto;

@@ -20,6 +20,24 @@ pub struct Contact {
 }
 
 /// The skin: where its pixels are and how much of the finger each shows.
+///
+/// ```
+/// use papilla_client::{
+///     Contact, Skin,
+///     proto::atlas::{Atlas, PatchVertices},
+/// };
+///
+/// // A plane skin of 18 mm, 0.1 mm a pixel; a service's own comes from `papilla_client::atlas`.
+/// let uv_px = vec![[20.0, 20.0], [200.0, 20.0], [200.0, 200.0], [20.0, 200.0]];
+/// let positions_mm = uv_px.iter().map(|[u, v]| [0.1 * v, -0.1 * u, 0.0]).collect();
+/// let patch = PatchVertices { positions_mm, uv_px };
+/// let skin = Skin::new(&Atlas::new(0.1, vec![[0, 2, 1], [0, 3, 2]], patch.clone(), patch)?);
+///
+/// let contact = Contact { at_mm: [11.0, -11.0, 0.0], force_n: 0.5, radius_mm: 2.0 };
+/// let pressure_pa = skin.contacts(&[contact]);
+/// assert!((skin.force_n(&pressure_pa) - 0.5).abs() < 0.01);
+/// # Ok::<(), papilla_client::proto::atlas::AtlasError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Skin {
     raster: Raster,

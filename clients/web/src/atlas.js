@@ -1,25 +1,13 @@
 // The atlas: which point of the finger each pixel of a map is, and how to fill a map.
 
-import { Raster } from './raster.js';
+import { Patch } from './raster.js';
 import { MAP_LEN, SIDE_PX } from './wire.js';
 
 /**
  * The atlas as the server sends it (`GET /v1/atlas`).
- * @typedef {{positions_mm: number[][], uv_px: number[][]}} PatchJson
+ * @typedef {import('./raster.js').PatchJson} PatchJson
  * @typedef {{hash: string, mm_per_px: number, triangles: number[][], skin: PatchJson, interface: PatchJson}} AtlasJson
  */
-
-/** One surface unwrapped into the map. */
-class Patch {
-  /** @param {Uint32Array} triangles @param {PatchJson} json */
-  constructor(triangles, json) {
-    /** x, y, z of each vertex, mm, in the finger's frame. */
-    this.positionsMm = Float32Array.from(json.positions_mm.flat());
-    /** u, v of each vertex, pixels. */
-    this.uvPx = Float32Array.from(json.uv_px.flat());
-    this.raster = new Raster(triangles, this.uvPx);
-  }
-}
 
 /**
  * Both patches share triangles, wound counter-clockwise from outside; vertex i of the skin lies over vertex i of

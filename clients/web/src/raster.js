@@ -1,11 +1,26 @@
-// Vertex values to 224 x 224 maps: the pixel -> (triangle, weights) table, built once from the
-// atlas by the server's own rule, so that both paint the same pixels: a pixel belongs to the patch
-// if its centre lies in a triangle, borders included, and to the lowest such triangle.
-// The server's page imports this file too: server/build.rs puts it beside the page's own.
+// The finger's surfaces, and vertex values as 224 x 224 maps: the pixel -> (triangle, weights)
+// table, built once from the atlas by the server's own rule, so that both paint the same pixels: a
+// pixel belongs to the patch if its centre lies in a triangle, borders included, and to the lowest
+// such triangle. The server's page imports this file too: server/build.rs puts it beside the page's
+// own.
 
 const SIDE_PX = 224;
 const MAP_LEN = SIDE_PX * SIDE_PX;
 const STEPS_PER_PX = 2 ** 40;
+
+/** @typedef {{positions_mm: number[][], uv_px: number[][]}} PatchJson a surface as `GET /v1/atlas` sends it */
+
+/** One surface of the finger unwrapped into the map. */
+export class Patch {
+  /** @param {Uint32Array} triangles @param {PatchJson} json */
+  constructor(triangles, json) {
+    /** x, y, z of each vertex, mm, in the finger's frame. */
+    this.positionsMm = Float32Array.from(json.positions_mm.flat());
+    /** u, v of each vertex, pixels. */
+    this.uvPx = Float32Array.from(json.uv_px.flat());
+    this.raster = new Raster(triangles, this.uvPx);
+  }
+}
 
 /** Linear interpolation of vertex values at pixel centres; pixels outside every triangle stay 0. */
 export class Raster {

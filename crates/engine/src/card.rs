@@ -1,10 +1,10 @@
 //! Model cards and the index of the shipped models.
 //!
 //! A card (`models/NAME.json`) is what `model-export evaluate` measured of
-//! `models/NAME.onnx` in this engine on presses that no training saw.
+//! `models/NAME.onnx` in this engine on indentations that no training saw.
 
 use crate::{EngineError, MODEL_FORMAT, ModelInfo};
-use papilla_proto::{Pattern, json};
+use papilla_proto::{InputStatistics, json};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -29,8 +29,8 @@ pub struct Card {
     pub pressure_range_pa: [f32; 2],
     /// Roughest and heaviest map of the training data: what is beyond is flagged. Absent from
     /// models that were fitted to no maps, and until `model-export patterns` has looked.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pattern_max: Option<Pattern>,
+    #[serde(rename = "pattern_max", default, skip_serializing_if = "Option::is_none")]
+    pub input_statistics_max: Option<InputStatistics>,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
     /// SHA-256 of the dataset it was trained on, of several that of their hashes one after
@@ -38,7 +38,7 @@ pub struct Card {
     pub dataset_sha256: String,
     /// How it was trained.
     pub training: Value,
-    /// Accuracy on held-out presses.
+    /// Accuracy on held-out indentations.
     pub metrics: Metrics,
     /// How long one map takes.
     pub latency_ms: Latency,
@@ -54,7 +54,7 @@ pub struct Metrics {
     /// written before it was recorded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset_sha256: Option<String>,
-    /// Which split of the dataset: `test` for presses that training never saw.
+    /// Which split of the dataset: `test` for indentations that training never saw.
     pub split: String,
     /// Number of samples measured.
     pub samples: usize,

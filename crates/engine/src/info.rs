@@ -34,7 +34,7 @@ pub struct ModelInfo {
     pub dataset_sha256: String,
     /// How it was trained: seed, epochs, optimiser, loss, versions, seconds.
     pub training: Value,
-    /// The trainer's own figures on held-out presses.
+    /// The trainer's own figures on held-out indentations.
     pub trainer_metrics: Value,
     /// What runs it, with version.
     pub backend: String,

@@ -70,8 +70,9 @@ pub enum Kind {
     Operator,
     /// A trained network.
     Network,
-    /// The published network that is the baseline.
-    S1Network,
+    /// The network of the U-Net paper (docs/glossary.md, sources): the baseline.
+    #[serde(rename = "s1_network")]
+    PublishedUNet,
     /// The finite-element solver itself.
     Fe,
 }
@@ -83,7 +84,7 @@ impl Kind {
         match network.get("kind").and_then(serde_json::Value::as_str) {
             Some("half_space") => Self::ClosedForm,
             Some("fe_operator") => Self::Operator,
-            Some("s1_unet") => Self::S1Network,
+            Some("s1_unet") => Self::PublishedUNet,
             _ => Self::Network,
         }
     }
@@ -91,7 +92,7 @@ impl Kind {
     /// Whether it was trained, ours or the published one.
     #[must_use]
     pub const fn is_network(self) -> bool {
-        matches!(self, Self::Network | Self::S1Network)
+        matches!(self, Self::Network | Self::PublishedUNet)
     }
 }
 

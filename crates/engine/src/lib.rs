@@ -7,9 +7,10 @@
 //! that its weights are finite, that it belongs to its card, and that it answers a
 //! trial map with finite, non-negative values.
 //!
-//! ```no_run
+//! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let onnx = std::fs::read("models/s1-base8.onnx")?;
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+//! let onnx = std::fs::read("models/nano.onnx")?;
 //! let model = papilla_engine::load(&onnx, None)?;
 //! let mut session = model.session()?; // one per inference thread
 //! let pressure_pa = vec![0.0; papilla_engine::MAP_LEN];
@@ -160,7 +161,7 @@ pub fn load_with(
     Ok(model)
 }
 
-/// One smooth press, half as hard as the model was trained for, through a new session.
+/// One smooth contact, half as hard as the model was trained for, through a new session.
 fn infer_trial_map(model: &dyn Model) -> Result<(), EngineError> {
     let centre = MAP_SIDE_PX as f32 / 2.0;
     let pressure_pa: Vec<f32> = (0..MAP_LEN)

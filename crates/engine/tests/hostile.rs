@@ -79,7 +79,7 @@ unsafe impl GlobalAlloc for Bounded {
 #[global_allocator]
 static ALLOCATOR: Bounded = Bounded;
 
-/// What becomes of a file: it is refused, or its answer to a press is finite and not negative, or
+/// What becomes of a file: it is refused, or its answer to a contact is finite and not negative, or
 /// an error. A model that takes minutes hangs.
 fn fate(onnx: Vec<u8>) -> Result<(), EngineError> {
     let (report, reports) = mpsc::channel();

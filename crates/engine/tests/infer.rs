@@ -161,7 +161,7 @@ fn refuses_maps_of_another_length_and_goes_on() {
 
 #[test]
 fn an_infinite_answer_is_an_error_not_a_map() {
-    // Scaled so far up that a press beyond the trained range overflows.
+    // Scaled so far up that a pressure beyond the trained range overflows.
     let onnx = altered(|model| {
         let scale = graph(model).initializer.iter_mut().find(|t| t.name == "scale_out").unwrap();
         scale.raw_data = 1e36f32.to_le_bytes().to_vec();

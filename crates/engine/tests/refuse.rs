@@ -283,7 +283,7 @@ fn card_of(info: &ModelInfo) -> Card {
         effects: info.effects.clone(),
         network: info.network.clone(),
         pressure_range_pa: [0.0, info.pressure_max_pa],
-        pattern_max: None,
+        input_statistics_max: None,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         dataset_sha256: info.dataset_sha256.clone(),
         training: json!({"seed": 7}),

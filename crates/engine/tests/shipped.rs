@@ -1,4 +1,5 @@
-//! Maps that no press makes, through every shipped model: each is answered by a map that is finite,
+//! Maps that no indentation makes, through every shipped model: each is
+//! answered by a map that is finite,
 //! not negative and empty outside of the interface, or refused by name; and the next is answered
 //! as if nothing had been.
 
@@ -71,8 +72,8 @@ fn single(pixel: usize, pressure_pa: f32) -> Vec<f32> {
     map
 }
 
-/// A round press of `peak_pa` in the middle of the pad, as smooth as real ones.
-fn press(peak_pa: f32) -> Vec<f32> {
+/// A round contact of `peak_pa` in the middle of the pad, as smooth as real ones.
+fn contact(peak_pa: f32) -> Vec<f32> {
     let pressure_pa = |i: usize| {
         let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
         let r2 = ((row - 80.0) / 34.0).powi(2) + ((column - 112.0) / 30.0).powi(2);
@@ -125,8 +126,8 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
     let [skin, interface] = masks();
     each(|tier| {
         let max_pa = tier.max_pa();
-        let good = press(0.5 * max_pa);
-        let due = tier.map("a press", &good, &interface);
+        let good = contact(0.5 * max_pa);
+        let due = tier.map("a contact", &good, &interface);
         assert!(due.iter().any(|v| *v > 0.0));
         for place in places(&skin) {
             for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -143,7 +144,7 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
             // Negative pressure is the service's to refuse, before any model is asked.
             let mut bad = good.clone();
             bad[place] = -1.0;
-            let range = PressureRange { trained_max_pa: max_pa, takes_more: true };
+            let range = PressureRange { trained_max_pa: max_pa, accepts_out_of_range: true };
             assert!(matches!(range.check(&bad), Err(MapError::Negative { .. })));
         }
         // Far beyond all that a range lets through: a map that is one, or an error.
@@ -160,7 +161,7 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
                 ),
             }
         }
-        let again = tier.map("the same press", &good, &interface);
+        let again = tier.map("the same contact", &good, &interface);
         assert!(again == due, "{}: what was refused left a trace", tier.card.name);
     });
 }
@@ -170,17 +171,17 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
 fn what_the_card_does_not_know_is_flagged() {
     each(|tier| {
         assert!(tier.max_pa() > 1e3 && tier.max_pa() < 1e6, "{}", tier.card.name);
-        let flagged = PressureRange { trained_max_pa: tier.max_pa(), takes_more: true };
-        let strict = PressureRange { takes_more: false, ..flagged };
+        let flagged = PressureRange { trained_max_pa: tier.max_pa(), accepts_out_of_range: true };
+        let strict = PressureRange { accepts_out_of_range: false, ..flagged };
         for (times, is_left) in [(0.5, false), (1.0, false), (1.02, true), (9.9, true)] {
-            let map = press(times * tier.max_pa());
+            let map = contact(times * tier.max_pa());
             let peak_pa = map.iter().copied().fold(0.0, f32::max);
             let summary = flagged.check(&map).unwrap();
             assert_eq!(flagged.is_left_by(summary), peak_pa > 1.01 * tier.max_pa());
             assert_eq!(flagged.is_left_by(summary), is_left, "{} x {times}", tier.card.name);
             assert_eq!(strict.check(&map).is_err(), is_left);
         }
-        let far = press(10.5 * tier.max_pa());
+        let far = contact(10.5 * tier.max_pa());
         assert!(matches!(flagged.check(&far), Err(MapError::OutOfRange { .. })));
     });
 }
@@ -191,7 +192,7 @@ fn quantised_pressure_changes_sed_within_the_stated_bounds() {
     let [_, interface] = masks();
     each(|tier| {
         let max_pa = tier.max_pa();
-        let exact = press(0.6 * max_pa);
+        let exact = contact(0.6 * max_pa);
         let due = tier.map("f32", &exact, &interface);
         let size = |map: &[f32]| map.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
         for (sample_type, bound) in

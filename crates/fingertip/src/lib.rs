@@ -6,6 +6,29 @@
 //! distribution of indentations, [`influence`] the linear map from pressure to strain.
 //!
 //! Units: mm, N, MPa, s.
+//!
+//! What an indentation will cost, before anything is solved:
+//!
+//! ```
+//! use papilla_fingertip::{forecast::Forecast, scene::Scene, simulation::Simulation};
+//!
+//! let text = r#"
+//!     [geometry]
+//!     kind = "fingertip"
+//!     density = "coarse"
+//!     [indenter]
+//!     shape = "sphere"
+//!     radius_mm = 5.0
+//!     [motion]
+//!     depth_mm = 1.0
+//!     increments = 4
+//! "#;
+//! let scene = Scene::parse("scene.toml".as_ref(), text.into())?;
+//! let forecast = Forecast::new(&scene, &Simulation::new(&scene)?);
+//! println!("{} MB, {:.0} s", forecast.memory_bytes >> 20, forecast.seconds.total);
+//! assert!(forecast.factor_entries > 0 && forecast.seconds.total > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]

@@ -29,7 +29,7 @@ use std::process::ExitCode;
     version,
     about,
     after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but something did not pass its own checks.\n\
-                  RUST_LOG=fe_datagen=debug tells the story of a solve."
+                  RUST_LOG=papilla=debug tells the story of a solve."
 )]
 struct Cli {
     #[command(subcommand)]

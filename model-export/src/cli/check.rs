@@ -1,9 +1,9 @@
 //! `model-export check`.
 
 use super::{load_card, load_model, print_json};
-use model_export::evaluate::require_atlas;
-use model_export::{ExportError, read_text};
 use papilla_engine::{Backend, ModelInfo};
+use papilla_model_export::evaluate::require_atlas;
+use papilla_model_export::{ExportError, read_text};
 use papilla_proto::atlas::Atlas;
 use std::path::{Path, PathBuf};
 

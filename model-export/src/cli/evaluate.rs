@@ -1,12 +1,12 @@
 //! `model-export evaluate`.
 
 use super::{bar, load_card, load_model, print_json};
-use model_export::dataset::Dataset;
-use model_export::evaluate::{self, Evaluation, Subject};
-use model_export::reference::{Recorded, TOLERANCE};
-use model_export::{ExportError, picture, write};
 use papilla_engine::card::{Card, Latency, Spread};
 use papilla_engine::{Backend, Model, ModelInfo};
+use papilla_model_export::dataset::Dataset;
+use papilla_model_export::evaluate::{self, Evaluation, Subject};
+use papilla_model_export::reference::{Recorded, TOLERANCE};
+use papilla_model_export::{ExportError, picture, write};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub(crate) struct Options {
     model: PathBuf,
     /// Folder of the dataset, as `fe-datagen generate` writes it.
     dataset: PathBuf,
-    /// Which presses: `test` (held out) or `train`.
+    /// Which indentations: `test` (held out) or `train`.
     #[arg(long, default_value = "test", value_name = "SPLIT")]
     split: String,
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
@@ -58,9 +58,9 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     }
     let mut card = evaluation.card(info, difference);
     if let Some(path) = &options.out {
-        // The pattern is the data's, not the model's: one that was noted for them still holds.
+        // Input statistics are the data's, not the model's: those noted for them still hold.
         let noted = load_card(path).ok().filter(|old| old.dataset_sha256 == card.dataset_sha256);
-        card.pattern_max = noted.and_then(|old| old.pattern_max);
+        card.input_statistics_max = noted.and_then(|old| old.input_statistics_max);
         write(path, card.to_json()?.as_bytes())?;
     }
     let pictures = draw_pictures(options, &subject, &dataset, &evaluation)?;
@@ -79,7 +79,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A card tells of presses that the training never saw.
+/// A card tells of indentations that the training never saw.
 fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> anyhow::Result<()> {
     if options.split != "test" {
         anyhow::bail!("a card tells of held-out presses: --out needs --split test");
@@ -137,7 +137,8 @@ fn measure(
     dataset: &Dataset,
     json: bool,
 ) -> anyhow::Result<Evaluation> {
-    let count: usize = dataset.presses(&options.split)?.iter().map(|press| press.samples).sum();
+    let count: usize =
+        dataset.indentations(&options.split)?.iter().map(|indentation| indentation.samples).sum();
     let bar = bar(json, count, "samples")?;
     let evaluation = evaluate::run(subject, other, dataset, &options.split, || bar.inc(1));
     bar.finish_and_clear();

@@ -3,9 +3,9 @@
 use super::check::load_atlas;
 use super::{load_card, load_model, print_json};
 use anyhow::{Context, bail};
-use model_export::evaluate::require_atlas;
-use model_export::{ExportError, write};
 use papilla_engine::{Backend, card::Index};
+use papilla_model_export::evaluate::require_atlas;
+use papilla_model_export::{ExportError, write};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]

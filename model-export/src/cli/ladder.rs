@@ -2,9 +2,9 @@
 
 use super::{bar, print_json};
 use indicatif::ProgressBar;
-use model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
-use model_export::{ExportError, read, read_text, write};
 use papilla_engine::{Ladder, MAP_LEN};
+use papilla_model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
+use papilla_model_export::{ExportError, read, read_text, write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;

@@ -2,11 +2,11 @@
 
 use super::{bar, load_card, print_json};
 use anyhow::bail;
-use model_export::dataset::Dataset;
-use model_export::{read_text, write};
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, ladder::Kind};
-use papilla_proto::Pattern;
+use papilla_model_export::dataset::Dataset;
+use papilla_model_export::{read_text, write};
+use papilla_proto::InputStatistics;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,8 @@ pub(crate) struct Options {
 struct Row {
     model: String,
     /// None if its datasets are not all among those given, or it was fitted to no maps.
-    pattern_max: Option<Pattern>,
+    #[serde(rename = "pattern_max")]
+    input_statistics_max: Option<InputStatistics>,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -35,28 +36,29 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     for name in &index.models {
         let path = options.folder.join(format!("{name}.json"));
         let mut card = load_card(&path)?;
-        let of = |hash: &str| seen.iter().find(|(own, _)| own == hash).map(|(_, pattern)| *pattern);
-        let pattern_max = if Kind::of_network(&card.network).is_network() {
+        let of =
+            |hash: &str| seen.iter().find(|(own, _)| own == hash).map(|(_, greatest)| *greatest);
+        let input_statistics_max = if Kind::of_network(&card.network).is_network() {
             card.datasets().into_iter().map(of).reduce(|a, b| Some(a?.max(b?))).flatten()
         } else {
             None
         };
-        if pattern_max.is_some() {
-            card.pattern_max = pattern_max;
+        if input_statistics_max.is_some() {
+            card.input_statistics_max = input_statistics_max;
             write(&path, card.to_json()?.as_bytes())?;
         }
-        rows.push(Row { model: name.clone(), pattern_max });
+        rows.push(Row { model: name.clone(), input_statistics_max });
     }
-    if rows.iter().all(|row| row.pattern_max.is_none()) {
+    if rows.iter().all(|row| row.input_statistics_max.is_none()) {
         bail!("no model of {} was trained on these datasets alone", options.folder.display());
     }
     if json {
         return print_json(&rows);
     }
-    for Row { model, pattern_max } in &rows {
-        match pattern_max {
+    for Row { model, input_statistics_max } in &rows {
+        match input_statistics_max {
             None => println!("{model}: left as it is"),
-            Some(Pattern { roughness, load_mpa_px }) => {
+            Some(InputStatistics { roughness, load_mpa_px }) => {
                 println!(
                     "{model}: roughness up to {roughness:.4}, load up to {load_mpa_px:.1} MPa px"
                 );
@@ -66,18 +68,18 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Hash and greatest pattern of a dataset.
-fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, Pattern)> {
+/// Hash and greatest input statistics of a dataset.
+fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, InputStatistics)> {
     let dataset = Dataset::open(folder)?;
-    let presses = dataset.every_press();
-    let bar = bar(hidden, presses.len(), "presses")?;
+    let indentations = dataset.every_indentation();
+    let bar = bar(hidden, indentations.len(), "presses")?;
     let mut pressure_pa = vec![0.0; MAP_LEN];
-    let mut greatest = Pattern::default();
-    for press in presses {
-        let shard = dataset.load(press)?;
-        for index in 0..press.samples {
-            dataset.draw_pressure(press, &shard, index, &mut pressure_pa)?;
-            greatest = greatest.max(Pattern::of(&pressure_pa));
+    let mut greatest = InputStatistics::default();
+    for indentation in indentations {
+        let shard = dataset.load(indentation)?;
+        for index in 0..indentation.samples {
+            dataset.draw_pressure(indentation, &shard, index, &mut pressure_pa)?;
+            greatest = greatest.max(InputStatistics::of(&pressure_pa));
         }
         bar.inc(1);
     }

@@ -143,7 +143,7 @@ pub(super) fn kind(kind: Kind) -> &'static str {
         Kind::ClosedForm => "closed form",
         Kind::Operator => "operator",
         Kind::Network => "network",
-        Kind::S1Network => "published U-Net",
+        Kind::PublishedUNet => "published U-Net",
         Kind::Fe => "finite elements",
     }
 }

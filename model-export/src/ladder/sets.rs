@@ -2,7 +2,7 @@
 
 use super::Canvas;
 use crate::ExportError;
-use crate::dataset::{Dataset, Press};
+use crate::dataset::{Dataset, Indentation};
 use crate::evaluate::require_same_atlas;
 use papilla_engine::ladder::Set;
 use std::path::Path;
@@ -117,9 +117,13 @@ impl Source {
         let what = folder.display().to_string();
         require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
         set.dataset_sha256 = Some(dataset.sha256().to_owned());
-        let presses = if self.test_only { dataset.presses("test")? } else { dataset.every_press() };
-        for press in presses {
-            self.take(&dataset, press, &mut set.states)?;
+        let indentations = if self.test_only {
+            dataset.indentations("test")?
+        } else {
+            dataset.every_indentation()
+        };
+        for indentation in indentations {
+            self.take(&dataset, indentation, &mut set.states)?;
         }
         if set.states.is_empty() {
             set.about = format!("not measured: '{}' has no such state", self.folder);
@@ -130,17 +134,17 @@ impl Source {
     fn take(
         &self,
         dataset: &Dataset,
-        press: &Press,
+        indentation: &Indentation,
         states: &mut Vec<State>,
     ) -> Result<(), ExportError> {
-        let shard = dataset.load(press)?;
+        let shard = dataset.load(indentation)?;
         for (index, depth_mm) in shard.depth_mm.iter().enumerate() {
             // Stored depths are rounded: 2.0 mm itself must not count as deeper.
             if self.deeper_than_mm.is_some_and(|limit| *depth_mm <= limit + 1e-4) {
                 continue;
             }
             states.push(State {
-                origin: format!("{}, sample {index}", dataset.shard_path(press).display()),
+                origin: format!("{}, sample {index}", dataset.shard_path(indentation).display()),
                 pressure_pa: shard.pressure_pa.row(index).to_vec(),
                 sed_j_per_m3: shard.sed_j_per_m3.row(index).to_vec(),
             });

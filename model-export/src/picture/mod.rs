@@ -89,9 +89,9 @@ fn describe(heading: &str, sample: &Sample) -> String {
     let m = &sample.metrics;
     let far = m.far_field_relative_l2.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v));
     format!(
-        "{heading}: press {}, depth {:.2} mm, pitch {:.1}, roll {:.1}, yaw {:.1} deg; relative L2 {:.1} %, \
+        "{heading}: indentation {}, depth {:.2} mm, pitch {:.1}, roll {:.1}, yaw {:.1} deg; relative L2 {:.1} %, \
          far field {far}, peak {:.1} %, energy {:.1} %, SSIM {:.4}",
-        sample.press,
+        sample.indentation,
         sample.depth_mm,
         sample.pitch_deg,
         sample.roll_deg,

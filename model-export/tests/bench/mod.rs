@@ -27,7 +27,7 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// A model, a dataset of two presses (one held out) and a recorded reference.
+    /// A model, a dataset of two indentations (one held out) and a recorded reference.
     pub(crate) fn new() -> Self {
         let bench = Self { folder: tempfile::tempdir().unwrap() };
         let atlas = atlas();
@@ -46,7 +46,7 @@ impl Bench {
         for (id, bytes) in shards.iter().enumerate() {
             fs::write(bench.path("data/shards").join(format!("{id}.npz")), bytes).unwrap();
         }
-        let presses: Vec<Value> = (0..2)
+        let indentations: Vec<Value> = (0..2)
             .map(|id| {
                 json!({"id": id, "file": format!("shards/{id}.npz"), "sha256": hashes[id],
                     "split": if id == 0 {"train"} else {"test"}, "samples": DEPTHS.len(),
@@ -55,7 +55,7 @@ impl Bench {
             .collect();
         let manifest = json!({"format": 1, "atlas_hash": atlas.hash(), "effects": ["layers"],
             "vertex_count": SIDE * SIDE, "pressure_max_pa": 4e4, "sed_max_j_per_m3": 2500.0,
-            "presses": presses, "splits": {"train": [0], "test": [1]}, "dataset_sha256": dataset});
+            "presses": indentations, "splits": {"train": [0], "test": [1]}, "dataset_sha256": dataset});
         fs::write(bench.path("data/manifest.json"), manifest.to_string()).unwrap();
         bench.write_reference(&onnx, 1.0);
         bench
@@ -63,7 +63,7 @@ impl Bench {
 
     /// What another engine would have recorded, were its answers `scale` times ours.
     pub(crate) fn write_reference(&self, onnx: &[u8], scale: f32) {
-        let pressure: Vec<f32> = press(1.0);
+        let pressure: Vec<f32> = contact(1.0);
         let sed: Vec<f32> = infer(onnx, &pressure).iter().map(|v| scale * v).collect();
         let maps = [pressure, sed]
             .map(|m| Array3::from_shape_vec((1, MAP_SIDE_PX, MAP_SIDE_PX), m).unwrap());
@@ -124,7 +124,7 @@ pub(crate) fn pixels() -> impl Iterator<Item = usize> {
 }
 
 /// A paraboloid on the patch, zero outside it.
-pub(crate) fn press(force: f32) -> Vec<f32> {
+pub(crate) fn contact(force: f32) -> Vec<f32> {
     let mut map = vec![0.0; MAP_LEN];
     for i in pixels() {
         let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
@@ -144,7 +144,7 @@ pub(crate) fn shard(onnx: &[u8], force: f32) -> Vec<u8> {
     let (d, v) = (DEPTHS.len(), SIDE * SIDE);
     let [mut pressure, mut sed] = [0, 1].map(|_| Array2::<f32>::zeros((d, v)));
     for (k, depth) in DEPTHS.iter().enumerate() {
-        let map = press(force * depth);
+        let map = contact(force * depth);
         let answer = infer(onnx, &map);
         for (vertex, pixel) in pixels().enumerate() {
             pressure[[k, vertex]] = map[pixel];

@@ -57,7 +57,7 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure() {
     let ladder = ladder();
     let theirs = errors(baseline(&ladder), PRESSES);
     let is_fast =
-        |row: &&Rung| row.kind != Kind::S1Network && row.time_ms().is_some_and(|ms| ms <= 1.0);
+        |row: &&Rung| row.kind != Kind::PublishedUNet && row.time_ms().is_some_and(|ms| ms <= 1.0);
     let fast = ladder.rungs.iter().filter(is_fast).filter(|row| row.errors.contains_key(PRESSES));
     let lost: Vec<_> =
         fast.map(|row| (&row.name, compare::lost(errors(row, PRESSES), theirs))).collect();
@@ -70,11 +70,11 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure() {
 fn the_best_network_is_as_accurate_as_asked() {
     let ladder = ladder();
     let best = best(&ladder);
-    let (presses, shapes) = (errors(best, PRESSES), errors(best, SHAPES));
-    let far_field = presses.far_field_relative_l2.unwrap();
+    let (indentations, shapes) = (errors(best, PRESSES), errors(best, SHAPES));
+    let far_field = indentations.far_field_relative_l2.unwrap();
     for (what, value, limit) in [
-        ("held-out simulations, median", presses.relative_l2.median, 0.03),
-        ("held-out simulations, 95th percentile", presses.relative_l2.p95, 0.10),
+        ("held-out simulations, median", indentations.relative_l2.median, 0.03),
+        ("held-out simulations, 95th percentile", indentations.relative_l2.p95, 0.10),
         ("shapes that no training saw, median", shapes.relative_l2.median, 0.10),
         ("far field, median", far_field.median, 0.10),
     ] {

@@ -1,4 +1,4 @@
-"""Papilla's trainer: dataset of finite-element presses to an ONNX model."""
+"""Papilla's trainer: dataset of finite-element indentations to an ONNX model."""
 
 import os
 

@@ -27,10 +27,11 @@ exit codes: 0 done; 1 a check failed or training diverged; 2 wrong arguments; 3 
 damaged dataset; 4 the run directory does not fit; 130 interrupted (go on with --resume)."""
 
 _TRAIN = """\
-Trains a network on the training presses of a dataset. A tenth of them is set aside to choose the
-epoch by; the test presses are touched once, after training, for the metrics.
+Trains a network on the training indentations of a dataset. A tenth of them is set aside to choose
+the epoch by; the test indentations are touched once, after training, for the metrics.
 
-s1-baseN is S1's U-Net on maps (two encoding and two decoding stages, MSE on max-normalised maps).
+s1-baseN is the published U-Net on maps (two encoding and two decoding stages, MSE on
+max-normalised maps).
 face-rR[-nK][-zW][-hH[s]] works on the faces of the interface and starts from --operator: a linear
 map of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a
 correction for finite strain of width H, the same at every face (s: it sees each neighbour by
@@ -41,7 +42,7 @@ and metrics.csv (one row for each held-out sample). Stop it at any time: the sam
 --resume goes on from the last whole epoch and ends in the same weights, bit for bit."""
 
 _EVALUATE = """\
-Measures a run on the held-out presses again (train does so at its end): relative L2, far field
+Measures a run on the held-out indentations again (train does so at its end): relative L2, far field
 (where SED < 10 % of its maximum), peak, total energy, SSIM; median and bad end. Use it after an
 interrupted run, or to measure the last weights instead of the best."""
 
@@ -62,7 +63,8 @@ own engine with."""
 _OPERATOR = """\
 Writes the finger's own linear operator (what `fe-datagen operator` wrote) as a model, without
 training: a low-rank part of global reach and, with --near, the exact rest at the nearest vertices.
-The dataset's training pressures say which directions matter; its test presses give the metrics."""
+The dataset's training pressures say which directions matter; its test indentations give the
+metrics."""
 
 _HALF_SPACE = """\
 Writes the closed form as a model, without training: Boussinesq's stresses in one elastic half-space
@@ -70,10 +72,10 @@ under the pressure on the flattened skin (Phillips & Johnson 1981), compressed l
 
 
 _CURVE = """\
-Trains the same network on more and more of the training presses, each time for as many steps as
---epochs are on all of them, and measures every one on the held-out presses of each dataset and on
-all presses of each --judge: would more data help? The presses of a small set are in every larger
-one. Takes train's options; --train-presses is set by --presses.
+Trains the same network on more and more of the training indentations, each time for as many steps
+as --epochs are on all of them, and measures every one on the held-out indentations of each dataset
+and on all of each --judge: would more data help? What a small set holds is in every larger one.
+Takes train's options; --train-presses is set by --presses.
 
 Writes to --out: the runs (presses-N; kept, so that the same command goes on after an
 interruption), curve.json, curve.csv and curve.svg."""
@@ -98,7 +100,7 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
 
     _train_arguments(command("train", "train a network on a dataset", _TRAIN))
 
-    curve = command("curve", "train on more and more presses: would more data help?", _CURVE)
+    curve = command("curve", "train on more and more indentations: would more data help?", _CURVE)
     _train_arguments(curve)
     curve.add_argument(
         "--presses", type=int, nargs="+", required=True, metavar="N", help="how many, each a run"
@@ -158,15 +160,15 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
     add("--network", default="s1-base8", help="s1-baseN or face-... (s1-base8)")
     add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
     add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
-    add("--epochs", type=int, default=40, help="passes over the training presses (40)")
-    add("--seed", type=int, default=0, help="of initial weights, order and validation presses (0)")
+    add("--epochs", type=int, default=40, help="passes over the training indentations (40)")
+    add("--seed", type=int, default=0, help="of weights, order and validation indentations (0)")
     add("--batch", type=int, default=4, help="samples in one step (4)")
-    add("--learning-rate", type=float, default=1e-3, help="Adam's (S1: 1e-3)")
+    add("--learning-rate", type=float, default=1e-3, help="Adam's (U-Net paper: 1e-3)")
     add(
         "--schedule",
         choices=("constant", "cosine"),
         default="constant",
-        help="learning rate over the epochs (S1: constant; cosine falls to zero at the last)",
+        help="learning rate over the epochs (U-Net paper: constant; cosine falls to zero)",
     )
     add(
         "--precision",
@@ -178,14 +180,14 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "--validation-presses",
         type=int,
         metavar="N",
-        help="training presses set aside to choose the epoch (default a tenth; 0: use the last)",
+        help="training indentations set aside to choose the epoch (a tenth; 0: use the last)",
     )
     add(
         "--loss",
         choices=("auto", "mse", "relative"),
         default="auto",
-        help="mse: S1's, of max-normalised maps; relative: squared relative L2 of each sample, the "
-        "far field once more (auto: mse for s1-*, relative for face-*)",
+        help="mse: the U-Net paper's, of max-normalised maps; relative: squared relative L2 of "
+        "each sample, the far field once more (auto: mse for s1-*, relative for face-*)",
     )
     add("--far-weight", type=float, default=0.2, help="of the far field in `relative` (0.2)")
     add("--operator", metavar="FILE.npz", help="linear operator that a face network starts from")
@@ -206,7 +208,7 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "--train-presses",
         type=int,
         metavar="N",
-        help="fit to N of the training presses only, drawn by the seed",
+        help="fit to N of the training indentations only, drawn by the seed",
     )
     add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")

@@ -71,13 +71,13 @@ class TrainConfig:
 
     @property
     def loss_name(self) -> str:
-        """The loss in use: S1's for S1's network, else the one that models are judged by."""
+        """The loss in use: the U-Net paper's for its network, else what models are judged by."""
         if self.loss != "auto":
             return self.loss
         return "relative" if isinstance(self.spec, FaceSpec) else "mse"
 
     def validation_count(self, train_presses: int) -> int:
-        """How many training presses to set aside: as asked, else a tenth (at least one)."""
+        """How many training indentations to set aside: as asked, else a tenth (at least one)."""
         if self.validation_presses is not None:
             return self.validation_presses
         return max(1, round(train_presses / 10)) if train_presses > 1 else 0

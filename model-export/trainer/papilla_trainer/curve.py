@@ -1,4 +1,4 @@
-"""Would more data help? One network trained on more and more presses, each judged alike."""
+"""Would more data help? One network trained on more and more indentations, each judged alike."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Jury:
 
 
 def juries(parts: list[Dataset], others: list[Dataset]) -> list[Jury]:
-    """The held-out presses of what is trained on, and all presses of ``others``."""
+    """The held-out indentations of what is trained on, and all indentations of ``others``."""
     trained = {part.dataset_sha256 for part in parts}
     own = [Jury(f"{p.directory.name}, held out", p, p.test_ids) for p in parts]
     for other in others:
@@ -49,7 +49,7 @@ def learning_curve(
     out: Path,
     bar: Callable[[int, int, int], Any],
 ) -> list[dict[str, Any]]:
-    """A row for each number of presses and each jury; ``bar`` shows a run."""
+    """A row for each number of indentations and each jury; ``bar`` shows a run."""
     dataset = parts[0] if len(parts) == 1 else JoinedDataset(parts)
     aside = config.validation_count(len(dataset.train_ids))
     fit_ids, _ = validation_split(dataset.train_ids, aside, config.seed)

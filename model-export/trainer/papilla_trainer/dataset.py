@@ -1,7 +1,7 @@
-"""Reads a dataset of presses and rasterises it to maps of 224 x 224.
+"""Reads a dataset of indentations and rasterises it to maps of 224 x 224.
 
 The directory is written by ``fe-datagen generate``: ``manifest.json``, ``raster.npz`` (the sparse
-map from vertices to pixels) and one ``.npz`` shard of vertex values for each press.
+map from vertices to pixels) and one ``.npz`` shard of vertex values for each indentation.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Raster:
 
 @dataclass(frozen=True)
 class Press:
-    """One press of the manifest: a shard of several depths."""
+    """One indentation of the manifest: a shard of several depths."""
 
     id: int
     directory: Path
@@ -114,7 +114,7 @@ class Dataset:
         self.interface = self._read_raster("interface")
 
     def load(self, ids: list[int]) -> Maps:
-        """Rasterise the given presses, in this order, all depths of each."""
+        """Rasterise the given indentations, in this order, all depths of each."""
         count = sum(self.presses[i].samples for i in ids)
         pressure = np.empty((count, SIDE_PX, SIDE_PX), dtype=np.float32)
         sed = np.empty_like(pressure)
@@ -155,7 +155,7 @@ class Dataset:
                 "the held-out metrics would be worthless"
             )
         if train | test != set(self.presses):
-            raise DatasetError(f"{self.directory}: the splits do not cover the presses listed")
+            raise DatasetError(f"{self.directory}: the splits do not cover the indentations listed")
         wrong = [i for i in self.presses if labels[i] != ("train" if i in train else "test")]
         if wrong:
             raise DatasetError(
@@ -205,10 +205,10 @@ class Dataset:
 
 
 def validation_split(train_ids: list[int], count: int, seed: int) -> tuple[list[int], list[int]]:
-    """Set ``count`` *train* presses aside to choose the epoch by; test presses stay untouched."""
+    """Set ``count`` *train* indentations aside to choose the epoch by; the test ones stay."""
     if not 0 <= count < len(train_ids):
         raise DatasetError(
-            f"cannot set {count} of {len(train_ids)} training presses aside for validation"
+            f"cannot set {count} of {len(train_ids)} training indentations aside for validation"
         )
     order = np.random.default_rng([seed, 0x5EED]).permutation(len(train_ids))
     chosen = {train_ids[i] for i in order[:count]}
@@ -216,7 +216,7 @@ def validation_split(train_ids: list[int], count: int, seed: int) -> tuple[list[
 
 
 def fewer(ids: list[int], count: int | None, seed: int) -> list[int]:
-    """``count`` of the presses by lot, in their order; of two counts the larger has the smaller."""
+    """``count`` of them by lot, in their order; of two counts the larger has the smaller."""
     if count is None or count >= len(ids):
         return ids
     order = np.random.default_rng([seed, 0xC04E]).permutation(len(ids))

@@ -1,4 +1,4 @@
-"""Measures a run on the held-out presses and writes what it found beside the checkpoint."""
+"""Measures a run on the held-out indentations and writes what it found beside the checkpoint."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def predict(model: nn.Module, pressure_pa: F32) -> F32:
 
 
 def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict[str, Any]:
-    """Errors on the test presses; writes ``metrics.json`` and, per sample, ``metrics.csv``."""
+    """Errors on the test indentations; writes ``metrics.json`` and, per sample, ``metrics.csv``."""
     checkpoint = Checkpoint.load(run_dir)
     if checkpoint.served.dataset_sha256 != dataset.dataset_sha256:
         raise RunError(f"{run_dir} was trained on another dataset than {dataset.directory}")
@@ -72,7 +72,7 @@ def evaluate_run(run_dir: Path, dataset: Dataset, weights: str = "best") -> dict
 def measure(
     model: nn.Module, dataset: Dataset, ids: list[int] | None = None
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Errors through the whole graph on the test presses (or ``ids``): summary, a row a sample."""
+    """Errors through the whole graph on test indentations (or ``ids``): summary, sample rows."""
     maps = dataset.load(dataset.test_ids if ids is None else ids)
     mask = dataset.interface.mask()
     results = evaluate(lambda p: predict(model, p), maps.pressure_pa, maps.sed_j_per_m3, mask)

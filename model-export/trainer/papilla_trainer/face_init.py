@@ -16,7 +16,7 @@ F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
 
 # Directions in which no pressure of the dataset points count as this part of the mean one, so that
-# a shape that no training press has is still answered.
+# a shape that no training indentation has is still answered.
 _UNSEEN = 0.02
 _ROUNDS = 4
 

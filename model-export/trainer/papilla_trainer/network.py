@@ -1,4 +1,4 @@
-"""S1's U-Net, and the wrapper in which it is served (physical units in and out)."""
+"""The published U-Net (docs/glossary.md, sources) and the wrapper that is exported."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ def _double_conv(channels_in: int, channels_out: int) -> nn.Sequential:
 
 
 class S1UNet(nn.Module):
-    """The U-Net of S1: two encoding and two decoding stages.
+    """The U-Net of the paper: two encoding and two decoding stages.
 
     Two 3 x 3 convolutions with ReLU in each stage, 2 x 2 max-pool down, 2 x 2 transposed
-    convolution up, skips by concatenation, width doubled from stage to stage (S1 prints neither
-    width nor head: base is a parameter here, the head is a linear 1 x 1 convolution).
+    convolution up, skips by concatenation, width doubled from stage to stage (the paper prints
+    neither width nor head: base is a parameter here, the head is a linear 1 x 1 convolution).
 
     Input and output: float32 ``[N, 1, H, W]``, max-normalised, H and W multiples of 4.
     """
@@ -86,7 +86,7 @@ class ServedModel(nn.Module):
     """The graph that is exported: pressure in Pa to SED in J/m3.
 
     Scales in, runs the network, clamps at zero (SED is an energy; training itself sees the bare
-    network, as S1's did), scales out and blanks what lies outside the interface patch.
+    network, as the paper's did), scales out and blanks what lies outside the interface patch.
     Networks with biases leave a residue where there is no pressure; the graph blanks that case.
     """
 
@@ -127,8 +127,9 @@ def build_network(spec: NetworkSpec, seed: int) -> S1UNet:
 def _initialise(layer: nn.Conv2d | nn.ConvTranspose2d) -> None:
     """He's normal initialisation (2015) with zero biases.
 
-    S1 prints none. PyTorch's default shrinks the signal by about two at each of the eleven layers:
-    narrow networks then learn their biases first and stay on a plateau for many epochs.
+    The U-Net paper prints none. PyTorch's default shrinks the signal by about two at each of the
+    eleven layers: narrow networks then learn their biases first and stay on a plateau for many
+    epochs.
     """
     if isinstance(layer, nn.ConvTranspose2d):
         # Kernel and stride are equal: each output pixel is reached by one tap of each channel.

@@ -1,4 +1,4 @@
-"""What a run trains: the network, its samples and its loss, for maps (S1) or for vertices."""
+"""What a run trains: the network, its samples and its loss, for maps (U-Net) or for vertices."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Samples:
 
     @staticmethod
     def of(maps: Maps, dataset: Dataset, device: torch.device) -> Samples:
-        """Divide by the dataset's maxima (S1's normalisation)."""
+        """Divide by the dataset's maxima (the U-Net paper's normalisation)."""
         inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / dataset.pressure_max_pa)
         targets = (
             torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / dataset.sed_max_j_per_m3)
@@ -58,7 +58,7 @@ def make_task(
     validation_ids: list[int],
     device: torch.device,
 ) -> Task:
-    """Load the presses named, and no others, and build the network."""
+    """Load the indentations named, and no others, and build the network."""
     spec = config.spec
     load = _load_vertices if isinstance(spec, FaceSpec) else _load_maps
     fit = load(dataset, fit_ids, device)

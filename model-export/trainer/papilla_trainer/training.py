@@ -162,7 +162,7 @@ class Trainer:
         state.model = copy_weights(self.network.state_dict())
         state.optimizer = self.optimizer.state_dict()
         loss = line["validation_loss"]
-        # Without validation presses there is nothing to choose by: the last epoch is the best.
+        # Without validation indentations there is nothing to choose by: the last epoch is the best.
         if math.isnan(loss) or loss < state.best_loss:
             state.best_epoch, state.best_loss = state.epoch, loss
             state.best_model = state.model

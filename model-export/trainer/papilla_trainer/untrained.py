@@ -25,7 +25,7 @@ from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 def write_operator(
     operator_file: Path, dataset: Dataset, rank: int, near: int, out: Path, name: str | None
 ) -> dict[str, Any]:
-    """The finger's operator at small strain, compressed; returns its errors on test presses."""
+    """The finger's operator at small strain, compressed; returns its test errors."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
     operator = Operator.read(operator_file, atlas)
     spec = FaceSpec(rank=rank, near=near, kind="fe_operator")
@@ -35,7 +35,7 @@ def write_operator(
 def write_half_space(
     body: HalfSpace, dataset: Dataset, rank: int, near: int, out: Path, name: str | None
 ) -> dict[str, Any]:
-    """The closed form, compressed alike; returns its errors on test presses."""
+    """The closed form, compressed alike; returns its test errors."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
     operator = Operator.at_vertices(body.operator(atlas))
     spec = FaceSpec(rank=rank, near=near, kind="half_space")

@@ -18,7 +18,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 @pytest.fixture(scope="session")
 def tiny(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Six presses of six depths; not physics."""
+    """Six indentations of six depths; not physics."""
     return Dataset(write_tiny_dataset(tmp_path_factory.mktemp("tiny") / "dataset"))
 
 

@@ -26,7 +26,7 @@ def test_layers_are_those_of_s1() -> None:
 
 
 def test_receptive_field_is_44_px() -> None:
-    """What DESIGN.md says of S1's network: it sees about 44 of 224 px.
+    """The published U-Net sees 44 of 224 px.
 
     The field is the union over the four phases of the two poolings. All weights are made
     positive, so that no path cancels, and the input is uniform, so that max-pool passes gradients.

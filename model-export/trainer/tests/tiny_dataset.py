@@ -17,7 +17,7 @@ COLUMNS, ROWS = 9, 12
 
 
 def write_tiny_dataset(directory: Path, presses: int = 6, depths: int = 6, seed: int = 1) -> Path:
-    """Write manifest, rasters and shards; every fifth press (from the third) is a test press."""
+    """Write manifest, rasters and shards; every fifth (from the third) is for testing."""
     (directory / "shards").mkdir(parents=True)
     random = np.random.default_rng(seed)
     skin, triangles = _grid(16.0, 208.0)

@@ -8,7 +8,7 @@ pub mod flags {
     pub const OUT_OF_RANGE: u8 = 1;
     /// Nothing touches the finger: the map is zero and no network was asked.
     pub const NO_CONTACT: u8 = 2;
-    /// Rougher or heavier than any map the tier was trained on ([`crate::pattern`]).
+    /// Rougher or heavier than any map the tier was trained on ([`crate::input_statistics`]).
     pub const UNFAMILIAR: u8 = 4;
     /// All of them by name.
     pub const NAMED: [(u8, &str); 3] =

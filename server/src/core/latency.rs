@@ -14,7 +14,7 @@ const OVERHEAD_US: u64 = 500;
 
 /// Runs whose median is the typical time of a tier.
 const WINDOW: usize = 32;
-/// Of so many frames in a row that seem hopeless one is rendered all the same.
+/// Of so many frames in a row that are expected to be late one is rendered all the same.
 const PROBE_EVERY: u32 = 16;
 
 /// How long the inference of a tier takes on this machine.
@@ -24,8 +24,8 @@ pub(crate) struct Latency {
     /// The last runs; what was expected or calibrated stands where there were fewer.
     window_us: [AtomicU64; WINDOW],
     runs: AtomicUsize,
-    /// Frames that seemed hopeless since the last run.
-    hopeless: AtomicU32,
+    /// Frames that were expected to be late since the last run.
+    expected_late: AtomicU32,
     calibrated_us: OnceLock<Percentiles>,
 }
 
@@ -35,7 +35,7 @@ impl Default for Latency {
             fastest_us: AtomicU64::new(u64::MAX),
             window_us: [const { AtomicU64::new(0) }; WINDOW],
             runs: AtomicUsize::new(0),
-            hopeless: AtomicU32::new(0),
+            expected_late: AtomicU32::new(0),
             calibrated_us: OnceLock::new(),
         }
     }
@@ -87,7 +87,7 @@ impl Latency {
         self.fastest_us.fetch_min(us, Ordering::Relaxed);
         let run = self.runs.fetch_add(1, Ordering::Relaxed);
         self.window_us[run % WINDOW].store(us, Ordering::Relaxed);
-        self.hopeless.store(0, Ordering::Relaxed);
+        self.expected_late.store(0, Ordering::Relaxed);
     }
 
     /// Whether no run can be expected to end within `left`: it is less than half the fastest run,
@@ -95,7 +95,7 @@ impl Latency {
     ///
     /// Now and then the answer is no all the same: a tier whose frames are all dropped would never
     /// be measured again, and a time that was taken on a busy machine would stand for good.
-    pub(crate) fn is_hopeless(&self, left: Duration) -> bool {
+    pub(crate) fn will_miss(&self, left: Duration) -> bool {
         if left.is_zero() {
             return true;
         }
@@ -103,7 +103,8 @@ impl Latency {
             u64::MAX => true,
             fastest_us => left > Duration::from_micros(fastest_us / 2),
         };
-        !is_enough && self.hopeless.fetch_add(1, Ordering::Relaxed) % PROBE_EVERY != PROBE_EVERY - 1
+        !is_enough
+            && self.expected_late.fetch_add(1, Ordering::Relaxed) % PROBE_EVERY != PROBE_EVERY - 1
     }
 
     /// The median of the last runs, us.
@@ -169,7 +170,7 @@ mod tests {
     #[test]
     fn a_calibration_replaces_what_was_shipped() {
         let latency = Latency::default();
-        assert_eq!((latency.typical_us(), latency.is_hopeless(ms(1))), (0, false));
+        assert_eq!((latency.typical_us(), latency.will_miss(ms(1))), (0, false));
         latency.expect(Duration::from_micros(900));
         assert_eq!((latency.typical_us(), latency.calibrated_us()), (900, None));
         let mut times: Vec<Duration> = (1..=100).rev().map(Duration::from_micros).collect();
@@ -184,13 +185,13 @@ mod tests {
         let latency = Latency::default();
         latency.calibrate(&mut [ms(40); 3]);
         assert_eq!(latency.typical_us(), 40_000);
-        // With 15 ms left frames seem hopeless, and one in a few is tried.
-        let tried = (0..64).filter(|_| !latency.is_hopeless(ms(15))).count();
+        // With 15 ms left frames are expected to be late, and one in a few is tried.
+        let tried = (0..64).filter(|_| !latency.will_miss(ms(15))).count();
         assert_eq!(tried, 4);
         latency.learn(ms(10));
-        assert!((0..64).all(|_| !latency.is_hopeless(ms(15))));
-        assert!((0..8).all(|_| latency.is_hopeless(ms(4))), "half of 10 ms is not there");
-        assert!((0..64).all(|_| latency.is_hopeless(Duration::ZERO)), "the deadline has passed");
+        assert!((0..64).all(|_| !latency.will_miss(ms(15))));
+        assert!((0..8).all(|_| latency.will_miss(ms(4))), "half of 10 ms is not there");
+        assert!((0..64).all(|_| latency.will_miss(Duration::ZERO)), "the deadline has passed");
         // Real frames take the place of the calibration, and a hiccup does not count.
         (0..WINDOW).for_each(|_| latency.learn(ms(10)));
         latency.learn(ms(2000));
@@ -205,7 +206,7 @@ mod tests {
         assert_eq!(latency.typical_us(), 40_000, "busier than at the start");
         latency.correct(&mut [ms(9), ms(10)]);
         assert_eq!(latency.typical_us(), 10_000);
-        assert!(!latency.is_hopeless(ms(5)), "half of 9 ms is there");
+        assert!(!latency.will_miss(ms(5)), "half of 9 ms is there");
         // Frames know better.
         (0..WINDOW).for_each(|_| latency.learn(ms(12)));
         latency.correct(&mut [ms(8), ms(8)]);

@@ -1,14 +1,13 @@
 //! What renders maps, whatever transport brings them.
 //!
 //! `scheduler` takes jobs to the inference threads. `catalogue` holds the tiers, the atlas and the
-//! replay; `reload` replaces it while the service runs. `effects` computes what sessions ask for
-//! beside the map, in `buffers` that are used again. `latency` and `metrics` keep the times.
+//! replay; `reload` replaces it while the service runs. `buffers` are used again from frame to frame.
+//! `latency` and `metrics` keep the times.
 
 pub(crate) mod buffers;
 pub(crate) mod cache;
 pub(crate) mod catalogue;
 pub(crate) mod digest;
-pub(crate) mod effects;
 pub(crate) mod latency;
 pub(crate) mod metrics;
 pub(crate) mod reload;

@@ -1,9 +1,8 @@
 //! What the client sends and what it wants back: `Content-Type`, `Accept` and the query.
 
 use axum::http::{HeaderMap, header};
+use papilla_codec::{Input, Output, is_npy, is_png};
 use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleType, error::shortened};
-
-use crate::codec::{Input, Output, is_npy, is_png};
 
 /// The answer types, best first.
 const OFFERED: [Output; 4] =

@@ -17,7 +17,7 @@ use tokio_rustls::TlsAcceptor;
 
 use super::{
     front::Front,
-    gate::{Peer, Place, Places, Standing},
+    gate::{Peer, Place, PlaceHandle, Places},
     stream::TimeoutStream,
 };
 use crate::{config::Timeouts, core::metrics::Metrics, drain::begun};
@@ -94,12 +94,12 @@ async fn connection(stream: TcpStream, peer: Peer, context: ConnectionContext, p
     let drain = context.drain.subscribe();
     let wait_max = context.timeouts.io;
     let stream = TimeoutStream::new(stream, wait_max);
-    let standing = &place.standing;
+    let handle = &place.handle;
     let serving = async {
         match &context.tls {
-            None => converse(stream, peer, standing, &context, drain).await,
+            None => converse(stream, peer, handle, &context, drain).await,
             Some(tls) => match timeout(wait_max, tls.accept(stream)).await {
-                Ok(Ok(stream)) => converse(stream, peer, standing, &context, drain).await,
+                Ok(Ok(stream)) => converse(stream, peer, handle, &context, drain).await,
                 Ok(Err(error)) => tracing::debug!(%error, "TLS handshake failed"),
                 Err(_) => tracing::debug!("TLS handshake took too long"),
             },
@@ -107,7 +107,7 @@ async fn connection(stream: TcpStream, peer: Peer, context: ConnectionContext, p
     };
     tokio::select! {
         () = serving => {}
-        () = standing.evicted() => tracing::debug!("a connection without a token gave way"),
+        () = handle.evicted() => tracing::debug!("a connection without a token gave way"),
     }
     context.metrics.connections_open.dec();
 }
@@ -115,16 +115,16 @@ async fn connection(stream: TcpStream, peer: Peer, context: ConnectionContext, p
 async fn converse<S>(
     stream: S,
     peer: Peer,
-    standing: &Arc<Standing>,
+    handle: &Arc<PlaceHandle>,
     context: &ConnectionContext,
     mut drain: watch::Receiver<bool>,
 ) where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
 {
-    let (front, standing) = (Arc::clone(&context.front), Arc::clone(standing));
+    let (front, handle) = (Arc::clone(&context.front), Arc::clone(handle));
     let service = service_fn(move |mut request: hyper::Request<Incoming>| {
         request.extensions_mut().insert(peer);
-        request.extensions_mut().insert(Arc::clone(&standing));
+        request.extensions_mut().insert(Arc::clone(&handle));
         let front = Arc::clone(&front);
         async move { front.answer(request).await }
     });

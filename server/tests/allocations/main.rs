@@ -22,7 +22,9 @@ use std::{
     sync::atomic::{AtomicBool, AtomicU64, Ordering},
 };
 
-use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, SampleType, Window};
+use papilla_proto::{
+    FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, RuntimeEffect, SampleType, Window,
+};
 use serde_json::{Value, json};
 use support::{GAIN, Service, bytes_of, model_folder, ramp};
 
@@ -226,9 +228,9 @@ fn one_frame_at_a_time(service: &Service, engines_own: u64) {
     let zero = [whole(&vec![0.0; MAP_LEN])];
     client.exchange(&zero, WARM_UP);
     assert_eq!(allocations(|| client.exchange(&zero, FRAMES)), 0, "without contact");
-    let press = [whole(&ramp())];
-    client.exchange(&press, WARM_UP);
-    let all = allocations(|| client.exchange(&press, FRAMES));
+    let frames = [whole(&ramp())];
+    client.exchange(&frames, WARM_UP);
+    let all = allocations(|| client.exchange(&frames, FRAMES));
     assert_eq!(all, FRAMES as u64 * engines_own, "beyond what the engine itself does");
 }
 
@@ -236,13 +238,13 @@ fn one_frame_at_a_time(service: &Service, engines_own: u64) {
 /// some are superseded.
 fn frames_that_wait(service: &Service, engines_own: u64) {
     let mut clients = [(); 2].map(|()| Client::connect(service, &plain_hello()));
-    let press = whole(&ramp());
+    let frame = whole(&ramp());
     let mut maps = 0;
     let mut exchange = |rounds: usize| {
         maps = 0;
         for _ in 0..rounds {
             for _ in 0..3 {
-                clients.iter_mut().for_each(|client| client.send(&press));
+                clients.iter_mut().for_each(|client| client.send(&frame));
             }
             for client in &mut clients {
                 for _ in 0..3 {
@@ -260,7 +262,7 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
 
 /// Every effect at once, windows both ways.
 fn every_effect(service: &Service, engines_own: u64) {
-    let effects = ["relaxation", "afferents", "contact_window", "summary", "points", "actuators"];
+    let effects = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
     let hello = json!({
         "type": "hello", "version": 2, "effects": effects, "tier": "quick",
         "points": [{"px": [110.0, 65.0]}],

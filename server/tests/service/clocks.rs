@@ -23,7 +23,7 @@ impl Clocked {
         Self { socket, sequence: 0 }
     }
 
-    /// A held press at this time of the client's; the answer's header and first sample.
+    /// A held contact at this time of the client's; the answer's header and first sample.
     async fn held(&mut self, time_us: u64) -> (FrameHeader, Option<f32>) {
         self.sequence += 1;
         let map = vec![PRESSURE_PA; MAP_LEN];
@@ -92,7 +92,7 @@ async fn relaxation_stays_between_its_limits_whatever_the_clock() {
         assert_eq!(header.status, FrameStatus::Ok);
         let sed = sed.unwrap();
         assert!((least - 1.0..=most + 1.0).contains(&sed), "{sed} at {time_us}");
-        // A press that is held only creeps on: a clock that runs back undoes nothing.
+        // A contact that is held only creeps on: a clock that runs back undoes nothing.
         assert!(sed >= last - 0.5, "{last} fell to {sed} at {time_us}");
         last = sed;
     }

@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     Extension, FrameHeader, FrameKind, FrameStatus, HEADER_LEN_V2, MAP_LEN, MAP_SIDE_PX,
-    SampleType, Summary, Window, flags,
+    RuntimeEffect, SampleType, Summary, Window, flags,
 };
 use serde_json::{Value, json};
 
@@ -306,7 +306,7 @@ async fn effects_are_listed_with_what_they_cost() {
     let list = service.json("/v1/effects").await;
     let effects = list["effects"].as_array().unwrap();
     let of = |kind: &str| effects.iter().filter(|e| e["of"] == kind).collect::<Vec<_>>();
-    assert_eq!(of("session").len(), 6);
+    assert_eq!(of("session").len(), RuntimeEffect::ALL.len());
     for effect in of("session") {
         assert!(effect["cost_us"].as_f64().is_some(), "{effect}");
         assert!(effect["what"].as_str().is_some_and(|what| what.len() > 20), "{effect}");

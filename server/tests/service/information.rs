@@ -60,8 +60,8 @@ async fn the_atlas_in_all_its_forms() {
 async fn presses_are_listed_shown_and_rasterised() {
     let service = Service::start().await;
     let list = service.json("/v1/presses").await;
-    let press = json!({"id": 0, "name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5});
-    assert_eq!(list["presses"], json!([press]));
+    let state = json!({"id": 0, "name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5});
+    assert_eq!(list["presses"], json!([state]));
     let values = service.json("/v1/presses/0").await;
     assert_eq!(values["pressure_pa"], json!([0.0, 100.0, 200.0, 300.0, 400.0]));
     let map = service.get("/v1/presses/0/pressure").send().await;

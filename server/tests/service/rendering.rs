@@ -254,7 +254,7 @@ async fn pressure_off_the_skin_is_on_no_finger() {
     socket.open(hello(&json!({}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_rendered(&masked, &floats_of(&socket.hear_frame().await.1), |_| 1e-2);
-    // A press beside the finger touches nothing, and asks no network.
+    // Pressure beside the finger touches nothing, and asks no network.
     let beside: Vec<f32> = (0..MAP_LEN).map(|i| if inside(&i) { 0.0 } else { 9000.0 }).collect();
     let answer = service.post("/v1/sed", bytes_of(&beside)).send().await;
     assert_eq!(answer.header("x-papilla-infer-us"), Some("0"));

@@ -7,7 +7,7 @@ use papilla_proto::{
     effects::{Actuator, Layout, Place},
 };
 
-use super::pattern::Contact;
+use super::inputs::Contact;
 
 /// Where the pixels of a patch are, and the area that each shows.
 #[derive(Debug)]

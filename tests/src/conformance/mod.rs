@@ -5,7 +5,7 @@
 
 mod due;
 mod finger;
-pub mod pattern;
+pub mod inputs;
 mod print;
 mod session;
 
@@ -27,7 +27,7 @@ pub use print::print;
 
 use due::Due;
 use finger::Surface;
-use pattern::{Contact, Pressure, Vertices};
+use inputs::{Contact, Pressure, Vertices};
 use session::Session;
 
 /// Why nothing can be recorded.
@@ -154,7 +154,7 @@ impl Recorder {
                 due.fill(&mut step["expect"]);
             }
             Some("burst") => {
-                // The last frame is the whole pattern.
+                // The last frame is the whole input.
                 let session = session.as_mut().ok_or("a burst without a hello")?;
                 let due = self.frame(step, session, 1.0)?;
                 due.fill(&mut step["expect"]["newest"]);
@@ -187,13 +187,13 @@ impl Recorder {
     }
 
     fn frame(&mut self, step: &Value, session: &mut Session, share: f64) -> Result<Due, String> {
-        let pattern: Pressure = member(step, "pressure")?;
-        if pattern.is_doubtful() {
-            return Err("a pixel of the pattern lies on a limit; move it a little".to_owned());
+        let input: Pressure = member(step, "pressure")?;
+        if input.is_doubtful() {
+            return Err("a pixel of the map lies on a limit; move it a little".to_owned());
         }
         let window: Option<[usize; 4]> = member(step, "window")?;
         let time_us: Option<u64> = member(step, "client_time_us")?;
-        let sent_pa = pattern.draw(share, window);
+        let sent_pa = input.draw(share, window);
         let tier = self.tier(&session.tier)?;
         let answer = session.render(tier, &sent_pa, time_us.unwrap_or(0))?;
         session.due(&answer, &sent_pa, (&self.skin, &self.interface))

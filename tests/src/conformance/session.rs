@@ -52,13 +52,13 @@ impl Session {
     ) -> Result<Answer, String> {
         let now_s = time_us as f64 * 1e-6;
         self.sent.push((now_s, sent_pa.to_vec()));
-        let felt_pa = if self.has(RuntimeEffect::Relaxation) {
+        let effective_pa = if self.has(RuntimeEffect::Relaxation) {
             crept(&self.hello.relaxation.clone().unwrap_or_default(), &self.sent)?
         } else {
             sent_pa.to_vec()
         };
-        let sed = tier.render(&felt_pa)?;
-        let tolerance = self.tolerance(tier, &felt_pa, &sed)?;
+        let sed = tier.render(&effective_pa)?;
+        let tolerance = self.tolerance(tier, &effective_pa, &sed)?;
         let sed: Vec<f64> = sed.into_iter().map(f64::from).collect();
         if !self.has(RuntimeEffect::Afferents) {
             return Ok(Answer { sed, rate_hz: None, tolerance });
@@ -84,7 +84,12 @@ impl Session {
     }
 
     /// What rounding samples on the way in and out may do to every pixel.
-    fn tolerance(&self, tier: &mut Tier, felt_pa: &[f32], sed: &[f32]) -> Result<Vec<f64>, String> {
+    fn tolerance(
+        &self,
+        tier: &mut Tier,
+        effective_pa: &[f32],
+        sed: &[f32],
+    ) -> Result<Vec<f64>, String> {
         let top = sed.iter().copied().fold(0.0, f32::max);
         let sent = self.hello.sample_type;
         let error_pa = |p: f32| match sent {
@@ -93,7 +98,7 @@ impl Session {
             SampleType::U16 | SampleType::U8 => 0.5 * tier.pressure_max_pa / sent.unit_max(),
         };
         let more_pa: Vec<f32> =
-            felt_pa.iter().map(|&p| if p > 0.0 { p + error_pa(p) } else { 0.0 }).collect();
+            effective_pa.iter().map(|&p| if p > 0.0 { p + error_pa(p) } else { 0.0 }).collect();
         let more = if sent == SampleType::F32 { sed.to_vec() } else { tier.render(&more_pa)? };
         let answered = self.hello.answer_sample_type.unwrap_or(sent);
         let unit = top.max(tier.sed_max_j_per_m3) / answered.unit_max();
@@ -189,18 +194,18 @@ fn crept(of: &Relaxation, sent: &[(f64, Vec<f32>)]) -> Result<Vec<f32>, String> 
         let decayed = ((-x * young).exp() - (-x * old).exp()) / (x * (old - young));
         (1.0 - g * decayed) / (1.0 - g)
     };
-    let mut felt_pa = vec![0.0; MAP_LEN];
+    let mut effective_pa = vec![0.0; MAP_LEN];
     for (number, (time_s, map_pa)) in sent.iter().enumerate() {
         let before = number.checked_sub(1).map(|before| &sent[before]);
         let share = match before {
             Some((before_s, _)) if time_s > before_s => mean(now_s - time_s, now_s - before_s),
             _ => (1.0 - g * (-x * (now_s - time_s)).exp()) / (1.0 - g),
         };
-        for (i, felt) in felt_pa.iter_mut().enumerate() {
+        for (i, effective) in effective_pa.iter_mut().enumerate() {
             let rise = f64::from(map_pa[i]) - before.map_or(0.0, |b| f64::from(b.1[i]));
-            *felt += share * rise;
+            *effective += share * rise;
         }
     }
-    // What is left of a press below 0.1 Pa is nothing (docs/concepts/physics.md).
-    Ok(felt_pa.into_iter().map(|p| if p < 0.1 { 0.0 } else { p as f32 }).collect())
+    // What is left of a pressure below 0.1 Pa is nothing (docs/concepts/physics.md).
+    Ok(effective_pa.into_iter().map(|p| if p < 0.1 { 0.0 } else { p as f32 }).collect())
 }

@@ -61,7 +61,7 @@ fn the_committed_script_is_what_engine_and_formulas_say() {
 }
 
 #[test]
-fn a_pattern_on_a_limit_is_refused() {
+fn a_map_on_a_limit_is_refused() {
     let mut file = serde_json::json!({"cases": [{"name": "limit", "steps": [
         {"do": "hello", "hello": {"tier": "half-space"}},
         {"do": "frame", "pressure": {"disc": [100.5, 100.5, 4.0, 5000.0]}, "expect": {}},

@@ -1,8 +1,8 @@
-//! What the frames hold: FE presses.
+//! What the frames hold: FE simulations.
 
 use std::path::Path;
 
-use model_export::dataset::Dataset;
+use papilla_model_export::dataset::Dataset;
 use papilla_proto::{
     MAP_LEN, SampleType,
     atlas::{Atlas, Patch, Raster},
@@ -12,7 +12,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use super::LoadError;
 use crate::http::Request;
 
-/// Pressure maps of FE presses.
+/// Pressure maps of FE simulations.
 #[derive(Clone, Debug)]
 pub struct Content {
     /// Where they are from, for people.
@@ -24,17 +24,18 @@ pub struct Content {
 }
 
 #[derive(Deserialize)]
-struct PressList {
-    presses: Vec<PressEntry>,
+struct StateList {
+    #[serde(rename = "presses")]
+    states: Vec<StateEntry>,
 }
 
 #[derive(Deserialize)]
-struct PressEntry {
+struct StateEntry {
     id: usize,
 }
 
 #[derive(Deserialize)]
-struct Press {
+struct State {
     pressure_pa: Vec<f32>,
 }
 
@@ -46,8 +47,8 @@ impl Content {
     pub fn from_dataset(folder: &Path, split: &str, count: usize) -> Result<Self, LoadError> {
         let dataset = Dataset::open(folder)?;
         let mut maps_pa = Vec::new();
-        for press in dataset.presses(split)? {
-            let shard = dataset.load(press)?;
+        for indentation in dataset.indentations(split)? {
+            let shard = dataset.load(indentation)?;
             for row in shard.pressure_pa.rows() {
                 if maps_pa.len() == count {
                     break;
@@ -59,22 +60,22 @@ impl Content {
         Ok(Self { source, atlas_hash: dataset.atlas.hash().to_owned(), maps_pa })
     }
 
-    /// The first `count` presses that the service at `server` ships.
+    /// The first `count` states that the service at `server` ships.
     ///
     /// # Errors
     /// [`LoadError`]: the service does not answer, or ships none.
     pub async fn from_server(server: &str, count: usize) -> Result<Self, LoadError> {
         let atlas: Atlas = get(server, "/v1/atlas").await?;
         let skin = Raster::new(&atlas, Patch::Skin);
-        let list: PressList = get(server, "/v1/presses").await?;
+        let list: StateList = get(server, "/v1/presses").await?;
         let mut maps_pa = Vec::new();
-        for entry in list.presses.iter().take(count) {
-            let press: Press = get(server, &format!("/v1/presses/{}", entry.id)).await?;
-            maps_pa.push(draw(&skin, &press.pressure_pa)?);
+        for entry in list.states.iter().take(count) {
+            let state: State = get(server, &format!("/v1/presses/{}", entry.id)).await?;
+            maps_pa.push(draw(&skin, &state.pressure_pa)?);
         }
         let source = format!("the presses of {server}");
         if maps_pa.is_empty() {
-            return Err(LoadError::NoPresses(source));
+            return Err(LoadError::NoMaps(source));
         }
         Ok(Self { source, atlas_hash: atlas.hash().to_owned(), maps_pa })
     }

@@ -8,11 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
+use papilla_client::dial;
 use papilla_proto::{HEADER_LEN_V2, MAP_LEN};
 use serde::{Deserialize, Serialize};
 
 use super::{report::Percentiles, tally::Times};
-use crate::dial::dial;
 
 /// Length of the sleeps.
 const SLEEP: Duration = Duration::from_millis(1);

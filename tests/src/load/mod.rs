@@ -57,7 +57,7 @@ pub enum LoadError {
     /// A session cannot be opened.
     #[error(transparent)]
     Socket(#[from] SocketError),
-    /// The service answers with something else than maps, atlas or presses.
+    /// The service answers with something else than maps, atlas or states.
     #[error("{path} of the service: {reason}")]
     Service {
         /// What was asked for.
@@ -65,20 +65,20 @@ pub enum LoadError {
         /// What is wrong with the answer.
         reason: String,
     },
-    /// There are no presses to send.
-    #[error("{0} holds no press to send; name a dataset with --dataset")]
-    NoPresses(String),
+    /// There are no maps to send.
+    #[error("{0} holds no map to send; name a dataset with --dataset")]
+    NoMaps(String),
     /// The dataset cannot be read.
     #[error(transparent)]
-    Dataset(#[from] model_export::ExportError),
-    /// A press does not fit its atlas.
+    Dataset(#[from] papilla_model_export::ExportError),
+    /// A state does not fit its atlas.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
     /// A map cannot be encoded.
     #[error(transparent)]
     Encode(#[from] SampleError),
     /// f16 ends at 65504.
-    #[error("the presses reach {0} Pa, f16 ends at 65504; take another --sample-type")]
+    #[error("the maps reach {0} Pa, f16 ends at 65504; take another --sample-type")]
     BeyondF16(f32),
     /// A file for --verify cannot be read.
     #[error("{path}: {source}; --models names the folder of the models that the service runs")]

@@ -140,7 +140,7 @@ pub struct Options {
     #[arg(long, value_name = "NAME")]
     pub tier: Option<String>,
 
-    /// Folder of a dataset whose presses are sent [default: the service's own presses].
+    /// Folder of a dataset whose maps are sent [default: the service's own states].
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
 

@@ -17,6 +17,7 @@ use hyper::{
     client::conn::http1::{self, SendRequest},
 };
 use hyper_util::rt::TokioIo;
+use papilla_client::dial;
 use papilla_proto::{FrameHeader, FrameStatus, MAP_LEN, MAP_SIDE_PX, Window};
 use serde_json::json;
 use tokio::{sync::mpsc::UnboundedReceiver, time::timeout};
@@ -27,7 +28,7 @@ use super::{
     tally::Tally,
     tally::Times,
 };
-use crate::{dial::dial, http::HttpError};
+use crate::http::HttpError;
 
 /// What is said to the service.
 #[derive(Clone, Debug)]

@@ -80,7 +80,7 @@ pub struct Report {
     pub tier: String,
     /// Latency that the server expected on an idle machine, us; sessions are told.
     pub predicted_latency_us: Option<u64>,
-    /// Where the presses are from.
+    /// Where the maps are from.
     pub source: String,
     /// Maps that took turns.
     pub maps: usize,

@@ -2,10 +2,10 @@
 
 use std::{io::Cursor, time::Duration};
 
-use model_export::metrics::quantile;
 use ndarray::Array2;
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use papilla_engine::Model;
+use papilla_model_export::metrics::quantile;
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX,
     SampleType,
@@ -55,7 +55,7 @@ pub(crate) async fn http_answers_are_the_librarys(service: &Service, sample: &Sa
     let map = service.pressure_map(sample);
     for model in &service.models {
         let due = infer(model.as_ref(), &map);
-        assert!(due.iter().any(|&e| e > 0.0), "a press must be felt");
+        assert!(due.iter().any(|&e| e > 0.0), "contact has SED above 0");
         let path = format!("/v1/sed?tier={}", model.info().name);
         let raw = service.render(&path, OCTETS, OCTETS, bytes_of(&map)).await;
         assert_eq!(raw.header("x-papilla-tier"), Some(model.info().name.as_str()));

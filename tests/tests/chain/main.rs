@@ -4,8 +4,8 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | `shipped` | the models, atlas and dataset of the repository, and this press solved again |
-//! | `scene` | a coarse press and a small network: the chain without any shipped file |
+//! | `shipped` | the models, atlas and dataset of the repository, and this indentation solved again |
+//! | `scene` | a coarse indentation and a small network: the chain without any shipped file |
 //! | `service` | a running service beside the library's own model |
 //! | `client` | what every client must find, over HTTP and in a session |
 //! | `load` | the load generator against the service |

@@ -67,7 +67,7 @@ impl Pressed {
     }
 }
 
-/// The coarse press, solved once.
+/// The coarse indentation, solved once.
 pub(crate) static PRESSED: LazyLock<Pressed> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");

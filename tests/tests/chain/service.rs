@@ -17,7 +17,7 @@ use tempfile::TempDir;
 
 use crate::shipped::{folder, text};
 
-/// Samples of presses: vertex values of pressure and FE truth.
+/// Samples of indentations: vertex values of pressure and FE truth.
 pub(crate) struct Sample {
     pub(crate) pressure_pa: Vec<f32>,
     pub(crate) sed_j_per_m3: Vec<f32>,
@@ -103,7 +103,7 @@ pub(crate) fn infer(model: &dyn Model, pressure_pa: &[f32]) -> Vec<f32> {
 }
 
 /// A model folder with the engine's small test network, made to belong to `atlas`; its only
-/// press is `sample`.
+/// indentation is `sample`.
 pub(crate) fn tiny_models(atlas: &Atlas, sample: &Sample) -> TempDir {
     let tiny = fs::read(folder("crates/engine/tests/assets").join("tiny.onnx")).unwrap();
     // Same length, so that no length in the file changes.
@@ -118,9 +118,9 @@ pub(crate) fn model_folder(atlas: &Atlas, sample: &Sample, onnx: &[u8]) -> TempD
     write("index.json", br#"{"default": "tiny", "models": ["tiny"]}"#);
     write("tiny.onnx", onnx);
     write("tiny.json", card_of(onnx).to_json().unwrap().as_bytes());
-    let press = json!({"name": "coarse", "depth_mm": sample.depth_mm,
+    let state = json!({"name": "coarse", "depth_mm": sample.depth_mm,
         "pressure_pa": sample.pressure_pa, "sed_j_per_m3": sample.sed_j_per_m3});
-    write("replay.json", json!({"presses": [press]}).to_string().as_bytes());
+    write("replay.json", json!({"presses": [state]}).to_string().as_bytes());
     models
 }
 
@@ -151,7 +151,7 @@ fn card_of(onnx: &[u8]) -> Card {
         effects: info.effects.clone(),
         network: info.network.clone(),
         pressure_range_pa: [0.0, info.pressure_max_pa],
-        pattern_max: None,
+        input_statistics_max: None,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         dataset_sha256: info.dataset_sha256.clone(),
         training: info.training.clone(),

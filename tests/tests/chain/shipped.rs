@@ -1,4 +1,4 @@
-//! What ships: the models answer the presses they come with, and the presses can be solved
+//! What ships: the models answer the indentations they come with, and the indentations can be solved
 //! again.
 
 use std::{
@@ -51,8 +51,8 @@ fn judged_on(card: &Card) -> Dataset {
 }
 
 fn held_out(dataset: &Dataset) -> Vec<&IndentationEntry> {
-    let presses = dataset.manifest().presses.iter();
-    presses.filter(|press| press.split == Split::Test).collect()
+    let indentations = dataset.manifest().presses.iter();
+    indentations.filter(|indentation| indentation.split == Split::Test).collect()
 }
 
 fn samples(shard: &Shard) -> Vec<Sample> {
@@ -72,12 +72,12 @@ async fn the_shipped_models_answer_every_client() {
     for card in &service.cards {
         assert_eq!(judged_on(card).atlas().hash(), dataset.atlas().hash(), "{}", card.name);
     }
-    let press = samples(&dataset.shard(held_out(&dataset)[0]).unwrap());
-    let deepest = press.last().unwrap();
+    let states = samples(&dataset.shard(held_out(&dataset)[0]).unwrap());
+    let deepest = states.last().unwrap();
     client::http_answers_are_the_librarys(&service, deepest).await;
     client::nothing_in_nothing_out(&service).await;
     client::http_mistakes_are_named(&service, deepest).await;
-    client::session_answers_are_the_librarys(&service, &press).await;
+    client::session_answers_are_the_librarys(&service, &states).await;
     client::sessions_survive_mistakes(&service, deepest).await;
 }
 
@@ -86,7 +86,8 @@ async fn the_shipped_models_answer_every_client() {
 async fn the_card_tells_the_truth() {
     let service = Service::shipped().await;
     let dataset = judged_on(&service.cards[0]);
-    let shards = held_out(&dataset).into_iter().map(|press| dataset.shard(press).unwrap());
+    let shards =
+        held_out(&dataset).into_iter().map(|indentation| dataset.shard(indentation).unwrap());
     let all: Vec<Sample> = shards.flat_map(|shard| samples(&shard)).collect();
     let card = &service.cards[0].metrics;
     assert_eq!((card.split.as_str(), card.samples), ("test", all.len()));
@@ -101,13 +102,13 @@ fn maps_of_the_dataset_carry_the_force_of_the_plate() {
     let dataset = dataset();
     let skin = Raster::new(dataset.atlas(), Patch::Skin);
     let mut map = vec![0.0; MAP_LEN];
-    for press in held_out(&dataset) {
-        let shard = dataset.shard(press).unwrap();
+    for indentation in held_out(&dataset) {
+        let shard = dataset.shard(indentation).unwrap();
         for (sample, force_n) in samples(&shard).iter().zip(shard.force_n.rows()) {
             skin.rasterise(&sample.pressure_pa, &mut map).unwrap();
             let force_n = force_n.iter().map(|f| f64::from(f * f)).sum::<f64>().sqrt();
             let share = map_integral(dataset.atlas(), &skin, &map) / force_n;
-            let what = format!("press {}, {} mm", press.id, sample.depth_mm);
+            let what = format!("press {}, {} mm", indentation.id, sample.depth_mm);
             assert!((share - 1.0).abs() < 0.1, "{what}: {share} of the force");
         }
     }
@@ -117,13 +118,13 @@ fn maps_of_the_dataset_carry_the_force_of_the_plate() {
 #[test]
 fn a_shipped_press_can_be_solved_again() {
     let dataset = dataset();
-    let press = held_out(&dataset)[0];
-    let shard = dataset.shard(press).unwrap();
-    // The campaign's mesh and plate are those of this scene; the pose is the press's.
+    let indentation = held_out(&dataset)[0];
+    let shard = dataset.shard(indentation).unwrap();
+    // The campaign's mesh and plate are those of this scene; the pose is the indentation's.
     let mut scene = Scene::read(&folder("scenes").join("flat-press.toml")).unwrap();
-    scene.motion.pitch_deg = press.pose.pitch_deg;
-    scene.motion.roll_deg = press.pose.roll_deg;
-    scene.motion.yaw_deg = press.pose.yaw_deg;
+    scene.motion.pitch_deg = indentation.pose.pitch_deg;
+    scene.motion.roll_deg = indentation.pose.roll_deg;
+    scene.motion.yaw_deg = indentation.pose.yaw_deg;
     scene.motion.depth_mm = Some(f64::from(shard.depth_mm[0]));
     scene.motion.increments = 1;
     scene.validate().unwrap();

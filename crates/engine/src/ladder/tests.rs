@@ -78,11 +78,11 @@ fn kinds_follow_from_the_network() {
     for (network, kind) in [
         (r#"{"kind":"half_space"}"#, Kind::ClosedForm),
         (r#"{"kind":"fe_operator","rank":64}"#, Kind::Operator),
-        (r#"{"kind":"s1_unet","base":16}"#, Kind::S1Network),
+        (r#"{"kind":"s1_unet","base":16}"#, Kind::PublishedUNet),
         (r#"{"kind":"vertex_net"}"#, Kind::Network),
         ("{}", Kind::Network),
     ] {
         assert_eq!(Kind::of_network(&serde_json::from_str(network).unwrap()), kind);
     }
-    assert_eq!(serde_json::to_string(&Kind::S1Network).unwrap(), r#""s1_network""#);
+    assert_eq!(serde_json::to_string(&Kind::PublishedUNet).unwrap(), r#""s1_network""#);
 }

@@ -156,16 +156,16 @@ fn shipped_models_answer_as_before() {
         crate::widen::widen(&mut proto);
         let typed = tract_onnx::onnx().model_for_proto_model(&proto).unwrap().into_typed().unwrap();
         let model = typed.into_decluttered().unwrap();
-        let press: Vec<f32> = (0..224 * 224)
+        let pressure_pa: Vec<f32> = (0..224 * 224)
             .map(|i| {
                 let (row, column) = ((i / 224) as f32 - 90.0, (i % 224) as f32 - 100.0);
                 2e4 * (1.0 - (row * row + column * column) / 900.0).max(0.0)
             })
             .collect();
-        let press = Tensor::from_shape(&[1, 1, 224, 224], &press).unwrap().into_tvalue();
+        let pressure = Tensor::from_shape(&[1, 1, 224, 224], &pressure_pa).unwrap().into_tvalue();
         let run = |model: TypedModel| {
             let plan = model.into_optimized().unwrap().into_runnable().unwrap();
-            let answer = plan.run(tvec!(press.clone())).unwrap().remove(0);
+            let answer = plan.run(tvec!(pressure.clone())).unwrap().remove(0);
             answer.try_as_plain_ram().unwrap().as_slice::<f32>().unwrap().to_vec()
         };
         let fused = fuse(model.clone()).unwrap();

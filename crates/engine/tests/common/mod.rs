@@ -1,4 +1,4 @@
-//! The small model the tests share, and a press for it.
+//! The small model the tests share, and a pressure map for it.
 #![allow(dead_code, reason = "each test program uses a part")]
 
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
@@ -21,7 +21,7 @@ pub(crate) fn expected() -> Expected {
     serde_json::from_str(include_str!("../assets/tiny.expected.json")).unwrap()
 }
 
-/// The same press as in `assets/make.py`, in the same f32 arithmetic.
+/// The same pressure as in `assets/make.py`, in the same f32 arithmetic.
 pub(crate) fn press_pa() -> Vec<f32> {
     (0..MAP_LEN)
         .map(|i| {

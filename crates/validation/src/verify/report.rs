@@ -24,7 +24,7 @@ const INTRODUCTION: &str = "# Verification
 Written by
 
 ```sh
-cargo run --release -p fe-datagen -- verify --markdown docs/reports/verification.md
+cargo run --release -p papilla-fe-datagen -- verify --markdown docs/reports/verification.md
 ```
 
 which solves every problem below with the solver of the fingertip and exits with code 3 if a row is

@@ -21,7 +21,7 @@ const LEGEND_PX: u32 = 34;
 const FONT_PX: i32 = 13;
 const GREY: RGBColor = RGBColor(120, 120, 120);
 const KINDS: [Kind; 5] =
-    [Kind::ClosedForm, Kind::Operator, Kind::Network, Kind::S1Network, Kind::Fe];
+    [Kind::ClosedForm, Kind::Operator, Kind::Network, Kind::PublishedUNet, Kind::Fe];
 
 /// Colours that stay apart for colour-blind eyes (Okabe & Ito 2008).
 fn colour(kind: Kind) -> RGBColor {
@@ -29,7 +29,7 @@ fn colour(kind: Kind) -> RGBColor {
         Kind::ClosedForm => RGBColor(204, 121, 167),
         Kind::Operator => RGBColor(0, 158, 115),
         Kind::Network => RGBColor(0, 114, 178),
-        Kind::S1Network => RGBColor(213, 94, 0),
+        Kind::PublishedUNet => RGBColor(213, 94, 0),
         Kind::Fe => RGBColor(60, 60, 60),
     }
 }
@@ -45,7 +45,7 @@ struct Point {
     reference: bool,
 }
 
-/// The sets that get a panel: the reference, where all rungs meet, and the held-out presses;
+/// The sets that get a panel: the reference, where all rungs meet, and the held-out indentations;
 /// without either, the first set that was measured.
 fn panels(ladder: &Ladder) -> Vec<&str> {
     let measured = |set: &&papilla_engine::ladder::Set| set.samples > 0;

@@ -3,16 +3,14 @@
 use std::time::{Duration, Instant};
 
 use bytes::BytesMut;
+use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 use papilla_proto::{MAP_LEN, SampleType, check_pressure};
+use papilla_session_effects as effects;
 
 use super::{Catalogue, Tier};
 use crate::{
     StartError,
-    codec::{self, Input, Map, Output, Quantity},
-    core::{
-        effects,
-        latency::{probe_map, us},
-    },
+    core::latency::{probe_map, us},
 };
 
 /// Runs of one tier after which its times are known well enough.
@@ -62,7 +60,9 @@ pub(crate) fn calibrate_noting(
         catalogue.overhead.set_us(codec_us + HAND_OVER_US);
     }
     let pressure_max_pa = catalogue.tiers.first().map_or(1.0, |tier| tier.pressure_max_pa);
-    effects::measure(catalogue.finger(), pressure_max_pa);
+    let mut contact_pa = vec![0.0; MAP_LEN];
+    probe_map(pressure_max_pa, &mut contact_pa);
+    effects::measure(catalogue.finger(), &contact_pa);
     tracing::info!(
         tiers = found.join(", "),
         overhead_us = catalogue.overhead.us(),
@@ -108,11 +108,11 @@ fn codec_us() -> Option<u64> {
     let mut least: Option<Duration> = None;
     for _ in 0..8 {
         let start = Instant::now();
-        codec::decode(input, &payload, &mut map).ok()?;
+        decode(input, &payload, &mut map).ok()?;
         check_pressure(&map, 1e4).ok()?;
         buffer.clear();
         let sed = Map { quantity: Quantity::Sed, values: &map, value_max: 1e4, source: "" };
-        codec::encode(samples, sed, &mut buffer).ok()?;
+        encode(samples, sed, &mut buffer).ok()?;
         let time = start.elapsed();
         least = Some(least.map_or(time, |least| least.min(time)));
     }

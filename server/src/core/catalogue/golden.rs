@@ -43,7 +43,7 @@ pub(crate) enum GoldenError {
     State { state: String, reason: String },
     /// It answers wrongly.
     #[error(
-        "its answer to press '{}' is off by {:.3} of the FE solver's (relative L2), {:.3} is the \
+        "its answer to state '{}' is off by {:.3} of the FE solver's (relative L2), {:.3} is the \
          most its card allows", .0.state, .0.relative_l2, .0.relative_l2_max
     )]
     Wrong(Golden),

@@ -8,12 +8,14 @@ pub(crate) mod replay;
 mod tier;
 
 use bytes::Bytes;
+use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
 use papilla_proto::{
     ErrorCode, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
     error::shortened,
 };
+use papilla_session_effects as effects;
 
 pub(crate) use self::tier::Tier;
 use self::{
@@ -23,8 +25,7 @@ use self::{
 };
 use crate::{
     StartError,
-    codec::{Output, Quantity},
-    core::{cache::Cache, effects, latency::Overhead, metrics::TierLabels},
+    core::{cache::Cache, latency::Overhead, metrics::TierLabels},
 };
 
 /// How far loading has come.

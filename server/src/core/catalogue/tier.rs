@@ -3,7 +3,7 @@
 use std::sync::{Arc, atomic::AtomicUsize};
 
 use papilla_engine::{Model, Session, ladder::Kind};
-use papilla_proto::Pattern;
+use papilla_proto::InputStatistics;
 use serde_json::Value;
 
 use crate::{
@@ -25,7 +25,7 @@ pub(crate) struct Tier {
     /// Greatest pressure it was trained on, Pa.
     pub(crate) pressure_max_pa: f32,
     /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
-    pub(crate) input_statistics_max: Option<Pattern>,
+    pub(crate) input_statistics_max: Option<InputStatistics>,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
     /// What it is.

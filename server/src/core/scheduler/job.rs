@@ -6,12 +6,11 @@ use std::{
 };
 
 use bytes::{Bytes, BytesMut};
+use papilla_codec::{Input, Output};
 use papilla_proto::{FrameHeader, FrameKind, Problem, Window};
+use papilla_session_effects::Effects;
 
-use crate::{
-    codec::{Input, Output},
-    core::{effects::Effects, metrics::Stage},
-};
+use crate::core::metrics::Stage;
 
 /// One pressure map on its way to a thread.
 #[derive(Debug)]
@@ -38,7 +37,7 @@ pub(crate) struct JobOptions {
     /// Bytes to be left free before the answer.
     pub(crate) headroom: usize,
     /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(crate) takes_more: bool,
+    pub(crate) accepts_out_of_range: bool,
     /// The client's clock, us: effects that change with time go by it.
     pub(crate) time_us: u64,
     /// The session's effects. Only the thread that renders the frame locks them, and a session

@@ -13,6 +13,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use papilla_codec::{Input, Output};
 use papilla_engine::{ModelInfo, ladder::Kind};
 use papilla_proto::{
     ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType,
@@ -23,14 +24,11 @@ use tokio::sync::mpsc;
 
 use self::gated::{Act, Gate, Gated};
 use super::{Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot};
-use crate::{
-    codec::{Input, Output},
-    core::{
-        buffers::{HEADROOM, Recycler},
-        catalogue::{Catalogue, Tier},
-        latency::Latency,
-        metrics::{Metrics, Stage},
-    },
+use crate::core::{
+    buffers::{HEADROOM, Recycler},
+    catalogue::{Catalogue, Tier},
+    latency::Latency,
+    metrics::{Metrics, Stage},
 };
 
 /// A pool of one thread and the handles of its gate.

@@ -7,8 +7,11 @@ use std::{
     time::{Duration, Instant},
 };
 
+use papilla_codec::{Map, Quantity, decode, encode};
 use papilla_engine::Session;
-use papilla_proto::{MAP_LEN, MapSummary, Pattern, PressureRange, Problem, flags, keep_inside};
+use papilla_proto::{
+    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
+};
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
@@ -17,7 +20,6 @@ use super::{
 };
 use crate::{
     StartError,
-    codec::{self, Map, Quantity},
     core::{
         buffers::{HEADROOM, Recycler},
         catalogue::Catalogue,
@@ -145,20 +147,21 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        let is_beyond = |trained| Pattern::of(&self.pressure_pa).is_beyond(trained);
+        let is_outside =
+            |trained| InputStatistics::of(&self.pressure_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
-            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_beyond);
+            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
         meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
         if summary.is_zero() {
-            // Nothing touches the finger: nothing is felt, and no network is asked.
+            // Nothing touches the finger: SED is zero, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
             meta.flags |= flags::NO_CONTACT;
         } else if job.deadline.is_some_and(|deadline| {
-            tier.latency.is_hopeless(deadline.saturating_duration_since(decoded))
+            tier.latency.will_miss(deadline.saturating_duration_since(decoded))
         }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
@@ -178,7 +181,9 @@ impl Worker {
             let buffer = recycler.claim(HEADROOM + effects.size_hint());
             buffer.resize(headroom, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
-            let written = effects.write(pressure_pa, sed, sed_max, time_us, buffer)?;
+            let written = effects
+                .write(pressure_pa, sed, sed_max, time_us, buffer)
+                .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
             (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
@@ -190,7 +195,8 @@ impl Worker {
                 value_max: sed_max,
                 source: &tier.name,
             };
-            let scale = codec::encode(job.output, map, buffer)?;
+            let scale = encode(job.output, map, buffer)
+                .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
         };
         times.encode = start.elapsed();
@@ -203,10 +209,10 @@ impl Worker {
         job: &Job,
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
-        codec::decode(job.input, payload, &mut self.pressure_pa)?;
+        decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            takes_more: job.options.takes_more,
+            accepts_out_of_range: job.options.accepts_out_of_range,
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);

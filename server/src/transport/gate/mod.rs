@@ -13,7 +13,7 @@ use papilla_proto::{ErrorCode, Problem};
 
 pub(crate) use self::{
     origin::cors,
-    places::{Place, Places, Standing},
+    places::{Place, PlaceHandle, Places},
     tokens::Holder,
 };
 use self::{
@@ -98,7 +98,7 @@ impl Gate {
         }
     }
 
-    /// Whether a request may come in, by its head. Of the connection, [`Peer`] and [`Standing`]
+    /// Whether a request may come in, by its head. Of the connection, [`Peer`] and [`PlaceHandle`]
     /// are among the head's extensions.
     ///
     /// # Errors
@@ -113,8 +113,8 @@ impl Gate {
             (Some(tokens), Some(shown)) => tokens.holder(shown),
             _ => None,
         };
-        if let (Some(_), Some(standing)) = (&holder, head.extensions.get::<Arc<Standing>>()) {
-            standing.on_token();
+        if let (Some(_), Some(handle)) = (&holder, head.extensions.get::<Arc<PlaceHandle>>()) {
+            handle.on_token();
         }
         let key = match (&holder, peer) {
             (Some(holder), _) => Some(Key::Token(Arc::clone(&holder.name))),

@@ -44,12 +44,12 @@ struct Newcomers {
 
 struct Newcomer {
     address: IpAddr,
-    standing: Arc<Standing>,
+    handle: Arc<PlaceHandle>,
 }
 
-/// What a connection and its requests know of its place.
+/// What a connection and its requests share of its place.
 #[derive(Default)]
-pub(crate) struct Standing {
+pub(crate) struct PlaceHandle {
     is_newcomer: AtomicBool,
     newcomers: Option<Arc<Newcomers>>,
     /// Told when the connection has to give way.
@@ -59,7 +59,7 @@ pub(crate) struct Standing {
 /// A place of a connection; given back when it is dropped.
 pub(crate) struct Place {
     _permit: OwnedSemaphorePermit,
-    pub(crate) standing: Arc<Standing>,
+    pub(crate) handle: Arc<PlaceHandle>,
 }
 
 impl Places {
@@ -83,7 +83,7 @@ impl Places {
     /// has all that it may have, gives way to it.
     pub(crate) fn take(&self, permit: OwnedSemaphorePermit, address: IpAddr) -> Place {
         let Some(newcomers) = &self.newcomers else {
-            return Place { _permit: permit, standing: Arc::default() };
+            return Place { _permit: permit, handle: Arc::default() };
         };
         let address = network_of(address);
         let mut queue = newcomers.queue();
@@ -95,13 +95,13 @@ impl Places {
                 (queue.len() >= newcomers.max).then_some(0)
             };
         if let Some(oldest) = gives_way.and_then(|index| queue.remove(index)) {
-            oldest.standing.evicted.notify_one();
+            oldest.handle.evicted.notify_one();
         }
         let newcomers = Some(Arc::clone(newcomers));
         let is_newcomer = AtomicBool::new(true);
-        let standing = Arc::new(Standing { is_newcomer, newcomers, evicted: Notify::new() });
-        queue.push_back(Newcomer { address, standing: Arc::clone(&standing) });
-        Place { _permit: permit, standing }
+        let handle = Arc::new(PlaceHandle { is_newcomer, newcomers, evicted: Notify::new() });
+        queue.push_back(Newcomer { address, handle: Arc::clone(&handle) });
+        Place { _permit: permit, handle }
     }
 }
 
@@ -112,13 +112,13 @@ impl Newcomers {
     }
 }
 
-impl Standing {
+impl PlaceHandle {
     /// A request has shown a token: the connection is no newcomer from now on.
     pub(crate) fn on_token(&self) {
         if let (true, Some(newcomers)) =
             (self.is_newcomer.swap(false, Ordering::Relaxed), &self.newcomers)
         {
-            newcomers.queue().retain(|newcomer| !std::ptr::eq(&*newcomer.standing, self));
+            newcomers.queue().retain(|newcomer| !std::ptr::eq(&*newcomer.handle, self));
         }
     }
 
@@ -130,7 +130,7 @@ impl Standing {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.standing.on_token();
+        self.handle.on_token();
     }
 }
 
@@ -146,7 +146,7 @@ mod tests {
 
     /// Whether each has to give way.
     fn evicted(held: &[Place]) -> Vec<bool> {
-        let is_told = |place: &Place| std::pin::pin!(place.standing.evicted()).now_or_never();
+        let is_told = |place: &Place| std::pin::pin!(place.handle.evicted()).now_or_never();
         held.iter().map(|place| is_told(place).is_some()).collect()
     }
 
@@ -156,7 +156,7 @@ mod tests {
         let mut held: Vec<_> = (0..4).map(|_| place(&places, [10, 0, 0, 1])).collect();
         held.push(place(&places, [10, 0, 0, 2]));
         assert_eq!(evicted(&held), [false; 5]);
-        held[0].standing.on_token();
+        held[0].handle.on_token();
         held.push(place(&places, [10, 0, 0, 1]));
         assert_eq!(evicted(&held), [false; 6]);
         held.push(place(&places, [10, 0, 0, 1]));
@@ -170,7 +170,7 @@ mod tests {
     fn the_oldest_newcomer_gives_way_and_a_holder_does_not() {
         let places = Places::new(8, true);
         let mut held: Vec<_> = (0..4).map(|n| place(&places, [10, 0, 0, n])).collect();
-        held[0].standing.on_token();
+        held[0].handle.on_token();
         held.extend((4..6).map(|n| place(&places, [10, 0, 0, n])));
         assert_eq!(evicted(&held), [false, true, false, false, false, false]);
     }

@@ -7,11 +7,11 @@ use axum::{
     http::{HeaderMap, Uri},
 };
 use bytes::BytesMut;
+use papilla_codec::{Map, Output, Quantity, encode};
 use papilla_proto::{ErrorCode, MAP_LEN, Problem, error::shortened};
 use serde_json::{Value, json};
 
 use crate::{
-    codec::{self, Map, Output, Quantity},
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
@@ -111,7 +111,8 @@ fn rasterised(
     let mut bytes = BytesMut::with_capacity(output.size_hint());
     // No common scale: each picture uses the whole range of gray.
     let map = Map { quantity, values: &values, value_max: f32::MIN_POSITIVE, source: "fe" };
-    let scale = codec::encode(output, map, &mut bytes)?;
+    let scale = encode(output, map, &mut bytes)
+        .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
     let white = (output == Output::Png).then_some((white, scale));
     Ok(Content { white, is_negotiated: true, ..Content::new(output.content_type(), bytes) })
 }

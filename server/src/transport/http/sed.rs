@@ -8,10 +8,10 @@ use axum::{
     http::{HeaderMap, HeaderValue, Uri},
     response::Response,
 };
+use papilla_codec::Output;
 use papilla_proto::Problem;
 
 use crate::{
-    codec::Output,
     core::{
         metrics::Transport,
         scheduler::{Job, JobOptions},

@@ -16,6 +16,7 @@ use axum::{
     response::Response,
 };
 use bytes::Bytes;
+use papilla_codec::{Input, Output};
 use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
 use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType, error::shortened};
 use serde_json::json;
@@ -23,7 +24,6 @@ use tokio::task::spawn_blocking;
 
 use self::{request::Wish, response::Tensor};
 use crate::{
-    codec::{Input, Output},
     core::{
         metrics::Transport,
         scheduler::{Job, JobOptions},

@@ -6,6 +6,7 @@ use std::{
 };
 
 use bytes::Bytes;
+use papilla_codec::{Input, Output};
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
 };
@@ -19,7 +20,6 @@ use super::{
     terms::Terms,
 };
 use crate::{
-    codec::{Input, Output},
     core::{
         buffers::HEADROOM,
         metrics::{Stage, Transport},
@@ -138,7 +138,7 @@ impl Session {
             deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
             options: JobOptions {
                 headroom: HEADROOM + header.header_len(),
-                takes_more: self.terms.takes_more,
+                accepts_out_of_range: self.terms.accepts_out_of_range,
                 time_us: header.client_time_us,
                 effects: self.terms.effects.clone(),
                 header: Some(header),

@@ -10,6 +10,7 @@ use std::{
 };
 
 use bytes::BytesMut;
+use papilla_codec::Output;
 use papilla_proto::{
     Extension, FrameHeader, FrameStatus, HEADER_LEN_V2, Problem, ServerMessage, SessionError,
 };
@@ -19,7 +20,6 @@ use super::{
     wire::{self, OUT_HEAD_MAX, opcode},
 };
 use crate::{
-    codec::Output,
     core::{
         buffers::{HEADROOM, Recycler},
         metrics::{Stage, Transport},

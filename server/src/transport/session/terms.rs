@@ -5,17 +5,18 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
+use papilla_codec::{Output, scale_of};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
     SampleType,
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
 };
+use papilla_session_effects::Effects;
 
 use super::reply::tier_number;
 use crate::{
-    codec::{Output, scale_of},
-    core::{buffers::HEADROOM, catalogue::Tier, effects::Effects},
+    core::{buffers::HEADROOM, catalogue::Tier},
     transport::app::App,
 };
 
@@ -34,7 +35,7 @@ pub(super) struct Terms {
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
     /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(super) takes_more: bool,
+    pub(super) accepts_out_of_range: bool,
     /// Longest delay on the way of a frame that is not stale, us.
     pub(super) stale_after_us: Option<u32>,
     /// What was asked for beside the bare map.
@@ -134,8 +135,8 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
     }
     let effects = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
     let info = effects.as_ref().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
-        names: effects.names.clone(),
-        sections: effects.sections.clone(),
+        names: effects.names().to_vec(),
+        sections: effects.sections().to_vec(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
     });
     Ok(Terms {
@@ -145,7 +146,7 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         sample_type: hello.sample_type,
         answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        takes_more: hello.out_of_range == Some(OutOfRange::Flag),
+        accepts_out_of_range: hello.out_of_range == Some(OutOfRange::Flag),
         stale_after_us: hello.stale_after_us,
         effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
         info,

@@ -114,9 +114,9 @@ pub(crate) fn model_folder_on(atlas: &Atlas) -> TempDir {
     let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| 100.0 * i as f32).collect();
     // What the test models make of it: their golden answer.
     let sed: Vec<f32> = values.iter().map(|value| GAIN * value).collect();
-    let press = json!({"name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5,
+    let state = json!({"name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5,
         "pressure_pa": values, "sed_j_per_m3": sed});
-    write(folder.path(), "replay.json", json!({"presses": [press]}).to_string().as_bytes());
+    write(folder.path(), "replay.json", json!({"presses": [state]}).to_string().as_bytes());
     folder
 }
 

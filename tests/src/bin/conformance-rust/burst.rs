@@ -9,7 +9,7 @@ use std::{
 
 use anyhow::{Context, Result, ensure};
 use papilla_client::{Answer, Status};
-use papilla_tests::conformance::pattern::Pressure;
+use papilla_tests::conformance::inputs::Pressure;
 use serde_json::{Value, json};
 use tokio::{sync::oneshot::Receiver, time};
 
@@ -68,10 +68,8 @@ impl<T> Outcomes<T> {
 impl Run {
     pub(crate) async fn burst(&mut self, step: &Value) -> Result<()> {
         let session = self.session()?;
-        let (count, pattern): (usize, Pressure) =
-            (member(step, "count")?, member(step, "pressure")?);
-        let maps: Vec<_> =
-            (1..=count).map(|k| pattern.draw(k as f64 / count as f64, None)).collect();
+        let (count, input): (usize, Pressure) = (member(step, "count")?, member(step, "pressure")?);
+        let maps: Vec<_> = (1..=count).map(|k| input.draw(k as f64 / count as f64, None)).collect();
         let gap = Duration::from_millis(step["gap_ms"].as_u64().unwrap_or(0));
         let before = session.superseded_by_client();
         let paused = step["paused"] == json!(true);

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use papilla_client::{Contact, Frame, PapillaError, Session, Skin, Status, atlas, sed};
 use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch};
 use papilla_tests::{
-    conformance::pattern::{self, Pressure, Vertices},
+    conformance::inputs::{self, Pressure, Vertices},
     http::Request,
 };
 use serde::de::DeserializeOwned;
@@ -156,8 +156,8 @@ impl Run {
     async fn contacts(&self, step: &Value) -> Result<()> {
         let server = self.server.clone();
         let skin = Skin::new(&spawn_blocking(move || atlas(&server)).await??);
-        let contacts: Vec<pattern::Contact> = member(step, "contacts")?;
-        let contact = |c: &pattern::Contact| Contact {
+        let contacts: Vec<inputs::Contact> = member(step, "contacts")?;
+        let contact = |c: &inputs::Contact| Contact {
             at_mm: c.at_mm,
             force_n: c.force_n,
             radius_mm: c.radius_mm,

@@ -8,13 +8,13 @@ use axum::{
     extract::State,
     http::{HeaderMap, Uri},
 };
+use papilla_codec::encode_mask;
 use papilla_proto::{
     ErrorCode, Problem,
     atlas::{Patch, Raster},
 };
 
 use crate::{
-    codec,
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
@@ -71,7 +71,7 @@ pub(crate) async fn mask(State(app): Shared, uri: Uri, headers: HeaderMap) -> An
 
 fn png(raster: &Raster) -> Result<Vec<u8>, Problem> {
     let mut png = Vec::new();
-    codec::encode_mask(raster.mask(), &mut png)
+    encode_mask(raster.mask(), &mut png)
         .map_err(|error| problem::internal("the mask cannot be encoded", &error))?;
     Ok(png)
 }

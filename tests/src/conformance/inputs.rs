@@ -4,7 +4,7 @@ use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// Pressure below which a pattern is 0, Pa.
+/// Pressure below which a map is 0, Pa.
 const NOTHING_PA: f64 = 1.0;
 
 /// A pressure map by formula.

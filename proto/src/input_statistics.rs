@@ -1,22 +1,22 @@
-//! How pressure lies on a map: what tells a map that no press makes, though every pressure in it
-//! is an ordinary one.
+//! Input statistics: what tells a map that no indentation makes, though every pressure in it is an
+//! ordinary one.
 //!
-//! A network answers a checkerboard as readily as a press, and its answer means nothing. Two
-//! numbers tell such maps from presses: skin that is pressed by a thing shares its load smoothly
-//! among neighbours, and no press carries much more than the hardest one a model has seen.
+//! A network answers a checkerboard as readily as a contact, and its answer means nothing. Two
+//! numbers tell such maps from contacts: skin under an indenter shares its load smoothly among
+//! neighbours, and no indentation carries much more than the hardest one a model has seen.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{MAP_SIDE_PX, map::LANES};
 
-/// Room above the greatest trained pattern, as a factor: quantisation and another raster of the
-/// same press move both numbers by less.
-pub const PATTERN_HEADROOM: f32 = 1.05;
+/// Room above the greatest of the training, as a factor: quantisation and another raster of the
+/// same contact move both numbers by less.
+pub const TRAINED_HEADROOM: f32 = 1.05;
 
-/// Two numbers of a pressure map.
+/// Statistics of a pressure map.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Pattern {
+pub struct InputStatistics {
     /// Squared steps between neighbours (in rows and in columns) over four times the squared
     /// pressures: 0 is flat, 1 a checkerboard of single pixels.
     pub roughness: f32,
@@ -24,8 +24,8 @@ pub struct Pattern {
     pub load_mpa_px: f32,
 }
 
-impl Pattern {
-    /// The pattern of a map (224 x 224, finite, not negative, Pa). Pressures whose squares an f32
+impl InputStatistics {
+    /// The statistics of a map (224 x 224, finite, not negative, Pa). Pressures whose squares an f32
     /// cannot hold are as none.
     #[must_use]
     pub fn of(map_pa: &[f32]) -> Self {
@@ -64,11 +64,12 @@ impl Pattern {
         }
     }
 
-    /// Whether a map with this pattern is unlike all whose greatest is `trained`.
+    /// Whether a map with these statistics is rougher or heavier than all whose greatest are
+    /// `trained`.
     #[must_use]
-    pub fn is_beyond(self, trained: Self) -> bool {
-        self.roughness > PATTERN_HEADROOM * trained.roughness
-            || self.load_mpa_px > PATTERN_HEADROOM * trained.load_mpa_px
+    pub fn is_out_of_distribution(self, trained: Self) -> bool {
+        self.roughness > TRAINED_HEADROOM * trained.roughness
+            || self.load_mpa_px > TRAINED_HEADROOM * trained.load_mpa_px
     }
 }
 
@@ -102,10 +103,10 @@ mod tests {
 
     #[test]
     fn a_flat_map_is_smooth_and_a_checkerboard_is_as_rough_as_can_be() {
-        let flat = Pattern::of(&drawn(|_, _| 2e4));
+        let flat = InputStatistics::of(&drawn(|_, _| 2e4));
         assert_eq!(flat.roughness.to_bits(), 0.0_f32.to_bits());
         assert!((flat.load_mpa_px / (2e-2 * MAP_LEN as f32) - 1.0).abs() < 1e-5, "{flat:?}");
-        let board = Pattern::of(&drawn(|y, x| if (x + y) % 2 == 0 { 1e4 } else { 0.0 }));
+        let board = InputStatistics::of(&drawn(|y, x| if (x + y) % 2 == 0 { 1e4 } else { 0.0 }));
         // 1, less the steps that the rim does not have.
         let due = (2.0 * 224.0 * 223.0) / (4.0 * 0.5 * 224.0 * 224.0);
         assert!((board.roughness - due).abs() < 1e-5, "{board:?}");
@@ -114,22 +115,30 @@ mod tests {
     #[test]
     fn nothing_and_next_to_nothing_have_no_pattern() {
         for pressure_pa in [0.0, -0.0, 1e-40] {
-            let pattern =
-                Pattern::of(&drawn(|y, x| if (x + y) % 2 == 0 { pressure_pa } else { 0.0 }));
-            assert!(!pattern.is_beyond(Pattern { roughness: 1e-3, load_mpa_px: 1e-3 }));
+            let found =
+                InputStatistics::of(&drawn(
+                    |y, x| if (x + y) % 2 == 0 { pressure_pa } else { 0.0 },
+                ));
+            assert!(
+                !found
+                    .is_out_of_distribution(InputStatistics { roughness: 1e-3, load_mpa_px: 1e-3 })
+            );
         }
     }
 
     #[test]
     fn either_number_tells() {
-        let trained = Pattern { roughness: 0.1, load_mpa_px: 50.0 };
-        for (roughness, load_mpa_px, is_beyond) in
+        let trained = InputStatistics { roughness: 0.1, load_mpa_px: 50.0 };
+        for (roughness, load_mpa_px, is_out_of_distribution) in
             [(0.1, 50.0, false), (0.104, 52.0, false), (0.106, 1.0, true), (0.01, 53.0, true)]
         {
-            assert_eq!(Pattern { roughness, load_mpa_px }.is_beyond(trained), is_beyond);
+            assert_eq!(
+                InputStatistics { roughness, load_mpa_px }.is_out_of_distribution(trained),
+                is_out_of_distribution
+            );
         }
-        let both = Pattern { roughness: 0.2, load_mpa_px: 1.0 }.max(trained);
-        assert_eq!(both, Pattern { roughness: 0.2, load_mpa_px: 50.0 });
+        let both = InputStatistics { roughness: 0.2, load_mpa_px: 1.0 }.max(trained);
+        assert_eq!(both, InputStatistics { roughness: 0.2, load_mpa_px: 50.0 });
     }
 
     proptest! {
@@ -139,7 +148,7 @@ mod tests {
             let mut random = fastrand::Rng::with_seed(seed);
             let map: Vec<f32> = (0..MAP_LEN).map(|_| peak_pa * random.f32().powi(3)).collect();
             let (roughness, load) = by_the_formula(&map);
-            let found = Pattern::of(&map);
+            let found = InputStatistics::of(&map);
             prop_assert!((f64::from(found.roughness) / roughness - 1.0).abs() < 1e-4);
             prop_assert!((f64::from(found.load_mpa_px) / load - 1.0).abs() < 1e-4);
         }

@@ -1,22 +1,21 @@
 //! `contact_window`, and the samples of a window.
 
 use bytes::BytesMut;
-use papilla_proto::{Problem, SampleType, Window};
-
-use crate::{codec::append, problem};
+use papilla_codec::append;
+use papilla_proto::{SampleError, SampleType, Window};
 
 /// Appends the samples of `window` to `bytes`; returns their scale. `value_max` is the value of
 /// the greatest unit, unless the window holds a greater one: nothing is clipped.
 ///
 /// # Errors
-/// Only faults of our own.
-pub(super) fn encode(
+/// Values that are not finite or below zero.
+pub(crate) fn encode(
     window: Window,
     sample_type: SampleType,
     map: &[f32],
     value_max: f32,
     bytes: &mut BytesMut,
-) -> Result<f32, Problem> {
+) -> Result<f32, SampleError> {
     let scale = if sample_type.is_scaled() {
         let values = window.rows().flat_map(|row| map.get(row).unwrap_or_default());
         let top = values.fold(value_max, |top, &v| if v > top { v } else { top });
@@ -24,13 +23,12 @@ pub(super) fn encode(
     } else {
         1.0
     };
-    let failed = |error| problem::internal("the window cannot be encoded", &error);
     if window == Window::WHOLE {
-        append(sample_type, map, scale, bytes).map_err(failed)?;
+        append(sample_type, map, scale, bytes)?;
         return Ok(scale);
     }
     let at = bytes.len();
     bytes.resize(at + window.pixel_count() * sample_type.bytes(), 0);
-    window.encode(sample_type, map, scale, &mut bytes[at..]).map_err(failed)?;
+    window.encode(sample_type, map, scale, &mut bytes[at..])?;
     Ok(scale)
 }

@@ -5,13 +5,13 @@ use std::io::{Cursor, Write};
 use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType};
 use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError, Limits, Transformations};
 
-use super::wrong_shape;
+use super::{EncodeError, refusal, wrong_shape};
 
 /// Memory the decoder may take beyond the image; a hostile file gets no further.
 const DECODER_BYTES_MAX: usize = 4 << 20;
 
 /// Whether `bytes` start like a PNG file.
-pub(crate) fn is_png(bytes: &[u8]) -> bool {
+pub fn is_png(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x89PNG\r\n\x1a\n")
 }
 
@@ -54,7 +54,7 @@ pub(super) fn decode(
         pixels.as_chunks_mut::<2>().0.iter_mut().for_each(|pair| pair.swap(0, 1));
     }
     let scale = pressure_max_pa / sample_type.unit_max();
-    sample_type.decode(&pixels, scale, pressure_pa).map_err(crate::problem::of_samples)
+    sample_type.decode(&pixels, scale, pressure_pa).map_err(refusal)
 }
 
 /// Writes a 16-bit gray PNG; full white is `white_j_per_m3`.
@@ -78,15 +78,18 @@ pub(super) fn encode(
     writer.finish()
 }
 
-/// Writes a mask as an 8-bit gray PNG, white where true.
-pub(crate) fn encode_mask(mask: &[bool], out: impl Write) -> Result<(), EncodingError> {
+/// Writes a mask, 224 x 224, as an 8-bit gray PNG, white where true.
+///
+/// # Errors
+/// A mask of another length, or `out` takes no more.
+pub fn encode_mask(mask: &[bool], out: impl Write) -> Result<(), EncodeError> {
     let pixels: Vec<u8> = mask.iter().map(|&inside| if inside { 255 } else { 0 }).collect();
     let mut encoder = Encoder::new(out, MAP_SIDE_PX as u32, MAP_SIDE_PX as u32);
     encoder.set_color(ColorType::Grayscale);
     encoder.set_depth(BitDepth::Eight);
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&pixels)?;
-    writer.finish()
+    Ok(writer.finish()?)
 }
 
 #[cfg(test)]

@@ -8,10 +8,8 @@ use papilla_proto::{
     atlas::Raster,
     effects::{Actuator, ActuatorInput, Layout, Place},
 };
-use serde::Serialize;
 
-use super::{Effects, Finger};
-use crate::core::latency::probe_map;
+use super::{Cost, Effects, Finger};
 
 /// Runs of which the fastest counts.
 const RUNS: u64 = 12;
@@ -19,25 +17,17 @@ const RUNS: u64 = 12;
 /// Points and actuators that the measurement takes.
 const PLACES: usize = 64;
 
-/// What an effect adds to a frame.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Cost {
-    #[serde(rename = "name")]
-    pub(crate) effect: RuntimeEffect,
-    /// Time, us; below zero where it saves more than it takes.
-    pub(crate) us: f64,
-}
-
-/// Times every effect on [`probe_map`] against the bare map, and keeps it for `/v1/effects`.
-pub(crate) fn measure(finger: Finger<'_>, pressure_max_pa: f32) {
+/// Times every effect on a contact, 224 x 224 values in Pa, against the bare map; keeps the costs
+/// in what the sessions on this finger share ([`Shared::costs`](super::Shared::costs)).
+pub fn measure(finger: Finger<'_>, contact_pa: &[f32]) {
     let bare = Hello { version: 2, effects: vec!["contact_window".to_owned()], ..Hello::default() };
     // An effect that cannot be set up here has no cost to tell of.
     let of = |hello: &Hello| Effects::of(hello, finger).ok().flatten();
-    let Some(base_us) = of(&bare).map(|effects| us(effects, pressure_max_pa)) else { return };
+    let Some(base_us) = of(&bare).map(|effects| us(effects, contact_pa)) else { return };
     let mut costs = Vec::new();
     for effect in RuntimeEffect::ALL {
         let hello = hello(effect, finger.interface);
-        let Some(us) = of(&hello).map(|effects| us(effects, pressure_max_pa)) else { continue };
+        let Some(us) = of(&hello).map(|effects| us(effects, contact_pa)) else { continue };
         let us = if effect == RuntimeEffect::ContactWindow { us } else { us - base_us };
         costs.push(Cost { effect, us: (10.0 * us).round() / 10.0 });
     }
@@ -76,20 +66,19 @@ fn hello(effect: RuntimeEffect, interface: &Raster) -> Hello {
 }
 
 /// Time of one frame's effects, us: the least of several.
-fn us(mut effects: Effects, pressure_max_pa: f32) -> f64 {
-    let [mut contact_pa, mut pressure_pa] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
-    probe_map(pressure_max_pa, &mut contact_pa);
+fn us(mut effects: Effects, contact_pa: &[f32]) -> f64 {
+    let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut bytes = BytesMut::with_capacity(effects.size_hint());
     let mut least = Duration::MAX;
     for run in 0..RUNS {
-        pressure_pa.copy_from_slice(&contact_pa);
+        pressure_pa.copy_from_slice(contact_pa);
         bytes.clear();
         bytes.resize(HEADER_LEN_V2, 0);
         let start = Instant::now();
         let time_us = run * 11_111;
         effects.before(&mut pressure_pa, time_us);
         // The pressure stands in for its SED: the times do not depend on the values.
-        if effects.write(&pressure_pa, &contact_pa, 1.0, time_us, &mut bytes).is_ok() {
+        if effects.write(&pressure_pa, contact_pa, 1.0, time_us, &mut bytes).is_ok() {
             least = least.min(start.elapsed());
         }
     }

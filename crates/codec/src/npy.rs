@@ -28,7 +28,7 @@ fn bad(message: impl Into<String>) -> Problem {
 }
 
 /// Whether `bytes` start like a `.npy` file.
-pub(crate) fn is_npy(bytes: &[u8]) -> bool {
+pub fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 

@@ -1,22 +1,40 @@
-//! The forms a map comes in and goes out in.
+//! The forms that a map comes in and goes out in: bare samples, numpy arrays, PNG, JSON.
+//!
+//! A map is 224 x 224 `f32`, row-major, row 0 at the tip of the finger. Bytes from outside are
+//! decoded within bounds: a file that claims more than a map is refused before it takes memory.
+//!
+//! ```
+//! use bytes::BytesMut;
+//! use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
+//!
+//! let pressure_pa = vec![250.0; papilla_proto::MAP_LEN];
+//! let map =
+//!     Map { quantity: Quantity::Pressure, values: &pressure_pa, value_max: 1e4, source: "example" };
+//! let mut npy = BytesMut::new();
+//! encode(Output::Npy, map, &mut npy)?;
+//!
+//! let mut back_pa = vec![0.0; papilla_proto::MAP_LEN];
+//! decode(Input::Npy, &npy, &mut back_pa)?;
+//! assert_eq!(back_pa, pressure_pa);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+#[cfg(any(test, fuzzing))]
+#[doc(hidden)]
+pub mod fuzz;
 mod json;
 mod npy;
 mod png;
 
-use std::fmt::Display;
-
 use bytes::{BufMut, BytesMut};
 use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType, Window};
 
-pub(crate) use npy::is_npy;
-pub(crate) use png::{encode_mask, is_png};
-
-use crate::problem;
+pub use npy::is_npy;
+pub use png::{encode_mask, is_png};
 
 /// How a pressure map is decoded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Input {
+pub enum Input {
     /// Bare samples; `scale` in Pa per unit for u16 and u8.
     Samples {
         /// Type of each sample.
@@ -46,7 +64,7 @@ pub(crate) enum Input {
 
 /// How a SED map is encoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Output {
+pub enum Output {
     /// Bare samples.
     Samples(SampleType),
     /// A numpy array file, f32, 224 x 224.
@@ -59,7 +77,7 @@ pub(crate) enum Output {
 
 impl Output {
     /// Bytes the encoded map needs, or a good guess.
-    pub(crate) fn size_hint(self) -> usize {
+    pub fn size_hint(self) -> usize {
         match self {
             Self::Samples(sample_type) => MAP_LEN * sample_type.bytes(),
             Self::Npy => npy::HEADER_LEN + MAP_LEN * 4,
@@ -69,7 +87,7 @@ impl Output {
     }
 
     /// The content type of the encoded map.
-    pub(crate) fn content_type(self) -> &'static str {
+    pub fn content_type(self) -> &'static str {
         match self {
             Self::Samples(_) => "application/octet-stream",
             Self::Npy => "application/x-npy",
@@ -83,13 +101,13 @@ impl Output {
 ///
 /// # Errors
 /// The bytes are not a map of that form.
-pub(crate) fn decode(input: Input, bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Problem> {
+pub fn decode(input: Input, bytes: &[u8], pressure_pa: &mut [f32]) -> Result<(), Problem> {
     match input {
         Input::Samples { sample_type, scale } => {
-            sample_type.decode(bytes, scale, pressure_pa).map_err(problem::of_samples)
+            sample_type.decode(bytes, scale, pressure_pa).map_err(refusal)
         }
         Input::Window { window, sample_type, scale } => {
-            window.decode(sample_type, bytes, scale, pressure_pa).map_err(problem::of_samples)
+            window.decode(sample_type, bytes, scale, pressure_pa).map_err(refusal)
         }
         Input::Npy => npy::decode(bytes, pressure_pa),
         Input::Png { pressure_max_pa } => png::decode(bytes, pressure_max_pa, pressure_pa),
@@ -97,9 +115,30 @@ pub(crate) fn decode(input: Input, bytes: &[u8], pressure_pa: &mut [f32]) -> Res
     }
 }
 
+/// The refusal of samples: what is wrong, and whether the payload or its scale is.
+fn refusal(error: SampleError) -> Problem {
+    let field = if error.code() == ErrorCode::BadScale { "scale" } else { "payload" };
+    Problem::new(error.code(), error.to_string()).at(field)
+}
+
+/// Why a map could not be encoded: always a fault of the caller or of this crate, never of what a
+/// client sent.
+#[derive(Debug, thiserror::Error)]
+pub enum EncodeError {
+    /// Samples do not fit their type or their room.
+    #[error(transparent)]
+    Samples(#[from] SampleError),
+    /// The image cannot be written.
+    #[error(transparent)]
+    Png(#[from] ::png::EncodingError),
+    /// The JSON cannot be written.
+    #[error(transparent)]
+    Json(#[from] std::io::Error),
+}
+
 /// What a map shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Quantity {
+pub enum Quantity {
     /// Pressure on the skin, Pa.
     Pressure,
     /// Strain energy density at the interface, J/m3.
@@ -108,20 +147,21 @@ pub(crate) enum Quantity {
 
 /// A map to encode.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Map<'a> {
-    pub(crate) quantity: Quantity,
+pub struct Map<'a> {
+    /// What it shows.
+    pub quantity: Quantity,
     /// [`MAP_LEN`] samples, finite, not negative.
-    pub(crate) values: &'a [f32],
+    pub values: &'a [f32],
     /// The value that scaled forms map to their greatest unit. A map that goes beyond
     /// is scaled by its own maximum: it does not clip.
-    pub(crate) value_max: f32,
+    pub value_max: f32,
     /// What made it; goes into JSON.
-    pub(crate) source: &'a str,
+    pub source: &'a str,
 }
 
 /// The scale of a map whose greatest value is `value_max`: the value of one unit (u16,
 /// u8), of full white (PNG), else 1.
-pub(crate) fn scale_of(output: Output, value_max: f32) -> f32 {
+pub fn scale_of(output: Output, value_max: f32) -> f32 {
     match output {
         Output::Samples(t) if t.is_scaled() => value_max / t.unit_max(),
         Output::Png => value_max,
@@ -132,9 +172,8 @@ pub(crate) fn scale_of(output: Output, value_max: f32) -> f32 {
 /// Appends `map` in the form `output` to `bytes`; returns its scale, see [`scale_of`].
 ///
 /// # Errors
-/// Only faults of our own.
-pub(crate) fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Result<f32, Problem> {
-    let failed = |error: &dyn Display| problem::internal("the map cannot be encoded", error);
+/// Values that are not finite, or below zero.
+pub fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Result<f32, EncodeError> {
     let values = map.values;
     let scale = match output {
         Output::Samples(SampleType::F32 | SampleType::F16) | Output::Npy | Output::Json => 1.0,
@@ -144,12 +183,10 @@ pub(crate) fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Resu
         }
     };
     match output {
-        Output::Samples(sample_type) => {
-            append(sample_type, values, scale, bytes).map_err(|e| failed(&e))?;
-        }
+        Output::Samples(sample_type) => append(sample_type, values, scale, bytes)?,
         Output::Npy => npy::encode(values, bytes),
-        Output::Png => png::encode(values, scale, bytes.writer()).map_err(|e| failed(&e))?,
-        Output::Json => json::encode(map, bytes.writer()).map_err(|e| failed(&e))?,
+        Output::Png => png::encode(values, scale, bytes.writer())?,
+        Output::Json => json::encode(map, bytes.writer())?,
     }
     Ok(scale)
 }
@@ -157,8 +194,8 @@ pub(crate) fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Resu
 /// Appends samples to `bytes`; values as they are, where they can be, are copied once.
 ///
 /// # Errors
-/// Only faults of our own.
-pub(crate) fn append(
+/// A scale that is none.
+pub fn append(
     sample_type: SampleType,
     values: &[f32],
     scale: f32,

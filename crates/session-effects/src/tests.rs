@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     MAP_SIDE_PX, Summary,
-    atlas::{Patch, PatchVertices},
+    atlas::{Atlas, Patch, PatchVertices, Raster},
     effects::{
         Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place, PronyTerm,
         Relaxation as RelaxationParameters,
@@ -11,7 +11,6 @@ use papilla_proto::{
 use proptest::prelude::*;
 
 use super::*;
-use crate::core::catalogue::Catalogue;
 
 /// A plane patch, 0.1 mm a pixel, from pixel 20 to 200 both ways: x = 0.1 v, y = -0.1 u, z = -0.5.
 fn plane_atlas() -> Atlas {
@@ -23,13 +22,29 @@ fn plane_atlas() -> Atlas {
 }
 
 pub(super) fn plane() -> Geometry {
-    let atlas = plane_atlas();
-    let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
+    let Owned { atlas, skin, interface, .. } = Owned::plane();
     Geometry::new(&atlas, &skin, &interface)
 }
 
-fn catalogue() -> Catalogue {
-    Catalogue::bare(plane_atlas(), Vec::new())
+/// A finger of its own.
+struct Owned {
+    atlas: Atlas,
+    skin: Raster,
+    interface: Raster,
+    shared: Shared,
+}
+
+impl Owned {
+    fn plane() -> Self {
+        let atlas = plane_atlas();
+        let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
+        Self { atlas, skin, interface, shared: Shared::default() }
+    }
+
+    fn finger(&self) -> Finger<'_> {
+        let Self { atlas, skin, interface, shared } = self;
+        Finger { atlas, skin, interface, shared }
+    }
 }
 
 fn hello(effects: &[&str]) -> Hello {
@@ -64,23 +79,23 @@ fn areas_are_those_of_the_finger() {
 
 #[test]
 fn a_bare_map_has_no_effects_and_costs_nothing() {
-    let catalogue = catalogue();
-    assert!(Effects::of(&hello(&["layers"]), catalogue.finger()).unwrap().is_none());
+    let plane = Owned::plane();
+    assert!(Effects::of(&hello(&["layers"]), plane.finger()).unwrap().is_none());
     let hello = Hello { map: Some(true), ..hello(&[]) };
-    assert!(Effects::of(&hello, catalogue.finger()).unwrap().is_none());
-    assert!(catalogue.runtime.geometry.get().is_none(), "nobody asked for areas");
+    assert!(Effects::of(&hello, plane.finger()).unwrap().is_none());
+    assert!(plane.shared.geometry.get().is_none(), "nobody asked for areas");
 }
 
 #[test]
 fn sections_lie_where_they_are_said_to_be() {
-    let catalogue = catalogue();
+    let plane = Owned::plane();
     let wish = Hello {
         points: Some(vec![Place::Px([100.5, 100.5]), Place::Px([101.5, 100.5])]),
         actuators: Some(display()),
         contact_window: Some(ContactWindow { margin_px: 1 }),
         ..hello(&["contact_window", "summary", "points", "actuators"])
     };
-    let mut effects = Effects::of(&wish, catalogue.finger()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, plane.finger()).unwrap().unwrap();
     let found: Vec<_> = effects.sections.iter().map(|s| (s.name, s.offset, s.bytes)).collect();
     let due = [
         (SectionName::Summary, 48, 64),
@@ -108,7 +123,7 @@ fn sections_lie_where_they_are_said_to_be() {
 #[test]
 fn no_map_is_no_map() {
     let wish = Hello { map: Some(false), ..hello(&["summary"]) };
-    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     assert_eq!((effects.sections.len(), effects.size_hint()), (1, 112));
     let map = vec![1.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
@@ -119,7 +134,7 @@ fn no_map_is_no_map() {
 #[test]
 fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
     let wish = hello(&["relaxation", "summary", "contact_window"]);
-    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     let press = |effects: &mut Effects, pa: f32, time_us| {
         let mut map = vec![0.0; MAP_LEN];
         map[100 * MAP_SIDE_PX + 100] = pa;
@@ -145,7 +160,7 @@ fn afferents_show_rates_in_map_points_and_if_asked_actuators() {
         answer_sample_type: Some(SampleType::U16),
         ..hello(&["afferents", "points", "actuators", "summary"])
     };
-    let mut effects = Effects::of(&wish, catalogue().finger()).unwrap().unwrap();
+    let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     // 20 kPa at 80 kPa: 12 Hz.
     let map = vec![2500.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
@@ -163,7 +178,7 @@ fn afferents_show_rates_in_map_points_and_if_asked_actuators() {
 
 #[test]
 fn wishes_that_contradict_themselves_are_refused() {
-    let catalogue = catalogue();
+    let plane = Owned::plane();
     let none = || hello(&[]);
     for (wish, field) in [
         (hello(&["points"]), "points"),
@@ -182,7 +197,7 @@ fn wishes_that_contradict_themselves_are_refused() {
             "actuators",
         ),
     ] {
-        let problem = Effects::of(&wish, catalogue.finger()).unwrap_err();
+        let problem = Effects::of(&wish, plane.finger()).unwrap_err();
         assert_eq!(problem.code, ErrorCode::BadEffect, "{problem}");
         assert_eq!(problem.field.as_deref(), Some(field), "{problem}");
     }
@@ -190,15 +205,15 @@ fn wishes_that_contradict_themselves_are_refused() {
 
 #[test]
 fn every_effect_has_a_cost() {
-    let catalogue = catalogue();
-    assert!(catalogue.runtime.costs().is_none());
-    measure(catalogue.finger(), 1.0);
-    let costs = catalogue.runtime.costs().unwrap();
+    let plane = Owned::plane();
+    assert!(plane.shared.costs().is_none());
+    measure(plane.finger(), &vec![1.0; MAP_LEN]);
+    let costs = plane.shared.costs().unwrap();
     let names: Vec<_> = costs.iter().map(|cost| cost.effect).collect();
     assert_eq!(names, RuntimeEffect::ALL);
     assert!(costs.iter().all(|cost| cost.us.is_finite()), "{costs:?}");
     let window = costs.iter().find(|c| c.effect == RuntimeEffect::ContactWindow).unwrap();
-    assert_eq!(catalogue.runtime.cost_us(&[window.effect]), window.us.ceil() as u64);
+    assert_eq!(plane.shared.cost_us(&[window.effect]), window.us.ceil() as u64);
 }
 
 proptest! {
@@ -227,7 +242,7 @@ proptest! {
             actuators: Some(Layout { gain: Some(gain), ..display() }),
             ..hello(&["relaxation", "afferents", "points", "actuators", "summary"])
         };
-        let Ok(Some(mut effects)) = Effects::of(&wish, catalogue().finger()) else { return Ok(()) };
+        let Ok(Some(mut effects)) = Effects::of(&wish, Owned::plane().finger()) else { return Ok(()) };
         for time_us in times_us {
             let mut map = vec![pressure_pa; MAP_LEN];
             let peak_pa = effects.before(&mut map, time_us).unwrap();

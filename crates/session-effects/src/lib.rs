@@ -1,13 +1,47 @@
 //! What a session asks for beside the SED map; one file an effect.
 //!
-//! All of it runs on the inference threads, in this order: `relaxation` before the network,
-//! `afferents` after it, and then whatever reads their results. **Invariant:** what the hello did
-//! not name is neither computed nor allocated; what it named allocates at the hello and never
-//! in a frame.
+//! A frame meets them in this order: `relaxation` before the network, `afferents` after it, and
+//! then whatever reads their results. **Invariant:** what the hello did not name is neither
+//! computed nor allocated; what it named allocates at the hello and never in a frame.
+//!
+//! ```
+//! use bytes::BytesMut;
+//! use papilla_proto::{
+//!     HEADER_LEN_V2, Hello, MAP_LEN, Summary,
+//!     atlas::{Atlas, Patch, PatchVertices, Raster},
+//! };
+//! use papilla_session_effects::{Effects, Finger, Shared};
+//!
+//! // A plane finger: both surfaces are one square of 18 mm, 0.1 mm a pixel.
+//! let uv_px = vec![[20.0, 20.0], [200.0, 20.0], [200.0, 200.0], [20.0, 200.0]];
+//! let positions_mm = uv_px.iter().map(|[u, v]| [0.1 * v, -0.1 * u, 0.0]).collect();
+//! let patch = PatchVertices { positions_mm, uv_px };
+//! let atlas = Atlas::new(0.1, vec![[0, 2, 1], [0, 3, 2]], patch.clone(), patch)?;
+//! let [skin, interface] = [Patch::Skin, Patch::Interface].map(|of| Raster::new(&atlas, of));
+//! let shared = Shared::default();
+//! let finger = Finger { atlas: &atlas, skin: &skin, interface: &interface, shared: &shared };
+//!
+//! let hello = Hello {
+//!     version: 2,
+//!     effects: vec!["summary".to_owned()],
+//!     map: Some(false),
+//!     ..Hello::default()
+//! };
+//! let mut effects = Effects::of(&hello, finger)?.expect("the hello names one");
+//!
+//! let (pressure_pa, sed_j_per_m3) = (vec![1000.0; MAP_LEN], vec![5.0; MAP_LEN]);
+//! let mut answer = BytesMut::zeroed(HEADER_LEN_V2);
+//! effects.write(&pressure_pa, &sed_j_per_m3, 100.0, 0, &mut answer)?;
+//! let summary = Summary::decode(&answer[HEADER_LEN_V2..]).expect("it lies there");
+//! // 1000 Pa on 324 mm2.
+//! assert!((summary.force_n - 0.324).abs() < 1e-4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod actuators;
 mod afferents;
 mod cost;
+mod finger;
 mod geometry;
 mod points;
 mod relaxation;
@@ -17,68 +51,30 @@ mod window;
 #[cfg(test)]
 mod tests;
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use bytes::BytesMut;
 use papilla_proto::{
     ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
-    SampleType, Window,
-    atlas::{Atlas, Raster},
+    SampleError, SampleType, Window,
     effects::{ActuatorInput, Section, SectionName},
 };
 
-pub(crate) use cost::{Cost, measure};
-pub(crate) use geometry::Geometry;
+pub use cost::measure;
+pub use finger::{Cost, Finger, Shared};
 
 use self::{
-    actuators::Actuators, afferents::Afferents, points::Points, relaxation::Relaxation,
-    summary::Contact,
+    actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,
+    relaxation::Relaxation, summary::Contact,
 };
-/// The finger that effects are placed on, and what all sessions on it share.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Finger<'a> {
-    pub(crate) atlas: &'a Atlas,
-    pub(crate) skin: &'a Raster,
-    pub(crate) interface: &'a Raster,
-    pub(crate) shared: &'a Shared,
-}
-
-impl Finger<'_> {
-    /// Areas and places of its pixels.
-    fn geometry(&self) -> Arc<Geometry> {
-        let make = || Arc::new(Geometry::new(self.atlas, self.skin, self.interface));
-        Arc::clone(self.shared.geometry.get_or_init(make))
-    }
-}
-
-/// What all sessions on one catalogue share; made when it is first asked for.
-#[derive(Debug, Default)]
-pub(crate) struct Shared {
-    geometry: OnceLock<Arc<Geometry>>,
-    costs: OnceLock<Vec<Cost>>,
-}
-
-impl Shared {
-    /// What each effect costs here; none without a calibration.
-    pub(crate) fn costs(&self) -> Option<&[Cost]> {
-        self.costs.get().map(Vec::as_slice)
-    }
-
-    /// What these effects add to a frame, us.
-    pub(crate) fn cost_us(&self, effects: &[RuntimeEffect]) -> u64 {
-        let costs = self.costs.get().into_iter().flatten();
-        let us: f64 = costs.filter(|cost| effects.contains(&cost.effect)).map(|cost| cost.us).sum();
-        us.ceil() as u64
-    }
-}
 
 /// The effects of one session and their state.
 #[derive(Debug)]
-pub(crate) struct Effects {
+pub struct Effects {
     /// Those that were asked for, in the order in which they act.
-    pub(crate) names: Vec<RuntimeEffect>,
+    names: Vec<RuntimeEffect>,
     /// What the payload of an answer holds.
-    pub(crate) sections: Vec<Section>,
+    sections: Vec<Section>,
     sample_type: SampleType,
     contact_pa: f32,
     map: bool,
@@ -92,13 +88,13 @@ pub(crate) struct Effects {
 
 /// What [`Effects::write`] put into an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Written {
+pub struct Written {
     /// What the samples show.
-    pub(crate) kind: FrameKind,
+    pub kind: FrameKind,
     /// The pixels whose samples were written.
-    pub(crate) window: Window,
+    pub window: Window,
     /// Unit of scaled samples.
-    pub(crate) scale: f32,
+    pub scale: f32,
 }
 
 /// A refusal of an effect's parameters.
@@ -113,7 +109,7 @@ impl Effects {
     ///
     /// # Errors
     /// Parameters are unusable, missing, or of an effect that is not named.
-    pub(crate) fn of(hello: &Hello, finger: Finger<'_>) -> Result<Option<Self>, Problem> {
+    pub fn of(hello: &Hello, finger: Finger<'_>) -> Result<Option<Self>, Problem> {
         let names = named(hello)?;
         let contact_pa = hello.contact_pa.unwrap_or(0.0);
         if !(contact_pa.is_finite() && contact_pa >= 0.0) {
@@ -163,11 +159,12 @@ impl Effects {
             points,
             actuators,
         };
-        effects.sections = effects.sections();
+        effects.sections = effects.laid_out();
         Ok(Some(effects))
     }
 
-    fn sections(&self) -> Vec<Section> {
+    /// Each section with its place behind the header.
+    fn laid_out(&self) -> Vec<Section> {
         let floats = |count: usize| 4 * count;
         let parts = [
             (SectionName::Summary, self.summary.as_ref().map(|_| SUMMARY_LEN)),
@@ -188,26 +185,40 @@ impl Effects {
         sections
     }
 
+    /// The effects that were asked for, in the order in which they act.
+    #[must_use]
+    pub fn names(&self) -> &[RuntimeEffect] {
+        &self.names
+    }
+
+    /// What the payload of an answer holds.
+    #[must_use]
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
     /// What the map of an answer shows.
-    pub(crate) fn kind(&self) -> FrameKind {
+    fn kind(&self) -> FrameKind {
         if self.afferents.is_some() { FrameKind::Sa1Rate } else { FrameKind::Sed }
     }
 
     /// The greatest value to expect of what the map shows, where SED reaches `sed_max_j_per_m3`.
-    pub(crate) fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
+    #[must_use]
+    pub fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
         self.afferents
             .as_ref()
             .map_or(sed_max_j_per_m3, |afferents| afferents.value_max(sed_max_j_per_m3))
     }
 
     /// Most bytes of an answer, its header included.
-    pub(crate) fn size_hint(&self) -> usize {
+    #[must_use]
+    pub fn size_hint(&self) -> usize {
         self.sections.last().map_or(HEADER_LEN_V2, |s| (s.offset + s.bytes) as usize)
     }
 
     /// What acts before the network: turns the pressure that was sent into that which the elastic
     /// map is to be asked about. The greatest pressure that results; none if nothing changed.
-    pub(crate) fn before(&mut self, pressure_pa: &mut [f32], time_us: u64) -> Option<f32> {
+    pub fn before(&mut self, pressure_pa: &mut [f32], time_us: u64) -> Option<f32> {
         self.relaxation.as_mut().map(|relaxation| relaxation.step(pressure_pa, time_us))
     }
 
@@ -215,14 +226,17 @@ impl Effects {
     ///
     /// `pressure_pa` is what [`before`](Self::before) left, `sed_max_j_per_m3` the SED that
     /// scaled samples map to their greatest unit.
-    pub(crate) fn write(
+    ///
+    /// # Errors
+    /// Values of the map that are not finite or below zero: a fault of the caller.
+    pub fn write(
         &mut self,
         pressure_pa: &[f32],
         sed_j_per_m3: &[f32],
         sed_max_j_per_m3: f32,
         time_us: u64,
         bytes: &mut BytesMut,
-    ) -> Result<Written, Problem> {
+    ) -> Result<Written, SampleError> {
         let value_max = self.value_max(sed_max_j_per_m3);
         if let Some(afferents) = &mut self.afferents {
             afferents.step(sed_j_per_m3, time_us);
