@@ -82,14 +82,11 @@ impl ContactSurface {
         let Some(deformed) = self.deformed_points(rule, surface, x) else {
             return self.nodal_pressure_mpa(traction_mpa, surface, x);
         };
-        let deformed = deformed.area_mm2;
-        let true_mpa: Vec<f64> = traction_mpa
-            .iter()
-            .zip(&points.area_mm2)
-            .zip(&deformed)
-            .map(|((t, undeformed), deformed)| t * undeformed / deformed)
-            .collect();
-        points.mean_at_nodes(&true_mpa, &deformed, self.nodes())
+        let force_and_area = points.shared_out(
+            |q| [traction_mpa[q] * points.area_mm2[q], deformed.area_mm2[q]],
+            self.nodes(),
+        );
+        force_and_area.iter().map(|[f, a]| if *a > 0.0 { f / a } else { 0.0 }).collect()
     }
 
     /// The Gauss points of a rule where `surface` is at the positions `x`; `None` at nodes.

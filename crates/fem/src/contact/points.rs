@@ -121,29 +121,25 @@ impl ContactPoints {
         points
     }
 
-    /// Mean of a quantity over the points around each of the sorted `nodes`, `weight` their
-    /// share of it: `sum_q w_q phi_a(q) v_q / sum_q w_q phi_a(q)` with functions that are
-    /// linear between neighbouring nodes, so that what is positive stays so.
+    /// A quantity of the points shared out among the sorted `nodes` around each, by functions that
+    /// are linear between neighbouring nodes: what is positive stays so, and so does the sum.
     #[must_use]
-    pub fn mean_at_nodes(&self, value: &[f64], weight: &[f64], nodes: &[u32]) -> Vec<f64> {
-        let (mut sum, mut total) = (vec![0.0; nodes.len()], vec![0.0; nodes.len()]);
-        for (point, (v, w)) in value.iter().zip(weight).enumerate() {
-            let range = self.range(point);
-            for (n, phi) in self.node[range.clone()].iter().zip(&self.hat[range]) {
+    pub(crate) fn shared_out<const N: usize>(
+        &self,
+        value: impl Fn(usize) -> [f64; N],
+        nodes: &[u32],
+    ) -> Vec<[f64; N]> {
+        let mut sum = vec![[0.0; N]; nodes.len()];
+        for point in 0..self.len() {
+            let (range, value) = (self.range(point), value(point));
+            for (n, hat) in self.node[range.clone()].iter().zip(&self.hat[range]) {
                 let Ok(at) = nodes.binary_search(n) else { continue };
-                sum[at] += w * phi * v;
-                total[at] += w * phi;
+                for i in 0..N {
+                    sum[at][i] += hat * value[i];
+                }
             }
         }
-        sum.iter().zip(&total).map(|(s, t)| if *t > 0.0 { s / t } else { 0.0 }).collect()
-    }
-
-    /// A nodal quantity at a point, linear between neighbouring nodes.
-    #[must_use]
-    pub(crate) fn linear_at(&self, point: usize, nodal: &[f64]) -> f64 {
-        let range = self.range(point);
-        let nodes = self.node[range.clone()].iter();
-        nodes.zip(&self.hat[range]).map(|(&n, hat)| hat * nodal[n as usize]).sum()
+        sum
     }
 
     /// Number of points.

@@ -11,7 +11,7 @@ use crate::material::{Isochoric, LinearElastic, NeoHookean, Ogden, Prony, Relaxi
 use crate::tensor::{Kinematics, Mat3};
 use std::sync::Arc;
 
-/// HistoryVariables of one element over a time step.
+/// History variables of one element over a time step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HistoryVariables<'a> {
     /// History of each quadrature point at the start of the step; empty for

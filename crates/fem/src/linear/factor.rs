@@ -29,7 +29,7 @@ fn scratch(system: &SymbolicSystem) -> StackReq {
         .or(s.solve_in_place_scratch::<f64>(1, Par::Seq))
 }
 
-/// HistoryVariables for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
+/// Memory for one numeric factor. It becomes a [`NumericFactor`] and comes back from it
 /// ([`NumericFactor::release`]): to factorize anew allocates nothing. Nothing can be solved with
 /// it.
 pub struct FactorMemory(Box<Buffers>);
@@ -45,7 +45,7 @@ struct Buffers {
 }
 
 impl FactorMemory {
-    /// HistoryVariables for factors on `structure`.
+    /// Memory for factors on `structure`.
     ///
     /// # Errors
     /// [`FactorError::HistoryVariables`].

@@ -138,7 +138,7 @@ impl SymbolicSystem {
         }
     }
 
-    /// HistoryVariables of pattern, scatter maps and symbolic factorization, bytes.
+    /// Memory of pattern, scatter maps and symbolic factorization, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let scatter: usize = self.scatter.iter().map(Vec::len).sum();

@@ -1,4 +1,4 @@
-//! HistoryVariables of materials that have one: its move over a step, and the energy of a body with
+//! History variables of viscoelastic materials: their move over a step, and the energy of a body with
 //! it.
 
 use super::history_layout::HistoryLayout;

@@ -141,14 +141,25 @@ impl<'a> Solver<'a> {
         let normal = |x| self.distance(x).map_or([0.0; 3], |d| d.normal);
         let mut total = [0.0; 3];
         let contact = self.newton.problem.contact.as_ref();
-        if let Some(points) =
-            contact.and_then(|c| c.deformed_points(self.contact_rule(), surface, &x))
-        {
-            for (q, (support, area)) in points.iter().enumerate() {
-                let force_n = area * points.linear_at(q, pressure);
+        let rule = self.contact_rule();
+        if let Some(points) = contact.and_then(|c| c.deformed_points(rule, surface, &x)) {
+            // The direction at a node is the mean of those at points around it, by their forces
+            // (shorter than 1 where they differ).
+            let tractions = &self.newton.current.traction_mpa;
+            let push = |q: usize| {
+                let force_n = tractions[q] * contact.map_or(0.0, |c| c.points(rule).area_mm2[q]);
+                let direction = if force_n > 0.0 {
+                    normal(points.support(q).of(|n| x[n])).map(|v| v * force_n)
+                } else {
+                    [0.0; 3]
+                };
+                [points.area_mm2[q], force_n, direction[0], direction[1], direction[2]]
+            };
+            let nodes = contact.map_or(&[][..], |c| c.nodes());
+            for (&n, [area, force_n, d @ ..]) in nodes.iter().zip(points.shared_out(push, nodes)) {
                 if force_n > 0.0 {
-                    let push = normal(support.of(|n| x[n]));
-                    total = std::array::from_fn(|i| total[i] + force_n * push[i]);
+                    let scale = pressure[n as usize] * area / force_n;
+                    total = std::array::from_fn(|i| total[i] + scale * d[i]);
                 }
             }
             return total;

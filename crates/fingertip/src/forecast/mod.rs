@@ -32,7 +32,7 @@ pub struct Forecast {
     pub factor_entries: usize,
     /// Multiplications and additions of one factorization.
     pub factor_flops: f64,
-    /// HistoryVariables of the process while it solves, bytes.
+    /// Memory of the process while it solves, bytes.
     pub memory_bytes: usize,
     /// HistoryVariables that one factorization of an indefinite tangent would add, bytes.
     pub memory_indefinite_bytes: usize,
@@ -64,7 +64,7 @@ const FACTOR_EFFICIENCY: f64 = 0.75;
 const FACTOR_BYTES_PER_ENTRY: f64 = 180.0;
 /// Share of the streaming speed that the triangular solves reach on those meshes.
 const SOLVE_EFFICIENCY: f64 = 0.36;
-/// HistoryVariables of the process without a scene, bytes.
+/// Memory of the process without a scene, bytes.
 const BASE_BYTES: usize = 8 << 20;
 
 impl Forecast {
@@ -104,7 +104,7 @@ impl Forecast {
     }
 }
 
-/// HistoryVariables of the process while it solves, bytes.
+/// Memory of the process while it solves, bytes.
 fn memory_bytes(problem: &Problem) -> usize {
     let (mesh, system) = (&problem.mesh, &problem.system);
     let elements: usize = mesh

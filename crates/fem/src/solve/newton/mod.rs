@@ -57,7 +57,7 @@ impl Held {
     }
 }
 
-/// HistoryVariables and counters of the iteration.
+/// Memory and counters of the iteration.
 pub(super) struct Newton<'a> {
     pub problem: &'a Problem,
     pub options: Options,
