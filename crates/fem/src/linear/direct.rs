@@ -24,7 +24,7 @@ impl<'a> Direct<'a> {
     /// Factorizes `matrix`, whose pattern is that of `structure`.
     ///
     /// # Errors
-    /// [`FactorError::NotPositiveDefinite`], or [`FactorError::HistoryVariables`].
+    /// [`FactorError::NotPositiveDefinite`], or [`FactorError::Memory`].
     pub fn new(
         system: &'a SymbolicSystem,
         matrix: &SymmetricMatrix,

@@ -48,7 +48,7 @@ impl FactorMemory {
     /// Memory for factors on `structure`.
     ///
     /// # Errors
-    /// [`FactorError::HistoryVariables`].
+    /// [`FactorError::Memory`].
     pub fn new(system: &SymbolicSystem) -> Result<Self, FactorError> {
         let scratch = MemBuffer::try_new(scratch(system))
             .map_err(|_| FactorError::Memory(system.factor_entries()))?;

@@ -287,7 +287,8 @@ fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
     let to = depths_mm[i];
     let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
     let coarse: &[f64] = match i {
-        0 => &[0.0, 0.1, 0.35, 1.0],
+        0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
+        1 => &[0.0, 0.5, 1.0],
         _ => &[0.0, 1.0],
     };
     let at = |part: f64| from + part * (to - from);
