@@ -1,0 +1,457 @@
+//! A finger's contact from frame to frame.
+//!
+//! A frame linearises the distance of every displaced vertex from the nearest object, solves for
+//! forces along the objects' normals, displaces the vertices under them, and repeats. It starts
+//! from the forces of the last frame. Objects that jumped deep into the skin are drawn back along
+//! the skin's normals and brought in by steps, so that each vertex meets the side that it
+//! would have met on the way.
+
+use crate::answer::{Contact, Effort, Person, collect};
+use crate::bounded::{BoundedSolver, Symmetric};
+use crate::clusters::Clusters;
+use crate::error::ContactError;
+use crate::ladder::Method;
+use crate::model::ContactModel;
+use crate::objects::{Object, View, validate};
+use crate::patch::{Patch, Slots};
+use crate::second_order::Amplitudes;
+use crate::springs;
+use std::sync::Arc;
+
+/// Undeformed vertices nearer than this may come into contact, reference mm.
+const CANDIDATE_MM: f64 = 0.6;
+/// Displaced vertices nearer than this may carry force in this frame, reference mm.
+const NEAR_MM: f32 = 0.08;
+/// Deepest that a displaced vertex may lie in an object before objects are brought in by steps.
+const STEP_MM: f64 = 0.25;
+/// Most steps.
+const STEPS_MAX: u32 = 16;
+/// Farthest that objects are drawn back, reference mm.
+const BACK_MAX_MM: f64 = 8.0;
+/// Linearisations in a step on the way.
+const ITERATIONS_ON_THE_WAY: u32 = 3;
+/// Linearisations in a frame's last step.
+const ITERATIONS_MAX: u32 = 25;
+/// Change of displacement that ends a frame, reference mm.
+const SETTLED_MM: f32 = 5e-5;
+/// Change of displacement above which an answer is not settled, reference mm.
+const UNSETTLED_MM: f32 = 1e-3;
+/// Violation of a complementarity condition that is accepted, reference mm.
+const VIOLATION_MM: f32 = 1e-5;
+/// Most products with the matrix in a complementarity solve.
+const PRODUCTS_MAX: u32 = 200;
+/// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
+const TURN_MAX: f32 = 0.05;
+/// Range of the over- or under-relaxation.
+const RELAXATION: [f32; 2] = [0.3, 2.5];
+/// Range of the share of tangent compliance that the second order takes.
+const SHARE: [f32; 2] = [-0.1, 0.3];
+/// Smallest and largest factor of a person.
+const PERSON: [f64; 2] = [0.25, 4.0];
+
+/// What a solver is to do in each frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// How pressure is found.
+    pub method: Method,
+    /// Whose finger it is.
+    pub person: Person,
+    /// Whether to find the local stiffness too.
+    pub stiffness: bool,
+}
+
+/// Contact of one finger. All memory is taken at construction.
+#[derive(Debug)]
+pub struct Solver {
+    model: Arc<ContactModel>,
+    settings: Settings,
+    clusters: Clusters,
+    patch: Patch,
+    bounded: BoundedSolver,
+    amplitudes: Option<Amplitudes>,
+    /// Compliance along normals, rows as in the patch, and the normals that it was made for.
+    matrix: Vec<f32>,
+    made_for: [Vec<f32>; 3],
+    made: usize,
+    rest: Vec<f32>,
+    wanted: Vec<bool>,
+    candidates: Vec<u32>,
+    overflow: bool,
+}
+
+impl Solver {
+    /// A solver of a finger that nothing touches yet.
+    ///
+    /// # Errors
+    /// [`ContactError::Value`] for factors of a person out of range.
+    pub fn new(model: Arc<ContactModel>, settings: Settings) -> Result<Self, ContactError> {
+        let Person { width, stiffness } = settings.person;
+        for (member, value) in [("person.width", width), ("person.stiffness", stiffness)] {
+            if !(PERSON[0]..=PERSON[1]).contains(&value) {
+                return Err(ContactError::Value { member, value, rule: "has to be 0.25 to 4" });
+            }
+        }
+        let patch = Patch::new(model.vertices());
+        let slots = patch.stride();
+        let second_order =
+            model.second_order.as_ref().filter(|_| settings.method.has_second_order());
+        Ok(Self {
+            clusters: Clusters::new(&model.positions_mm),
+            bounded: BoundedSolver::new(slots),
+            amplitudes: second_order.map(|s| s.amplitudes()),
+            matrix: vec![0.0; slots * slots],
+            made_for: std::array::from_fn(|_| vec![0.0; slots]),
+            made: 0,
+            rest: vec![0.0; slots],
+            wanted: vec![false; model.vertices()],
+            candidates: Vec::with_capacity(model.vertices()),
+            overflow: false,
+            patch,
+            model,
+            settings,
+        })
+    }
+
+    /// Forgets the last frame.
+    pub fn reset(&mut self) {
+        self.patch.clear();
+        self.made = 0;
+    }
+
+    /// The model that it solves with.
+    #[must_use]
+    pub fn model(&self) -> &ContactModel {
+        &self.model
+    }
+
+    /// Finds what presses on the finger where `objects` are; they are in the finger's frame, in mm
+    /// of this person.
+    ///
+    /// # Errors
+    /// [`ContactError`] for what cannot be placed; the last frame is kept.
+    pub fn solve(&mut self, objects: &[Object], out: &mut Contact) -> Result<(), ContactError> {
+        validate(objects)?;
+        out.pressure_pa.resize(self.model.vertices(), 0.0);
+        out.clear();
+        let view = View { objects, length: self.settings.person.width, back_mm: [0.0; 3] };
+        self.find_candidates(view, &mut out.effort);
+        if self.candidates.is_empty() {
+            self.reset();
+            return Ok(());
+        }
+        if self.settings.method == Method::Springs {
+            springs::press(&self.model, view, self.settings.person, &self.candidates, out);
+            return Ok(());
+        }
+        self.keep_candidates();
+        self.displace();
+        self.approach(view, &mut out.effort);
+        let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
+        self.answer(view, change, out);
+        Ok(())
+    }
+
+    fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
+        let Self { clusters, model, candidates, wanted, .. } = self;
+        for vertex in candidates.drain(..) {
+            wanted[vertex as usize] = false;
+        }
+        let mut asked = 0;
+        let balls = clusters.near(
+            CANDIDATE_MM,
+            |p| view.clearance_mm(p),
+            |vertex| {
+                asked += 1;
+                if view.clearance_mm(model.positions_mm[vertex as usize]) < CANDIDATE_MM {
+                    candidates.push(vertex);
+                    wanted[vertex as usize] = true;
+                }
+            },
+        );
+        effort.distances += balls + asked;
+        effort.candidates = candidates.len() as u32;
+    }
+
+    /// Makes the patch hold the candidates.
+    fn keep_candidates(&mut self) {
+        for slot in (0..self.patch.vertices().len()).rev() {
+            if !self.wanted[self.patch.vertices()[slot] as usize] {
+                self.patch.remove(slot);
+                self.made = 0;
+            }
+        }
+        self.overflow = false;
+        for &vertex in &self.candidates {
+            if self.patch.slot(vertex).is_none() && !self.patch.add(&self.model, vertex) {
+                self.overflow = true;
+            }
+        }
+    }
+
+    /// Displaces all slots under the near slots' forces.
+    fn displace(&mut self) {
+        self.patch.displace();
+        let m = self.patch.near();
+        if let (Some(a), Some(s)) = (&mut self.amplitudes, &self.model.second_order) {
+            let [x, y, z] = &self.patch.values.force;
+            s.evaluate(&self.patch.vertices()[..m], [&x[..m], &y[..m], &z[..m]], a);
+        }
+        self.move_slots();
+    }
+
+    fn move_slots(&mut self) {
+        let Self { patch, amplitudes, model, .. } = self;
+        let n = patch.vertices().len();
+        let second = amplitudes.as_ref().zip(model.second_order.as_ref());
+        crate::kernels::vectorized(|| {
+            for slot in 0..n {
+                let more =
+                    second.map_or([0.0; 3], |(a, s)| s.displacement_mm(a, patch.vertices()[slot]));
+                for i in 0..3 {
+                    patch.values.moved[i][slot] = patch.values.linear[i][slot] + more[i];
+                }
+            }
+        });
+    }
+
+    /// Distances of all displaced slots.
+    fn measure(&mut self, view: View<'_>, effort: &mut Effort) {
+        let Self { patch, model, settings, .. } = self;
+        let Person { width, stiffness } = settings.person;
+        for slot in 0..patch.vertices().len() {
+            let vertex = patch.vertices()[slot] as usize;
+            let v = &mut patch.values;
+            let at = std::array::from_fn(|i| {
+                model.positions_mm[vertex][i] + f64::from(v.moved[i][slot])
+            });
+            let nearest = view.nearest(at);
+            for i in 0..3 {
+                v.normal[i][slot] = nearest.normal[i] as f32;
+            }
+            // In the units of the reference finger: pressure over stiffness, length over width.
+            let give = stiffness / (view.objects[nearest.object].stiffness_mpa_per_mm * width);
+            v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
+            v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
+        }
+        effort.distances += patch.vertices().len() as u32;
+    }
+
+    /// Brings objects in by steps that lie too deep in the displaced skin.
+    fn approach(&mut self, view: View<'_>, effort: &mut Effort) {
+        self.measure(view, effort);
+        let n = self.patch.vertices().len();
+        let deepest = |patch: &Patch| patch.values.gap[..n].iter().copied().fold(0.0, f32::min);
+        if f64::from(deepest(&self.patch)) >= -STEP_MM {
+            return;
+        }
+        let Some(away) = self.way_back() else { return };
+        let mut back = 0.0;
+        let held = |back: f64| View { back_mm: away.map(|v| back * v), ..view };
+        while back < BACK_MAX_MM {
+            let deep = -f64::from(deepest(&self.patch));
+            if deep <= STEP_MM {
+                break;
+            }
+            back += (deep - 0.5 * STEP_MM).max(0.1 * STEP_MM);
+            self.measure(held(back), effort);
+        }
+        let steps = (back / STEP_MM).ceil().min(f64::from(STEPS_MAX)) as u32;
+        for step in 0..steps {
+            let left = back * (1.0 - f64::from(step) / f64::from(steps));
+            self.iterate(held(left), ITERATIONS_ON_THE_WAY, effort);
+        }
+    }
+
+    /// The mean outward normal of the skin that lies in objects.
+    fn way_back(&self) -> Option<[f64; 3]> {
+        let mut sum = [0.0; 3];
+        for (&vertex, gap) in self.patch.vertices().iter().zip(&self.patch.values.gap) {
+            let normal = self.model.normals[vertex as usize];
+            for i in 0..3 {
+                sum[i] += f64::from(normal[i]) * f64::from((-gap).max(0.0));
+            }
+        }
+        let size = sum.iter().map(|v| v * v).sum::<f64>().sqrt();
+        (size > 0.0).then(|| sum.map(|v| v / size))
+    }
+
+    /// Linearises and solves until displacements settle; returns their last change, mm.
+    fn iterate(&mut self, view: View<'_>, iterations_max: u32, effort: &mut Effort) -> f32 {
+        let (mut relaxation, mut change) = (1.0f32, f32::INFINITY);
+        for iteration in 0..iterations_max {
+            effort.iterations += 1;
+            self.measure(view, effort);
+            self.choose_near();
+            let taken = self.share_taken();
+            self.remake_matrix();
+            effort.products += self.complement(1.0 - 2.0 * taken);
+            relaxation = self.relax(relaxation, iteration == 0);
+            change = self.follow() / relaxation.min(1.0);
+            if change <= SETTLED_MM {
+                break;
+            }
+        }
+        change
+    }
+
+    /// Lets every slot carry force that does or might.
+    fn choose_near(&mut self) {
+        for slot in self.patch.near()..self.patch.vertices().len() {
+            if self.patch.values.gap[slot] < NEAR_MM {
+                self.patch.bring_near(slot);
+                self.made = 0;
+            }
+        }
+        for slot in (0..self.patch.near()).rev() {
+            let v = &self.patch.values;
+            if v.gap[slot] > 2.0 * NEAR_MM && v.size[slot] <= 0.0 {
+                let Slots { force, found, change, .. } = &mut self.patch.values;
+                for vector in [force, found, change] {
+                    vector.iter_mut().for_each(|v| v[slot] = 0.0);
+                }
+                self.patch.send_far(slot);
+                self.made = 0;
+            }
+        }
+    }
+
+    /// Share of the displacement in contact that the second order takes back.
+    fn share_taken(&self) -> f32 {
+        let v = &self.patch.values;
+        let (mut along, mut square) = (0.0f32, 0.0f32);
+        for slot in 0..self.patch.near() {
+            if v.size[slot] > 0.0 {
+                for i in 0..3 {
+                    let linear = v.linear[i][slot];
+                    along += (linear - v.moved[i][slot]) * linear;
+                    square += linear * linear;
+                }
+            }
+        }
+        if square > 0.0 { (along / square).clamp(SHARE[0], SHARE[1]) } else { 0.0 }
+    }
+
+    fn remake_matrix(&mut self) {
+        let m = self.patch.near();
+        let v = &self.patch.values;
+        let turned = |slot: usize| {
+            (0..3).any(|i| (v.normal[i][slot] - self.made_for[i][slot]).abs() > TURN_MAX)
+        };
+        if self.made == m && !(0..m).any(turned) {
+            return;
+        }
+        self.patch.along_normals(&mut self.matrix);
+        for (kept, normal) in self.made_for.iter_mut().zip(&self.patch.values.normal) {
+            kept[..m].copy_from_slice(&normal[..m]);
+        }
+        self.made = m;
+    }
+
+    /// Solves for the sizes of the forces with the compliance scaled by `scale`.
+    fn complement(&mut self, scale: f32) -> u32 {
+        let Self { patch, bounded, matrix, rest, .. } = self;
+        let (m, stride) = (patch.near(), patch.stride());
+        let Slots { force, found, normal, gap, size, .. } = &mut patch.values;
+        let size = &mut size[..m];
+        for slot in 0..m {
+            size[slot] = (0..3).map(|i| force[i][slot] * normal[i][slot]).sum();
+        }
+        crate::kernels::multiply(matrix, stride, size, &mut rest[..m]);
+        for slot in 0..m {
+            rest[slot] = gap[slot] / scale - rest[slot];
+        }
+        let symmetric = Symmetric { values: matrix, stride };
+        let effort = bounded.solve(symmetric, &rest[..m], size, VIOLATION_MM, PRODUCTS_MAX);
+        for slot in 0..m {
+            for i in 0..3 {
+                found[i][slot] = size[slot] * normal[i][slot];
+            }
+        }
+        effort.products
+    }
+
+    /// Goes on from the forces towards those found, as far as Aitken's extrapolation of the last
+    /// two changes says.
+    fn relax(&mut self, last: f32, first: bool) -> f32 {
+        let m = self.patch.near();
+        let Slots { force, found, change, .. } = &mut self.patch.values;
+        let (mut along, mut square) = (0.0f32, 0.0f32);
+        for i in 0..3 {
+            for slot in 0..m {
+                let new = found[i][slot] - force[i][slot];
+                let turn = new - change[i][slot];
+                along += change[i][slot] * turn;
+                square += turn * turn;
+                change[i][slot] = new;
+            }
+        }
+        let aitken = if first || !(square > 0.0) { 1.0 } else { -last * along / square };
+        let relaxation = aitken.clamp(RELAXATION[0], RELAXATION[1]);
+        for i in 0..3 {
+            for slot in 0..m {
+                force[i][slot] += relaxation * change[i][slot];
+            }
+        }
+        relaxation
+    }
+
+    /// Displaces all slots; returns the largest change, mm.
+    fn follow(&mut self) -> f32 {
+        let n = self.patch.vertices().len();
+        let v = &mut self.patch.values;
+        std::mem::swap(&mut v.before, &mut v.moved);
+        self.displace();
+        let v = &self.patch.values;
+        let mut change = 0.0f32;
+        for (now, before) in v.moved.iter().zip(&v.before) {
+            for (now, before) in now[..n].iter().zip(&before[..n]) {
+                let by = (now - before).abs();
+                // NaN must not hide behind a maximum.
+                if !(by <= change) {
+                    change = by;
+                }
+            }
+        }
+        change
+    }
+
+    fn answer(&mut self, view: View<'_>, change: f32, out: &mut Contact) {
+        self.measure(view, &mut out.effort);
+        let share_max = self.model.header().share_max;
+        let v = &self.patch.values;
+        for slot in 0..self.patch.vertices().len() {
+            let deep = f64::from(v.object[slot] * v.size[slot] - v.gap[slot]);
+            out.penetration_mm = out.penetration_mm.max(deep);
+        }
+        out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
+        out.quality.out_of_range = self.overflow || !(out.quality.share <= share_max);
+        out.quality.settled = change <= UNSETTLED_MM;
+        collect(&self.model, &self.patch, self.settings.person, out);
+        if self.settings.stiffness {
+            out.stiffness_n_per_mm = self.stiffness(out);
+        }
+    }
+
+    /// Change of force for a small travel of the objects along it: forces of the points in contact
+    /// that move all of them by the part of the travel along their normals.
+    fn stiffness(&mut self, out: &mut Contact) -> Option<f64> {
+        let size = out.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        if !(size > 0.0) {
+            return None;
+        }
+        let along = out.force_n.map(|f| (f / size) as f32);
+        let scale = 1.0 - 2.0 * self.share_taken();
+        self.remake_matrix();
+        let Self { patch, matrix, rest, bounded, .. } = self;
+        let m = patch.near();
+        let v = &patch.values;
+        for slot in 0..m {
+            let part: f32 = (0..3).map(|i| along[i] * v.normal[i][slot]).sum();
+            rest[slot] = if v.size[slot] > 0.0 { part } else { 0.0 };
+        }
+        let symmetric = Symmetric { values: matrix, stride: patch.stride() };
+        let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
+        let Person { width, stiffness } = self.settings.person;
+        Some(f64::from(force / scale) * stiffness * width)
+    }
+}
