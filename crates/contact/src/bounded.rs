@@ -6,7 +6,7 @@
 //! the points in contact, a projected step where one of them would be pulled, a step towards
 //! contact where points outside penetrate. One product with `M` an iteration, or two.
 
-use crate::kernels::{add_scaled, dot, multiply, vectorized};
+use crate::kernels::{multiply, product as dot};
 
 /// Weighs points that penetrate against points out of balance: 1 treats them alike.
 const PROPORTION: f32 = 1.0;
@@ -26,6 +26,17 @@ pub(crate) struct BoundedSolver {
 pub(crate) struct Symmetric<'a> {
     pub values: &'a [f32],
     pub stride: usize,
+    /// No less than its largest eigenvalue.
+    pub norm: f32,
+}
+
+impl<'a> Symmetric<'a> {
+    /// The first `n` rows and columns.
+    pub(crate) fn new(values: &'a [f32], stride: usize, n: usize) -> Self {
+        let sum = |row: &[f32]| row[..n].iter().map(|v| v.abs()).sum::<f32>();
+        let norm = values.chunks(stride).take(n).map(sum).fold(0.0, f32::max);
+        Self { values, stride, norm }
+    }
 }
 
 /// How an iteration ended.
@@ -75,7 +86,7 @@ impl BoundedSolver {
         };
         refresh(f, gradient);
         let mut effort = Effort { products: 1, violation_mm: 0.0 };
-        let step = 1.0 / row_sum_max(m, n).max(f32::MIN_POSITIVE);
+        let step = 1.0 / m.norm.max(f32::MIN_POSITIVE);
         let mut restart = true;
         loop {
             let (mut out_of_balance, mut penetrating) = (0.0f32, 0.0f32);
@@ -101,7 +112,7 @@ impl BoundedSolver {
             if penetrating > PROPORTION * usable.max(0.0) {
                 times(chopped, product);
                 effort.products += 1;
-                let bends = vectorized(|| dot(chopped, product));
+                let bends = dot(chopped, product);
                 let length = penetrating / bends.max(f32::MIN_POSITIVE);
                 add_scaled(f, -length, chopped);
                 add_scaled(gradient, -length, product);
@@ -114,8 +125,8 @@ impl BoundedSolver {
             }
             times(direction, product);
             effort.products += 1;
-            let bends = vectorized(|| dot(direction, product)).max(f32::MIN_POSITIVE);
-            let length = vectorized(|| dot(gradient, direction)) / bends;
+            let bends = dot(direction, product).max(f32::MIN_POSITIVE);
+            let length = dot(gradient, direction) / bends;
             let mut longest = f32::INFINITY;
             for i in 0..n {
                 if direction[i] > 0.0 {
@@ -167,7 +178,7 @@ impl BoundedSolver {
         left.copy_from_slice(travel);
         direction.copy_from_slice(travel);
         f.fill(0.0);
-        let first = vectorized(|| dot(travel, travel));
+        let first = dot(travel, travel);
         let mut square = first;
         for _ in 0..products_max {
             if !(square > 1e-6 * first) {
@@ -179,25 +190,24 @@ impl BoundedSolver {
                     *p = 0.0;
                 }
             }
-            let length = square / vectorized(|| dot(direction, product)).max(f32::MIN_POSITIVE);
+            let length = square / dot(direction, product).max(f32::MIN_POSITIVE);
             add_scaled(f, length, direction);
             add_scaled(left, -length, product);
-            let next = vectorized(|| dot(left, left));
+            let next = dot(left, left);
             for (d, l) in direction.iter_mut().zip(&*left) {
                 *d = l + next / square * *d;
             }
             square = next;
         }
-        vectorized(|| dot(travel, f))
+        dot(travel, f)
     }
 }
 
-/// Largest sum of absolute values of a row: no less than the largest eigenvalue.
-fn row_sum_max(m: Symmetric<'_>, n: usize) -> f32 {
-    vectorized(|| {
-        let rows = m.values.chunks(m.stride).take(n);
-        rows.map(|row| row[..n].iter().map(|v| v.abs()).sum()).fold(0.0, f32::max)
-    })
+/// `y += k x`.
+fn add_scaled(y: &mut [f32], k: f32, x: &[f32]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y += k * x;
+    }
 }
 
 #[cfg(test)]
@@ -225,7 +235,7 @@ mod tests {
         #[test]
         fn conditions_hold_at_random_points(seed in any::<u64>(), n in 1usize..60) {
             let (m, g) = problem(seed, n);
-            let matrix = Symmetric { values: &m, stride: n };
+            let matrix = Symmetric::new(&m, n, n);
             let mut f = vec![0.0; n];
             let effort = BoundedSolver::new(n).solve(matrix, &g, &mut f, 1e-5, 4000);
             prop_assert!(effort.violation_mm <= 1e-5, "{effort:?}");
@@ -242,7 +252,7 @@ mod tests {
         #[test]
         fn a_warm_start_ends_where_a_cold_one_does(seed in any::<u64>(), n in 2usize..40) {
             let (m, g) = problem(seed, n);
-            let matrix = Symmetric { values: &m, stride: n };
+            let matrix = Symmetric::new(&m, n, n);
             let (mut cold, mut warm) = (vec![0.0; n], (0..n).map(|i| i as f32).collect::<Vec<_>>());
             let mut solver = BoundedSolver::new(n);
             solver.solve(matrix, &g, &mut cold, 1e-6, 4000);
@@ -257,10 +267,10 @@ mod tests {
         let mut solver = BoundedSolver::new(2);
         let m = [f32::NAN, 0.0, 0.0, 1.0];
         let mut f = [1.0, f32::NAN];
-        let matrix = Symmetric { values: &m, stride: 2 };
+        let matrix = Symmetric::new(&m, 2, 2);
         let effort = solver.solve(matrix, &[-1.0, f32::INFINITY], &mut f, 1e-6, 100);
         assert!(effort.products <= 100);
-        let none = Symmetric { values: &[], stride: 1 };
+        let none = Symmetric::new(&[], 1, 0);
         assert_eq!(solver.solve(none, &[], &mut [], 1e-6, 9).violation_mm.to_bits(), 0);
     }
 }

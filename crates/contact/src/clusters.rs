@@ -28,6 +28,11 @@ impl Clusters {
         built
     }
 
+    /// The points, neighbours beside each other.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     fn split(&mut self, points: &[[f64; 3]], first: usize, last: usize) {
         let own = &mut self.order[first..last];
         let bound = |i: usize, pick: fn(f64, f64) -> f64, from: f64| {

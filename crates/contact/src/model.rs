@@ -3,6 +3,7 @@
 //! Its file is one text line, a header in JSON on a second line, and little-endian arrays in the
 //! order of [`Arrays`]. `fe-datagen contact` writes it.
 
+use crate::clusters::Clusters;
 use crate::error::ModelError;
 use crate::second_order::SecondOrder;
 use serde::{Deserialize, Serialize};
@@ -73,8 +74,12 @@ pub struct ContactModel {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) areas_mm2: Vec<f32>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// `[V][9][V]`: blocks of compliance by component pair, so that rows are contiguous.
+    /// `[V][9][V]`: blocks of compliance by component pair. Columns stand by [`Self::rank`], so
+    /// that those of neighbours share cache lines.
     pub(crate) compliance: Vec<f32>,
+    /// Column of each vertex.
+    pub(crate) rank: Vec<u32>,
+    pub(crate) clusters: Clusters,
     pub(crate) second_order: Option<SecondOrder>,
     /// Triangles round each vertex.
     pub(crate) around: Vec<Vec<u32>>,
@@ -126,15 +131,21 @@ impl ContactModel {
         let second_order = (r > 0).then(|| {
             SecondOrder::new([r, k], arrays.projection, arrays.products, arrays.displacements)
         });
+        let positions_mm: Vec<[f64; 3]> =
+            triples(&arrays.positions_mm).into_iter().map(|p| p.map(f64::from)).collect();
+        let clusters = Clusters::new(&positions_mm);
+        let mut rank = vec![0; v];
+        for (column, &vertex) in clusters.order().iter().enumerate() {
+            rank[vertex as usize] = column as u32;
+        }
         Ok(Self {
-            positions_mm: triples(&arrays.positions_mm)
-                .into_iter()
-                .map(|p| p.map(f64::from))
-                .collect(),
+            positions_mm,
             normals: triples(&arrays.normals),
             areas_mm2: arrays.areas_mm2,
             triangles,
-            compliance: unpacked(&arrays.compliance_mm_per_n, v)?,
+            compliance: unpacked(&arrays.compliance_mm_per_n, &rank)?,
+            rank,
+            clusters,
             second_order,
             around,
             header,
@@ -261,11 +272,12 @@ fn lengths(header: &Header) -> Result<[(&'static str, usize); 7], ModelError> {
     ])
 }
 
-/// Blocks `[V][9][V]` of a packed upper triangle.
-fn unpacked(packed: &[f32], v: usize) -> Result<Vec<f32>, ModelError> {
+/// Blocks `[V][9][V]` of a packed upper triangle, columns by `rank`.
+fn unpacked(packed: &[f32], rank: &[u32]) -> Result<Vec<f32>, ModelError> {
+    let v = rank.len();
     let mut blocks = vec![0.0; 9 * v * v];
     let mut place = |i: usize, k: usize, value: f32| {
-        blocks[((i / 3) * 9 + 3 * (i % 3) + k % 3) * v + k / 3] = value;
+        blocks[((i / 3) * 9 + 3 * (i % 3) + k % 3) * v + rank[k / 3] as usize] = value;
     };
     let mut values = packed.iter();
     for i in 0..3 * v {

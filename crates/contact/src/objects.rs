@@ -86,11 +86,16 @@ impl View<'_> {
         let p = self.seen(at_mm);
         let mut nearest = Nearest { gap_mm: f64::INFINITY, normal: [0.0, 0.0, 1.0], object: 0 };
         for (object, o) in self.objects.iter().enumerate() {
-            let d = o.placement.distance(o.shape.as_ref(), p);
-            let gap_mm = d.gap_mm / self.length;
+            let Placement { rotation: r, origin_mm } = &o.placement;
+            let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
+            let local = [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2]);
+            let found = o.shape.distance(local);
+            let gap_mm = found.gap_mm / self.length;
             if gap_mm < nearest.gap_mm {
-                let size = d.normal.iter().map(|v| v * v).sum::<f64>().sqrt();
-                let normal = if size > 1e-6 { d.normal.map(|v| v / size) } else { nearest.normal };
+                let n = found.normal;
+                let size = n.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let turned = r.map(|row| (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]) / size);
+                let normal = if size > 1e-6 { turned } else { nearest.normal };
                 nearest = Nearest { gap_mm, normal, object };
             }
         }

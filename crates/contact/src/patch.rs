@@ -1,16 +1,19 @@
 //! The vertices that may be in contact, and how they move each other.
 //!
 //! Compliance of a whole finger does not fit a cache. A patch holds the blocks of its own vertices
-//! in nine dense planes, from frame to frame: a vertex that comes costs a row and a column. The
+//! densely, from frame to frame: a vertex that comes costs a row and a column. The
 //! first [`Patch::near`] slots are those that can carry force.
 
-use crate::kernels::{dot, vectorized};
+use crate::kernels::{AlongNormals, Displace, run};
 use crate::model::ContactModel;
 
 /// No slot.
 const NONE: u16 = u16::MAX;
 /// Most vertices of a patch.
 pub(crate) const SLOTS_MAX: usize = 512;
+/// Rows are an odd number of these long: of a length that is a power of two all would fall into
+/// the same few lines of a cache.
+const BLOCK: usize = 16;
 
 /// Values of the slots, vectors component by component.
 #[derive(Clone, Debug)]
@@ -42,8 +45,11 @@ pub(crate) struct Slots {
 pub(crate) struct Patch {
     ids: Vec<u32>,
     slot_of: Vec<u16>,
+    slots_max: usize,
+    /// Length of a row; follows the number of vertices.
     stride: usize,
-    planes: Vec<f32>,
+    /// `[slot][component pair][slot]`.
+    blocks: Vec<f32>,
     near: usize,
     pub values: Slots,
 }
@@ -77,15 +83,40 @@ impl Slots {
 
 impl Patch {
     pub(crate) fn new(vertices: usize) -> Self {
-        let stride = vertices.min(SLOTS_MAX);
+        let slots_max = vertices.min(SLOTS_MAX);
         Self {
-            ids: Vec::with_capacity(stride),
+            ids: Vec::with_capacity(slots_max),
             slot_of: vec![NONE; vertices],
-            stride,
-            planes: vec![0.0; 9 * stride * stride],
+            slots_max,
+            stride: row_length(0),
+            blocks: vec![0.0; 9 * slots_max * row_length(slots_max)],
             near: 0,
-            values: Slots::new(stride),
+            values: Slots::new(slots_max),
         }
+    }
+
+    /// Most vertices that it can hold, and the length of a row of them.
+    pub(crate) fn room(&self) -> [usize; 2] {
+        [self.slots_max, row_length(self.slots_max)]
+    }
+
+    /// Makes rows as long as `slots` vertices need, with some to spare, or shorter if that is
+    /// much less; what is close together stays in the caches.
+    pub(crate) fn make_room(&mut self, slots: usize) {
+        let (slots, n) = (slots.min(self.slots_max).max(self.ids.len()), self.ids.len());
+        let (old, new) = (self.stride, row_length((slots + slots / 8).min(self.slots_max)));
+        if slots > old {
+            for row in (0..9 * n).rev() {
+                self.blocks.copy_within(row * old..row * old + n, row * new);
+            }
+        } else if 2 * new < old {
+            for row in 0..9 * n {
+                self.blocks.copy_within(row * old..row * old + n, row * new);
+            }
+        } else {
+            return;
+        }
+        self.stride = new;
     }
 
     /// Vertices in it.
@@ -110,20 +141,23 @@ impl Patch {
 
     /// Takes a vertex in, at rest and without force; `false` if there is no room.
     pub(crate) fn add(&mut self, model: &ContactModel, vertex: u32) -> bool {
-        let (slot, stride, v) = (self.ids.len(), self.stride, model.vertices());
-        if slot == stride {
+        let (slot, v) = (self.ids.len(), model.vertices());
+        if slot == self.slots_max {
             return false;
         }
+        if slot >= self.stride {
+            self.make_room(slot + 1);
+        }
+        let stride = self.stride;
         self.ids.push(vertex);
         self.slot_of[vertex as usize] = slot as u16;
-        let plane = stride * stride;
         for pair in 0..9 {
             let turned = 3 * (pair % 3) + pair / 3;
             let row = &model.compliance[(9 * vertex as usize + pair) * v..][..v];
             for (k, &other) in self.ids.iter().enumerate() {
-                let value = row[other as usize];
-                self.planes[pair * plane + slot * stride + k] = value;
-                self.planes[turned * plane + k * stride + slot] = value;
+                let value = row[model.rank[other as usize] as usize];
+                self.blocks[(9 * slot + pair) * stride + k] = value;
+                self.blocks[(9 * k + turned) * stride + slot] = value;
             }
         }
         for column in self.values.columns() {
@@ -167,13 +201,14 @@ impl Patch {
             return;
         }
         let (n, stride) = (self.ids.len(), self.stride);
-        for plane in self.planes.chunks_exact_mut(stride * stride) {
-            let (low, high) = (a.min(b), a.max(b));
-            let (head, tail) = plane.split_at_mut(high * stride);
-            head[low * stride..][..n].swap_with_slice(&mut tail[..n]);
-            for row in plane.chunks_exact_mut(stride).take(n) {
-                row.swap(a, b);
-            }
+        let (low, high) = (a.min(b), a.max(b));
+        let (head, tail) = self.blocks.split_at_mut(9 * high * stride);
+        for pair in 0..9 {
+            let own = &mut head[(9 * low + pair) * stride..][..n];
+            own.swap_with_slice(&mut tail[pair * stride..][..n]);
+        }
+        for row in self.blocks.chunks_exact_mut(stride).take(9 * n) {
+            row.swap(a, b);
         }
         for column in self.values.columns() {
             column.swap(a, b);
@@ -184,23 +219,23 @@ impl Patch {
         }
     }
 
-    /// Displacement of every slot by compliance alone under the forces of the near ones.
-    pub(crate) fn displace(&mut self) {
-        let (n, m, stride) = (self.ids.len(), self.near, self.stride);
+    /// Displacement of the first `rows` slots by compliance alone under the forces of the near ones.
+    pub(crate) fn displace(&mut self, rows: usize) {
+        let m = self.near;
         let Slots { force, linear, .. } = &mut self.values;
-        let planes = &self.planes;
-        vectorized(|| {
-            for a in 0..3 {
-                for i in 0..n {
-                    let mut sum = 0.0;
-                    for b in 0..3 {
-                        let row = &planes[((3 * a + b) * stride + i) * stride..][..m];
-                        sum += dot(row, &force[b][..m]);
-                    }
-                    linear[a][i] = sum;
-                }
-            }
-        });
+        let [x, y, z] = force;
+        let force = [&x[..m], &y[..m], &z[..m]];
+        run(Displace { blocks: &self.blocks, stride: self.stride, rows, force, linear });
+    }
+
+    /// Lets `displace` fill displacements from the vertices and their linear displacements.
+    pub(crate) fn move_by(
+        &mut self,
+        rows: usize,
+        displace: impl FnOnce(&[u32], &[Vec<f32>; 3], &mut [Vec<f32>; 3]),
+    ) {
+        let Slots { linear, moved, .. } = &mut self.values;
+        displace(&self.ids[..rows], linear, moved);
     }
 
     /// Fills rows of compliance along the objects' normals between the near slots; rows are
@@ -208,25 +243,21 @@ impl Patch {
     pub(crate) fn along_normals(&self, matrix: &mut [f32]) {
         let (m, stride) = (self.near, self.stride);
         let Slots { normal, object, .. } = &self.values;
-        let [x, y, z] = [0, 1, 2].map(|b| &normal[b][..m]);
-        vectorized(|| {
-            for i in 0..m {
-                let plane = |pair: usize| &self.planes[(pair * stride + i) * stride..][..m];
-                let own = [x[i], y[i], z[i]];
-                let row = &mut matrix[i * stride..][..m];
-                row.fill(0.0);
-                for (b, other) in [x, y, z].into_iter().enumerate() {
-                    let (p, q, r) = (plane(b), plane(3 + b), plane(6 + b));
-                    for k in 0..m {
-                        row[k] += (own[0] * p[k] + own[1] * q[k] + own[2] * r[k]) * other[k];
-                    }
-                }
-                row[i] += object[i];
-            }
-        });
+        let [x, y, z] = normal;
+        let normal = [&x[..m], &y[..m], &z[..m]];
+        run(AlongNormals { blocks: &self.blocks, stride, normal, matrix });
+        for (i, give) in object[..m].iter().enumerate() {
+            matrix[i * stride + i] += give;
+        }
     }
 
     pub(crate) fn stride(&self) -> usize {
         self.stride
     }
+}
+
+/// Length of a row for a number of slots.
+fn row_length(slots: usize) -> usize {
+    let blocks = slots.div_ceil(BLOCK).max(1);
+    BLOCK * (blocks + usize::from(blocks.is_multiple_of(2)))
 }

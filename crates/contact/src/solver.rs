@@ -8,7 +8,6 @@
 
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
-use crate::clusters::Clusters;
 use crate::error::ContactError;
 use crate::ladder::Method;
 use crate::model::ContactModel;
@@ -20,6 +19,10 @@ use std::sync::Arc;
 
 /// Undeformed vertices nearer than this may come into contact, reference mm.
 const CANDIDATE_MM: f64 = 0.6;
+/// Candidates that are nearer than this stay candidates, reference mm.
+const KEPT_MM: f64 = 0.8;
+/// Force of a vertex that counts as none, reference N.
+const FORCE_MIN_N: f32 = 1e-12;
 /// Displaced vertices nearer than this may carry force in this frame, reference mm.
 const NEAR_MM: f32 = 0.08;
 /// Deepest that a displaced vertex may lie in an object before objects are brought in by steps.
@@ -65,12 +68,13 @@ pub struct Settings {
 pub struct Solver {
     model: Arc<ContactModel>,
     settings: Settings,
-    clusters: Clusters,
     patch: Patch,
     bounded: BoundedSolver,
     amplitudes: Option<Amplitudes>,
     /// Compliance along normals, rows as in the patch, and the normals that it was made for.
     matrix: Vec<f32>,
+    /// Bound of its eigenvalues.
+    norm: f32,
     made_for: [Vec<f32>; 3],
     made: usize,
     rest: Vec<f32>,
@@ -92,14 +96,14 @@ impl Solver {
             }
         }
         let patch = Patch::new(model.vertices());
-        let slots = patch.stride();
+        let [slots, row] = patch.room();
         let second_order =
             model.second_order.as_ref().filter(|_| settings.method.has_second_order());
         Ok(Self {
-            clusters: Clusters::new(&model.positions_mm),
             bounded: BoundedSolver::new(slots),
             amplitudes: second_order.map(|s| s.amplitudes()),
-            matrix: vec![0.0; slots * slots],
+            matrix: vec![0.0; slots * row],
+            norm: 0.0,
             made_for: std::array::from_fn(|_| vec![0.0; slots]),
             made: 0,
             rest: vec![0.0; slots],
@@ -144,25 +148,26 @@ impl Solver {
             return Ok(());
         }
         self.keep_candidates();
-        self.displace();
+        self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
         let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
-        self.answer(view, change, out);
+        self.answer(change, out);
         Ok(())
     }
 
     fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
-        let Self { clusters, model, candidates, wanted, .. } = self;
+        let Self { model, candidates, wanted, patch, .. } = self;
         for vertex in candidates.drain(..) {
             wanted[vertex as usize] = false;
         }
         let mut asked = 0;
-        let balls = clusters.near(
-            CANDIDATE_MM,
+        let balls = model.clusters.near(
+            KEPT_MM,
             |p| view.clearance_mm(p),
             |vertex| {
                 asked += 1;
-                if view.clearance_mm(model.positions_mm[vertex as usize]) < CANDIDATE_MM {
+                let free = view.clearance_mm(model.positions_mm[vertex as usize]);
+                if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
                     candidates.push(vertex);
                     wanted[vertex as usize] = true;
                 }
@@ -180,45 +185,56 @@ impl Solver {
                 self.made = 0;
             }
         }
+        let stride = self.patch.stride();
+        self.patch.make_room(self.candidates.len());
         self.overflow = false;
         for &vertex in &self.candidates {
             if self.patch.slot(vertex).is_none() && !self.patch.add(&self.model, vertex) {
                 self.overflow = true;
             }
         }
+        if self.patch.stride() != stride {
+            self.made = 0;
+        }
     }
 
-    /// Displaces all slots under the near slots' forces.
-    fn displace(&mut self) {
-        self.patch.displace();
+    /// Displaces the first `rows` slots under the near slots' forces.
+    fn displace(&mut self, rows: usize) {
+        self.patch.displace(rows);
         let m = self.patch.near();
         if let (Some(a), Some(s)) = (&mut self.amplitudes, &self.model.second_order) {
             let [x, y, z] = &self.patch.values.force;
             s.evaluate(&self.patch.vertices()[..m], [&x[..m], &y[..m], &z[..m]], a);
         }
-        self.move_slots();
+        self.move_slots(rows);
     }
 
-    fn move_slots(&mut self) {
-        let Self { patch, amplitudes, model, .. } = self;
-        let n = patch.vertices().len();
-        let second = amplitudes.as_ref().zip(model.second_order.as_ref());
-        crate::kernels::vectorized(|| {
-            for slot in 0..n {
-                let more =
-                    second.map_or([0.0; 3], |(a, s)| s.displacement_mm(a, patch.vertices()[slot]));
-                for i in 0..3 {
-                    patch.values.moved[i][slot] = patch.values.linear[i][slot] + more[i];
-                }
+    fn move_slots(&mut self, rows: usize) {
+        if let (Some(a), Some(s)) = (&self.amplitudes, &self.model.second_order) {
+            self.patch.move_by(rows, |ids, first, moved| s.displace(a, ids, first, moved));
+        } else {
+            let Slots { linear, moved, .. } = &mut self.patch.values;
+            for (moved, linear) in moved.iter_mut().zip(linear) {
+                moved[..rows].copy_from_slice(&linear[..rows]);
             }
-        });
+        }
     }
 
     /// Distances of all displaced slots.
+    fn measure_all(&mut self, view: View<'_>, effort: &mut Effort) {
+        self.measure_first(view, self.patch.vertices().len(), effort);
+    }
+
+    /// Distances of the displaced near slots.
     fn measure(&mut self, view: View<'_>, effort: &mut Effort) {
+        self.measure_first(view, self.patch.near(), effort);
+    }
+
+    fn measure_first(&mut self, view: View<'_>, slots: usize, effort: &mut Effort) {
         let Self { patch, model, settings, .. } = self;
         let Person { width, stiffness } = settings.person;
-        for slot in 0..patch.vertices().len() {
+        effort.distances += slots as u32;
+        for slot in 0..slots {
             let vertex = patch.vertices()[slot] as usize;
             let v = &mut patch.values;
             let at = std::array::from_fn(|i| {
@@ -233,12 +249,11 @@ impl Solver {
             v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
             v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
         }
-        effort.distances += patch.vertices().len() as u32;
     }
 
     /// Brings objects in by steps that lie too deep in the displaced skin.
     fn approach(&mut self, view: View<'_>, effort: &mut Effort) {
-        self.measure(view, effort);
+        self.measure_all(view, effort);
         let n = self.patch.vertices().len();
         let deepest = |patch: &Patch| patch.values.gap[..n].iter().copied().fold(0.0, f32::min);
         if f64::from(deepest(&self.patch)) >= -STEP_MM {
@@ -253,7 +268,7 @@ impl Solver {
                 break;
             }
             back += (deep - 0.5 * STEP_MM).max(0.1 * STEP_MM);
-            self.measure(held(back), effort);
+            self.measure_all(held(back), effort);
         }
         let steps = (back / STEP_MM).ceil().min(f64::from(STEPS_MAX)) as u32;
         for step in 0..steps {
@@ -288,10 +303,22 @@ impl Solver {
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
             if change <= SETTLED_MM {
-                break;
+                // Slots that carry no force have stood still meanwhile.
+                self.displace(self.patch.vertices().len());
+                self.measure_all(view, effort);
+                if !self.any_far_inside() {
+                    return change;
+                }
             }
         }
+        self.displace(self.patch.vertices().len());
+        self.measure_all(view, effort);
         change
+    }
+
+    fn any_far_inside(&self) -> bool {
+        let n = self.patch.vertices().len();
+        self.patch.values.gap[self.patch.near()..n].iter().any(|gap| *gap < 0.0)
     }
 
     /// Lets every slot carry force that does or might.
@@ -341,6 +368,7 @@ impl Solver {
             return;
         }
         self.patch.along_normals(&mut self.matrix);
+        self.norm = Symmetric::new(&self.matrix, self.patch.stride(), m).norm;
         for (kept, normal) in self.made_for.iter_mut().zip(&self.patch.values.normal) {
             kept[..m].copy_from_slice(&normal[..m]);
         }
@@ -349,7 +377,7 @@ impl Solver {
 
     /// Solves for the sizes of the forces with the compliance scaled by `scale`.
     fn complement(&mut self, scale: f32) -> u32 {
-        let Self { patch, bounded, matrix, rest, .. } = self;
+        let Self { patch, bounded, matrix, norm, rest, .. } = self;
         let (m, stride) = (patch.near(), patch.stride());
         let Slots { force, found, normal, gap, size, .. } = &mut patch.values;
         let size = &mut size[..m];
@@ -360,7 +388,7 @@ impl Solver {
         for slot in 0..m {
             rest[slot] = gap[slot] / scale - rest[slot];
         }
-        let symmetric = Symmetric { values: matrix, stride };
+        let symmetric = Symmetric { values: matrix, stride, norm: *norm };
         let effort = bounded.solve(symmetric, &rest[..m], size, VIOLATION_MM, PRODUCTS_MAX);
         for slot in 0..m {
             for i in 0..3 {
@@ -389,7 +417,9 @@ impl Solver {
         let relaxation = aitken.clamp(RELAXATION[0], RELAXATION[1]);
         for i in 0..3 {
             for slot in 0..m {
-                force[i][slot] += relaxation * change[i][slot];
+                let new = force[i][slot] + relaxation * change[i][slot];
+                // What fades must not become subnormal, which is slow.
+                force[i][slot] = if new.abs() < FORCE_MIN_N { 0.0 } else { new };
             }
         }
         relaxation
@@ -397,10 +427,12 @@ impl Solver {
 
     /// Displaces all slots; returns the largest change, mm.
     fn follow(&mut self) -> f32 {
-        let n = self.patch.vertices().len();
+        let n = self.patch.near();
         let v = &mut self.patch.values;
-        std::mem::swap(&mut v.before, &mut v.moved);
-        self.displace();
+        for (before, moved) in v.before.iter_mut().zip(&v.moved) {
+            before[..n].copy_from_slice(&moved[..n]);
+        }
+        self.displace(n);
         let v = &self.patch.values;
         let mut change = 0.0f32;
         for (now, before) in v.moved.iter().zip(&v.before) {
@@ -415,8 +447,7 @@ impl Solver {
         change
     }
 
-    fn answer(&mut self, view: View<'_>, change: f32, out: &mut Contact) {
-        self.measure(view, &mut out.effort);
+    fn answer(&mut self, change: f32, out: &mut Contact) {
         let share_max = self.model.header().share_max;
         let v = &self.patch.values;
         for slot in 0..self.patch.vertices().len() {
@@ -442,14 +473,14 @@ impl Solver {
         let along = out.force_n.map(|f| (f / size) as f32);
         let scale = 1.0 - 2.0 * self.share_taken();
         self.remake_matrix();
-        let Self { patch, matrix, rest, bounded, .. } = self;
+        let Self { patch, matrix, norm, rest, bounded, .. } = self;
         let m = patch.near();
         let v = &patch.values;
         for slot in 0..m {
             let part: f32 = (0..3).map(|i| along[i] * v.normal[i][slot]).sum();
             rest[slot] = if v.size[slot] > 0.0 { part } else { 0.0 };
         }
-        let symmetric = Symmetric { values: matrix, stride: patch.stride() };
+        let symmetric = Symmetric { values: matrix, stride: patch.stride(), norm: *norm };
         let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
         let Person { width, stiffness } = self.settings.person;
         Some(f64::from(force / scale) * stiffness * width)
