@@ -40,8 +40,6 @@ pub struct Header {
     /// Largest share of second-order displacement among the training indentations; beyond it
     /// an answer is out of range.
     pub share_max: f32,
-    /// Young's modulus of a half-space that comes nearest to the finger, MPa.
-    pub half_space_modulus_mpa: f32,
 }
 
 /// Arrays of a file, in its order.

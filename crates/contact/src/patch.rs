@@ -139,11 +139,11 @@ impl Patch {
         }
     }
 
-    /// Takes a vertex in, at rest and without force; `false` if there is no room.
-    pub(crate) fn add(&mut self, model: &ContactModel, vertex: u32) -> bool {
+    /// Takes a vertex in, at rest and without force, if there is room.
+    pub(crate) fn add(&mut self, model: &ContactModel, vertex: u32) {
         let (slot, v) = (self.ids.len(), model.vertices());
         if slot == self.slots_max {
-            return false;
+            return;
         }
         if slot >= self.stride {
             self.make_room(slot + 1);
@@ -163,7 +163,6 @@ impl Patch {
         for column in self.values.columns() {
             column[slot] = 0.0;
         }
-        true
     }
 
     /// Takes the vertex of a slot out; another one may take its slot.

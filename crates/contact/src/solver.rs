@@ -79,7 +79,8 @@ pub struct Solver {
     made: usize,
     rest: Vec<f32>,
     wanted: Vec<bool>,
-    candidates: Vec<u32>,
+    /// Distance from the objects at rest and vertex.
+    candidates: Vec<(f64, u32)>,
     overflow: bool,
 }
 
@@ -157,7 +158,7 @@ impl Solver {
 
     fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
         let Self { model, candidates, wanted, patch, .. } = self;
-        for vertex in candidates.drain(..) {
+        for (_, vertex) in candidates.drain(..) {
             wanted[vertex as usize] = false;
         }
         let mut asked = 0;
@@ -168,13 +169,21 @@ impl Solver {
                 asked += 1;
                 let free = view.clearance_mm(model.positions_mm[vertex as usize]);
                 if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
-                    candidates.push(vertex);
-                    wanted[vertex as usize] = true;
+                    candidates.push((free, vertex));
                 }
             },
         );
         effort.distances += balls + asked;
         effort.candidates = candidates.len() as u32;
+        let [slots, _] = patch.room();
+        self.overflow = candidates.len() > slots;
+        if self.overflow {
+            candidates.select_nth_unstable_by(slots, |a, b| a.0.total_cmp(&b.0));
+            candidates.truncate(slots);
+        }
+        for (_, vertex) in candidates {
+            wanted[*vertex as usize] = true;
+        }
     }
 
     /// Makes the patch hold the candidates.
@@ -187,10 +196,9 @@ impl Solver {
         }
         let stride = self.patch.stride();
         self.patch.make_room(self.candidates.len());
-        self.overflow = false;
-        for &vertex in &self.candidates {
-            if self.patch.slot(vertex).is_none() && !self.patch.add(&self.model, vertex) {
-                self.overflow = true;
+        for &(_, vertex) in &self.candidates {
+            if self.patch.slot(vertex).is_none() {
+                self.patch.add(&self.model, vertex);
             }
         }
         if self.patch.stride() != stride {

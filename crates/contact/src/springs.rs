@@ -16,23 +16,24 @@ pub(crate) fn press(
     model: &ContactModel,
     view: View<'_>,
     person: Person,
-    candidates: &[u32],
+    candidates: &[(f64, u32)],
     out: &mut Contact,
 ) {
-    let depth = |&vertex: &u32| {
+    let depth = |&(_, vertex): &(f64, u32)| {
         let at = model.positions_mm[vertex as usize];
         (at, view.nearest(at))
     };
     let deepest = candidates.iter().map(|v| -depth(v).1.gap_mm).fold(0.0, f64::max);
     let mut size_n = 0.0;
-    for vertex in candidates {
-        let (at, nearest) = depth(vertex);
+    for candidate in candidates {
+        let (at, nearest) = depth(candidate);
+        let vertex = candidate.1;
         let d = -nearest.gap_mm - RELIEF * deepest;
         if d > 0.0 {
             let pressure = person.stiffness * STIFFNESS_PA * d.powf(EXPONENT);
-            let area = f64::from(model.areas_mm2[*vertex as usize]);
+            let area = f64::from(model.areas_mm2[vertex as usize]);
             let size = pressure / person.stiffness * area * 1e-6;
-            out.press(*vertex, pressure as f32);
+            out.press(vertex, pressure as f32);
             out.add(at, nearest.normal.map(|n| size * n), size, area);
             size_n += size;
         }
