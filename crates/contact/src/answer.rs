@@ -68,6 +68,17 @@ impl Default for Person {
     }
 }
 
+impl Effort {
+    pub(crate) const fn plus(self, other: Self) -> Self {
+        Self {
+            distances: self.distances + other.distances,
+            iterations: self.iterations + other.iterations,
+            products: self.products + other.products,
+            candidates: other.candidates,
+        }
+    }
+}
+
 const PA_PER_MPA: f64 = 1e6;
 
 impl Contact {

@@ -9,6 +9,7 @@ mod answer;
 mod bounded;
 mod clusters;
 mod error;
+mod force_target;
 mod kernels;
 mod ladder;
 mod model;

@@ -68,8 +68,8 @@ pub(crate) struct View<'a> {
     pub objects: &'a [Object],
     /// Width of the finger over the reference width.
     pub length: f64,
-    /// How far the objects are held back, reference mm.
-    pub back_mm: [f64; 3],
+    /// How far the objects have moved from their places, reference mm.
+    pub shift_mm: [f64; 3],
 }
 
 /// The nearest object.
@@ -110,6 +110,6 @@ impl View<'_> {
     }
 
     fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| self.length * (at_mm[i] - self.back_mm[i]))
+        std::array::from_fn(|i| self.length * (at_mm[i] - self.shift_mm[i]))
     }
 }

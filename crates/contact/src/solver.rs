@@ -136,24 +136,38 @@ impl Solver {
     /// [`ContactError`] for what cannot be placed; the last frame is kept.
     pub fn solve(&mut self, objects: &[Object], out: &mut Contact) -> Result<(), ContactError> {
         validate(objects)?;
+        self.frame(View { objects, length: self.settings.person.width, shift_mm: [0.0; 3] }, out);
+        Ok(())
+    }
+
+    pub(crate) const fn person(&self) -> Person {
+        self.settings.person
+    }
+
+    /// A distance that all objects are certainly away from the finger at rest, mm.
+    pub(crate) fn free_mm(&self, view: View<'_>) -> f64 {
+        let free = |at: &[f64; 3]| view.clearance_mm(*at);
+        view.length * self.model.positions_mm.iter().map(free).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Finds what presses on the finger in `view`.
+    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         out.clear();
-        let view = View { objects, length: self.settings.person.width, back_mm: [0.0; 3] };
         self.find_candidates(view, &mut out.effort);
         if self.candidates.is_empty() {
             self.reset();
-            return Ok(());
+            return;
         }
         if self.settings.method == Method::Springs {
             springs::press(&self.model, view, self.settings.person, &self.candidates, out);
-            return Ok(());
+            return;
         }
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
         let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
         self.answer(change, out);
-        Ok(())
     }
 
     fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
@@ -269,7 +283,10 @@ impl Solver {
         }
         let Some(away) = self.way_back() else { return };
         let mut back = 0.0;
-        let held = |back: f64| View { back_mm: away.map(|v| back * v), ..view };
+        let held = |back: f64| View {
+            shift_mm: std::array::from_fn(|i| view.shift_mm[i] + back * away[i]),
+            ..view
+        };
         while back < BACK_MAX_MM {
             let deep = -f64::from(deepest(&self.patch));
             if deep <= STEP_MM {

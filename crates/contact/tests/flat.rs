@@ -1,6 +1,8 @@
 //! A flat patch of an elastic half-space, where answers are known in closed form.
 
-use papilla_contact::{Arrays, Contact, ContactModel, Header, Method, Object, Person, Settings, Solver};
+use papilla_contact::{
+    Arrays, Contact, ContactModel, Header, Method, Object, Person, Settings, Solver,
+};
 use papilla_sdf::{Placement, SignedDistance, Sphere};
 use proptest::prelude::*;
 use std::sync::Arc;
@@ -152,6 +154,25 @@ fn a_scaled_finger_answers_scaled() {
     }
 }
 
+/// Whether an object starts in air or too deep, it travels to where Hertz has the force.
+#[test]
+fn a_net_force_is_met() {
+    for start in [-3.0, -0.01, 0.04, 0.15] {
+        let (mut solver, mut out) = solver(small_strain());
+        let force = 0.006;
+        let travel = solver
+            .solve_for_force(&[ball(10.0, [0.0; 2], start)], [0.0, 0.0, 1.0], force, &mut out)
+            .expect("a travel");
+        assert!((out.force_n[2] / force - 1.0).abs() < 3e-3, "{}", out.force_n[2]);
+        let due = (0.75 * force / (MODULUS_MPA * 10f64.sqrt())).powf(2.0 / 3.0);
+        assert!(((start + travel) / due - 1.0).abs() < 0.05, "{start}: {travel} for {due}");
+    }
+    let (mut solver, mut out) = solver(small_strain());
+    let away = [0.0, 0.0, -1.0];
+    let error = solver.solve_for_force(&[ball(1.0, [0.0; 2], -1.0)], away, 1.0, &mut out);
+    assert!(error.is_err());
+}
+
 /// A soft object and the skin share the depth; a very stiff one is rigid.
 #[test]
 fn a_soft_object_gives_way() {
@@ -194,7 +215,7 @@ fn a_warm_frame_ends_where_a_cold_one_does() {
     for step in 0..40 {
         let at = [0.02 * f64::from(step) - 0.4, 0.01 * f64::from(step % 7)];
         let object = ball(6.0, at, 0.05 + 0.01 * f64::from(step % 5));
-        warm.solve(&[object.clone()], &mut out).expect("an answer");
+        warm.solve(std::slice::from_ref(&object), &mut out).expect("an answer");
         cold.reset();
         cold.solve(&[object], &mut anew).expect("an answer");
         let miss: f32 =
@@ -273,7 +294,7 @@ fn a_file_comes_back_and_a_damaged_one_is_refused() {
     }
     let longer = [&bytes[..], &[0; 4]].concat();
     assert!(ContactModel::read(&longer).is_err());
-    let mut bad = arrays.clone();
+    let mut bad = arrays;
     bad.compliance_mm_per_n[3] = f32::NAN;
     let error = ContactModel::new(header, bad).expect_err("refused").to_string();
     assert!(error.contains("compliance_mm_per_n[3]"), "{error}");
