@@ -1,6 +1,9 @@
-//! Error against FE and time a frame of every method, side by side:
-//! `ladder MODEL FRAMES`, where each line of FRAMES is an FE state (JSON, as
-//! `fe-datagen contact --frames` writes it).
+//! Error against FE and processor time a frame of every method, side by side:
+//! `ladder MODEL FRAMES [verbose]`.
+//!
+//! MODEL is a file of `fe-datagen contact`. Each line of FRAMES is an FE state in JSON: `set`,
+//! `ind` (name of the indenter), `press` (id), `depth` (mm), `indenter` (as in a scene),
+//! `rotation` and `origin` (its placement, mm), `force` (N) and `p`, pairs of vertex and pressure (Pa).
 
 use papilla_contact::{Contact, ContactModel, Method, Object, Settings, Solver};
 use papilla_sdf::{IndenterSpec, Placement};
