@@ -2,6 +2,7 @@
 
 mod atlas;
 mod choices;
+mod contact;
 mod convergence;
 mod cross_check;
 mod dataset;
@@ -43,6 +44,7 @@ enum Command {
     Schema(schema::Args),
     Generate(generate::Args),
     Operator(influence::Args),
+    Contact(contact::Args),
     Fidelity(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
@@ -72,6 +74,7 @@ pub fn run() -> ExitCode {
         Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => influence::run(&args),
+        Command::Contact(args) => contact::run(&args),
         Command::Fidelity(args) => fidelity::run(&args),
         Command::Wedge(args) => wedge::run(&args),
     };

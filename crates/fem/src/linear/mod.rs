@@ -7,6 +7,7 @@
 mod cg;
 mod direct;
 mod dof_map;
+mod dominant;
 mod dot;
 mod eigen;
 mod factor;
@@ -17,6 +18,7 @@ mod symbolic;
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
 pub use direct::Direct;
 pub use dof_map::DofMap;
+pub use dominant::dominant;
 pub(crate) use dot::dot;
 pub(crate) use eigen::eigen;
 pub use factor::{FactorError, FactorKind, FactorMemory, NumericFactor};

@@ -97,7 +97,7 @@ pub(super) fn loads(problem: &Problem, surface: &Surface, nodes: &[u32]) -> Vec<
     nodes.iter().map(load).collect()
 }
 
-fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, InfluenceError> {
+pub(super) fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, InfluenceError> {
     let mut tangent = problem.system.zeros();
     let rest = vec![[0.0; 3]; problem.mesh.nodes.len()];
     let multipliers = vec![0.0; problem.contact.as_ref().map_or(0, |c| c.nodes().len())];
@@ -124,7 +124,7 @@ fn displacement(system: &SymbolicSystem, u: &[f64], node: u32) -> [f64; 3] {
 }
 
 /// Solutions for all loads, block by block, and what checks them.
-struct Columns<'a> {
+pub(super) struct Columns<'a> {
     system: &'a SymbolicSystem,
     tangent: &'a SymmetricMatrix,
     loads: &'a [Load],
@@ -138,7 +138,7 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    fn new(
+    pub(super) fn new(
         problem: &'a Problem,
         tangent: &'a SymmetricMatrix,
         loads: &'a [Load],
@@ -195,7 +195,21 @@ impl<'a> Columns<'a> {
         self.solution.chunks_exact(n)
     }
 
-    fn quality(&self) -> Result<Quality, InfluenceError> {
+    /// Solves for all loads, keeping their work alone.
+    pub(super) fn solve_all(&mut self, progress: &mut dyn FnMut(usize)) {
+        for first in (0..self.loads.len()).step_by(COLUMNS) {
+            let last = (first + COLUMNS).min(self.loads.len());
+            let _ = self.solve(first..last);
+            progress(last);
+        }
+    }
+
+    /// Work of load `i` on the displacement of load `j`, mJ, `[j][i]`.
+    pub(super) fn work_mj(&self) -> &[f64] {
+        &self.work
+    }
+
+    pub(super) fn quality(&self) -> Result<Quality, InfluenceError> {
         let found = self.residual_relative;
         if !(found <= RESIDUAL_MAX) {
             return Err(InfluenceError::Residual { found, accepted: RESIDUAL_MAX });

@@ -46,6 +46,9 @@ pub enum InfluenceError {
         /// Accepted.
         accepted: f64,
     },
+    /// Loads that give no modes.
+    #[error("no load modes can be made of the loads: there are none, or one is not finite")]
+    Loads,
     /// Pressure of another length than the influence operator has vertices.
     #[error("{found} pressures for an influence operator of {expected} vertices")]
     Pressures {

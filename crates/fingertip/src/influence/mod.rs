@@ -16,13 +16,17 @@
 //! In prose: `docs/concepts/networks.md`.
 
 mod build;
+mod compliance;
 mod error;
+mod second_order;
 pub mod strain;
 #[cfg(test)]
 mod tests;
 
 pub use build::build;
+pub use compliance::{Compliance, compliance};
 pub use error::InfluenceError;
+pub use second_order::{Load, SecondOrder, second_order};
 pub use strain::COMPONENTS;
 
 use crate::mesh::fingertip::{Density, Order};

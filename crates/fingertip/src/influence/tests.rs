@@ -161,3 +161,72 @@ fn what_is_not_linear_is_refused() {
     let error = build(&finite, &mut |_| ()).unwrap_err();
     assert!(matches!(error, InfluenceError::FiniteStrain), "{error}");
 }
+
+/// Gaussian pressure on the pad as dead forces on the finger of finite strain. What compliance
+/// and second order leave of the solver's displacement is of third order: a tenth of the load
+/// leaves some thousandth of it.
+#[test]
+fn displacement_is_that_of_the_solver_to_second_order() {
+    let rest = &finger().0;
+    let compliance = compliance(rest, &mut |_| ()).unwrap();
+    let x = skin(rest);
+    let bottom = x.iter().min_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
+    let square = |p: &[f64; 3]| (0..3).map(|i| (p[i] - bottom[i]).powi(2)).sum::<f64>();
+    let load: Load = (0..x.len())
+        .filter(|&i| square(&x[i]) < 16.0)
+        .map(|i| (i as u32, [0.0, 0.0, 0.02 * (-square(&x[i]) / 8.0).exp()]))
+        .collect();
+    let body = Body::usual(Density::Coarse).unwrap();
+    let loads = [load.clone()];
+    let second = second_order(&body, &compliance, &loads, [1, 1], &mut |_| ()).unwrap();
+    assert_eq!((second.modes, second.outputs), (1, 1));
+    let patch = &body.patch.as_ref().unwrap().patch;
+    let left = |part: f64| {
+        let scaled: Load = load.iter().map(|(v, f)| (*v, f.map(|f| part * f))).collect();
+        let mut dead_n = vec![[0.0; 3]; body.problem.mesh.nodes.len()];
+        let mut z = 0.0;
+        for (v, f) in &scaled {
+            dead_n[patch.skin[*v as usize] as usize] = *f;
+            z += (0..3)
+                .map(|i| f[i] * f64::from(second.projection[3 * *v as usize + i]))
+                .sum::<f64>();
+        }
+        let options = Options { residual_tolerance: 1e-10, ..Options::default() };
+        let mut solver = body.solver(options).unwrap();
+        solver.start(Loading { dead_n, ..Loading::default() });
+        solver.advance_to(1.0).unwrap();
+        let found: Vec<f64> =
+            patch.skin.iter().flat_map(|&n| solver.displacement_mm()[n as usize]).collect();
+        let first = compliance.displacement(&scaled);
+        let c = z * z * f64::from(second.products[0]);
+        let both: Vec<f64> =
+            first.iter().zip(&second.displacements).map(|(u, d)| u + c * f64::from(*d)).collect();
+        let miss =
+            |a: &[f64]| a.iter().zip(&found).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        (miss(&first), miss(&both))
+    };
+    let ((first, both), (first_of_tenth, of_tenth)) = (left(1.0), left(0.1));
+    println!(
+        "left by first order {first:.3e} {first_of_tenth:.3e}, second {both:.3e} {of_tenth:.3e}"
+    );
+    assert!((80.0..125.0).contains(&(first / first_of_tenth)), "second order is quadratic");
+    assert!(both < 0.3 * first && of_tenth < 0.03 * first_of_tenth, "{both} {of_tenth}");
+}
+
+#[test]
+fn compliance_is_symmetric_and_gives_way_to_a_push() {
+    let (body, operator) = finger();
+    let found = compliance(body, &mut |_| ()).unwrap();
+    assert_eq!(found.atlas_hash, operator.atlas_hash);
+    let size = 3 * found.area_mm2.len();
+    let largest = found.mm_per_n.iter().copied().fold(0.0, f32::max);
+    for i in 0..size {
+        assert!(found.mm_per_n[i * size + i] >= 0.0);
+        for k in 0..i {
+            let [a, b] = [found.mm_per_n[i * size + k], found.mm_per_n[k * size + i]];
+            assert!((a - b).abs() <= 1e-6 * largest, "{i} {k}: {a} {b}");
+        }
+    }
+    let unit = |n: &[f32; 3]| (n.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-5;
+    assert!(found.normal.iter().all(unit));
+}

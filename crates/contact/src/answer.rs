@@ -1,0 +1,193 @@
+//! What presses on a finger: the outcome of a frame.
+
+use crate::model::ContactModel;
+use crate::patch::Patch;
+
+/// Pressure and its sums. Filled anew by each frame; keeps its memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contact {
+    /// True normal pressure at each vertex of the skin, Pa.
+    pub pressure_pa: Vec<f32>,
+    /// Force on the finger, N, in its frame.
+    pub force_n: [f64; 3],
+    /// Torque of it about the origin of the finger's frame, N mm.
+    pub torque_n_mm: [f64; 3],
+    /// Deformed area of the vertices in contact, mm2.
+    pub area_mm2: f64,
+    /// Centre of pressure on the deformed skin, mm; the origin without contact.
+    pub centre_mm: [f64; 3],
+    /// Deepest point left inside an object, mm.
+    pub penetration_mm: f64,
+    /// Change of force for a small travel of the objects along it, N/mm, if asked for.
+    pub stiffness_n_per_mm: Option<f64>,
+    /// What the answer is worth.
+    pub quality: Quality,
+    /// What it took.
+    pub effort: Effort,
+    /// Vertices with pressure.
+    touched: Vec<u32>,
+}
+
+/// What an answer is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality {
+    /// Share of the second-order displacement; 0 of a method without.
+    pub share: f32,
+    /// Whether the deformation is beyond what the model was made for, or more vertices could
+    /// touch than are looked at.
+    pub out_of_range: bool,
+    /// Whether the iteration settled.
+    pub settled: bool,
+}
+
+/// What a frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Distances asked of objects.
+    pub distances: u32,
+    /// Linearisations of the contact.
+    pub iterations: u32,
+    /// Products with the matrix of the vertices in contact.
+    pub products: u32,
+    /// Vertices that could touch.
+    pub candidates: u32,
+}
+
+/// Factors between the reference finger and this one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Person {
+    /// Width of the finger over that of the reference finger.
+    pub width: f64,
+    /// Stiffness of its tissue over that of the reference finger.
+    pub stiffness: f64,
+}
+
+impl Default for Person {
+    fn default() -> Self {
+        Self { width: 1.0, stiffness: 1.0 }
+    }
+}
+
+impl Effort {
+    pub(crate) const fn plus(self, other: Self) -> Self {
+        Self {
+            distances: self.distances + other.distances,
+            iterations: self.iterations + other.iterations,
+            products: self.products + other.products,
+            candidates: other.candidates,
+        }
+    }
+}
+
+const PA_PER_MPA: f64 = 1e6;
+
+impl Contact {
+    /// Memory for a finger of `vertices`.
+    #[must_use]
+    pub fn new(vertices: usize) -> Self {
+        Self {
+            pressure_pa: vec![0.0; vertices],
+            touched: Vec::with_capacity(vertices),
+            ..Self::default()
+        }
+    }
+
+    /// Nothing touches.
+    pub(crate) fn clear(&mut self) {
+        for &vertex in &self.touched {
+            self.pressure_pa[vertex as usize] = 0.0;
+        }
+        let pressure_pa = std::mem::take(&mut self.pressure_pa);
+        let mut touched = std::mem::take(&mut self.touched);
+        touched.clear();
+        let quality = Quality { settled: true, ..Quality::default() };
+        *self = Self { pressure_pa, touched, quality, ..Self::default() };
+    }
+
+    /// Puts pressure (Pa) at a vertex.
+    pub(crate) fn press(&mut self, vertex: u32, pressure_pa: f32) {
+        self.pressure_pa[vertex as usize] = pressure_pa;
+        self.touched.push(vertex);
+    }
+
+    /// Vertices with pressure.
+    #[must_use]
+    pub fn touched(&self) -> &[u32] {
+        &self.touched
+    }
+
+    /// Adds force `force_n` at `at_mm` with deformed area `area_mm2`, all of the reference finger.
+    pub(crate) fn add(&mut self, at_mm: [f64; 3], force_n: [f64; 3], size_n: f64, area_mm2: f64) {
+        let [x, y, z] = at_mm;
+        let [fx, fy, fz] = force_n;
+        let torque = [y * fz - z * fy, z * fx - x * fz, x * fy - y * fx];
+        for i in 0..3 {
+            self.force_n[i] += force_n[i];
+            self.torque_n_mm[i] += torque[i];
+            self.centre_mm[i] += size_n * at_mm[i];
+        }
+        self.area_mm2 += area_mm2;
+    }
+
+    /// From the reference finger to a person's; `size_n` is the sum of the sizes of the forces.
+    ///
+    /// Lengths grow with the width, stresses with the stiffness, and so forces with
+    /// stiffness width^2, torques with stiffness width^3, force over travel with stiffness width:
+    /// equilibrium and laws without an inner length know no other scale.
+    pub(crate) fn finish(&mut self, person: Person, size_n: f64) {
+        let Person { width, stiffness } = person;
+        let force = stiffness * width * width;
+        for i in 0..3 {
+            self.force_n[i] *= force;
+            self.torque_n_mm[i] *= force * width;
+            self.centre_mm[i] *= if size_n > 0.0 { width / size_n } else { 0.0 };
+        }
+        self.area_mm2 *= width * width;
+        self.penetration_mm *= width;
+    }
+}
+
+/// Sums the patch's forces into `out`.
+pub(crate) fn collect(model: &ContactModel, patch: &Patch, person: Person, out: &mut Contact) {
+    let v = &patch.values;
+    let mut size_n = 0.0;
+    for slot in 0..patch.near() {
+        let size = f64::from(v.size[slot]);
+        if !(size > 0.0) {
+            continue;
+        }
+        let vertex = patch.vertices()[slot];
+        let area = f64::from(model.areas_mm2[vertex as usize]) * stretch(model, patch, vertex);
+        let pressure = person.stiffness * PA_PER_MPA * size / area;
+        out.press(vertex, pressure as f32);
+        let at = std::array::from_fn(|i| {
+            model.positions_mm[vertex as usize][i] + f64::from(v.moved[i][slot])
+        });
+        out.add(at, [0, 1, 2].map(|i| f64::from(v.found[i][slot])), size, area);
+        size_n += size;
+    }
+    out.finish(person, size_n);
+}
+
+/// Deformed over undeformed area round a vertex.
+fn stretch(model: &ContactModel, patch: &Patch, vertex: u32) -> f64 {
+    let (mut rest, mut deformed) = (0.0, 0.0);
+    for &triangle in &model.around[vertex as usize] {
+        let corners = model.triangles[triangle as usize];
+        let [Some(a), Some(b), Some(c)] = corners.map(|corner| patch.slot(corner)) else {
+            continue;
+        };
+        let x = corners.map(|corner| model.positions_mm[corner as usize]);
+        let moved = |slot: usize| [0, 1, 2].map(|i| f64::from(patch.values.moved[i][slot]));
+        let u = [a, b, c].map(moved);
+        rest += area(x);
+        deformed += area(std::array::from_fn(|k| std::array::from_fn(|i| x[k][i] + u[k][i])));
+    }
+    if rest > 0.0 && deformed > 0.1 * rest { deformed / rest } else { 1.0 }
+}
+
+fn area([a, b, c]: [[f64; 3]; 3]) -> f64 {
+    let [p, q]: [[f64; 3]; 2] = [b, c].map(|v| std::array::from_fn(|i| v[i] - a[i]));
+    let n = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+    0.5 * n.iter().map(|v| v * v).sum::<f64>().sqrt()
+}

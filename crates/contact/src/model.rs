@@ -1,0 +1,294 @@
+//! What is known of a finger before anything touches it: the contact model.
+//!
+//! Its file is one text line, a header in JSON on a second line, and little-endian arrays in the
+//! order of [`Arrays`]. `fe-datagen contact` writes it.
+
+use crate::clusters::Clusters;
+use crate::error::ModelError;
+use crate::second_order::SecondOrder;
+use serde::{Deserialize, Serialize};
+
+/// First line of a file.
+const MAGIC: &[u8] = b"papilla contact model\n";
+/// Version of the file.
+const FORMAT: u32 = 1;
+/// Most vertices of a skin.
+const VERTICES_MAX: usize = 8192;
+
+/// Header of a file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Header {
+    /// Version of the file.
+    pub format: u32,
+    /// Program and version that made it.
+    pub software: String,
+    /// Hash of the atlas whose vertices these are.
+    pub atlas_hash: String,
+    /// Effects of the finger that it stands for.
+    pub effects: Vec<String>,
+    /// Hashes of the datasets whose training indentations gave the load modes.
+    pub datasets: Vec<String>,
+    /// V.
+    pub vertices: usize,
+    /// T.
+    pub triangles: usize,
+    /// R: load modes of the second order; 0 without.
+    pub modes: usize,
+    /// K: displacement modes of the second order.
+    pub outputs: usize,
+    /// Largest share of second-order displacement among the training indentations; beyond it
+    /// an answer is out of range.
+    pub share_max: f32,
+}
+
+/// Arrays of a file, in its order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arrays {
+    /// `[V, 3]`: undeformed vertices in the finger's frame, mm.
+    pub positions_mm: Vec<f32>,
+    /// `[V, 3]`: outward unit normals.
+    pub normals: Vec<f32>,
+    /// `[V]`: undeformed areas, mm2.
+    pub areas_mm2: Vec<f32>,
+    /// `[T, 3]`: the atlas' triangles.
+    pub triangles: Vec<u32>,
+    /// `[3 V (3 V + 1) / 2]`: upper triangle, row by row, of the displacement (mm) of component
+    /// `3 i + a` under a force of 1 N on component `3 k + b`.
+    pub compliance_mm_per_n: Vec<f32>,
+    /// `[V, 3, R]`: amplitude of each load mode for 1 N on a component.
+    pub projection: Vec<f32>,
+    /// `[R (R + 1) / 2, K]`: displacement amplitudes of products of load amplitudes `k <= l`.
+    pub products: Vec<f32>,
+    /// `[V, 3, K]`: displacement modes, mm; orthonormal over the skin.
+    pub displacements: Vec<f32>,
+}
+
+/// A finger's contact model, ready for any number of solvers.
+#[derive(Debug)]
+pub struct ContactModel {
+    header: Header,
+    pub(crate) positions_mm: Vec<[f64; 3]>,
+    pub(crate) normals: Vec<[f32; 3]>,
+    pub(crate) areas_mm2: Vec<f32>,
+    pub(crate) triangles: Vec<[u32; 3]>,
+    /// `[V][9][V]`: blocks of compliance by component pair. Columns stand by [`Self::rank`], so
+    /// that those of neighbours share cache lines.
+    pub(crate) compliance: Vec<f32>,
+    /// Column of each vertex.
+    pub(crate) rank: Vec<u32>,
+    pub(crate) clusters: Clusters,
+    pub(crate) second_order: Option<SecondOrder>,
+    /// Triangles round each vertex.
+    pub(crate) around: Vec<Vec<u32>>,
+}
+
+impl ContactModel {
+    /// A model of the arrays.
+    ///
+    /// # Errors
+    /// [`ModelError`] names the array that does not fit.
+    pub fn new(header: Header, arrays: Arrays) -> Result<Self, ModelError> {
+        let (v, t, r, k) = (header.vertices, header.triangles, header.modes, header.outputs);
+        if header.format != FORMAT {
+            return Err(ModelError::Version { found: header.format, expected: FORMAT });
+        }
+        let lengths = lengths(&header)?;
+        for ((array, values), (_, expected)) in arrays.floats().into_iter().zip(&lengths) {
+            if values.len() != *expected {
+                let found = values.len();
+                return Err(ModelError::Length { array, found, expected: *expected });
+            }
+            if let Some(index) = values.iter().position(|v| !v.is_finite()) {
+                let value = f64::from(values[index]);
+                return Err(ModelError::Value { array, index, value, rule: "not finite" });
+            }
+        }
+        if arrays.triangles.len() != 3 * t {
+            let found = arrays.triangles.len();
+            return Err(ModelError::Length { array: "triangles", found, expected: 3 * t });
+        }
+        if let Some(index) = arrays.triangles.iter().position(|i| *i as usize >= v) {
+            let value = f64::from(arrays.triangles[index]);
+            let rule = "not a vertex";
+            return Err(ModelError::Value { array: "triangles", index, value, rule });
+        }
+        if let Some(index) = arrays.areas_mm2.iter().position(|a| !(*a > 0.0)) {
+            let value = f64::from(arrays.areas_mm2[index]);
+            let rule = "areas have to be positive";
+            return Err(ModelError::Value { array: "areas_mm2", index, value, rule });
+        }
+        let triples = |x: &[f32]| x.as_chunks::<3>().0.to_vec();
+        let triangles = arrays.triangles.as_chunks::<3>().0.to_vec();
+        let mut around = vec![Vec::new(); v];
+        for (n, triangle) in triangles.iter().enumerate() {
+            for &corner in triangle {
+                around[corner as usize].push(n as u32);
+            }
+        }
+        let second_order = (r > 0).then(|| {
+            SecondOrder::new([r, k], arrays.projection, arrays.products, arrays.displacements)
+        });
+        let positions_mm: Vec<[f64; 3]> =
+            triples(&arrays.positions_mm).into_iter().map(|p| p.map(f64::from)).collect();
+        let clusters = Clusters::new(&positions_mm);
+        let mut rank = vec![0; v];
+        for (column, &vertex) in clusters.order().iter().enumerate() {
+            rank[vertex as usize] = column as u32;
+        }
+        Ok(Self {
+            positions_mm,
+            normals: triples(&arrays.normals),
+            areas_mm2: arrays.areas_mm2,
+            triangles,
+            compliance: unpacked(&arrays.compliance_mm_per_n, &rank)?,
+            rank,
+            clusters,
+            second_order,
+            around,
+            header,
+        })
+    }
+
+    /// Reads a file's bytes.
+    ///
+    /// # Errors
+    /// [`ModelError`] for what is no model, or one that is damaged.
+    pub fn read(bytes: &[u8]) -> Result<Self, ModelError> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or(ModelError::Format("its first line differs"))?;
+        let end = rest.iter().position(|b| *b == b'\n');
+        let end = end.ok_or(ModelError::Format("its header does not end"))?;
+        let header: Header = serde_json::from_slice(&rest[..end])?;
+        let mut words = rest[end + 1..].as_chunks::<4>().0.iter().copied();
+        let lengths = lengths(&header)?;
+        let mut take = |(array, expected): (&'static str, usize)| {
+            let values: Vec<f32> = words.by_ref().take(expected).map(f32::from_le_bytes).collect();
+            let found = values.len();
+            if found == expected {
+                Ok(values)
+            } else {
+                Err(ModelError::Length { array, found, expected })
+            }
+        };
+        let [positions, normals, areas, compliance, projection, products, displacements] = lengths;
+        let (positions_mm, normals, areas_mm2) = (take(positions)?, take(normals)?, take(areas)?);
+        let triangles = take(("triangles", 3 * header.triangles))?;
+        let arrays = Arrays {
+            positions_mm,
+            normals,
+            areas_mm2,
+            triangles: triangles.into_iter().map(f32::to_bits).collect(),
+            compliance_mm_per_n: take(compliance)?,
+            projection: take(projection)?,
+            products: take(products)?,
+            displacements: take(displacements)?,
+        };
+        if words.next().is_some() {
+            return Err(ModelError::Format("it goes on after its last array"));
+        }
+        Self::new(header, arrays)
+    }
+
+    /// What the file says of itself.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Number of vertices.
+    #[must_use]
+    pub fn vertices(&self) -> usize {
+        self.areas_mm2.len()
+    }
+
+    /// Refuses a model of another atlas.
+    ///
+    /// # Errors
+    /// [`ModelError::Atlas`].
+    pub fn require_atlas(&self, hash: &str) -> Result<(), ModelError> {
+        if self.header.atlas_hash == hash {
+            return Ok(());
+        }
+        let (found, expected) = (self.header.atlas_hash.clone(), hash.to_owned());
+        Err(ModelError::Atlas { found, expected })
+    }
+}
+
+impl Header {
+    /// A header of this version.
+    #[must_use]
+    pub fn current() -> Self {
+        Self { format: FORMAT, ..Self::default() }
+    }
+}
+
+impl Arrays {
+    fn floats(&self) -> [(&'static str, &[f32]); 7] {
+        [
+            ("positions_mm", &self.positions_mm),
+            ("normals", &self.normals),
+            ("areas_mm2", &self.areas_mm2),
+            ("compliance_mm_per_n", &self.compliance_mm_per_n),
+            ("projection", &self.projection),
+            ("products", &self.products),
+            ("displacements", &self.displacements),
+        ]
+    }
+
+    /// Bytes of a file.
+    ///
+    /// # Errors
+    /// [`ModelError::Header`] if the header cannot be written.
+    pub fn to_bytes(&self, header: &Header) -> Result<Vec<u8>, ModelError> {
+        let mut bytes = MAGIC.to_vec();
+        serde_json::to_writer(&mut bytes, header)?;
+        bytes.push(b'\n');
+        for (array, values) in self.floats() {
+            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+            if array == "areas_mm2" {
+                bytes.extend(self.triangles.iter().flat_map(|i| i.to_le_bytes()));
+            }
+        }
+        Ok(bytes)
+    }
+}
+
+/// Lengths of the arrays of floats, in the order of [`Arrays::floats`].
+fn lengths(header: &Header) -> Result<[(&'static str, usize); 7], ModelError> {
+    let (v, r, k) = (header.vertices, header.modes, header.outputs);
+    if !(1..=VERTICES_MAX).contains(&v) || header.triangles > 4 * v || r > v || k > v {
+        return Err(ModelError::Format("its header names sizes that no finger has"));
+    }
+    Ok([
+        ("positions_mm", 3 * v),
+        ("normals", 3 * v),
+        ("areas_mm2", v),
+        ("compliance_mm_per_n", 3 * v * (3 * v + 1) / 2),
+        ("projection", 3 * v * r),
+        ("products", r * (r + 1) / 2 * k),
+        ("displacements", 3 * v * k),
+    ])
+}
+
+/// Blocks `[V][9][V]` of a packed upper triangle, columns by `rank`.
+fn unpacked(packed: &[f32], rank: &[u32]) -> Result<Vec<f32>, ModelError> {
+    let v = rank.len();
+    let mut blocks = vec![0.0; 9 * v * v];
+    let mut place = |i: usize, k: usize, value: f32| {
+        blocks[((i / 3) * 9 + 3 * (i % 3) + k % 3) * v + rank[k / 3] as usize] = value;
+    };
+    let mut values = packed.iter();
+    for i in 0..3 * v {
+        for k in i..3 * v {
+            let &value = values.next().unwrap_or(&0.0);
+            if i == k && !(value >= 0.0) {
+                let (array, index, rule) =
+                    ("compliance_mm_per_n", i, "a force cannot pull its own point back");
+                return Err(ModelError::Value { array, index, value: f64::from(value), rule });
+            }
+            place(i, k, value);
+            place(k, i, value);
+        }
+    }
+    Ok(blocks)
+}

@@ -1,0 +1,57 @@
+//! Vertices that may come into contact, and the slots that hold them.
+
+use super::{CANDIDATE_MM, KEPT_MM, Solver};
+use crate::answer::Effort;
+use crate::objects::View;
+
+impl Solver {
+    pub(super) fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
+        let Self { model, candidates, wanted, patch, .. } = self;
+        for (_, vertex) in candidates.drain(..) {
+            wanted[vertex as usize] = false;
+        }
+        let mut asked = 0;
+        let balls = model.clusters.near(
+            KEPT_MM,
+            |p| view.clearance_mm(p),
+            |vertex| {
+                asked += 1;
+                let free = view.clearance_mm(model.positions_mm[vertex as usize]);
+                if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
+                    candidates.push((free, vertex));
+                }
+            },
+        );
+        effort.distances += balls + asked;
+        effort.candidates = candidates.len() as u32;
+        let [slots, _] = patch.room();
+        self.overflow = candidates.len() > slots;
+        if self.overflow {
+            candidates.select_nth_unstable_by(slots, |a, b| a.0.total_cmp(&b.0));
+            candidates.truncate(slots);
+        }
+        for (_, vertex) in candidates {
+            wanted[*vertex as usize] = true;
+        }
+    }
+
+    /// Makes the patch hold the candidates.
+    pub(super) fn keep_candidates(&mut self) {
+        for slot in (0..self.patch.vertices().len()).rev() {
+            if !self.wanted[self.patch.vertices()[slot] as usize] {
+                self.patch.remove(slot);
+                self.made = 0;
+            }
+        }
+        let stride = self.patch.stride();
+        self.patch.make_room(self.candidates.len());
+        for &(_, vertex) in &self.candidates {
+            if self.patch.slot(vertex).is_none() {
+                self.patch.add(&self.model, vertex);
+            }
+        }
+        if self.patch.stride() != stride {
+            self.made = 0;
+        }
+    }
+}

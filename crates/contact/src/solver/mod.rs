@@ -1,0 +1,268 @@
+//! A finger's contact from frame to frame.
+//!
+//! A frame linearises the distance of every displaced vertex from the nearest object, solves for
+//! forces along the objects' normals, displaces the vertices under them, and repeats. It starts
+//! from the forces of the last frame. Objects that jumped deep into the skin are drawn back along
+//! the skin's normals and brought in by steps, so that each vertex meets the side that it
+//! would have met on the way.
+
+mod approach;
+mod candidates;
+mod iteration;
+
+use crate::answer::{Contact, Effort, Person, collect};
+use crate::bounded::{BoundedSolver, Symmetric};
+use crate::error::ContactError;
+use crate::ladder::Method;
+use crate::model::ContactModel;
+use crate::objects::{Object, View, validate};
+use crate::patch::{Patch, Slots};
+use crate::second_order::Amplitudes;
+use crate::springs;
+use std::sync::Arc;
+
+/// Undeformed vertices nearer than this may come into contact, reference mm.
+const CANDIDATE_MM: f64 = 0.6;
+/// Candidates that are nearer than this stay candidates, reference mm.
+const KEPT_MM: f64 = 0.8;
+/// Force of a vertex that counts as none, reference N.
+const FORCE_MIN_N: f32 = 1e-12;
+/// Displaced vertices nearer than this may carry force in this frame, reference mm.
+const NEAR_MM: f32 = 0.08;
+/// Deepest that a displaced vertex may lie in an object before objects are brought in by steps.
+const STEP_MM: f64 = 0.25;
+/// Most steps.
+const STEPS_MAX: u32 = 16;
+/// Farthest that objects are drawn back, reference mm.
+const BACK_MAX_MM: f64 = 8.0;
+/// Linearisations in a step on the way.
+const ITERATIONS_ON_THE_WAY: u32 = 3;
+/// Linearisations in a frame's last step.
+const ITERATIONS_MAX: u32 = 25;
+/// Change of displacement that ends a frame, reference mm.
+const SETTLED_MM: f32 = 5e-5;
+/// Change of displacement above which an answer is not settled, reference mm.
+const UNSETTLED_MM: f32 = 1e-3;
+/// Violation of a complementarity condition that is accepted, reference mm.
+const VIOLATION_MM: f32 = 1e-5;
+/// Most products with the matrix in a complementarity solve.
+const PRODUCTS_MAX: u32 = 200;
+/// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
+const TURN_MAX: f32 = 0.05;
+/// Range of the over- or under-relaxation.
+const RELAXATION: [f32; 2] = [0.3, 2.5];
+/// Range of the share of tangent compliance that the second order takes.
+const SHARE: [f32; 2] = [-0.1, 0.3];
+/// Smallest and largest factor of a person.
+const PERSON: [f64; 2] = [0.25, 4.0];
+
+/// What a solver is to do in each frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// How pressure is found.
+    pub method: Method,
+    /// Whose finger it is.
+    pub person: Person,
+    /// Whether to find the local stiffness too.
+    pub stiffness: bool,
+}
+
+/// Contact of one finger. All memory is taken at construction.
+#[derive(Debug)]
+pub struct Solver {
+    model: Arc<ContactModel>,
+    settings: Settings,
+    patch: Patch,
+    bounded: BoundedSolver,
+    amplitudes: Option<Amplitudes>,
+    /// Compliance along normals, rows as in the patch, and the normals that it was made for.
+    matrix: Vec<f32>,
+    /// Bound of its eigenvalues.
+    norm: f32,
+    made_for: [Vec<f32>; 3],
+    made: usize,
+    rest: Vec<f32>,
+    wanted: Vec<bool>,
+    /// Distance from the objects at rest and vertex.
+    candidates: Vec<(f64, u32)>,
+    overflow: bool,
+}
+
+impl Solver {
+    /// A solver of a finger that nothing touches yet.
+    ///
+    /// # Errors
+    /// [`ContactError::Value`] for factors of a person out of range.
+    pub fn new(model: Arc<ContactModel>, settings: Settings) -> Result<Self, ContactError> {
+        let Person { width, stiffness } = settings.person;
+        for (member, value) in [("person.width", width), ("person.stiffness", stiffness)] {
+            if !(PERSON[0]..=PERSON[1]).contains(&value) {
+                return Err(ContactError::Value { member, value, rule: "has to be 0.25 to 4" });
+            }
+        }
+        let patch = Patch::new(model.vertices());
+        let [slots, row] = patch.room();
+        let second_order =
+            model.second_order.as_ref().filter(|_| settings.method.has_second_order());
+        Ok(Self {
+            bounded: BoundedSolver::new(slots),
+            amplitudes: second_order.map(|s| s.amplitudes()),
+            matrix: vec![0.0; slots * row],
+            norm: 0.0,
+            made_for: std::array::from_fn(|_| vec![0.0; slots]),
+            made: 0,
+            rest: vec![0.0; slots],
+            wanted: vec![false; model.vertices()],
+            candidates: Vec::with_capacity(model.vertices()),
+            overflow: false,
+            patch,
+            model,
+            settings,
+        })
+    }
+
+    /// Forgets the last frame.
+    pub fn reset(&mut self) {
+        self.patch.clear();
+        self.made = 0;
+    }
+
+    /// The model that it solves with.
+    #[must_use]
+    pub fn model(&self) -> &ContactModel {
+        &self.model
+    }
+
+    /// Finds what presses on the finger where `objects` are; they are in the finger's frame, in mm
+    /// of this person.
+    ///
+    /// # Errors
+    /// [`ContactError`] for what cannot be placed; the last frame is kept.
+    pub fn solve(&mut self, objects: &[Object], out: &mut Contact) -> Result<(), ContactError> {
+        validate(objects)?;
+        self.frame(View { objects, length: self.settings.person.width, shift_mm: [0.0; 3] }, out);
+        Ok(())
+    }
+
+    pub(crate) const fn person(&self) -> Person {
+        self.settings.person
+    }
+
+    /// A distance that all objects are certainly away from the finger at rest, mm.
+    pub(crate) fn free_mm(&self, view: View<'_>) -> f64 {
+        let free = |at: &[f64; 3]| view.clearance_mm(*at);
+        view.length * self.model.positions_mm.iter().map(free).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Finds what presses on the finger in `view`.
+    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) {
+        out.pressure_pa.resize(self.model.vertices(), 0.0);
+        out.clear();
+        self.find_candidates(view, &mut out.effort);
+        if self.candidates.is_empty() {
+            self.reset();
+            return;
+        }
+        if self.settings.method == Method::Springs {
+            springs::press(&self.model, view, self.settings.person, &self.candidates, out);
+            return;
+        }
+        self.keep_candidates();
+        self.displace(self.patch.vertices().len());
+        self.approach(view, &mut out.effort);
+        let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
+        self.answer(change, out);
+    }
+
+    /// Displaces the first `rows` slots under the near slots' forces.
+    fn displace(&mut self, rows: usize) {
+        self.patch.displace(rows);
+        let m = self.patch.near();
+        if let (Some(a), Some(s)) = (&mut self.amplitudes, &self.model.second_order) {
+            let [x, y, z] = &self.patch.values.force;
+            s.evaluate(&self.patch.vertices()[..m], [&x[..m], &y[..m], &z[..m]], a);
+        }
+        self.move_slots(rows);
+    }
+
+    fn move_slots(&mut self, rows: usize) {
+        if let (Some(a), Some(s)) = (&self.amplitudes, &self.model.second_order) {
+            self.patch.move_by(rows, |ids, first, moved| s.displace(a, ids, first, moved));
+        } else {
+            let Slots { linear, moved, .. } = &mut self.patch.values;
+            for (moved, linear) in moved.iter_mut().zip(linear) {
+                moved[..rows].copy_from_slice(&linear[..rows]);
+            }
+        }
+    }
+
+    /// Distances of all displaced slots.
+    fn measure_all(&mut self, view: View<'_>, effort: &mut Effort) {
+        self.measure_first(view, self.patch.vertices().len(), effort);
+    }
+
+    /// Distances of the displaced near slots.
+    fn measure(&mut self, view: View<'_>, effort: &mut Effort) {
+        self.measure_first(view, self.patch.near(), effort);
+    }
+
+    fn measure_first(&mut self, view: View<'_>, slots: usize, effort: &mut Effort) {
+        let Self { patch, model, settings, .. } = self;
+        let Person { width, stiffness } = settings.person;
+        effort.distances += slots as u32;
+        for slot in 0..slots {
+            let vertex = patch.vertices()[slot] as usize;
+            let v = &mut patch.values;
+            let at = std::array::from_fn(|i| {
+                model.positions_mm[vertex][i] + f64::from(v.moved[i][slot])
+            });
+            let nearest = view.nearest(at);
+            for i in 0..3 {
+                v.normal[i][slot] = nearest.normal[i] as f32;
+            }
+            // In the units of the reference finger: pressure over stiffness, length over width.
+            let give = stiffness / (view.objects[nearest.object].stiffness_mpa_per_mm * width);
+            v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
+            v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
+        }
+    }
+
+    fn answer(&mut self, change: f32, out: &mut Contact) {
+        let share_max = self.model.header().share_max;
+        let v = &self.patch.values;
+        for slot in 0..self.patch.vertices().len() {
+            let deep = f64::from(v.object[slot] * v.size[slot] - v.gap[slot]);
+            out.penetration_mm = out.penetration_mm.max(deep);
+        }
+        out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
+        out.quality.out_of_range = self.overflow || !(out.quality.share <= share_max);
+        out.quality.settled = change <= UNSETTLED_MM;
+        collect(&self.model, &self.patch, self.settings.person, out);
+        if self.settings.stiffness {
+            out.stiffness_n_per_mm = self.stiffness(out);
+        }
+    }
+
+    /// Change of force for a small travel of the objects along it: forces of the points in contact
+    /// that move all of them by the part of the travel along their normals.
+    fn stiffness(&mut self, out: &mut Contact) -> Option<f64> {
+        let size = out.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        if !(size > 0.0) {
+            return None;
+        }
+        let along = out.force_n.map(|f| (f / size) as f32);
+        let scale = 1.0 - 2.0 * self.share_taken();
+        self.remake_matrix();
+        let Self { patch, matrix, norm, rest, bounded, .. } = self;
+        let m = patch.near();
+        let v = &patch.values;
+        for slot in 0..m {
+            let part: f32 = (0..3).map(|i| along[i] * v.normal[i][slot]).sum();
+            rest[slot] = if v.size[slot] > 0.0 { part } else { 0.0 };
+        }
+        let symmetric = Symmetric { values: matrix, stride: patch.stride(), norm: *norm };
+        let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
+        let Person { width, stiffness } = self.settings.person;
+        Some(f64::from(force / scale) * stiffness * width)
+    }
+}

@@ -1,0 +1,44 @@
+//! The baseline: a spring for each vertex.
+//!
+//! `p = k max(0, d - relief d_max)^n` with the penetration `d` of the undeformed vertex and that
+//! of the deepest one. Constants are a fit to FE indentations: `docs/reports/penetration.md`.
+
+use crate::answer::{Contact, Person};
+use crate::model::ContactModel;
+use crate::objects::View;
+
+const STIFFNESS_PA: f64 = 20090.0;
+const EXPONENT: f64 = 0.6;
+const RELIEF: f64 = 0.35;
+
+/// Presses the vertices `candidates`.
+pub(crate) fn press(
+    model: &ContactModel,
+    view: View<'_>,
+    person: Person,
+    candidates: &[(f64, u32)],
+    out: &mut Contact,
+) {
+    let depth = |&(_, vertex): &(f64, u32)| {
+        let at = model.positions_mm[vertex as usize];
+        (at, view.nearest(at))
+    };
+    let deepest = candidates.iter().map(|v| -depth(v).1.gap_mm).fold(0.0, f64::max);
+    let mut size_n = 0.0;
+    for candidate in candidates {
+        let (at, nearest) = depth(candidate);
+        let vertex = candidate.1;
+        let d = -nearest.gap_mm - RELIEF * deepest;
+        if d > 0.0 {
+            let pressure = person.stiffness * STIFFNESS_PA * d.powf(EXPONENT);
+            let area = f64::from(model.areas_mm2[vertex as usize]);
+            let size = pressure / person.stiffness * area * 1e-6;
+            out.press(vertex, pressure as f32);
+            out.add(at, nearest.normal.map(|n| size * n), size, area);
+            size_n += size;
+        }
+    }
+    out.effort.distances += 2 * candidates.len() as u32;
+    out.penetration_mm = deepest;
+    out.finish(person, size_n);
+}

@@ -1,0 +1,301 @@
+//! A flat patch of an elastic half-space, where answers are known in closed form.
+
+use papilla_contact::{
+    Arrays, Contact, ContactModel, Header, Method, Object, Person, Settings, Solver,
+};
+use papilla_sdf::{Placement, SignedDistance, Sphere};
+use proptest::prelude::*;
+use std::sync::Arc;
+
+const SIDE: usize = 21;
+const SPACING_MM: f64 = 0.1;
+/// E / (1 - nu^2), MPa.
+const MODULUS_MPA: f64 = 0.2;
+
+fn vertex(i: usize) -> [f64; 2] {
+    let middle = (SIDE - 1) as f64 / 2.0;
+    [i % SIDE, i / SIDE].map(|k| (k as f64 - middle) * SPACING_MM)
+}
+
+/// Vertices on a square grid at z = 0, skin looking down (-z): objects press towards +z. Only the
+/// normal displacement is not zero (Boussinesq); a point's own is the mean under a uniform square.
+fn arrays() -> (Header, Arrays) {
+    let v = SIDE * SIDE;
+    let own = 4.0 * (1.0 + 2f64.sqrt()).ln() - 4.0 / 3.0 * (2f64.sqrt() - 1.0);
+    let compliance = |i: usize, k: usize| {
+        let (p, q) = (vertex(i), vertex(k));
+        let r = (p[0] - q[0]).hypot(p[1] - q[1]) / SPACING_MM;
+        let shape = if i == k { own } else { 1.0 / r };
+        (shape / (std::f64::consts::PI * MODULUS_MPA * SPACING_MM)) as f32
+    };
+    let mut packed = Vec::new();
+    for row in 0..3 * v {
+        for column in row..3 * v {
+            let normal = row % 3 == 2 && column % 3 == 2;
+            packed.push(if normal { compliance(row / 3, column / 3) } else { 0.0 });
+        }
+    }
+    let mut triangles = Vec::new();
+    for y in 0..SIDE - 1 {
+        for x in 0..SIDE - 1 {
+            let a = (y * SIDE + x) as u32;
+            let s = SIDE as u32;
+            triangles.extend([a, a + 1, a + s, a + 1, a + s + 1, a + s]);
+        }
+    }
+    let header = Header {
+        vertices: v,
+        triangles: triangles.len() / 3,
+        share_max: 1.0,
+        atlas_hash: "flat".into(),
+        ..Header::current()
+    };
+    let place = |i: usize| {
+        let [x, y] = vertex(i);
+        [x as f32, y as f32, 0.0]
+    };
+    let arrays = Arrays {
+        positions_mm: (0..v).flat_map(place).collect(),
+        normals: (0..v).flat_map(|_| [0.0, 0.0, -1.0]).collect(),
+        areas_mm2: vec![(SPACING_MM * SPACING_MM) as f32; v],
+        triangles,
+        compliance_mm_per_n: packed,
+        ..Arrays::default()
+    };
+    (header, arrays)
+}
+
+fn model() -> Arc<ContactModel> {
+    static MODEL: std::sync::OnceLock<Arc<ContactModel>> = std::sync::OnceLock::new();
+    let make = || {
+        let (header, arrays) = arrays();
+        Arc::new(ContactModel::new(header, arrays).expect("a model"))
+    };
+    MODEL.get_or_init(make).clone()
+}
+
+fn ball(radius_mm: f64, at: [f64; 2], depth_mm: f64) -> Object {
+    let shape: Arc<dyn SignedDistance> = Arc::new(Sphere { radius_mm });
+    let place = [at[0], at[1], depth_mm - radius_mm];
+    Object::rigid(shape, Placement::turned(0.0, 0.0, 0.0, place))
+}
+
+fn solver(settings: Settings) -> (Solver, Contact) {
+    let model = model();
+    let out = Contact::new(model.vertices());
+    (Solver::new(model, settings).expect("a solver"), out)
+}
+
+fn small_strain() -> Settings {
+    Settings { method: Method::SmallStrain, ..Settings::default() }
+}
+
+/// Hertz: `F = 4/3 E* sqrt(R) d^1.5`, `a^2 = R d`, `p0 = 2 E* sqrt(d / R) / pi`, `dF/dd = 2 E* a`.
+#[test]
+fn a_ball_presses_as_hertz_says() {
+    let (mut solver, mut out) = solver(Settings { stiffness: true, ..small_strain() });
+    for (radius, depth) in [(10.0f64, 0.02f64), (10.0, 0.06), (20.0, 0.03)] {
+        solver.solve(&[ball(radius, [0.0; 2], depth)], &mut out).expect("an answer");
+        let a = (radius * depth).sqrt();
+        let force = 4.0 / 3.0 * MODULUS_MPA * radius.sqrt() * depth.powf(1.5);
+        let peak = 2.0 * MODULUS_MPA * (depth / radius).sqrt() / std::f64::consts::PI;
+        let near = |found: f64, due: f64, part: f64| (found / due - 1.0).abs() < part;
+        let top = out.pressure_pa.iter().copied().fold(0.0, f32::max);
+        assert!(near(out.force_n[2], force, 0.04), "{} for {force} N", out.force_n[2]);
+        assert!(near(f64::from(top) * 1e-6, peak, 0.06), "{top} Pa for {peak} MPa");
+        let area = std::f64::consts::PI * a * a;
+        assert!(near(out.area_mm2, area, 0.12), "{} for {area}", out.area_mm2);
+        let stiffness = out.stiffness_n_per_mm.expect("asked for");
+        assert!(near(stiffness, 2.0 * MODULUS_MPA * a, 0.08), "{stiffness}");
+        assert!(out.quality.settled && out.penetration_mm < 1e-4);
+    }
+}
+
+#[test]
+fn force_and_torque_are_those_of_the_pressure() {
+    let (mut solver, mut out) = solver(small_strain());
+    solver.solve(&[ball(10.0, [0.4, -0.3], 0.06)], &mut out).expect("an answer");
+    let [x, y] = [out.centre_mm[0], out.centre_mm[1]];
+    assert!((x - 0.4).abs() < 5e-3 && (y + 0.3).abs() < 5e-3, "{x} {y}");
+    let [fz, tx, ty] = [out.force_n[2], out.torque_n_mm[0], out.torque_n_mm[1]];
+    assert!((tx - y * fz).abs() < 0.02 * fz && (ty + x * fz).abs() < 0.02 * fz, "{tx} {ty}");
+}
+
+#[test]
+fn in_air_one_distance_is_asked_and_nothing_presses() {
+    let (mut solver, mut out) = solver(small_strain());
+    solver.solve(&[ball(10.0, [0.0; 2], 0.1)], &mut out).expect("an answer");
+    assert!(!out.touched().is_empty());
+    solver.solve(&[ball(10.0, [0.0; 2], -20.0)], &mut out).expect("an answer");
+    assert!(out.pressure_pa.iter().all(|p| p.to_bits() == 0));
+    assert_eq!((out.effort.distances, out.effort.iterations), (1, 0));
+    solver.solve(&[], &mut out).expect("an answer");
+    assert_eq!(out.force_n.map(f64::to_bits), [0; 3]);
+}
+
+/// Lengths times w, moduli times s: pressure times s, force times s w^2, torque times s w^3.
+#[test]
+fn a_scaled_finger_answers_scaled() {
+    let (mut own, mut out) = solver(Settings { stiffness: true, ..small_strain() });
+    own.solve(&[ball(8.0, [0.2, 0.1], 0.08)], &mut out).expect("an answer");
+    let person = Person { width: 1.3, stiffness: 0.7 };
+    let (mut other, mut scaled) = solver(Settings { person, stiffness: true, ..small_strain() });
+    let larger = ball(8.0 * 1.3, [0.2 * 1.3, 0.1 * 1.3], 0.08 * 1.3);
+    other.solve(&[larger], &mut scaled).expect("an answer");
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-3 * b.abs();
+    assert!(same(scaled.force_n[2], 0.7 * 1.69 * out.force_n[2]));
+    assert!(same(scaled.torque_n_mm[0], 0.7 * 1.3f64.powi(3) * out.torque_n_mm[0]));
+    assert!(same(scaled.area_mm2, 1.69 * out.area_mm2));
+    assert!(same(scaled.centre_mm[0], 1.3 * out.centre_mm[0]));
+    let stiffness = [&scaled, &out].map(|o| o.stiffness_n_per_mm.expect("asked for"));
+    assert!(same(stiffness[0], 0.7 * 1.3 * stiffness[1]));
+    for (a, b) in scaled.pressure_pa.iter().zip(&out.pressure_pa) {
+        assert!((a - 0.7 * b).abs() <= 1e-3 * 0.7 * b + 1.0, "{a} {b}");
+    }
+}
+
+/// Whether an object starts in air or too deep, it travels to where Hertz has the force.
+#[test]
+fn a_net_force_is_met() {
+    for start in [-3.0, -0.01, 0.04, 0.15] {
+        let (mut solver, mut out) = solver(small_strain());
+        let force = 0.006;
+        let travel = solver
+            .solve_for_force(&[ball(10.0, [0.0; 2], start)], [0.0, 0.0, 1.0], force, &mut out)
+            .expect("a travel");
+        assert!((out.force_n[2] / force - 1.0).abs() < 3e-3, "{}", out.force_n[2]);
+        let due = (0.75 * force / (MODULUS_MPA * 10f64.sqrt())).powf(2.0 / 3.0);
+        assert!(((start + travel) / due - 1.0).abs() < 0.05, "{start}: {travel} for {due}");
+    }
+    let (mut solver, mut out) = solver(small_strain());
+    let away = [0.0, 0.0, -1.0];
+    let error = solver.solve_for_force(&[ball(1.0, [0.0; 2], -1.0)], away, 1.0, &mut out);
+    assert!(error.is_err());
+}
+
+/// A soft object and the skin share the depth; a very stiff one is rigid.
+#[test]
+fn a_soft_object_gives_way() {
+    let force = |stiffness_mpa_per_mm: f64| {
+        let (mut solver, mut out) = solver(small_strain());
+        let object = Object { stiffness_mpa_per_mm, ..ball(10.0, [0.0; 2], 0.08) };
+        solver.solve(&[object], &mut out).expect("an answer");
+        out.force_n[2]
+    };
+    let [soft, stiff, rigid] = [0.1, 1e4, f64::INFINITY].map(force);
+    assert!(soft < 0.7 * rigid && soft > 0.2 * rigid, "{soft} {rigid}");
+    assert!((stiff / rigid - 1.0).abs() < 1e-2, "{stiff} {rigid}");
+}
+
+/// Two parts of a millimetre in steps of a micrometre: force rises by what its stiffness says.
+#[test]
+fn force_is_continuous_along_a_path() {
+    let (mut solver, mut out) = solver(Settings { stiffness: true, ..small_strain() });
+    let mut last: Option<(f64, Vec<f32>)> = None;
+    for step in 0..200 {
+        let depth = 0.02 + 1e-3 * f64::from(step) * 0.5;
+        solver.solve(&[ball(10.0, [0.3, 0.0], depth)], &mut out).expect("an answer");
+        if let Some((force, pressure)) = &last {
+            let rise = out.force_n[2] - force;
+            let due = 0.5e-3 * out.stiffness_n_per_mm.expect("asked for");
+            assert!(rise > 0.7 * due && rise < 1.3 * due, "{step}: {rise} for {due}");
+            let most = out.pressure_pa.iter().copied().fold(0.0, f32::max);
+            for (a, b) in out.pressure_pa.iter().zip(pressure) {
+                assert!((a - b).abs() < 0.08 * most, "{step}: {b} to {a} of {most}");
+            }
+        }
+        last = Some((out.force_n[2], out.pressure_pa.clone()));
+    }
+}
+
+#[test]
+fn a_warm_frame_ends_where_a_cold_one_does() {
+    let (mut warm, mut out) = solver(small_strain());
+    let (mut cold, mut anew) = solver(small_strain());
+    for step in 0..40 {
+        let at = [0.02 * f64::from(step) - 0.4, 0.01 * f64::from(step % 7)];
+        let object = ball(6.0, at, 0.05 + 0.01 * f64::from(step % 5));
+        warm.solve(std::slice::from_ref(&object), &mut out).expect("an answer");
+        cold.reset();
+        cold.solve(&[object], &mut anew).expect("an answer");
+        let miss: f32 =
+            out.pressure_pa.iter().zip(&anew.pressure_pa).map(|(a, b)| (a - b).powi(2)).sum();
+        let size: f32 = anew.pressure_pa.iter().map(|p| p * p).sum();
+        assert!(miss <= 1e-4 * size, "{step}: {miss} of {size}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(60) })]
+    /// Frames that jump, also deep: no tension, no NaN, bounded work, and what does not fit is said.
+    #[test]
+    fn any_frame_is_answered(
+        frames in prop::collection::vec(
+            (0.3f64..40.0, -2.5f64..2.5, -2.5f64..2.5, -1.0f64..3.0, 0usize..2), 1..5),
+    ) {
+        let (mut solver, mut out) = solver(small_strain());
+        for (radius, x, y, depth, more) in frames {
+            let mut objects = vec![ball(radius, [x, y], depth)];
+            objects.extend((0..more).map(|_| ball(1.0, [-x, y], 0.3 * depth)));
+            solver.solve(&objects, &mut out).expect("an answer");
+            prop_assert!(out.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0));
+            prop_assert!(out.force_n.iter().all(|f| f.is_finite()));
+            prop_assert!(out.effort.iterations <= 16 * 3 + 25);
+            let judged = out.quality.settled && !out.quality.out_of_range;
+            prop_assert!(!judged || out.penetration_mm < 2e-3, "{} mm left", out.penetration_mm);
+            let clearance = |o: &Object, i: usize| {
+                let [x, y] = vertex(i);
+                o.placement.clearance_mm(o.shape.as_ref(), [x, y, 0.0])
+            };
+            let nearest = objects
+                .iter()
+                .flat_map(|o| (0..SIDE * SIDE).map(move |i| clearance(o, i)))
+                .fold(f64::INFINITY, f64::min);
+            let pressed = out.pressure_pa.iter().any(|p| *p > 0.0);
+            prop_assert!(pressed || nearest > -1e-3, "missed by {nearest}");
+            prop_assert!(!pressed || nearest < 1e-4, "pressure across {nearest}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_placed_is_named() {
+    let (mut solver, mut out) = solver(small_strain());
+    let place = |change: &dyn Fn(&mut Object)| {
+        let mut object = ball(5.0, [0.0; 2], 0.1);
+        change(&mut object);
+        object
+    };
+    let cases = [
+        (place(&|o| o.placement.origin_mm[1] = f64::NAN), "origin_mm"),
+        (place(&|o| o.placement.origin_mm[1] = 1e9), "origin_mm"),
+        (place(&|o| o.placement.rotation[0][0] = 1.1), "rotation"),
+        (place(&|o| o.placement.rotation[2][2] = -1.0), "rotation"),
+        (place(&|o| o.placement.rotation[2][2] = f64::NAN), "rotation"),
+        (place(&|o| o.stiffness_mpa_per_mm = 0.0), "stiffness"),
+    ];
+    for (object, word) in cases {
+        let error = solver.solve(&[object], &mut out).expect_err("refused").to_string();
+        assert!(error.contains(word), "{error} should name {word}");
+    }
+    let person = Person { width: f64::NAN, ..Person::default() };
+    assert!(Solver::new(model(), Settings { person, ..small_strain() }).is_err());
+}
+
+#[test]
+fn a_file_comes_back_and_a_damaged_one_is_refused() {
+    let (header, arrays) = arrays();
+    let bytes = arrays.to_bytes(&header).expect("bytes");
+    let read = ContactModel::read(&bytes).expect("a model");
+    assert_eq!((read.header(), read.vertices()), (&header, SIDE * SIDE));
+    assert!(read.require_atlas("flat").is_ok() && read.require_atlas("other").is_err());
+    for cut in [0, 10, 60, bytes.len() - 4] {
+        assert!(ContactModel::read(&bytes[..cut]).is_err(), "cut at {cut}");
+    }
+    let longer = [&bytes[..], &[0; 4]].concat();
+    assert!(ContactModel::read(&longer).is_err());
+    let mut bad = arrays;
+    bad.compliance_mm_per_n[3] = f32::NAN;
+    let error = ContactModel::new(header, bad).expect_err("refused").to_string();
+    assert!(error.contains("compliance_mm_per_n[3]"), "{error}");
+}

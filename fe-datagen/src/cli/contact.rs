@@ -1,0 +1,149 @@
+//! `contact`: what the real-time contact solver has to know of the finger.
+
+use anyhow::Context;
+use papilla_contact::{Arrays, Header};
+use papilla_dataset::{Dataset, Split};
+use papilla_fingertip::influence::{self, Compliance, Load, SecondOrder};
+use papilla_fingertip::mesh::fingertip::{Density, Order};
+use papilla_fingertip::scene::TissueTable;
+use papilla_fingertip::simulation::body::Body;
+use papilla_output::atomic;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Make a contact model of this finger for the real-time contact solver.
+///
+/// Two parts: how far each vertex of the skin moves under a force on any other one at small strain
+/// (one factorization, 3 V right-hand sides), and the second order of finite strain over the load
+/// modes of the datasets' training indentations (exact derivatives of the internal forces, no fit).
+/// Held-out indentations are not read. Layers and finite strain on, rigid bone and nail.
+#[derive(clap::Args)]
+#[command(after_help = "Takes 3 min and 3 GB.\n\
+                        Example: fe-datagen contact data/s1 data/broad --out out/finger.contact")]
+pub(super) struct Args {
+    /// Datasets of this finger, by density medium.
+    #[arg(required = true)]
+    datasets: Vec<PathBuf>,
+    /// Load modes of the second order.
+    #[arg(long, default_value_t = 48)]
+    modes: usize,
+    /// Displacements of the second order.
+    #[arg(long, default_value_t = 48)]
+    outputs: usize,
+    /// File to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let (density, order, materials) = (Density::Medium, Order::Linear, TissueTable::default());
+    let rest = influence::body(density, order, &materials)?;
+    let vertices = rest.patch.as_ref().map_or(0, |p| p.patch.skin.len());
+    let bar = super::progress("solving for forces", 3 * vertices);
+    let compliance = influence::compliance(&rest, &mut |done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    let (atlas, _) = rest.atlas().context("the finger has no atlas")??;
+    let skin = atlas.patch(papilla_atlas::Patch::Skin);
+    let (mut loads, mut datasets) = (Vec::new(), Vec::new());
+    for folder in &args.datasets {
+        let dataset = Dataset::open(folder)?;
+        dataset.atlas().require_hash(atlas.hash()).with_context(|| folder.display().to_string())?;
+        loads_of(&dataset, &compliance, &mut loads)?;
+        datasets.push(dataset.manifest().dataset_sha256.clone());
+    }
+    add_mirrored(&skin.positions_mm, &mut loads);
+    let body = Body::usual(density)?;
+    let bar = super::progress("solving for pairs", args.modes * (args.modes + 1) / 2);
+    let second = influence::second_order(
+        &body,
+        &compliance,
+        &loads,
+        [args.modes, args.outputs],
+        &mut |done| bar.set_position(done as u64),
+    )?;
+    bar.finish_and_clear();
+    let header = Header {
+        software: concat!("fe-datagen ", env!("CARGO_PKG_VERSION")).into(),
+        atlas_hash: compliance.atlas_hash.clone(),
+        effects: vec!["finite_strain".into(), "layers".into()],
+        datasets,
+        vertices,
+        triangles: atlas.triangles().len(),
+        modes: second.modes,
+        outputs: second.outputs,
+        share_max: second.share_max as f32,
+        ..Header::current()
+    };
+    let arrays = arrays(&compliance, second, &skin.positions_mm, atlas.triangles());
+    let bytes = arrays.to_bytes(&header)?;
+    atomic::write(&args.out, &bytes)?;
+    println!(
+        "contact model of {vertices} vertices, {} load modes of {} loads, second order up to {:.0} % \
+         of the displacement\nwrote {}",
+        header.modes,
+        loads.len(),
+        100.0 * header.share_max,
+        args.out.display()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Forces of the deepest and of a middle state of each training indentation: pressure times
+/// undeformed area along the recorded force, as large as that.
+fn loads_of(
+    dataset: &Dataset,
+    compliance: &Compliance,
+    loads: &mut Vec<Load>,
+) -> anyhow::Result<()> {
+    for press in dataset.manifest().presses.iter().filter(|p| p.split == Split::Train) {
+        let shard = dataset.shard(press)?;
+        let last = shard.len() - 1;
+        for state in [last / 2, last] {
+            let force: [f64; 3] = std::array::from_fn(|i| f64::from(shard.force_n[[state, i]]));
+            let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let pressure = shard.pressure_pa.row(state);
+            let weights = pressure.iter().zip(&compliance.area_mm2).map(|(p, a)| f64::from(p * a));
+            let total: f64 = weights.clone().sum();
+            if !(size > 0.0 && total > 0.0) {
+                continue;
+            }
+            let pressed = weights.enumerate().filter(|(_, w)| *w > 0.0);
+            loads.push(pressed.map(|(v, w)| (v as u32, force.map(|f| f * w / total))).collect());
+        }
+    }
+    Ok(())
+}
+
+/// The finger is its own mirror image in y: so are its loads.
+fn add_mirrored(positions_mm: &[[f32; 3]], loads: &mut Vec<Load>) {
+    let key = |p: &[f32; 3], sign: f32| [p[0], sign * p[1] + 0.0, p[2]].map(f32::to_bits);
+    let at: HashMap<_, _> =
+        positions_mm.iter().enumerate().map(|(i, p)| (key(p, 1.0), i as u32)).collect();
+    let twin = |v: u32| at.get(&key(&positions_mm[v as usize], -1.0)).copied();
+    let mirrored = |load: &Load| -> Option<Load> {
+        load.iter().map(|(v, f)| Some((twin(*v)?, [f[0], -f[1], f[2]]))).collect()
+    };
+    let more: Vec<Load> = loads.iter().filter_map(mirrored).collect();
+    loads.extend(more);
+}
+
+fn arrays(
+    compliance: &Compliance,
+    second: SecondOrder,
+    positions_mm: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+) -> Arrays {
+    let size = 3 * positions_mm.len();
+    let row = |i: usize| &compliance.mm_per_n[i * size..][..size];
+    Arrays {
+        positions_mm: positions_mm.as_flattened().to_vec(),
+        normals: compliance.normal.as_flattened().to_vec(),
+        areas_mm2: compliance.area_mm2.clone(),
+        triangles: triangles.as_flattened().to_vec(),
+        compliance_mm_per_n: (0..size).flat_map(|i| row(i)[i..].to_vec()).collect(),
+        projection: second.projection,
+        products: second.products,
+        displacements: second.displacements,
+    }
+}
