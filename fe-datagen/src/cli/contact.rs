@@ -1,5 +1,6 @@
 //! `contact`: what the real-time contact solver has to know of the finger.
 
+use crate::progress::Progress;
 use anyhow::Context;
 use papilla_contact::{Arrays, Header};
 use papilla_dataset::{Dataset, Split};
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 /// Held-out indentations are not read. Layers and finite strain on, rigid bone and nail.
 #[derive(clap::Args)]
 #[command(after_help = "Takes 3 min and 3 GB.\n\
-                        Example: fe-datagen contact data/s1 data/broad --out out/finger.contact")]
+                        Example: fe-datagen contact data/s1 data/broad --out out/contact")]
 pub(super) struct Args {
     /// Datasets of this finger, by density medium.
     #[arg(required = true)]
@@ -31,7 +32,7 @@ pub(super) struct Args {
     /// Displacements of the second order.
     #[arg(long, default_value_t = 48)]
     outputs: usize,
-    /// File to write.
+    /// Folder for finger.contact.
     #[arg(long)]
     out: PathBuf,
 }
@@ -40,9 +41,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (density, order, materials) = (Density::Medium, Order::Linear, TissueTable::default());
     let rest = influence::body(density, order, &materials)?;
     let vertices = rest.patch.as_ref().map_or(0, |p| p.patch.skin.len());
-    let bar = super::progress("solving for forces", 3 * vertices);
-    let compliance = influence::compliance(&rest, &mut |done| bar.set_position(done as u64))?;
-    bar.finish_and_clear();
+    let progress = Progress::new("forces", 3 * vertices, 0, false);
+    let compliance = influence::compliance(&rest, &mut |done| progress.set_position(done))?;
+    drop(progress);
     let (atlas, _) = rest.atlas().context("the finger has no atlas")??;
     let skin = atlas.patch(papilla_atlas::Patch::Skin);
     let (mut loads, mut datasets) = (Vec::new(), Vec::new());
@@ -54,15 +55,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     add_mirrored(&skin.positions_mm, &mut loads);
     let body = Body::usual(density)?;
-    let bar = super::progress("solving for pairs", args.modes * (args.modes + 1) / 2);
+    let pairs = args.modes * (args.modes + 1) / 2;
+    let progress = Progress::new("pairs of load modes", pairs, 0, false);
     let second = influence::second_order(
         &body,
         &compliance,
         &loads,
         [args.modes, args.outputs],
-        &mut |done| bar.set_position(done as u64),
+        &mut |done| progress.set_position(done),
     )?;
-    bar.finish_and_clear();
+    drop(progress);
     let header = Header {
         software: concat!("fe-datagen ", env!("CARGO_PKG_VERSION")).into(),
         atlas_hash: compliance.atlas_hash.clone(),
@@ -77,14 +79,16 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let arrays = arrays(&compliance, second, &skin.positions_mm, atlas.triangles());
     let bytes = arrays.to_bytes(&header)?;
-    atomic::write(&args.out, &bytes)?;
+    atomic::create_folder(&args.out)?;
+    let path = args.out.join("finger.contact");
+    atomic::write(&path, &bytes)?;
     println!(
         "contact model of {vertices} vertices, {} load modes of {} loads, second order up to {:.0} % \
          of the displacement\nwrote {}",
         header.modes,
         loads.len(),
         100.0 * header.share_max,
-        args.out.display()
+        path.display()
     );
     Ok(ExitCode::SUCCESS)
 }

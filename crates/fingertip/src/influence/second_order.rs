@@ -198,7 +198,7 @@ impl<'a> Curvature<'a> {
                 multipliers_mpa: &self.multipliers,
                 penalty: 1.0,
                 load_fraction: 0.0,
-                memory: Default::default(),
+                variables: Default::default(),
                 friction: None,
             };
             evaluate_body(problem, &Loading::default(), &trial, None, &mut self.out)?;
