@@ -71,7 +71,7 @@ pub struct Receiver(SplitStream<WebSocketStream<TcpStream>>);
 
 /// What the server said.
 #[derive(Clone, Debug)]
-pub enum Heard {
+pub enum Received {
     /// An answer: its header and its samples (none unless the status is ok).
     Frame(FrameHeader, Bytes),
     /// A refusal; `closes` says whether the session ends.
@@ -146,10 +146,10 @@ impl Receiver {
     ///
     /// # Errors
     /// The session is closed or broken, or the server leaves the protocol.
-    pub async fn hear(&mut self) -> Result<Heard, SocketError> {
+    pub async fn receive(&mut self) -> Result<Received, SocketError> {
         match self.text_or_frame().await? {
-            Said::Frame(header, payload) => Ok(Heard::Frame(header, payload)),
-            Said::Text(ServerMessage::Error(error)) => Ok(Heard::Error(error)),
+            Said::Frame(header, payload) => Ok(Received::Frame(header, payload)),
+            Said::Text(ServerMessage::Error(error)) => Ok(Received::Error(error)),
             Said::Text(_) => Err(SocketError::Text("a second ready".to_owned())),
         }
     }

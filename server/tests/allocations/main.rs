@@ -106,7 +106,7 @@ impl Client {
         assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
         let mut client = Self { stream, buffer: vec![0; 1 << 20] };
         client.send(&masked(0x81, hello.to_string().as_bytes()));
-        let ready: Value = serde_json::from_slice(client.hear()).unwrap();
+        let ready: Value = serde_json::from_slice(client.receive()).unwrap();
         assert_eq!(ready["type"], "ready", "{ready}");
         client
     }
@@ -116,7 +116,7 @@ impl Client {
     }
 
     /// The payload of the next message.
-    fn hear(&mut self) -> &[u8] {
+    fn receive(&mut self) -> &[u8] {
         let mut head = [0; 2];
         self.stream.read_exact(&mut head).unwrap();
         let len = match head[1] {
@@ -139,7 +139,7 @@ impl Client {
         for _ in 0..rounds {
             for message in messages {
                 self.send(message);
-                let header = FrameHeader::decode(self.hear()).unwrap();
+                let header = FrameHeader::decode(self.receive()).unwrap();
                 assert_eq!(header.status, FrameStatus::Ok, "{header:?}");
             }
         }
@@ -248,7 +248,7 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
             }
             for client in &mut clients {
                 for _ in 0..3 {
-                    let header = FrameHeader::decode(client.hear()).unwrap();
+                    let header = FrameHeader::decode(client.receive()).unwrap();
                     maps += u64::from(header.status == FrameStatus::Ok);
                 }
             }

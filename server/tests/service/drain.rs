@@ -6,7 +6,7 @@ use papilla_proto::{FrameStatus, SampleType};
 use serde_json::json;
 use tokio::{net::TcpStream, time::sleep};
 
-use crate::support::{Heard, Service, bytes_of, frame, hello, ramp};
+use crate::support::{Received, Service, bytes_of, frame, hello, ramp};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn accepted_work_is_answered_and_sessions_are_told() {
@@ -57,19 +57,19 @@ async fn frames_that_come_during_the_drain_are_refused_by_name() {
     // The answer to the first and the refusal of the second, whichever is sooner.
     let (mut refused, mut answered) = (0, 0);
     for _ in 0..2 {
-        match socket.hear().await {
-            Heard::Json(problem) => {
+        match socket.receive().await {
+            Received::Json(problem) => {
                 assert_eq!(
                     (&problem["code"], &problem["sequence"]),
                     (&json!("shutting_down"), &json!(2))
                 );
                 refused += 1;
             }
-            Heard::Frame(header, _) => {
+            Received::Frame(header, _) => {
                 assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
                 answered += 1;
             }
-            Heard::Closed(code) => panic!("closed with {code:?} before both were answered"),
+            Received::Closed(code) => panic!("closed with {code:?} before both were answered"),
         }
     }
     assert_eq!((refused, answered), (1, 1));

@@ -134,7 +134,7 @@ async fn a_session_that_answers_pings_lives_on_and_one_that_does_not_ends() {
     let mut dead = service.socket().await;
     dead.open(hello(&json!({}))).await;
     // Reading answers pings; `dead` does not read.
-    let _ = timeout(Duration::from_secs(5), live.hear()).await.expect_err("nothing is due");
+    let _ = timeout(Duration::from_secs(5), live.receive()).await.expect_err("nothing is due");
     live.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     live.hear_frame().await;
     let wait = async {

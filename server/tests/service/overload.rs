@@ -6,7 +6,7 @@ use papilla_proto::{FrameStatus, SampleType};
 use serde_json::json;
 
 use crate::support::{
-    Heard, Running, Service, Socket, bytes_of, frame, hello, metric_at, model_folder, ramp,
+    Received, Running, Service, Socket, bytes_of, frame, hello, metric_at, model_folder, ramp,
 };
 
 const SESSIONS: usize = 8;
@@ -40,8 +40,8 @@ async fn flood(mut socket: Socket, deadline_us: u32, ahead: u32) -> Tally {
             sent += 1;
             continue;
         }
-        let header = match socket.hear().await {
-            Heard::Frame(header, _) => header,
+        let header = match socket.receive().await {
+            Received::Frame(header, _) => header,
             other => panic!("{other:?} after {heard} of {sent} frames"),
         };
         let known = std::mem::replace(&mut answered[header.sequence as usize], true);

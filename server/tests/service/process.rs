@@ -11,8 +11,8 @@ use serde_json::{Value, json};
 use tokio::time::{sleep, timeout};
 
 use crate::support::{
-    Heard, Request, Running, Socket, add_model_of_gain, atlas, bytes_of, frame, hello, metric_at,
-    model_folder, papilla, ramp, signal, write,
+    Received, Request, Running, Socket, add_model_of_gain, atlas, bytes_of, frame, hello,
+    metric_at, model_folder, papilla, ramp, signal, write,
 };
 
 /// Longest wait for what comes within seconds; only a hang takes longer.
@@ -122,7 +122,7 @@ async fn sigterm_answers_what_was_accepted_and_ends() {
     let (header, _) = socket.hear_frame().await;
     assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
     socket.hear_end("shutting_down", 1001).await;
-    assert!(matches!(socket.hear().await, Heard::Closed(_)));
+    assert!(matches!(socket.receive().await, Received::Closed(_)));
     drop(socket);
     let status = loop {
         match running.child.try_wait().unwrap() {

@@ -6,7 +6,8 @@ use papilla_proto::{FrameHeader, FrameKind, FrameStatus, MAP_LEN, SampleType};
 use serde_json::{Value, json};
 
 use crate::support::{
-    Heard, PRESSURE_MAX_PA, SED_MAX, Service, Socket, assert_rendered, bytes_of, frame, hello, ramp,
+    PRESSURE_MAX_PA, Received, SED_MAX, Service, Socket, assert_rendered, bytes_of, frame, hello,
+    ramp,
 };
 
 fn outcome(name: &str) -> String {
@@ -308,7 +309,7 @@ async fn sessions_beyond_the_bound_are_turned_away() {
     let (status, body) = Socket::connect(service.address).await.err().unwrap();
     assert_eq!((status, &body["error"]["code"]), (503, &json!("overloaded")));
     first.close(None).await;
-    while !matches!(first.hear().await, Heard::Closed(_)) {}
+    while !matches!(first.receive().await, Received::Closed(_)) {}
     let mut second = loop {
         // The place is free a moment after the close.
         match Socket::connect(service.address).await {

@@ -121,7 +121,7 @@ impl<'a> Ear<'a> {
         let Shared { plan, drain, .. } = self.shared;
         let last = plan.intended(self.session, plan.frames - 1) + *drain;
         while self.outstanding > 0 {
-            match hearer.hear(last) {
+            match hearer.receive(last) {
                 Ok(Some((now, Said::Frame(header, payload)))) => self.frame(now, &header, payload),
                 Ok(Some((_, Said::Error(error)))) => self.error(&error),
                 Err(error) => return self.end(&error),

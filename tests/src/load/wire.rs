@@ -133,7 +133,7 @@ impl Hearer {
     ///
     /// # Errors
     /// The connection is gone, or the server leaves the protocol.
-    pub(super) fn hear(
+    pub(super) fn receive(
         &mut self,
         until: Instant,
     ) -> Result<Option<(Instant, Said<'_>)>, SocketError> {

@@ -12,7 +12,7 @@ use papilla_proto::{
 };
 use papilla_tests::{
     http::{Request, Response},
-    socket::{self, Heard, Receiver, Sender},
+    socket::{self, Received, Receiver, Sender},
 };
 use serde_json::{Value, json};
 use tokio::time::timeout;
@@ -189,15 +189,17 @@ impl Session {
         socket::frame(&header, &payload)
     }
 
-    async fn hear(&mut self) -> Heard {
-        let heard = timeout(Duration::from_secs(60), self.receiver.hear()).await;
+    async fn receive(&mut self) -> Received {
+        let heard = timeout(Duration::from_secs(60), self.receiver.receive()).await;
         heard.expect("no answer").unwrap()
     }
 
     /// Sends a map; returns the answer and the header it came under.
     async fn render(&mut self, sequence: u32, map: &[f32]) -> (FrameHeader, Vec<f32>) {
         self.sender.send(self.frame(sequence, map)).await.unwrap();
-        let Heard::Frame(header, payload) = self.hear().await else { panic!("a frame is due") };
+        let Received::Frame(header, payload) = self.receive().await else {
+            panic!("a frame is due")
+        };
         assert_eq!((header.kind, header.status), (FrameKind::Sed, FrameStatus::Ok));
         assert_eq!((header.sequence, header.client_time_us), (sequence, 7));
         let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
@@ -257,11 +259,11 @@ pub(crate) async fn sessions_survive_mistakes(service: &Service, sample: &Sample
         (with(HEADER_LEN, &1e9_f32.to_le_bytes()), ErrorCode::OutOfRange, Some(5)),
     ] {
         session.sender.send(bad).await.unwrap();
-        let Heard::Error(error) = session.hear().await else { panic!("{code} is due") };
+        let Received::Error(error) = session.receive().await else { panic!("{code} is due") };
         assert_eq!((error.code, error.sequence, error.closes), (code, sequence, false));
     }
     session.sender.send("press harder".to_owned()).await.unwrap();
-    let Heard::Error(error) = session.hear().await else { panic!("a refusal is due") };
+    let Received::Error(error) = session.receive().await else { panic!("a refusal is due") };
     assert_eq!((error.code, error.closes), (ErrorCode::UnexpectedText, false));
     let (_, found) = session.render(6, &map).await;
     assert_close("after ten mistakes", &found, &due, EQUAL);

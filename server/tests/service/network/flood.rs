@@ -117,7 +117,7 @@ async fn a_client_that_pings_without_end_is_told_and_closed() {
     // A fast measurement of the round trip is no flood.
     for _ in 0..100 {
         raw.send(&ws(opcode::FINAL | opcode::PING, b"")).await;
-        assert_eq!(raw.hear().await.unwrap().0, opcode::PONG);
+        assert_eq!(raw.receive().await.unwrap().0, opcode::PONG);
     }
     raw.send(&ws(opcode::FINAL | opcode::PING, b"").repeat(2000)).await;
     let last: Vec<_> =

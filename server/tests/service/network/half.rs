@@ -81,7 +81,7 @@ async fn half_a_connection_is_none() {
     // A session whose client will send no more is over, though the client still listens.
     let mut raw = Raw::open(service.address, &small_hello()).await;
     raw.send(&ws(opcode::FINAL | opcode::BINARY, &small_frame(1))).await;
-    assert_small_answer(raw.hear().await, 1);
+    assert_small_answer(raw.receive().await, 1);
     raw.stream.shutdown().await.unwrap();
     assert!(raw.hear_all().await.iter().all(|(kind, _)| *kind == opcode::CLOSE));
     until_open(service.address, 1).await;

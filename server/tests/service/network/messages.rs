@@ -38,12 +38,12 @@ async fn messages_in_pieces_are_messages() {
     // A ping between two pieces is allowed, and answered at once.
     raw.send(&ws(opcode::BINARY, &whole[..1])).await;
     raw.send(&ws(opcode::FINAL | opcode::PING, b"there?")).await;
-    assert_eq!(raw.hear().await, Some((opcode::PONG, b"there?".to_vec())));
+    assert_eq!(raw.receive().await, Some((opcode::PONG, b"there?".to_vec())));
     for piece in whole[1..].chunks(3) {
         raw.send(&ws(opcode::CONTINUATION, piece)).await;
     }
     raw.send(&ws(opcode::FINAL | opcode::CONTINUATION, b"")).await;
-    assert_small_answer(raw.hear().await, 7);
+    assert_small_answer(raw.receive().await, 7);
 }
 
 #[tokio::test(flavor = "multi_thread")]

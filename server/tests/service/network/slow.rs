@@ -52,10 +52,10 @@ async fn a_byte_at_a_time_is_slow_but_right() {
         head.push(raw.stream.read_u8().await.unwrap());
     }
     raw.dribble(&ws(opcode::FINAL | opcode::TEXT, small_hello().to_string().as_bytes())).await;
-    assert_eq!(raw.hear().await.unwrap().0, opcode::TEXT);
+    assert_eq!(raw.receive().await.unwrap().0, opcode::TEXT);
     for sequence in 1..4 {
         raw.dribble(&ws(opcode::FINAL | opcode::BINARY, &small_frame(sequence))).await;
-        assert_small_answer(raw.hear().await, sequence);
+        assert_small_answer(raw.receive().await, sequence);
     }
     neighbour.is_served().await;
 }

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 pub(crate) use binary::{Logged, Running, papilla, signal};
 pub(crate) use http::{Answer, Request, raw_exchange};
-pub(crate) use socket::{Heard, Socket, frame, hello};
+pub(crate) use socket::{Received, Socket, frame, hello};
 
 /// Greatest pressure the test models take, Pa.
 pub(crate) const PRESSURE_MAX_PA: f32 = 10_000.0;

@@ -68,7 +68,7 @@ impl Raw {
     pub(crate) async fn open(address: SocketAddr, hello: &Value) -> Self {
         let mut raw = Self::connect(address).await;
         raw.send(&ws(opcode::FINAL | opcode::TEXT, hello.to_string().as_bytes())).await;
-        let (kind, ready) = raw.hear().await.unwrap();
+        let (kind, ready) = raw.receive().await.unwrap();
         assert_eq!(kind, opcode::TEXT);
         assert!(ready.starts_with(b"{\"type\":\"ready\""), "{}", String::from_utf8_lossy(&ready));
         raw
@@ -86,7 +86,7 @@ impl Raw {
     }
 
     /// The next message: its kind and what it holds. None: the server has closed.
-    pub(crate) async fn hear(&mut self) -> Option<(u8, Vec<u8>)> {
+    pub(crate) async fn receive(&mut self) -> Option<(u8, Vec<u8>)> {
         timeout(PATIENCE, self.read()).await.expect("the server neither answers nor closes")
     }
 
@@ -106,7 +106,7 @@ impl Raw {
     /// Everything up to the end of the connection: kinds and contents.
     pub(crate) async fn hear_all(&mut self) -> Vec<(u8, Vec<u8>)> {
         let mut all = Vec::new();
-        while let Some(message) = self.hear().await {
+        while let Some(message) = self.receive().await {
             all.push(message);
         }
         all

@@ -23,7 +23,7 @@ pub(crate) struct Socket<S = TcpStream> {
 
 /// What the server said.
 #[derive(Debug)]
-pub(crate) enum Heard {
+pub(crate) enum Received {
     Json(Value),
     Frame(FrameHeader, Vec<u8>),
     Closed(Option<u16>),
@@ -79,32 +79,34 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
         let _ = self.stream.close(frame).await;
     }
 
-    pub(crate) async fn hear(&mut self) -> Heard {
+    pub(crate) async fn receive(&mut self) -> Received {
         loop {
             let message = timeout(PATIENCE, self.stream.next()).await.expect("no answer");
             return match message {
-                Some(Ok(Message::Text(text))) => Heard::Json(serde_json::from_str(&text).unwrap()),
+                Some(Ok(Message::Text(text))) => {
+                    Received::Json(serde_json::from_str(&text).unwrap())
+                }
                 Some(Ok(Message::Binary(bytes))) => {
                     let header = FrameHeader::decode(&bytes).unwrap();
-                    Heard::Frame(header, bytes[HEADER_LEN..].to_vec())
+                    Received::Frame(header, bytes[HEADER_LEN..].to_vec())
                 }
-                Some(Ok(Message::Close(frame))) => Heard::Closed(frame.map(|f| f.code.into())),
+                Some(Ok(Message::Close(frame))) => Received::Closed(frame.map(|f| f.code.into())),
                 Some(Ok(_)) => continue,
-                Some(Err(_)) | None => Heard::Closed(None),
+                Some(Err(_)) | None => Received::Closed(None),
             };
         }
     }
 
     pub(crate) async fn hear_json(&mut self) -> Value {
-        match self.hear().await {
-            Heard::Json(value) => value,
+        match self.receive().await {
+            Received::Json(value) => value,
             other => panic!("text is due, not {other:?}"),
         }
     }
 
     pub(crate) async fn hear_frame(&mut self) -> (FrameHeader, Vec<u8>) {
-        match self.hear().await {
-            Heard::Frame(header, payload) => (header, payload),
+        match self.receive().await {
+            Received::Frame(header, payload) => (header, payload),
             other => panic!("a frame is due, not {other:?}"),
         }
     }
@@ -122,8 +124,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
     pub(crate) async fn hear_end(&mut self, code: &str, close_code: u16) {
         let error = self.hear_json().await;
         assert_eq!((&error["code"], &error["closes"]), (&json!(code), &json!(true)), "{error}");
-        match self.hear().await {
-            Heard::Closed(found) => assert_eq!(found, Some(close_code)),
+        match self.receive().await {
+            Received::Closed(found) => assert_eq!(found, Some(close_code)),
             other => panic!("a close is due, not {other:?}"),
         }
     }

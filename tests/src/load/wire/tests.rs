@@ -65,20 +65,20 @@ fn what_a_library_sends_is_understood() {
         server.close(None).unwrap();
     });
     for n in 0..50_u32 {
-        let Some((_, Said::Frame(header, samples))) = hearer.hear(soon()).unwrap() else {
+        let Some((_, Said::Frame(header, samples))) = hearer.receive(soon()).unwrap() else {
             panic!("no frame {n}")
         };
         assert_eq!((header.sequence, samples.len()), (n, 4096 * n as usize));
         assert!(samples.iter().all(|&byte| byte == n as u8));
     }
-    let Some((_, Said::Error(error))) = hearer.hear(soon()).unwrap() else { panic!("no error") };
+    let Some((_, Said::Error(error))) = hearer.receive(soon()).unwrap() else { panic!("no error") };
     assert_eq!(error.code, ErrorCode::Overloaded);
-    assert!(matches!(hearer.hear(soon()), Err(SocketError::Closed)));
+    assert!(matches!(hearer.receive(soon()), Err(SocketError::Closed)));
     answering.join().unwrap();
 }
 
 #[test]
 fn silence_ends() {
     let (_mouth, mut hearer, _server) = pair();
-    assert!(hearer.hear(Instant::now()).unwrap().is_none());
+    assert!(hearer.receive(Instant::now()).unwrap().is_none());
 }
