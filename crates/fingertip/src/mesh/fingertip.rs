@@ -40,7 +40,7 @@ pub enum Order {
     /// `Hex27` on the same nodes: a quarter of the cells on the skin.
     Quadratic,
     /// `Hex27` in layers that are thin beside the interface, lattice lines drawn together where
-    /// the indenter touches: for SED that a finer mesh hardly changes.
+    /// the indenter touches: for SED that a finer mesh changes less.
     Graded,
 }
 
