@@ -255,7 +255,8 @@ impl FingertipShape {
     }
 }
 
-fn smoothstep(t: f64) -> f64 {
+/// Rises from 0 at `t = 0` to 1 at 1, level at both.
+pub(crate) fn smoothstep(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -2,7 +2,9 @@
 
 use super::strain::{StrainMap, Weighted};
 use super::{COMPONENTS, Faces, InfluenceError, InfluenceOperator, Quality};
+use crate::mesh::fingertip::Patch;
 use crate::simulation::body::{Body, RecordedPatch};
+use papilla_atlas::Atlas;
 use papilla_fem::linear::{Direct, DofMap, SymbolicSystem, SymmetricMatrix};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
@@ -38,14 +40,7 @@ pub fn build(
     body: &Body,
     progress: &mut dyn FnMut(usize),
 ) -> Result<InfluenceOperator, InfluenceError> {
-    let Some(RecordedPatch { patch, .. }) = &body.patch else {
-        return Err(InfluenceError::NoPatch);
-    };
-    let problem = &body.problem;
-    if problem.materials.models().any(|m| m.is_finite_strain()) {
-        return Err(InfluenceError::FiniteStrain);
-    }
-    let (atlas, _) = body.atlas().ok_or(InfluenceError::NoPatch)??;
+    let (problem, (patch, atlas)) = (&body.problem, small_strain_patch(body)?);
     let loads = loads(problem, &problem.mesh.surfaces[&body.contact], &patch.skin);
     let strain = StrainMap::new(problem, &patch.interface)?;
     let tangent = tangent_at_rest(problem)?;
@@ -67,6 +62,18 @@ pub fn build(
     let area_mm2 = loads.iter().map(|l| l.area_mm2).collect();
     let faces = Faces { g: of_faces, of_vertex: strain.terms().to_vec() };
     Ok(InfluenceOperator { atlas_hash: atlas.hash().to_owned(), g, faces, area_mm2, quality })
+}
+
+/// What is read off a fingertip of small strain, and its atlas.
+pub(super) fn small_strain_patch(body: &Body) -> Result<(&Patch, Atlas), InfluenceError> {
+    let Some(RecordedPatch { patch, .. }) = &body.patch else {
+        return Err(InfluenceError::NoPatch);
+    };
+    if body.problem.materials.models().any(|m| m.is_finite_strain()) {
+        return Err(InfluenceError::FiniteStrain);
+    }
+    let (atlas, _) = body.atlas().ok_or(InfluenceError::NoPatch)??;
+    Ok((patch, atlas))
 }
 
 /// Puts strain under unit pressure at vertex `j` into its column.

@@ -1,8 +1,8 @@
 //! How the skin moves under forces on it: the finger's compliance at rest.
 
 use super::InfluenceError;
-use super::build::{Columns, Load, loads, tangent_at_rest};
-use crate::simulation::body::{Body, RecordedPatch};
+use super::build::{Columns, Load, loads, small_strain_patch, tangent_at_rest};
+use crate::simulation::body::Body;
 
 /// Displacement of the skin's vertices under forces at the skin's vertices, to first order.
 ///
@@ -47,14 +47,7 @@ pub fn compliance(
     body: &Body,
     progress: &mut dyn FnMut(usize),
 ) -> Result<Compliance, InfluenceError> {
-    let Some(RecordedPatch { patch, .. }) = &body.patch else {
-        return Err(InfluenceError::NoPatch);
-    };
-    let problem = &body.problem;
-    if problem.materials.models().any(|m| m.is_finite_strain()) {
-        return Err(InfluenceError::FiniteStrain);
-    }
-    let (atlas, _) = body.atlas().ok_or(InfluenceError::NoPatch)??;
+    let (problem, (patch, atlas)) = (&body.problem, small_strain_patch(body)?);
     let under_pressure = loads(problem, &problem.mesh.surfaces[&body.contact], &patch.skin);
     let unit = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
     let unit_forces: Vec<Load> = under_pressure

@@ -82,8 +82,8 @@ mod tests {
     /// At nodes, and within faces under a bar 1.5 mm wide.
     #[test]
     fn shear_traction_carries_the_tangential_force() {
-        let rubbing = "effects = [\"finite_strain\", \"friction\"]\nfriction.coefficient = 0.4";
-        let ball = scene(rubbing);
+        let friction = "effects = [\"finite_strain\", \"friction\"]\nfriction.coefficient = 0.4";
+        let ball = scene(friction);
         let mut bar = ball.clone();
         bar.indenter =
             toml::from_str("shape = \"plate\"\nsize_mm = [1.5, 4.0]\nedge_radius_mm = 0.5")

@@ -13,7 +13,7 @@ mod spacing;
 pub use contact::{Coming, Contact};
 
 use super::half_cube::Grid;
-use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
+use crate::geometry::fingertip::{FingertipShape, SurfaceParameter, smoothstep};
 use line::LineMap;
 use papilla_fem::tensor::norm;
 
@@ -27,13 +27,29 @@ const HELD_FADE_MM: f64 = 4.0;
 /// How nodes of the skin slide.
 #[derive(Clone, Debug)]
 pub struct Grading {
+    chart: Chart,
+    lines: Lines,
+    /// Part of their way that nodes go.
+    strength: f64,
+}
+
+/// The skin around the first touch, in the plane.
+#[derive(Clone, Debug)]
+struct Chart {
     /// First touch, mm.
     centre: [f64; 3],
     /// The indenter's x and y axes.
     axes: [[f64; 3]; 2],
-    lines: Lines,
-    /// Part of their way that nodes go.
-    strength: f64,
+}
+
+impl Chart {
+    /// Place of a point of the skin, mm.
+    fn place(&self, p: [f64; 3]) -> [f64; 2] {
+        let r: [f64; 3] = std::array::from_fn(|i| p[i] - self.centre[i]);
+        let c = self.axes.map(|a| (0..3).map(|i| a[i] * r[i]).sum::<f64>());
+        let size = c[0].hypot(c[1]);
+        if size > 0.0 { c.map(|v| v * norm(r) / size) } else { [0.0; 2] }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -48,33 +64,27 @@ impl Grading {
     /// The sliding that suits a contact.
     #[must_use]
     pub fn new(shape: &FingertipShape, contact: &Contact) -> Self {
-        let touched = spacing::touched(shape, contact);
         let r = contact.start.rotation;
         let axes = [0, 1].map(|k| [r[0][k], r[1][k], r[2][k]]);
-        let centre = contact.first;
-        let mut grading = Self {
-            centre,
-            axes,
-            lines: Lines::Around(LineMap::new(REACH_MM, &[1.0])),
-            strength: 1.0,
-        };
-        let places: Vec<_> = touched.iter().map(|t| (grading.chart(t.at), t)).collect();
+        let chart = Chart { centre: contact.first, axes };
+        let touched = spacing::touched(shape, contact, axes);
+        let places: Vec<_> = touched.iter().map(|t| (chart.place(t.at), t)).collect();
         let across = [0, 1].map(|k| {
             let points = places.iter().map(|(c, t)| (c[k], t.spacing_mm[k]));
-            LineMap::new(REACH_MM, &spacing::along(points, REACH_MM))
+            LineMap::new(REACH_MM, &spacing::along(points))
         });
         let around = places.iter().flat_map(|(c, t)| {
             let h = t.spacing_mm[0].min(t.spacing_mm[1]);
             let r = c[0].hypot(c[1]);
             [(r, h), (-r, h)]
         });
-        let around = LineMap::new(REACH_MM, &spacing::along(around, REACH_MM));
-        grading.lines = if around.intervals.powi(2) < across[0].intervals * across[1].intervals {
+        let around = LineMap::new(REACH_MM, &spacing::along(around));
+        let lines = if around.intervals.powi(2) < across[0].intervals * across[1].intervals {
             Lines::Around(around)
         } else {
             Lines::Across(Box::new(across))
         };
-        grading
+        Self { chart, lines, strength: 1.0 }
     }
 
     /// The same with nodes that go `factor` of their way.
@@ -129,19 +139,11 @@ impl Grading {
         }
     }
 
-    /// Place in the chart, mm.
-    fn chart(&self, p: [f64; 3]) -> [f64; 2] {
-        let r: [f64; 3] = std::array::from_fn(|i| p[i] - self.centre[i]);
-        let c = self.axes.map(|a| (0..3).map(|i| a[i] * r[i]).sum::<f64>());
-        let size = c[0].hypot(c[1]);
-        if size > 0.0 { c.map(|v| v * norm(r) / size) } else { [0.0; 2] }
-    }
-
     /// Where a point of the skin slides to, mm; it is projected back onto the skin.
     #[must_use]
     pub fn moved(&self, shape: &FingertipShape, p: [f64; 3]) -> [f64; 3] {
-        let from = self.chart(p);
-        let r: [f64; 3] = std::array::from_fn(|i| p[i] - self.centre[i]);
+        let from = self.chart.place(p);
+        let r: [f64; 3] = std::array::from_fn(|i| p[i] - self.chart.centre[i]);
         let fade = self.strength * fade(norm(r) / REACH_MM) * free(shape, p);
         if fade <= 0.0 {
             return p;
@@ -164,13 +166,13 @@ impl Grading {
         const ITERATIONS: usize = 30;
         let mut p = near;
         for _ in 0..ITERATIONS {
-            let here = self.chart(p);
+            let here = self.chart.place(p);
             let miss: [f64; 2] = std::array::from_fn(|k| target[k] - here[k]);
             if miss[0].hypot(miss[1]) < 1e-9 {
                 break;
             }
-            let step: [f64; 3] =
-                std::array::from_fn(|i| miss[0] * self.axes[0][i] + miss[1] * self.axes[1][i]);
+            let [x, y] = self.chart.axes;
+            let step: [f64; 3] = std::array::from_fn(|i| miss[0] * x[i] + miss[1] * y[i]);
             // Along the skin, not off it.
             let n = shape.skin_normal(p);
             let off: f64 = (0..3).map(|i| step[i] * n[i]).sum();
@@ -191,11 +193,6 @@ fn free(shape: &FingertipShape, p: [f64; 3]) -> f64 {
 /// 1 near the first touch, 0 at the reach, smooth between.
 fn fade(part: f64) -> f64 {
     smoothstep((1.0 - part) / (1.0 - WHOLE))
-}
-
-fn smoothstep(t: f64) -> f64 {
-    let t = t.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

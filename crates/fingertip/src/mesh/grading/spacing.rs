@@ -28,10 +28,13 @@ pub(super) struct Touched {
     pub spacing_mm: [f64; 2],
 }
 
-/// The skin that the indenter touches on its way if nothing deforms.
-pub(super) fn touched(shape: &FingertipShape, contact: &Contact) -> Vec<Touched> {
-    let r = contact.start.rotation;
-    let axes = [0, 1].map(|k| [r[0][k], r[1][k], r[2][k]]);
+/// The skin that the indenter touches on its way if nothing deforms; `axes` are the indenter's x
+/// and y.
+pub(super) fn touched(
+    shape: &FingertipShape,
+    contact: &Contact,
+    axes: [[f64; 3]; 2],
+) -> Vec<Touched> {
     facing(shape, contact.direction)
         .filter_map(|at| {
             let t = contact.travel_mm(at, contact.depth_mm);
@@ -58,12 +61,12 @@ pub(super) fn touched(shape: &FingertipShape, contact: &Contact) -> Vec<Touched>
 
 /// Spacing on the line `[-reach, reach]` from that of points on it: the least around each place,
 /// growing from there.
-pub(super) fn along(points: impl Iterator<Item = (f64, f64)>, reach_mm: f64) -> Vec<f64> {
+pub(super) fn along(points: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {
     let count = (2.0 * REACH_MM / CELL_MM).round() as usize;
-    let cell = 2.0 * reach_mm / count as f64;
+    let cell = 2.0 * REACH_MM / count as f64;
     let mut spacing = vec![SPACING_FAR_MM; count];
     for (x, h) in points {
-        let k = (x + reach_mm) / cell;
+        let k = (x + REACH_MM) / cell;
         if k >= 0.0 && k < count as f64 {
             let k = k as usize;
             spacing[k] = spacing[k].min(h);
