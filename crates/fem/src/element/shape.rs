@@ -10,7 +10,8 @@ pub(crate) fn linear_1d(at: i8, x: f64) -> (f64, f64) {
 }
 
 /// Quadratic Lagrange function of the node at `at` (-1, 0 or 1) and its slope.
-pub(crate) fn quadratic_1d(at: i8, x: f64) -> (f64, f64) {
+#[must_use]
+pub fn quadratic_1d(at: i8, x: f64) -> (f64, f64) {
     match at {
         0 => (1.0 - x * x, -2.0 * x),
         s => {
@@ -18,6 +19,12 @@ pub(crate) fn quadratic_1d(at: i8, x: f64) -> (f64, f64) {
             (0.5 * x * (x + s), x + 0.5 * s)
         }
     }
+}
+
+/// Function of the node at `at` (-1, 0 or 1) that is linear between neighbouring ones.
+#[must_use]
+pub fn hat_1d(at: i8, x: f64) -> f64 {
+    if at == 0 { 1.0 - x.abs() } else { (f64::from(at) * x).max(0.0) }
 }
 
 /// Products of one-dimensional functions along the first `d` axes.

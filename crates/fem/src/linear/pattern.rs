@@ -4,13 +4,13 @@ use super::DofMap;
 use crate::mesh::Mesh;
 use std::collections::BTreeSet;
 
-/// Neighbours of every node through elements, itself left out.
+/// Neighbours of every node through elements, itself left out; those that follow others have none.
 pub(super) fn node_graph(mesh: &Mesh) -> Vec<BTreeSet<u32>> {
     let mut graph = vec![BTreeSet::new(); mesh.nodes.len()];
     for block in &mesh.blocks {
         for e in 0..block.len() {
-            let nodes = block.element(e);
-            for &a in nodes {
+            let nodes = mesh.coupled_nodes(block, e);
+            for &a in &nodes {
                 graph[a as usize].extend(nodes.iter().copied().filter(|&b| b != a));
             }
         }
@@ -70,10 +70,10 @@ pub(super) fn scatter_maps(
             let size = 3 * block.kind.nodes();
             let mut map = Vec::with_capacity(block.len() * size * (size + 1) / 2);
             for e in 0..block.len() {
-                let of: Vec<u32> = block
-                    .element(e)
-                    .iter()
-                    .flat_map(|&n| (0..3).map(move |i| 3 * n as usize + i))
+                let of: Vec<u32> = mesh
+                    .coupled_nodes(block, e)
+                    .into_iter()
+                    .flat_map(|n| (0..3).map(move |i| 3 * n as usize + i))
                     .map(|d| dofs.of_dof[d])
                     .collect();
                 for p in 0..size {

@@ -3,7 +3,8 @@
 use super::DofMap;
 use super::ordering::{Elimination, OrderingError, elimination_order};
 use super::pattern::{entry, node_graph, pattern, scatter_maps};
-use crate::mesh::Mesh;
+use crate::mesh::hanging::HangingInElement;
+use crate::mesh::{Block, Mesh};
 use faer::Side;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
@@ -37,6 +38,8 @@ pub struct SymbolicSystem {
     /// Per block: value index of every local pair `p <= q`, row-major upper
     /// triangle, [`DofMap::FIXED`] where a degree of freedom is prescribed.
     scatter: Vec<Vec<u32>>,
+    /// Per block and element: its nodes that hang; empty without any in the mesh.
+    hanging: Vec<Vec<Vec<HangingInElement>>>,
     pub(super) symbolic: SymbolicCholesky<usize>,
 }
 
@@ -65,7 +68,7 @@ impl SymbolicSystem {
         fixed: &[bool],
         elimination: Elimination,
     ) -> Result<Self, SymbolicError> {
-        let dofs = DofMap::new(fixed);
+        let dofs = DofMap::new(fixed, &mesh.hanging);
         if dofs.count == 0 {
             return Err(SymbolicError::NoUnknowns);
         }
@@ -86,7 +89,13 @@ impl SymbolicSystem {
         )
         .map_err(|e| SymbolicError::Symbolic(format!("{e:?}")))?;
         let scatter = scatter_maps(mesh, &dofs, &column_start, &row);
-        Ok(Self { dofs, column_start, row, scatter, symbolic })
+        let of_block = |b: &Block| (0..b.len()).map(|e| mesh.hanging_in_element(b, e)).collect();
+        let hanging = if mesh.hanging.is_empty() {
+            Vec::new()
+        } else {
+            mesh.blocks.iter().map(of_block).collect()
+        };
+        Ok(Self { dofs, column_start, row, scatter, hanging, symbolic })
     }
 
     /// A matrix of zeros on this pattern.
@@ -150,16 +159,25 @@ impl SymbolicSystem {
             + 4 * (scatter + self.dofs.of_dof.len())
     }
 
-    /// Adds an element's dense tangent (blocks `a <= b` of `3 n x 3 n`).
+    /// Adds an element's dense tangent (blocks `a <= b` of `3 n x 3 n`), of which nothing is kept.
     #[inline]
     pub fn add_element(
         &self,
         matrix: &mut SymmetricMatrix,
         block: usize,
         element: usize,
-        dense: &[f64],
+        dense: &mut [f64],
     ) {
         let size = dense.len().isqrt();
+        let hanging = self.hanging.get(block).map_or(&[][..], |b| &b[element]);
+        if !hanging.is_empty() {
+            for p in 0..size {
+                for q in 0..p {
+                    dense[p * size + q] = dense[q * size + p];
+                }
+            }
+            hanging.iter().for_each(|h| h.condense(dense));
+        }
         let pairs = size * (size + 1) / 2;
         let map = &self.scatter[block][element * pairs..(element + 1) * pairs];
         let mut at = 0;
@@ -175,26 +193,25 @@ impl SymbolicSystem {
         }
     }
 
-    /// Adds a symmetric 3 x 3 block between the nodes of a point with shape functions
-    /// `values`, `N_a N_b block`.
+    /// Adds a symmetric 3 x 3 block between the nodes of a point with their shape functions,
+    /// `N_a N_b block`; see [`Mesh::free_support`].
     ///
     /// # Panics
     /// If the nodes are not all of one element.
     pub fn add_point(
         &self,
         matrix: &mut SymmetricMatrix,
-        nodes: &[u32],
-        values: &[f64],
+        support: &[(u32, f64)],
         block: &[[f64; 3]; 3],
     ) {
         let equation = |node: u32, i: usize| self.dofs.of_dof[3 * node as usize + i];
-        for (&b, vb) in nodes.iter().zip(values) {
+        for &(b, vb) in support {
             for j in 0..3 {
                 let column = equation(b, j);
                 if column == DofMap::FIXED {
                     continue;
                 }
-                for (&a, va) in nodes.iter().zip(values) {
+                for &(a, va) in support {
                     for i in 0..3 {
                         let row = equation(a, i);
                         if row != DofMap::FIXED && row >= column {

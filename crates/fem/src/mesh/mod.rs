@@ -3,6 +3,7 @@
 pub mod block;
 pub mod complete;
 pub mod gmsh;
+pub mod hanging;
 pub mod lattice;
 pub mod nearest;
 pub mod probe;
@@ -14,6 +15,7 @@ pub mod surface;
 
 use crate::element::ElementKind;
 pub use crate::element::Region;
+pub use hanging::HangingNode;
 use std::collections::BTreeMap;
 pub use surface::{FaceKind, Surface};
 
@@ -62,6 +64,8 @@ pub struct Mesh {
     /// Named surfaces, faces seen counter-clockwise from outside (edges of planar
     /// elements: body on the left).
     pub surfaces: BTreeMap<String, Surface>,
+    /// Nodes that follow others, sorted.
+    pub hanging: Vec<HangingNode>,
 }
 
 impl Mesh {
@@ -110,6 +114,11 @@ impl Mesh {
         let faces = self.surfaces.values_mut().flat_map(|s| &mut s.connectivity);
         for n in blocks.chain(faces) {
             *n = number[*n as usize];
+        }
+        self.hanging.retain(|h| number[h.node as usize] != u32::MAX);
+        for h in &mut self.hanging {
+            h.node = number[h.node as usize];
+            h.masters = h.masters.map(|m| number[m as usize]);
         }
         for set in self.node_sets.values_mut() {
             set.retain(|n| number[*n as usize] != u32::MAX);

@@ -20,6 +20,25 @@ impl SurfaceReader {
     /// Finds the points (mm) on a surface of the undeformed mesh.
     #[must_use]
     pub fn new(mesh: &Mesh, surface: &Surface, points: &[[f64; 3]]) -> Self {
+        Self::with(mesh, surface, points, |xi| {
+            let mut value = [0.0; 9];
+            surface.kind.shape(xi, &mut value, &mut [[0.0; 2]; 9]);
+            value
+        })
+    }
+
+    /// The same for fields that are linear between neighbouring nodes, as pressure is.
+    #[must_use]
+    pub fn linear(mesh: &Mesh, surface: &Surface, points: &[[f64; 3]]) -> Self {
+        Self::with(mesh, surface, points, |xi| surface.kind.hats(xi))
+    }
+
+    fn with(
+        mesh: &Mesh,
+        surface: &Surface,
+        points: &[[f64; 3]],
+        functions: impl Fn([f64; 2]) -> [f64; 9],
+    ) -> Self {
         let n = surface.kind.nodes();
         let at = |node: u32| mesh.nodes[node as usize];
         let balls: Vec<([f64; 3], f64)> = surface.faces().map(|f| ball(f, &at)).collect();
@@ -35,18 +54,18 @@ impl SurfaceReader {
             let mut order: Vec<(f64, usize)> =
                 (0..faces.len()).map(|f| ((away(f) - balls[f].1).max(0.0), f)).collect();
             order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let mut best = (f64::INFINITY, 0, [0.0; 9]);
+            let mut best = (f64::INFINITY, 0, [0.0; 2]);
             for (least, f) in order {
                 if least >= best.0 {
                     break;
                 }
-                let (distance, value) = project(surface, faces[f], &at, *p);
+                let (distance, xi) = project(surface, faces[f], &at, *p);
                 if distance < best.0 {
-                    best = (distance, f, value);
+                    best = (distance, f, xi);
                 }
             }
             out.nodes.extend(faces[best.1]);
-            out.values.extend(&best.2[..n]);
+            out.values.extend(&functions(best.2)[..n]);
             out.distance_mm.push(best.0);
         }
         out
@@ -81,14 +100,14 @@ fn ball(face: &[u32], at: &dyn Fn(u32) -> [f64; 3]) -> ([f64; 3], f64) {
     (centre, 1.25 * radius)
 }
 
-/// Distance of `p` from a face, and the shape functions at the nearest place found (Gauss-Newton,
+/// Distance of `p` from a face, and the reference coordinates of the nearest place found (Gauss-Newton,
 /// within the face).
 fn project(
     surface: &Surface,
     face: &[u32],
     at: &dyn Fn(u32) -> [f64; 3],
     p: [f64; 3],
-) -> (f64, [f64; 9]) {
+) -> (f64, [f64; 2]) {
     let (mut value, mut gradient) = ([0.0; 9], [[0.0; 2]; 9]);
     let mut xi = [0.0; 2];
     let mut distance = f64::INFINITY;
@@ -115,7 +134,7 @@ fn project(
             break;
         }
     }
-    (distance, value)
+    (distance, xi)
 }
 
 #[cfg(test)]

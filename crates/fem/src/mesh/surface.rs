@@ -6,7 +6,7 @@
 
 use crate::element::ElementKind;
 use crate::element::reference::GAUSS_3;
-use crate::element::shape::{linear_1d, quadratic_1d};
+use crate::element::shape::{hat_1d, linear_1d, quadratic_1d};
 use crate::tensor::norm;
 
 /// Kind of face.
@@ -108,18 +108,16 @@ impl FaceKind {
     /// 1; on faces without nodes between corners the shape functions.
     #[must_use]
     pub fn hats(self, xi: [f64; 2]) -> [f64; 9] {
-        let one_d =
-            |at: i8, x: f64| if at == 0 { 1.0 - x.abs() } else { (f64::from(at) * x).max(0.0) };
         let mut value = [0.0; 9];
         match self {
             Self::Quad9 => {
                 for (v, at) in value.iter_mut().zip(ElementKind::Quad9.lattice()) {
-                    *v = one_d(at[0], xi[0]) * one_d(at[1], xi[1]);
+                    *v = hat_1d(at[0], xi[0]) * hat_1d(at[1], xi[1]);
                 }
             }
             Self::Line3 => {
                 for (v, at) in value.iter_mut().zip([-1, 1, 0]) {
-                    *v = one_d(at, xi[0]);
+                    *v = hat_1d(at, xi[0]);
                 }
             }
             _ => self.shape(xi, &mut value, &mut [[0.0; 2]; 9]),

@@ -80,6 +80,7 @@ pub fn evaluate_body(
     out.j_min = f64::INFINITY;
     let mut lag = Lag::new(problem, trial.independent);
     elements(problem, trial, tangent.as_deref_mut(), out, &mut lag)?;
+    lag.condense(problem);
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent, out);
     for (node, f) in loading.dead_n.iter().enumerate() {
@@ -90,6 +91,7 @@ pub fn evaluate_body(
             reference += force * force;
         }
     }
+    problem.mesh.hanging.iter().for_each(|h| h.condense(&mut out.residual_n));
     out.mixed_norm = lag.norm_n(problem, &out.residual_n);
     let mut norm = 0.0;
     for (r, &e) in out.residual_n.iter().zip(&problem.system.dofs.of_dof) {
@@ -160,7 +162,7 @@ fn elements(
                 lag.add(nodes, &lag_n, mu_mpa, g.weights, state.gap_squared_mm3);
             }
             if let Some(t) = tangent.as_deref_mut() {
-                problem.system.add_element(t, b, e, &dense);
+                problem.system.add_element(t, b, e, &mut dense);
             }
         }
     }
@@ -204,7 +206,8 @@ fn contact(
         }
         square += out.add_contact_force(support, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.system.add_point(t, support.nodes, support.values, &c.stiffness);
+            let free = problem.mesh.free_support(support.nodes, support.values);
+            problem.system.add_point(t, &free, &c.stiffness);
             out.curvature.extend(c.curvature.map(|k| (at, k)));
         }
     }
@@ -236,7 +239,8 @@ fn add_friction(
         out.potential_mj += f.energy_mj;
         square += out.add_contact_force(support, f.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            problem.system.add_point(t, support.nodes, support.values, &f.stiffness);
+            let free = problem.mesh.free_support(support.nodes, support.values);
+            problem.system.add_point(t, &free, &f.stiffness);
         }
     }
     square

@@ -10,17 +10,21 @@
 //! to stop.
 
 use super::problem::Problem;
-use crate::element::{Dilatation, next_dilatation};
+use crate::element::{Dilatation, ElementKind, next_dilatation};
 use crate::linear::DofMap;
 
 /// Ratio of bulk to shear modulus beyond which dilatations are unknowns of their own: nu = .495.
 /// Below, the potential alone leads to the same equilibria, at .48 in as many iterations.
 const STIFF_RATIO: f64 = 100.0;
 
+/// The same for quadratic elements, whose dilatation varies within: nu = .45. Under an edge the
+/// potential alone led them through indefinite tangents at .48, and took twice the time.
+const STIFF_RATIO_QUADRATIC: f64 = 10.0;
+
 /// Conjugate gradients on an old factor are given up after so many iterations: the stiff
 /// directions turn with the deformation, and a factor that does not know them is soon worth less
 /// than a new one.
-pub(super) const OLD_FACTOR_CG_MAX: u32 = 20;
+pub(super) const OLD_FACTOR_CG_MAX: u32 = 30;
 
 /// Least relative residual that is asked of conjugate gradients.
 const LINEAR_MIN: f64 = 1e-10;
@@ -29,10 +33,14 @@ const LINEAR_MIN: f64 = 1e-10;
 /// and so nearly incompressible that it pays.
 pub(super) fn at_rest(problem: &Problem) -> Vec<Dilatation> {
     let blocks = &problem.mesh.blocks;
-    let pays = blocks.iter().flat_map(|b| &b.region).any(|&region| {
-        let model = &problem.materials[region];
-        model.is_finite_strain()
-            && model.bulk_modulus_mpa() > STIFF_RATIO * model.shear_modulus_mpa()
+    let ratio =
+        |kind: ElementKind| if kind.order() == 2 { STIFF_RATIO_QUADRATIC } else { STIFF_RATIO };
+    let pays = blocks.iter().any(|b| {
+        b.region.iter().any(|&region| {
+            let model = &problem.materials[region];
+            model.is_finite_strain()
+                && model.bulk_modulus_mpa() > ratio(b.kind) * model.shear_modulus_mpa()
+        })
     });
     if pays { vec![[0.0; 4]; blocks.iter().map(|b| b.len()).sum()] } else { Vec::new() }
 }
@@ -69,6 +77,13 @@ impl Lag {
         }
     }
 
+    /// Moves what acts on nodes that hang to those that they follow.
+    pub(super) fn condense(&mut self, problem: &Problem) {
+        if !self.force_n.is_empty() {
+            problem.mesh.hanging.iter().for_each(|h| h.condense(&mut self.force_n));
+        }
+    }
+
     /// Norm of the residual of both fields, N, from the one of the displacement.
     pub(super) fn norm_n(&self, problem: &Problem, residual_n: &[f64]) -> f64 {
         let mut square = self.gap_n2;
@@ -90,16 +105,22 @@ pub(super) fn next_dilatations(
     out: &mut Vec<Dilatation>,
 ) {
     let of_dof = &problem.system.dofs.of_dof;
+    let moved = |node: u32| -> [f64; 3] {
+        std::array::from_fn(|i| match of_dof[3 * node as usize + i] {
+            DofMap::FIXED => 0.0,
+            e => step[e as usize],
+        })
+    };
     let (mut local, mut change) = ([[0.0; 3]; 27], [[0.0; 3]; 27]);
     for (block, geometry) in problem.mesh.blocks.iter().zip(&problem.geometry) {
         let n = block.kind.nodes();
         for e in 0..block.len() {
             for (a, &node) in block.element(e).iter().enumerate() {
                 local[a] = u[node as usize];
-                change[a] = std::array::from_fn(|i| match of_dof[3 * node as usize + i] {
-                    DofMap::FIXED => 0.0,
-                    e => step[e as usize],
-                });
+                change[a] = match problem.mesh.hanging_node(node) {
+                    Some(h) => h.of(moved),
+                    None => moved(node),
+                };
             }
             let material = &problem.materials[block.region[e]];
             let g = geometry.element(e);
@@ -141,9 +162,9 @@ mod tests {
             for keeps in [false, true] {
                 let mut solver = Solver::new(&problem, tight()).unwrap();
                 solver.start(loading.clone());
-                assert!(solver.state.independent.is_empty(), "nu = .48 is solved as it always was");
+                let elements: usize = problem.mesh.blocks.iter().map(|b| b.len()).sum();
+                solver.state.independent.clear();
                 if keeps {
-                    let elements = problem.mesh.blocks.iter().map(|b| b.len()).sum();
                     solver.state.independent = vec![[0.0; 4]; elements];
                 }
                 solver.advance_to(0.4).unwrap();

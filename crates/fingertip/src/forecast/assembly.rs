@@ -41,7 +41,7 @@ impl Pass {
                     let both = fastest_s(RUNS, || {
                         dense.fill(0.0);
                         evaluate(problem, b, block, e, Some(dense.as_mut_slice()));
-                        problem.system.add_element(&mut tangent, b, e, &dense);
+                        problem.system.add_element(&mut tangent, b, e, &mut dense);
                     });
                     pass.forces_s += share * forces;
                     pass.tangent_s += share * both;

@@ -8,12 +8,12 @@
 //! whatever else is solid.
 
 use super::extrude::Cells;
-use super::grading::Grading;
+use super::grading::{Closeness, Contact, Spacing};
 use super::half_cube::{Grid, GridSize};
 use super::nail;
+use super::refined::{self, Refined, Vertices};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::tissue::Tissue;
-use papilla_fem::element::BlockGeometry;
 use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -39,8 +39,8 @@ pub enum Order {
     Linear,
     /// `Hex27` on the same nodes: a quarter of the cells on the skin.
     Quadratic,
-    /// `Hex27` in layers that are thin beside the interface, lattice lines drawn together where
-    /// the indenter touches: for SED that a finer mesh changes less.
+    /// `Hex27` in layers that are thin beside the interface, cells split where the indenter
+    /// touches: for SED that a finer mesh changes less.
     Graded,
 }
 
@@ -122,37 +122,51 @@ impl Density {
     /// Two elements through the epidermis and a dermis whose first is .08 mm thick: SED at
     /// the interface of a plane section is then within 1 to 3 % of that of many more layers.
     fn graded(self) -> Resolution {
-        let (grid, dermis): (_, &'static [f64]) = match self {
-            Self::Coarse => (
-                GridSize { across: 16, side: 8, cap: 8, body: 8 },
-                &[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0],
-            ),
-            Self::Medium => (
-                GridSize { across: 24, side: 12, cap: 14, body: 10 },
-                &[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0],
-            ),
+        let grid = GridSize { across: 8, side: 4, cap: 4, body: 6 };
+        let (dermis, fat): (&'static [f64], &'static [f64]) = match self {
             Self::Fine => (
-                GridSize { across: 40, side: 20, cap: 24, body: 16 },
                 &[0.0, 0.03, 0.06, 0.13, 0.2, 0.35, 0.5, 0.75, 1.0],
+                &[0.0, 0.12, 0.25, 0.4, 0.6, 0.8, 1.0],
             ),
-        };
-        let fat: &'static [f64] = match self {
-            Self::Fine => &[0.0, 0.12, 0.25, 0.4, 0.6, 0.8, 1.0],
-            _ => &[0.0, 0.2, 0.4, 0.7, 1.0],
+            _ => (&[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0], &[0.0, 0.2, 0.4, 0.7, 1.0]),
         };
         Resolution { grid, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
+    }
+
+    /// How close nodes are under an indenter.
+    const fn closeness(self) -> Closeness {
+        let (of_radius_mm, flat_mm, growth) = match self {
+            Self::Coarse => (0.24, 0.8, 0.8),
+            Self::Medium => (0.14, 0.6, 0.6),
+            Self::Fine => (0.075, 0.35, 0.45),
+        };
+        Closeness { of_radius_mm, flat_mm, growth }
     }
 }
 
 /// The patch that the atlas shows, as indices into the mesh.
 #[derive(Clone, Debug)]
 pub struct Patch {
-    /// Skin node of each vertex.
+    /// Skin nodes that are read: one a vertex, or those that `vertices` names.
     pub skin: Vec<u32>,
-    /// Interface node of each vertex, straight below.
+    /// Interface node straight below each.
     pub interface: Vec<u32>,
     /// Triangles of vertices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Where vertices are not nodes: how they are read off these.
+    pub vertices: Option<Vertices>,
+}
+
+impl Patch {
+    /// Undeformed places of the vertices on the skin and on the interface below, mm.
+    #[must_use]
+    pub fn places_mm(&self, mesh: &Mesh) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
+        let at = |nodes: &[u32]| nodes.iter().map(|&n| mesh.nodes[n as usize]).collect();
+        match &self.vertices {
+            Some(v) => (v.skin_mm.clone(), v.interface_mm.clone()),
+            None => (at(&self.skin), at(&self.interface)),
+        }
+    }
 }
 
 /// A meshed fingertip.
@@ -176,13 +190,9 @@ pub struct FingertipMesh {
 
 /// Fraction of the lateral sides that the atlas shows, from the palmar edge:
 /// three quarters, about 112 degrees from the palmar line.
-const PATCH_SIDE_QUARTERS: u32 = 3;
+pub(super) const PATCH_SIDE_QUARTERS: u32 = 3;
 
-/// Parts of their way that nodes slide, tried in turn until no element folds.
-const STRENGTHS: [f64; 5] = [1.0, 0.8, 0.6, 0.4, 0.0];
-
-/// Meshes a fingertip, lattice lines drawn together by `grading` if there is one: as far as no
-/// element folds.
+/// Meshes a fingertip; of [`Order::Graded`] with cells as small as `contact` wants them.
 ///
 /// # Errors
 /// Refuses a shape whose lengths contradict each other; see [`FingertipShapeError`].
@@ -191,48 +201,30 @@ pub fn build(
     density: Density,
     order: Order,
     parts: Parts,
-    grading: Option<&Grading>,
-) -> Result<FingertipMesh, FingertipShapeError> {
-    let Some(grading) = grading else {
-        return build_drawn(shape, density, order, parts, None);
-    };
-    let whole = |m: &Mesh| {
-        m.blocks.iter().all(|b| BlockGeometry::new(b.kind, &m.nodes, &b.connectivity).is_ok())
-    };
-    let mut built = build_drawn(shape, density, order, parts, Some(grading))?;
-    for strength in &STRENGTHS[1..] {
-        if whole(&built.mesh) {
-            break;
-        }
-        tracing::info!(strength, "lattice lines are drawn together less: elements would fold");
-        built = build_drawn(shape, density, order, parts, Some(&grading.weaker(*strength)))?;
-    }
-    Ok(built)
-}
-
-fn build_drawn(
-    shape: &FingertipShape,
-    density: Density,
-    order: Order,
-    parts: Parts,
-    grading: Option<&Grading>,
+    contact: Option<&Contact>,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
     let resolution = density.resolution(order);
-    let size = resolution.grid;
     let step = order.step();
-    let cap_row_mm = shape.cap_length_mm * std::f64::consts::FRAC_PI_4 / f64::from(size.cap);
-    let first = cap_row_mm / (shape.length_mm - shape.cap_length_mm);
-    let mut grid = size.build(step, first);
+    let refined = (order == Order::Graded).then(|| {
+        let spacing = contact.map(|c| Spacing::new(shape, c, density.closeness()));
+        Refined::new(resolution.grid, shape, spacing.as_ref())
+    });
+    let lattice;
+    let (grid, size, hanging) = match &refined {
+        Some(r) => (&r.grid, r.size, &r.hanging[..]),
+        None => {
+            let size = resolution.grid;
+            lattice = size.build(step, size.first_body_fraction(shape));
+            (&lattice, size, &[][..])
+        }
+    };
     let step = step as usize;
     let n = grid.parameters.len();
     let under_nail = (0..n as u32)
         .filter(|&s| shape.under_nail(shape.skin(grid.parameters[s as usize])))
         .collect();
-    if let Some(grading) = grading {
-        grading.slide(shape, &mut grid, step);
-    }
-    let (nodes, tissue) = extrude(shape, &grid, &resolution, parts.bone)?;
+    let (nodes, tissue) = extrude(shape, grid, &resolution, parts.bone)?;
     let mut mesh = Mesh { nodes, ..Mesh::default() };
     let cells = Cells { cells: &grid.cells, step };
     mesh.blocks.push(cells.hexahedra(&tissue, |layer, s| (layer * n) as u32 + s));
@@ -253,12 +245,16 @@ fn build_drawn(
         let layers = bone_layer..tissue.len() + 1;
         mesh.node_sets.insert("bone_base".into(), in_base_plane(layers));
     }
+    refined::hang(&mut mesh, hanging, n);
     if parts.nail {
-        let plate = nail::attach(&mut mesh, shape, &grid, step)?;
+        let plate = nail::attach(&mut mesh, shape, grid, step, hanging)?;
         mesh.blocks.push(plate.block);
         mesh.surfaces.insert("skin".into(), plate.outside);
     }
-    let patch = patch(&grid, size, step, interface);
+    let patch = match &refined {
+        Some(r) => r.patch(shape, interface)?,
+        None => patch_of(grid, size, step, interface),
+    };
     Ok(FingertipMesh { mesh, patch })
 }
 
@@ -298,7 +294,7 @@ fn extrude(
 
 /// Vertices and triangles of the palmar and lateral part of the grid. Quads are
 /// cut so that the mirror image of the patch is cut alike.
-fn patch(grid: &Grid, size: GridSize, step: usize, interface_offset: u32) -> Patch {
+pub(super) fn patch_of(grid: &Grid, size: GridSize, step: usize, interface_offset: u32) -> Patch {
     let side_max = size.side * PATCH_SIDE_QUARTERS / 4;
     let inside = |s: u32| grid.lattice[s as usize][1] <= side_max;
     let w = step + 1;
@@ -334,7 +330,7 @@ fn patch(grid: &Grid, size: GridSize, step: usize, interface_offset: u32) -> Pat
         }
     }
     let interface = skin.iter().map(|s| s + interface_offset).collect();
-    Patch { skin, interface, triangles }
+    Patch { skin, interface, triangles, vertices: None }
 }
 
 #[cfg(test)]

@@ -2,9 +2,12 @@
 //! is extended along the finger. No pole; every quad has four neighbours but
 //! those at the two-by-two corners of the cube, where three meet.
 
-use crate::geometry::fingertip::SurfaceParameter;
+use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
+
+/// Sides of the half cube: front, palmar, left, dorsal, right.
+pub(super) const SIDES: usize = 5;
 
 /// Cells of the grid. Sides are palmar, left, dorsal, right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,39 +34,76 @@ pub(super) struct Grid {
 
 impl GridSize {
     /// Number of the node at a lattice address, new if not met before.
-    fn node_of(self, map: &mut BTreeMap<[u32; 3], u32>, at: [u32; 3]) -> u32 {
+    pub(super) fn node_of(self, map: &mut BTreeMap<[u32; 3], u32>, at: [u32; 3]) -> u32 {
         let next = u32::try_from(map.len()).unwrap_or(u32::MAX);
         *map.entry(at).or_insert(next)
+    }
+
+    /// Length of the body's first row over that of the body: as long as the cap's rows.
+    pub(super) fn first_body_fraction(self, shape: &FingertipShape) -> f64 {
+        let cap_row_mm = shape.cap_length_mm * FRAC_PI_4 / f64::from(self.cap);
+        cap_row_mm / (shape.length_mm - shape.cap_length_mm)
+    }
+
+    /// Rows and columns of a side of the half cube.
+    pub(super) const fn extent(self, side: usize) -> [u32; 2] {
+        let rows = self.cap + self.body;
+        match side {
+            0 => [self.side, self.across],
+            1 | 3 => [self.across, rows],
+            _ => [self.side, rows],
+        }
+    }
+
+    /// Lattice address of a row and a column of a side; rows, then columns turn counter-clockwise
+    /// seen from outside.
+    pub(super) const fn address(self, side: usize, [row, column]: [u32; 2]) -> [u32; 3] {
+        let (na, nb) = (self.across, self.side);
+        match side {
+            0 => [column, row, 0],       // front, outward -x
+            1 => [row, 0, column],       // palmar, outward -z
+            2 => [0, nb - row, column],  // outward -y
+            3 => [na - row, nb, column], // dorsal, outward +z
+            _ => [na, row, column],      // outward +y
+        }
+    }
+
+    /// A side and the place on it of a lattice address.
+    pub(super) const fn place(self, [i, j, k]: [u32; 3]) -> (usize, [u32; 2]) {
+        if k == 0 {
+            (0, [j, i])
+        } else if j == 0 {
+            (1, [i, k])
+        } else if i == 0 {
+            (2, [self.side - j, k])
+        } else if j == self.side {
+            (3, [self.across - i, k])
+        } else {
+            (4, [j, k])
+        }
     }
 
     /// The grid with cells of `step` lattice intervals (1, or 2 for quadratic
     /// elements, which needs even sizes). The body's first row
     /// takes `first_body_fraction` of its length and the others grow from it.
     pub(super) fn build(self, step: u32, first_body_fraction: f64) -> Grid {
-        let rows = self.cap + self.body;
-        let (na, nb) = (self.across, self.side);
         let mut map = BTreeMap::new();
         let mut cells = Vec::new();
-        // Each patch: lattice address of (row, column); rows then columns turn
-        // counter-clockwise seen from outside.
-        let mut patch = |height: u32, width: u32, at: &dyn Fn(u32, u32) -> [u32; 3]| {
+        for side in 0..SIDES {
+            let [height, width] = self.extent(side);
             for r in (0..height).step_by(step as usize) {
                 for c in (0..width).step_by(step as usize) {
                     let mut cell = Vec::with_capacity(((step + 1) * (step + 1)) as usize);
                     for dr in 0..=step {
                         for dc in 0..=step {
-                            cell.push(self.node_of(&mut map, at(r + dr, c + dc)));
+                            let at = self.address(side, [r + dr, c + dc]);
+                            cell.push(self.node_of(&mut map, at));
                         }
                     }
                     cells.push(cell);
                 }
             }
-        };
-        patch(nb, na, &|j, i| [i, j, 0]); // front face, outward -x
-        patch(na, rows, &|i, k| [i, 0, k]); // palmar, outward -z
-        patch(nb, rows, &|j, k| [0, nb - j, k]); // outward -y
-        patch(na, rows, &|i, k| [na - i, nb, k]); // dorsal, outward +z
-        patch(nb, rows, &|j, k| [na, j, k]); // outward +y
+        }
         let mut lattice = vec![[0; 3]; map.len()];
         for (at, id) in map {
             lattice[id as usize] = at;
@@ -73,7 +113,8 @@ impl GridSize {
         Grid { parameters, lattice, cells }
     }
 
-    fn parameter(self, [i, j, k]: [u32; 3], body: &[f64]) -> SurfaceParameter {
+    /// Parameter of a lattice address; `body` holds the fraction of each of the body's rows.
+    pub(super) fn parameter(self, [i, j, k]: [u32; 3], body: &[f64]) -> SurfaceParameter {
         let equiangular = |i: u32, n: u32| {
             // The middle is exactly 0 and the ends exactly 1, for mirror symmetry.
             let t = (2.0 * f64::from(i) - f64::from(n)) / f64::from(n);

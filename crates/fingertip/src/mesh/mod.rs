@@ -4,8 +4,10 @@ mod extrude;
 pub mod fingertip;
 pub mod grading;
 mod half_cube;
+mod leaves;
 mod mirror;
 mod nail;
 #[cfg(test)]
 mod quality;
+mod refined;
 pub mod section;

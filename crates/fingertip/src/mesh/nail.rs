@@ -4,7 +4,7 @@ use super::extrude::Cells;
 use super::half_cube::Grid;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::tissue::Tissue;
-use papilla_fem::mesh::{Block, Mesh, Surface};
+use papilla_fem::mesh::{Block, HangingNode, Mesh, Surface};
 use std::collections::BTreeMap;
 
 /// Intervals through the plate: two `Hex8` or one `Hex27`.
@@ -20,7 +20,7 @@ pub(super) struct Nail {
 
 /// Extrudes the skin faces all of whose nodes are in the node set `nail`
 /// outward along the skin's normals and appends the new nodes to the mesh, the
-/// top layer first.
+/// top layer first. Above skin nodes that hang, those of the plate do.
 ///
 /// # Errors
 /// [`FingertipShapeError::NailTooSmall`] if no face is covered.
@@ -29,6 +29,7 @@ pub(super) fn attach(
     shape: &FingertipShape,
     grid: &Grid,
     step: usize,
+    hanging: &[HangingNode],
 ) -> Result<Nail, FingertipShapeError> {
     let under = |s: &u32| mesh.node_sets["nail"].binary_search(s).is_ok();
     let (covered, bare): (Vec<_>, Vec<_>) =
@@ -47,6 +48,15 @@ pub(super) fn attach(
             let p = mesh.nodes[s as usize];
             let normal = shape.skin_normal(p);
             mesh.nodes.push(std::array::from_fn(|i| p[i] + height_mm * normal[i]));
+        }
+    }
+    for layer in 0..INTERVALS as u32 {
+        let own = |s: u32| local.get(&s).map(|at| first + layer * n + at);
+        for h in hanging {
+            let [a, b, c] = h.masters.map(own);
+            if let (Some(node), Some(a), Some(b), Some(c)) = (own(h.node), a, b, c) {
+                mesh.hanging.push(HangingNode { node, masters: [a, b, c] });
+            }
         }
     }
     // Layer INTERVALS is the skin itself.

@@ -102,7 +102,7 @@ impl Geometry {
     }
 }
 
-/// Only the fingertip's lattice can be drawn together.
+/// Only the cells of the fingertip can be split.
 fn even_lattice(order: Order) -> Result<(), SceneError> {
     let rule = "is for kind = \"fingertip\": take \"linear\" or \"quadratic\"";
     require(order != Order::Graded, "geometry.order", &"graded", rule)

@@ -4,7 +4,7 @@ use super::record::{Checks, IncrementRecord};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::IndenterError;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
-use crate::mesh::grading::{Contact, Grading};
+use crate::mesh::grading::Contact;
 use crate::mesh::section::SectionMeshError;
 use crate::scene::error::{indenter_field, material_field};
 use crate::scene::{Located, Pose, Scene, SceneError, TissueError};
@@ -154,7 +154,7 @@ pub struct Body {
     /// Where the indenter first touches the undeformed finger, whatever the mesh; where none is given
     /// it is where it first touches the mesh.
     pub first_touch: Option<Contact>,
-    /// Whether its lattice is drawn together under that contact.
+    /// Whether its cells are split under that contact.
     pub graded: bool,
 }
 
@@ -188,8 +188,7 @@ impl Body {
         parts: Parts,
         contact: Option<Contact>,
     ) -> Result<Self, SimulationError> {
-        let grading = contact.as_ref().map(|c| Grading::new(shape, c));
-        let FingertipMesh { mesh, patch } = build(shape, density, order, parts, grading.as_ref())?;
+        let FingertipMesh { mesh, patch } = build(shape, density, order, parts, contact.as_ref())?;
         let mut fixed = vec![false; 3 * mesh.nodes.len()];
         for &n in &mesh.node_sets["base"] {
             fixed[3 * n as usize] = true;
@@ -261,10 +260,8 @@ impl Body {
     /// [`BuildAtlasError`] if the patch cannot be flattened.
     pub fn atlas(&self) -> Option<Result<(Atlas, AtlasReport), BuildAtlasError>> {
         let patch = &self.patch.as_ref().filter(|_| !self.plane)?.patch;
-        let at = |nodes: &[u32]| -> Vec<[f64; 3]> {
-            nodes.iter().map(|&n| self.problem.mesh.nodes[n as usize]).collect()
-        };
-        Some(build_atlas(&at(&patch.skin), &at(&patch.interface), &patch.triangles))
+        let (skin, interface) = patch.places_mm(&self.problem.mesh);
+        Some(build_atlas(&skin, &interface, &patch.triangles))
     }
 
     /// Orientation of an indenter in `pose`: its own z axis is the direction in
@@ -333,12 +330,18 @@ impl Body {
         let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
             Default::default();
         if let Some(p) = &self.patch {
-            pressure_mpa = p.patch.skin.iter().map(|&n| pressure[n as usize]).collect();
+            let nodal = self.nodal_fields(solver, p, &pressure)?;
             shear_mpa = self.shear_mpa(solver, &p.patch.skin);
-            let history = |block, element| solver.history_of(block, element);
-            let body = self.deformed(solver, &history);
-            sed_dermis_mpa = p.dermis.sed_mpa(&body)?;
-            sed_epidermis_mpa = p.epidermis.sed_mpa(&body)?;
+            [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = match &p.patch.vertices {
+                None => nodal,
+                Some(vertices) => {
+                    if !shear_mpa.is_empty() {
+                        shear_mpa = vertices.vector(&shear_mpa);
+                    }
+                    let [pressure, dermis, epidermis] = nodal;
+                    [vertices.pressure(&pressure), vertices.sed(&dermis), vertices.sed(&epidermis)]
+                }
+            };
         }
         Ok(IncrementRecord {
             depth_mm,
@@ -366,6 +369,29 @@ impl Body {
             },
             seconds: 0.0,
         })
+    }
+
+    /// Pressure at the patch's skin nodes and SED of dermis and epidermis below, MPa, at the
+    /// solver's equilibrium; empty without a patch.
+    ///
+    /// # Errors
+    /// [`SimulationError::Inverted`] where SED cannot be read.
+    pub fn fields_at_nodes(&self, solver: &Solver<'_>) -> Result<[Vec<f64>; 3], SimulationError> {
+        let Some(p) = &self.patch else { return Ok(Default::default()) };
+        let skin = &self.problem.mesh.surfaces[&self.contact];
+        self.nodal_fields(solver, p, &solver.pressure_mpa(skin))
+    }
+
+    fn nodal_fields(
+        &self,
+        solver: &Solver<'_>,
+        p: &RecordedPatch,
+        pressure_mpa: &[f64],
+    ) -> Result<[Vec<f64>; 3], SimulationError> {
+        let history = |block, element| solver.history_of(block, element);
+        let body = self.deformed(solver, &history);
+        let pressure = p.patch.skin.iter().map(|&n| pressure_mpa[n as usize]).collect();
+        Ok([pressure, p.dermis.sed_mpa(&body)?, p.epidermis.sed_mpa(&body)?])
     }
 
     /// A solver for this body.

@@ -138,7 +138,7 @@ impl Body {
             let clock = Instant::now();
             let at = |source| SimulationError::Solve { depth_mm, source };
             let mut effort = Effort::default();
-            for between in path_mm(depths_mm, i, refinement) {
+            for between in path_mm(depths_mm, i, refinement, self.graded) {
                 effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
             }
             let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
@@ -283,12 +283,13 @@ impl Drive {
 /// Depths between stored depth `i` and the one before it at which to find
 /// equilibrium too, mm. Force turns fast after first touch, and with it the
 /// work integral.
-fn path_mm(depths_mm: &[f64], i: usize, refinement: u32) -> Vec<f64> {
+fn path_mm(depths_mm: &[f64], i: usize, refinement: u32, graded: bool) -> Vec<f64> {
     let to = depths_mm[i];
     let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
     let coarse: &[f64] = match i {
+        0 if graded => &[0.0, 0.12, 0.35, 0.65, 1.0],
         0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
-        1 => &[0.0, 0.5, 1.0],
+        1 if !graded => &[0.0, 0.5, 1.0],
         _ => &[0.0, 1.0],
     };
     let at = |part: f64| from + part * (to - from);

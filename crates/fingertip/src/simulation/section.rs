@@ -37,7 +37,7 @@ impl Body {
         let section = build(spec.shape, parts, spec.density, kind, spec.extent)?;
         let (fixed, mesh) = (section.fixed(), section.mesh);
         let [skin, interface] = ["skin", "interface"].map(|name| mesh.surfaces[name].walk());
-        let patch = Patch { skin, interface, triangles: Vec::new() };
+        let patch = Patch { skin, interface, triangles: Vec::new(), vertices: None };
         Self::with_patch(mesh, materials, fixed, patch, true)
     }
 }

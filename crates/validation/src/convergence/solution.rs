@@ -75,7 +75,7 @@ impl Solution {
         if let Err(e) = solution.solve(&scene, target) {
             solution.record.error = Some(e.to_string());
         }
-        solution.write(&arrays, &record)?;
+        solution.write(target, &arrays, &record)?;
         Ok(solution)
     }
 
@@ -89,22 +89,30 @@ impl Solution {
         let readers = Readers::new(&body, target);
         let begun_s = processor::thread_s();
         let mut solver = body.solver(Options::default())?;
-        let mut keep = |_: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
-            self.pressure_pa.push(readers.skin(&found.pressure_mpa));
-            self.sed_j_per_m3.push(readers.interface(&found.sed_dermis_mpa));
+        let mut failed = None;
+        let mut keep = |solver: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
+            match body.fields_at_nodes(solver) {
+                Ok([pressure, sed, _]) => {
+                    self.pressure_pa.push(readers.skin(&pressure));
+                    self.sed_j_per_m3.push(readers.interface(&sed));
+                }
+                Err(e) => failed = Some(e),
+            }
             self.record.depth_mm.push(found.depth_mm);
             self.record.force_n.push(norm(found.force_n));
             self.record.faults.push(fault(found, found.pressure_mpa.len()));
         };
         let pressed = body.press(&mut solver, &approach, &drive, 1, &mut keep);
         self.record.solve_s = processor::thread_s() - begun_s;
-        pressed
+        pressed.and(failed.map_or(Ok(()), Err))
     }
 
-    fn write(&self, arrays: &Path, record: &Path) -> Result<(), ConvergenceError> {
+    fn write(&self, target: &Target, arrays: &Path, record: &Path) -> Result<(), ConvergenceError> {
         let points = self.pressure_pa.first().map_or(0, Vec::len);
         let shape = [self.pressure_pa.len(), points];
         let mut npz = NpzBuilder::new();
+        let place: Vec<f32> = target.place_mm.iter().flatten().map(|v| *v as f32).collect();
+        npz.add_slice("place_mm", &[target.place_mm.len(), 2], &place)?;
         npz.add_slice("pressure_pa", &shape, &self.pressure_pa.concat())?;
         npz.add_slice("sed_j_per_m3", &shape, &self.sed_j_per_m3.concat())?;
         npz.write(arrays)?;
@@ -154,13 +162,11 @@ struct Readers<'a> {
 impl<'a> Readers<'a> {
     fn new(body: &'a Body, target: &Target) -> Self {
         let mesh = &body.problem.mesh;
-        let reader = |name: &str, points: &[[f64; 3]]| {
-            SurfaceReader::new(mesh, &mesh.surfaces[name], points)
-        };
+        let [skin, interface] = ["skin", "interface"].map(|name| &mesh.surfaces[name]);
         Self {
             body,
-            skin: reader("skin", &target.skin),
-            interface: reader("interface", &target.interface),
+            skin: SurfaceReader::linear(mesh, skin, &target.skin),
+            interface: SurfaceReader::new(mesh, interface, &target.interface),
         }
     }
 

@@ -19,6 +19,8 @@ pub(super) struct Target {
     pub finger: FingertipShape,
     pub indenter: IndenterSpec,
     pub contact: Contact,
+    /// Place of each along the indenter's x and y from the first touch, mm.
+    pub place_mm: Vec<[f64; 2]>,
     /// On the skin, mm.
     pub skin: Vec<[f64; 3]>,
     /// On the dermis-epidermis interface below each, mm.
@@ -46,14 +48,14 @@ impl Target {
         let contact = approach
             .contact_with(&finger, &depths)
             .ok_or_else(|| describe("the indenter passes the finger".into()))?;
-        let (skin, interface) = points(&finger, &contact).map_err(|source| {
+        let (place_mm, skin, interface) = points(&finger, &contact).map_err(|source| {
             ConvergenceError::Case { case: case.name, source: Box::new(source.into()) }
         })?;
-        Ok(Self { finger, indenter, contact, skin, interface })
+        Ok(Self { finger, indenter, contact, place_mm, skin, interface })
     }
 }
 
-type Points = (Vec<[f64; 3]>, Vec<[f64; 3]>);
+type Points = (Vec<[f64; 2]>, Vec<[f64; 3]>, Vec<[f64; 3]>);
 
 /// A square grid across the indenter's axes, projected onto the skin; and the interface below.
 fn points(
@@ -64,7 +66,7 @@ fn points(
     let axis = |k: usize| [r[0][k], r[1][k], r[2][k]];
     let (x, y) = (axis(0), axis(1));
     let count = (HALF_MM / SPACING_MM).round() as i32;
-    let (mut skin, mut interface) = (Vec::new(), Vec::new());
+    let (mut place, mut skin, mut interface) = (Vec::new(), Vec::new(), Vec::new());
     for i in -count..=count {
         for j in -count..=count {
             let (a, b) = (SPACING_MM * f64::from(i), SPACING_MM * f64::from(j));
@@ -74,10 +76,11 @@ fn points(
             // Neither past the end of the finger nor round its sides.
             let moved: [f64; 3] = std::array::from_fn(|k| on[k] - p[k]);
             if on[0] < finger.length_mm - 1.0 && norm(moved) < 3.0 {
+                place.push([a, b]);
                 skin.push(on);
                 interface.push(finger.layers(parameter)?[1]);
             }
         }
     }
-    Ok((skin, interface))
+    Ok((place, skin, interface))
 }

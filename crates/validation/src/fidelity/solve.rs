@@ -48,10 +48,8 @@ type Surfaces = (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<[u32; 3]>);
 
 fn surfaces(body: &Body) -> Option<Surfaces> {
     let patch = &body.patch.as_ref()?.patch;
-    let at = |nodes: &[u32]| -> Vec<[f64; 3]> {
-        nodes.iter().map(|&n| body.problem.mesh.nodes[n as usize]).collect()
-    };
-    Some((at(&patch.skin), at(&patch.interface), patch.triangles.clone()))
+    let (skin, interface) = patch.places_mm(&body.problem.mesh);
+    Some((skin, interface, patch.triangles.clone()))
 }
 
 /// The campaign's finger as a fidelity level has it.

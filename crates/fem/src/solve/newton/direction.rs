@@ -62,8 +62,19 @@ impl Newton<'_> {
                 &mut self.cg,
             );
             self.effort.solve_s += clock.elapsed().as_secs_f64();
+            tracing::trace!(
+                iterations = found.iterations,
+                residual = found.relative_residual,
+                tolerance,
+                negative_curvature = found.negative_curvature,
+                assemble_s = self.effort.assemble_s,
+                factor_s = self.effort.factor_s,
+                solve_s = self.effort.solve_s,
+                "conjugate gradients"
+            );
             self.effort.cg_iterations += found.iterations;
-            self.stale = found.iterations > self.options.refactor_after_cg;
+            let enough = self.options.refactor_after_cg * if mixed { 2 } else { 1 };
+            self.stale = found.iterations > enough;
             if found.negative_curvature && self.convexify(loading) {
                 continue;
             }
@@ -88,7 +99,8 @@ impl Newton<'_> {
         let points = surface.points(loading.contact());
         for (point, k) in self.current.curvature.drain(..) {
             let Support { nodes, values } = points.support(point);
-            self.problem.system.add_point(&mut self.tangent, nodes, values, &k);
+            let free = self.problem.mesh.free_support(nodes, values);
+            self.problem.system.add_point(&mut self.tangent, &free, &k);
         }
         any
     }

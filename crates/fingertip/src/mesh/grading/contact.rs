@@ -6,7 +6,7 @@ use papilla_sdf::{Placement, SignedDistance};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
-/// What the lattice is drawn together for.
+/// What cells are split for.
 #[derive(Clone)]
 pub struct Contact {
     /// The indenter's shape.
