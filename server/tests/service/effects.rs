@@ -162,9 +162,24 @@ async fn sample_types_may_differ_by_direction() {
     socket.send(whole(1, &ramp())).await;
     let (header, _, message) = socket.hear_2().await;
     assert_eq!((header.sample_type, message.len()), (SampleType::U8, HEADER_LEN_V2 + MAP_LEN));
-    assert!((header.scale - SED_MAX / 255.0).abs() < 1e-3);
+    assert!((header.scale - SED_MAX / 255.0).abs() < 1e-3, "the ramp reaches the greatest SED");
     for (unit, p) in message[HEADER_LEN_V2..].iter().zip(ramp()) {
         assert!((f32::from(*unit) * header.scale - GAIN * p).abs() <= 0.51 * header.scale);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_keep_their_precision_however_light_the_touch() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let wish = json!({"answer_sample_type": "u8", "effects": ["contact_window"]});
+    socket.open(hello_2(&wish)).await;
+    for (sequence, share) in (1..).zip([1e-6, 5e-4, 1.0]) {
+        let map: Vec<f32> = patch().iter().map(|p| share * p).collect();
+        socket.send(whole(sequence, &map)).await;
+        let (header, _, _) = socket.hear_2().await;
+        let unit = GAIN * share * 5000.0 / 255.0;
+        assert!((header.scale / unit - 1.0).abs() < 1e-5, "{share}: {header:?}");
     }
 }
 

@@ -101,7 +101,7 @@ impl Session {
             effective_pa.iter().map(|&p| if p > 0.0 { p + error_pa(p) } else { 0.0 }).collect();
         let more = if sent == SampleType::F32 { sed.to_vec() } else { tier.render(&more_pa)? };
         let answered = self.hello.answer_sample_type.unwrap_or(sent);
-        let unit = top.max(tier.sed_max_j_per_m3) / answered.unit_max();
+        let unit = top / answered.unit_max();
         let pixel = |(&w, &more): (&f32, &f32)| {
             let rounding = f64::from(answered.error_max(w, unit));
             MAP_TOLERANCE * f64::from(top) + 2.0 * f64::from((more - w).abs()) + rounding

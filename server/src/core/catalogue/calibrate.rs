@@ -111,7 +111,7 @@ fn codec_us() -> Option<u64> {
         decode(input, &payload, &mut map).ok()?;
         check_pressure(&map, 1e4).ok()?;
         buffer.clear();
-        let sed = Map { quantity: Quantity::Sed, values: &map, value_max: 1e4, source: "" };
+        let sed = Map { quantity: Quantity::Sed, values: &map, source: "" };
         encode(samples, sed, &mut buffer).ok()?;
         let time = start.elapsed();
         least = Some(least.map_or(time, |least| least.min(time)));

@@ -176,25 +176,20 @@ impl Worker {
         }
 
         let start = Instant::now();
-        let sed_max = tier.sed_max_j_per_m3;
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint());
             buffer.resize(headroom, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
             let written = effects
-                .write(pressure_pa, sed, sed_max, time_us, buffer)
+                .write(pressure_pa, sed, time_us, buffer)
                 .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
             (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
             let buffer = recycler.claim(headroom + job.output.size_hint());
             buffer.resize(headroom, 0);
-            let map = Map {
-                quantity: Quantity::Sed,
-                values: &self.sed_j_per_m3,
-                value_max: sed_max,
-                source: &tier.name,
-            };
+            let map =
+                Map { quantity: Quantity::Sed, values: &self.sed_j_per_m3, source: &tier.name };
             let scale = encode(job.output, map, buffer)
                 .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
