@@ -66,7 +66,11 @@ fn hello() -> impl Strategy<Value = Hello> {
         prop::option::of(prop::sample::select(SampleType::ALL.to_vec())),
         any::<Option<bool>>(),
         prop::option::of(number()),
-        prop::option::of(prop::sample::select(vec![OutOfRange::Refuse, OutOfRange::Flag])),
+        prop::option::of(prop::sample::select(vec![
+            OutOfRange::Refuse,
+            OutOfRange::Flag,
+            OutOfRange::Clamp,
+        ])),
         any::<Option<u32>>(),
         prop::option::of(any::<u16>().prop_map(|margin_px| ContactWindow { margin_px })),
         prop::option::of(prop::collection::vec(place(), 0..5)),

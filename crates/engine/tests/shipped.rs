@@ -10,6 +10,7 @@ use papilla_engine::{Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Ind
 use papilla_proto::{
     MapError, PressureRange, SampleType,
     atlas::{Atlas, Patch, Raster},
+    effects::OutOfRange,
 };
 use std::fs;
 
@@ -144,7 +145,7 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
             // Negative pressure is the service's to refuse, before any model is asked.
             let mut bad = good.clone();
             bad[place] = -1.0;
-            let range = PressureRange { trained_max_pa: max_pa, accepts_out_of_range: true };
+            let range = PressureRange { trained_max_pa: max_pa, beyond: OutOfRange::Flag };
             assert!(matches!(range.check(&bad), Err(MapError::Negative { .. })));
         }
         // Far beyond all that a range lets through: a map that is one, or an error.
@@ -171,8 +172,8 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
 fn what_the_card_does_not_know_is_flagged() {
     each(|tier| {
         assert!(tier.max_pa() > 1e3 && tier.max_pa() < 1e6, "{}", tier.card.name);
-        let flagged = PressureRange { trained_max_pa: tier.max_pa(), accepts_out_of_range: true };
-        let strict = PressureRange { accepts_out_of_range: false, ..flagged };
+        let flagged = PressureRange { trained_max_pa: tier.max_pa(), beyond: OutOfRange::Flag };
+        let strict = PressureRange { beyond: OutOfRange::Refuse, ..flagged };
         for (times, is_left) in [(0.5, false), (1.0, false), (1.02, true), (9.9, true)] {
             let map = contact(times * tier.max_pa());
             let peak_pa = map.iter().copied().fold(0.0, f32::max);

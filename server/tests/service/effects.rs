@@ -184,23 +184,36 @@ async fn windows_keep_their_precision_however_light_the_touch() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn pressure_beyond_the_range_is_flagged_where_that_is_asked_for() {
+async fn pressure_beyond_the_range_is_clamped_and_flagged_unless_the_hello_says_otherwise() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello_2(&json!({}))).await;
-    let beyond = vec![2.0 * PRESSURE_MAX_PA; MAP_LEN];
-    socket.send(whole(1, &beyond)).await;
+    let beyond = vec![3.0 * PRESSURE_MAX_PA; MAP_LEN];
+    for (sequence, members, seen) in [
+        (1, json!({"effects": ["summary"]}), 1.0),
+        (2, json!({"effects": ["summary"], "out_of_range": "clamp"}), 1.0),
+        (3, json!({"effects": ["summary"], "out_of_range": "flag"}), 3.0),
+    ] {
+        socket.open(hello_2(&members)).await;
+        socket.send(whole(sequence, &beyond)).await;
+        let (header, extension, message) = socket.hear_2().await;
+        assert_eq!(header.status, FrameStatus::Ok, "{members}");
+        assert_ne!(extension.flags & flags::OUT_OF_RANGE, 0, "{members}");
+        let summary = Summary::decode(&message[HEADER_LEN_V2..]).unwrap();
+        assert!((summary.pressure_max_pa / beyond[0] - 1.0).abs() < 1e-6, "as it was sent");
+        let sed = floats_of(&message[HEADER_LEN_V2 + 64..]);
+        assert!(sed.iter().all(|e| (e - GAIN * seen * PRESSURE_MAX_PA).abs() < 1.0), "{members}");
+    }
+    socket.open(hello_2(&json!({"out_of_range": "refuse"}))).await;
+    socket.send(whole(4, &beyond)).await;
     socket.hear_refusal("out_of_range").await;
-    socket.open(hello_2(&json!({"out_of_range": "flag"}))).await;
-    socket.send(whole(2, &beyond)).await;
-    let (header, extension, message) = socket.hear_2().await;
-    assert_eq!((header.status, extension.flags), (FrameStatus::Ok, flags::OUT_OF_RANGE));
-    let sed = floats_of(&message[HEADER_LEN_V2..]);
-    assert!(sed.iter().all(|e| (e - GAIN * 2.0 * PRESSURE_MAX_PA).abs() < 1.0));
-    socket.send(whole(3, &ramp())).await;
-    assert_eq!(socket.hear_2().await.1.flags, 0);
-    socket.send(whole(4, &vec![11.0 * PRESSURE_MAX_PA; MAP_LEN])).await;
-    socket.hear_refusal("out_of_range").await;
+    // Each way ends somewhere.
+    for (sequence, way, times) in [(5, "flag", 11.0), (6, "clamp", 1.1e4)] {
+        socket.open(hello_2(&json!({"out_of_range": way}))).await;
+        socket.send(whole(sequence, &ramp())).await;
+        assert_eq!(socket.hear_2().await.1.flags, 0);
+        socket.send(whole(sequence + 2, &vec![times * PRESSURE_MAX_PA; MAP_LEN])).await;
+        socket.hear_refusal("out_of_range").await;
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -35,6 +35,8 @@ pub(super) struct Worker {
     /// One per tier, in the catalogue's order.
     sessions: Vec<Box<dyn Session>>,
     pressure_pa: Vec<f32>,
+    /// What the network sees in place of pressure beyond its range.
+    clamped_pa: Vec<f32>,
     sed_j_per_m3: Vec<f32>,
 }
 
@@ -49,6 +51,7 @@ impl Worker {
             catalogue: Arc::clone(catalogue),
             metrics,
             pressure_pa: vec![0.0; MAP_LEN],
+            clamped_pa: vec![0.0; MAP_LEN],
             sed_j_per_m3: vec![0.0; MAP_LEN],
         };
         for tier in &catalogue.tiers {
@@ -147,8 +150,9 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        let is_outside =
-            |trained| InputStatistics::of(&self.pressure_pa).is_out_of_distribution(trained);
+        let is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
+        let seen_pa = if is_clamped { &self.clamped_pa } else { &self.pressure_pa };
+        let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
             !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
         meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
@@ -165,12 +169,10 @@ impl Worker {
         }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
-            self.sessions[job.tier].infer(&self.pressure_pa, &mut self.sed_j_per_m3).map_err(
-                |error| {
-                    let error = format_args!("{}.onnx: {error}", tier.name);
-                    problem::internal("the inference failed", &error)
-                },
-            )?;
+            self.sessions[job.tier].infer(seen_pa, &mut self.sed_j_per_m3).map_err(|error| {
+                let error = format_args!("{}.onnx: {error}", tier.name);
+                problem::internal("the inference failed", &error)
+            })?;
             times.infer = decoded.elapsed();
             tier.latency.learn(times.infer);
         }
@@ -207,7 +209,7 @@ impl Worker {
         decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            accepts_out_of_range: job.options.accepts_out_of_range,
+            beyond: job.options.out_of_range,
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);

@@ -138,7 +138,7 @@ impl Session {
             deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
             options: JobOptions {
                 headroom: HEADROOM + header.header_len(),
-                accepts_out_of_range: self.terms.accepts_out_of_range,
+                out_of_range: self.terms.out_of_range,
                 time_us: header.client_time_us,
                 effects: self.terms.effects.clone(),
                 header: Some(header),

@@ -34,8 +34,8 @@ pub(super) struct Terms {
     pub(super) answer_sample_type: SampleType,
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
-    /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(super) accepts_out_of_range: bool,
+    /// What becomes of pressure above what the tier was trained on.
+    pub(super) out_of_range: OutOfRange,
     /// Longest delay on the way of a frame that is not stale, us.
     pub(super) stale_after_us: Option<u32>,
     /// What was asked for beside the bare map.
@@ -146,7 +146,11 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         sample_type: hello.sample_type,
         answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        accepts_out_of_range: hello.out_of_range == Some(OutOfRange::Flag),
+        // Frames of version 1 have no flags.
+        out_of_range: hello.out_of_range.unwrap_or(match hello.version {
+            1 => OutOfRange::Refuse,
+            _ => OutOfRange::Clamp,
+        }),
         stale_after_us: hello.stale_after_us,
         effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
         info,
