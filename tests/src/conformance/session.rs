@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     FrameKind, Hello, MAP_LEN, RuntimeEffect, SampleType, Window,
-    effects::{Moduli, Relaxation},
+    effects::{Moduli, OutOfRange, Relaxation},
 };
 
 use super::{
@@ -57,8 +57,9 @@ impl Session {
         } else {
             sent_pa.to_vec()
         };
-        let sed = tier.render(&effective_pa)?;
-        let tolerance = self.tolerance(tier, &effective_pa, &sed)?;
+        let seen_pa = self.seen(tier, effective_pa);
+        let sed = tier.render(&seen_pa)?;
+        let tolerance = self.tolerance(tier, &seen_pa, &sed)?;
         let sed: Vec<f64> = sed.into_iter().map(f64::from).collect();
         if !self.has(RuntimeEffect::Afferents) {
             return Ok(Answer { sed, rate_hz: None, tolerance });
@@ -81,6 +82,16 @@ impl Session {
         self.stress = Some((now_s, stress));
         let top = rate_hz.iter().copied().fold(0.0, f64::max);
         Ok(Answer { sed, rate_hz: Some(rate_hz), tolerance: vec![2e-3 * top; MAP_LEN] })
+    }
+
+    /// What the network sees: no pressure beyond its range, unless it was asked to extrapolate.
+    fn seen(&self, tier: &Tier, mut effective_pa: Vec<f32>) -> Vec<f32> {
+        let most_pa = tier.pressure_max_pa;
+        let leaves = effective_pa.iter().any(|&p| p > 1.01 * most_pa);
+        if leaves && self.hello.out_of_range.unwrap_or(OutOfRange::Clamp) == OutOfRange::Clamp {
+            effective_pa.iter_mut().for_each(|p| *p = p.min(most_pa));
+        }
+        effective_pa
     }
 
     /// What rounding samples on the way in and out may do to every pixel.
