@@ -290,7 +290,9 @@ sealed partial class Run : IDisposable
         var map = new float[Wire.MapLength];
         foreach (var c in step["contacts"])
         {
-            atlas.AddContact((double)c["at_mm"][0], (double)c["at_mm"][1], (double)c["at_mm"][2], (double)c["force_n"], (double)c["radius_mm"], map);
+            double x = (double)c["at_mm"][0], y = (double)c["at_mm"][1], z = (double)c["at_mm"][2], forceN = (double)c["force_n"];
+            if (c["radius_mm"] == null) atlas.AddContact(x, y, z, forceN, map);
+            else atlas.AddContact(x, y, z, forceN, (double)c["radius_mm"], map);
         }
         CheckMap(expect, map);
         if (expect["force_n"] != null) Near("force", atlas.ForceN(map), (double)expect["force_n"][0], (double)expect["force_n"][1]);
