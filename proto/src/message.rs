@@ -228,6 +228,10 @@ pub struct Ready {
     /// Number that answers name the tier by. Version 2, as all that follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tier_number: Option<u16>,
+    /// Names of the tiers by the numbers that answers give, where the budget chooses among them
+    /// while the session lasts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_names: Option<Vec<String>>,
     /// Sample type of the answers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer_sample_type: Option<SampleType>,

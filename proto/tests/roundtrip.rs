@@ -133,6 +133,7 @@ proptest! {
             pressure_max_pa: scales.0,
             sed_scale_j_per_m3: scales.1,
             tier_number: numbers.4,
+            tier_names: numbers.3.map(|_| names.clone()),
             answer_sample_type: Some(SampleType::F16),
             session_effects: effects,
             sections: Some(vec![section]),

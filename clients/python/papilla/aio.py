@@ -195,6 +195,7 @@ class AsyncSession:
 
     async def _agree(self, ready: dict[str, Any]) -> None:
         self.ready = ready
+        self._tiers.update(enumerate(ready.get("tier_names", [])))
         self._tiers.setdefault(ready["tier_number"], ready["tier"])
 
     async def _live(self) -> None:

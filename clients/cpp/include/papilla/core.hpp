@@ -128,6 +128,8 @@ class Core {
     for (const Ready& each : history_) {
       if (each.tier_number == header.tier) answer.tier = each.tier;
     }
+    const auto& names = ready.message["tier_names"].items;
+    if (header.tier < names.size()) answer.tier = names[header.tier].string;
     if (header.status == Status::ok && !read(bytes, size, header, ready)) return Event::broken;
     outcome(header.sequence, header.client_time_us, header.status);
     return Event::nothing;

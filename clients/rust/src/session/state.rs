@@ -77,6 +77,9 @@ impl State {
         if let Some(number) = ready.tier_number {
             self.tiers.insert(number, ready.tier.clone());
         }
+        for (number, name) in (0..).zip(ready.tier_names.iter().flatten()) {
+            self.tiers.insert(number, name.clone());
+        }
         self.ready = ready;
     }
 

@@ -72,12 +72,12 @@ pub(crate) fn calibrate_noting(
     Ok(())
 }
 
-/// Measures a tier again that no frame has measured yet.
+/// Measures a tier again that no frame has measured since the last look.
 ///
 /// # Errors
 /// It does not run.
 pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
-    if !tier.latency.is_used() {
+    if tier.latency.is_idle() {
         tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
     }
     Ok(())
