@@ -270,10 +270,11 @@ function showState(state, detail) {
 }
 
 /** What a network says that has not learnt such a press. */
-function showFlags({ outOfRange, unfamiliar }, mostPa) {
+function showFlags({ outOfRange, unfamiliar, cutOff }, mostPa) {
   const words = [];
   if (outOfRange) words.push(`harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most`);
   if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
+  if (cutOff) words.push('cut off at the edge of the map');
   const text = words.join('; ');
   if (byId('flags').textContent === text) return;
   byId('flags').textContent = text;

@@ -16,7 +16,7 @@ const BACK_OFF_MS = { first: 250, last: 400 };
 /** A server that says nothing for so many of these is given up; counted by a timer, which stands still where the page does. */
 const WATCH_MS = 250;
 const SILENT_WATCHES = 7;
-const FLAG = { outOfRange: 1, unfamiliar: 4 };
+const FLAG = { outOfRange: 1, unfamiliar: 4, cutOff: 8 };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
 export class RequestFrame {
@@ -56,6 +56,7 @@ export function readAnswer(data, into) {
   into.serverUs = view.getUint32(24, true);
   into.tierNumber = view.getUint16(44, true);
   into.outOfRange = (view.getUint8(46) & FLAG.outOfRange) !== 0;
+  into.cutOff = (view.getUint8(46) & FLAG.cutOff) !== 0;
   into.unfamiliar = (view.getUint8(46) & FLAG.unfamiliar) !== 0;
   into.sedJPerM3 = null;
   if (into.status === 'ok') {
@@ -80,7 +81,7 @@ export class Session {
     this.url = url;
     this.callbacks = callbacks;
     this.frame = new RequestFrame();
-    this.answer = { status: 'error', sequence: 0, serverUs: 0, sedJPerM3: null, tierNumber: 0, outOfRange: false, unfamiliar: false };
+    this.answer = { status: 'error', sequence: 0, serverUs: 0, sedJPerM3: null, tierNumber: 0, outOfRange: false, unfamiliar: false, cutOff: false };
     this.sequence = 0;
     this.inFlight = false;
     this.sentAtMs = 0;

@@ -56,7 +56,7 @@ sealed class Outcome
     internal string Code, Field;
     internal float[] Map, Summary, Points, Actuators;
     internal int[] Window;
-    internal bool IsRate, OutOfRange, NoContact, Unfamiliar;
+    internal bool IsRate, OutOfRange, NoContact, Unfamiliar, CutOff;
     internal ulong ClientTimeUs;
     internal int TierNumber;
     internal uint TotalUs, QueueUs, InferUs;
@@ -150,7 +150,7 @@ sealed partial class Run : IDisposable
                 Status = a.Status, Code = a.Problem == null ? null : a.Problem.Code, Field = a.Problem == null ? null : a.Problem.Field,
                 Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
                 Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
-                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar,
+                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
                 ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
             };
             order.Add(a.Sequence);

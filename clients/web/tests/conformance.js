@@ -5,7 +5,7 @@ import { Atlas, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '..
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
 
-const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar']]);
+const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar'], ['cut_off', 'cutOff']]);
 
 const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 

@@ -134,7 +134,7 @@ async function start() {
     }
     if (answer.status !== 'ok' || !answer.summary) return;
     state.answers++;
-    state.flags = [answer.outOfRange && 'harder than learnt', answer.unfamiliar && 'unlike anything learnt'].filter(Boolean).join(', ');
+    state.flags = [answer.outOfRange && 'harder than learnt', answer.unfamiliar && 'unlike anything learnt', answer.cutOff && 'cut off at the edge'].filter(Boolean).join(', ');
     state.sedMax = answer.summary[SUMMARY.indexOf('sed_max_j_per_m3')];
     state.forceN = answer.summary[SUMMARY.indexOf('force_n')];
     // Grows at once, shrinks slowly, and never below what a light touch makes.

@@ -62,7 +62,9 @@ async fn every_answer_says_how_it_fared() {
     for _ in 0..3 {
         let (header, extension, message) = socket.hear_2().await;
         assert_eq!(header.client_time_us, 1000 * u64::from(header.sequence));
-        assert_eq!((extension.tier, extension.flags), (1, 0));
+        // The ramp goes to the edge of the map.
+        let due = if header.status == FrameStatus::Ok { flags::CUT_OFF } else { 0 };
+        assert_eq!((extension.tier, extension.flags), (1, due));
         if header.status == FrameStatus::Ok {
             maps += 1;
             assert_eq!(header.window(), Window::WHOLE);
@@ -210,7 +212,7 @@ async fn pressure_beyond_the_range_is_clamped_and_flagged_unless_the_hello_says_
     for (sequence, way, times) in [(5, "flag", 11.0), (6, "clamp", 1.1e4)] {
         socket.open(hello_2(&json!({"out_of_range": way}))).await;
         socket.send(whole(sequence, &ramp())).await;
-        assert_eq!(socket.hear_2().await.1.flags, 0);
+        assert_eq!(socket.hear_2().await.1.flags, flags::CUT_OFF);
         socket.send(whole(sequence + 2, &vec![times * PRESSURE_MAX_PA; MAP_LEN])).await;
         socket.hear_refusal("out_of_range").await;
     }
@@ -224,7 +226,10 @@ async fn a_map_that_no_press_makes_is_rendered_and_flagged() {
     // Squares of `side_px`, as high as what the test models' card knows.
     let board = |side_px: usize| -> Vec<f32> {
         let is_on = |i: usize| (i / 224 / side_px + i % 224 / side_px).is_multiple_of(2);
-        (0..MAP_LEN).map(|i| if is_on(i) { PRESSURE_MAX_PA } else { 0.0 }).collect()
+        let is_rim = |x: usize| x == 0 || x == MAP_SIDE_PX - 1;
+        let is_off = |i: usize| is_rim(i / MAP_SIDE_PX) || is_rim(i % MAP_SIDE_PX);
+        let pressure_pa = |i| if is_on(i) && !is_off(i) { PRESSURE_MAX_PA } else { 0.0 };
+        (0..MAP_LEN).map(pressure_pa).collect()
     };
     for (sequence, (side_px, due)) in [(1, flags::UNFAMILIAR), (8, 0)].into_iter().enumerate() {
         socket.send(whole(sequence as u32, &board(side_px))).await;
@@ -236,6 +241,21 @@ async fn a_map_that_no_press_makes_is_rendered_and_flagged() {
     }
     let nothing = service.post("/v1/sed", bytes_of(&vec![0.0; MAP_LEN])).send().await;
     assert_eq!(nothing.header("x-papilla-flags"), Some("no_contact"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_contact_at_the_edge_of_the_atlas_is_flagged_as_cut_off() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_2(&json!({}))).await;
+    // Twenty rows that end so many before the last one; the test skin is all of the map.
+    for (sequence, (before, due)) in (1..).zip([(0, flags::CUT_OFF), (1, 0), (60, 0)]) {
+        let rows = MAP_SIDE_PX - 20 - before..MAP_SIDE_PX - before;
+        let inside = |i: usize| rows.contains(&(i / MAP_SIDE_PX)) && (90..130).contains(&(i % 224));
+        let map: Vec<f32> = (0..MAP_LEN).map(|i| if inside(i) { 5000.0 } else { 0.0 }).collect();
+        socket.send(whole(sequence, &map)).await;
+        assert_eq!(socket.hear_2().await.1.flags, due, "{before} rows before the edge");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -28,6 +28,10 @@ use crate::{
     problem,
 };
 
+/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
+/// zero there in all of them.
+const RIM_SHARE: f32 = 0.01;
+
 /// Everything a thread owns; nothing is allocated after `prepare`.
 pub(super) struct Worker {
     catalogue: Arc<Catalogue>,
@@ -150,6 +154,9 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        let least_pa = RIM_SHARE * summary.peak_pa;
+        let is_cut_off = self.catalogue.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
+        meta.flags |= if is_cut_off { flags::CUT_OFF } else { 0 };
         let is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
         let seen_pa = if is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
