@@ -41,4 +41,3 @@ mod body_file;
 pub mod campaign;
 pub mod cli;
 pub mod influence_file;
-mod progress;

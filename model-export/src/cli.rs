@@ -7,7 +7,6 @@ mod ladder;
 mod patterns;
 
 use clap::{Parser, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use papilla_engine::{Backend, Card, Model};
 use papilla_model_export::{ExportError, read, read_text, table};
 use serde::Serialize;
@@ -31,7 +30,7 @@ will serve it, on indentations that no training saw, and writes its card.";
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
   model-export check    models/s1-base8.onnx --atlas models/atlas.json
-  model-export evaluate models/s1-base8.onnx data/s1 --out models/s1-base8.json --pictures docs/reports/pictures/s1-base8
+  model-export evaluate models/s1-base8.onnx data/s1 --out out/models/s1-base8.json --pictures docs/reports/pictures/s1-base8
   model-export index    models --default s1-base8
   model-export patterns models --dataset data/s1
   model-export table    models/*.json
@@ -147,13 +146,6 @@ fn load_model(
 ) -> Result<Arc<dyn Model>, ExportError> {
     let refused = |source| ExportError::Engine { path: path.to_owned(), source };
     papilla_engine::load_with(backend, &read(path)?, card).map_err(refused)
-}
-
-/// How far a command has come: on stderr, only where that is a terminal, and not beside JSON.
-fn bar(hidden: bool, count: usize, what: &str) -> anyhow::Result<ProgressBar> {
-    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(count as u64) };
-    let template = format!("{{bar:32}} {{pos}}/{{len}} {what}, {{per_sec}}, {{eta}} left {{msg}}");
-    Ok(bar.with_style(ProgressStyle::with_template(&template)?))
 }
 
 fn print_json(value: &impl Serialize) -> anyhow::Result<()> {

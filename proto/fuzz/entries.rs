@@ -8,6 +8,7 @@ use papilla_proto::{
     ClientMessage, FrameHeader, MAP_LEN, MapError, PressureRange, SampleType, ServerMessage,
     Summary, Window,
     atlas::{Atlas, AtlasError, Patch, Raster, VertexSampler},
+    effects::OutOfRange,
 };
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -38,7 +39,12 @@ pub(crate) fn frame(data: &[u8]) {
     let decoded = window.decode(header.sample_type, payload, header.scale, &mut map);
     if decoded.is_ok() {
         assert!(window.is_inside() && payload.len() == header.payload_len());
-        let range = PressureRange { trained_max_pa: 1e5, accepts_out_of_range: sequence > Some(9) };
+        let beyond = match sequence.unwrap_or_default() {
+            0..=9 => OutOfRange::Refuse,
+            10..=99 => OutOfRange::Flag,
+            _ => OutOfRange::Clamp,
+        };
+        let range = PressureRange { trained_max_pa: 1e5, beyond };
         check(range, &map);
         // What lies outside of the window is nothing.
         let inside: usize = window.rows().map(|row| row.len()).sum();
@@ -51,7 +57,12 @@ pub(crate) fn frame(data: &[u8]) {
 /// A map that passes is finite, not negative and below the limit; one that does not is refused
 /// for a sample that is indeed at fault.
 fn check(range: PressureRange, map: &[f32]) {
-    let limit_pa = range.trained_max_pa * if range.accepts_out_of_range { 10.0 } else { 1.01 };
+    let headroom = match range.beyond {
+        OutOfRange::Refuse => 1.01,
+        OutOfRange::Flag => 10.0,
+        OutOfRange::Clamp => 1e4,
+    };
+    let limit_pa = range.trained_max_pa * headroom;
     match range.check(map) {
         Ok(summary) => {
             assert!(map.iter().all(|p| (0.0..=limit_pa).contains(p)));

@@ -244,15 +244,20 @@ pub struct Relaxation {
     pub moduli: Moduli,
 }
 
-/// What becomes of pressure above what the tier was trained on.
+/// What becomes of pressure above what the tier was trained on. Sessions of version 2 clamp unless
+/// their hello says otherwise; whatever has no flags to show refuses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutOfRange {
     /// The frame is refused with the error `out_of_range`.
     #[default]
     Refuse,
-    /// It is rendered and its answer flagged, up to ten times that pressure.
+    /// It is rendered as it is and its answer flagged, up to ten times that pressure: the network
+    /// extrapolates.
     Flag,
+    /// The network sees the greatest pressure that it knows instead, and the answer is flagged, up
+    /// to ten thousand times that pressure. Force and area of a summary stay those that were sent.
+    Clamp,
 }
 
 /// One part of the payload of an answer of version 2. Parts begin at multiples of 16, which the

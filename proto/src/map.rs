@@ -1,6 +1,6 @@
 //! The map: 224 x 224 samples, row-major, row 0 at the fingertip's far end.
 
-use crate::ErrorCode;
+use crate::{ErrorCode, effects::OutOfRange};
 
 pub use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 
@@ -69,8 +69,12 @@ impl MapError {
     }
 }
 
-/// Room above the greatest trained pressure where a map is flagged instead of refused, as a factor.
+/// Room above the greatest trained pressure where a network may extrapolate, as a factor.
 pub const FLAGGED_HEADROOM: f32 = 10.0;
+
+/// Room above the greatest trained pressure where pressure is clamped, as a factor: far beyond any
+/// finger, and sums over a map stay finite.
+pub const CLAMPED_HEADROOM: f32 = 1e4;
 
 /// What [`PressureRange::check`] learns on its way through the map.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,8 +88,8 @@ pub struct MapSummary {
 pub struct PressureRange {
     /// Greatest pressure the model was trained on, Pa.
     pub trained_max_pa: f32,
-    /// Whether pressures beyond are taken, up to [`FLAGGED_HEADROOM`] times as much.
-    pub accepts_out_of_range: bool,
+    /// What becomes of pressures beyond.
+    pub beyond: OutOfRange,
 }
 
 impl MapSummary {
@@ -99,13 +103,29 @@ impl MapSummary {
 impl PressureRange {
     fn limit_pa(self) -> f32 {
         self.trained_max_pa
-            * if self.accepts_out_of_range { FLAGGED_HEADROOM } else { PRESSURE_HEADROOM }
+            * match self.beyond {
+                OutOfRange::Refuse => PRESSURE_HEADROOM,
+                OutOfRange::Flag => FLAGGED_HEADROOM,
+                OutOfRange::Clamp => CLAMPED_HEADROOM,
+            }
     }
 
     /// Whether a map with this peak is an extrapolation.
     #[must_use]
     pub fn is_left_by(self, summary: MapSummary) -> bool {
         summary.peak_pa > self.trained_max_pa * PRESSURE_HEADROOM
+    }
+
+    /// What the network is to see of a map that [leaves the range](Self::is_left_by), written to
+    /// `seen_pa`; false where it is to see the map itself.
+    pub fn clamp(self, map_pa: &[f32], summary: MapSummary, seen_pa: &mut [f32]) -> bool {
+        let clamps = self.beyond == OutOfRange::Clamp && self.is_left_by(summary);
+        if clamps {
+            for (seen, &p) in seen_pa.iter_mut().zip(map_pa) {
+                *seen = p.min(self.trained_max_pa);
+            }
+        }
+        clamps
     }
 
     /// Checks a pressure map, Pa: length, finite, not negative, not above the limit.
@@ -189,7 +209,7 @@ pub(crate) const LANES: usize = 16;
 /// # Errors
 /// The first sample at fault, in row-major order.
 pub fn check_pressure(map_pa: &[f32], pressure_max_pa: f32) -> Result<MapSummary, MapError> {
-    PressureRange { trained_max_pa: pressure_max_pa, accepts_out_of_range: false }.check(map_pa)
+    PressureRange { trained_max_pa: pressure_max_pa, beyond: OutOfRange::Refuse }.check(map_pa)
 }
 
 #[cfg(test)]
@@ -222,16 +242,25 @@ mod tests {
     }
 
     #[test]
-    fn pressure_beyond_the_range_is_taken_where_it_is_flagged_and_up_to_ten_times() {
-        let mut map = vec![1.0; MAP_LEN];
-        let range = PressureRange { trained_max_pa: 100.0, accepts_out_of_range: true };
-        for (pressure_pa, taken, left) in
-            [(100.0, true, false), (102.0, true, true), (999.0, true, true), (1001.0, false, true)]
-        {
-            map[5] = pressure_pa;
-            let found = range.check(&map);
-            assert_eq!(found.is_ok(), taken, "{pressure_pa} Pa");
-            assert!(found.is_err() || range.is_left_by(found.unwrap()) == left, "{pressure_pa} Pa");
+    fn pressure_beyond_the_range_is_taken_as_far_as_was_asked_for() {
+        let (mut map, mut seen) = (vec![1.0; MAP_LEN], vec![0.0; MAP_LEN]);
+        for (beyond, limit_pa) in [
+            (OutOfRange::Refuse, 101.0),
+            (OutOfRange::Flag, 1000.0),
+            (OutOfRange::Clamp, 1_000_000.0),
+        ] {
+            let range = PressureRange { trained_max_pa: 100.0, beyond };
+            for pressure_pa in [100.0, 102.0, 999.0, 1001.0, 999e3, 1001e3] {
+                map[5] = pressure_pa;
+                let found = range.check(&map);
+                assert_eq!(found.is_ok(), pressure_pa < limit_pa, "{beyond:?} {pressure_pa} Pa");
+                let Ok(found) = found else { continue };
+                assert_eq!(range.is_left_by(found), pressure_pa > 101.0, "{pressure_pa} Pa");
+                let clamped = range.clamp(&map, found, &mut seen);
+                let due = beyond == OutOfRange::Clamp && pressure_pa > 101.0;
+                assert_eq!(clamped, due);
+                assert!(!due || seen[5].to_bits() == 100_f32.to_bits() && seen[6] < 1.5);
+            }
         }
     }
 

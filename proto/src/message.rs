@@ -222,12 +222,16 @@ pub struct Ready {
     pub sample_type: SampleType,
     /// Greatest pressure the tier takes, Pa.
     pub pressure_max_pa: f32,
-    /// J/m3 per unit of u16 and u8 answers, 1 for floats. A map that would
-    /// clip raises it: the header of each answer has the last word.
+    /// J/m3 per unit of u16 and u8 answers that reach the greatest SED the tier knows, 1 for
+    /// floats. The header of each answer has its own.
     pub sed_scale_j_per_m3: f32,
     /// Number that answers name the tier by. Version 2, as all that follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tier_number: Option<u16>,
+    /// Names of the tiers by the numbers that answers give, where the budget chooses among them
+    /// while the session lasts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_names: Option<Vec<String>>,
     /// Sample type of the answers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer_sample_type: Option<SampleType>,

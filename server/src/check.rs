@@ -143,7 +143,8 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             || "no golden answers".to_owned(),
             |golden| {
                 let (error, most) = (golden.relative_l2, golden.relative_l2_max);
-                format!("{} golden answers within {error:.3} of {most:.3}", golden.states)
+                let (states, share) = (golden.states, golden.share);
+                format!("{states} golden answers within {error:.3} of {most:.3}, share {share:.2}")
             },
         );
         let is_default = index == catalogue.default;

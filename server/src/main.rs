@@ -116,12 +116,18 @@ fn announce(server: &Server, config: &Config) -> io::Result<()> {
     } else {
         let threads = server.threads();
         let plural = if threads == 1 { "" } else { "s" };
+        let others: Vec<&str> = server
+            .tiers()
+            .iter()
+            .map(String::as_str)
+            .filter(|&tier| tier != server.default_tier())
+            .collect();
         writeln!(
             out,
-            "Papilla {} serves tier {} of {} on {threads} thread{plural}.\nOpen {address}",
+            "Papilla {} serves tier {}, and by name {}, on {threads} thread{plural}.\nOpen {address}",
             env!("CARGO_PKG_VERSION"),
             server.default_tier(),
-            server.tiers().join(", "),
+            others.join(", "),
         )?;
     }
     out.flush()

@@ -2,7 +2,11 @@
 //!
 //! Without a collector nobody wants the spans, and making one costs a comparison.
 
-use std::{future::Future, io, time::Duration};
+use std::{
+    future::Future,
+    io::{self, IsTerminal},
+    time::Duration,
+};
 
 use axum::http::{Method, StatusCode};
 use tracing::{Instrument, Span, field::Empty};
@@ -38,7 +42,10 @@ impl Telemetry {
             .parse()
             .map_err(|error| refuse(format!("'{}' is not a filter: {error}", config.log)))?;
         let filter = filter.with_target(SPANS, LevelFilter::OFF);
-        let log = tracing_subscriber::fmt::layer().with_writer(io::stderr).with_filter(filter);
+        let log = tracing_subscriber::fmt::layer()
+            .with_ansi(io::stderr().is_terminal())
+            .with_writer(io::stderr)
+            .with_filter(filter);
         let registry = tracing_subscriber::registry().with(log);
         let taken = |error: tracing_subscriber::util::TryInitError| refuse(error.to_string());
         #[cfg(feature = "otlp")]

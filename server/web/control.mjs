@@ -4,6 +4,8 @@ const RAMP_MM_PER_S = 5;
 const LIFT_MM_PER_S = 14;
 const WHEEL_MM_PER_PX = 0.0008;
 const KEY_DEPTH_MM = 0.1;
+/** A thumb that goes so far to the side does not scroll. */
+const SIDEWAYS_PX = 8;
 const TURN_RAD_PER_PX = 0.008;
 const TURN_RAD_PER_KEY = 0.12;
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -20,6 +22,7 @@ export class PressControl {
     /** Present depth, mm; moves towards its goal with finite speed. */
     this.depthMm = 0;
     this.held = false;
+    this.touching = false;
     this.down = true;
     this.changed = true;
     this.lastMs = 0;
@@ -99,12 +102,13 @@ export class PressControl {
 
   #begin(element, event) {
     element.setPointerCapture(event.pointerId);
+    document.body.dataset.pressed = '';
     this.held = true;
     this.changed = true;
   }
 
   #end() {
-    this.held = false;
+    this.held = this.touching = false;
     this.down = this.inputs.keep.checked;
   }
 
@@ -115,11 +119,27 @@ export class PressControl {
     };
     canvas.addEventListener('pointerdown', (event) => {
       if (event.button !== 0 || document.body.dataset.mode !== 'press') return;
+      // A thumb may be about to scroll: it presses once it moves to the side, or lifts where it was.
+      if (event.pointerType === 'touch') {
+        this.touching = true;
+        this.last.x = event.clientX;
+        return;
+      }
       this.#begin(canvas, event);
       move(event);
     });
-    canvas.addEventListener('pointermove', (event) => { if (this.held) move(event); });
-    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => this.#end());
+    canvas.addEventListener('pointermove', (event) => {
+      if (this.touching && !this.held && Math.abs(event.clientX - this.last.x) > SIDEWAYS_PX) this.#begin(canvas, event);
+      if (this.held) move(event);
+    });
+    canvas.addEventListener('pointerup', (event) => {
+      if (this.touching && !this.held) {
+        this.#begin(canvas, event);
+        move(event);
+      }
+      this.#end();
+    });
+    canvas.addEventListener('pointercancel', () => this.#end());
     canvas.addEventListener('keydown', (event) => this.#padKey(event));
     this.#listenToWheel(canvas, (event) => this.#changeDepth(-event.deltaY * WHEEL_MM_PER_PX));
   }

@@ -14,6 +14,8 @@ import { Replay, fetchJson } from './replay.mjs';
 const byId = (id) => document.getElementById(id);
 /** A complaint stays at least this long, then until frames are answered again. */
 const NOTICE_MS = 6000;
+/** A frame is sent so often even if nothing changes, so that a silent server is noticed. */
+const QUIET_MS = 1000;
 const SED_UNIT = 'J/m³';
 
 class Page {
@@ -22,13 +24,12 @@ class Page {
     this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
-    this.pressureMaxPa = Infinity;
     this.unsent = true;
     this.stream = byId('stream');
     this.log = false;
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN) };
-    this.answered = { sequence: 0, pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
-    this.meters = new Meters();
+    this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
+    this.meters = new Meters(fastest(listing.tiers));
     this.replay = new Replay(atlas);
     this.#makeViews();
     this.control = new PressControl(atlas, this.press, this.views.pressure);
@@ -91,8 +92,6 @@ class Page {
 
   #ready(ready) {
     this.ladder.setReady(ready);
-    // The server refuses what lies above; interpolation may round up by a digit.
-    this.pressureMaxPa = 0.9999 * ready.pressure_max_pa;
     this.control.changed = true;
     this.unsent = true;
     this.replay.forget();
@@ -108,13 +107,27 @@ class Page {
       return;
     }
     if (nowMs - noticedAtMs > NOTICE_MS) notify('');
+    this.#followTier(answer.tierNumber);
+    showFlags(answer, this.session.ready?.pressure_max_pa);
     this.answered.sequence = answer.sequence;
+    this.answered.tier = this.session.ready?.tier;
     this.answered.pressurePa.set(this.sent.pressurePa);
     if (!equal(this.answered.sedJPerM3, answer.sedJPerM3)) {
       this.answered.sedJPerM3.set(answer.sedJPerM3);
       this.#showSed(nowMs);
     }
     if (this.sent.mode === 'replay' && this.mode === 'replay' && !this.replay.judged) this.#showErrors(nowMs);
+  }
+
+  /** The budget may go on with another tier while the session lasts. */
+  #followTier(number) {
+    const { ready } = this.session;
+    const tier = ready?.tier_names?.[number];
+    if (!tier || tier === ready.tier) return;
+    ready.tier = tier;
+    this.ladder.setReady(ready);
+    this.meters.ready(ready, this.ladder.medians(tier));
+    this.replay.forget();
   }
 
   #showSed(nowMs) {
@@ -150,7 +163,8 @@ class Page {
       this.views.truth.show(this.replay.truth, nowMs, this.views.sed.range);
     }
     const ready = this.mode === 'press' || this.replay.loaded;
-    if (ready && (this.unsent || this.stream.checked)) this.#send(nowMs, map);
+    const isQuiet = nowMs - this.session.sentAtMs > QUIET_MS;
+    if (ready && (this.unsent || this.stream.checked || isQuiet)) this.#send(nowMs, map);
     this.finger?.draw();
     if (this.meters.refresh(nowMs, this.unsent || this.stream.checked, this.session.ready !== null)) {
       const judged = this.mode === 'replay' && this.replay.judged;
@@ -169,7 +183,7 @@ class Page {
   #stepPress(nowMs, map) {
     if (!this.control.step(nowMs)) return false;
     const { press, control } = this;
-    press.evaluate(control.depthMm, this.pressureMaxPa);
+    press.evaluate(control.depthMm);
     this.atlas.skin.raster.rasterise(press.pressurePa, map);
     this.views.pressure.setMarker(press.uvPx);
     this.finger?.setPress(press);
@@ -235,6 +249,14 @@ class Page {
   }
 }
 
+/** The tier to advise where another is late: of those that are about as fast as any the most accurate. */
+function fastest(tiers) {
+  const choices = tiers.filter((tier) => !tier.for_comparison);
+  const leastUs = Math.min(...choices.map((tier) => tier.predicted_latency_us));
+  const fast = choices.filter((tier) => tier.predicted_latency_us <= 1.5 * leastUs);
+  return fast.reduce((a, b) => (a.relative_l2_median <= b.relative_l2_median ? a : b)).name;
+}
+
 /** A press that does not move is answered alike again and again: no reason to draw it again. */
 function equal(a, b) {
   for (let i = 0; i < a.length; i++) if (a[i] !== b[i]) return false;
@@ -245,6 +267,18 @@ function showState(state, detail) {
   const words = { connecting: 'connecting', ready: 'connected', waiting: 'disconnected', refused: 'refused' };
   byId('state').dataset.state = state;
   byId('state-text').textContent = detail ? `${words[state]}: ${detail}` : words[state];
+}
+
+/** What a network says that has not learnt such a press. */
+function showFlags({ outOfRange, unfamiliar, cutOff }, mostPa) {
+  const words = [];
+  if (outOfRange) words.push(`harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most`);
+  if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
+  if (cutOff) words.push('cut off at the edge of the map');
+  const text = words.join('; ');
+  if (byId('flags').textContent === text) return;
+  byId('flags').textContent = text;
+  byId('flags').hidden = text === '';
 }
 
 let noticedAtMs = Infinity;

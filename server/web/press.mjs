@@ -68,8 +68,8 @@ export class Press {
     this.#aim();
   }
 
-  /** Pressure of every vertex at this depth, none above `pressureMaxPa`; also force, area and peak. */
-  evaluate(depthMm, pressureMaxPa) {
+  /** Pressure of every vertex at this depth; also force, area and peak. */
+  evaluate(depthMm) {
     const { pressurePa, overlapMm, gapMm } = this;
     const { areasMm2 } = this.atlas;
     this.heightMm = this.touchMm - depthMm;
@@ -80,7 +80,7 @@ export class Press {
     for (let i = 0; i < pressurePa.length; i++) {
       overlapMm[i] = Math.max(0, depthMm - gapMm[i]);
       const closeness = 1 - gapMm[i] / (HERTZ.share * depthMm);
-      const p = closeness > 0 ? Math.min(pressureMaxPa, centrePa * Math.sqrt(closeness)) : 0;
+      const p = closeness > 0 ? centrePa * Math.sqrt(closeness) : 0;
       pressurePa[i] = p;
       if (p > 0) {
         this.forceN += 1e-6 * p * areasMm2[i];

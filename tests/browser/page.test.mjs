@@ -47,8 +47,8 @@ async function settled() {
 
 /** The last pair of pressure sent and SED answered. */
 const answered = () => page.evaluate(() => {
-  const { pressurePa, sedJPerM3 } = globalThis.papilla.answered;
-  return { pressurePa: Array.from(pressurePa), sedJPerM3: Array.from(sedJPerM3) };
+  const { tier, pressurePa, sedJPerM3 } = globalThis.papilla.answered;
+  return { tier, pressurePa: Array.from(pressurePa), sedJPerM3: Array.from(sedJPerM3) };
 });
 
 /** Colours on a map's canvas, one number a pixel. */
@@ -127,10 +127,10 @@ test('an indenter that is not kept down lifts with the mouse button', async () =
 });
 
 test('the session answers what POST /v1/sed answers', async () => {
-  const { pressurePa, sedJPerM3 } = await answered();
+  const { tier, pressurePa, sedJPerM3 } = await answered();
   assert.equal(pressurePa.length, MAP_LEN);
   assert.ok(largest(pressurePa) > 0);
-  const posted = await postPressure(pressurePa, await text('tier-name'));
+  const posted = await postPressure(pressurePa, tier);
   const difference = largest(sedJPerM3.map((value, i) => value - posted[i]));
   assert.ok(difference <= 1e-6 * largest(posted), `they differ by up to ${difference} J/m3`);
 });
@@ -202,6 +202,8 @@ test('the indenter shapes press differently', async () => {
 });
 
 test('replay shows the error against the FE truth', async () => {
+  // By budget the tier might change between the two figures.
+  await page.selectOption('#tier', 'nano');
   await chooseRadio('mode', 'replay');
   await until(() => document.getElementById('replay-press').options.length > 0);
   const { presses } = await (await fetch(new URL('v1/presses', BASE))).json();
@@ -284,7 +286,7 @@ test('a budget too small for the tier is shown as late frames, not as an old map
   await page.selectOption('#tier', slowest.name);
   await page.selectOption('#budget', '5500');
   await until(() => Number(document.getElementById('count-late').textContent) > 5);
-  assert.match(await page.locator('#count-late').getAttribute('class') ?? '', /bad/);
+  await until(() => /needs more than 5.5 ms: raise the budget or take \S+$/.test(document.getElementById('stale').textContent));
   assert.ok(await page.locator('#stale').isVisible(), 'the old map is marked');
   await page.selectOption('#budget', '500000');
   await nextAnswer();
@@ -302,6 +304,67 @@ test('a lost connection comes back by itself', async () => {
   });
   await nextAnswer();
   await until(() => !document.getElementById('sed').classList.contains('stale'));
+});
+
+test('a server that says nothing is given up and found again', async () => {
+  await page.evaluate(() => {
+    globalThis.lost = globalThis.papilla.session.socket;
+    // Frames leave and no answer comes, as of a server that stands still.
+    globalThis.lost.send = () => {};
+  });
+  await until(() => /silent/.test(document.getElementById('state-text').textContent)
+    || globalThis.papilla.session.socket !== globalThis.lost);
+  await until(() => globalThis.papilla.session.socket !== globalThis.lost && globalThis.papilla.session.ready);
+  await nextAnswer();
+});
+
+test('a press beyond what the network learnt says so', async () => {
+  await chooseRadio('mode', 'press');
+  await page.selectOption('#tier', 'nano');
+  await page.evaluate(() => globalThis.papilla.press.moveToPixel(112, 112));
+  await chooseRadio('shape', 'sphere');
+  await page.fill('#radius', '1.5');
+  await page.fill('#depth', '2');
+  await settled();
+  assert.ok(largest((await answered()).pressurePa) > 48200);
+  await until(() => /harder than any press it learnt: it saw 48 kPa/.test(document.getElementById('flags').textContent));
+  assert.ok(await page.locator('#flags').isVisible());
+  await page.fill('#depth', '0.5');
+  await page.fill('#radius', '10');
+  await settled();
+  await until(() => document.getElementById('flags').hidden);
+  await page.fill('#depth', '1');
+  await chooseRadio('shape', 'plate');
+  await chooseRadio('mode', 'replay');
+  await settled();
+});
+
+test('on a phone a swipe scrolls, a tap presses, and targets are as large as a thumb', async () => {
+  const context = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+  const phone = await context.newPage();
+  await phone.goto(BASE, { timeout: PATIENCE_MS });
+  await phone.waitForFunction(() => globalThis.papilla?.session.ready, undefined, { timeout: PATIENCE_MS });
+  const small = await phone.evaluate(() => [...document.querySelectorAll('select, button, .segmented label, .check, footer a')]
+    .filter((element) => element.checkVisibility())
+    .map((element) => [element.outerHTML.slice(0, 60), element.getBoundingClientRect().height])
+    .filter(([, height]) => height < 44));
+  assert.deepEqual(small, []);
+  const box = await phone.locator('#pad').boundingBox();
+  const [x, y] = [box.x + 0.5 * box.width, box.y + 0.6 * box.height];
+  const before = await phone.evaluate(() => globalThis.papilla.press.uvPx[1]);
+  const devtools = await context.newCDPSession(phone);
+  const touch = (type, ...touchPoints) => devtools.send('Input.dispatchTouchEvent', { type, touchPoints });
+  await touch('touchStart', { x, y });
+  for (let step = 1; step <= 15; step++) await touch('touchMove', { x, y: y - 15 * step });
+  await touch('touchEnd');
+  await phone.waitForFunction(() => window.scrollY > 100, undefined, { timeout: PATIENCE_MS });
+  assert.equal(await phone.evaluate(() => globalThis.papilla.press.uvPx[1]), before, 'and nothing was pressed');
+  await phone.evaluate(() => window.scrollTo(0, 0));
+  await phone.touchscreen.tap(x, y);
+  const pressed = await phone.evaluate(() => globalThis.papilla.press.uvPx[1]);
+  assert.ok(Math.abs(pressed - 0.6 * 224) < 4, `pressed at row ${pressed}`);
+  assert.equal(await phone.locator('.drag-hint').isVisible(), false);
+  await context.close();
 });
 
 test('the page fits a phone and follows the dark theme', async () => {

@@ -24,6 +24,9 @@ examples:   ./test --fast
             ./test --all --record
 """
 
+# Minutes of the wall, the build among them.
+MINUTES = {"fast": "15 min", "full": "25 min", "all": "some hours"}
+
 
 def options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
@@ -91,6 +94,7 @@ def main() -> int:
     for step in suite:
         if step.installs:
             print(f"installs: {step.installs}")
+    print(f"takes {MINUTES[extent]} where measured (two cores), and the installs once", flush=True)
     begun = time.monotonic()
     surroundings = environment()
     logs = Path(surroundings["TARGET"]) / "test-logs"

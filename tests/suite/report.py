@@ -13,7 +13,7 @@ PAGE = Path("docs/reports/tests.md")
 INTRODUCTION = """# Tests: when each part last ran
 
 Written by `./test --record` (`--fast`, `--all`), which notes every part that it ran; what each is
-and why a long form may stay out of `./test` says [testing](../guides/testing.md). Processor seconds count
+and what only the long form does says [testing](../guides/testing.md). Processor seconds count
 all processes of a part.
 
 | part | of | last run | commit | processor | outcome | tests | wall, s | processor, s |

@@ -120,6 +120,7 @@ inline void check_answer(const Value& expect, const Answer& answer) {
     check("out_of_range", answer.out_of_range);
     check("no_contact", answer.no_contact);
     check("unfamiliar", answer.unfamiliar);
+    check("cut_off", answer.cut_off);
   }
   must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole");
   if (expect.has("map")) {

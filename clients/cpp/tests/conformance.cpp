@@ -201,7 +201,8 @@ class Run {
     std::vector<Contact> contacts;
     for (const Value& c : step["contacts"].items) {
       const Value& at = c["at_mm"];
-      contacts.push_back({{at[0].number, at[1].number, at[2].number}, c["force_n"].number, c["radius_mm"].number});
+      contacts.push_back({{at[0].number, at[1].number, at[2].number}, c["force_n"].number,
+                          c.has("radius_mm") ? c["radius_mm"].number : 0.0});
     }
     std::vector<float> map(map_len);
     atlas().contacts(contacts.data(), contacts.size(), map.data());

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import time
 from concurrent.futures import Future
 from types import TracebackType
@@ -25,6 +26,7 @@ from .wire import Window
 
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
+_LOG: Final = logging.getLogger("papilla")
 
 
 class AsyncSession:
@@ -59,6 +61,7 @@ class AsyncSession:
         self._tasks: list[asyncio.Task[None]] = []
         self._closed = False
         self._fault: Refused | None = None
+        self._warned: set[str] = set()
 
     async def __aenter__(self) -> AsyncSession:
         await self.open()
@@ -192,6 +195,7 @@ class AsyncSession:
 
     async def _agree(self, ready: dict[str, Any]) -> None:
         self.ready = ready
+        self._tiers.update(enumerate(ready.get("tier_names", [])))
         self._tiers.setdefault(ready["tier_number"], ready["tier"])
 
     async def _live(self) -> None:
@@ -239,12 +243,21 @@ class AsyncSession:
         frame = self._sent.pop(header.sequence, None)
         if frame is not None:
             tier = self._tiers.get(header.tier, "")
+            if "out_of_range" in header.flags:
+                self._warn("out_of_range", f"pressure is beyond what tier {tier} knows; such answers are flagged")
             frame.give(answers.read(message, header, frame.ready, tier))
+
+    def _warn(self, code: str, words: str) -> None:
+        """Says once in a session what a program that looks at maps alone would not see."""
+        if code not in self._warned:
+            self._warned.add(code)
+            _LOG.warning("%s", words)
 
     def _told(self, message: dict[str, Any]) -> None:
         frame = self._sent.pop(message.get("sequence", -1), None)
         if frame is not None:
             problem = Problem(message["code"], message["message"], message.get("field"))
+            self._warn(problem.code, f"a frame was refused: {problem.message}")
             frame.end("error", problem=problem)
         elif self._renewal is not None and not self._renewal.done():
             if message["type"] == "ready":

@@ -60,6 +60,8 @@ class Answer:
     """A pressure is above what the tier was trained on; the map is an extrapolation."""
     no_contact: bool = False
     """The map is zero; no network was asked."""
+    cut_off: bool = False
+    """The contact reaches the edge of the atlas; what lies beyond is missing."""
     unfamiliar: bool = False
     """The map is rougher or heavier than any the tier was trained on: it may mean nothing."""
     tier: str = ""
@@ -106,6 +108,7 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         kind=header.kind,
         out_of_range="out_of_range" in header.flags,
         no_contact="no_contact" in header.flags,
+        cut_off="cut_off" in header.flags,
         unfamiliar="unfamiliar" in header.flags,
         tier=tier,
         window=header.window,

@@ -12,14 +12,18 @@ from .http import DEFAULT_URL, get_json
 from .wire import SIDE_PX, Map
 
 _REACH_MM = 5.0
+_RADIUS_AT_1_N_MM = 5.1
 
 
 class Contact(NamedTuple):
-    """A contact point: a place on or near the undeformed skin, a force and a radius."""
+    """A contact point: a place on or near the undeformed skin, a force and a radius.
+
+    Without a radius it is the finger's own on a flat object.
+    """
 
     at_mm: tuple[float, float, float]
     force_n: float
-    radius_mm: float = 2.5
+    radius_mm: float | None = None
 
 
 class Atlas:
@@ -72,6 +76,8 @@ class Atlas:
             if squared[own] > _REACH_MM**2:
                 continue
             off = ((self.places_mm - self.places_mm[own]) ** 2).sum(axis=1)
+            if radius_mm is None:
+                radius_mm = _RADIUS_AT_1_N_MM * max(force_n, 0.0) ** (1 / 3)
             if radius_mm > 0.0:
                 weights = np.sqrt(np.maximum(0.0, 1.0 - off / radius_mm**2))
             else:

@@ -89,7 +89,7 @@ def check_answer(expect: Step, answer: Answer) -> None:
         if name in expect:
             must(getattr(answer, name) == expect[name], f"{name} is {getattr(answer, name)}")
     if "flags" in expect:
-        flags = {name for name in ("out_of_range", "no_contact", "unfamiliar") if getattr(answer, name)}
+        flags = {name for name in ("out_of_range", "no_contact", "unfamiliar", "cut_off") if getattr(answer, name)}
         must(set(expect["flags"]) == flags, f"flags are {flags}")
     must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole")
     if expect.get("map") is False:

@@ -38,12 +38,14 @@ pub struct Answer {
     pub client_time_us: u64,
     /// SED (J/m3), or with the effect `afferents` firing rates (Hz).
     pub kind: FrameKind,
-    /// A pressure is above what the tier was trained on: the map is an extrapolation.
+    /// A pressure is above what the tier was trained on: the map is of less, or an extrapolation.
     pub out_of_range: bool,
     /// The map is zero; no network was asked.
     pub no_contact: bool,
     /// Rougher or heavier than any map the tier was trained on: it may mean nothing.
     pub unfamiliar: bool,
+    /// The contact reaches the edge of the atlas; what lies beyond is missing.
+    pub cut_off: bool,
     /// Name of the tier that rendered.
     pub tier: String,
     /// Time in the server, us.
@@ -86,6 +88,7 @@ impl Answer {
             out_of_range: false,
             no_contact: false,
             unfamiliar: false,
+            cut_off: false,
             tier: String::new(),
             total_us: 0,
             queue_us: 0,
@@ -121,6 +124,7 @@ impl Answer {
             out_of_range: bits & flags::OUT_OF_RANGE != 0,
             no_contact: bits & flags::NO_CONTACT != 0,
             unfamiliar: bits & flags::UNFAMILIAR != 0,
+            cut_off: bits & flags::CUT_OFF != 0,
             tier,
             total_us: header.time_us,
             queue_us,

@@ -8,6 +8,9 @@ use papilla_proto::{
 /// Distance from the skin beyond which a contact adds nothing, mm.
 const REACH_MM: f64 = 5.0;
 
+/// Radius of a fingertip's contact with a flat object at 1 N, mm (docs/reference/atlas.md).
+const RADIUS_AT_1_N_MM: f64 = 5.1;
+
 /// A contact point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
@@ -17,6 +20,14 @@ pub struct Contact {
     pub force_n: f64,
     /// Radius of the contact, mm.
     pub radius_mm: f64,
+}
+
+impl Contact {
+    /// A contact with a flat object: its radius is the finger's own at that force (N).
+    #[must_use]
+    pub fn flat(at_mm: [f64; 3], force_n: f64) -> Self {
+        Self { at_mm, force_n, radius_mm: RADIUS_AT_1_N_MM * force_n.cbrt() }
+    }
 }
 
 /// The skin: where its pixels are and how much of the finger each shows.
@@ -33,8 +44,7 @@ pub struct Contact {
 /// let patch = PatchVertices { positions_mm, uv_px };
 /// let skin = Skin::new(&Atlas::new(0.1, vec![[0, 2, 1], [0, 3, 2]], patch.clone(), patch)?);
 ///
-/// let contact = Contact { at_mm: [11.0, -11.0, 0.0], force_n: 0.5, radius_mm: 2.0 };
-/// let pressure_pa = skin.contacts(&[contact]);
+/// let pressure_pa = skin.contacts(&[Contact::flat([11.0, -11.0, 0.0], 0.5)]);
 /// assert!((skin.force_n(&pressure_pa) - 0.5).abs() < 0.01);
 /// # Ok::<(), papilla_client::proto::atlas::AtlasError>(())
 /// ```

@@ -26,6 +26,8 @@ namespace Papilla
         public bool HasSummary, OutOfRange, NoContact;
         /// <summary>The map is rougher or heavier than any the tier was trained on: its answer may mean nothing.</summary>
         public bool Unfamiliar;
+        /// <summary>The contact reaches the edge of the atlas; what lies beyond is missing.</summary>
+        public bool CutOff;
         public ulong ClientTimeUs;
         public long RoundTripUs;
         public uint TotalUs, QueueUs, InferUs;
@@ -48,6 +50,7 @@ namespace Papilla
                 OutOfRange = (m[46] & Wire.FlagOutOfRange) != 0;
                 NoContact = (m[46] & Wire.FlagNoContact) != 0;
                 Unfamiliar = (m[46] & Wire.FlagUnfamiliar) != 0;
+                CutOff = (m[46] & Wire.FlagCutOff) != 0;
                 if (Status != Status.Ok) return;
                 Clear();
                 HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);

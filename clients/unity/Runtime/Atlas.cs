@@ -11,7 +11,7 @@ namespace Papilla
     /// </summary>
     public sealed class Atlas
     {
-        const double ReachMm = 5;
+        const double ReachMm = 5, RadiusAt1NMm = 5.1;
 
         public readonly string Hash;
         /// <summary>Corners of the triangles, three each.</summary>
@@ -76,6 +76,12 @@ namespace Papilla
                 total += weights[n] * areasMm2[n];
             }
             for (int n = 0; n < weights.Length; n++) if (weights[n] > 0) map[Skin.Pixels[n]] += (float)(1e6 * forceN * weights[n] / total);
+        }
+
+        /// <summary>The same with the finger's own radius on a flat object at that force.</summary>
+        public void AddContact(double xMm, double yMm, double zMm, double forceN, float[] map)
+        {
+            AddContact(xMm, yMm, zMm, forceN, RadiusAt1NMm * Math.Pow(Math.Max(0, forceN), 1 / 3.0), map);
         }
 
         /// <summary>Force of a pressure map over the undeformed skin, N.</summary>

@@ -128,10 +128,12 @@ namespace Papilla
             if (problem.Sequence != null)
             {
                 lock (gate) isOurs = outstanding.Remove(problem.Sequence.Value);
+                if (isOurs) WarnOnce(ref toldRefusal, "a frame was refused: " + problem.Message);
                 if (isOurs) Tell(problem.Sequence.Value, Status.Error, problem);
                 return true;
             }
             bool goesOn = OnRefusal(problem);
+            if (!goesOn) WarnOnce(ref toldRefusal, "the session was refused: " + problem.Message);
             var refused = Refused;
             if (refused != null) refused(problem);
             return goesOn;
@@ -175,6 +177,7 @@ namespace Papilla
             lock (telling)
             {
                 filling.Read(message, bytes, terms);
+                if (filling.OutOfRange && filling.Status == Status.Ok) WarnOnce(ref toldRange, "pressure is beyond what the tier knows; such answers are flagged");
                 filling.RoundTripUs = (long)(ClockUs() - filling.ClientTimeUs);
                 var answeredEvent = Answered;
                 if (answeredEvent != null) answeredEvent(filling);

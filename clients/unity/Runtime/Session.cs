@@ -27,6 +27,11 @@ namespace Papilla
         public uint DeadlineUs;
         /// <summary>Frames that went out, and those that a newer one superseded before they left.</summary>
         public int Sent, SupersededByClient;
+        /// <summary>
+        /// Called with the first refused hello, the first refused frame and the first one out of range, on a thread of the client's:
+        /// by default Unity's console, or standard error.
+        /// </summary>
+        public Action<string> Warn = Print;
         /// <summary>us of the client's clock.</summary>
         public Func<ulong> ClockUs = Now;
 
@@ -39,7 +44,7 @@ namespace Papilla
         readonly Random random = new Random();
         Answer filling = new Answer(), newest = new Answer(), taken = new Answer();
         Frame waiting = new Frame(), leaving = new Frame();
-        bool isWaiting, isFresh, isClosed, isRefused;
+        bool isWaiting, isFresh, isClosed, isRefused, toldRefusal, toldRange;
         uint sequence, renewedFrom;
         Hello hello, helloBefore;
         Ready readyBefore, olderReady;
@@ -148,6 +153,23 @@ namespace Papilla
             }
             answer = null;
             return false;
+        }
+
+        static void Print(string words)
+        {
+#if UNITY_5_3_OR_NEWER
+            UnityEngine.Debug.LogWarning("Papilla: " + words);
+#else
+            Console.Error.WriteLine("papilla: " + words);
+#endif
+        }
+
+        void WarnOnce(ref bool told, string words)
+        {
+            if (told) return;
+            told = true;
+            var warn = Warn;
+            if (warn != null) warn(words);
         }
 
         /// <summary>us since the system started.</summary>

@@ -60,7 +60,7 @@ export class Atlas {
    * nearest point of the skin (docs/reference/atlas.md, 'Helpers of the clients'). A point more than 5 mm off the skin adds nothing.
    * @param {ArrayLike<number>} positionsMm x, y, z of each point, in the finger's frame
    * @param {ArrayLike<number>} forcesN normal force of each
-   * @param {ArrayLike<number>} radiiMm radius of each contact; 2 to 3 for a light touch of a flat object
+   * @param {ArrayLike<number> | null} radiiMm radius of each contact; null: the finger's own on a flat object
    * @param {Float32Array} map 224 x 224, overwritten
    */
   contactMap(positionsMm, forcesN, radiiMm, map) {
@@ -71,11 +71,12 @@ export class Atlas {
     for (let c = 0; c < forcesN.length; c++) {
       const nearest = nearestPlace(xyzMm, positionsMm[3 * c], positionsMm[3 * c + 1], positionsMm[3 * c + 2]);
       if (nearest < 0) continue;
+      const radiusMm = radiiMm ? radiiMm[c] : RADIUS_AT_1_N_MM * Math.cbrt(forcesN[c]);
       const weight = (/** @type {number} */ n) => {
         if (n === nearest) return 1;
         const d2 = (xyzMm[3 * n] - xyzMm[3 * nearest]) ** 2 + (xyzMm[3 * n + 1] - xyzMm[3 * nearest + 1]) ** 2
           + (xyzMm[3 * n + 2] - xyzMm[3 * nearest + 2]) ** 2;
-        return Math.sqrt(Math.max(0, 1 - d2 / radiiMm[c] ** 2));
+        return Math.sqrt(Math.max(0, 1 - d2 / radiusMm ** 2));
       };
       let total = 0;
       for (let n = 0; n < pixels.length; n++) total += weight(n) * areasMm2[n];
@@ -172,6 +173,7 @@ function pixelPlaces(triangles, { raster, positionsMm, uvPx }) {
 }
 
 const REACH_MM = 5;
+const RADIUS_AT_1_N_MM = 5.1;
 
 /** The place nearest to (x, y, z); -1 beyond REACH_MM. @param {Float64Array} xyzMm @param {number} x @param {number} y @param {number} z */
 function nearestPlace(xyzMm, x, y, z) {

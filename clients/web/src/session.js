@@ -12,7 +12,7 @@ import { Answer, MAP_LEN, SIDE_PX } from './wire.js';
 /** @typedef {import('./types.js').State} State */
 /** @typedef {import('./types.js').Options} Options */
 
-/** What a hello asks for where it does not say: half the bytes of f32, SED within 0.01 %. */
+/** What a hello asks for where it does not say: half the bytes of f32, SED within .02 %. */
 const DEFAULTS = Object.freeze(/** @type {Hello} */ ({ sample_type: 'u16' }));
 /** Refusals of a hello that pass by themselves. */
 const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal', 'rate_limited']);
@@ -33,7 +33,7 @@ const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 10
 export class Session {
   /** @type {(ready: Ready) => void} */ onready = () => {};
   /** @type {(answer: Answer) => void} */ onanswer = () => {};
-  /** @type {(problem: Problem) => void} */ onrefused = () => {};
+  /** By default the console says so. @type {(problem: Problem) => void} */ onrefused = (problem) => console.warn(`papilla: ${problem.message}`);
   /** @type {(state: State, why: string) => void} */ onstate = () => {};
 
   /** The terms as the server confirmed them; null while there is no session. @type {Ready | null} */
@@ -60,6 +60,7 @@ export class Session {
   /** @type {ReturnType<Answer['views']> | null} */ #viewsBefore = null;
   /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */ #promised = new Map();
   #opened = false;
+  /** @type {Set<string>} */ #warned = new Set();
 
   /**
    * @param {string} base http(s)://host[:port]; '' for the server of the page
@@ -188,8 +189,18 @@ export class Session {
     this.#tell(this.#brief);
   }
 
+  /** Says once what a program that looks at maps alone would not see. @param {Answer} answer */
+  #warn(answer) {
+    const code = answer.status === 'error' ? 'error' : answer.status === 'ok' && answer.outOfRange ? 'out_of_range' : '';
+    if (!code || this.#warned.has(code)) return;
+    this.#warned.add(code);
+    const flagged = 'pressure is beyond what the tier knows; such answers are flagged';
+    console.warn(`papilla: ${code === 'error' ? `a frame was refused: ${answer.problem?.message}` : flagged}`);
+  }
+
   /** @param {Answer} answer */
   #tell(answer) {
+    this.#warn(answer);
     this.onanswer(answer);
     const promised = this.#promised.size > 0 ? this.#promised.get(answer.sequence) : undefined;
     if (!promised) return;

@@ -5,7 +5,7 @@ import { Atlas, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '..
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
 
-const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar']]);
+const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar'], ['cut_off', 'cutOff']]);
 
 const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -241,7 +241,8 @@ class Runner {
   contacts({ contacts, expect }) {
     const list = /** @type {Step[]} */ (contacts);
     const map = new Float32Array(MAP_LEN);
-    this.atlas.contactMap(list.flatMap((c) => c.at_mm), list.map((c) => c.force_n), list.map((c) => c.radius_mm), map);
+    const radiiMm = list.every((c) => c.radius_mm) ? list.map((c) => c.radius_mm) : null;
+    this.atlas.contactMap(list.flatMap((c) => c.at_mm), list.map((c) => c.force_n), radiiMm, map);
     checkMap(expect, map);
     if (expect.force_n) near('force', this.atlas.forceN(map), expect.force_n);
   }

@@ -11,6 +11,13 @@ const FRAME = new Quaternion(-0.5, -0.5, -0.5, 0.5);
 /** With the mouse the finger comes down a little steeply. */
 const TILT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.35);
 
+/** Where the table is: beside it the finger stays at its edge, and never behind what it is shown on. */
+const TABLE = { near: new Vector3(-1.2, 0.9, -1.25), far: new Vector3(1.2, 0.9, -0.25) };
+
+/** At first the finger hovers over the object in the middle. */
+const ABOVE = new Vector3(0, 2, -0.75);
+const DOWN = new Vector3(0, -1, 0);
+
 /** Puts the pad of the mesh to a place of the world. @param {import('three').Mesh} mesh @param {Vector3} place @param {Quaternion} turn */
 function place(mesh, place, turn) {
   mesh.quaternion.copy(turn).multiply(FRAME);
@@ -29,15 +36,18 @@ export class Pointer {
   }
 
   #ray = new Raycaster();
-  #at = new Vector2(0, 0);
-  #place = new Vector3(0, 1.1, -0.75);
+  /** Where the pointer is; null before it has moved. @type {Vector2 | null} */
+  #at = null;
+  /** The place that it points at, and where the pad is over it. */
+  #aim = new Vector3(0, 0.9, -0.75);
+  #place = new Vector3();
   #table = new Plane(new Vector3(0, 1, 0), -0.9);
   #isPressed = false;
   #heightMm = HOVER_MM;
 
   /** @param {HTMLCanvasElement} canvas */
   #listen(canvas) {
-    const move = (/** @type {PointerEvent} */ event) => this.#at.set((2 * event.clientX) / canvas.clientWidth - 1, 1 - (2 * event.clientY) / canvas.clientHeight);
+    const move = (/** @type {PointerEvent} */ event) => (this.#at ??= new Vector2()).set((2 * event.clientX) / canvas.clientWidth - 1, 1 - (2 * event.clientY) / canvas.clientHeight);
     canvas.addEventListener('pointermove', move);
     canvas.addEventListener('pointerdown', (event) => { move(event); this.#isPressed = true; canvas.setPointerCapture(event.pointerId); });
     for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, () => { this.#isPressed = false; });
@@ -49,13 +59,15 @@ export class Pointer {
 
   /** @param {import('three').Mesh} mesh @param {number} seconds since the last call */
   move(mesh, seconds) {
-    this.#ray.setFromCamera(this.#at, this.camera);
+    if (this.#at) this.#ray.setFromCamera(this.#at, this.camera);
+    else this.#ray.set(ABOVE, DOWN);
     const [hit] = this.#ray.intersectObjects(this.meshes);
-    if (hit) this.#place.copy(hit.point);
-    else this.#ray.ray.intersectPlane(this.#table, this.#place);
+    if (hit) this.#aim.copy(hit.point);
+    else this.#ray.ray.intersectPlane(this.#table, this.#aim)?.clamp(TABLE.near, TABLE.far);
     const goal = this.#isPressed ? -this.depthMm : HOVER_MM;
     const step = LOWER_MM_PER_S * seconds;
     this.#heightMm += Math.min(step, Math.max(-step, goal - this.#heightMm));
+    this.#place.copy(this.#aim);
     this.#place.y += this.#heightMm * mesh.scale.x;
     place(mesh, this.#place, TILT);
   }

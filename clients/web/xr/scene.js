@@ -12,6 +12,8 @@ import { makeObjects } from './objects.js';
 const MM_TO_WORLD = 0.012;
 const SHOWN_MM_TO_WORLD = 0.03;
 const WORDS_MS = 200;
+/** So far from the middle the outermost object reaches, in the world's units. */
+const OBJECTS_HALF_WIDTH = 0.85;
 /** So many late maps in a row, and the budget is doubled. */
 const LATE_MOST = 30;
 /** One frame of a headset; `?tier=NAME&budget_us=N` in the address says otherwise. */
@@ -64,16 +66,13 @@ async function offerVr(renderer) {
   };
 }
 
-function makeWorld() {
+/** @param {(aspect: number) => void} onResize */
+function makeWorld(onResize) {
   const renderer = new WebGLRenderer({ antialias: true });
   renderer.xr.enabled = true;
   renderer.setPixelRatio(Math.min(2, devicePixelRatio));
   document.body.prepend(renderer.domElement);
   const camera = new PerspectiveCamera(50, 1, 0.05, 20);
-  camera.position.set(0, 1.55, 0.75);
-  camera.lookAt(0, 1.25, -0.9);
-  // The mouse may point before anything is drawn, and only drawing would bring this up to date.
-  camera.updateMatrixWorld();
   const scene = new Scene();
   scene.background = new Color(0x20242a);
   scene.add(new HemisphereLight(0xffffff, 0x556070, 2));
@@ -85,7 +84,14 @@ function makeWorld() {
   scene.add(table);
   const resize = () => {
     camera.aspect = innerWidth / innerHeight;
+    // Upright, the view is as wide as the objects and the finger stands higher.
+    camera.fov = camera.aspect < 1 ? 62 : 50;
+    const halfWidth = Math.tan((camera.fov * Math.PI) / 360) * camera.aspect;
+    camera.position.set(0, 1.55, Math.max(0.75, OBJECTS_HALF_WIDTH / halfWidth - 0.75));
+    camera.lookAt(0, camera.aspect < 1 ? 1.7 : 1.25, -0.9);
+    camera.updateMatrixWorld();
     camera.updateProjectionMatrix();
+    onResize(camera.aspect);
     renderer.setSize(innerWidth, innerHeight);
   };
   addEventListener('resize', resize);
@@ -94,19 +100,21 @@ function makeWorld() {
 }
 
 async function start() {
-  const { renderer, camera, scene } = makeWorld();
+  const atlas = await Atlas.load();
+  const finger = new Finger(atlas);
+  // The same finger, larger, its pad towards the viewer and its tip up.
+  const shown = finger.mesh();
+  const { renderer, camera, scene } = makeWorld((aspect) => {
+    shown.scale.setScalar(SHOWN_MM_TO_WORLD * (aspect < 1 ? 1.9 : 1));
+    shown.position.set(0, aspect < 1 ? 3.05 : 1.95, -1.5);
+  });
   const objects = makeObjects(MM_TO_WORLD);
   for (const { mesh } of objects) scene.add(mesh);
   scene.updateMatrixWorld(true);
 
-  const finger = new Finger(await Atlas.load());
   const mesh = finger.mesh();
   mesh.scale.setScalar(MM_TO_WORLD);
-  // The same finger, larger, its pad towards the viewer and its tip up.
-  const shown = finger.mesh();
-  shown.scale.setScalar(SHOWN_MM_TO_WORLD);
   shown.setRotationFromMatrix(new Matrix4().makeBasis(new Vector3(0, -1, 0), new Vector3(-1, 0, 0), new Vector3(0, 0, -1)));
-  shown.position.set(0, 1.95, -1.5);
   const board = new Board();
   scene.add(mesh, shown, board.mesh);
 
@@ -114,18 +122,19 @@ async function start() {
   let late = 0;
   const session = new Session('', hello);
   scene.userData.camera = camera;
-  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, answers: 0, frames: 0, isPresenting: false };
+  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, flags: '', answers: 0, frames: 0, isPresenting: false };
   session.onstate = (now, why) => { element('state').textContent = why ? `${now}: ${why}` : now; };
   session.onready = (ready) => { element('state').textContent = `ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a map`; };
   session.onanswer = (answer) => {
     late = answer.status === 'late' ? late + 1 : answer.status === 'ok' ? 0 : late;
     if (late >= LATE_MOST && session.ready) {
       late = 0;
-      hello = { ...hello, tier: session.ready.tier, budget_us: 2 * (hello.budget_us ?? BUDGET_US) };
+      hello = { ...hello, budget_us: 2 * (hello.budget_us ?? BUDGET_US) };
       session.renew(hello);
     }
     if (answer.status !== 'ok' || !answer.summary) return;
     state.answers++;
+    state.flags = [answer.outOfRange && 'harder than learnt', answer.unfamiliar && 'unlike anything learnt', answer.cutOff && 'cut off at the edge'].filter(Boolean).join(', ');
     state.sedMax = answer.summary[SUMMARY.indexOf('sed_max_j_per_m3')];
     state.forceN = answer.summary[SUMMARY.indexOf('force_n')];
     // Grows at once, shrinks slowly, and never below what a light touch makes.
@@ -141,16 +150,19 @@ async function start() {
     const seconds = Math.min(0.1, (nowMs - lastMs) / 1000);
     lastMs = nowMs;
     state.isPresenting = renderer.xr.isPresenting;
+    // The page's own words say the same.
+    board.mesh.visible = state.isPresenting;
     mesh.visible = true;
     if (!state.isPresenting) pointer.move(mesh, seconds);
     else mesh.visible = hands.move(mesh);
     if (mesh.visible) finger.touch(mesh, objects);
-    if (session.ready) session.send(finger.pressureMap(0.99 * session.ready.pressure_max_pa));
+    if (session.ready) session.send(finger.pressureMap(Infinity));
     finger.dent();
     if (nowMs - wordsMs > WORDS_MS) {
       wordsMs = nowMs;
       const what = finger.touched ? `${finger.touched.name}, ${finger.deepestMm.toFixed(1)} mm` : 'nothing touched';
-      const text = `${what}; ${state.forceN.toFixed(2)} N, SED up to ${state.sedMax.toFixed(0)} J/m3`;
+      const flags = state.flags && `; ${state.flags}`;
+      const text = `${what}; ${state.forceN.toFixed(2)} N, SED up to ${state.sedMax.toFixed(0)} J/m3${flags}`;
       element('figures').textContent = text;
       board.write(text);
     }

@@ -30,7 +30,7 @@ fn body(input: Input, form: Output, data: &[u8], error: impl Fn(f32) -> f32) {
     }
     let mut bytes = BytesMut::new();
     let values = &map[..];
-    let of = Map { quantity: Quantity::Pressure, values, value_max: WHITE_PA, source: "fuzz" };
+    let of = Map { quantity: Quantity::Pressure, values, source: "fuzz" };
     let scale = encode(form, of, &mut bytes).expect("a good map can be encoded");
     let again_as = match input {
         Input::Png { .. } => Input::Png { pressure_max_pa: scale },

@@ -8,8 +8,7 @@
 //! use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 //!
 //! let pressure_pa = vec![250.0; papilla_proto::MAP_LEN];
-//! let map =
-//!     Map { quantity: Quantity::Pressure, values: &pressure_pa, value_max: 1e4, source: "example" };
+//! let map = Map { quantity: Quantity::Pressure, values: &pressure_pa, source: "example" };
 //! let mut npy = BytesMut::new();
 //! encode(Output::Npy, map, &mut npy)?;
 //!
@@ -152,24 +151,26 @@ pub struct Map<'a> {
     pub quantity: Quantity,
     /// [`MAP_LEN`] samples, finite, not negative.
     pub values: &'a [f32],
-    /// The value that scaled forms map to their greatest unit. A map that goes beyond
-    /// is scaled by its own maximum: it does not clip.
-    pub value_max: f32,
     /// What made it; goes into JSON.
     pub source: &'a str,
 }
 
+/// Greatest value of a map that counts as zero: a 65535th part of more is still a normal number.
+const NOTHING: f32 = 1e-30;
+
 /// The scale of a map whose greatest value is `value_max`: the value of one unit (u16,
-/// u8), of full white (PNG), else 1.
+/// u8), of full white (PNG), else 1, as for a map of zeros.
 pub fn scale_of(output: Output, value_max: f32) -> f32 {
     match output {
+        _ if value_max <= NOTHING => 1.0,
         Output::Samples(t) if t.is_scaled() => value_max / t.unit_max(),
         Output::Png => value_max,
         Output::Samples(_) | Output::Npy | Output::Json => 1.0,
     }
 }
 
-/// Appends `map` in the form `output` to `bytes`; returns its scale, see [`scale_of`].
+/// Appends `map` in the form `output` to `bytes`; returns its scale: that of its own greatest
+/// value ([`scale_of`]), so that light touch is as precise as heavy touch.
 ///
 /// # Errors
 /// Values that are not finite, or below zero.
@@ -178,8 +179,7 @@ pub fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Result<f32,
     let scale = match output {
         Output::Samples(SampleType::F32 | SampleType::F16) | Output::Npy | Output::Json => 1.0,
         Output::Samples(_) | Output::Png => {
-            let top = values.iter().fold(map.value_max, |top, &v| if v > top { v } else { top });
-            scale_of(output, top)
+            scale_of(output, values.iter().fold(0.0, |top, &v| if v > top { v } else { top }))
         }
     };
     match output {

@@ -10,6 +10,7 @@ use papilla_engine::{Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Ind
 use papilla_proto::{
     MapError, PressureRange, SampleType,
     atlas::{Atlas, Patch, Raster},
+    effects::OutOfRange,
 };
 use std::fs;
 
@@ -144,7 +145,7 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
             // Negative pressure is the service's to refuse, before any model is asked.
             let mut bad = good.clone();
             bad[place] = -1.0;
-            let range = PressureRange { trained_max_pa: max_pa, accepts_out_of_range: true };
+            let range = PressureRange { trained_max_pa: max_pa, beyond: OutOfRange::Flag };
             assert!(matches!(range.check(&bad), Err(MapError::Negative { .. })));
         }
         // Far beyond all that a range lets through: a map that is one, or an error.
@@ -171,8 +172,8 @@ fn what_is_no_pressure_is_named_and_leaves_no_trace() {
 fn what_the_card_does_not_know_is_flagged() {
     each(|tier| {
         assert!(tier.max_pa() > 1e3 && tier.max_pa() < 1e6, "{}", tier.card.name);
-        let flagged = PressureRange { trained_max_pa: tier.max_pa(), accepts_out_of_range: true };
-        let strict = PressureRange { accepts_out_of_range: false, ..flagged };
+        let flagged = PressureRange { trained_max_pa: tier.max_pa(), beyond: OutOfRange::Flag };
+        let strict = PressureRange { beyond: OutOfRange::Refuse, ..flagged };
         for (times, is_left) in [(0.5, false), (1.0, false), (1.02, true), (9.9, true)] {
             let map = contact(times * tier.max_pa());
             let peak_pa = map.iter().copied().fold(0.0, f32::max);
@@ -186,31 +187,56 @@ fn what_the_card_does_not_know_is_flagged() {
     });
 }
 
-/// What quantised pressure costs in SED: `docs/concepts/stability.md` states these bounds.
+/// The pressure of a flat object on the middle of the pad: Hertz's, of the finger's own radius
+/// (docs/reference/atlas.md) on a plane of the atlas' pixels.
+fn press(force_n: f32, mm_per_px: f32) -> Vec<f32> {
+    let radius_mm = 5.1 * force_n.cbrt();
+    let peak_pa = 1.5e6 * force_n / (std::f32::consts::PI * radius_mm * radius_mm);
+    let pressure_pa = |i: usize| {
+        let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
+        let r_mm = mm_per_px * (row - 100.0).hypot(column - 112.0);
+        peak_pa * (1.0 - (r_mm / radius_mm).powi(2)).max(0.0).sqrt()
+    };
+    (0..MAP_LEN).map(pressure_pa).collect()
+}
+
+/// A map through a sample type, each with its own scale, as clients and service do it.
+fn quantised(exact: &[f32], sample_type: SampleType) -> Vec<f32> {
+    let top = exact.iter().copied().fold(0.0, f32::max);
+    let scale = if sample_type.is_scaled() { top / sample_type.unit_max() } else { 1.0 };
+    let mut bytes = vec![0; MAP_LEN * sample_type.bytes()];
+    sample_type.encode(exact, scale, &mut bytes).unwrap();
+    let mut coarse = vec![0.0; MAP_LEN];
+    sample_type.decode(&bytes, scale, &mut coarse).unwrap();
+    for (p, q) in exact.iter().zip(&coarse) {
+        assert!((p - q).abs() <= sample_type.error_max(*p, scale));
+    }
+    coarse
+}
+
+/// What sample types cost in SED, there and back: `docs/concepts/stability.md` states these bounds.
 #[test]
-fn quantised_pressure_changes_sed_within_the_stated_bounds() {
+fn sample_types_change_sed_within_the_stated_bounds_at_any_force() {
     let [_, interface] = masks();
+    let mm_per_px = Atlas::from_json(&text("atlas.json")).unwrap().mm_per_px();
     each(|tier| {
-        let max_pa = tier.max_pa();
-        let exact = contact(0.6 * max_pa);
-        let due = tier.map("f32", &exact, &interface);
         let size = |map: &[f32]| map.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
-        for (sample_type, bound) in
-            [(SampleType::F16, 1e-3), (SampleType::U16, 1e-4), (SampleType::U8, 1e-2)]
-        {
-            let scale = max_pa / sample_type.unit_max();
-            let mut bytes = vec![0; MAP_LEN * sample_type.bytes()];
-            sample_type.encode(&exact, scale, &mut bytes).unwrap();
-            let mut coarse = vec![0.0; MAP_LEN];
-            sample_type.decode(&bytes, scale, &mut coarse).unwrap();
-            for (p, q) in exact.iter().zip(&coarse) {
-                assert!((p - q).abs() <= sample_type.error_max(*p, scale));
+        let forces_n: &[f32] =
+            if tier.is_slow { &[0.005, 10.0] } else { &[0.005, 0.05, 0.5, 10.0] };
+        for &force_n in forces_n {
+            let exact = press(force_n, mm_per_px);
+            let due = tier.map("f32", &exact, &interface);
+            for (sample_type, bound) in
+                [(SampleType::F16, 1e-3), (SampleType::U16, 2e-4), (SampleType::U8, 4e-2)]
+            {
+                let coarse = quantised(&exact, sample_type);
+                let found = quantised(&tier.map("quantised", &coarse, &interface), sample_type);
+                let off: Vec<f32> = found.iter().zip(&due).map(|(f, d)| f - d).collect();
+                let error = size(&off) / size(&due);
+                let name = &tier.card.name;
+                println!("{name} {sample_type:?} {force_n} N: {error:.2e}");
+                assert!(error <= bound, "{name} {sample_type:?} {force_n} N: {error:.2e}");
             }
-            let found = tier.map("quantised", &coarse, &interface);
-            let off: Vec<f32> = found.iter().zip(&due).map(|(f, d)| f - d).collect();
-            let error = size(&off) / size(&due);
-            println!("{} {sample_type:?}: {error:.2e}", tier.card.name);
-            assert!(error <= bound, "{} {sample_type:?}: {error:.2e}", tier.card.name);
         }
     });
 }

@@ -78,7 +78,7 @@ fn us(mut effects: Effects, contact_pa: &[f32]) -> f64 {
         let time_us = run * 11_111;
         effects.before(&mut pressure_pa, time_us);
         // The pressure stands in for its SED: the times do not depend on the values.
-        if effects.write(&pressure_pa, contact_pa, 1.0, time_us, &mut bytes).is_ok() {
+        if effects.write(&pressure_pa, contact_pa, time_us, &mut bytes).is_ok() {
             least = least.min(start.elapsed());
         }
     }

@@ -31,7 +31,7 @@
 //!
 //! let (pressure_pa, sed_j_per_m3) = (vec![1000.0; MAP_LEN], vec![5.0; MAP_LEN]);
 //! let mut answer = BytesMut::zeroed(HEADER_LEN_V2);
-//! effects.write(&pressure_pa, &sed_j_per_m3, 100.0, 0, &mut answer)?;
+//! effects.write(&pressure_pa, &sed_j_per_m3, 0, &mut answer)?;
 //! let summary = Summary::decode(&answer[HEADER_LEN_V2..]).expect("it lies there");
 //! // 1000 Pa on 324 mm2.
 //! assert!((summary.force_n - 0.324).abs() < 1e-4);
@@ -224,8 +224,7 @@ impl Effects {
 
     /// What acts after the network: appends every section to `bytes`, which holds the header.
     ///
-    /// `pressure_pa` is what [`before`](Self::before) left, `sed_max_j_per_m3` the SED that
-    /// scaled samples map to their greatest unit.
+    /// `pressure_pa` is what [`before`](Self::before) left.
     ///
     /// # Errors
     /// Values of the map that are not finite or below zero: a fault of the caller.
@@ -233,11 +232,9 @@ impl Effects {
         &mut self,
         pressure_pa: &[f32],
         sed_j_per_m3: &[f32],
-        sed_max_j_per_m3: f32,
         time_us: u64,
         bytes: &mut BytesMut,
     ) -> Result<Written, SampleError> {
-        let value_max = self.value_max(sed_max_j_per_m3);
         if let Some(afferents) = &mut self.afferents {
             afferents.step(sed_j_per_m3, time_us);
         }
@@ -269,7 +266,7 @@ impl Effects {
         let window = self
             .margin_px
             .map_or(Window::WHOLE, |margin| Window::around(sent_pa, self.contact_pa, margin));
-        let scale = window::encode(window, self.sample_type, shown, value_max, bytes)?;
+        let scale = window::encode(window, self.sample_type, shown, bytes)?;
         Ok(Written { kind, window, scale })
     }
 }

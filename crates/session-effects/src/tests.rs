@@ -109,7 +109,7 @@ fn sections_lie_where_they_are_said_to_be() {
     map[100 * MAP_SIDE_PX + 100] = 7.0;
     map[100 * MAP_SIDE_PX + 101] = 9.0;
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
-    let written = effects.write(&map, &map, 1.0, 0, &mut bytes).unwrap();
+    let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!(written.window, Window { x: 99, y: 99, width: 4, height: 3 });
     assert_eq!((written.kind, bytes.len()), (FrameKind::Sed, 144 + 48));
     let summary = Summary::decode(&bytes[48..]).unwrap();
@@ -127,7 +127,7 @@ fn no_map_is_no_map() {
     assert_eq!((effects.sections.len(), effects.size_hint()), (1, 112));
     let map = vec![1.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
-    let written = effects.write(&map, &map, 1.0, 0, &mut bytes).unwrap();
+    let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!((written.window, bytes.len()), (Window::EMPTY, 112));
 }
 
@@ -140,7 +140,7 @@ fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
         map[100 * MAP_SIDE_PX + 100] = pa;
         let peak_pa = effects.before(&mut map, time_us).unwrap();
         let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
-        let window = effects.write(&map, &map, 1.0, time_us, &mut bytes).unwrap().window;
+        let window = effects.write(&map, &map, time_us, &mut bytes).unwrap().window;
         (peak_pa, Summary::decode(&bytes[48..]).unwrap().pressure_max_pa, window.pixel_count())
     };
     let (at_once, sent, _) = press(&mut effects, 1000.0, 0);
@@ -164,7 +164,7 @@ fn afferents_show_rates_in_map_points_and_if_asked_actuators() {
     // 20 kPa at 80 kPa: 12 Hz.
     let map = vec![2500.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
-    let written = effects.write(&map, &map, 4000.0, 0, &mut bytes).unwrap();
+    let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!(written.kind, FrameKind::Sa1Rate);
     let values = [floats(&bytes[112..116]), floats(&bytes[128..140])].concat();
     assert!(values.iter().all(|hz| (hz - 12.0).abs() < 1e-3), "{values:?}");
@@ -250,7 +250,7 @@ proptest! {
             prop_assert!(map.iter().all(|p| p.is_finite() && *p >= 0.0));
             let sed: Vec<f32> = map.iter().map(|p| p * p).collect();
             let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
-            effects.write(&map, &sed, 1.0, time_us, &mut bytes).unwrap();
+            effects.write(&map, &sed, time_us, &mut bytes).unwrap();
             let found = floats(&bytes[HEADER_LEN_V2..]);
             prop_assert!(found.iter().all(|v| v.is_finite()), "{:?}", &found[..24]);
         }

@@ -1,11 +1,10 @@
 //! `contact_window`, and the samples of a window.
 
 use bytes::BytesMut;
-use papilla_codec::append;
+use papilla_codec::{Output, append, scale_of};
 use papilla_proto::{SampleError, SampleType, Window};
 
-/// Appends the samples of `window` to `bytes`; returns their scale. `value_max` is the value of
-/// the greatest unit, unless the window holds a greater one: nothing is clipped.
+/// Appends the samples of `window` to `bytes`; returns their scale, that of the window's greatest.
 ///
 /// # Errors
 /// Values that are not finite or below zero.
@@ -13,13 +12,12 @@ pub(crate) fn encode(
     window: Window,
     sample_type: SampleType,
     map: &[f32],
-    value_max: f32,
     bytes: &mut BytesMut,
 ) -> Result<f32, SampleError> {
     let scale = if sample_type.is_scaled() {
         let values = window.rows().flat_map(|row| map.get(row).unwrap_or_default());
-        let top = values.fold(value_max, |top, &v| if v > top { v } else { top });
-        top / sample_type.unit_max()
+        let top = values.fold(0.0, |top, &v| if v > top { v } else { top });
+        scale_of(Output::Samples(sample_type), top)
     } else {
         1.0
     };

@@ -1,7 +1,7 @@
 //! What a finished campaign says of itself.
 
-use crate::progress::clock;
 use papilla_dataset::{DroppedSample, FailedIndentation};
+use papilla_progress::clock;
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;

@@ -3,12 +3,12 @@
 use super::assemble::manifest;
 use super::state::{IndentationState, Outcome, Workspace};
 use super::{BoxError, CampaignError, CampaignReport};
-use crate::progress::Progress;
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
 use papilla_output::atomic;
+use papilla_progress::Progress;
 use std::any::Any;
 use std::num::NonZero;
 use std::panic::{AssertUnwindSafe, catch_unwind};

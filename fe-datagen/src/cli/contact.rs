@@ -1,6 +1,5 @@
 //! `contact`: what the real-time contact solver has to know of the finger.
 
-use crate::progress::Progress;
 use anyhow::Context;
 use papilla_contact::{Arrays, Header};
 use papilla_dataset::{Dataset, Split};
@@ -9,6 +8,7 @@ use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::TissueTable;
 use papilla_fingertip::simulation::body::Body;
 use papilla_output::atomic;
+use papilla_progress::Progress;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::process::ExitCode;

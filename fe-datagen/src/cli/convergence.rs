@@ -1,7 +1,7 @@
 //! `convergence`: SED at the interface on ever finer meshes.
 
 use super::{CHECKS_FAILED, print, refuse_unknown};
-use crate::progress::Progress;
+use papilla_progress::Progress;
 use papilla_validation::convergence::{self, CASES, MESHES};
 use std::path::PathBuf;
 use std::process::ExitCode;

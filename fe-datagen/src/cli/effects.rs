@@ -1,10 +1,10 @@
 //! `effects`: what each effect of a scene changes and costs.
 
 use super::print;
-use crate::progress::Progress;
 use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_output::atomic;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
+use papilla_progress::Progress;
 use papilla_validation::effect_study::{self, Change, Outcome, Study, Switched};
 use papilla_validation::processor::today_here;
 use std::fmt::Write as _;

@@ -1,8 +1,8 @@
 //! `fidelity`: finite elements as rows of the ladder.
 
 use super::{CHECKS_FAILED, print};
-use crate::progress::Progress;
 use papilla_fingertip::campaign::CampaignSpec;
+use papilla_progress::Progress;
 use papilla_validation::fidelity::{self, Ladder, Report};
 use std::fmt::Write as _;
 use std::path::PathBuf;

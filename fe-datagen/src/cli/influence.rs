@@ -3,10 +3,10 @@
 use super::choices::Density;
 use super::print;
 use crate::influence_file::{self, Card};
-use crate::progress::Progress;
 use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::Order;
 use papilla_fingertip::scene::TissueTable;
+use papilla_progress::Progress;
 use papilla_validation::processor;
 use std::path::PathBuf;
 use std::process::ExitCode;

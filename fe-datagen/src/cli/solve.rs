@@ -2,7 +2,6 @@
 
 use super::{CHECKS_FAILED, print};
 use crate::body_file::write_vtu;
-use crate::progress::Progress;
 use anyhow::Context as _;
 use ndarray::Array2;
 use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, Raster};
@@ -18,6 +17,7 @@ use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
 use papilla_output::map_image::{MapView, Quantity, white_of};
 use papilla_output::npz::NpzBuilder;
 use papilla_output::{atomic, vtu};
+use papilla_progress::Progress;
 use papilla_validation::acceptance::fault;
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -1,10 +1,10 @@
 //! `stability`: the named suite of hard cases, and random scenes by the thousand.
 
 use super::{CHECKS_FAILED, choices, print};
-use crate::progress::Progress;
 use anyhow::Context as _;
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_output::atomic;
+use papilla_progress::Progress;
 use papilla_validation::stability::scenes::{self, ScenesOptions, Watch};
 use papilla_validation::stability::{self, CASES, Extent};
 use std::num::NonZero;

@@ -1,8 +1,8 @@
 //! `verify`: the solver against closed forms, published values and itself.
 
 use super::{CHECKS_FAILED, print};
-use crate::progress::Progress;
 use anyhow::Context;
+use papilla_progress::Progress;
 use papilla_validation::verify::{self, CASES, Row};
 use std::path::PathBuf;
 use std::process::ExitCode;

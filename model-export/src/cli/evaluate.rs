@@ -1,12 +1,13 @@
 //! `model-export evaluate`.
 
-use super::{bar, load_card, load_model, print_json};
+use super::{load_card, load_model, print_json};
 use papilla_engine::card::{Card, Latency, Spread};
 use papilla_engine::{Backend, Model, ModelInfo};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::evaluate::{self, Evaluation, Subject};
 use papilla_model_export::reference::{Recorded, TOLERANCE};
 use papilla_model_export::{ExportError, picture, write};
+use papilla_progress::Progress;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -139,10 +140,8 @@ fn measure(
 ) -> anyhow::Result<Evaluation> {
     let count: usize =
         dataset.indentations(&options.split)?.iter().map(|indentation| indentation.samples).sum();
-    let bar = bar(json, count, "samples")?;
-    let evaluation = evaluate::run(subject, other, dataset, &options.split, || bar.inc(1));
-    bar.finish_and_clear();
-    Ok(evaluation?)
+    let progress = Progress::new("samples", count, 0, json);
+    Ok(evaluate::run(subject, other, dataset, &options.split, || progress.inc())?)
 }
 
 fn draw_pictures(

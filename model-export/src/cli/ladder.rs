@@ -1,7 +1,6 @@
 //! `model-export ladder`, and the hidden command that weighs one model in a fresh process.
 
-use super::{bar, print_json};
-use indicatif::ProgressBar;
+use super::print_json;
 use papilla_engine::{Ladder, MAP_LEN};
 use papilla_model_export::ladder::{self, Canvas, Footprint, Progress, Task, plot, report};
 use papilla_model_export::{ExportError, read, read_text, write};
@@ -47,10 +46,8 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
             Ladder::from_json(&read_text(path)?).map_err(refused)?
         }
         None => {
-            let bar = Bar(bar(json, 0, "samples")?);
-            let ladder = ladder::measure(&task, &bar, &footprint)?;
-            bar.0.finish_and_clear();
-            ladder
+            let shown = Shown(papilla_progress::Progress::new("samples", 0, 0, json));
+            ladder::measure(&task, &shown, &footprint)?
         }
     };
     let written = write_all(options, &ladder)?;
@@ -93,19 +90,19 @@ fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>>
     Ok(files.into_iter().map(|(path, _)| path).collect())
 }
 
-struct Bar(ProgressBar);
+struct Shown(papilla_progress::Progress);
 
-impl Progress for Bar {
+impl Progress for Shown {
     fn total(&self, steps: u64) {
-        self.0.set_length(steps);
+        self.0.set_length(usize::try_from(steps).unwrap_or(usize::MAX));
     }
 
     fn stage(&self, what: &str) {
-        self.0.set_message(what.to_owned());
+        self.0.set_message(what);
     }
 
     fn step(&self) {
-        self.0.inc(1);
+        self.0.inc();
     }
 }
 

@@ -1,11 +1,12 @@
 //! `model-export patterns`.
 
-use super::{bar, load_card, print_json};
+use super::{load_card, print_json};
 use anyhow::bail;
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, ladder::Kind};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::{read_text, write};
+use papilla_progress::Progress;
 use papilla_proto::InputStatistics;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -72,7 +73,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, InputStatistics)> {
     let dataset = Dataset::open(folder)?;
     let indentations = dataset.every_indentation();
-    let bar = bar(hidden, indentations.len(), "presses")?;
+    let progress = Progress::new("presses", indentations.len(), 0, hidden);
     let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut greatest = InputStatistics::default();
     for indentation in indentations {
@@ -81,8 +82,7 @@ fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, InputStatistics)
             dataset.draw_pressure(indentation, &shard, index, &mut pressure_pa)?;
             greatest = greatest.max(InputStatistics::of(&pressure_pa));
         }
-        bar.inc(1);
+        progress.inc();
     }
-    bar.finish_and_clear();
     Ok((dataset.sha256().to_owned(), greatest))
 }

@@ -10,9 +10,15 @@ pub mod flags {
     pub const NO_CONTACT: u8 = 2;
     /// Rougher or heavier than any map the tier was trained on ([`crate::input_statistics`]).
     pub const UNFAMILIAR: u8 = 4;
+    /// The contact reaches the edge of the atlas: what lies beyond is missing from the map.
+    pub const CUT_OFF: u8 = 8;
     /// All of them by name.
-    pub const NAMED: [(u8, &str); 3] =
-        [(OUT_OF_RANGE, "out_of_range"), (NO_CONTACT, "no_contact"), (UNFAMILIAR, "unfamiliar")];
+    pub const NAMED: [(u8, &str); 4] = [
+        (OUT_OF_RANGE, "out_of_range"),
+        (NO_CONTACT, "no_contact"),
+        (UNFAMILIAR, "unfamiliar"),
+        (CUT_OFF, "cut_off"),
+    ];
 }
 
 /// What version 2 adds to a header.

@@ -12,8 +12,8 @@ use papilla_proto::MAP_SIDE_PX;
 /// What decoding, encoding and handing over add where no calibration has measured it, us.
 const OVERHEAD_US: u64 = 500;
 
-/// Runs whose median is the typical time of a tier.
-const WINDOW: usize = 32;
+/// Runs whose median is the typical time of a tier: eight slow ones move it.
+const WINDOW: usize = 16;
 /// Of so many frames in a row that are expected to be late one is rendered all the same.
 const PROBE_EVERY: u32 = 16;
 
@@ -21,9 +21,13 @@ const PROBE_EVERY: u32 = 16;
 #[derive(Debug)]
 pub(crate) struct Latency {
     fastest_us: AtomicU64,
+    /// The shipped time; 0: none.
+    expected_us: AtomicU64,
     /// The last runs; what was expected or calibrated stands where there were fewer.
     window_us: [AtomicU64; WINDOW],
     runs: AtomicUsize,
+    /// Runs at the last look of [`is_idle`](Self::is_idle).
+    runs_seen: AtomicUsize,
     /// Frames that were expected to be late since the last run.
     expected_late: AtomicU32,
     calibrated_us: OnceLock<Percentiles>,
@@ -33,8 +37,10 @@ impl Default for Latency {
     fn default() -> Self {
         Self {
             fastest_us: AtomicU64::new(u64::MAX),
+            expected_us: AtomicU64::new(0),
             window_us: [const { AtomicU64::new(0) }; WINDOW],
             runs: AtomicUsize::new(0),
+            runs_seen: AtomicUsize::new(0),
             expected_late: AtomicU32::new(0),
             calibrated_us: OnceLock::new(),
         }
@@ -44,7 +50,31 @@ impl Default for Latency {
 impl Latency {
     /// What to expect before any run: the shipped time.
     pub(crate) fn expect(&self, time: Duration) {
+        self.expected_us.store(us(time), Ordering::Relaxed);
         self.fill(us(time));
+    }
+
+    /// The shipped time, us; without one the typical.
+    pub(crate) fn expected_us(&self) -> u64 {
+        match self.expected_us.load(Ordering::Relaxed) {
+            0 => self.typical_us().max(1),
+            us => us,
+        }
+    }
+
+    /// How much slower than shipped it is now.
+    pub(crate) fn slowdown(&self) -> f64 {
+        self.typical_us() as f64 / self.expected_us() as f64
+    }
+
+    /// The fastest run here, us; none before the first.
+    pub(crate) fn fastest_us(&self) -> Option<u64> {
+        Some(self.fastest_us.load(Ordering::Relaxed)).filter(|&us| us < u64::MAX)
+    }
+
+    /// Whether a run on this machine is known.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.fastest_us().is_some()
     }
 
     fn fill(&self, us: u64) {
@@ -63,17 +93,28 @@ impl Latency {
             self.calibrated_us.set(Percentiles { p50: us(middle) as f64, p99: us(*high) as f64 });
     }
 
-    /// Takes the times of a second look, if no frame has been measured yet and they are shorter: a
-    /// machine may be busier than it was, but no tier is faster than it can be.
+    /// Takes the times of a second look, if they are shorter: a machine may be busier than it was,
+    /// but no tier is faster than it can be.
     pub(crate) fn correct(&self, times: &mut [Duration]) {
         times.sort_unstable();
         let (Some(first), Some(middle)) = (times.first(), times.get(times.len() / 2)) else {
             return;
         };
         self.fastest_us.fetch_min(us(*first), Ordering::Relaxed);
-        if !self.is_used() && us(*middle) < self.typical_us() {
+        if us(*middle) < self.typical_us() {
             self.fill(us(*middle));
         }
+    }
+
+    /// Whether no frame has been measured since this was last asked.
+    pub(crate) fn is_idle(&self) -> bool {
+        let runs = self.runs.load(Ordering::Relaxed);
+        self.runs_seen.swap(runs, Ordering::Relaxed) == runs
+    }
+
+    /// Whether it seems half as slow again as it has been.
+    pub(crate) fn has_been_faster(&self) -> bool {
+        self.fastest_us().is_some_and(|us| self.typical_us() > us + us / 2)
     }
 
     /// Whether a frame has been measured.
@@ -207,9 +248,11 @@ mod tests {
         latency.correct(&mut [ms(9), ms(10)]);
         assert_eq!(latency.typical_us(), 10_000);
         assert!(!latency.will_miss(ms(5)), "half of 9 ms is there");
-        // Frames know better.
-        (0..WINDOW).for_each(|_| latency.learn(ms(12)));
-        latency.correct(&mut [ms(8), ms(8)]);
-        assert_eq!(latency.typical_us(), 12_000);
+        // Frames know better, while there are any.
+        assert!(latency.is_idle());
+        (0..WINDOW).for_each(|_| latency.learn(ms(40)));
+        assert!(!latency.is_idle() && latency.is_idle() && latency.has_been_faster());
+        latency.correct(&mut [ms(10), ms(10)]);
+        assert!(latency.typical_us() == 10_000 && !latency.has_been_faster());
     }
 }

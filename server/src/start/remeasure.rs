@@ -1,7 +1,7 @@
 //! Measuring again the tiers that nobody uses.
 //!
 //! A tier that serves is measured by its frames. One that seemed slow because the machine was busy
-//! at the start is chosen for no budget, serves nobody and would seem slow for good.
+//! is chosen for no budget, serves nobody and would seem slow for good.
 
 use std::{sync::Arc, time::Duration};
 
@@ -12,12 +12,12 @@ use crate::{core::catalogue::calibrate, drain::begun, transport::app::App};
 /// Time between two tiers, so that it costs an idle machine next to nothing.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// How often each tier is looked at: a machine that is busy for longer is busy always.
+/// How often each tier is looked at; later those alone that have been faster than they seem.
 const ROUNDS: usize = 3;
 
 /// Measures one tier after the other, each time while nobody is served, until the drain begins.
 pub(super) async fn until_drain(app: Arc<App>) {
-    for _ in 0..ROUNDS {
+    for round in 0.. {
         let mut place = 0;
         while place < app.catalogue().tiers.len() {
             // Held no longer than the wait: a drain waits for whoever holds one.
@@ -30,6 +30,11 @@ pub(super) async fn until_drain(app: Arc<App>) {
                 continue;
             }
             let catalogue = app.catalogue();
+            let latency = &catalogue.tiers[place].latency;
+            if round >= ROUNDS && !latency.has_been_faster() {
+                place += 1;
+                continue;
+            }
             let measured = spawn_blocking(move || calibrate::remeasure(&catalogue.tiers[place]));
             if let Ok(Err(error)) = measured.await {
                 tracing::warn!(%error, "a tier cannot be measured again");

@@ -62,7 +62,9 @@ async fn every_answer_says_how_it_fared() {
     for _ in 0..3 {
         let (header, extension, message) = socket.hear_2().await;
         assert_eq!(header.client_time_us, 1000 * u64::from(header.sequence));
-        assert_eq!((extension.tier, extension.flags), (1, 0));
+        // The ramp goes to the edge of the map.
+        let due = if header.status == FrameStatus::Ok { flags::CUT_OFF } else { 0 };
+        assert_eq!((extension.tier, extension.flags), (1, due));
         if header.status == FrameStatus::Ok {
             maps += 1;
             assert_eq!(header.window(), Window::WHOLE);
@@ -162,30 +164,58 @@ async fn sample_types_may_differ_by_direction() {
     socket.send(whole(1, &ramp())).await;
     let (header, _, message) = socket.hear_2().await;
     assert_eq!((header.sample_type, message.len()), (SampleType::U8, HEADER_LEN_V2 + MAP_LEN));
-    assert!((header.scale - SED_MAX / 255.0).abs() < 1e-3);
+    assert!((header.scale - SED_MAX / 255.0).abs() < 1e-3, "the ramp reaches the greatest SED");
     for (unit, p) in message[HEADER_LEN_V2..].iter().zip(ramp()) {
         assert!((f32::from(*unit) * header.scale - GAIN * p).abs() <= 0.51 * header.scale);
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn pressure_beyond_the_range_is_flagged_where_that_is_asked_for() {
+async fn windows_keep_their_precision_however_light_the_touch() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello_2(&json!({}))).await;
-    let beyond = vec![2.0 * PRESSURE_MAX_PA; MAP_LEN];
-    socket.send(whole(1, &beyond)).await;
+    let wish = json!({"answer_sample_type": "u8", "effects": ["contact_window"]});
+    socket.open(hello_2(&wish)).await;
+    for (sequence, share) in (1..).zip([1e-6, 5e-4, 1.0]) {
+        let map: Vec<f32> = patch().iter().map(|p| share * p).collect();
+        socket.send(whole(sequence, &map)).await;
+        let (header, _, _) = socket.hear_2().await;
+        let unit = GAIN * share * 5000.0 / 255.0;
+        assert!((header.scale / unit - 1.0).abs() < 1e-5, "{share}: {header:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pressure_beyond_the_range_is_clamped_and_flagged_unless_the_hello_says_otherwise() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let beyond = vec![3.0 * PRESSURE_MAX_PA; MAP_LEN];
+    for (sequence, members, seen) in [
+        (1, json!({"effects": ["summary"]}), 1.0),
+        (2, json!({"effects": ["summary"], "out_of_range": "clamp"}), 1.0),
+        (3, json!({"effects": ["summary"], "out_of_range": "flag"}), 3.0),
+    ] {
+        socket.open(hello_2(&members)).await;
+        socket.send(whole(sequence, &beyond)).await;
+        let (header, extension, message) = socket.hear_2().await;
+        assert_eq!(header.status, FrameStatus::Ok, "{members}");
+        assert_ne!(extension.flags & flags::OUT_OF_RANGE, 0, "{members}");
+        let summary = Summary::decode(&message[HEADER_LEN_V2..]).unwrap();
+        assert!((summary.pressure_max_pa / beyond[0] - 1.0).abs() < 1e-6, "as it was sent");
+        let sed = floats_of(&message[HEADER_LEN_V2 + 64..]);
+        assert!(sed.iter().all(|e| (e - GAIN * seen * PRESSURE_MAX_PA).abs() < 1.0), "{members}");
+    }
+    socket.open(hello_2(&json!({"out_of_range": "refuse"}))).await;
+    socket.send(whole(4, &beyond)).await;
     socket.hear_refusal("out_of_range").await;
-    socket.open(hello_2(&json!({"out_of_range": "flag"}))).await;
-    socket.send(whole(2, &beyond)).await;
-    let (header, extension, message) = socket.hear_2().await;
-    assert_eq!((header.status, extension.flags), (FrameStatus::Ok, flags::OUT_OF_RANGE));
-    let sed = floats_of(&message[HEADER_LEN_V2..]);
-    assert!(sed.iter().all(|e| (e - GAIN * 2.0 * PRESSURE_MAX_PA).abs() < 1.0));
-    socket.send(whole(3, &ramp())).await;
-    assert_eq!(socket.hear_2().await.1.flags, 0);
-    socket.send(whole(4, &vec![11.0 * PRESSURE_MAX_PA; MAP_LEN])).await;
-    socket.hear_refusal("out_of_range").await;
+    // Each way ends somewhere.
+    for (sequence, way, times) in [(5, "flag", 11.0), (6, "clamp", 1.1e4)] {
+        socket.open(hello_2(&json!({"out_of_range": way}))).await;
+        socket.send(whole(sequence, &ramp())).await;
+        assert_eq!(socket.hear_2().await.1.flags, flags::CUT_OFF);
+        socket.send(whole(sequence + 2, &vec![times * PRESSURE_MAX_PA; MAP_LEN])).await;
+        socket.hear_refusal("out_of_range").await;
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -196,7 +226,10 @@ async fn a_map_that_no_press_makes_is_rendered_and_flagged() {
     // Squares of `side_px`, as high as what the test models' card knows.
     let board = |side_px: usize| -> Vec<f32> {
         let is_on = |i: usize| (i / 224 / side_px + i % 224 / side_px).is_multiple_of(2);
-        (0..MAP_LEN).map(|i| if is_on(i) { PRESSURE_MAX_PA } else { 0.0 }).collect()
+        let is_rim = |x: usize| x == 0 || x == MAP_SIDE_PX - 1;
+        let is_off = |i: usize| is_rim(i / MAP_SIDE_PX) || is_rim(i % MAP_SIDE_PX);
+        let pressure_pa = |i| if is_on(i) && !is_off(i) { PRESSURE_MAX_PA } else { 0.0 };
+        (0..MAP_LEN).map(pressure_pa).collect()
     };
     for (sequence, (side_px, due)) in [(1, flags::UNFAMILIAR), (8, 0)].into_iter().enumerate() {
         socket.send(whole(sequence as u32, &board(side_px))).await;
@@ -208,6 +241,21 @@ async fn a_map_that_no_press_makes_is_rendered_and_flagged() {
     }
     let nothing = service.post("/v1/sed", bytes_of(&vec![0.0; MAP_LEN])).send().await;
     assert_eq!(nothing.header("x-papilla-flags"), Some("no_contact"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_contact_at_the_edge_of_the_atlas_is_flagged_as_cut_off() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_2(&json!({}))).await;
+    // Twenty rows that end so many before the last one; the test skin is all of the map.
+    for (sequence, (before, due)) in (1..).zip([(0, flags::CUT_OFF), (1, 0), (60, 0)]) {
+        let rows = MAP_SIDE_PX - 20 - before..MAP_SIDE_PX - before;
+        let inside = |i: usize| rows.contains(&(i / MAP_SIDE_PX)) && (90..130).contains(&(i % 224));
+        let map: Vec<f32> = (0..MAP_LEN).map(|i| if inside(i) { 5000.0 } else { 0.0 }).collect();
+        socket.send(whole(sequence, &map)).await;
+        assert_eq!(socket.hear_2().await.1.flags, due, "{before} rows before the edge");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -2,11 +2,15 @@
 
 use std::time::Duration;
 
+use papilla_proto::{FrameStatus, Window};
 use papilla_server::{Config, StartError};
 use serde_json::{Value, json};
 use tokio::time::timeout;
 
-use crate::support::{Service, atlas, hello, model_folder, write};
+use crate::{
+    effects::{hello_2, windowed},
+    support::{Service, atlas, hello, model_folder, ramp, write},
+};
 
 /// A rung as `model-export ladder` writes it.
 fn rung(name: &str, model: Option<&str>, ms: f64, error: f64) -> Value {
@@ -103,4 +107,48 @@ async fn a_damaged_ladder_is_named() {
         let named = matches!(&error, StartError::Unusable { file, .. } if file == "ladder.json");
         assert!(named, "{error}");
     }
+}
+
+/// `slow` takes some hundred milliseconds, whatever its shipped time says: a calibration that was
+/// skipped may begin with it, and no more than ten frames are late before it is left.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_budget_is_kept_although_the_calibration_was_skipped() {
+    let mut ladder = ladder();
+    ladder["rungs"][0] = rung("quick", Some("quick"), 0.5, 0.2);
+    ladder["rungs"][1] = rung("slow", Some("slow"), 1.0, 0.1);
+    let service = with(&ladder, 0).await.unwrap();
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello_2(&json!({"budget_us": 20_000}))).await;
+    assert_eq!((&ready["tier"], &ready["tier_names"]), (&json!("slow"), &json!(["quick", "slow"])));
+    let mut late = 0;
+    for sequence in 1..100 {
+        socket.send(windowed(sequence, 0, Window::WHOLE, &ramp())).await;
+        let (header, _) = socket.hear_frame().await;
+        let tier = header.extension.unwrap().tier;
+        if tier == 0 {
+            assert!((1..=10).contains(&late), "{late} late frames");
+            return;
+        }
+        assert_eq!(header.status, FrameStatus::Late, "by tier {tier}");
+        late += 1;
+    }
+    panic!("{late} late frames, and none by another tier");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_tier_that_is_worse_and_slower_is_for_comparison_alone() {
+    let mut ladder = ladder();
+    ladder["rungs"][1]["latency_ms"]["tract"]["p50"] = json!(3.7);
+    let service = with(&ladder, 0).await.unwrap();
+    let tiers = service.json("/v1/tiers").await;
+    // `slow` errs by 2 % in 3.7 ms, which is no tenth less than the 4 ms in which `quick` errs by 1 %.
+    let flags = [0, 1].map(|tier| tiers["tiers"][tier]["for_comparison"].clone());
+    assert_eq!(flags, [json!(false), json!(true)]);
+    for budget_us in [1, 4_300, 60_000_000] {
+        let mut socket = service.socket().await;
+        let ready = socket.open(hello(&json!({"budget_us": budget_us}))).await;
+        assert_eq!(ready["tier"], "quick", "{budget_us} us");
+    }
+    let mut socket = service.socket().await;
+    assert_eq!(socket.open(hello(&json!({"tier": "slow"}))).await["tier"], "slow");
 }

@@ -8,7 +8,7 @@ use papilla_proto::{FrameStatus, SampleType};
 use serde_json::{Value, json};
 
 use crate::support::{
-    Answer, Service, Socket, add_model, add_model_of_gain, atlas, bytes_of, floats_of, frame,
+    Answer, GAIN, Service, Socket, add_model, add_model_of_gain, atlas, bytes_of, floats_of, frame,
     hello, ramp, write,
 };
 
@@ -74,11 +74,16 @@ async fn a_bad_model_changes_nothing_and_says_why() {
         ("missing", "quick.onnx"),
         ("of another atlas", "trained on atlas"),
         ("wrong", "is off by"),
+        ("nothing", "its answers hold 0.000"),
+        ("in kJ/m3", "its answers hold 0.001"),
     ] {
         match bad {
             "torn" => write(folder, "quick.onnx", &good[..good.len() / 2]),
             "missing" => fs::remove_file(folder.join("quick.onnx")).unwrap(),
             "of another atlas" => add_model(folder, "quick", &"f".repeat(64), 0, 0.2),
+            // A card that allows any error still wants an answer.
+            "nothing" => add_model_of_gain(folder, "quick", atlas().hash(), 0, 3.0, 0.0),
+            "in kJ/m3" => add_model_of_gain(folder, "quick", atlas().hash(), 0, 3.0, 1e-3 * GAIN),
             // It loads, belongs to its card and answers; but not what its card promises.
             _ => add_model_of_gain(folder, "quick", atlas().hash(), 0, 0.01, 1.0),
         }
@@ -90,7 +95,7 @@ async fn a_bad_model_changes_nothing_and_says_why() {
         assert!((gain(&mut socket, sequence).await - 0.5).abs() < 1e-4, "{bad}");
     }
     assert_eq!(service.json("/v1/models").await, before);
-    assert_eq!(service.metric("papilla_reloads_total{outcome=\"refused\"}").await as u64, 4);
+    assert_eq!(service.metric("papilla_reloads_total{outcome=\"refused\"}").await as u64, 6);
     write(folder, "quick.onnx", &good);
     write(folder, "quick.json", &card);
     assert_eq!(reload(&service).await.status, 200);

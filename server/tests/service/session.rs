@@ -6,8 +6,8 @@ use papilla_proto::{FrameHeader, FrameKind, FrameStatus, MAP_LEN, SampleType};
 use serde_json::{Value, json};
 
 use crate::support::{
-    PRESSURE_MAX_PA, Received, SED_MAX, Service, Socket, assert_rendered, bytes_of, frame, hello,
-    ramp,
+    GAIN, PRESSURE_MAX_PA, Received, SED_MAX, Service, Socket, assert_rendered, bytes_of, frame,
+    hello, ramp,
 };
 
 fn outcome(name: &str) -> String {
@@ -36,7 +36,6 @@ async fn every_sample_type_renders_within_its_error() {
         assert_eq!((header.width, header.height, header.sample_type), (224, 224, sample_type));
         if sample_type.is_scaled() {
             let announced = ready["sed_scale_j_per_m3"].as_f64().unwrap() as f32;
-            assert_eq!(header.scale.to_bits(), announced.to_bits());
             assert!((announced * sample_type.unit_max() - SED_MAX).abs() < 0.01);
         }
         let mut sed = vec![0.0; MAP_LEN];
@@ -225,18 +224,37 @@ async fn scales_come_from_the_header_or_the_hello() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_map_beyond_the_scale_raises_it_instead_of_clipping() {
+async fn answers_keep_their_precision_however_light_the_touch() {
+    let service = Service::start().await;
+    for (name, sample_type) in [("u8", SampleType::U8), ("u16", SampleType::U16)] {
+        let mut socket = service.socket().await;
+        socket.open(hello(&json!({"sample_type": name}))).await;
+        for (sequence, share) in (1..).zip([1e-6, 5e-4, 0.05, 1.005]) {
+            let map: Vec<f32> = ramp().iter().map(|p| share * p).collect();
+            let scale = share * PRESSURE_MAX_PA / sample_type.unit_max();
+            socket.send(frame(sequence, 0, sample_type, scale, &map)).await;
+            let (header, payload) = socket.hear_frame().await;
+            let unit = GAIN * scale;
+            assert!((header.scale / unit - 1.0).abs() < 1e-5, "{name} {share}: {header:?}");
+            let mut sed = vec![0.0; MAP_LEN];
+            sample_type.decode(&payload, header.scale, &mut sed).unwrap();
+            assert_rendered(&map, &sed, |_| 1.01 * unit);
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_map_of_zeros_has_a_scale_that_can_be_used() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    let ready = socket.open(hello(&json!({"sample_type": "u16"}))).await;
-    // The test models' card says 5000 J/m3; 1 % headroom in pressure goes beyond.
-    let map = vec![1.005 * PRESSURE_MAX_PA; MAP_LEN];
-    socket.send(frame(1, 0, SampleType::U16, 1.0, &map)).await;
-    let (header, payload) = socket.hear_frame().await;
-    assert!(header.scale > ready["sed_scale_j_per_m3"].as_f64().unwrap() as f32);
-    let mut sed = vec![0.0; MAP_LEN];
-    SampleType::U16.decode(&payload, header.scale, &mut sed).unwrap();
-    assert_rendered(&map, &sed, |e| SampleType::U16.error_max(e, header.scale) + 0.5);
+    socket.open(hello(&json!({"sample_type": "u16"}))).await;
+    // A pressure whose SED has no unit of its own is nothing.
+    for value in [0.0, 1e-37] {
+        socket.send(frame(1, 0, SampleType::U16, 1e-37, &vec![value; MAP_LEN])).await;
+        let (header, payload) = socket.hear_frame().await;
+        assert_eq!((header.status, header.scale.to_bits()), (FrameStatus::Ok, 1_f32.to_bits()));
+        assert!(payload.iter().all(|&byte| byte == 0), "{value}");
+    }
 }
 
 /// Hears `count` frames; each sequence with its status, and the order of the maps.

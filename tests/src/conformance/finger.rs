@@ -104,9 +104,9 @@ impl Surface {
             if off.sqrt() > 5.0 {
                 continue;
             }
+            let radius_mm = contact.radius_mm.unwrap_or(5.1 * contact.force_n.powf(1.0 / 3.0));
             let weight = |index: usize, place_mm: [f64; 3]| {
-                let share =
-                    1.0 - squared(place_mm, centre_mm) / (contact.radius_mm * contact.radius_mm);
+                let share = 1.0 - squared(place_mm, centre_mm) / (radius_mm * radius_mm);
                 if index == own { 1.0 } else { share.max(0.0).sqrt() }
             };
             let sum: f64 =

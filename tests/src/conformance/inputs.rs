@@ -31,8 +31,8 @@ pub struct Contact {
     pub at_mm: [f64; 3],
     /// Normal force, N.
     pub force_n: f64,
-    /// Radius of the contact, mm.
-    pub radius_mm: f64,
+    /// Radius of the contact, mm; none: the finger's own on a flat object.
+    pub radius_mm: Option<f64>,
 }
 
 impl Pressure {

@@ -64,7 +64,6 @@ pub enum ConformanceError {
 struct Tier {
     session: Box<dyn papilla_engine::Session>,
     pressure_max_pa: f32,
-    sed_max_j_per_m3: f32,
 }
 
 impl Tier {
@@ -209,7 +208,6 @@ impl Recorder {
                 Ok::<_, ConformanceError>(Tier {
                     session: model.session()?,
                     pressure_max_pa: model.info().pressure_max_pa,
-                    sed_max_j_per_m3: model.info().sed_max_j_per_m3,
                 })
             };
             let tier = load().map_err(|error| error.to_string())?;

@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     FrameKind, Hello, MAP_LEN, RuntimeEffect, SampleType, Window,
-    effects::{Moduli, Relaxation},
+    effects::{Moduli, OutOfRange, Relaxation},
 };
 
 use super::{
@@ -57,8 +57,9 @@ impl Session {
         } else {
             sent_pa.to_vec()
         };
-        let sed = tier.render(&effective_pa)?;
-        let tolerance = self.tolerance(tier, &effective_pa, &sed)?;
+        let seen_pa = self.seen(tier, effective_pa);
+        let sed = tier.render(&seen_pa)?;
+        let tolerance = self.tolerance(tier, &seen_pa, &sed)?;
         let sed: Vec<f64> = sed.into_iter().map(f64::from).collect();
         if !self.has(RuntimeEffect::Afferents) {
             return Ok(Answer { sed, rate_hz: None, tolerance });
@@ -83,6 +84,16 @@ impl Session {
         Ok(Answer { sed, rate_hz: Some(rate_hz), tolerance: vec![2e-3 * top; MAP_LEN] })
     }
 
+    /// What the network sees: no pressure beyond its range, unless it was asked to extrapolate.
+    fn seen(&self, tier: &Tier, mut effective_pa: Vec<f32>) -> Vec<f32> {
+        let most_pa = tier.pressure_max_pa;
+        let leaves = effective_pa.iter().any(|&p| p > 1.01 * most_pa);
+        if leaves && self.hello.out_of_range.unwrap_or(OutOfRange::Clamp) == OutOfRange::Clamp {
+            effective_pa.iter_mut().for_each(|p| *p = p.min(most_pa));
+        }
+        effective_pa
+    }
+
     /// What rounding samples on the way in and out may do to every pixel.
     fn tolerance(
         &self,
@@ -101,7 +112,7 @@ impl Session {
             effective_pa.iter().map(|&p| if p > 0.0 { p + error_pa(p) } else { 0.0 }).collect();
         let more = if sent == SampleType::F32 { sed.to_vec() } else { tier.render(&more_pa)? };
         let answered = self.hello.answer_sample_type.unwrap_or(sent);
-        let unit = top.max(tier.sed_max_j_per_m3) / answered.unit_max();
+        let unit = top / answered.unit_max();
         let pixel = |(&w, &more): (&f32, &f32)| {
             let rounding = f64::from(answered.error_max(w, unit));
             MAP_TOLERANCE * f64::from(top) + 2.0 * f64::from((more - w).abs()) + rounding

@@ -34,6 +34,7 @@ struct Answer {
   Kind kind = Kind::sed;
   bool out_of_range = false;          ///< a pressure is above what the tier was trained on
   bool no_contact = false;            ///< the map is zero; no network was asked
+  bool cut_off = false;               ///< the contact reaches the edge of the atlas
   bool unfamiliar = false;            ///< rougher or heavier than any map the tier was trained on
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`

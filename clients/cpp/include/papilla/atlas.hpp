@@ -19,7 +19,7 @@ namespace papilla {
 struct Contact {
   std::array<double, 3> at_mm{};
   double force_n = 0.0;
-  double radius_mm = 2.5;
+  double radius_mm = 0.0;  ///< 0: the finger's own on a flat object
 };
 
 class Atlas {
@@ -87,7 +87,9 @@ class Atlas {
         if (squared < nearest || (!own && squared <= nearest)) nearest = squared, own = &pixel;
       }
       if (!own) continue;
-      const double reach = contact.radius_mm * contact.radius_mm;
+      const double radius_mm =
+          contact.radius_mm > 0.0 ? contact.radius_mm : radius_at_1_n_mm * std::cbrt(contact.force_n);
+      const double reach = radius_mm * radius_mm;
       const auto weight = [&](const Pixel& pixel) {
         if (&pixel == own) return 1.0;
         const double share = 1.0 - apart(pixel.place_mm, own->place_mm) / reach;
@@ -110,6 +112,7 @@ class Atlas {
 
  private:
   static constexpr double reach_mm = 5.0;
+  static constexpr double radius_at_1_n_mm = 5.1;
 
   static double apart(const std::array<double, 3>& a, const std::array<double, 3>& b) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];

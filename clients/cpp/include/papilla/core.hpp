@@ -120,6 +120,7 @@ class Core {
     answer.out_of_range = (header.flags & wire::out_of_range) != 0;
     answer.no_contact = (header.flags & wire::no_contact) != 0;
     answer.unfamiliar = (header.flags & wire::unfamiliar) != 0;
+    answer.cut_off = (header.flags & wire::cut_off) != 0;
     answer.window = header.window;
     answer.total_us = header.time_us;
     answer.queue_us = header.queue_us;
@@ -128,6 +129,8 @@ class Core {
     for (const Ready& each : history_) {
       if (each.tier_number == header.tier) answer.tier = each.tier;
     }
+    const auto& names = ready.message["tier_names"].items;
+    if (header.tier < names.size()) answer.tier = names[header.tier].string;
     if (header.status == Status::ok && !read(bytes, size, header, ready)) return Event::broken;
     outcome(header.sequence, header.client_time_us, header.status);
     return Event::nothing;

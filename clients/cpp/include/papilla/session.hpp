@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -31,6 +32,10 @@ class Session {
     /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
     /// what is needed and return.
     std::function<void(const Answer&)> on_answer;
+    /// Called with the first refused frame and the first one out of range: by default it prints.
+    std::function<void(const std::string&)> warn = [](const std::string& words) {
+      std::fprintf(stderr, "papilla: %s\n", words.c_str());
+    };
     int retry_ms = 150;
   };
 
@@ -161,8 +166,21 @@ class Session {
   std::uint32_t wanted_ = 0;
   std::string new_hello_, pong_;
   bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
+  bool told_refusal_ = false, told_range_ = false;
+
+  /// Says once what a program that looks at maps alone would not see.
+  void warn(const Answer& answer) {
+    if (!options_.warn) return;
+    if (answer.status == Status::error && !std::exchange(told_refusal_, true)) {
+      options_.warn("a frame was refused: " + answer.problem.message);
+    }
+    if (answer.status == Status::ok && answer.out_of_range && !std::exchange(told_range_, true)) {
+      options_.warn("pressure is beyond what tier " + answer.tier + " knows; such answers are flagged");
+    }
+  }
 
   void outcome(const Answer& answer) {
+    warn(answer);
     if (options_.on_answer) options_.on_answer(answer);
     if (answer.status == Status::ok) {
       latest_ = answer;               // keeps its room: no allocation

@@ -185,7 +185,7 @@ func check(expect, outcome):
 		same("kind", outcome.kind, expect.kind)
 	if expect.has("flags"):
 		var flags = []
-		for flag in ["out_of_range", "no_contact", "unfamiliar"]:
+		for flag in ["out_of_range", "no_contact", "unfamiliar", "cut_off"]:
 			if outcome[flag]:
 				flags.append(flag)
 		same("flags", str(flags), str(expect.flags))

@@ -1,6 +1,6 @@
 //! What is agreed, what waits, what is on its way.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::HashMap, mem::replace, sync::Arc};
 
 use papilla_proto::{FrameHeader, Hello, Problem, Ready, SampleType, ServerMessage, SessionError};
 use tokio::sync::oneshot;
@@ -50,6 +50,8 @@ pub(super) struct State {
     waiting: Option<(Pending, Vec<u8>)>,
     sent: Vec<Pending>,
     over: bool,
+    warned_of_refusal: bool,
+    warned_of_range: bool,
 }
 
 impl State {
@@ -64,6 +66,8 @@ impl State {
             waiting: None,
             sent: Vec::new(),
             over: false,
+            warned_of_refusal: false,
+            warned_of_range: false,
         };
         state.agree(Arc::clone(&state.ready));
         state
@@ -72,6 +76,9 @@ impl State {
     pub(super) fn agree(&mut self, ready: Arc<Ready>) {
         if let Some(number) = ready.tier_number {
             self.tiers.insert(number, ready.tier.clone());
+        }
+        for (number, name) in (0..).zip(ready.tier_names.iter().flatten()) {
+            self.tiers.insert(number, name.clone());
         }
         self.ready = ready;
     }
@@ -125,6 +132,12 @@ impl State {
         let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
         let tier = self.tiers.get(&number).cloned().unwrap_or_default();
         let answer = Answer::read(&header, message, &pending.ready, tier)?;
+        if answer.out_of_range && !replace(&mut self.warned_of_range, true) {
+            eprintln!(
+                "papilla: pressure is beyond what tier {} knows; such answers are flagged",
+                answer.tier
+            );
+        }
         // Err: nobody waits for it any more.
         let _ = pending.outcome.send(answer);
         Ok(())
@@ -144,7 +157,13 @@ impl State {
             ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
                 let problem = Problem { code, message, field };
                 match sequence.and_then(|sequence| self.forget(sequence)) {
-                    Some(pending) => pending.end(Status::Error(problem)),
+                    Some(pending) => {
+                        // Whoever looks at maps alone would not see it.
+                        if !replace(&mut self.warned_of_refusal, true) {
+                            eprintln!("papilla: a frame was refused: {}", problem.message);
+                        }
+                        pending.end(Status::Error(problem));
+                    }
                     None => {
                         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
                             let _ = asked.reply.send(Err(PapillaError::Refused(problem)));

@@ -72,12 +72,12 @@ pub(crate) fn calibrate_noting(
     Ok(())
 }
 
-/// Measures a tier again that no frame has measured yet.
+/// Measures a tier again that no frame has measured since the last look.
 ///
 /// # Errors
 /// It does not run.
 pub(crate) fn remeasure(tier: &Tier) -> Result<(), StartError> {
-    if !tier.latency.is_used() {
+    if tier.latency.is_idle() {
         tier.latency.correct(&mut runs(tier, Duration::ZERO)?);
     }
     Ok(())
@@ -111,7 +111,7 @@ fn codec_us() -> Option<u64> {
         decode(input, &payload, &mut map).ok()?;
         check_pressure(&map, 1e4).ok()?;
         buffer.clear();
-        let sed = Map { quantity: Quantity::Sed, values: &map, value_max: 1e4, source: "" };
+        let sed = Map { quantity: Quantity::Sed, values: &map, source: "" };
         encode(samples, sed, &mut buffer).ok()?;
         let time = start.elapsed();
         least = Some(least.map_or(time, |least| least.min(time)));

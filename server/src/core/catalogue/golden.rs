@@ -17,6 +17,11 @@ const TIMES_P95: f64 = 3.0;
 /// And by so much in any case, so that a nearly exact model is not held to its rounding.
 const ERROR_MIN: f64 = 0.05;
 
+/// Least share of the FE solver's map in an answer, whatever error the card allows. A model of
+/// zeros holds nothing, one in kJ/m3 a thousandth; of the shipped models a half-space holds .22 and
+/// all others .7 or more.
+const SHARE_MIN: f64 = 0.1;
+
 /// The state a model does worst.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Golden {
@@ -30,6 +35,8 @@ pub(crate) struct Golden {
     pub(crate) relative_l2: f64,
     /// The error it may have.
     pub(crate) relative_l2_max: f64,
+    /// Least share of the due map in an answer: `sum found due / sum due^2`.
+    pub(crate) share: f64,
 }
 
 /// Why a model is not to be trusted.
@@ -47,6 +54,12 @@ pub(crate) enum GoldenError {
          most its card allows", .0.state, .0.relative_l2, .0.relative_l2_max
     )]
     Wrong(Golden),
+    /// It answers next to nothing.
+    #[error(
+        "its answers hold {:.3} of the FE solver's map, {SHARE_MIN} is the least: are they in J/m3, \
+         and the right way up?", .0.share
+    )]
+    Empty(Golden),
 }
 
 /// Asks `tier` for every state of the catalogue's replay; None if there are none.
@@ -68,18 +81,28 @@ pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>
         fill(&catalogue.skin, &state.pressure_pa, &mut pressure_pa)?;
         fill(&catalogue.interface, &state.sed_j_per_m3, &mut due)?;
         session.infer(&pressure_pa, &mut found)?;
-        let relative_l2 = relative_l2(&found, &due, catalogue.interface.mask());
+        let mask = catalogue.interface.mask();
+        let relative_l2 = relative_l2(&found, &due, mask);
+        let share = worst
+            .as_ref()
+            .map_or(f64::INFINITY, |worst| worst.share)
+            .min(share(&found, &due, mask));
         if worst.as_ref().is_none_or(|worst| relative_l2 > worst.relative_l2) {
             worst = Some(Golden {
                 states: states.len(),
                 state: state.name.clone(),
                 relative_l2,
                 relative_l2_max: (TIMES_P95 * tier.relative_l2_p95).max(ERROR_MIN),
+                share,
             });
+        }
+        if let Some(worst) = &mut worst {
+            worst.share = share;
         }
     }
     match worst {
         Some(worst) if worst.relative_l2 > worst.relative_l2_max => Err(GoldenError::Wrong(worst)),
+        Some(worst) if worst.share < SHARE_MIN => Err(GoldenError::Empty(worst)),
         worst => Ok(worst),
     }
 }
@@ -94,9 +117,30 @@ fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
     if difference > 0.0 { (difference / size.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 }
 }
 
+/// `sum found due / sum due^2` over the pixels of the mask; 1 where nothing is due.
+fn share(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
+    let (mut common, mut size) = (0.0, 0.0);
+    for ((&found, &due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
+        common += f64::from(found) * f64::from(due);
+        size += f64::from(due).powi(2);
+    }
+    if size > 0.0 { common / size } else { 1.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_share_of_a_multiple_is_its_factor() {
+        let (due, mask) = ([6.0, 8.0, 5.0], [true, true, false]);
+        for factor in [0.0, 0.001, 0.5, 1.0, 2.0] {
+            let found = due.map(|due| factor * due);
+            assert!((share(&found, &due, &mask) - f64::from(factor)).abs() < 1e-7);
+        }
+        assert!((share(&[8.0, -6.0, 9.0], &due, &mask)).abs() < 1e-12, "nothing in common");
+        assert!((share(&[1.0; 3], &[0.0; 3], &mask) - 1.0).abs() < 1e-12);
+    }
 
     #[test]
     fn the_error_is_relative_and_of_the_patch_alone() {

@@ -53,8 +53,21 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
             tier.relative_l2_median = error;
         }
     }
+    let ms = |tier: &Tier| ladder.rung_of(&tier.name)?.time_ms();
+    let beats = |better: &Tier, tier: &Tier| {
+        let is_as_fast = ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b);
+        is_as_fast
+            && better.relative_l2_median < tier.relative_l2_median
+            && better.renders(&tier.effects)
+    };
+    let beaten: Vec<bool> =
+        tiers.iter().map(|tier| tiers.iter().any(|better| beats(better, tier))).collect();
+    tiers.iter_mut().zip(beaten).for_each(|(tier, beaten)| tier.for_comparison = beaten);
     Some(set.to_owned())
 }
+
+/// By so much a shipped time may be greater and still not count as slower.
+const MARGIN: f64 = 1.1;
 
 fn milliseconds(ms: f64) -> Duration {
     Duration::try_from_secs_f64(ms / 1e3).unwrap_or_default()
@@ -121,6 +134,7 @@ pub(super) fn load_tier(
         relative_l2_p95: card.metrics.relative_l2.p95,
         card: shipped,
         latency,
+        for_comparison: false,
         retired: false,
         model,
     })

@@ -5,13 +5,15 @@ pub(crate) mod calibrate;
 pub(crate) mod golden;
 mod load;
 pub(crate) mod replay;
+#[cfg(test)]
+pub(crate) mod testing;
 mod tier;
 
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
 use papilla_proto::{
-    ErrorCode, PixelMask, Problem,
+    ErrorCode, MAP_SIDE_PX, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
     error::shortened,
 };
@@ -66,6 +68,8 @@ pub(crate) struct Catalogue {
     pub(crate) skin: Raster,
     /// The pixels of `skin`.
     pub(crate) skin_mask: PixelMask,
+    /// The pixels of `skin` at its edge.
+    pub(crate) rim: Vec<usize>,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
     /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
@@ -79,6 +83,23 @@ pub(crate) struct Catalogue {
     pub(crate) cache: Cache<Document>,
 }
 
+/// The pixels of a mask that have a neighbour outside of it.
+fn rim(mask: &[bool]) -> Vec<usize> {
+    let is_inside = |row: usize, column: usize| {
+        row < MAP_SIDE_PX && column < MAP_SIDE_PX && mask[row * MAP_SIDE_PX + column]
+    };
+    let is_rim = |&i: &usize| {
+        let (row, column) = (i / MAP_SIDE_PX, i % MAP_SIDE_PX);
+        let sides = [(0, 1), (2, 1), (1, 0), (1, 2)];
+        // Before row or column 0 the difference wraps, and lies outside.
+        let is_off = |(down, across): (usize, usize)| {
+            !is_inside((row + down).wrapping_sub(1), (column + across).wrapping_sub(1))
+        };
+        mask[i] && sides.into_iter().any(is_off)
+    };
+    (0..mask.len()).filter(is_rim).collect()
+}
+
 impl Catalogue {
     /// These tiers on this atlas, and nothing else.
     #[cfg(test)]
@@ -89,6 +110,7 @@ impl Catalogue {
             default: 0,
             atlas_json: Bytes::new(),
             skin_mask: PixelMask::from(skin.mask()),
+            rim: rim(skin.mask()),
             skin,
             interface,
             atlas,
@@ -189,6 +211,7 @@ impl Catalogue {
             atlas,
             atlas_json,
             skin_mask: PixelMask::from(skin.mask()),
+            rim: rim(skin.mask()),
             skin,
             interface,
             replay,
@@ -206,9 +229,27 @@ impl Catalogue {
         effects::Finger { atlas, skin, interface, shared: runtime }
     }
 
-    /// Time of a tier from receipt to answer on an idle machine, us.
+    /// Time of a tier from receipt to answer on an idle machine, us. Of one that was never measured
+    /// here: its shipped time, slower by as much as the slowest of those that were.
     pub(crate) fn predicted_latency_us(&self, tier: usize) -> u64 {
-        self.tiers[tier].latency.typical_us().saturating_add(self.overhead.us())
+        let latency = &self.tiers[tier].latency;
+        let slower = if latency.is_measured() { 1.0 } else { self.slowdown() };
+        ((slower * latency.typical_us() as f64) as u64).saturating_add(self.overhead.us())
+    }
+
+    /// The same at its best: in its fastest run here, or as much slower than shipped as the tier
+    /// `by` is now.
+    pub(crate) fn hoped_latency_us(&self, tier: usize, by: usize) -> u64 {
+        let latency = &self.tiers[tier].latency;
+        let likewise_us = (self.tiers[by].latency.slowdown() * latency.expected_us() as f64) as u64;
+        let best_us = latency.fastest_us().unwrap_or(u64::MAX).min(likewise_us);
+        self.predicted_latency_us(tier).min(best_us.saturating_add(self.overhead.us()))
+    }
+
+    /// How much slower than shipped the tiers are that frames have measured; 1 at least.
+    fn slowdown(&self) -> f64 {
+        let used = self.tiers.iter().filter(|tier| tier.latency.is_used());
+        used.map(|tier| tier.latency.slowdown()).fold(1.0, f64::max)
     }
 
     /// Whether a tier is expected to meet a budget; none without one.
@@ -259,19 +300,38 @@ impl Catalogue {
     /// Without a budget: the default. With one: of the tiers that render
     /// `effects` and are expected to meet it the most accurate, or else the fastest.
     pub(crate) fn choose(&self, budget_us: Option<u32>, effects: &[String]) -> Option<usize> {
-        let renders = |tier: &Tier| effects.iter().all(|e| tier.effects.contains(e));
-        let fitting = || self.offered().filter(|(_, tier)| renders(tier));
         let Some(budget_us) = budget_us else {
-            return if renders(&self.tiers[self.default]) {
-                Some(self.default)
-            } else {
-                fitting().next().map(|(index, _)| index)
-            };
+            let mut fitting =
+                self.offered().filter(|(_, tier)| tier.renders(effects)).map(|(place, _)| place);
+            let default = Some(self.default).filter(|&tier| self.tiers[tier].renders(effects));
+            return default.or_else(|| fitting.next());
         };
+        self.choose_among(budget_us, effects, |_| true)
+    }
+
+    /// The tier for a budget, of those that `may` be taken: the most accurate that is expected to
+    /// meet it, or else the fastest.
+    pub(crate) fn choose_among(
+        &self,
+        budget_us: u32,
+        effects: &[String],
+        may: impl Fn(usize) -> bool,
+    ) -> Option<usize> {
+        let fitting = || self.for_budgets(effects).filter(|&place| may(place));
+        let error = |place: usize| self.tiers[place].relative_l2_median;
         fitting()
-            .filter(|(index, _)| self.meets(*index, Some(budget_us)) == Some(true))
-            .min_by(|(_, a), (_, b)| a.relative_l2_median.total_cmp(&b.relative_l2_median))
-            .or_else(|| fitting().min_by_key(|(_, tier)| tier.latency.typical_us()))
-            .map(|(index, _)| index)
+            .filter(|&place| self.meets(place, Some(budget_us)) == Some(true))
+            .min_by(|&a, &b| error(a).total_cmp(&error(b)))
+            .or_else(|| fitting().min_by_key(|&place| self.predicted_latency_us(place)))
+    }
+
+    /// The tiers that a budget may pick: they render these effects, and are not there for
+    /// comparison alone, unless no other renders them.
+    pub(crate) fn for_budgets(&self, effects: &[String]) -> impl Iterator<Item = usize> {
+        let fitting = move || self.offered().filter(move |(_, tier)| tier.renders(effects));
+        let is_choice = fitting().any(|(_, tier)| !tier.for_comparison);
+        fitting()
+            .filter(move |(_, tier)| !(is_choice && tier.for_comparison))
+            .map(|(place, _)| place)
     }
 }

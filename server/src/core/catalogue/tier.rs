@@ -34,6 +34,8 @@ pub(crate) struct Tier {
     pub(crate) relative_l2_median: f64,
     /// 95th percentile of that error on the card's own split.
     pub(crate) relative_l2_p95: f64,
+    /// Another tier is more accurate and no slower: no budget picks this one.
+    pub(crate) for_comparison: bool,
     /// How long it takes here.
     pub(crate) latency: Arc<Latency>,
     /// Sessions that render with it now.
@@ -43,6 +45,11 @@ pub(crate) struct Tier {
 }
 
 impl Tier {
+    /// Whether it renders these effects.
+    pub(crate) fn renders(&self, effects: &[String]) -> bool {
+        effects.iter().all(|effect| self.effects.contains(effect))
+    }
+
     /// A session that has rendered [`probe_map`]: the memory that frames will use has been touched.
     /// `pressure_pa` and `sed_j_per_m3` (224 x 224 each) then hold that map and its answer.
     ///

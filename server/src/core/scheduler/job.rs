@@ -7,7 +7,7 @@ use std::{
 
 use bytes::{Bytes, BytesMut};
 use papilla_codec::{Input, Output};
-use papilla_proto::{FrameHeader, FrameKind, Problem, Window};
+use papilla_proto::{FrameHeader, FrameKind, Problem, Window, effects::OutOfRange};
 use papilla_session_effects::Effects;
 
 use crate::core::metrics::Stage;
@@ -36,8 +36,8 @@ pub(crate) struct Job {
 pub(crate) struct JobOptions {
     /// Bytes to be left free before the answer.
     pub(crate) headroom: usize,
-    /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(crate) accepts_out_of_range: bool,
+    /// What becomes of pressure above what the tier was trained on.
+    pub(crate) out_of_range: OutOfRange,
     /// The client's clock, us: effects that change with time go by it.
     pub(crate) time_us: u64,
     /// The session's effects. Only the thread that renders the frame locks them, and a session

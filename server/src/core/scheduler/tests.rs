@@ -5,7 +5,6 @@ mod gated;
 use std::{
     sync::{
         Arc, Mutex,
-        atomic::AtomicUsize,
         mpsc::{Receiver, SyncSender, sync_channel},
     },
     thread::sleep,
@@ -14,20 +13,14 @@ use std::{
 
 use bytes::Bytes;
 use papilla_codec::{Input, Output};
-use papilla_engine::{ModelInfo, ladder::Kind};
-use papilla_proto::{
-    ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType,
-    atlas::{Atlas, PatchVertices},
-};
-use serde_json::json;
+use papilla_proto::{ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType};
 use tokio::sync::mpsc;
 
 use self::gated::{Act, Gate, Gated};
 use super::{Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot};
 use crate::core::{
     buffers::{HEADROOM, Recycler},
-    catalogue::{Catalogue, Tier},
-    latency::Latency,
+    catalogue::testing,
     metrics::{Metrics, Stage},
 };
 
@@ -44,44 +37,8 @@ fn bench() -> Bench {
     let (begun_in, begun) = sync_channel(16);
     let (go, go_out) = sync_channel(16);
     let gate = Arc::new(Gate { begun: begun_in, go: Mutex::new(go_out) });
-    let info = ModelInfo {
-        name: "gated".to_owned(),
-        onnx_sha256: String::new(),
-        bytes: 0,
-        weights: 0,
-        atlas_hash: String::new(),
-        effects: Vec::new(),
-        network: json!({}),
-        pressure_max_pa: 100.0,
-        sed_max_j_per_m3: 100.0,
-        dataset_sha256: String::new(),
-        training: json!({}),
-        trainer_metrics: json!({}),
-        backend: "gated".to_owned(),
-    };
-    let tier = Tier {
-        name: "gated".to_owned(),
-        model: Arc::new(Gated { info, gate }),
-        card: json!({}),
-        effects: Vec::new(),
-        atlas_hash: String::new(),
-        pressure_max_pa: 100.0,
-        input_statistics_max: None,
-        sed_max_j_per_m3: 100.0,
-        kind: Kind::Network,
-        relative_l2_median: 0.1,
-        latency: Arc::new(Latency::default()),
-        sessions: Arc::new(AtomicUsize::new(0)),
-        relative_l2_p95: 0.0,
-        retired: false,
-    };
-    let patch = PatchVertices {
-        positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-        // All of the map is skin.
-        uv_px: vec![[0.0, 0.0], [0.0, 224.0], [224.0, 224.0], [224.0, 0.0]],
-    };
-    let atlas = Atlas::new(0.1, vec![[0, 1, 2], [0, 2, 3]], patch.clone(), patch).unwrap();
-    let catalogue = Arc::new(Catalogue::bare(atlas, vec![tier]));
+    let gated = Gated { info: testing::info("gated"), gate };
+    let catalogue = Arc::new(testing::catalogue(vec![testing::tier(Arc::new(gated), 0.1)]));
     let metrics = Metrics::new();
     metrics.name_tiers(catalogue.tier_labels());
     let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();

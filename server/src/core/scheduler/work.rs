@@ -28,6 +28,10 @@ use crate::{
     problem,
 };
 
+/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
+/// zero there in all of them.
+const RIM_SHARE: f32 = 0.01;
+
 /// Everything a thread owns; nothing is allocated after `prepare`.
 pub(super) struct Worker {
     catalogue: Arc<Catalogue>,
@@ -35,6 +39,8 @@ pub(super) struct Worker {
     /// One per tier, in the catalogue's order.
     sessions: Vec<Box<dyn Session>>,
     pressure_pa: Vec<f32>,
+    /// What the network sees in place of pressure beyond its range.
+    clamped_pa: Vec<f32>,
     sed_j_per_m3: Vec<f32>,
 }
 
@@ -49,6 +55,7 @@ impl Worker {
             catalogue: Arc::clone(catalogue),
             metrics,
             pressure_pa: vec![0.0; MAP_LEN],
+            clamped_pa: vec![0.0; MAP_LEN],
             sed_j_per_m3: vec![0.0; MAP_LEN],
         };
         for tier in &catalogue.tiers {
@@ -147,8 +154,12 @@ impl Worker {
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
         meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        let is_outside =
-            |trained| InputStatistics::of(&self.pressure_pa).is_out_of_distribution(trained);
+        let least_pa = RIM_SHARE * summary.peak_pa;
+        let is_cut_off = self.catalogue.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
+        meta.flags |= if is_cut_off { flags::CUT_OFF } else { 0 };
+        let is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
+        let seen_pa = if is_clamped { &self.clamped_pa } else { &self.pressure_pa };
+        let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
             !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
         meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
@@ -165,36 +176,29 @@ impl Worker {
         }) {
             return Ok(Outcome::Late(Stage::Inference));
         } else {
-            self.sessions[job.tier].infer(&self.pressure_pa, &mut self.sed_j_per_m3).map_err(
-                |error| {
-                    let error = format_args!("{}.onnx: {error}", tier.name);
-                    problem::internal("the inference failed", &error)
-                },
-            )?;
+            self.sessions[job.tier].infer(seen_pa, &mut self.sed_j_per_m3).map_err(|error| {
+                let error = format_args!("{}.onnx: {error}", tier.name);
+                problem::internal("the inference failed", &error)
+            })?;
             times.infer = decoded.elapsed();
             tier.latency.learn(times.infer);
         }
 
         let start = Instant::now();
-        let sed_max = tier.sed_max_j_per_m3;
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint());
             buffer.resize(headroom, 0);
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
             let written = effects
-                .write(pressure_pa, sed, sed_max, time_us, buffer)
+                .write(pressure_pa, sed, time_us, buffer)
                 .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
             (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
             let buffer = recycler.claim(headroom + job.output.size_hint());
             buffer.resize(headroom, 0);
-            let map = Map {
-                quantity: Quantity::Sed,
-                values: &self.sed_j_per_m3,
-                value_max: sed_max,
-                source: &tier.name,
-            };
+            let map =
+                Map { quantity: Quantity::Sed, values: &self.sed_j_per_m3, source: &tier.name };
             let scale = encode(job.output, map, buffer)
                 .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
@@ -212,7 +216,7 @@ impl Worker {
         decode(job.input, payload, &mut self.pressure_pa)?;
         let range = PressureRange {
             trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            accepts_out_of_range: job.options.accepts_out_of_range,
+            beyond: job.options.out_of_range,
         };
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);

@@ -109,8 +109,7 @@ fn rasterised(
         .rasterise(vertex_values, &mut values)
         .map_err(|error| problem::internal("the press does not fit the atlas", &error))?;
     let mut bytes = BytesMut::with_capacity(output.size_hint());
-    // No common scale: each picture uses the whole range of gray.
-    let map = Map { quantity, values: &values, value_max: f32::MIN_POSITIVE, source: "fe" };
+    let map = Map { quantity, values: &values, source: "fe" };
     let scale = encode(output, map, &mut bytes)
         .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
     let white = (output == Output::Png).then_some((white, scale));

@@ -72,6 +72,7 @@ impl Session {
 
     /// Takes one frame: into the slot, or back with an error.
     fn take(&mut self, connection: &Connection, frame: &Bytes, received: Instant, draining: bool) {
+        self.keep_budget(connection, received);
         let (reply, metrics) = (&connection.reply, &connection.app.metrics);
         let job = if draining { Err(problem::shutting_down()) } else { self.job(frame, received) };
         let job = match job {
@@ -103,6 +104,17 @@ impl Session {
                 reply.refuse(problem::shutting_down(), Some(header.sequence));
                 reply.finish();
             }
+        }
+    }
+
+    /// Goes on with another tier where the budget calls for one.
+    fn keep_budget(&mut self, connection: &Connection, now: Instant) {
+        let Some(budget) = &mut self.terms.budget else { return };
+        let (catalogue, old) = (connection.app.catalogue(), self.terms.tier);
+        if let Some(place) = budget.next(&catalogue, old, &connection.reply.fared, now) {
+            let (from, to) = (&catalogue.tiers[old], &catalogue.tiers[place]);
+            tracing::debug!(session = self.number, from = from.name, to = to.name, "another tier");
+            self.terms.move_to(place, to);
         }
     }
 
@@ -138,7 +150,7 @@ impl Session {
             deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
             options: JobOptions {
                 headroom: HEADROOM + header.header_len(),
-                accepts_out_of_range: self.terms.accepts_out_of_range,
+                out_of_range: self.terms.out_of_range,
                 time_us: header.client_time_us,
                 effects: self.terms.effects.clone(),
                 header: Some(header),

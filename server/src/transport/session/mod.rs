@@ -3,6 +3,7 @@
 //! The handshake is axum's; the framing is our own (`wire`), since a library would fill memory with
 //! zeros before it reads, and copy every map before it writes.
 
+mod budget;
 mod connection;
 mod frames;
 mod fresh;

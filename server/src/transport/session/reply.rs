@@ -16,6 +16,7 @@ use papilla_proto::{
 };
 
 use super::{
+    budget::Fared,
     outbox::Outbox,
     wire::{self, OUT_HEAD_MAX, opcode},
 };
@@ -37,6 +38,8 @@ pub(super) struct Reply {
     /// Whether the task waits for the last of them.
     is_awaited: AtomicBool,
     is_over: AtomicBool,
+    /// How the frames fare by their deadlines.
+    pub(super) fared: Fared,
     app: Arc<App>,
 }
 
@@ -47,6 +50,7 @@ impl Reply {
             outstanding: AtomicUsize::new(0),
             is_awaited: AtomicBool::new(false),
             is_over: AtomicBool::new(false),
+            fared: Fared::default(),
             app,
         }
     }
@@ -104,6 +108,9 @@ impl Reply {
         status: FrameStatus,
         received: Instant,
     ) {
+        if status == FrameStatus::Late {
+            self.fared.late(tier);
+        }
         let total_us = us(received.elapsed());
         let head = numbered(header.answer(status, total_us, 1.0), tier).encode();
         let mut message = [0; OUT_HEAD_MAX + HEADER_LEN_V2];
@@ -144,6 +151,7 @@ impl Reply {
         }
         // Counted before it is sent: whoever has the answer finds it in the metrics.
         self.app.metrics.of(Transport::Session).ok.inc();
+        self.fared.good(done.tier);
         let timers = self.app.metrics.tier(done.tier);
         let start = Instant::now();
         self.send(bytes, &head);

@@ -14,7 +14,7 @@ use papilla_proto::{
 };
 use papilla_session_effects::Effects;
 
-use super::reply::tier_number;
+use super::{budget::Budget, reply::tier_number};
 use crate::{
     core::{buffers::HEADROOM, catalogue::Tier},
     transport::app::App,
@@ -26,6 +26,8 @@ pub(super) struct Terms {
     pub(super) tier: usize,
     /// Deadline of frames that name none, us.
     pub(super) budget_us: Option<u32>,
+    /// Who chooses the tier while the session lasts; none: it stays.
+    pub(super) budget: Option<Budget>,
     /// Version of the frames, both ways.
     pub(super) version: u32,
     /// Sample type of the client's frames.
@@ -34,18 +36,24 @@ pub(super) struct Terms {
     pub(super) answer_sample_type: SampleType,
     /// Pa per unit of frames whose header says 0.
     pub(super) pressure_scale_pa: Option<f32>,
-    /// Whether pressure above what the tier was trained on is taken and flagged.
-    pub(super) accepts_out_of_range: bool,
+    /// What becomes of pressure above what the tier was trained on.
+    pub(super) out_of_range: OutOfRange,
     /// Longest delay on the way of a frame that is not stale, us.
     pub(super) stale_after_us: Option<u32>,
     /// What was asked for beside the bare map.
     pub(super) effects: Option<Arc<Mutex<Effects>>>,
     /// What the client is told of them.
     info: ReadyInfo,
-    _permit: Permit,
+    permit: Permit,
 }
 
 impl Terms {
+    /// Goes on with another tier.
+    pub(super) fn move_to(&mut self, place: usize, tier: &Tier) {
+        self.tier = place;
+        self.permit = Permit::take(tier);
+    }
+
     /// Most bytes of an answer, its heads included.
     pub(super) fn answer_len_max(&self) -> usize {
         let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
@@ -139,18 +147,25 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         sections: effects.sections().to_vec(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
     });
+    // Answers of version 1 could not tell of another tier.
+    let by_budget = budget_us.filter(|_| hello.version > 1 && hello.tier.is_none());
     Ok(Terms {
         tier: index,
         budget_us,
+        budget: by_budget.map(|us| Budget::new(us, wanted)),
         version: hello.version,
         sample_type: hello.sample_type,
         answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        accepts_out_of_range: hello.out_of_range == Some(OutOfRange::Flag),
+        // Frames of version 1 have no flags.
+        out_of_range: hello.out_of_range.unwrap_or(match hello.version {
+            1 => OutOfRange::Refuse,
+            _ => OutOfRange::Clamp,
+        }),
         stale_after_us: hello.stale_after_us,
         effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
         info,
-        _permit: Permit::take(tier),
+        permit: Permit::take(tier),
     })
 }
 
@@ -187,6 +202,10 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         pressure_max_pa: tier.pressure_max_pa,
         sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
         tier_number: is_new.then(|| tier_number(terms.tier)),
+        tier_names: terms
+            .budget
+            .as_ref()
+            .map(|_| catalogue.tiers.iter().map(|tier| tier.name.clone()).collect()),
         answer_sample_type: is_new.then_some(terms.answer_sample_type),
         session_effects: is_new.then(|| terms.info.names.clone()),
         sections: is_new.then(sections),

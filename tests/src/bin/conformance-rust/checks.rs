@@ -80,6 +80,7 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
             ("out_of_range", answer.out_of_range),
             ("no_contact", answer.no_contact),
             ("unfamiliar", answer.unfamiliar),
+            ("cut_off", answer.cut_off),
         ];
         for (name, is_set) in found {
             ensure!(is_set == due.contains(&json!(name)), "the flag {name} is {is_set}");

@@ -157,10 +157,9 @@ impl Run {
         let server = self.server.clone();
         let skin = Skin::new(&spawn_blocking(move || atlas(&server)).await??);
         let contacts: Vec<inputs::Contact> = member(step, "contacts")?;
-        let contact = |c: &inputs::Contact| Contact {
-            at_mm: c.at_mm,
-            force_n: c.force_n,
-            radius_mm: c.radius_mm,
+        let contact = |c: &inputs::Contact| match c.radius_mm {
+            Some(radius_mm) => Contact { at_mm: c.at_mm, force_n: c.force_n, radius_mm },
+            None => Contact::flat(c.at_mm, c.force_n),
         };
         let map_pa = skin.contacts(&contacts.iter().map(contact).collect::<Vec<_>>());
         if let Some(due) = step["expect"].get("force_n") {

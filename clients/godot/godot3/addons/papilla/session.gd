@@ -58,6 +58,7 @@ var _asked = {}
 var _before = null
 var _older_ready = null
 var _renewed_from = 0
+var _warned = {}
 
 
 func _ready():
@@ -240,10 +241,13 @@ func _text(message):
 		var sequence = int(message.sequence)
 		if _outstanding.has(sequence):
 			_outstanding.erase(sequence)
+			_warn("error", "a frame was refused: " + message.message)
 			_tell({"status": "error", "sequence": sequence, "problem": message})
 			_flush()
 	else:
 		_on_refusal(message)
+		if _is_refused:
+			_warn("refused", "the session was refused: " + message.message)
 		emit_signal("refused", message)
 
 
@@ -275,7 +279,16 @@ func _binary(packet):
 	if not is_older:
 		_older_ready = null
 	_flush()
+	if answer.status == "ok" and answer.out_of_range:
+		_warn("out_of_range", "pressure is beyond what the tier knows; such answers are flagged")
 	_tell(answer)
+
+
+# Says once what a scene that looks at maps alone would not see.
+func _warn(kind, words):
+	if not _warned.has(kind):
+		_warned[kind] = true
+		push_warning("papilla: " + words)
 
 
 func _tell(answer):

@@ -5,6 +5,8 @@ extends RefCounted
 const Compat = preload("compat.gd")
 const SIDE_PX = 224
 const REACH_MM = 5.0
+const RADIUS_AT_1_N_MM = 5.1
+const BLOCK_PX = 12
 
 var hash_hex = ""
 # Corners of the triangles, three each.
@@ -22,6 +24,12 @@ var first = PackedInt32Array()
 var areas_mm2 = PackedFloat32Array()
 var places_mm = PackedFloat32Array()
 
+# The same pixels block by block: what contacts read.
+var _places = []
+var _areas = []
+var _indices = []
+var _blocks = []
+
 
 # From the text of GET /v1/atlas. Takes about a second.
 func _init(text):
@@ -36,6 +44,7 @@ func _init(text):
 	interface_uv_px = _flat(json.interface.uv_px)
 	_claim_all()
 	_place_pixels()
+	_sort_into_blocks()
 
 
 func vertex_count():
@@ -66,45 +75,85 @@ func pressure_map(vertex_pa):
 
 
 # Contact points [{at_mm = Vector3 or array, force_n, radius_mm}] as a map: each is the pressure of Hertz's contact of that force and
-# radius around the nearest point of the skin; one more than 5 mm off the skin adds nothing.
+# radius around the nearest point of the skin; one more than 5 mm off the skin adds nothing. Without a radius it is the finger's own
+# on a flat object.
 func contact_map(contacts):
 	var map = zeros()
 	for contact in contacts:
-		map = _add_contact(map, contact.at_mm, contact.force_n, contact.radius_mm)
+		var radius_mm = contact.get("radius_mm", RADIUS_AT_1_N_MM * pow(contact.force_n, 1.0 / 3.0))
+		map = _add_contact(map, contact.at_mm, contact.force_n, radius_mm)
 	return map
 
 
 func _add_contact(map, at, force_n, radius_mm):
-	var nearest = -1
-	var least = REACH_MM * REACH_MM
-	for n in pixels.size():
-		var d2 = _squared(n, at[0], at[1], at[2])
-		if d2 < least or (d2 == least and (nearest < 0 or pixels[n] < pixels[nearest])):
-			least = d2
-			nearest = n
+	var nearest = _nearest(Vector3(at[0], at[1], at[2]))
 	if nearest < 0:
 		return map
-	var x = places_mm[3 * nearest]
-	var y = places_mm[3 * nearest + 1]
-	var z = places_mm[3 * nearest + 2]
-	var total = 0.0
-	var parts = {}
-	for n in pixels.size():
-		var part = 1.0 - _squared(n, x, y, z) / (radius_mm * radius_mm)
-		if n == nearest or part > 0:
-			parts[n] = 1.0 if n == nearest else sqrt(part)
-			total += parts[n] * areas_mm2[n]
-	for n in parts:
-		map[pixels[n]] += 1e6 * force_n * parts[n] / total
+	# Of locals and plain arrays, since this loop is what a contact costs.
+	var places = _places
+	var areas = _areas
+	var own = places[nearest]
+	var per_mm2 = 1.0 / (radius_mm * radius_mm)
+	var touched = [nearest]
+	var parts = [1.0]
+	var total = areas[nearest]
+	for block in _blocks:
+		if own.distance_to(block.centre) > radius_mm + block.radius:
+			continue
+		for n in range(block.first, block.end):
+			var part = 1.0 - own.distance_squared_to(places[n]) * per_mm2
+			if part > 0.0 and n != nearest:
+				part = sqrt(part)
+				total += part * areas[n]
+				touched.append(n)
+				parts.append(part)
+	var top_pa = 1e6 * force_n / total
+	var indices = _indices
+	for k in touched.size():
+		map[indices[touched[k]]] += top_pa * parts[k]
 	# Arrays of floats are handed over by value in Godot 3: hence the return.
 	return map
 
 
-func _squared(n, x, y, z):
-	var dx = places_mm[3 * n] - x
-	var dy = places_mm[3 * n + 1] - y
-	var dz = places_mm[3 * n + 2] - z
-	return dx * dx + dy * dy + dz * dz
+# The place of the skin's pixel nearest to a point, the first of equals; -1 beyond REACH_MM.
+func _nearest(at):
+	# No pixel of the nearest block can be farther than this.
+	var within = REACH_MM
+	for block in _blocks:
+		within = min(within, at.distance_to(block.centre) + block.radius)
+	var nearest = -1
+	var least = REACH_MM * REACH_MM
+	for block in _blocks:
+		if at.distance_to(block.centre) - block.radius > within:
+			continue
+		for n in range(block.first, block.end):
+			var d2 = at.distance_squared_to(_places[n])
+			if d2 < least or (d2 == least and (nearest < 0 or _indices[n] < _indices[nearest])):
+				least = d2
+				nearest = n
+	return nearest
+
+
+# Pixels by squares of BLOCK_PX, each with the sphere that holds it: a contact looks at those that it may touch.
+func _sort_into_blocks():
+	var members = {}
+	for n in pixels.size():
+		var key = pixels[n] / SIDE_PX / BLOCK_PX * SIDE_PX + pixels[n] % SIDE_PX / BLOCK_PX
+		if not members.has(key):
+			members[key] = []
+		members[key].append(n)
+	for key in members:
+		var centre = Vector3()
+		var begin = _places.size()
+		for n in members[key]:
+			_places.append(Vector3(places_mm[3 * n], places_mm[3 * n + 1], places_mm[3 * n + 2]))
+			_areas.append(areas_mm2[n])
+			_indices.append(pixels[n])
+			centre += _places[_places.size() - 1] / members[key].size()
+		var radius = 0.0
+		for n in range(begin, _places.size()):
+			radius = max(radius, centre.distance_to(_places[n]))
+		_blocks.append({"centre": centre, "radius": radius + 1e-4, "first": begin, "end": _places.size()})
 
 
 # Force of a pressure map over the undeformed skin, N.

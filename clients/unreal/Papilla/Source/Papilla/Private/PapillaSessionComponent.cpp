@@ -39,6 +39,11 @@ void UPapillaSessionComponent::BeginPlay()
     Core = MakeUnique<papilla::Core>(ToUtf8(Hello));
     Core->on_answer = [this](const papilla::Answer& Outcome)
     {
+        if (Outcome.status == papilla::Status::error && !bHasWarned)
+        {
+            bHasWarned = true;
+            UE_LOG(LogTemp, Warning, TEXT("Papilla refused a frame: %s"), *ToFString(Outcome.problem.message));
+        }
         if (Outcome.status != papilla::Status::ok) return;
         Answer = Outcome;
         bHasAnswer = true;

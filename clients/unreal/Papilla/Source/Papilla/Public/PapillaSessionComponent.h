@@ -26,7 +26,7 @@ struct FPapillaContact
     double ForceN = 0.0;
 
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
-    double RadiusMm = 2.5;
+    double RadiusMm = 0.0;  // 0: the finger's own on a flat object
 };
 
 DECLARE_DYNAMIC_MULTICAST_DELEGATE(FPapillaReady);
@@ -108,5 +108,6 @@ private:
     std::vector<papilla::Contact> Points;
     bool bHasAtlas = false;
     bool bHasAnswer = false;
+    bool bHasWarned = false;
     double RetryAt = 0.0;
 };

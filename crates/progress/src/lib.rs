@@ -1,4 +1,14 @@
 //! How far long work is: a bar on a terminal, elsewhere a line every few seconds.
+//!
+//! ```
+//! use papilla_progress::Progress;
+//!
+//! let progress = Progress::new("samples", 3, 0, false);
+//! for sample in ["a", "b", "c"] {
+//!     progress.set_message(sample);
+//!     progress.inc();
+//! }
+//! ```
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write as _;
@@ -11,14 +21,15 @@ use std::time::{Duration, Instant};
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 /// The progress of some work, on standard error until it is dropped.
-pub(crate) struct Progress {
+#[derive(Debug)]
+pub struct Progress {
     bar: ProgressBar,
     lines: Option<Lines>,
 }
 
 impl Progress {
     /// Of `total` parts of which `reused` were done by an earlier run; `quiet` shows nothing.
-    pub(crate) fn new(what: &str, total: usize, reused: usize, quiet: bool) -> Self {
+    pub fn new(what: &str, total: usize, reused: usize, quiet: bool) -> Self {
         let terminal = std::io::stderr().is_terminal();
         let shown = terminal && !quiet;
         let target =
@@ -42,27 +53,27 @@ impl Progress {
     }
 
     /// One more part is done.
-    pub(crate) fn inc(&self) {
+    pub fn inc(&self) {
         self.bar.inc(1);
     }
 
     /// So many parts are done.
-    pub(crate) fn set_position(&self, done: usize) {
+    pub fn set_position(&self, done: usize) {
         self.bar.set_position(done as u64);
     }
 
     /// There are so many parts.
-    pub(crate) fn set_length(&self, total: usize) {
+    pub fn set_length(&self, total: usize) {
         self.bar.set_length(total as u64);
     }
 
     /// What is being done now.
-    pub(crate) fn set_message(&self, state: impl Into<String>) {
+    pub fn set_message(&self, state: impl Into<String>) {
         self.bar.set_message(state.into());
     }
 
     /// Prints to standard output or error without a bar in the way.
-    pub(crate) fn suspend(&self, print: impl FnOnce()) {
+    pub fn suspend(&self, print: impl FnOnce()) {
         self.bar.suspend(print);
     }
 }
@@ -75,6 +86,7 @@ impl Drop for Progress {
 }
 
 /// A thread that writes lines until it is dropped.
+#[derive(Debug)]
 struct Lines {
     ended: Arc<(Mutex<bool>, Condvar)>,
     writer: Option<JoinHandle<()>>,
@@ -135,7 +147,7 @@ fn left(passed: Duration, done: u64, all: u64, reused: u64) -> String {
 }
 
 /// A duration as h:mm:ss.
-pub(crate) fn clock(duration: Duration) -> String {
+pub fn clock(duration: Duration) -> String {
     let s = duration.as_secs();
     format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }

@@ -21,6 +21,7 @@ sealed partial class Run
             if (got.OutOfRange) flags.Add("out_of_range");
             if (got.NoContact) flags.Add("no_contact");
             if (got.Unfamiliar) flags.Add("unfamiliar");
+            if (got.CutOff) flags.Add("cut_off");
             Same("flags", string.Join(",", flags), string.Join(",", expect["flags"].Select(f => (string)f)));
         }
         if (expect["tier"] != null && got.Window != null) Same("tier", tiers[got.TierNumber], (string)expect["tier"]);

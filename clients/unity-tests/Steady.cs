@@ -9,6 +9,11 @@ static class Steady
 
     static int Main()
     {
+        // Two springs in a row, 10 and 30 kPa/mm: the softer takes three quarters of a millimetre.
+        var springs = new Foundation { Stiffness = 10000, Exponent = 1, Relief = 0 };
+        var vertexPa = new float[1];
+        springs.Pressures(new float[] { 1 }, vertexPa, float.MaxValue, 30000);
+        if (Math.Abs(springs.FingerShare - 0.75) > 1e-6 || Math.Abs(vertexPa[0] - 7500) > 0.01) throw new Exception("soft object: " + vertexPa[0] + " Pa");
         var pressurePa = new float[Wire.MapLength];
         for (int k = 0; k < 5000; k++) pressurePa[20000 + k] = 3000;
         long before = 0;

@@ -56,7 +56,7 @@ sealed class Outcome
     internal string Code, Field;
     internal float[] Map, Summary, Points, Actuators;
     internal int[] Window;
-    internal bool IsRate, OutOfRange, NoContact, Unfamiliar;
+    internal bool IsRate, OutOfRange, NoContact, Unfamiliar, CutOff;
     internal ulong ClientTimeUs;
     internal int TierNumber;
     internal uint TotalUs, QueueUs, InferUs;
@@ -150,7 +150,7 @@ sealed partial class Run : IDisposable
                 Status = a.Status, Code = a.Problem == null ? null : a.Problem.Code, Field = a.Problem == null ? null : a.Problem.Field,
                 Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
                 Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
-                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar,
+                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
                 ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
             };
             order.Add(a.Sequence);
@@ -290,7 +290,9 @@ sealed partial class Run : IDisposable
         var map = new float[Wire.MapLength];
         foreach (var c in step["contacts"])
         {
-            atlas.AddContact((double)c["at_mm"][0], (double)c["at_mm"][1], (double)c["at_mm"][2], (double)c["force_n"], (double)c["radius_mm"], map);
+            double x = (double)c["at_mm"][0], y = (double)c["at_mm"][1], z = (double)c["at_mm"][2], forceN = (double)c["force_n"];
+            if (c["radius_mm"] == null) atlas.AddContact(x, y, z, forceN, map);
+            else atlas.AddContact(x, y, z, forceN, (double)c["radius_mm"], map);
         }
         CheckMap(expect, map);
         if (expect["force_n"] != null) Near("force", atlas.ForceN(map), (double)expect["force_n"][0], (double)expect["force_n"][1]);

@@ -1,0 +1,60 @@
+//! Catalogues for tests, of tiers without files.
+
+use std::sync::{Arc, atomic::AtomicUsize};
+
+use papilla_engine::{Model, ModelInfo, ladder::Kind};
+use papilla_proto::atlas::{Atlas, PatchVertices};
+use serde_json::json;
+
+use super::{Catalogue, Tier};
+use crate::core::latency::Latency;
+
+/// What a model says of itself.
+pub(crate) fn info(name: &str) -> ModelInfo {
+    ModelInfo {
+        name: name.to_owned(),
+        onnx_sha256: String::new(),
+        bytes: 0,
+        weights: 0,
+        atlas_hash: String::new(),
+        effects: Vec::new(),
+        network: json!({}),
+        pressure_max_pa: 100.0,
+        sed_max_j_per_m3: 100.0,
+        dataset_sha256: String::new(),
+        training: json!({}),
+        trainer_metrics: json!({}),
+        backend: "test".to_owned(),
+    }
+}
+
+/// A tier that errs by so much.
+pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
+    Tier {
+        name: model.info().name.clone(),
+        model,
+        card: json!({}),
+        effects: Vec::new(),
+        atlas_hash: String::new(),
+        pressure_max_pa: 100.0,
+        input_statistics_max: None,
+        sed_max_j_per_m3: 100.0,
+        kind: Kind::Network,
+        relative_l2_median,
+        relative_l2_p95: 0.0,
+        for_comparison: false,
+        latency: Arc::new(Latency::default()),
+        sessions: Arc::new(AtomicUsize::new(0)),
+        retired: false,
+    }
+}
+
+/// These tiers on an atlas whose skin is all of the map.
+pub(crate) fn catalogue(tiers: Vec<Tier>) -> Catalogue {
+    let patch = PatchVertices {
+        positions_mm: vec![[0.0; 3], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+        uv_px: vec![[0.0, 0.0], [0.0, 224.0], [224.0, 224.0], [224.0, 0.0]],
+    };
+    let atlas = Atlas::new(0.1, vec![[0, 1, 2], [0, 2, 3]], patch.clone(), patch).unwrap();
+    Catalogue::bare(atlas, tiers)
+}

@@ -1,0 +1,133 @@
+//! The budget of a session, kept live: the tier follows what this machine does now.
+
+use std::{
+    sync::atomic::{AtomicU32, AtomicUsize, Ordering},
+    time::{Duration, Instant},
+};
+
+use crate::core::catalogue::Catalogue;
+
+/// Late frames after which a session goes down; two more may be on their way.
+const LATE_MOST: u32 = 8;
+/// Frames in time, one after another, after which earlier late ones are forgotten.
+const GOOD_LEAST: u32 = 32;
+/// Time between two changes before a more accurate tier is tried. It doubles each time the tier
+/// that was tried cannot keep the budget, so that a session does not swing.
+const TRY_AFTER: Duration = Duration::from_secs(2);
+const TRY_AFTER_MOST: Duration = Duration::from_secs(64);
+/// Share of the budget that a more accurate tier may be expected to take.
+const SHARE_TO_CLIMB: f64 = 0.8;
+
+/// How the frames of a session fare: counted where answers are sent.
+#[derive(Debug, Default)]
+pub(super) struct Fared {
+    /// The tier that the counts are of: answers of the one before do not count.
+    tier: AtomicUsize,
+    late: AtomicU32,
+    good: AtomicU32,
+}
+
+impl Fared {
+    /// A frame of this tier was late.
+    pub(super) fn late(&self, tier: usize) {
+        if tier == self.tier.load(Ordering::Relaxed) {
+            self.late.fetch_add(1, Ordering::Relaxed);
+            self.good.store(0, Ordering::Relaxed);
+        }
+    }
+
+    /// A frame of this tier was in time.
+    pub(super) fn good(&self, tier: usize) {
+        if tier == self.tier.load(Ordering::Relaxed)
+            && self.good.fetch_add(1, Ordering::Relaxed) >= GOOD_LEAST
+        {
+            self.late.store(0, Ordering::Relaxed);
+        }
+    }
+
+    fn begin(&self, tier: usize) {
+        self.tier.store(tier, Ordering::Relaxed);
+        self.late.store(0, Ordering::Relaxed);
+        self.good.store(0, Ordering::Relaxed);
+    }
+}
+
+/// The choice of tier of a session that named a budget and no tier.
+#[derive(Debug)]
+pub(super) struct Budget {
+    budget_us: u32,
+    /// Effects that the tier has to render.
+    effects: Vec<String>,
+    changed: Option<Instant>,
+    try_after: Duration,
+    /// Whether the last change was to a more accurate tier.
+    has_climbed: bool,
+}
+
+impl Budget {
+    pub(super) fn new(budget_us: u32, effects: Vec<String>) -> Self {
+        Self { budget_us, effects, changed: None, try_after: TRY_AFTER, has_climbed: false }
+    }
+
+    /// The tier for the next frame, where it is another than `tier`. Allocates nothing.
+    pub(super) fn next(
+        &mut self,
+        catalogue: &Catalogue,
+        tier: usize,
+        fared: &Fared,
+        now: Instant,
+    ) -> Option<usize> {
+        let Some(changed) = self.changed else {
+            self.changed = Some(now);
+            fared.begin(tier);
+            return None;
+        };
+        let since = now.saturating_duration_since(changed);
+        let next = if fared.late.load(Ordering::Relaxed) >= LATE_MOST {
+            let faster = self.faster(catalogue, tier);
+            if faster.is_none() {
+                fared.begin(tier);
+            }
+            faster
+        } else if since >= self.try_after && fared.good.load(Ordering::Relaxed) >= GOOD_LEAST {
+            self.more_accurate(catalogue, tier)
+        } else {
+            None
+        }?;
+        let climbs = error_of(catalogue, next) < error_of(catalogue, tier);
+        self.try_after = match (self.has_climbed, climbs) {
+            (true, false) => (2 * self.try_after).min(TRY_AFTER_MOST),
+            // What was tried before has held.
+            (true, true) => TRY_AFTER,
+            (false, _) => self.try_after,
+        };
+        (self.changed, self.has_climbed) = (Some(now), climbs);
+        fared.begin(next);
+        Some(next)
+    }
+
+    /// Of the faster tiers the most accurate that is expected to keep the budget, or else the
+    /// fastest.
+    fn faster(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
+        let time_us = catalogue.predicted_latency_us(tier);
+        let is_faster = |place: usize| catalogue.predicted_latency_us(place) < time_us;
+        catalogue.choose_among(self.budget_us, &self.effects, is_faster)
+    }
+
+    /// The most accurate tier that may keep the budget, if that is more accurate than this one.
+    fn more_accurate(&self, catalogue: &Catalogue, tier: usize) -> Option<usize> {
+        let most_us = SHARE_TO_CLIMB * f64::from(self.budget_us);
+        catalogue
+            .for_budgets(&self.effects)
+            .filter(|&place| error_of(catalogue, place) < error_of(catalogue, tier))
+            .filter(|&place| catalogue.hoped_latency_us(place, tier) as f64 <= most_us)
+            .min_by(|&a, &b| error_of(catalogue, a).total_cmp(&error_of(catalogue, b)))
+    }
+}
+
+fn error_of(catalogue: &Catalogue, tier: usize) -> f64 {
+    catalogue.tiers[tier].relative_l2_median
+}
+
+#[cfg(test)]
+mod tests;
