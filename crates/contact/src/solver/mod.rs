@@ -13,9 +13,11 @@ mod iteration;
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
 use crate::error::ContactError;
+use crate::force_target::Reached;
+use crate::gaps::Field;
 use crate::ladder::Method;
 use crate::model::ContactModel;
-use crate::objects::{Object, View, validate};
+use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
 use crate::springs;
@@ -70,7 +72,7 @@ pub struct Settings {
 /// Contact of one finger. All memory is taken at construction.
 #[derive(Debug)]
 pub struct Solver {
-    model: Arc<ContactModel>,
+    pub(crate) model: Arc<ContactModel>,
     settings: Settings,
     patch: Patch,
     bounded: BoundedSolver,
@@ -86,6 +88,10 @@ pub struct Solver {
     /// Distance from the objects at rest and vertex.
     candidates: Vec<(f64, u32)>,
     overflow: bool,
+    /// Gaps of this frame.
+    field: Field,
+    /// Where the last frame under a net force ended.
+    pub(crate) reached: Option<Reached>,
 }
 
 impl Solver {
@@ -115,6 +121,8 @@ impl Solver {
             wanted: vec![false; model.vertices()],
             candidates: Vec::with_capacity(model.vertices()),
             overflow: false,
+            field: Field::with_capacity(model.vertices()),
+            reached: None,
             patch,
             model,
             settings,
@@ -125,6 +133,7 @@ impl Solver {
     pub fn reset(&mut self) {
         self.patch.clear();
         self.made = 0;
+        self.reached = None;
     }
 
     /// The model that it solves with.
@@ -133,45 +142,84 @@ impl Solver {
         &self.model
     }
 
-    /// Finds what presses on the finger where `objects` are; they are in the finger's frame, in mm
-    /// of this person.
+    /// Finds what presses on the finger in a scene: objects in the finger's frame, in mm of this
+    /// person, or gaps.
     ///
     /// # Errors
-    /// [`ContactError`] for what cannot be placed; the last frame is kept.
-    pub fn solve(&mut self, objects: &[Object], out: &mut Contact) -> Result<(), ContactError> {
-        validate(objects)?;
-        self.frame(View { objects, length: self.settings.person.width, shift_mm: [0.0; 3] }, out);
-        Ok(())
+    /// [`ContactError`] for what cannot be placed, with the last frame kept, or
+    /// [`ContactError::Diverged`].
+    pub fn solve<'a>(
+        &mut self,
+        scene: impl Into<Scene<'a>>,
+        out: &mut Contact,
+    ) -> Result<(), ContactError> {
+        self.within(scene.into(), |solver, view| solver.frame(view, out))
     }
 
-    pub(crate) const fn person(&self) -> Person {
-        self.settings.person
+    /// Runs `work` on a view of the scene.
+    pub(crate) fn within<T>(
+        &mut self,
+        scene: Scene<'_>,
+        work: impl FnOnce(&mut Self, View<'_>) -> Result<T, ContactError>,
+    ) -> Result<T, ContactError> {
+        let length = self.settings.person.width;
+        match scene {
+            Scene::Objects(objects) => {
+                validate(objects)?;
+                let things = Things::Objects(objects);
+                work(self, View { things, length, shift_mm: [0.0; 3] })
+            }
+            Scene::Gaps(gaps) => {
+                let mut field = std::mem::take(&mut self.field);
+                let read = field.read(&self.model, gaps, length, KEPT_MM as f32);
+                let result = read.and_then(|()| {
+                    let things = Things::Field(&field);
+                    work(self, View { things, length, shift_mm: [0.0; 3] })
+                });
+                self.field = field;
+                result
+            }
+        }
     }
 
-    /// A distance that all objects are certainly away from the finger at rest, mm.
-    pub(crate) fn free_mm(&self, view: View<'_>) -> f64 {
-        let free = |at: &[f64; 3]| view.clearance_mm(*at);
-        view.length * self.model.positions_mm.iter().map(free).fold(f64::INFINITY, f64::min)
+    /// Finds what presses on the finger in `view`. A warm frame that runs away is tried once more
+    /// from nothing.
+    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) -> Result<(), ContactError> {
+        if self.attempt(view, out) {
+            return Ok(());
+        }
+        self.reset();
+        if self.attempt(view, out) {
+            return Ok(());
+        }
+        self.reset();
+        out.clear();
+        Err(ContactError::Diverged)
     }
 
-    /// Finds what presses on the finger in `view`.
-    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) {
+    /// Whether what came out is finite.
+    fn attempt(&mut self, view: View<'_>, out: &mut Contact) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         out.clear();
         self.find_candidates(view, &mut out.effort);
         if self.candidates.is_empty() {
-            self.reset();
-            return;
+            self.patch.clear();
+            self.made = 0;
+            return true;
         }
         if self.settings.method == Method::Springs {
             springs::press(&self.model, view, self.settings.person, &self.candidates, out);
-            return;
+            return true;
         }
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
         let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
+        if !change.is_finite() {
+            return false;
+        }
         self.answer(change, out);
+        out.force_n.iter().chain(&out.torque_n_mm).all(|v| v.is_finite())
     }
 
     /// Displaces the first `rows` slots under the near slots' forces.
@@ -213,15 +261,13 @@ impl Solver {
         for slot in 0..slots {
             let vertex = patch.vertices()[slot] as usize;
             let v = &mut patch.values;
-            let at = std::array::from_fn(|i| {
-                model.positions_mm[vertex][i] + f64::from(v.moved[i][slot])
-            });
-            let nearest = view.nearest(at);
+            let moved = [0, 1, 2].map(|i| f64::from(v.moved[i][slot]));
+            let nearest = view.nearest(model, vertex, moved);
             for i in 0..3 {
                 v.normal[i][slot] = nearest.normal[i] as f32;
             }
             // In the units of the reference finger: pressure over stiffness, length over width.
-            let give = stiffness / (view.objects[nearest.object].stiffness_mpa_per_mm * width);
+            let give = stiffness / (nearest.stiffness_mpa_per_mm * width);
             v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
             v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
         }

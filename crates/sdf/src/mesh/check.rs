@@ -103,8 +103,11 @@ pub(super) fn checked(mesh: &Mesh) -> Result<Checked, MeshError> {
     Ok(Checked { corners_mm, triangles, tree })
 }
 
-/// Corners without doubles, and the triangles between them.
-fn welded(mesh: &Mesh) -> Result<(Vec<[f64; 3]>, Vec<[u32; 3]>), MeshError> {
+/// Corners without doubles, mm, and the triangles between them.
+type Welded = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+/// Corners at the same place become one.
+fn welded(mesh: &Mesh) -> Result<Welded, MeshError> {
     let mut first = HashMap::new();
     let mut corners = Vec::new();
     let mut new = Vec::with_capacity(mesh.vertices_mm.len());
