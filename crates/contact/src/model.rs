@@ -36,6 +36,9 @@ pub struct Header {
     /// Largest share of second-order displacement among the training indentations; beyond it
     /// an answer is out of range.
     pub share_max: f32,
+    /// Deepest training indentation, mm; beyond it an answer is out of range. 0: not known.
+    #[serde(default)]
+    pub depth_max_mm: f32,
     /// mm/N for a unit of the file's compliance; set when it is written.
     #[serde(default)]
     pub compliance_unit_mm_per_n: f32,

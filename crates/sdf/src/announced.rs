@@ -2,8 +2,8 @@
 
 use super::rules::{BadValue, ShapeError, length, require};
 use super::{
-    AnyOf, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, Placed, Placement, Plate,
-    Punch, Ring, SignedDistance, Sphere, Wedge,
+    AnyOf, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, MeshError, Placed, Placement,
+    Plate, Punch, Ring, SignedDistance, Sphere, Wedge,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -35,6 +35,28 @@ pub enum AnnouncedShape {
     Mesh(Mesh),
     /// Several of them, each moved and turned.
     Union(AnnouncedUnion),
+}
+
+/// Why what was announced is no shape.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AnnouncedError {
+    /// A dimension makes no sense.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// A mesh bounds no body.
+    #[error("{field}: {source}")]
+    Mesh {
+        /// The mesh, dotted.
+        field: String,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+}
+
+impl From<BadValue> for AnnouncedError {
+    fn from(error: BadValue) -> Self {
+        Self::Shape(error.into())
+    }
 }
 
 /// A plate with a face of listed heights, see [`crate::Heightmap`].
@@ -86,8 +108,8 @@ impl AnnouncedShape {
     /// The shape.
     ///
     /// # Errors
-    /// [`ShapeError`] names the member, `field` before it, and its rule.
-    pub fn build(&self, field: &str) -> Result<Arc<dyn SignedDistance>, ShapeError> {
+    /// [`AnnouncedError`] names the member, `field` before it, and its rule.
+    pub fn build(&self, field: &str) -> Result<Arc<dyn SignedDistance>, AnnouncedError> {
         let plain = match self {
             Self::Plate(s) => IndenterSpec::Plate(*s),
             Self::Sphere(s) => IndenterSpec::Sphere(*s),
@@ -99,13 +121,13 @@ impl AnnouncedShape {
             Self::Dots(s) => IndenterSpec::Dots(*s),
             Self::Heightmap(s) => return Ok(Arc::new(s.build().map_err(|e| e.under(field))?)),
             Self::Mesh(s) => {
-                let refuse = |source| ShapeError::Mesh { field: field.to_owned(), source };
+                let refuse = |source| AnnouncedError::Mesh { field: field.to_owned(), source };
                 return Ok(Arc::new(s.build().map_err(refuse)?));
             }
             Self::Union(s) => return Ok(Arc::new(s.build(field)?)),
         };
         plain.validate_part().map_err(|e| e.under(field))?;
-        plain.build(Path::new(""))
+        Ok(plain.build(Path::new(""))?)
     }
 
     /// Numbers that it takes memory for: triangles of meshes and heights.
@@ -138,18 +160,18 @@ impl HeightGrid {
 }
 
 impl AnnouncedUnion {
-    fn build(&self, field: &str) -> Result<AnyOf, ShapeError> {
+    fn build(&self, field: &str) -> Result<AnyOf, AnnouncedError> {
         let some = (1..=PARTS_MAX).contains(&self.parts.len());
         require(some, "parts", &self.parts.len(), "has to list 1 to 64 parts")
             .map_err(|e| e.under(field))?;
         let parts = self.parts.iter().enumerate();
         let parts = parts.map(|(i, part)| part.build(&format!("{field}.parts[{i}]")));
-        Ok(AnyOf { parts: parts.collect::<Result<_, ShapeError>>()? })
+        Ok(AnyOf { parts: parts.collect::<Result<_, AnnouncedError>>()? })
     }
 }
 
 impl AnnouncedPart {
-    fn build(&self, field: &str) -> Result<Placed, ShapeError> {
+    fn build(&self, field: &str) -> Result<Placed, AnnouncedError> {
         let check = || {
             let near = self.at_mm.iter().all(|v| v.abs() <= 1000.0);
             require(near, "at_mm", &self.at_mm, "has to be within 1000 mm")?;

@@ -37,7 +37,7 @@ mod touch;
 mod union;
 mod wedge;
 
-pub use announced::{AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};
+pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};
 pub use cylinder::Cylinder;
 pub use dots::Dots;
 pub use grating::Grating;

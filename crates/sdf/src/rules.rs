@@ -24,14 +24,6 @@ pub enum ShapeError {
     /// A dimension makes no sense.
     #[error(transparent)]
     Value(#[from] BadValue),
-    /// A mesh bounds no body.
-    #[error("{field}: {source}")]
-    Mesh {
-        /// The mesh, dotted.
-        field: String,
-        /// What is wrong with it.
-        source: crate::MeshError,
-    },
     /// A picture cannot be taken as a height map.
     #[error("{} cannot be a height map: {message}", path.display())]
     Picture {

@@ -150,6 +150,20 @@ impl Solver {
         relaxation
     }
 
+    /// Takes the forces gone on from for the answer: the mean of what an iteration that does not
+    /// settle goes to and fro between.
+    pub(super) fn take_mean(&mut self) {
+        let m = self.patch.near();
+        let Slots { force, found, normal, size, .. } = &mut self.patch.values;
+        for slot in 0..m {
+            let along: f32 = (0..3).map(|i| force[i][slot] * normal[i][slot]).sum();
+            size[slot] = if along > FORCE_MIN_N { along } else { 0.0 };
+            for i in 0..3 {
+                found[i][slot] = size[slot] * normal[i][slot];
+            }
+        }
+    }
+
     /// Displaces all slots; returns the largest change, mm.
     pub(super) fn follow(&mut self) -> f32 {
         let n = self.patch.near();

@@ -16,7 +16,7 @@ use crate::error::ContactError;
 use crate::force_target::Reached;
 use crate::gaps::Field;
 use crate::ladder::Method;
-use crate::model::ContactModel;
+use crate::model::{ContactModel, Header};
 use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
@@ -45,6 +45,9 @@ const ITERATIONS_MAX: u32 = 25;
 const SETTLED_MM: f32 = 5e-5;
 /// Change of displacement above which an answer is not settled, reference mm.
 const UNSETTLED_MM: f32 = 1e-3;
+/// Depth of a displaced vertex in a thing, beyond how far that gives way, above which an answer is
+/// not settled, reference mm.
+const INSIDE_MAX_MM: f32 = 5e-3;
 /// Violation of a complementarity condition that is accepted, reference mm.
 const VIOLATION_MM: f32 = 1e-5;
 /// Most products with the matrix in a complementarity solve.
@@ -197,12 +200,28 @@ impl Solver {
         Err(ContactError::Diverged)
     }
 
+    /// Presses on the undeformed skin, which always has one answer: what is left where
+    /// linearisations lead nowhere.
+    fn press_undeformed(&mut self, view: View<'_>, effort: &mut Effort) {
+        let Slots { force, found, change, .. } = &mut self.patch.values;
+        for vector in [force, found, change].into_iter().flatten() {
+            vector.fill(0.0);
+        }
+        self.displace(self.patch.vertices().len());
+        self.measure_all(view, effort);
+        self.choose_near();
+        self.remake_matrix();
+        effort.products += self.complement(1.0);
+    }
+
     /// Whether what came out is finite.
     fn attempt(&mut self, view: View<'_>, out: &mut Contact) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         out.clear();
         self.find_candidates(view, &mut out.effort);
-        if self.candidates.is_empty() {
+        // Where no undeformed vertex lies in a thing, no force is an answer; a warm start could find
+        // another one, on the far side of something thin.
+        if self.candidates.iter().all(|(free, _)| *free > 0.0) {
             self.patch.clear();
             self.made = 0;
             return true;
@@ -218,8 +237,14 @@ impl Solver {
         if !change.is_finite() {
             return false;
         }
+        if change > UNSETTLED_MM {
+            self.take_mean();
+        }
+        if !self.patch.values.size[..self.patch.near()].iter().any(|s| *s > 0.0) {
+            self.press_undeformed(view, &mut out.effort);
+        }
         self.answer(change, out);
-        out.force_n.iter().chain(&out.torque_n_mm).all(|v| v.is_finite())
+        out.is_finite()
     }
 
     /// Displaces the first `rows` slots under the near slots' forces.
@@ -274,15 +299,19 @@ impl Solver {
     }
 
     fn answer(&mut self, change: f32, out: &mut Contact) {
-        let share_max = self.model.header().share_max;
+        let Header { share_max, depth_max_mm, .. } = *self.model.header();
+        let deepest = self.candidates.iter().map(|(free, _)| -free).fold(0.0, f64::max);
+        let is_deep = depth_max_mm > 0.0 && deepest > f64::from(depth_max_mm);
         let v = &self.patch.values;
-        for slot in 0..self.patch.vertices().len() {
+        let slots = self.patch.vertices().len();
+        let least = v.gap[..slots].iter().copied().fold(0.0, f32::min);
+        for slot in 0..slots {
             let deep = f64::from(v.object[slot] * v.size[slot] - v.gap[slot]);
             out.penetration_mm = out.penetration_mm.max(deep);
         }
         out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
-        out.quality.out_of_range = self.overflow || !(out.quality.share <= share_max);
-        out.quality.settled = change <= UNSETTLED_MM;
+        out.quality.out_of_range = self.overflow || is_deep || !(out.quality.share <= share_max);
+        out.quality.settled = change <= UNSETTLED_MM && least >= -INSIDE_MAX_MM;
         collect(&self.model, &self.patch, self.settings.person, out);
         if self.settings.stiffness {
             out.stiffness_n_per_mm = self.stiffness(out);
@@ -309,6 +338,7 @@ impl Solver {
         let symmetric = Symmetric { values: matrix, stride: patch.stride(), norm: *norm };
         let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
         let Person { width, stiffness } = self.settings.person;
-        Some(f64::from(force / scale) * stiffness * width)
+        let found = f64::from(force / scale) * stiffness * width;
+        Some(found).filter(|s| s.is_finite() && *s >= 0.0)
     }
 }

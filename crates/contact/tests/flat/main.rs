@@ -3,8 +3,7 @@
 mod gaps;
 mod support;
 
-use papilla_contact::{Arrays, ContactModel, Method, NetForce, Object, Person, Settings, Solver};
-use papilla_sdf::Placement;
+use papilla_contact::{Arrays, ContactModel, NetForce, Object, Person, Settings, Solver};
 use proptest::prelude::*;
 use support::{MODULUS_MPA, SIDE, arrays, ball, model, small_strain, solver, vertex};
 
