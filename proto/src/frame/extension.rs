@@ -10,12 +10,18 @@ pub mod flags {
     pub const NO_CONTACT: u8 = 2;
     /// Rougher or heavier than any map the tier was trained on ([`crate::input_statistics`]).
     pub const UNFAMILIAR: u8 = 4;
+    /// The contact solve did not settle: its answer is rough. Version 3.
+    pub const UNSETTLED: u8 = 8;
     /// All of them by name.
-    pub const NAMED: [(u8, &str); 3] =
-        [(OUT_OF_RANGE, "out_of_range"), (NO_CONTACT, "no_contact"), (UNFAMILIAR, "unfamiliar")];
+    pub const NAMED: [(u8, &str); 4] = [
+        (OUT_OF_RANGE, "out_of_range"),
+        (NO_CONTACT, "no_contact"),
+        (UNFAMILIAR, "unfamiliar"),
+        (UNSETTLED, "unsettled"),
+    ];
 }
 
-/// What version 2 adds to a header.
+/// What versions 2 and 3 add to a header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Extension {
     /// Column of the window's first pixel.
@@ -30,6 +36,8 @@ pub struct Extension {
     pub tier: u16,
     /// Answer: bits of [`flags`].
     pub flags: u8,
+    /// Number of the finger in version 3; none in version 2.
+    pub finger: Option<u8>,
 }
 
 impl Extension {
@@ -41,6 +49,7 @@ impl Extension {
             infer_us: u32::from_le_bytes([b[40], b[41], b[42], b[43]]),
             tier: u16::from_le_bytes([b[44], b[45]]),
             flags: b[46],
+            finger: (b[4] == 3).then_some(b[47]),
         }
     }
 }
