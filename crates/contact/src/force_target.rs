@@ -67,7 +67,8 @@ impl Solver {
         out: &mut Contact,
     ) -> Result<f64, ContactError> {
         net.validate()?;
-        self.within(scene.into(), |solver, view| solver.travel_until(view, net, out))
+        let everywhere = f32::INFINITY;
+        self.within(scene.into(), everywhere, |solver, view| solver.travel_until(view, net, out))
     }
 
     fn travel_until(

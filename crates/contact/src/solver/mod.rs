@@ -156,13 +156,14 @@ impl Solver {
         scene: impl Into<Scene<'a>>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        self.within(scene.into(), |solver, view| solver.frame(view, out))
+        self.within(scene.into(), KEPT_MM as f32, |solver, view| solver.frame(view, out))
     }
 
-    /// Runs `work` on a view of the scene.
+    /// Runs `work` on a view of the scene, of which gaps are told up to `reach_mm`.
     pub(crate) fn within<T>(
         &mut self,
         scene: Scene<'_>,
+        reach_mm: f32,
         work: impl FnOnce(&mut Self, View<'_>) -> Result<T, ContactError>,
     ) -> Result<T, ContactError> {
         let length = self.settings.person.width;
@@ -174,7 +175,7 @@ impl Solver {
             }
             Scene::Gaps(gaps) => {
                 let mut field = std::mem::take(&mut self.field);
-                let read = field.read(&self.model, gaps, length, KEPT_MM as f32);
+                let read = field.read(&self.model, gaps, length, reach_mm);
                 let result = read.and_then(|()| {
                     let things = Things::Field(&field);
                     work(self, View { things, length, shift_mm: [0.0; 3] })
