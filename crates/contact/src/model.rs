@@ -166,6 +166,13 @@ impl ContactModel {
         self.areas_mm2.len()
     }
 
+    /// The lowest vertex, mm: where something flat meets the pad from below.
+    #[must_use]
+    pub fn lowest_mm(&self) -> [f64; 3] {
+        let lower = |a: [f64; 3], b: &[f64; 3]| if b[2] < a[2] { *b } else { a };
+        self.positions_mm.iter().fold([0.0, 0.0, f64::INFINITY], lower)
+    }
+
     /// Refuses a model of another atlas.
     ///
     /// # Errors

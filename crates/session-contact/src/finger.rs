@@ -1,6 +1,6 @@
 //! One finger of a session: its solver, from frame to frame.
 
-use std::{sync::Arc, time::Instant};
+use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
 use papilla_contact::{
@@ -10,7 +10,7 @@ use papilla_contact::{
 use papilla_proto::{
     ErrorCode, Hello, MAP_LEN, Problem, SampleType,
     atlas::{Raster, VertexSampler},
-    contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, Touch},
+    contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     flags,
 };
 
@@ -32,6 +32,12 @@ pub struct Finger {
     /// The pressure that is sent, if as a map.
     sent_pa: Vec<f32>,
     touch: Touch,
+}
+
+impl fmt::Debug for Finger {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Finger").field("form", &self.form).finish_non_exhaustive()
+    }
 }
 
 /// What a frame came to.
@@ -85,6 +91,29 @@ impl Finger {
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
             touch: Touch::default(),
         })
+    }
+
+    /// Whether frames are windows of pressure, which the codec reads.
+    #[must_use]
+    pub fn reads_windows(&self) -> bool {
+        self.form.is_window()
+    }
+
+    /// Whether frames are pressure, which a client may have wrong.
+    #[must_use]
+    pub fn takes_pressure(&self) -> bool {
+        self.form.input == Input::Pressure
+    }
+
+    /// Bytes that [`Self::write`] appends.
+    #[must_use]
+    pub fn sections_len(&self) -> usize {
+        let touch = if self.form.input == Input::Pressure { 0 } else { TOUCH_LEN };
+        let pressure = self.pressure.map_or(0, |layout| match layout {
+            SampleLayout::Map => 4 * self.sent_pa.len(),
+            SampleLayout::Vertices => 4 * self.out.pressure_pa.len(),
+        });
+        (touch + pressure).next_multiple_of(16)
     }
 
     /// Stiffness of the tissue over that of the reference finger: the network is asked about

@@ -42,6 +42,12 @@ impl FrameForm {
         }
     }
 
+    /// Whether frames are pressure: nothing is solved.
+    #[must_use]
+    pub fn takes_pressure(&self) -> bool {
+        self.input == Input::Pressure
+    }
+
     /// Whether the samples are a window of the map that the codec reads.
     #[must_use]
     pub fn is_window(&self) -> bool {

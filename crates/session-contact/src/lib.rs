@@ -25,6 +25,7 @@
 //! ```
 
 mod announced;
+mod assets;
 mod finger;
 mod frame;
 
@@ -41,9 +42,9 @@ use papilla_proto::{
     effects::{Section, SectionName},
 };
 
+pub use assets::ContactAssets;
 pub use finger::{Finger, Taken};
 pub use frame::FrameForm;
-pub use papilla_contact;
 
 /// The skin that things press on.
 #[derive(Clone, Copy)]

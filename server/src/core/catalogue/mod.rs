@@ -7,6 +7,8 @@ mod load;
 pub(crate) mod replay;
 mod tier;
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
@@ -63,7 +65,7 @@ pub(crate) struct Catalogue {
     pub(crate) default: usize,
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
-    pub(crate) skin: Raster,
+    pub(crate) skin: Arc<Raster>,
     /// The pixels of `skin`.
     pub(crate) skin_mask: PixelMask,
     pub(crate) interface: Raster,
@@ -89,7 +91,7 @@ impl Catalogue {
             default: 0,
             atlas_json: Bytes::new(),
             skin_mask: PixelMask::from(skin.mask()),
-            skin,
+            skin: Arc::new(skin),
             interface,
             atlas,
             replay: Replay::default(),
@@ -189,7 +191,7 @@ impl Catalogue {
             atlas,
             atlas_json,
             skin_mask: PixelMask::from(skin.mask()),
-            skin,
+            skin: Arc::new(skin),
             interface,
             replay,
             ladder_json,
