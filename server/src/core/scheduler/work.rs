@@ -153,7 +153,7 @@ impl Worker {
             let peak_pa = effects.before(&mut self.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
-        meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        meta.flags |= if shows_sed && range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
         let is_outside =
             |trained| InputStatistics::of(&self.pressure_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
