@@ -183,8 +183,8 @@ impl Finger {
         if let Some(map_pa) = map_pa {
             // Both lengths are those of the atlas.
             let _ = self.raster.rasterise(&self.out.pressure_pa, map_pa);
-            if self.person.stiffness != 1.0 {
-                let part = 1.0 / self.stiffness();
+            let part = 1.0 / self.stiffness();
+            if part.to_bits() != 1.0f32.to_bits() {
                 map_pa.iter_mut().for_each(|p| *p *= part);
             }
         }
