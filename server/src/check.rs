@@ -17,6 +17,8 @@ use crate::{
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_EFFECTS: usize = 20 << 20;
+/// A finger's solver, during a renewal twice, and the shapes of its session.
+const PER_FINGER: usize = 34 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
 /// What was found, in the order it was looked at.
@@ -165,7 +167,9 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
 fn memory_bound(config: &Config) -> usize {
     let requests =
         config.max_requests.get() * (3 * config.max_body_bytes + PER_REQUEST_BEYOND_BODY);
+    let contact = config.contact.as_ref().map_or(0, |_| PER_FINGER);
     config.max_connections.get() * (PER_CONNECTION + config.max_body_bytes)
         + config.max_sessions.get() * (PER_SESSION + PER_EFFECTS)
+        + config.max_fingers.get() * (PER_EFFECTS + contact)
         + requests
 }

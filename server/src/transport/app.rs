@@ -51,7 +51,6 @@ impl App {
     pub(crate) fn new(
         config: &Config,
         catalogue: Arc<Catalogue>,
-        contact: Option<ContactAssets>,
         metrics: Arc<Metrics>,
         pool: &Pool,
         gate: Gate,
@@ -70,13 +69,18 @@ impl App {
             drain,
             progress,
             store: Store::new(config.max_sessions.get()),
-            contact,
+            contact: None,
             fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),
             requests_max: config.max_requests.get(),
             next_session: AtomicU64::new(1),
         }
+    }
+
+    /// The same with a contact model.
+    pub(crate) fn with_contact(self, contact: Option<ContactAssets>) -> Self {
+        Self { contact, ..self }
     }
 
     /// What there is to render with now; it may be replaced at any time, so whoever needs it
