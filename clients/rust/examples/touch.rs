@@ -1,56 +1,102 @@
-//! A ball that goes down on a finger, and what pushes back: objects in, forces out.
+//! Balls that go down on fingers, and what pushes back: objects in, forces out.
 //!
-//! `cargo run --release -p papilla-client --example touch [HOST:PORT] [FRAMES]`; the service needs
-//! `--contact FILE`. Says at the end how long the way there and back took.
+//! `cargo run --release -p papilla-client --example touch -- [HOST:PORT [FRAMES [HZ [FINGERS [TIER]]]]]`;
+//! the service needs `--contact FILE`. With a tier, answers carry SED at the vertices. Says at the
+//! end how long the way there and back took.
 
-use std::{env, time::Instant};
+use std::{
+    env,
+    time::{Duration, Instant},
+};
 
 use papilla_client::{
-    Session,
+    Answer, Session,
     proto::{
         Hello,
-        contact::{AnnouncedObject, Input, Pose},
+        contact::{AnnouncedFinger, AnnouncedObject, Input, Pose, SampleLayout},
         sdf::{AnnouncedShape, Sphere},
     },
 };
+use tokio::time::{MissedTickBehavior, interval};
 
 #[tokio::main]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let server = env::args().nth(1).unwrap_or_else(|| "127.0.0.1:7224".to_owned());
-    let frames: u32 = env::args().nth(2).map_or(Ok(1000), |text| text.parse())?;
+    let argument =
+        |n: usize, default: &str| env::args().nth(n).unwrap_or_else(|| default.to_owned());
+    let (server, tier) = (argument(1, "127.0.0.1:7224"), env::args().nth(5));
+    let (frames, hz): (u32, f64) = (argument(2, "1000").parse()?, argument(3, "1000").parse()?);
+    let fingers: u8 = argument(4, "1").parse()?;
     let shape = AnnouncedShape::Sphere(Sphere { radius_mm: 10.0 });
-    let objects = vec![AnnouncedObject { shape, stiffness_mpa_per_mm: None }];
     let hello = Hello {
         input: Some(Input::Objects),
-        objects: Some(objects),
-        map: Some(false),
+        objects: Some(vec![AnnouncedObject { shape, stiffness_mpa_per_mm: None }]),
+        fingers: Some(vec![AnnouncedFinger::default(); fingers.into()]),
+        map: Some(tier.is_some()),
+        answer_layout: Some(SampleLayout::Vertices),
+        tier,
         ..Hello::default()
     };
     let session = Session::open(&server, hello).await?;
-    let mut round_trips_us = Vec::new();
-    let mut in_server_us = Vec::new();
+    let mut times = Times::default();
+    let mut beat = interval(Duration::from_secs_f64(1.0 / hz));
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
     for frame in 0..frames {
+        beat.tick().await;
         let depth_mm = 0.5 + 0.5 * (frame as f32 / 300.0).sin();
         // The pad's lowest point, seen from the finger's frame.
-        let pose = Pose { origin_mm: [11.25, 0.0, -6.53 - 10.0 + depth_mm], ..Pose::default() };
+        let pose = Pose { origin_mm: [11.25, 0.0, -16.53 + depth_mm], ..Pose::default() };
         let start = Instant::now();
-        let answer = session.touch(0, &[pose]).await?;
-        round_trips_us.push(start.elapsed().as_micros() as u32);
-        in_server_us.push(answer.total_us);
-        let touch = answer.touch.ok_or_else(|| format!("no touch: {:?}", answer.status))?;
-        if frame % 250 == 0 {
-            let [x, y, z] = touch.force_n;
-            println!(
-                "{depth_mm:.2} mm: ({x:.3}, {y:.3}, {z:.3}) N on {:.1} mm2, solved in {:.0} us",
-                touch.area_mm2, touch.solve_us
-            );
+        let sent = (0..fingers).map(|finger| session.send_poses(finger, &[pose], None));
+        for outcome in sent.collect::<Result<Vec<_>, _>>()? {
+            let answer = outcome.await?;
+            times.take(start, &answer)?;
+            if frame % 250 == 0 && answer.finger == 0 {
+                print(depth_mm, &answer);
+            }
         }
     }
-    for (what, times) in [("round trip", &mut round_trips_us), ("in the server", &mut in_server_us)]
-    {
-        times.sort_unstable();
-        let at = |part: f64| times[((times.len() - 1) as f64 * part) as usize];
-        println!("{what}: median {} us, 99 % {} us, 99.9 % {} us", at(0.5), at(0.99), at(0.999));
-    }
+    times.print();
     Ok(())
+}
+
+fn print(depth_mm: f32, answer: &Answer) {
+    if let Some(touch) = answer.touch {
+        let [x, y, z] = touch.force_n;
+        println!("{depth_mm:.2} mm: ({x:.3}, {y:.3}, {z:.3}) N on {:.1} mm2", touch.area_mm2);
+    }
+}
+
+#[derive(Default)]
+struct Times {
+    round_trip_us: Vec<u32>,
+    in_server_us: Vec<u32>,
+    solve_us: Vec<u32>,
+    beside_us: Vec<u32>,
+}
+
+impl Times {
+    fn take(&mut self, start: Instant, answer: &Answer) -> Result<(), String> {
+        let touch = answer.touch.ok_or_else(|| format!("no touch: {:?}", answer.status))?;
+        let solve_us = touch.solve_us as u32;
+        self.round_trip_us.push(start.elapsed().as_micros() as u32);
+        self.in_server_us.push(answer.total_us);
+        self.solve_us.push(solve_us);
+        let beside = answer.total_us.saturating_sub(solve_us).saturating_sub(answer.infer_us);
+        self.beside_us.push(beside);
+        Ok(())
+    }
+
+    fn print(self) {
+        for (what, mut times) in [
+            ("round trip", self.round_trip_us),
+            ("in the server", self.in_server_us),
+            ("of which solving", self.solve_us),
+            ("beside solve and network", self.beside_us),
+        ] {
+            times.sort_unstable();
+            let at = |part: f64| times[((times.len() - 1) as f64 * part) as usize];
+            let (half, most) = (at(0.5), at(0.99));
+            println!("{what}: median {half} us, 99 % {most} us, 99.9 % {} us", at(0.999));
+        }
+    }
 }
