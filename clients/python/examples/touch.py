@@ -1,6 +1,6 @@
 """A ball that goes down on a finger, and what pushes back. Needs `papilla-server --contact FILE`.
 
-    python examples/touch.py [URL]
+python examples/touch.py [URL]
 """
 
 import sys
