@@ -13,8 +13,9 @@ const STEP_MM: f64 = 0.1;
 const STEP_MAX_MM: f64 = 1.0;
 /// How closely the force is met.
 const TOLERANCE: f64 = 2e-3;
-/// Most frames tried.
+/// Most frames tried, and linearisations in all of them.
 const TRIES_MAX: u32 = 40;
+const ITERATIONS_MAX: u32 = 400;
 /// A travel this near an end of its bracket, as part of it, goes to the middle.
 const MARGIN: f64 = 0.02;
 
@@ -118,7 +119,7 @@ impl Solver {
                 }
                 (None, None) => travel,
             };
-            if travel.abs() > TRAVEL_MAX_MM {
+            if travel.abs() > TRAVEL_MAX_MM || effort.iterations > ITERATIONS_MAX {
                 break;
             }
         }

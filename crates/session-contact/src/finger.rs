@@ -181,8 +181,12 @@ impl Finger {
         let quality = self.out.quality;
         let peak_pa = self.touch.pressure_max_pa / self.stiffness();
         if let Some(map_pa) = map_pa {
-            // Both lengths are those of the atlas.
-            let _ = self.raster.rasterise(&self.out.pressure_pa, map_pa);
+            if peak_pa > 0.0 {
+                // Both lengths are those of the atlas.
+                let _ = self.raster.rasterise(&self.out.pressure_pa, map_pa);
+            } else {
+                map_pa.fill(0.0);
+            }
             let part = 1.0 / self.stiffness();
             if part.to_bits() != 1.0f32.to_bits() {
                 map_pa.iter_mut().for_each(|p| *p *= part);

@@ -227,3 +227,33 @@ fn frames_of_another_form_are_refused_by_field() {
     assert_eq!(field(of(FrameKind::Gaps, 0, [ROW as u16, 2])), "kind");
     assert_eq!(field(of(FrameKind::Objects, 0, [ROW as u16, 1])), "width");
 }
+
+/// Whatever bytes come, of the right length or not: an answer or a refusal, and the finger lives on.
+#[test]
+fn any_bytes_are_answered_or_refused() {
+    let plane = Plane::new();
+    let mut random = fastrand::Rng::with_seed(3);
+    let gaps = Hello {
+        input: Some(Input::Gaps),
+        input_layout: Some(SampleLayout::Vertices),
+        objects: None,
+        force_target: Some(true),
+        ..objects()
+    };
+    for hello in [Hello { force_target: Some(true), ..objects() }, gaps] {
+        let hand = plane.hand(&hello).expect("a hand");
+        let due = hand.form().payload_len_max(4);
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        for _ in 0..300 {
+            let len = if random.u8(..8) == 0 { random.usize(..2 * due) } else { due };
+            let mut bytes: Vec<u8> = (0..len).map(|_| random.u8(..)).collect();
+            if random.bool() {
+                // Numbers that may be meant.
+                let small = |_: &[u8; 4]| (2.0 * random.f32() - 1.0).to_le_bytes();
+                bytes = bytes.as_chunks::<4>().0.iter().flat_map(small).collect();
+            }
+            let taken = finger.take(&bytes, SampleType::F32, 1.0, None);
+            assert!(taken.is_err() || taken.is_ok_and(|taken| taken.peak_pa.is_finite()));
+        }
+    }
+}

@@ -52,6 +52,9 @@ const INSIDE_MAX_MM: f32 = 5e-3;
 const VIOLATION_MM: f32 = 1e-5;
 /// Most products with the matrix in a complementarity solve.
 const PRODUCTS_MAX: u32 = 200;
+/// The same in a frame; then each solve has the least.
+const FRAME_PRODUCTS_MAX: u32 = 3000;
+const PRODUCTS_MIN: u32 = 10;
 /// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
 const TURN_MAX: f32 = 0.05;
 /// Range of the over- or under-relaxation.
@@ -212,7 +215,7 @@ impl Solver {
         self.measure_all(view, effort);
         self.choose_near();
         self.remake_matrix();
-        effort.products += self.complement(1.0);
+        effort.products += self.complement(1.0, PRODUCTS_MAX);
     }
 
     /// Whether what came out is finite.
