@@ -7,17 +7,8 @@ fn root() -> PathBuf {
 }
 
 /// Members whose lists of numbers end in value and tolerance.
-const MEASURED: [&str; 9] = [
-    "pixels",
-    "sum",
-    "max",
-    "force_n",
-    "summary",
-    "points",
-    "actuators",
-    "touch",
-    "pressure_sum",
-];
+const MEASURED: [&str; 9] =
+    ["pixels", "sum", "max", "force_n", "summary", "points", "actuators", "touch", "pressure_sum"];
 
 /// Compares recorded numbers; returns how many there were.
 fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
