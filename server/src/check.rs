@@ -9,6 +9,7 @@ use crate::{
     StartError,
     config::Config,
     core::catalogue::{Catalogue, assets::Assets, calibrate, golden},
+    start::load_contact,
     transport::{gate::Gate, net, tls},
 };
 
@@ -96,7 +97,10 @@ pub fn check(config: &Config) -> Report {
     }
     let assets = Assets::of(config);
     match assets.and_then(|a| Catalogue::load(&a, config.default_tier.as_deref(), None)) {
-        Ok(catalogue) => look_at_models(&mut report, config, &catalogue),
+        Ok(catalogue) => {
+            look_at_models(&mut report, config, &catalogue);
+            look_at_contact(&mut report, config, &catalogue);
+        }
         Err(error) => report.bad("models", error.exit_code(), &error),
     }
     match TcpListener::bind(config.bind) {
@@ -160,6 +164,17 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             "predicted_latency_us": predicted_us,
         });
         report.good(&what, format!("{predicted_us} us, {answers}{default}"), values);
+    }
+}
+
+fn look_at_contact(report: &mut Report, config: &Config, catalogue: &Catalogue) {
+    let Some(file) = &config.contact else { return };
+    match load_contact(file, catalogue) {
+        Ok(contact) => {
+            let detail = format!("of this finger, {} us a frame", contact.frame_us);
+            report.good("contact", detail, json!({"frame_us": contact.frame_us}));
+        }
+        Err(error) => report.bad("contact", error.exit_code(), &error),
     }
 }
 

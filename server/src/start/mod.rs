@@ -114,7 +114,10 @@ fn load(
 }
 
 /// Reads the contact model, which has to be of the models' finger.
-fn load_contact(file: &Path, catalogue: &Catalogue) -> Result<ContactAssets, StartError> {
+pub(crate) fn load_contact(
+    file: &Path,
+    catalogue: &Catalogue,
+) -> Result<ContactAssets, StartError> {
     let bad = |reason: String| StartError::Unusable {
         file: file.display().to_string(),
         origin: "--contact".to_owned(),
