@@ -1,8 +1,9 @@
-// Papilla's client for browsers: sessions, the atlas, pressure from penetration.
+// Papilla's client for browsers: sessions, fingers that touch, the atlas, pressure from penetration.
 
 export { PapillaError } from './src/error.js';
 export { postPressure } from './src/http.js';
 export { Atlas } from './src/atlas.js';
 export { Foundation } from './src/foundation.js';
+export { Hand } from './src/hand.js';
 export { Session } from './src/session.js';
 export { Answer, MAP_LEN, SIDE_PX, SUMMARY } from './src/wire.js';

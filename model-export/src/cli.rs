@@ -1,6 +1,7 @@
 //! The command line.
 
 mod check;
+mod contact;
 mod evaluate;
 mod index;
 mod ladder;
@@ -93,6 +94,12 @@ enum Command {
     /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
     #[command(after_long_help = EXIT_CODES)]
     Ladder(ladder::Options),
+    /// Measure the contact ladder: from where an indenter is to pressure, force and SED.
+    ///
+    /// Springs, a half-space, the finger's compliance, and its second order told gaps or the object,
+    /// each against the FE states of the datasets, with the processor time of a frame.
+    #[command(after_long_help = EXIT_CODES)]
+    Contact(contact::Options),
     /// Load one model and say what that took, as JSON; the ladder runs it in a fresh process.
     #[command(hide = true)]
     Footprint {
@@ -111,6 +118,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Index(options) => index::run(options, json),
         Command::Patterns(options) => patterns::run(options, json),
         Command::Ladder(options) => ladder::run(options, json),
+        Command::Contact(options) => contact::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }
 }

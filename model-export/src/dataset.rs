@@ -6,7 +6,10 @@ use crate::metrics::Ground;
 use crate::{ExportError, read, read_text};
 use ndarray::{Array1, Array2, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
-use papilla_proto::atlas::{Atlas, Patch, Raster};
+use papilla_proto::{
+    atlas::{Atlas, Patch, Raster},
+    sdf::IndenterSpec,
+};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::io::Cursor;
@@ -20,11 +23,29 @@ struct Manifest {
     format: u32,
     atlas_hash: String,
     effects: Vec<String>,
+    #[serde(default)]
+    campaign: Campaign,
     vertex_count: usize,
     #[serde(rename = "presses")]
     indentations: Vec<Indentation>,
     splits: Splits,
     dataset_sha256: String,
+}
+
+/// What a campaign says of its indenters.
+#[derive(Debug, Default, Deserialize)]
+struct Campaign {
+    #[serde(default)]
+    name: String,
+    indenter: Option<IndenterSpec>,
+    #[serde(default)]
+    indenters: Vec<NamedIndenter>,
+}
+
+#[derive(Debug, Deserialize)]
+struct NamedIndenter {
+    name: String,
+    indenter: IndenterSpec,
 }
 
 #[derive(Debug, Deserialize)]
@@ -44,6 +65,12 @@ pub struct Indentation {
     pub sha256: String,
     /// Samples in the shard.
     pub samples: usize,
+    /// Name of the indenter within the campaign.
+    #[serde(default)]
+    pub indenter: String,
+    /// Where its axis meets the skin, mm along its own x and y.
+    #[serde(default)]
+    pub offset_mm: [f64; 2],
     /// Pitch of the plate, degrees.
     pub pitch_deg: f64,
     /// Roll of the plate, degrees.
@@ -61,6 +88,8 @@ pub struct Shard {
     pub sed_j_per_m3: Array2<f32>,
     /// Depth of each sample, mm; `[D]`.
     pub depth_mm: Array1<f32>,
+    /// Force on the finger, N; `[D, 3]`.
+    pub force_n: Array2<f32>,
 }
 
 /// A dataset whose manifest and atlas have been read and agree.
@@ -115,6 +144,20 @@ impl Dataset {
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.manifest.dataset_sha256
+    }
+
+    /// Name of its campaign.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.manifest.campaign.name
+    }
+
+    /// What pressed in an indentation; none if the manifest does not say.
+    #[must_use]
+    pub fn indenter(&self, indentation: &Indentation) -> Option<&IndenterSpec> {
+        let Campaign { indenter, indenters, .. } = &self.manifest.campaign;
+        let named = indenters.iter().find(|other| other.name == indentation.indenter);
+        named.map(|named| &named.indenter).or(indenter.as_ref())
     }
 
     /// Effects that the solver modelled.
@@ -181,6 +224,7 @@ impl Dataset {
             pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
             sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
+            force_n: read_array(&mut npz, "force_n").map_err(unreadable)?,
         };
         let expected = (indentation.samples, self.manifest.vertex_count);
         for (name, array) in

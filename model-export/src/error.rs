@@ -35,6 +35,14 @@ pub enum ExportError {
         /// What is wrong with it.
         source: AtlasError,
     },
+    /// The contact model is refused.
+    #[error("{path}: {source}")]
+    Contact {
+        /// The contact model, or what does not go with it.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: papilla_contact::ModelError,
+    },
     /// A file of the dataset is not what its contract says.
     #[error("{path}: {reason}")]
     Dataset {

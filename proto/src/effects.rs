@@ -276,6 +276,10 @@ pub struct Section {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SectionName {
+    /// A [`Touch`](crate::contact::Touch). Version 3.
+    Touch,
+    /// Pressure, one f32 a vertex or pixel. Version 3.
+    Pressure,
     /// A [`Summary`](crate::Summary).
     Summary,
     /// One f32 a point.
@@ -284,6 +288,8 @@ pub enum SectionName {
     Actuators,
     /// The samples of the map; always last.
     Map,
+    /// What the map shows at the vertices of the atlas, in place of it. Version 3.
+    Vertices,
 }
 
 #[cfg(test)]

@@ -53,6 +53,8 @@ pub enum ErrorCode {
     UnknownEffect,
     /// A parameter of an effect is missing or unusable.
     BadEffect,
+    /// A shape, pose, gap, finger or net force that cannot be.
+    BadContact,
     /// The client's atlas is not the one the tier was trained on.
     AtlasMismatch,
     /// No answer type in `Accept` is offered.
@@ -88,7 +90,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::WrongLength,
         Self::WrongType,
         Self::WrongShape,
@@ -109,6 +111,7 @@ impl ErrorCode {
         Self::UnknownTier,
         Self::UnknownEffect,
         Self::BadEffect,
+        Self::BadContact,
         Self::AtlasMismatch,
         Self::NotAcceptable,
         Self::NotFound,
@@ -150,6 +153,7 @@ impl ErrorCode {
             Self::UnknownTier => "unknown_tier",
             Self::UnknownEffect => "unknown_effect",
             Self::BadEffect => "bad_effect",
+            Self::BadContact => "bad_contact",
             Self::AtlasMismatch => "atlas_mismatch",
             Self::NotAcceptable => "not_acceptable",
             Self::NotFound => "not_found",
@@ -198,6 +202,7 @@ impl ErrorCode {
             | Self::OutOfRange
             | Self::UnknownEffect
             | Self::BadEffect
+            | Self::BadContact
             | Self::AtlasMismatch
             | Self::BadModel => 422,
             Self::RateLimited => 429,

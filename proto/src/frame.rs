@@ -6,8 +6,8 @@
 //! | at | type | field |
 //! |---|---|---|
 //! | 0 | u32 | magic, the bytes `PPL1` |
-//! | 4 | u8 | version, 1 or 2: the hello's |
-//! | 5 | u8 | kind: 1 pressure (client to server); 2 SED, 3 firing rate of SA1 units (server to client) |
+//! | 4 | u8 | version, 1 to 3: the hello's |
+//! | 5 | u8 | kind: 1 pressure, 4 poses of objects, 5 gaps (client to server); 2 SED, 3 firing rate of SA1 units (server to client) |
 //! | 6 | u8 | sample type: 0 f32, 1 f16, 2 u16, 3 u8 |
 //! | 7 | u8 | status: 0 in requests; answers 0 ok, 1 superseded, 2 late, 3 error, 4 stale |
 //! | 8 | u32 | sequence, the client's; the answer repeats it |
@@ -17,7 +17,7 @@
 //! | 24 | u32 | request: deadline, us from receipt (0: the session's budget); answer: us spent in the server |
 //! | 28 | f32 | scale: Pa, J/m3 or Hz per unit for u16 and u8, else 1 |
 //!
-//! Version 2 goes on ([`Extension`]):
+//! Versions 2 and 3 go on ([`Extension`]):
 //!
 //! | at | type | field |
 //! |---|---|---|
@@ -27,7 +27,7 @@
 //! | 40 | u32 | answer: us in the network, 0 if it was not asked |
 //! | 44 | u16 | answer: number of the tier, as `ready` gave it |
 //! | 46 | u8 | answer: flags, see [`flags`] |
-//! | 47 | u8 | 0, to be ignored |
+//! | 47 | u8 | version 3: number of the finger, both ways; version 2: 0, to be ignored |
 //!
 //! The payload follows. A request's: width x height samples, row-major, first row first. An
 //! answer's: the sections that `ready` listed; only answers with status ok carry one.
@@ -61,6 +61,10 @@ pub enum FrameKind {
     Sed = 2,
     /// Firing rate of slowly adapting type 1 (SA1) afferents, Hz; server to client, version 2.
     Sa1Rate = 3,
+    /// Poses of objects; client to server, version 3.
+    Objects = 4,
+    /// Depth of the undeformed skin in things, mm; client to server, version 3.
+    Gaps = 5,
 }
 
 /// How the frame fared.
@@ -156,6 +160,19 @@ impl FrameHeader {
         Self { width: window.width, height: window.height, extension: Some(extension), ..self }
     }
 
+    /// The same header in version 3, of this kind and finger, for `width` x `height` samples.
+    #[must_use]
+    pub fn of_finger(self, kind: FrameKind, finger: u8, [width, height]: [u16; 2]) -> Self {
+        let extension = Extension { finger: Some(finger), ..self.extension.unwrap_or_default() };
+        Self { kind, width, height, extension: Some(extension), ..self }
+    }
+
+    /// Version of the frame.
+    #[must_use]
+    pub fn version(&self) -> u8 {
+        self.extension.map_or(1, |extension| if extension.finger.is_some() { 3 } else { 2 })
+    }
+
     /// The pixels that the payload holds.
     #[must_use]
     pub fn window(&self) -> Window {
@@ -205,6 +222,9 @@ impl FrameHeader {
             b[40..44].copy_from_slice(&extension.infer_us.to_le_bytes());
             b[44..46].copy_from_slice(&extension.tier.to_le_bytes());
             b[46] = extension.flags;
+            if let Some(finger) = extension.finger {
+                (b[4], b[47]) = (3, finger);
+            }
         }
         HeaderBytes { bytes: b, len: self.header_len() }
     }
@@ -227,7 +247,7 @@ impl FrameHeader {
         }
         let extension = match b[4] {
             1 => None,
-            2 => Some(Extension::decode(
+            2 | 3 => Some(Extension::decode(
                 frame.first_chunk::<HEADER_LEN_V2>().ok_or(truncated(HEADER_LEN_V2))?,
             )),
             found => return Err(FrameError::UnknownVersion { found }),
@@ -236,6 +256,8 @@ impl FrameHeader {
             1 => FrameKind::Pressure,
             2 => FrameKind::Sed,
             3 => FrameKind::Sa1Rate,
+            4 if b[4] >= 3 => FrameKind::Objects,
+            5 if b[4] >= 3 => FrameKind::Gaps,
             found => return Err(FrameError::UnknownKind { found }),
         };
         let sample_type =

@@ -12,6 +12,7 @@
 //! | [`sample`] | f32 / f16 / u16 / u8 samples and their quantisation error |
 //! | [`window`] | a rectangle of the map: finding, decoding and encoding one |
 //! | [`frame`] | the header in front of every binary frame |
+//! | [`contact`] | poses, gaps, and what pushes back |
 //! | [`effects`] | what a session can ask for beside the map |
 //! | [`summary`] | a map in sixteen numbers |
 //! | [`message`] | the JSON messages of a session |
@@ -37,6 +38,7 @@
 //!
 //! The protocol in prose, with examples: `docs/reference/protocol.md`.
 
+pub mod contact;
 pub mod effects;
 pub mod error;
 pub mod frame;
@@ -52,6 +54,9 @@ pub use papilla_json as json;
 
 /// The two unwrapped patches, their rasteriser and hash.
 pub use papilla_atlas as atlas;
+
+/// Shapes that a hello announces.
+pub use papilla_sdf as sdf;
 
 pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};
@@ -69,5 +74,6 @@ pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;
 
 /// Versions of the session protocol and of the binary frame that are spoken. The second adds to
-/// the first: windows, timings in every answer, run-time effects.
-pub const PROTOCOL_VERSIONS: [u8; 2] = [1, 2];
+/// the first: windows, timings in every answer, run-time effects. The third adds to that: objects
+/// and gaps in place of pressure, forces, several fingers.
+pub const PROTOCOL_VERSIONS: [u8; 3] = [1, 2, 3];

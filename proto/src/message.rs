@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use self::tagged::WithoutType;
 use crate::{
     ErrorCode, Problem, RuntimeEffect, SampleType,
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout},
     effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
     json::{self, JsonError},
 };
@@ -134,6 +135,33 @@ pub struct Hello {
     /// Parameters of the effect `relaxation`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
+    /// What frames hold. Version 3, as all that follows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input: Option<Input>,
+    /// Where samples of pressure and gaps are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input_layout: Option<SampleLayout>,
+    /// Where samples of answers are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub answer_layout: Option<SampleLayout>,
+    /// The objects whose poses frames hold. Due with them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objects: Option<Vec<AnnouncedObject>>,
+    /// The fingers; none: one, the reference finger.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingers: Option<Vec<AnnouncedFinger>>,
+    /// How pressure is found of objects or gaps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<ContactMethod>,
+    /// Whether each frame holds a net force to be met.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_target: Option<bool>,
+    /// Whether answers tell the local stiffness.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<bool>,
+    /// Whether, and where, answers carry the pressure that was found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pressure: Option<SampleLayout>,
 }
 
 impl Hello {
@@ -151,6 +179,24 @@ impl Hello {
             (self.actuators.is_some(), "actuators"),
             (self.afferents.is_some(), "afferents"),
             (self.relaxation.is_some(), "relaxation"),
+        ]
+        .into_iter()
+        .find_map(|(there, name)| there.then_some(name))
+    }
+
+    /// The first member of version 3 that is there.
+    #[must_use]
+    pub fn member_of_version_3(&self) -> Option<&'static str> {
+        [
+            (self.input.is_some(), "input"),
+            (self.input_layout.is_some(), "input_layout"),
+            (self.answer_layout.is_some(), "answer_layout"),
+            (self.objects.is_some(), "objects"),
+            (self.fingers.is_some(), "fingers"),
+            (self.method.is_some(), "method"),
+            (self.force_target.is_some(), "force_target"),
+            (self.stiffness.is_some(), "stiffness"),
+            (self.pressure.is_some(), "pressure"),
         ]
         .into_iter()
         .find_map(|(there, name)| there.then_some(name))
@@ -178,6 +224,15 @@ impl Default for Hello {
             actuators: None,
             afferents: None,
             relaxation: None,
+            input: None,
+            input_layout: None,
+            answer_layout: None,
+            objects: None,
+            fingers: None,
+            method: None,
+            force_target: None,
+            stiffness: None,
+            pressure: None,
         }
     }
 }
@@ -241,6 +296,15 @@ pub struct Ready {
     /// What the payload of an answer with status ok holds, and where.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sections: Option<Vec<Section>>,
+    /// Vertices of the atlas, for what is laid out by them. Version 3, as all that follows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertices: Option<u32>,
+    /// Fingers of the session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingers: Option<u32>,
+    /// Time of the contact solve that is expected, us; within `predicted_latency_us`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_us: Option<u64>,
 }
 
 /// Something was refused; says whether the session goes on.

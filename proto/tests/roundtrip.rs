@@ -3,6 +3,10 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
+use papilla_proto::contact::{
+    AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout,
+};
+use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
 use papilla_proto::{
     ClientMessage, Hello, Ready, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage, Summary,
     effects::{
@@ -78,7 +82,7 @@ fn hello() -> impl Strategy<Value = Hello> {
         prop::option::of(prop::array::uniform4(number())),
         prop::option::of(relaxation()),
     );
-    (old, new).prop_map(|(old, new)| Hello {
+    (old, new, contact()).prop_map(|(old, new, contact)| Hello {
         version: old.0,
         effects: old.1,
         budget_us: old.2,
@@ -98,7 +102,47 @@ fn hello() -> impl Strategy<Value = Hello> {
             Afferents { e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa }
         }),
         relaxation: new.9,
+        ..contact
     })
+}
+
+/// The members of version 3.
+fn contact() -> impl Strategy<Value = Hello> {
+    let layout =
+        || prop::option::of(prop::sample::select(vec![SampleLayout::Map, SampleLayout::Vertices]));
+    let shape = prop_oneof![
+        (0.1..9.0f64).prop_map(|radius_mm| AnnouncedShape::Sphere(Sphere { radius_mm })),
+        prop::collection::vec(prop::array::uniform3(-9.0..9.0f64), 0..4).prop_map(|vertices_mm| {
+            AnnouncedShape::Mesh(Mesh { vertices_mm, triangles: vec![[0, 1, 2]] })
+        }),
+    ];
+    let object = (shape, prop::option::of(0.1..9.0f64))
+        .prop_map(|(shape, stiffness_mpa_per_mm)| AnnouncedObject { shape, stiffness_mpa_per_mm });
+    let finger = (0.5..2.0f64, 0.5..2.0f64)
+        .prop_map(|(width, stiffness)| AnnouncedFinger { width, stiffness });
+    let inputs = vec![Input::Pressure, Input::Gaps, Input::Objects];
+    let methods =
+        vec![ContactMethod::Springs, ContactMethod::SmallStrain, ContactMethod::SecondOrder];
+    (
+        prop::option::of(prop::sample::select(inputs)),
+        (layout(), layout(), layout()),
+        prop::option::of(prop::collection::vec(object, 0..3)),
+        prop::option::of(prop::collection::vec(finger, 0..3)),
+        prop::option::of(prop::sample::select(methods)),
+        any::<(Option<bool>, Option<bool>)>(),
+    )
+        .prop_map(|(input, layouts, objects, fingers, method, asked)| Hello {
+            input,
+            input_layout: layouts.0,
+            answer_layout: layouts.1,
+            pressure: layouts.2,
+            objects,
+            fingers,
+            method,
+            force_target: asked.0,
+            stiffness: asked.1,
+            ..Hello::default()
+        })
 }
 
 proptest! {
@@ -137,6 +181,9 @@ proptest! {
             answer_sample_type: Some(SampleType::F16),
             session_effects: effects,
             sections: Some(vec![section]),
+            vertices: Some(offset),
+            fingers: numbers.2,
+            contact_us: Some(numbers.1),
         });
         let text = serde_json::to_string(&message).unwrap();
         prop_assert_eq!(serde_json::from_str::<ServerMessage>(&text).unwrap(), message);

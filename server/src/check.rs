@@ -9,6 +9,7 @@ use crate::{
     StartError,
     config::Config,
     core::catalogue::{Catalogue, assets::Assets, calibrate, golden},
+    start::load_contact,
     transport::{gate::Gate, net, tls},
 };
 
@@ -17,6 +18,8 @@ use crate::{
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_EFFECTS: usize = 20 << 20;
+/// A finger's solver, during a renewal twice, and the shapes of its session.
+const PER_FINGER: usize = 34 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
 /// What was found, in the order it was looked at.
@@ -94,7 +97,10 @@ pub fn check(config: &Config) -> Report {
     }
     let assets = Assets::of(config);
     match assets.and_then(|a| Catalogue::load(&a, config.default_tier.as_deref(), None)) {
-        Ok(catalogue) => look_at_models(&mut report, config, &catalogue),
+        Ok(catalogue) => {
+            look_at_models(&mut report, config, &catalogue);
+            look_at_contact(&mut report, config, &catalogue);
+        }
         Err(error) => report.bad("models", error.exit_code(), &error),
     }
     match TcpListener::bind(config.bind) {
@@ -162,11 +168,24 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     }
 }
 
+fn look_at_contact(report: &mut Report, config: &Config, catalogue: &Catalogue) {
+    let Some(file) = &config.contact else { return };
+    match load_contact(file, catalogue) {
+        Ok(contact) => {
+            let detail = format!("of this finger, {} us a frame", contact.frame_us);
+            report.good("contact", detail, json!({"frame_us": contact.frame_us}));
+        }
+        Err(error) => report.bad("contact", error.exit_code(), &error),
+    }
+}
+
 /// Bytes that clients can make the service hold, by construction.
 fn memory_bound(config: &Config) -> usize {
     let requests =
         config.max_requests.get() * (3 * config.max_body_bytes + PER_REQUEST_BEYOND_BODY);
+    let contact = config.contact.as_ref().map_or(0, |_| PER_FINGER);
     config.max_connections.get() * (PER_CONNECTION + config.max_body_bytes)
         + config.max_sessions.get() * (PER_SESSION + PER_EFFECTS)
+        + config.max_fingers.get() * (PER_EFFECTS + contact)
         + requests
 }

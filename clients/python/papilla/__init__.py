@@ -4,12 +4,12 @@ Pressure on the skin (Pa) in, strain energy density (SED) at the dermis-epidermi
 out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 
 - `sed(pressure_pa)`: one map over HTTP
-- `Session`, `AsyncSession`: many maps over a WebSocket; the latest frame wins
+- `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
 """
 
 from .aio import AsyncSession
-from .answer import Answer, Problem, Summary
+from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
 from .errors import Closed, NotRendered, PapillaError, Refused, Unreachable
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
@@ -31,6 +31,7 @@ __all__ = [
     "Refused",
     "Session",
     "Summary",
+    "Touch",
     "Unreachable",
     "indentation",
     "post",

@@ -6,9 +6,10 @@ import asyncio
 import json
 import logging
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -27,6 +28,12 @@ from .wire import Window
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
 _LOG: Final = logging.getLogger("papilla")
+NetForce: TypeAlias = tuple[Sequence[float], float]
+"""A unit vector in the finger's frame, and N along it."""
+_OF_VERSION_3: Final = {
+    "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target",
+    "stiffness", "pressure",
+}  # fmt: skip
 
 
 class AsyncSession:
@@ -52,7 +59,7 @@ class AsyncSession:
         self._socket: ClientConnection | None = None
         self._tiers: dict[int, str] = {}
         self._sequence = 0
-        self._waiting: Frame | None = None
+        self._waiting: dict[int, Frame] = {}
         self._sent: dict[int, Frame] = {}
         self._wake = asyncio.Event()
         self._connected = asyncio.Event()
@@ -85,10 +92,10 @@ class AsyncSession:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._socket is not None:
             await self._socket.close()
-        for frame in [*self._sent.values(), self._waiting]:
+        for frame in [*self._sent.values(), *self._waiting.values()]:
             self._lose(frame)
         self._sent.clear()
-        self._waiting = None
+        self._waiting.clear()
 
     @property
     def connected(self) -> bool:
@@ -140,10 +147,7 @@ class AsyncSession:
         client_time_us: int | None,
         deadline_us: int,
     ) -> Frame:
-        if self._closed:
-            raise Closed("the session is closed")
-        if self._fault is not None:
-            raise self._fault
+        self._check_open()
         if pressure_pa is None:
             pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
         samples = np.asarray(pressure_pa, np.float32)
@@ -152,21 +156,58 @@ class AsyncSession:
             raise ValueError(f"{samples.shape} samples for a window of {window[3], window[2]}")
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
-        kind = self.ready["sample_type"]
-        message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
+        kind, version = self.ready["sample_type"], self.ready["version"]
+        message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us, version)
         return Frame(self._sequence, time_us, message)
+
+    def send_poses(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+        """Hands over where the objects of the hello are, and returns at once.
+
+        `poses` has a row of seven for each: its origin in the finger's frame, mm, and its turn as a
+        unit quaternion x y z w. `net` is a net force to be met: a unit vector and N.
+        """
+        frame = self.encode_rows("objects", np.atleast_2d(np.asarray(poses, np.float32)), finger, net)
+        self.hand_over(frame)
+        return frame.outcome
+
+    async def touch(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Answer:
+        """`send_poses`, and waits for the outcome; `.touch` holds the force."""
+        return await asyncio.wrap_future(self.send_poses(poses, finger=finger, net=net))
+
+    def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+        """Hands over how deep the undeformed skin lies in things, mm; negative in air."""
+        frame = self.encode_rows("gaps", np.atleast_2d(np.asarray(depth_mm, np.float32)), finger, net)
+        self.hand_over(frame)
+        return frame.outcome
+
+    def encode_rows(self, kind: str, rows: wire.Map, finger: int, net: NetForce | None) -> Frame:
+        self._check_open()
+        self._sequence = (self._sequence + 1) % 2**32
+        time_us = time.monotonic_ns() // 1000
+        row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
+        message = wire.encode_rows(kind, rows, row, finger, self._sequence, time_us)
+        return Frame(self._sequence, time_us, message, finger)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise Closed("the session is closed")
+        if self._fault is not None:
+            raise self._fault
 
     def hand_over(self, frame: Frame) -> None:
         if self._closed or self._fault is not None:
             return self._lose(frame)
-        old, self._waiting = self._waiting, frame
+        # At the end: fingers take turns.
+        old = self._waiting.pop(frame.finger, None)
+        self._waiting[frame.finger] = frame
         if old is not None:
             self.superseded_by_client += 1
             old.end("superseded", by_client=True)
         self._wake.set()
 
     def _words(self, hello: dict[str, Any]) -> str:
-        return json.dumps({"type": "hello", "version": 2, **hello})
+        version = 3 if _OF_VERSION_3 & hello.keys() else 2
+        return json.dumps({"type": "hello", "version": version, **hello})
 
     async def _connect(self) -> None:
         parts = urlsplit(self.url)
@@ -221,8 +262,9 @@ class AsyncSession:
                         continue
                     # The service is another one now: the program has to know.
                     self._fault = error
-                    self._lose(self._waiting)
-                    self._waiting = None
+                    for frame in self._waiting.values():
+                        self._lose(frame)
+                    self._waiting.clear()
                     return
             self._wake.set()
 
@@ -273,9 +315,11 @@ class AsyncSession:
             self._wake.clear()
             await self._connected.wait()
             async with self._writing:
-                frame, self._waiting = self._waiting, None
-                if frame is None or self._socket is None:
+                if not self._waiting or self._socket is None:
                     continue
+                frame = self._waiting.pop(next(iter(self._waiting)))
+                if self._waiting:
+                    self._wake.set()
                 frame.ready = self.ready
                 self._sent[frame.sequence] = frame
                 try:

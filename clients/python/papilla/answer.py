@@ -34,6 +34,30 @@ class Summary(NamedTuple):
     sa1_rate_hz: float
 
 
+class Touch(NamedTuple):
+    """What pushes back on a finger, in its frame."""
+
+    force_n: tuple[float, float, float]
+    torque_n_mm: tuple[float, float, float]
+    area_mm2: float
+    centre_mm: tuple[float, float, float]
+    penetration_mm: float
+    stiffness_n_per_mm: float
+    """0 if it was not asked for."""
+    travel_mm: float
+    """How far things travelled to meet a net force."""
+    pressure_max_pa: float
+    share: float
+    """Of the second order of finite strain in the displacement."""
+    solve_us: float
+
+
+def read_touch(message: bytes, offset: int) -> Touch:
+    """The touch at `offset`."""
+    v = struct.unpack_from("<16f", message, offset)
+    return Touch((v[0], v[1], v[2]), (v[3], v[4], v[5]), v[6], (v[7], v[8], v[9]), *v[10:])
+
+
 class Problem(NamedTuple):
     """Why the service refused a frame."""
 
@@ -64,6 +88,9 @@ class Answer:
     """The contact reaches the edge of the atlas; what lies beyond is missing."""
     unfamiliar: bool = False
     """The map is rougher or heavier than any the tier was trained on: it may mean nothing."""
+    unsettled: bool = False
+    """The contact solve did not settle: the answer is rough."""
+    finger: int = 0
     tier: str = ""
     window: Window = wire.WHOLE
     """Column, row, width and height of `values`."""
@@ -73,6 +100,12 @@ class Answer:
     infer_us: int = 0
     values: Map | None = None
     """The samples of the window, (height, width)."""
+    touch: Touch | None = None
+    """Of objects and gaps."""
+    pressure_pa: Map | None = None
+    """The pressure that was found, if asked for: a map, or a value a vertex."""
+    vertices: Map | None = None
+    """What the map shows at the vertices, if asked for in its place."""
     summary: Summary | None = None
     points: Map | None = None
     actuators: Map | None = None
@@ -110,6 +143,8 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         no_contact="no_contact" in header.flags,
         cut_off="cut_off" in header.flags,
         unfamiliar="unfamiliar" in header.flags,
+        unsettled="unsettled" in header.flags,
+        finger=header.finger,
         tier=tier,
         window=header.window,
         total_us=header.total_us,
@@ -120,7 +155,13 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         return answer
     for section in ready["sections"]:
         name, offset, size = section["name"], section["offset"], section["bytes"]
-        if name == "summary":
+        if name == "touch":
+            answer.touch = read_touch(message, offset)
+        elif name == "pressure":
+            answer.pressure_pa = wire.floats(message, offset, size)
+        elif name == "vertices":
+            answer.vertices = wire.scaled(message, offset, ready["vertices"], header)
+        elif name == "summary":
             answer.summary = Summary(*struct.unpack_from("<16f", message, offset))
         elif name == "points":
             answer.points = wire.floats(message, offset, size)

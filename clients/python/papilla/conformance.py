@@ -103,6 +103,24 @@ def check_answer(expect: Step, answer: Answer) -> None:
             check_list(name, getattr(answer, name), expect[name])
 
 
+def check_touch(step: Step, answer: Answer) -> None:
+    expect = step["expect"]
+    if answer.problem:
+        must(expect.get("status") == "error", f"refused: {answer.problem.message}")
+        return check_problem(expect, answer.problem.code, answer.problem.field)
+    must(expect.get("status") != "error", "the frame is not refused")
+    must(answer.status == "ok" and answer.finger == step.get("finger", 0), f"{answer}")
+    assert answer.touch is not None
+    touch = answer.touch
+    numbers = [*touch.force_n, *touch.torque_n_mm, touch.area_mm2, *touch.centre_mm, *touch[4:-1]]
+    check_list("touch", numbers, expect["touch"])
+    if "pressure_sum" in expect:
+        assert answer.pressure_pa is not None
+        near("pressure", float(answer.pressure_pa.sum(dtype=np.float64)), expect["pressure_sum"])
+    must(answer.no_contact == ("no_contact" in expect["flags"]), "flags")
+    must(not answer.out_of_range and not answer.unsettled, f"{answer}")
+
+
 class Run:
     """One case."""
 
@@ -186,6 +204,21 @@ class Run:
         must(here >= expect.get("superseded_by_client", 0), f"the client superseded {here} frames")
         check_answer(expect["newest"], answers[-1])
         self.note = f"({good} ok, {here} superseded here, {superseded - here} by the service)"
+
+    def touch(self, step: Step) -> None:
+        poses = np.array(step["poses"], np.float32)
+        check_touch(step, self.open_session().send_poses(poses, **self.of_hand(step)).result(self.timeout_s))
+
+    def gaps(self, step: Step) -> None:
+        *centre, radius = step["sphere"]
+        off = np.sqrt(((self.finger().positions_mm.astype(np.float64) - centre) ** 2).sum(axis=1))
+        sent = self.open_session().send_gaps((radius - off).astype(np.float32), **self.of_hand(step))
+        check_touch(step, sent.result(self.timeout_s))
+
+    @staticmethod
+    def of_hand(step: Step) -> dict[str, Any]:
+        net = step.get("net")
+        return {"finger": step.get("finger", 0), "net": net and (net[:3], net[3])}
 
     def reconnect(self, step: Step) -> None:
         session = self.open_session()

@@ -15,12 +15,13 @@ _SOCKET_BYTES: Final = 512 * 1024
 class Frame:
     """A frame on its way, and who waits for its outcome."""
 
-    __slots__ = ("client_time_us", "message", "outcome", "ready", "sequence")
+    __slots__ = ("client_time_us", "finger", "message", "outcome", "ready", "sequence")
 
-    def __init__(self, sequence: int, client_time_us: int, message: bytes) -> None:
+    def __init__(self, sequence: int, client_time_us: int, message: bytes, finger: int = 0) -> None:
         self.sequence = sequence
         self.client_time_us = client_time_us
         self.message = message
+        self.finger = finger
         self.outcome: Future[Answer] = Future()
         self.ready: dict[str, Any] = {}
 

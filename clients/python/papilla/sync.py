@@ -9,9 +9,10 @@ from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, TypeVar
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from .aio import AsyncSession
+from .aio import AsyncSession, NetForce
 from .answer import Answer
 from .http import DEFAULT_URL
 from .wire import Window
@@ -109,6 +110,27 @@ class Session:
         """`send`, and waits for the outcome; raises TimeoutError after `timeout_s`."""
         sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
         return sent.result(timeout_s)
+
+    def send_poses(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+        """Hands over where objects are and returns at once; see `AsyncSession.send_poses`."""
+        return self._hand_over("objects", poses, finger, net)
+
+    def touch(
+        self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
+    ) -> Answer:
+        """`send_poses`, and waits for the outcome; `.touch` holds the force."""
+        return self.send_poses(poses, finger=finger, net=net).result(timeout_s)
+
+    def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+        """Hands over gaps and returns at once; see `AsyncSession.send_gaps`."""
+        return self._hand_over("gaps", depth_mm, finger, net)
+
+    def _hand_over(self, kind: str, values: ArrayLike, finger: int, net: NetForce | None) -> Future[Answer]:
+        rows = np.atleast_2d(np.asarray(values, np.float32))
+        with self._lock:
+            frame = self._session.encode_rows(kind, rows, finger, net)
+            self._loop.call_soon_threadsafe(self._session.hand_over, frame)
+        return frame.outcome
 
     def renew(self, **hello: Any) -> dict[str, Any]:
         """Says hello again, in the open session; raises Refused, and the old terms stand."""

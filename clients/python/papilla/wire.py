@@ -1,4 +1,4 @@
-"""Frames of version 2 of the protocol (docs/reference/protocol.md)."""
+"""Frames of versions 2 and 3 of the protocol (docs/reference/protocol.md)."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ class Header(NamedTuple):
     infer_us: int
     tier: int
     flags: frozenset[str]
+    finger: int
 
 
 def encode(
@@ -53,6 +54,7 @@ def encode(
     sequence: int,
     client_time_us: int,
     deadline_us: int,
+    version: int = 2,
 ) -> bytes:
     """The message of one pressure frame; `pressure_pa` has the window's shape."""
     number, dtype, unit_max = _SAMPLES[sample_type]
@@ -69,13 +71,39 @@ def encode(
         samples = pressure_pa.astype(dtype, copy=False).tobytes()
     column, row, width, height = window
     head = HEADER.pack(
-        b"PPL1", 2, 1, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
+        b"PPL1", version, 1, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
         column, row, 0, 0, 0, 0, 0,
     )  # fmt: skip
     return head + samples
 
 
-FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "cut_off"}
+def encode_rows(
+    kind: str,
+    rows: NDArray[Any],
+    net: NDArray[Any] | None,
+    finger: int,
+    sequence: int,
+    client_time_us: int,
+) -> bytes:
+    """The message of poses (`rows` of seven) or of gaps (a row of them, or a map), as f32.
+
+    `net` is the row of seven of a net force, or None.
+    """
+    height, width = rows.shape
+    samples = rows.astype("<f4").tobytes()
+    if net is not None:
+        samples += net.astype("<f4").tobytes()
+        height += kind == "objects"
+    head = HEADER.pack(
+        b"PPL1", 3, INPUTS[kind], 0, 0, sequence, width, height, client_time_us, 0, 1.0,
+        0, 0, 0, 0, 0, 0, finger,
+    )  # fmt: skip
+    return head + samples
+
+
+INPUTS: Final = {"objects": 4, "gaps": 5}
+"""Kinds of frames of version 3."""
+FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "cut_off", 16: "unsettled"}
 """Bits of an answer's flags."""
 
 
@@ -87,15 +115,16 @@ def decode(message: bytes) -> Header:
     if len(message) < HEADER.size:
         raise ValueError(f"an answer of {len(message)} bytes; a header has {HEADER.size}")
     (magic, version, kind, number, status, sequence, width, height, client_time_us, total_us,
-     scale, column, row, queue_us, infer_us, tier, flags, _) = HEADER.unpack_from(message)  # fmt: skip
-    if magic != b"PPL1" or version != 2 or kind not in KINDS or number not in _NAMES:
-        raise ValueError("not an answer of version 2 of the protocol")
+     scale, column, row, queue_us, infer_us, tier, flags, finger) = HEADER.unpack_from(message)  # fmt: skip
+    if magic != b"PPL1" or version not in (2, 3) or kind not in KINDS or number not in _NAMES:
+        raise ValueError("not an answer of version 2 or 3 of the protocol")
     if status >= len(STATUSES):
         raise ValueError(f"an answer with status {status}")
     names = {name for bit, name in FLAGS.items() if flags & bit}
     return Header(
         KINDS[kind], _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
         client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names),
+        finger if version == 3 else 0,
     )  # fmt: skip
 
 
@@ -106,9 +135,14 @@ def floats(message: bytes, offset: int, size: int) -> Map:
 
 def samples(message: bytes, offset: int, header: Header) -> Map:
     """The samples of the window, in J/m3 or Hz: (height, width)."""
-    _, dtype, unit_max = _SAMPLES[header.sample_type]
     _, _, width, height = header.window
-    values = np.frombuffer(message, dtype, width * height, offset).astype(np.float32)
+    return scaled(message, offset, width * height, header).reshape(height, width)
+
+
+def scaled(message: bytes, offset: int, count: int, header: Header) -> Map:
+    """`count` samples at `offset`, in J/m3 or Hz."""
+    _, dtype, unit_max = _SAMPLES[header.sample_type]
+    values = np.frombuffer(message, dtype, count, offset).astype(np.float32)
     if unit_max:
         values *= np.float32(header.scale)
-    return values.reshape(height, width)
+    return values

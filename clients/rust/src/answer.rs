@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
-    Window, effects::SectionName, flags,
+    Window, contact::Touch, effects::SectionName, flags,
 };
 
 use crate::PapillaError;
@@ -46,6 +46,10 @@ pub struct Answer {
     pub unfamiliar: bool,
     /// The contact reaches the edge of the atlas; what lies beyond is missing.
     pub cut_off: bool,
+    /// The contact solve did not settle: the answer is rough.
+    pub unsettled: bool,
+    /// Number of the finger.
+    pub finger: u8,
     /// Name of the tier that rendered.
     pub tier: String,
     /// Time in the server, us.
@@ -58,6 +62,12 @@ pub struct Answer {
     pub window: Window,
     /// The whole map, 224 x 224, row-major; empty if the session asked for none.
     pub map: Vec<f32>,
+    /// What pushes back, of objects and gaps.
+    pub touch: Option<Touch>,
+    /// The pressure that was found, Pa, if asked for.
+    pub pressure_pa: Vec<f32>,
+    /// What the map shows at the vertices, if asked for in its place.
+    pub vertices: Vec<f32>,
     /// The effect `summary`.
     pub summary: Option<Summary>,
     /// The effect `points`.
@@ -89,12 +99,17 @@ impl Answer {
             no_contact: false,
             unfamiliar: false,
             cut_off: false,
+            unsettled: false,
+            finger: 0,
             tier: String::new(),
             total_us: 0,
             queue_us: 0,
             infer_us: 0,
             window: Window::EMPTY,
             map: Vec::new(),
+            touch: None,
+            pressure_pa: Vec::new(),
+            vertices: Vec::new(),
             summary: None,
             points: Vec::new(),
             actuators: Vec::new(),
@@ -108,7 +123,7 @@ impl Answer {
         ready: &Ready,
         tier: String,
     ) -> Result<Self, PapillaError> {
-        let Extension { queue_us, infer_us, flags: bits, .. } =
+        let Extension { queue_us, infer_us, flags: bits, finger, .. } =
             header.extension.unwrap_or_default();
         let status = match header.status {
             FrameStatus::Ok => Status::Ok,
@@ -125,6 +140,8 @@ impl Answer {
             no_contact: bits & flags::NO_CONTACT != 0,
             unfamiliar: bits & flags::UNFAMILIAR != 0,
             cut_off: bits & flags::CUT_OFF != 0,
+            unsettled: bits & flags::UNSETTLED != 0,
+            finger: finger.unwrap_or_default(),
             tier,
             total_us: header.time_us,
             queue_us,
@@ -154,6 +171,15 @@ impl Answer {
             let short = || PapillaError::Protocol(format!("an answer ends in {:?}", section.name));
             let part = message.get(at..at + bytes).ok_or_else(short)?;
             match section.name {
+                SectionName::Touch => self.touch = Touch::decode(part),
+                SectionName::Pressure => self.pressure_pa = floats(part)?,
+                SectionName::Vertices => {
+                    self.vertices = vec![0.0; part.len() / header.sample_type.bytes()];
+                    header
+                        .sample_type
+                        .decode(part, header.scale, &mut self.vertices)
+                        .map_err(|error| PapillaError::Protocol(error.to_string()))?;
+                }
                 SectionName::Summary => self.summary = Summary::decode(part),
                 SectionName::Points => self.points = floats(part)?,
                 SectionName::Actuators => self.actuators = floats(part)?,

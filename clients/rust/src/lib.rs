@@ -24,5 +24,5 @@ pub use dial::dial;
 pub use error::PapillaError;
 pub use http::{Rendered, atlas, get, sed};
 pub use papilla_proto as proto;
-pub use session::{Frame, Session};
+pub use session::{Frame, NetForce, Session};
 pub use skin::{Contact, Skin};

@@ -1,5 +1,6 @@
 //! A session that reconnects by itself.
 
+mod hand;
 mod link;
 mod state;
 
@@ -15,6 +16,7 @@ use tokio::{
 };
 
 use crate::{Answer, PapillaError, dial::host_and_port};
+pub use hand::NetForce;
 use link::Link;
 use state::{Asked, State};
 
@@ -72,6 +74,12 @@ pub struct Session {
     task: JoinHandle<()>,
 }
 
+/// The hello in the version that its members need.
+fn versioned(hello: Hello) -> Hello {
+    let version = if hello.member_of_version_3().is_some() { 3 } else { 2 };
+    Hello { version, ..hello }
+}
+
 /// Microseconds of a steady clock.
 fn now_us() -> u64 {
     static START: OnceLock<Instant> = OnceLock::new();
@@ -79,13 +87,14 @@ fn now_us() -> u64 {
 }
 
 impl Session {
-    /// Opens a session at `server` (host and port, or a URL). The hello goes as version 2.
+    /// Opens a session at `server` (host and port, or a URL). The hello goes as version 2, or 3 if it
+    /// has members of that.
     ///
     /// # Errors
     /// Nobody listens, or the hello is refused: [`PapillaError::code`] says why.
     pub async fn open(server: &str, hello: Hello) -> Result<Self, PapillaError> {
         let server = host_and_port(server).to_owned();
-        let hello = Hello { version: 2, ..hello };
+        let hello = versioned(hello);
         let (link, ready) = Link::open(&server, &hello).await?;
         let shared = Arc::new(Shared {
             state: std::sync::Mutex::new(State::new(hello, ready)),
@@ -133,8 +142,7 @@ impl Session {
     /// It is refused, and the old terms stand; or the connection broke meanwhile.
     pub async fn renew(&self, hello: Hello) -> Result<Arc<Ready>, PapillaError> {
         let (reply, answer) = oneshot::channel();
-        self.shared.state().asked =
-            Some(Asked { hello: Hello { version: 2, ..hello }, said: false, reply });
+        self.shared.state().asked = Some(Asked { hello: versioned(hello), said: false, reply });
         self.shared.wake.notify_one();
         answer.await.map_err(|_| PapillaError::Closed)?
     }

@@ -46,15 +46,69 @@ export interface Hello {
   relaxation?: Relaxation;
 }
 
+/** A shape of scene files with its dimensions, or a closed mesh. */
+export type Shape =
+  | { shape: 'mesh'; vertices_mm: [number, number, number][]; triangles: [number, number, number][] }
+  | ({ shape: string } & Record<string, unknown>);
+
+/** What a hand asks for; answers are f32. */
+export interface HandHello {
+  objects?: { shape: Shape; stiffness_mpa_per_mm?: number }[];
+  fingers?: { width?: number; stiffness?: number }[];
+  input_layout?: 'map' | 'vertices';
+  answer_layout?: 'map' | 'vertices';
+  method?: 'springs' | 'small_strain' | 'second_order';
+  force_target?: boolean;
+  stiffness?: boolean;
+  pressure?: 'map' | 'vertices';
+  map?: boolean;
+  effects?: string[];
+  tier?: string | null;
+  budget_us?: number | null;
+  atlas_hash?: string | null;
+  points?: Place[];
+  actuators?: Actuators;
+  relaxation?: Relaxation;
+}
+
+/** Where an object is in a finger's frame: mm, and a unit quaternion x y z w. */
+export interface Pose {
+  at: [number, number, number];
+  turn?: [number, number, number, number];
+}
+
+/** A net force to be met: a unit vector in the finger's frame, and N along it. */
+export interface NetForce {
+  direction: [number, number, number];
+  forceN: number;
+}
+
+/** What pushes back on a finger, in its frame. */
+export interface Touch {
+  forceN: [number, number, number];
+  torqueNMm: [number, number, number];
+  areaMm2: number;
+  centreMm: [number, number, number];
+  penetrationMm: number;
+  /** 0 if it was not asked for. */
+  stiffnessNPerMm: number;
+  /** How far things travelled to meet a net force. */
+  travelMm: number;
+  pressureMaxPa: number;
+  /** Of the second order of finite strain in the displacement. */
+  share: number;
+  solveUs: number;
+}
+
 export interface Section {
-  name: 'summary' | 'points' | 'actuators' | 'map';
+  name: 'touch' | 'pressure' | 'summary' | 'points' | 'actuators' | 'map' | 'vertices';
   offset: number;
   bytes: number;
 }
 
 export interface Ready {
   type: 'ready';
-  version: 2;
+  version: 2 | 3;
   session: number;
   tier: string;
   tier_number: number;
@@ -71,6 +125,10 @@ export interface Ready {
   pressure_max_pa: number;
   sed_scale_j_per_m3: number;
   sections: Section[];
+  /** Of version 3. */
+  vertices?: number;
+  fingers?: number;
+  contact_us?: number;
 }
 
 /** A refusal, of a hello or of a frame (then with its `sequence`). */

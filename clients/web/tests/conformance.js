@@ -1,6 +1,6 @@
 // The steps of docs/reference/conformance.md by this client; runs in the page, which has nothing but the client and the server.
 
-import { Atlas, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '../papilla.js';
+import { Atlas, Hand, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '../papilla.js';
 
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
@@ -64,6 +64,7 @@ function checkMap(expect, map) {
 /** One case's session. */
 class Runner {
   /** @type {Session | null} */ session = null;
+  /** @type {Hand | null} */ hand = null;
   /** @type {Map<number, Outcome>} */ outcomes = new Map();
   /** @type {number[]} */ order = [];
   /** @type {Map<number, string>} */ tiers = new Map();
@@ -97,6 +98,7 @@ class Runner {
   async hello({ hello: wire, expect }) {
     // What a case does not say is the protocol's default, not the client's.
     const hello = { sample_type: 'f32', ...wire };
+    if (wire.input) return this.announce(wire, expect);
     let reply = /** @type {any} */ (null);
     const fresh = this.session === null || this.session.state === 'refused';
     if (fresh) this.session = new Session(this.url, hello, { crop: false, clockUs: () => this.now() });
@@ -228,6 +230,55 @@ class Runner {
     this.check({ ...expect, tier: undefined }, outcome);
   }
 
+  /** @param {Step} wire @param {Step} expect */
+  async announce(wire, expect) {
+    this.hand?.close();
+    try {
+      this.hand = await Hand.connect(this.url, wire);
+    } catch (error) {
+      return this.refused(expect, error);
+    }
+    same('status', expect.status ?? 'ok', 'ok');
+    for (const [member, due] of Object.entries(expect.ready ?? {})) same(`ready.${member}`, /** @type {Step} */ (this.hand.ready)[member], due);
+  }
+
+  /** @param {Step} expect @param {unknown} error */
+  refused(expect, error) {
+    if (!(error instanceof PapillaError)) throw error;
+    same(`status (${error.message})`, 'error', expect.status);
+    for (const member of /** @type {const} */ (['code', 'field'])) if (expect[member]) same(member, error.problem[member], expect[member]);
+  }
+
+  /** @param {Step} step */
+  touch(step) {
+    const poses = step.poses.map((/** @type {number[]} */ p) => ({ at: p.slice(0, 3), turn: p.slice(3) }));
+    return this.press(step, (hand, more) => hand.touch(poses, more));
+  }
+
+  /** @param {Step} step */
+  gaps(step) {
+    const [x, y, z, radius] = step.sphere;
+    const p = this.atlas.skin.positionsMm;
+    const depths = Float32Array.from({ length: this.atlas.vertexCount }, (_, i) => radius - Math.hypot(p[3 * i] - x, p[3 * i + 1] - y, p[3 * i + 2] - z));
+    return this.press(step, (hand, more) => hand.touchGaps(depths, more));
+  }
+
+  /** @param {Step} step @param {(hand: Hand, more: any) => Promise<import('../src/hand.js').HandAnswer>} send */
+  async press({ finger = 0, net, expect }, send) {
+    let answer;
+    try {
+      answer = await send(/** @type {Hand} */ (this.hand), { finger, net: net && { direction: net.slice(0, 3), forceN: net[3] } });
+    } catch (error) {
+      return this.refused(expect, error);
+    }
+    const { forceN, torqueNMm, areaMm2, centreMm, penetrationMm, stiffnessNPerMm, travelMm, pressureMaxPa, share } = answer.touch;
+    same('finger', answer.finger, finger);
+    allNear('touch', [...forceN, ...torqueNMm, areaMm2, ...centreMm, penetrationMm, stiffnessNPerMm, travelMm, pressureMaxPa, share], expect.touch);
+    if (expect.pressure_sum) near('pressure', /** @type {Float32Array} */ (answer.pressurePa).reduce((sum, value) => sum + value, 0), expect.pressure_sum);
+    same('flags', answer.noContact ? ['no_contact'] : [], expect.flags);
+    same('odd flags', [answer.outOfRange, answer.unsettled], [false, false]);
+  }
+
   /** @param {Step} step */
   rasterise({ vertices, expect }) {
     const [x, y, z, sigma, peak] = vertices.gaussian_mm;
@@ -271,6 +322,7 @@ export async function run({ url, control, file, report }) {
       report(`FAIL ${name}: step ${at} (${steps[at - 1]?.do}): ${error instanceof Error ? error.message : error}`);
     }
     runner.session?.close();
+    runner.hand?.close();
   }
   return failed;
 }

@@ -18,7 +18,7 @@ pub struct Contact {
     pub centre_mm: [f64; 3],
     /// Deepest point left inside an object, mm.
     pub penetration_mm: f64,
-    /// Change of force for a small travel of the objects along it, N/mm, if asked for.
+    /// Change of force for a small travel of the objects along it, N/mm, if asked for and found.
     pub stiffness_n_per_mm: Option<f64>,
     /// What the answer is worth.
     pub quality: Quality,
@@ -108,6 +108,12 @@ impl Contact {
     pub(crate) fn press(&mut self, vertex: u32, pressure_pa: f32) {
         self.pressure_pa[vertex as usize] = pressure_pa;
         self.touched.push(vertex);
+    }
+
+    /// Whether every number is one.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.touched.iter().all(|v| self.pressure_pa[*v as usize].is_finite())
+            && self.force_n.iter().chain(&self.torque_n_mm).all(|v| v.is_finite())
     }
 
     /// Vertices with pressure.

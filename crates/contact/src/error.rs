@@ -81,6 +81,17 @@ pub enum ContactError {
         /// Expected.
         expected: usize,
     },
+    /// A depth that is none.
+    #[error("depth_mm[{vertex}] is {value}: it has to be finite and within 100 m")]
+    Depth {
+        /// Vertex.
+        vertex: usize,
+        /// Found.
+        value: f32,
+    },
+    /// The iteration ran away; the last frame is forgotten.
+    #[error("no finite pressure was found for this frame; the next one starts anew")]
+    Diverged,
     /// A force that no depth within reach gives.
     #[error("no depth up to {depth_mm} mm gives {wanted_n} N: {reached_n} N are reached")]
     Force {

@@ -1,74 +1,125 @@
-//! Contact under a net force: how far objects have to travel.
+//! Contact under a net force: how far things have to travel.
 
 use crate::answer::{Contact, Effort};
 use crate::error::ContactError;
-use crate::objects::{Object, View, validate};
+use crate::objects::{Scene, View};
 use crate::solver::Solver;
 
-/// Farthest that objects travel, mm.
+/// Farthest that things travel, mm.
 const TRAVEL_MAX_MM: f64 = 30.0;
 /// First step of the travel, mm.
 const STEP_MM: f64 = 0.1;
+/// Longest step where only one side of the travel is known, mm.
+const STEP_MAX_MM: f64 = 1.0;
 /// How closely the force is met.
 const TOLERANCE: f64 = 2e-3;
-/// Most frames tried.
+/// Most frames tried, and linearisations in all of them.
 const TRIES_MAX: u32 = 40;
+const ITERATIONS_MAX: u32 = 400;
+/// A travel this near an end of its bracket, as part of it, goes to the middle.
+const MARGIN: f64 = 0.02;
 
-impl Solver {
-    /// Moves `objects` along the unit vector `direction` until they press on the finger along it
-    /// with `force_n`, and finds what presses there; returns their travel, mm, which is negative
-    /// where they have to draw back.
-    ///
-    /// Secant and bisection between a travel with too little force and one with too much. What
-    /// it took is summed over all frames tried.
-    ///
-    /// # Errors
-    /// [`ContactError::Force`] if no travel up to 30 mm gives the force;
-    /// [`ContactError::Value`] for a direction that is no unit vector, or no positive force.
-    pub fn solve_for_force(
-        &mut self,
-        objects: &[Object],
-        direction: [f64; 3],
-        force_n: f64,
-        out: &mut Contact,
-    ) -> Result<f64, ContactError> {
-        validate(objects)?;
-        let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+/// Where a net force was met; the next frame starts there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached {
+    travel_mm: f64,
+    slope_n_per_mm: f64,
+}
+
+/// A net force to be met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NetForce {
+    /// Unit vector along which things travel and press.
+    pub direction: [f64; 3],
+    /// Force on the finger along it, N.
+    pub force_n: f64,
+}
+
+impl NetForce {
+    fn validate(&self) -> Result<(), ContactError> {
+        let size = self.direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !((size - 1.0).abs() < 1e-3) {
             let (member, rule) = ("direction", "has to be a unit vector; this is its length");
             return Err(ContactError::Value { member, value: size, rule });
         }
-        if !(force_n > 0.0 && force_n.is_finite()) {
+        if !(self.force_n > 0.0 && self.force_n.is_finite()) {
             let (member, rule) = ("force_n", "has to be positive");
-            return Err(ContactError::Value { member, value: force_n, rule });
+            return Err(ContactError::Value { member, value: self.force_n, rule });
         }
-        let length = self.person().width;
+        Ok(())
+    }
+}
+
+impl Solver {
+    /// Moves the things of a scene along a direction until they press on the finger with a net
+    /// force, and finds what presses there; returns their travel, mm, which is negative where they
+    /// have to draw back.
+    ///
+    /// Secant steps, kept between a travel with too little force and one with too much; the first
+    /// is where the last frame ended. What it took is summed over all frames tried.
+    ///
+    /// # Errors
+    /// [`ContactError::Force`] if no travel up to 30 mm gives the force;
+    /// [`ContactError::Value`] for a direction that is no unit vector, or no positive force.
+    pub fn solve_for_force<'a>(
+        &mut self,
+        scene: impl Into<Scene<'a>>,
+        net: NetForce,
+        out: &mut Contact,
+    ) -> Result<f64, ContactError> {
+        net.validate()?;
+        let everywhere = f32::INFINITY;
+        self.within(scene.into(), everywhere, |solver, view| solver.travel_until(view, net, out))
+    }
+
+    fn travel_until(
+        &mut self,
+        view: View<'_>,
+        NetForce { direction, force_n }: NetForce,
+        out: &mut Contact,
+    ) -> Result<f64, ContactError> {
         let mut effort = Effort::default();
         let [mut low, mut high]: [Option<(f64, f64)>; 2] = [None, None];
-        let (mut travel, mut reached) = (0.0f64, 0.0f64);
+        let mut last: Option<(f64, f64)> = None;
+        let start = self.reached.take();
+        let mut slope = start.map(|s| s.slope_n_per_mm);
+        let (mut travel, mut reached) = (start.map_or(0.0, |s| s.travel_mm), 0.0f64);
         for _ in 0..TRIES_MAX {
-            let shift_mm = direction.map(|d| d * travel / length);
-            let view = View { objects, length, shift_mm };
-            self.frame(view, out);
+            let shift_mm = direction.map(|d| d * travel / view.length);
+            let view = View { shift_mm, ..view };
+            self.frame(view, out)?;
             effort = effort.plus(out.effort);
             out.effort = effort;
             let force = (0..3).map(|i| direction[i] * out.force_n[i]).sum::<f64>();
             reached = reached.max(force);
+            if let Some((at, then)) = last.filter(|(_, then)| *then > 0.0 && force > 0.0) {
+                let found = (force - then) / (travel - at);
+                slope = Some(found).filter(|s| *s > 0.0 && s.is_finite()).or(slope);
+            }
             if (force - force_n).abs() <= TOLERANCE * force_n {
+                let slope_n_per_mm = slope.unwrap_or(0.0);
+                self.reached = Some(Reached { travel_mm: travel, slope_n_per_mm });
                 return Ok(travel);
             }
-            *if force < force_n { &mut low } else { &mut high } = Some((travel, force));
+            last = Some((travel, force));
+            *if force < force_n { &mut low } else { &mut high } = last;
+            let secant = slope.filter(|s| *s > 0.0).map(|s| travel + (force_n - force) / s);
             travel = match (low, high) {
-                (Some((a, fa)), Some((b, fb))) => {
-                    let part = ((force_n - fa) / (fb - fa)).clamp(0.1, 0.9);
-                    a + part * (b - a)
+                (Some((a, _)), Some((b, _))) => {
+                    let inside = |t: &f64| (MARGIN..1.0 - MARGIN).contains(&((t - a) / (b - a)));
+                    secant.filter(inside).unwrap_or(0.5 * (a + b))
                 }
-                (Some((a, fa)), None) if fa > 0.0 => a + STEP_MM.max(0.5 * a.abs().min(1.0)),
-                (Some((a, _)), None) => a + self.free_mm(view).max(STEP_MM),
-                (None, Some((b, _))) => b - 4.0 * STEP_MM,
+                (Some((a, fa)), None) if fa > 0.0 => {
+                    a + secant.map_or(STEP_MM, |t| (1.05 * (t - a)).clamp(1e-4, STEP_MAX_MM))
+                }
+                (Some((a, _)), None) => a + view.free_mm(&self.model).max(STEP_MM),
+                (None, Some((b, _))) => {
+                    b + secant
+                        .map_or(-4.0 * STEP_MM, |t| (1.05 * (t - b)).clamp(-STEP_MAX_MM, -1e-4))
+                }
                 (None, None) => travel,
             };
-            if travel.abs() > TRAVEL_MAX_MM {
+            if travel.abs() > TRAVEL_MAX_MM || effort.iterations > ITERATIONS_MAX {
                 break;
             }
         }

@@ -4,12 +4,36 @@
 //! pressure that keeps the skin out of [`Object`]s, frame by frame:
 //! `p >= 0`, `gap >= 0`, `p gap = 0` at every vertex, on the displaced skin.
 //! In prose, with what accuracy costs in time: `docs/concepts/contact.md`.
+//!
+//! ```
+//! use papilla_contact::{Arrays, Contact, ContactModel, Header, Object, Settings, Solver};
+//! use papilla_sdf::{Placement, Sphere};
+//! use std::sync::Arc;
+//!
+//! // A skin of four vertices that looks down, on a half-space of .2 MPa.
+//! let positions_mm = vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+//! let normals = [0.0, 0.0, -1.0].repeat(4);
+//! let triangles = vec![0, 2, 1, 1, 2, 3];
+//! let arrays = Arrays::half_space(positions_mm, normals, vec![0.25; 4], triangles, 0.2);
+//! let header = Header { vertices: 4, triangles: 2, share_max: 1.0, ..Header::current() };
+//! let model = Arc::new(ContactModel::new(header, arrays)?);
+//!
+//! let mut solver = Solver::new(model.clone(), Settings::default())?;
+//! let mut contact = Contact::new(model.vertices());
+//! let below = Placement::turned(0.0, 0.0, 0.0, [0.5, 0.5, -9.9]);
+//! solver.solve(&[Object::rigid(Arc::new(Sphere { radius_mm: 10.0 }), below)], &mut contact)?;
+//! assert!(contact.force_n[2] > 0.0 && contact.penetration_mm < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod answer;
 mod bounded;
 mod clusters;
 mod error;
+mod file;
 mod force_target;
+mod gaps;
+mod half_space;
 mod kernels;
 mod ladder;
 mod model;
@@ -21,7 +45,9 @@ mod springs;
 
 pub use answer::{Contact, Effort, Person, Quality};
 pub use error::{ContactError, ModelError};
+pub use force_target::NetForce;
+pub use gaps::Gaps;
 pub use ladder::Method;
 pub use model::{Arrays, ContactModel, Header};
-pub use objects::Object;
+pub use objects::{Object, Scene};
 pub use solver::{Settings, Solver};

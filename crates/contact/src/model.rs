@@ -1,17 +1,13 @@
 //! What is known of a finger before anything touches it: the contact model.
-//!
-//! Its file is one text line, a header in JSON on a second line, and little-endian arrays in the
-//! order of [`Arrays`]. `fe-datagen contact` writes it.
 
 use crate::clusters::Clusters;
 use crate::error::ModelError;
+use crate::gaps::{Slopes, slopes};
 use crate::second_order::SecondOrder;
 use serde::{Deserialize, Serialize};
 
-/// First line of a file.
-const MAGIC: &[u8] = b"papilla contact model\n";
 /// Version of the file.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Most vertices of a skin.
 const VERTICES_MAX: usize = 8192;
 
@@ -40,6 +36,12 @@ pub struct Header {
     /// Largest share of second-order displacement among the training indentations; beyond it
     /// an answer is out of range.
     pub share_max: f32,
+    /// Deepest training indentation, mm; beyond it an answer is out of range. 0: not known.
+    #[serde(default)]
+    pub depth_max_mm: f32,
+    /// mm/N for a unit of the file's compliance; set when it is written.
+    #[serde(default)]
+    pub compliance_unit_mm_per_n: f32,
 }
 
 /// Arrays of a file, in its order.
@@ -79,6 +81,8 @@ pub struct ContactModel {
     pub(crate) rank: Vec<u32>,
     pub(crate) clusters: Clusters,
     pub(crate) second_order: Option<SecondOrder>,
+    /// Gradients over each triangle.
+    pub(crate) slopes: Vec<Slopes>,
     /// Triangles round each vertex.
     pub(crate) around: Vec<Vec<u32>>,
 }
@@ -90,9 +94,7 @@ impl ContactModel {
     /// [`ModelError`] names the array that does not fit.
     pub fn new(header: Header, arrays: Arrays) -> Result<Self, ModelError> {
         let (v, t, r, k) = (header.vertices, header.triangles, header.modes, header.outputs);
-        if header.format != FORMAT {
-            return Err(ModelError::Version { found: header.format, expected: FORMAT });
-        }
+        header.require_format()?;
         let lengths = lengths(&header)?;
         for ((array, values), (_, expected)) in arrays.floats().into_iter().zip(&lengths) {
             if values.len() != *expected {
@@ -131,6 +133,7 @@ impl ContactModel {
         });
         let positions_mm: Vec<[f64; 3]> =
             triples(&arrays.positions_mm).into_iter().map(|p| p.map(f64::from)).collect();
+        let slopes = slopes(&positions_mm, &triangles);
         let clusters = Clusters::new(&positions_mm);
         let mut rank = vec![0; v];
         for (column, &vertex) in clusters.order().iter().enumerate() {
@@ -145,48 +148,10 @@ impl ContactModel {
             rank,
             clusters,
             second_order,
+            slopes,
             around,
             header,
         })
-    }
-
-    /// Reads a file's bytes.
-    ///
-    /// # Errors
-    /// [`ModelError`] for what is no model, or one that is damaged.
-    pub fn read(bytes: &[u8]) -> Result<Self, ModelError> {
-        let rest = bytes.strip_prefix(MAGIC).ok_or(ModelError::Format("its first line differs"))?;
-        let end = rest.iter().position(|b| *b == b'\n');
-        let end = end.ok_or(ModelError::Format("its header does not end"))?;
-        let header: Header = serde_json::from_slice(&rest[..end])?;
-        let mut words = rest[end + 1..].as_chunks::<4>().0.iter().copied();
-        let lengths = lengths(&header)?;
-        let mut take = |(array, expected): (&'static str, usize)| {
-            let values: Vec<f32> = words.by_ref().take(expected).map(f32::from_le_bytes).collect();
-            let found = values.len();
-            if found == expected {
-                Ok(values)
-            } else {
-                Err(ModelError::Length { array, found, expected })
-            }
-        };
-        let [positions, normals, areas, compliance, projection, products, displacements] = lengths;
-        let (positions_mm, normals, areas_mm2) = (take(positions)?, take(normals)?, take(areas)?);
-        let triangles = take(("triangles", 3 * header.triangles))?;
-        let arrays = Arrays {
-            positions_mm,
-            normals,
-            areas_mm2,
-            triangles: triangles.into_iter().map(f32::to_bits).collect(),
-            compliance_mm_per_n: take(compliance)?,
-            projection: take(projection)?,
-            products: take(products)?,
-            displacements: take(displacements)?,
-        };
-        if words.next().is_some() {
-            return Err(ModelError::Format("it goes on after its last array"));
-        }
-        Self::new(header, arrays)
     }
 
     /// What the file says of itself.
@@ -199,6 +164,13 @@ impl ContactModel {
     #[must_use]
     pub fn vertices(&self) -> usize {
         self.areas_mm2.len()
+    }
+
+    /// The lowest vertex, mm: where something flat meets the pad from below.
+    #[must_use]
+    pub fn lowest_mm(&self) -> [f64; 3] {
+        let lower = |a: [f64; 3], b: &[f64; 3]| if b[2] < a[2] { *b } else { a };
+        self.positions_mm.iter().fold([0.0, 0.0, f64::INFINITY], lower)
     }
 
     /// Refuses a model of another atlas.
@@ -220,10 +192,15 @@ impl Header {
     pub fn current() -> Self {
         Self { format: FORMAT, ..Self::default() }
     }
+
+    pub(crate) fn require_format(&self) -> Result<(), ModelError> {
+        let (found, expected) = (self.format, FORMAT);
+        if found == expected { Ok(()) } else { Err(ModelError::Version { found, expected }) }
+    }
 }
 
 impl Arrays {
-    fn floats(&self) -> [(&'static str, &[f32]); 7] {
+    pub(crate) fn floats(&self) -> [(&'static str, &[f32]); 7] {
         [
             ("positions_mm", &self.positions_mm),
             ("normals", &self.normals),
@@ -234,27 +211,10 @@ impl Arrays {
             ("displacements", &self.displacements),
         ]
     }
-
-    /// Bytes of a file.
-    ///
-    /// # Errors
-    /// [`ModelError::Header`] if the header cannot be written.
-    pub fn to_bytes(&self, header: &Header) -> Result<Vec<u8>, ModelError> {
-        let mut bytes = MAGIC.to_vec();
-        serde_json::to_writer(&mut bytes, header)?;
-        bytes.push(b'\n');
-        for (array, values) in self.floats() {
-            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-            if array == "areas_mm2" {
-                bytes.extend(self.triangles.iter().flat_map(|i| i.to_le_bytes()));
-            }
-        }
-        Ok(bytes)
-    }
 }
 
 /// Lengths of the arrays of floats, in the order of [`Arrays::floats`].
-fn lengths(header: &Header) -> Result<[(&'static str, usize); 7], ModelError> {
+pub(crate) fn lengths(header: &Header) -> Result<[(&'static str, usize); 7], ModelError> {
     let (v, r, k) = (header.vertices, header.modes, header.outputs);
     if !(1..=VERTICES_MAX).contains(&v) || header.triangles > 4 * v || r > v || k > v {
         return Err(ModelError::Format("its header names sizes that no finger has"));

@@ -1,6 +1,8 @@
 //! What can press on a finger, and how far it is.
 
 use crate::error::ContactError;
+use crate::gaps::{Field, Gaps};
+use crate::model::ContactModel;
 use papilla_sdf::{Placement, SignedDistance};
 use std::sync::Arc;
 
@@ -16,6 +18,15 @@ pub struct Object {
     pub stiffness_mpa_per_mm: f64,
 }
 
+/// What lies round a finger in a frame.
+#[derive(Clone, Copy)]
+pub enum Scene<'a> {
+    /// Objects in their places.
+    Objects(&'a [Object]),
+    /// How deep the undeformed skin lies in things.
+    Gaps(Gaps<'a>),
+}
+
 /// Largest deviation of a rotation from orthonormal columns.
 const ROTATION_MISS_MAX: f64 = 1e-3;
 /// Farthest place of an object, mm.
@@ -27,6 +38,36 @@ impl Object {
     pub fn rigid(shape: Arc<dyn SignedDistance>, placement: Placement) -> Self {
         Self { shape, placement, stiffness_mpa_per_mm: f64::INFINITY }
     }
+}
+
+impl<'a> From<&'a [Object]> for Scene<'a> {
+    fn from(objects: &'a [Object]) -> Self {
+        Self::Objects(objects)
+    }
+}
+
+impl<'a, const N: usize> From<&'a [Object; N]> for Scene<'a> {
+    fn from(objects: &'a [Object; N]) -> Self {
+        Self::Objects(objects)
+    }
+}
+
+impl<'a> From<&'a Vec<Object>> for Scene<'a> {
+    fn from(objects: &'a Vec<Object>) -> Self {
+        Self::Objects(objects)
+    }
+}
+
+impl<'a> From<Gaps<'a>> for Scene<'a> {
+    fn from(gaps: Gaps<'a>) -> Self {
+        Self::Gaps(gaps)
+    }
+}
+
+/// Refuses a stiffness that is none.
+pub(crate) fn require_stiffness(member: &'static str, value: f64) -> Result<(), ContactError> {
+    let rule = "has to be positive";
+    if value > 0.0 { Ok(()) } else { Err(ContactError::Value { member, value, rule }) }
 }
 
 /// Refuses what cannot be placed.
@@ -53,39 +94,57 @@ pub(crate) fn validate(objects: &[Object]) -> Result<(), ContactError> {
         if !(miss <= ROTATION_MISS_MAX && volume > 0.0) {
             return Err(ContactError::Rotation { object: index, miss });
         }
-        let value = object.stiffness_mpa_per_mm;
-        if !(value > 0.0) {
-            let (member, rule) = ("objects[].stiffness_mpa_per_mm", "has to be positive");
-            return Err(ContactError::Value { member, value, rule });
-        }
+        require_stiffness("objects[].stiffness_mpa_per_mm", object.stiffness_mpa_per_mm)?;
     }
     Ok(())
 }
 
-/// Objects as a finger of reference width sees them.
+/// What lies round a finger of reference width.
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
-    pub objects: &'a [Object],
+    pub things: Things<'a>,
     /// Width of the finger over the reference width.
     pub length: f64,
-    /// How far the objects have moved from their places, reference mm.
+    /// How far the things have moved from their places, reference mm.
     pub shift_mm: [f64; 3],
 }
 
-/// The nearest object.
+/// A scene, ready to be asked.
+#[derive(Clone, Copy)]
+pub(crate) enum Things<'a> {
+    Objects(&'a [Object]),
+    Field(&'a Field),
+}
+
+/// The nearest thing.
 #[derive(Clone, Copy)]
 pub(crate) struct Nearest {
     pub gap_mm: f64,
     pub normal: [f64; 3],
-    pub object: usize,
+    pub stiffness_mpa_per_mm: f64,
 }
 
 impl View<'_> {
-    /// The nearest object of a place of the reference finger, mm.
-    pub(crate) fn nearest(&self, at_mm: [f64; 3]) -> Nearest {
-        let p = self.seen(at_mm);
-        let mut nearest = Nearest { gap_mm: f64::INFINITY, normal: [0.0, 0.0, 1.0], object: 0 };
-        for (object, o) in self.objects.iter().enumerate() {
+    /// The nearest thing of a vertex that has moved by `moved` (reference mm).
+    pub(crate) fn nearest(&self, model: &ContactModel, vertex: usize, moved: [f64; 3]) -> Nearest {
+        match self.things {
+            Things::Objects(objects) => {
+                let at = std::array::from_fn(|i| model.positions_mm[vertex][i] + moved[i]);
+                self.nearest_object(objects, self.seen(at))
+            }
+            Things::Field(field) => {
+                field.at(vertex, std::array::from_fn(|i| moved[i] - self.shift_mm[i]))
+            }
+        }
+    }
+
+    fn nearest_object(&self, objects: &[Object], p: [f64; 3]) -> Nearest {
+        let mut nearest = Nearest {
+            gap_mm: f64::INFINITY,
+            normal: [0.0, 0.0, 1.0],
+            stiffness_mpa_per_mm: f64::INFINITY,
+        };
+        for o in objects {
             let Placement { rotation: r, origin_mm } = &o.placement;
             let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
             let local = [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2]);
@@ -96,17 +155,58 @@ impl View<'_> {
                 let size = n.iter().map(|v| v * v).sum::<f64>().sqrt();
                 let turned = r.map(|row| (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]) / size);
                 let normal = if size > 1e-6 { turned } else { nearest.normal };
-                nearest = Nearest { gap_mm, normal, object };
+                let stiffness_mpa_per_mm = o.stiffness_mpa_per_mm;
+                nearest = Nearest { gap_mm, normal, stiffness_mpa_per_mm };
             }
         }
         nearest
     }
 
+    /// Calls `each` with every vertex that is at most `margin_mm` (reference mm) from a thing, and
+    /// with a distance that is certainly free there; returns how often objects were asked.
+    pub(crate) fn near(
+        &self,
+        model: &ContactModel,
+        margin_mm: f64,
+        mut each: impl FnMut(u32, f64),
+    ) -> u32 {
+        match self.things {
+            Things::Objects(objects) => {
+                let mut asked = 0;
+                let clearance = |p| self.clearance_mm(objects, p);
+                let balls = model.clusters.near(margin_mm, clearance, |vertex| {
+                    asked += 1;
+                    each(vertex, clearance(model.positions_mm[vertex as usize]));
+                });
+                balls + asked
+            }
+            Things::Field(field) => {
+                for vertex in 0..model.vertices() {
+                    let away = self.shift_mm.map(|s| -s);
+                    let gap_mm = field.at(vertex, away).gap_mm;
+                    if gap_mm <= margin_mm {
+                        each(vertex as u32, gap_mm);
+                    }
+                }
+                0
+            }
+        }
+    }
+
+    /// A distance that all things are certainly away from the finger at rest, mm.
+    pub(crate) fn free_mm(&self, model: &ContactModel) -> f64 {
+        let free = |vertex: usize| match self.things {
+            Things::Objects(objects) => self.clearance_mm(objects, model.positions_mm[vertex]),
+            Things::Field(field) => field.at(vertex, self.shift_mm.map(|s| -s)).gap_mm,
+        };
+        self.length * (0..model.vertices()).map(free).fold(f64::INFINITY, f64::min)
+    }
+
     /// A distance that is certainly free round a place, reference mm.
-    pub(crate) fn clearance_mm(&self, at_mm: [f64; 3]) -> f64 {
+    fn clearance_mm(&self, objects: &[Object], at_mm: [f64; 3]) -> f64 {
         let p = self.seen(at_mm);
         let free = |o: &Object| o.placement.clearance_mm(o.shape.as_ref(), p);
-        self.objects.iter().map(free).fold(f64::INFINITY, f64::min) / self.length
+        objects.iter().map(free).fold(f64::INFINITY, f64::min) / self.length
     }
 
     fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {

@@ -21,7 +21,7 @@ pub(crate) fn press(
 ) {
     let depth = |&(_, vertex): &(f64, u32)| {
         let at = model.positions_mm[vertex as usize];
-        (at, view.nearest(at))
+        (at, view.nearest(model, vertex as usize, [0.0; 3]))
     };
     let deepest = candidates.iter().map(|v| -depth(v).1.gap_mm).fold(0.0, f64::max);
     let mut size_n = 0.0;

@@ -17,10 +17,12 @@
 //! assert_eq!((found.gap_mm, found.normal), (5.0, [0.0, 0.0, 1.0]));
 //! ```
 
+mod announced;
 mod cylinder;
 mod dots;
 mod grating;
 mod heightmap;
+mod mesh;
 mod placed;
 mod plate;
 mod punch;
@@ -35,10 +37,12 @@ mod touch;
 mod union;
 mod wedge;
 
+pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};
 pub use cylinder::Cylinder;
 pub use dots::Dots;
 pub use grating::Grating;
 pub use heightmap::{HeightField, Heightmap};
+pub use mesh::{Mesh, MeshDistance, MeshError, TRIANGLES_MAX};
 pub use placed::{Placed, Placement};
 pub use plate::{Plate, RoundedPlate};
 pub use punch::Punch;

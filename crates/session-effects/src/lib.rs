@@ -46,6 +46,7 @@ mod geometry;
 mod points;
 mod relaxation;
 mod summary;
+mod vertices;
 mod window;
 
 #[cfg(test)]
@@ -57,6 +58,7 @@ use bytes::BytesMut;
 use papilla_proto::{
     ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
     SampleError, SampleType, Window,
+    contact::SampleLayout,
     effects::{ActuatorInput, Section, SectionName},
 };
 
@@ -65,7 +67,7 @@ pub use finger::{Cost, Finger, Shared};
 
 use self::{
     actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,
-    relaxation::Relaxation, summary::Contact,
+    relaxation::Relaxation, summary::Contact, vertices::Vertices,
 };
 
 /// The effects of one session and their state.
@@ -78,6 +80,7 @@ pub struct Effects {
     sample_type: SampleType,
     contact_pa: f32,
     map: bool,
+    vertices: Option<Vertices>,
     relaxation: Option<Relaxation>,
     afferents: Option<Afferents>,
     margin_px: Option<u16>,
@@ -117,7 +120,8 @@ impl Effects {
             return Err(unusable("contact_pa", message));
         }
         let map = hello.map.unwrap_or(true);
-        if names.is_empty() && map {
+        let by_vertices = hello.answer_layout == Some(SampleLayout::Vertices);
+        if names.is_empty() && map && !by_vertices {
             return Ok(None);
         }
         let has = |effect| names.contains(&effect);
@@ -151,7 +155,8 @@ impl Effects {
             sections: Vec::new(),
             sample_type,
             contact_pa,
-            map,
+            map: map && !by_vertices,
+            vertices: (map && by_vertices).then(|| Vertices::new(finger)),
             relaxation,
             afferents,
             margin_px,
@@ -174,6 +179,10 @@ impl Effects {
                 self.actuators.as_ref().map(|(_, actuators)| floats(actuators.len())),
             ),
             (SectionName::Map, self.map.then(|| MAP_LEN * self.sample_type.bytes())),
+            (
+                SectionName::Vertices,
+                self.vertices.as_ref().map(|v| v.len() * self.sample_type.bytes()),
+            ),
         ];
         let mut offset = HEADER_LEN_V2;
         let mut sections = Vec::new();
@@ -183,6 +192,12 @@ impl Effects {
             offset = (offset + bytes).next_multiple_of(16);
         }
         sections
+    }
+
+    /// Whether anything that was asked for shows SED: without, the network need not be asked.
+    #[must_use]
+    pub fn shows_sed(&self) -> bool {
+        !self.sections.is_empty()
     }
 
     /// The effects that were asked for, in the order in which they act.
@@ -259,6 +274,11 @@ impl Effects {
             actuators.write(input, bytes);
         }
         let kind = self.kind();
+        if let Some(vertices) = &mut self.vertices {
+            pad(bytes);
+            let scale = vertices.write(shown, self.sample_type, bytes)?;
+            return Ok(Written { kind, window: Window::EMPTY, scale });
+        }
         if !self.map {
             return Ok(Written { kind, window: Window::EMPTY, scale: 1.0 });
         }
@@ -299,8 +319,13 @@ fn named(hello: &Hello) -> Result<Vec<RuntimeEffect>, Problem> {
             return Err(unusable(effect.as_str(), message));
         }
     }
-    if names.contains(&RuntimeEffect::ContactWindow) && hello.map == Some(false) {
-        let message = "'contact_window' cuts the map, but 'map' is false";
+    let by_vertices = hello.answer_layout == Some(SampleLayout::Vertices);
+    if names.contains(&RuntimeEffect::ContactWindow) && (hello.map == Some(false) || by_vertices) {
+        let message = if by_vertices {
+            "'contact_window' cuts the map, but 'answer_layout' is 'vertices'"
+        } else {
+            "'contact_window' cuts the map, but 'map' is false"
+        };
         return Err(unusable("contact_window", message));
     }
     Ok(names)

@@ -46,11 +46,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     drop(progress);
     let (atlas, _) = rest.atlas().context("the finger has no atlas")??;
     let skin = atlas.patch(papilla_atlas::Patch::Skin);
-    let (mut loads, mut datasets) = (Vec::new(), Vec::new());
+    let (mut loads, mut datasets, mut depth_max_mm) = (Vec::new(), Vec::new(), 0.0f32);
     for folder in &args.datasets {
         let dataset = Dataset::open(folder)?;
         dataset.atlas().require_hash(atlas.hash()).with_context(|| folder.display().to_string())?;
-        loads_of(&dataset, &compliance, &mut loads)?;
+        let deepest = loads_of(&dataset, &compliance, &mut loads)?;
+        depth_max_mm = depth_max_mm.max(deepest);
         datasets.push(dataset.manifest().dataset_sha256.clone());
     }
     add_mirrored(&skin.positions_mm, &mut loads);
@@ -75,6 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         modes: second.modes,
         outputs: second.outputs,
         share_max: second.share_max as f32,
+        depth_max_mm,
         ..Header::current()
     };
     let arrays = arrays(&compliance, second, &skin.positions_mm, atlas.triangles());
@@ -94,15 +96,17 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Forces of the deepest and of a middle state of each training indentation: pressure times
-/// undeformed area along the recorded force, as large as that.
+/// undeformed area along the recorded force, as large as that. Returns the largest depth, mm.
 fn loads_of(
     dataset: &Dataset,
     compliance: &Compliance,
     loads: &mut Vec<Load>,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<f32> {
+    let mut deepest = 0.0f32;
     for press in dataset.manifest().presses.iter().filter(|p| p.split == Split::Train) {
         let shard = dataset.shard(press)?;
         let last = shard.len() - 1;
+        deepest = deepest.max(shard.depth_mm.iter().copied().fold(0.0, f32::max));
         for state in [last / 2, last] {
             let force: [f64; 3] = std::array::from_fn(|i| f64::from(shard.force_n[[state, i]]));
             let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
@@ -116,7 +120,7 @@ fn loads_of(
             loads.push(pressed.map(|(v, w)| (v as u32, force.map(|f| f * w / total))).collect());
         }
     }
-    Ok(())
+    Ok(deepest)
 }
 
 /// The finger is its own mirror image in y: so are its loads.

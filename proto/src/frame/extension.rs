@@ -12,16 +12,19 @@ pub mod flags {
     pub const UNFAMILIAR: u8 = 4;
     /// The contact reaches the edge of the atlas: what lies beyond is missing from the map.
     pub const CUT_OFF: u8 = 8;
+    /// The contact solve did not settle: its answer is rough. Version 3.
+    pub const UNSETTLED: u8 = 16;
     /// All of them by name.
-    pub const NAMED: [(u8, &str); 4] = [
+    pub const NAMED: [(u8, &str); 5] = [
         (OUT_OF_RANGE, "out_of_range"),
         (NO_CONTACT, "no_contact"),
         (UNFAMILIAR, "unfamiliar"),
         (CUT_OFF, "cut_off"),
+        (UNSETTLED, "unsettled"),
     ];
 }
 
-/// What version 2 adds to a header.
+/// What versions 2 and 3 add to a header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Extension {
     /// Column of the window's first pixel.
@@ -36,6 +39,8 @@ pub struct Extension {
     pub tier: u16,
     /// Answer: bits of [`flags`].
     pub flags: u8,
+    /// Number of the finger in version 3; none in version 2.
+    pub finger: Option<u8>,
 }
 
 impl Extension {
@@ -47,6 +52,7 @@ impl Extension {
             infer_us: u32::from_le_bytes([b[40], b[41], b[42], b[43]]),
             tier: u16::from_le_bytes([b[44], b[45]]),
             flags: b[46],
+            finger: (b[4] == 3).then_some(b[47]),
         }
     }
 }

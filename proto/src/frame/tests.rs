@@ -16,16 +16,24 @@ fn any_header() -> impl Strategy<Value = FrameHeader> {
         ]),
     );
     let numbers = (any::<u32>(), any::<u16>(), any::<u16>(), any::<u64>(), any::<u32>());
-    let more = any::<Option<(u16, u16, u32, u32, u16, u8)>>();
-    (enums, numbers, -1e30f32..1e30, more).prop_map(|((kind, sample_type, status), n, scale, e)| {
-        let extension = e.map(|(x, y, queue_us, infer_us, tier, flags)| Extension {
+    let more = any::<Option<(u16, u16, u32, u32, u16, u8, Option<u8>)>>();
+    let all = (enums, numbers, -1e30f32..1e30, more, any::<bool>());
+    all.prop_map(|((kind, sample_type, status), n, scale, e, input)| {
+        let extension = e.map(|(x, y, queue_us, infer_us, tier, flags, finger)| Extension {
             x,
             y,
             queue_us,
             infer_us,
             tier,
             flags,
+            finger,
         });
+        let is_new = extension.is_some_and(|e| e.finger.is_some());
+        let kind = if input && is_new {
+            [FrameKind::Objects, FrameKind::Gaps][n.1 as usize % 2]
+        } else {
+            kind
+        };
         FrameHeader {
             extension,
             kind,
@@ -66,12 +74,21 @@ fn the_layout_is_the_documented_one() {
         infer_us: 0x0c0b_0a09,
         tier: 0x0e0d,
         flags: 15,
+        finger: None,
     };
     expected[4] = 2;
     expected.extend(1..=15);
     expected.push(0);
     let header = FrameHeader { extension: Some(extension), ..header };
-    assert_eq!((header.encode().to_vec(), header.header_len()), (expected, 48));
+    assert_eq!((header.encode().to_vec(), header.header_len()), (expected.clone(), 48));
+    expected[4] = 3;
+    expected[5] = 4;
+    expected[47] = 16;
+    let header = header.of_finger(FrameKind::Objects, 16, [0x0605, 0x0807]);
+    assert_eq!(header.encode().to_vec(), expected);
+    // Versions before the third know no such kind.
+    expected[4] = 2;
+    assert_eq!(FrameHeader::decode(&expected), Err(FrameError::UnknownKind { found: 4 }));
 }
 
 #[test]

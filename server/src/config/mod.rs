@@ -89,6 +89,11 @@ pub struct Config {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub models: Option<PathBuf>,
 
+    /// Contact model of `fe-datagen contact`: sessions may then send objects and gaps.
+    #[arg(long, env = "PAPILLA_CONTACT", value_name = "FILE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contact: Option<PathBuf>,
+
     /// Reload when the folder of models changes.
     #[arg(long, env = "PAPILLA_WATCH_MODELS")]
     pub watch_models: bool,
@@ -152,6 +157,11 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_MAX_SESSIONS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_sessions: NonZeroUsize,
 
+    /// Greatest number of fingers of all sessions of version 3, of up to 11 MB each; further ones
+    /// are refused; 1 to 10000.
+    #[arg(long, env = "PAPILLA_MAX_FINGERS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
+    pub max_fingers: NonZeroUsize,
+
     /// Greatest number of posted maps that wait or run; further ones are answered 503; 1 to 10000.
     #[arg(long, env = "PAPILLA_MAX_REQUESTS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_requests: NonZeroUsize,
@@ -199,6 +209,7 @@ impl Default for Config {
             bind: SocketAddr::from(([127, 0, 0, 1], 0)),
             allow_anyone: false,
             models: None,
+            contact: None,
             watch_models: false,
             threads: None,
             default_tier: None,
@@ -212,6 +223,7 @@ impl Default for Config {
             allow_origin: Vec::new(),
             xr_dir: None,
             max_sessions: n(64),
+            max_fingers: n(64),
             max_requests: n(64),
             max_connections: n(256),
             max_body_bytes: 2 << 20,

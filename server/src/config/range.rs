@@ -39,6 +39,7 @@ pub(super) fn check(config: &Config) -> Result<(), SettingError> {
     let count = |number: usize| u64::try_from(number).unwrap_or(u64::MAX);
     for (field, value, range) in [
         ("max_sessions", count(config.max_sessions.get()), PLACES),
+        ("max_fingers", count(config.max_fingers.get()), PLACES),
         ("max_requests", count(config.max_requests.get()), PLACES),
         ("max_connections", count(config.max_connections.get()), CONNECTIONS),
         ("threads", count(config.threads.map_or(1, |threads| threads.get())), THREADS),

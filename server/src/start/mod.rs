@@ -3,8 +3,10 @@
 
 mod remeasure;
 
-use std::{sync::Arc, thread};
+use std::{path::Path, sync::Arc, thread};
 
+use papilla_proto::contact::FINGERS_MAX;
+use papilla_session_contact::ContactAssets;
 use tokio::sync::{oneshot, watch};
 
 use crate::{
@@ -52,10 +54,10 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
             (config.clone(), Arc::clone(&metrics), Arc::clone(&progress));
         move || {
             let catalogue = match load(&config, &metrics, &progress) {
-                Ok((catalogue, pool)) => {
+                Ok((catalogue, pool, contact)) => {
                     let to_measure = Arc::clone(&catalogue);
                     // Err: the start was given up.
-                    if loaded.send(Ok((catalogue, pool))).is_err() {
+                    if loaded.send(Ok((catalogue, pool, contact))).is_err() {
                         return;
                     }
                     to_measure
@@ -70,11 +72,11 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     };
     // A thread of its own: a runtime that ends would wait for its blocking tasks.
     thread::Builder::new().name("start".to_owned()).spawn(work).map_err(StartError::Thread)?;
-    let (catalogue, pool) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
+    let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
     let app = App::new(&config, catalogue, metrics, &pool, gate, drain, Arc::clone(&progress));
-    let app = Arc::new(app);
+    let app = Arc::new(app.with_contact(contact));
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
         reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {
             let reason = format!("{} cannot be watched: {error}", folder.display());
@@ -94,7 +96,7 @@ fn load(
     config: &Config,
     metrics: &Arc<Metrics>,
     progress: &Progress,
-) -> Result<(Arc<Catalogue>, Pool), StartError> {
+) -> Result<(Arc<Catalogue>, Pool, Option<ContactAssets>), StartError> {
     let assets = Assets::of(config)?;
     let default = config.default_tier.as_deref();
     let catalogue = Catalogue::load_noting(&assets, default, None, &mut |step| match step {
@@ -105,9 +107,27 @@ fn load(
     progress.enter(Stage::Warming, Vec::new());
     metrics.name_tiers(catalogue.tier_labels());
     // A slot is in the queue at most once, so this many places are always enough.
-    let places = config.max_sessions.get() + config.max_requests.get();
+    let places = config.max_sessions.get() * FINGERS_MAX + config.max_requests.get();
     let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
-    Ok((catalogue, pool))
+    let contact = config.contact.as_deref().map(|file| load_contact(file, &catalogue));
+    Ok((catalogue, pool, contact.transpose()?))
+}
+
+/// Reads the contact model, which has to be of the models' finger.
+pub(crate) fn load_contact(
+    file: &Path,
+    catalogue: &Catalogue,
+) -> Result<ContactAssets, StartError> {
+    let bad = |reason: String| StartError::Unusable {
+        file: file.display().to_string(),
+        origin: "--contact".to_owned(),
+        reason,
+    };
+    let bytes = std::fs::read(file).map_err(|error| bad(error.to_string()))?;
+    let assets = ContactAssets::read(&bytes).map_err(|error| bad(error.to_string()))?;
+    let fits = assets.model.require_atlas(catalogue.atlas.hash());
+    fits.map_err(|error| bad(error.to_string()))?;
+    Ok(assets)
 }
 
 /// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not

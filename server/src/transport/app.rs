@@ -6,6 +6,7 @@ use std::{
 };
 
 use papilla_proto::{ErrorCode, Problem};
+use papilla_session_contact::ContactAssets;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::gate::{Gate, Principal};
@@ -37,6 +38,9 @@ pub(crate) struct App {
     pub(crate) progress: Arc<Progress>,
     /// Memory of sessions that are over.
     pub(crate) store: Store,
+    /// The contact model, if there is one.
+    pub(crate) contact: Option<ContactAssets>,
+    fingers: Arc<Semaphore>,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
     requests_max: usize,
@@ -65,11 +69,18 @@ impl App {
             drain,
             progress,
             store: Store::new(config.max_sessions.get()),
+            contact: None,
+            fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),
             requests_max: config.max_requests.get(),
             next_session: AtomicU64::new(1),
         }
+    }
+
+    /// The same with a contact model.
+    pub(crate) fn with_contact(self, contact: Option<ContactAssets>) -> Self {
+        Self { contact, ..self }
     }
 
     /// What there is to render with now; it may be replaced at any time, so whoever needs it
@@ -106,6 +117,19 @@ impl App {
         let of_token = of_token.transpose()?;
         let of_all = self.admit(&self.sessions, "session", Shed::Sessions)?;
         Ok(SessionPlace { _of_all: of_all, _of_token: of_token })
+    }
+
+    /// Places for the fingers of a session.
+    ///
+    /// # Errors
+    /// Too few are left.
+    pub(crate) fn admit_fingers(&self, count: usize) -> Result<OwnedSemaphorePermit, Problem> {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        Arc::clone(&self.fingers).try_acquire_many_owned(count).map_err(|_| {
+            self.metrics.shed(Shed::Sessions);
+            let message = "places for fingers are taken (max_fingers); try again in a moment";
+            Problem::new(ErrorCode::Overloaded, message).at("fingers")
+        })
     }
 
     /// A place for one posted map.

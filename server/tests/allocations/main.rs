@@ -26,7 +26,7 @@ use papilla_proto::{
     FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, RuntimeEffect, SampleType, Window,
 };
 use serde_json::{Value, json};
-use support::{GAIN, Service, bytes_of, model_folder, ramp};
+use support::{GAIN, Service, bytes_of, contact, model_folder, ramp};
 
 struct Counting;
 
@@ -220,6 +220,9 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
     frames_that_wait(&service, engines_own);
     every_effect(&service, engines_own);
     runtime.block_on(service.server.drain()).unwrap();
+    let service = runtime.block_on(contact::service());
+    fingers(&service);
+    runtime.block_on(service.server.drain()).unwrap();
 }
 
 fn one_frame_at_a_time(service: &Service, engines_own: u64) {
@@ -258,6 +261,19 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
     let all = allocations(|| exchange(FRAMES));
     assert!(maps < 6 * FRAMES as u64, "some frames were superseded");
     assert_eq!(all, maps * engines_own, "frames that wait");
+}
+
+/// Two fingers under a ball that moves, forces out alone: nothing is left to the engine.
+fn fingers(service: &Service) {
+    let members = json!({"map": false, "stiffness": true, "fingers": [{}, {}]});
+    let mut client = Client::connect(service, &contact::hello_3(&members));
+    let frame = |n: u32| {
+        let depth_mm = 0.2 + 0.001 * (n % 20) as f32;
+        masked(0x82, &contact::rows(n, (n % 2) as u8, &[contact::deep(depth_mm)]))
+    };
+    let frames: Vec<_> = (1..=(WARM_UP + FRAMES) as u32).map(frame).collect();
+    client.exchange(&frames[..WARM_UP], 1);
+    assert_eq!(allocations(|| client.exchange(&frames[WARM_UP..], 1)), 0, "poses in, forces out");
 }
 
 /// Every effect at once, windows both ways.

@@ -6,6 +6,7 @@
 mod binary;
 mod broken;
 mod clocks;
+mod contact;
 mod drain;
 mod effects;
 mod gate;

@@ -98,6 +98,11 @@ fn check_finds_what_would_keep_it_from_serving() {
     assert_eq!(code, Some(4), "{text}");
     assert!(text.contains("FAILED port") && text.contains(&address), "{text}");
 
+    let no_model = models.path().join("index.json");
+    let (code, text, _) = with(&["--contact", no_model.to_str().unwrap()]);
+    assert_eq!(code, Some(3), "{text}");
+    assert!(text.contains("FAILED contact") && text.contains("fe-datagen contact"), "{text}");
+
     add_model_of_gain(models.path(), "quick", atlas().hash(), 0, 0.01, 1.0);
     let (code, text, _) = with(&[]);
     assert_eq!(code, Some(3), "{text}");

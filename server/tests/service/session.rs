@@ -117,7 +117,7 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
     let mut socket = service.socket().await;
     let atlas_hash = "0".repeat(64);
     for (bad, code, field) in [
-        (hello(&json!({"version": 3})), "unknown_version", json!("version")),
+        (hello(&json!({"version": 4})), "unknown_version", json!("version")),
         (hello(&json!({"tier": "nobody"})), "unknown_tier", json!("tier")),
         (hello(&json!({"effects": ["layers", "friction"]})), "unknown_effect", json!("effects")),
         (hello(&json!({"atlas_hash": atlas_hash})), "atlas_mismatch", json!("atlas_hash")),

@@ -1,21 +1,45 @@
-//! Writes what `proto/conformance.json` expects anew, from the engine and the documentation's
-//! formulas. Inputs, and which numbers are asked for, are written by hand and stay.
+//! Writes what `proto/conformance.json` and `proto/conformance-contact.json` expect anew, from the
+//! engine, the contact solver and the documentation's formulas. Inputs, and which numbers are asked
+//! for, are written by hand and stay.
 //!
-//! `cargo run --release -p papilla-tests --bin conformance-record [FILE [MODELS]]`
+//! ```text
+//! conformance-record                                    both files, with models/
+//! conformance-record --contact-model FILE               the model that contact is tested with
+//! ```
 
-use std::{env, fs, path::PathBuf};
+use std::{env, fs, path::Path};
 
-use anyhow::Context;
-use papilla_tests::conformance::{Recorder, print};
+use anyhow::{Context, bail};
+use papilla_tests::conformance::{ContactRecorder, Recorder, print};
+use serde_json::Value;
+
+const MODELS: &str = "models";
 
 fn main() -> anyhow::Result<()> {
-    let mut arguments = env::args_os().skip(1).map(PathBuf::from);
-    let path = arguments.next().unwrap_or_else(|| "proto/conformance.json".into());
-    let models = arguments.next().unwrap_or_else(|| "models".into());
-    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-    let mut file = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-    Recorder::new(&models)?.fill(&mut file)?;
-    fs::write(&path, print(&file)).with_context(|| path.display().to_string())?;
-    println!("{} is up to date", path.display());
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let models = Path::new(MODELS);
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => {
+            rewrite("proto/conformance.json", |file| Ok(Recorder::new(models)?.fill(file)?))?;
+            rewrite("proto/conformance-contact.json", |file| {
+                Ok(ContactRecorder::new(models)?.fill(file)?)
+            })
+        }
+        ["--contact-model", path] => {
+            let bytes = ContactRecorder::new(models)?.file()?;
+            fs::write(path, bytes).with_context(|| path.to_owned())?;
+            println!("wrote {path}");
+            Ok(())
+        }
+        _ => bail!("conformance-record [--contact-model FILE]"),
+    }
+}
+
+fn rewrite(path: &str, fill: impl FnOnce(&mut Value) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    let text = fs::read_to_string(path).with_context(|| path.to_owned())?;
+    let mut file = serde_json::from_str(&text).with_context(|| path.to_owned())?;
+    fill(&mut file)?;
+    fs::write(path, print(&file)).with_context(|| path.to_owned())?;
+    println!("{path} is up to date");
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! Maps come from the engine, everything else from the formulas of the documentation
 //! (`finger`): nothing here asks the server, which is one of the things that are tested.
 
+mod contact;
 mod due;
 mod finger;
 pub mod inputs;
@@ -23,6 +24,7 @@ use papilla_proto::{
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
+pub use contact::{ContactRecorder, depth};
 pub use print::print;
 
 use due::Due;
@@ -48,6 +50,9 @@ pub enum ConformanceError {
     /// A model cannot be run.
     #[error(transparent)]
     Engine(#[from] papilla_engine::EngineError),
+    /// The contact model cannot be made.
+    #[error(transparent)]
+    Contact(#[from] papilla_contact::ModelError),
     /// A step is not of the format.
     #[error("case {case}, step {step}: {reason}")]
     Step {

@@ -7,7 +7,8 @@ fn root() -> PathBuf {
 }
 
 /// Members whose lists of numbers end in value and tolerance.
-const MEASURED: [&str; 7] = ["pixels", "sum", "max", "force_n", "summary", "points", "actuators"];
+const MEASURED: [&str; 9] =
+    ["pixels", "sum", "max", "force_n", "summary", "points", "actuators", "touch", "pressure_sum"];
 
 /// Compares recorded numbers; returns how many there were.
 fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
@@ -58,6 +59,19 @@ fn the_committed_script_is_what_engine_and_formulas_say() {
     let numbers = compare("", false, &committed, &recorded);
     assert!(numbers > 250, "only {numbers} numbers are expected in the whole script");
     assert_eq!(print(&committed), text, "not as `conformance-record` prints it");
+}
+
+#[test]
+fn the_committed_contact_script_is_what_the_solver_says() {
+    let text = fs::read_to_string(root().join("proto/conformance-contact.json")).unwrap();
+    let committed: Value = serde_json::from_str(&text).unwrap();
+    let mut recorded = committed.clone();
+    let recorder = ContactRecorder::new(&root().join("models")).unwrap();
+    recorder.fill(&mut recorded).unwrap();
+    let numbers = compare("", false, &committed, &recorded);
+    assert!(numbers > 200, "only {numbers} numbers are expected in the whole script");
+    assert_eq!(print(&committed), text, "not as `conformance-record` prints it");
+    assert!(recorder.file().unwrap().starts_with(b"papilla contact model"));
 }
 
 #[test]

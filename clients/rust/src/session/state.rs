@@ -2,7 +2,9 @@
 
 use std::{collections::HashMap, mem::replace, sync::Arc};
 
-use papilla_proto::{FrameHeader, Hello, Problem, Ready, SampleType, ServerMessage, SessionError};
+use papilla_proto::{
+    FrameHeader, FrameKind, Hello, Problem, Ready, SampleType, ServerMessage, SessionError,
+};
 use tokio::sync::oneshot;
 
 use super::Frame;
@@ -39,6 +41,14 @@ pub(super) enum Next {
     Frame(Vec<u8>),
 }
 
+/// A frame that has not left.
+#[derive(Debug)]
+struct Waiting {
+    finger: u8,
+    pending: Pending,
+    message: Vec<u8>,
+}
+
 #[derive(Debug)]
 pub(super) struct State {
     pub(super) hello: Hello,
@@ -47,7 +57,8 @@ pub(super) struct State {
     pub(super) superseded_by_client: u64,
     tiers: HashMap<u16, String>,
     sequence: u32,
-    waiting: Option<(Pending, Vec<u8>)>,
+    /// At most one a finger, in the order in which they came.
+    waiting: Vec<Waiting>,
     sent: Vec<Pending>,
     over: bool,
     warned_of_refusal: bool,
@@ -63,7 +74,7 @@ impl State {
             superseded_by_client: 0,
             tiers: HashMap::new(),
             sequence: 0,
-            waiting: None,
+            waiting: Vec::new(),
             sent: Vec::new(),
             over: false,
             warned_of_refusal: false,
@@ -83,11 +94,25 @@ impl State {
         self.ready = ready;
     }
 
-    /// Encodes a frame and lets it wait in place of the one that waits.
+    /// Encodes a frame and lets it wait in place of the one of its finger that waits.
     pub(super) fn put(
         &mut self,
         frame: &Frame<'_>,
         client_time_us: u64,
+    ) -> Result<oneshot::Receiver<Answer>, PapillaError> {
+        let sample_type = self.ready.sample_type;
+        let of_hand = self.ready.version > 2;
+        self.put_message(0, client_time_us, |sequence| {
+            encode(frame, sequence, client_time_us, sample_type, of_hand)
+        })
+    }
+
+    /// The same of any message.
+    pub(super) fn put_message(
+        &mut self,
+        finger: u8,
+        client_time_us: u64,
+        message: impl FnOnce(u32) -> Result<Vec<u8>, Problem>,
     ) -> Result<oneshot::Receiver<Answer>, PapillaError> {
         if self.over {
             return Err(PapillaError::Closed);
@@ -97,12 +122,17 @@ impl State {
         let (outcome, receiver) = oneshot::channel();
         let ready = Arc::clone(&self.ready);
         let pending = Pending { sequence, client_time_us, ready, outcome };
-        match encode(frame, sequence, client_time_us, self.ready.sample_type) {
+        match message(sequence) {
             Err(problem) => pending.end(Status::Error(problem)),
             Ok(message) => {
-                if let Some((old, _)) = self.waiting.replace((pending, message)) {
-                    self.superseded_by_client += 1;
-                    old.end(Status::Superseded { by_client: true });
+                let new = Waiting { finger, pending, message };
+                match self.waiting.iter_mut().find(|waiting| waiting.finger == finger) {
+                    Some(place) => {
+                        let old = std::mem::replace(place, new);
+                        self.superseded_by_client += 1;
+                        old.pending.end(Status::Superseded { by_client: true });
+                    }
+                    None => self.waiting.push(new),
                 }
             }
         }
@@ -118,7 +148,10 @@ impl State {
             asked.said = true;
             return Some(Next::Hello(Box::new(asked.hello.clone())));
         }
-        let (mut pending, message) = self.waiting.take()?;
+        if self.waiting.is_empty() {
+            return None;
+        }
+        let Waiting { mut pending, message, .. } = self.waiting.remove(0);
         // New terms may have come while it waited. Another sample type is the service's to refuse.
         pending.ready = Arc::clone(&self.ready);
         self.sent.push(pending);
@@ -188,9 +221,7 @@ impl State {
     pub(super) fn end(&mut self) {
         self.over = true;
         self.lose();
-        if let Some((pending, _)) = self.waiting.take() {
-            pending.end(Status::Lost);
-        }
+        self.waiting.drain(..).for_each(|waiting| waiting.pending.end(Status::Lost));
         self.asked = None;
     }
 
@@ -206,6 +237,7 @@ fn encode(
     sequence: u32,
     client_time_us: u64,
     sample_type: SampleType,
+    of_hand: bool,
 ) -> Result<Vec<u8>, Problem> {
     let Frame { pressure_pa, window, deadline_us, .. } = *frame;
     let top_pa = pressure_pa.iter().copied().fold(0.0, f32::max);
@@ -214,6 +246,11 @@ fn encode(
         if sample_type.is_scaled() && top_pa > 0.0 { top_pa / sample_type.unit_max() } else { 1.0 };
     let header = FrameHeader::pressure(sequence, client_time_us, deadline_us, sample_type, scale)
         .windowed(window);
+    let header = if of_hand {
+        header.of_finger(FrameKind::Pressure, 0, [window.width, window.height])
+    } else {
+        header
+    };
     let head = header.encode();
     let mut message = vec![0; head.len() + window.pixel_count() * sample_type.bytes()];
     message[..head.len()].copy_from_slice(&head);

@@ -10,19 +10,11 @@ impl Solver {
         for (_, vertex) in candidates.drain(..) {
             wanted[vertex as usize] = false;
         }
-        let mut asked = 0;
-        let balls = model.clusters.near(
-            KEPT_MM,
-            |p| view.clearance_mm(p),
-            |vertex| {
-                asked += 1;
-                let free = view.clearance_mm(model.positions_mm[vertex as usize]);
-                if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
-                    candidates.push((free, vertex));
-                }
-            },
-        );
-        effort.distances += balls + asked;
+        effort.distances += view.near(model, KEPT_MM, |vertex, free| {
+            if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
+                candidates.push((free, vertex));
+            }
+        });
         effort.candidates = candidates.len() as u32;
         let [slots, _] = patch.room();
         self.overflow = candidates.len() > slots;

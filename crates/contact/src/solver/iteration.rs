@@ -1,8 +1,8 @@
 //! Linearisation, complementarity solve and displacement in turn, until displacements settle.
 
 use super::{
-    FORCE_MIN_N, NEAR_MM, PRODUCTS_MAX, RELAXATION, SETTLED_MM, SHARE, Solver, TURN_MAX,
-    VIOLATION_MM,
+    FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SETTLED_MM,
+    SHARE, Solver, TURN_MAX, VIOLATION_MM,
 };
 use crate::answer::Effort;
 use crate::bounded::Symmetric;
@@ -24,7 +24,8 @@ impl Solver {
             self.choose_near();
             let taken = self.share_taken();
             self.remake_matrix();
-            effort.products += self.complement(1.0 - 2.0 * taken);
+            let left = FRAME_PRODUCTS_MAX.saturating_sub(effort.products);
+            effort.products += self.complement(1.0 - 2.0 * taken, left);
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
             if change <= SETTLED_MM {
@@ -100,8 +101,10 @@ impl Solver {
         self.made = m;
     }
 
-    /// Solves for the sizes of the forces with the compliance scaled by `scale`.
-    pub(super) fn complement(&mut self, scale: f32) -> u32 {
+    /// Solves for the sizes of the forces with the compliance scaled by `scale`, of a frame with so
+    /// many products `left`.
+    pub(super) fn complement(&mut self, scale: f32, left: u32) -> u32 {
+        let products_max = left.clamp(PRODUCTS_MIN, PRODUCTS_MAX);
         let Self { patch, bounded, matrix, norm, rest, .. } = self;
         let (m, stride) = (patch.near(), patch.stride());
         let Slots { force, found, normal, gap, size, .. } = &mut patch.values;
@@ -114,7 +117,7 @@ impl Solver {
             rest[slot] = gap[slot] / scale - rest[slot];
         }
         let symmetric = Symmetric { values: matrix, stride, norm: *norm };
-        let effort = bounded.solve(symmetric, &rest[..m], size, VIOLATION_MM, PRODUCTS_MAX);
+        let effort = bounded.solve(symmetric, &rest[..m], size, VIOLATION_MM, products_max);
         for slot in 0..m {
             for i in 0..3 {
                 found[i][slot] = size[slot] * normal[i][slot];
@@ -148,6 +151,20 @@ impl Solver {
             }
         }
         relaxation
+    }
+
+    /// Takes the forces gone on from for the answer: the mean of what an iteration that does not
+    /// settle goes to and fro between.
+    pub(super) fn take_mean(&mut self) {
+        let m = self.patch.near();
+        let Slots { force, found, normal, size, .. } = &mut self.patch.values;
+        for slot in 0..m {
+            let along: f32 = (0..3).map(|i| force[i][slot] * normal[i][slot]).sum();
+            size[slot] = if along > FORCE_MIN_N { along } else { 0.0 };
+            for i in 0..3 {
+                found[i][slot] = size[slot] * normal[i][slot];
+            }
+        }
     }
 
     /// Displaces all slots; returns the largest change, mm.

@@ -13,9 +13,11 @@ mod iteration;
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
 use crate::error::ContactError;
+use crate::force_target::Reached;
+use crate::gaps::Field;
 use crate::ladder::Method;
-use crate::model::ContactModel;
-use crate::objects::{Object, View, validate};
+use crate::model::{ContactModel, Header};
+use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
 use crate::springs;
@@ -43,10 +45,16 @@ const ITERATIONS_MAX: u32 = 25;
 const SETTLED_MM: f32 = 5e-5;
 /// Change of displacement above which an answer is not settled, reference mm.
 const UNSETTLED_MM: f32 = 1e-3;
+/// Depth of a displaced vertex in a thing, beyond how far that gives way, above which an answer is
+/// not settled, reference mm.
+const INSIDE_MAX_MM: f32 = 5e-3;
 /// Violation of a complementarity condition that is accepted, reference mm.
 const VIOLATION_MM: f32 = 1e-5;
 /// Most products with the matrix in a complementarity solve.
 const PRODUCTS_MAX: u32 = 200;
+/// The same in a frame; then each solve has the least.
+const FRAME_PRODUCTS_MAX: u32 = 3000;
+const PRODUCTS_MIN: u32 = 10;
 /// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
 const TURN_MAX: f32 = 0.05;
 /// Range of the over- or under-relaxation.
@@ -70,7 +78,7 @@ pub struct Settings {
 /// Contact of one finger. All memory is taken at construction.
 #[derive(Debug)]
 pub struct Solver {
-    model: Arc<ContactModel>,
+    pub(crate) model: Arc<ContactModel>,
     settings: Settings,
     patch: Patch,
     bounded: BoundedSolver,
@@ -86,6 +94,10 @@ pub struct Solver {
     /// Distance from the objects at rest and vertex.
     candidates: Vec<(f64, u32)>,
     overflow: bool,
+    /// Gaps of this frame.
+    field: Field,
+    /// Where the last frame under a net force ended.
+    pub(crate) reached: Option<Reached>,
 }
 
 impl Solver {
@@ -115,6 +127,8 @@ impl Solver {
             wanted: vec![false; model.vertices()],
             candidates: Vec::with_capacity(model.vertices()),
             overflow: false,
+            field: Field::with_capacity(model.vertices()),
+            reached: None,
             patch,
             model,
             settings,
@@ -125,6 +139,7 @@ impl Solver {
     pub fn reset(&mut self) {
         self.patch.clear();
         self.made = 0;
+        self.reached = None;
     }
 
     /// The model that it solves with.
@@ -133,45 +148,107 @@ impl Solver {
         &self.model
     }
 
-    /// Finds what presses on the finger where `objects` are; they are in the finger's frame, in mm
-    /// of this person.
+    /// Finds what presses on the finger in a scene: objects in the finger's frame, in mm of this
+    /// person, or gaps.
     ///
     /// # Errors
-    /// [`ContactError`] for what cannot be placed; the last frame is kept.
-    pub fn solve(&mut self, objects: &[Object], out: &mut Contact) -> Result<(), ContactError> {
-        validate(objects)?;
-        self.frame(View { objects, length: self.settings.person.width, shift_mm: [0.0; 3] }, out);
-        Ok(())
+    /// [`ContactError`] for what cannot be placed, with the last frame kept, or
+    /// [`ContactError::Diverged`].
+    pub fn solve<'a>(
+        &mut self,
+        scene: impl Into<Scene<'a>>,
+        out: &mut Contact,
+    ) -> Result<(), ContactError> {
+        self.within(scene.into(), KEPT_MM as f32, |solver, view| solver.frame(view, out))
     }
 
-    pub(crate) const fn person(&self) -> Person {
-        self.settings.person
+    /// Runs `work` on a view of the scene, of which gaps are told up to `reach_mm`.
+    pub(crate) fn within<T>(
+        &mut self,
+        scene: Scene<'_>,
+        reach_mm: f32,
+        work: impl FnOnce(&mut Self, View<'_>) -> Result<T, ContactError>,
+    ) -> Result<T, ContactError> {
+        let length = self.settings.person.width;
+        match scene {
+            Scene::Objects(objects) => {
+                validate(objects)?;
+                let things = Things::Objects(objects);
+                work(self, View { things, length, shift_mm: [0.0; 3] })
+            }
+            Scene::Gaps(gaps) => {
+                let mut field = std::mem::take(&mut self.field);
+                let read = field.read(&self.model, gaps, length, reach_mm);
+                let result = read.and_then(|()| {
+                    let things = Things::Field(&field);
+                    work(self, View { things, length, shift_mm: [0.0; 3] })
+                });
+                self.field = field;
+                result
+            }
+        }
     }
 
-    /// A distance that all objects are certainly away from the finger at rest, mm.
-    pub(crate) fn free_mm(&self, view: View<'_>) -> f64 {
-        let free = |at: &[f64; 3]| view.clearance_mm(*at);
-        view.length * self.model.positions_mm.iter().map(free).fold(f64::INFINITY, f64::min)
+    /// Finds what presses on the finger in `view`. A warm frame that runs away is tried once more
+    /// from nothing.
+    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) -> Result<(), ContactError> {
+        if self.attempt(view, out) {
+            return Ok(());
+        }
+        self.reset();
+        if self.attempt(view, out) {
+            return Ok(());
+        }
+        self.reset();
+        out.clear();
+        Err(ContactError::Diverged)
     }
 
-    /// Finds what presses on the finger in `view`.
-    pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) {
+    /// Presses on the undeformed skin, which always has one answer: what is left where
+    /// linearisations lead nowhere.
+    fn press_undeformed(&mut self, view: View<'_>, effort: &mut Effort) {
+        let Slots { force, found, change, .. } = &mut self.patch.values;
+        for vector in [force, found, change].into_iter().flatten() {
+            vector.fill(0.0);
+        }
+        self.displace(self.patch.vertices().len());
+        self.measure_all(view, effort);
+        self.choose_near();
+        self.remake_matrix();
+        effort.products += self.complement(1.0, PRODUCTS_MAX);
+    }
+
+    /// Whether what came out is finite.
+    fn attempt(&mut self, view: View<'_>, out: &mut Contact) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         out.clear();
         self.find_candidates(view, &mut out.effort);
-        if self.candidates.is_empty() {
-            self.reset();
-            return;
+        // Where no undeformed vertex lies in a thing, no force is an answer; a warm start could find
+        // another one, on the far side of something thin.
+        if self.candidates.iter().all(|(free, _)| *free > 0.0) {
+            self.patch.clear();
+            self.made = 0;
+            return true;
         }
         if self.settings.method == Method::Springs {
             springs::press(&self.model, view, self.settings.person, &self.candidates, out);
-            return;
+            return true;
         }
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
         let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
+        if !change.is_finite() {
+            return false;
+        }
+        if change > UNSETTLED_MM {
+            self.take_mean();
+        }
+        if !self.patch.values.size[..self.patch.near()].iter().any(|s| *s > 0.0) {
+            self.press_undeformed(view, &mut out.effort);
+        }
         self.answer(change, out);
+        out.is_finite()
     }
 
     /// Displaces the first `rows` slots under the near slots' forces.
@@ -213,30 +290,32 @@ impl Solver {
         for slot in 0..slots {
             let vertex = patch.vertices()[slot] as usize;
             let v = &mut patch.values;
-            let at = std::array::from_fn(|i| {
-                model.positions_mm[vertex][i] + f64::from(v.moved[i][slot])
-            });
-            let nearest = view.nearest(at);
+            let moved = [0, 1, 2].map(|i| f64::from(v.moved[i][slot]));
+            let nearest = view.nearest(model, vertex, moved);
             for i in 0..3 {
                 v.normal[i][slot] = nearest.normal[i] as f32;
             }
             // In the units of the reference finger: pressure over stiffness, length over width.
-            let give = stiffness / (view.objects[nearest.object].stiffness_mpa_per_mm * width);
+            let give = stiffness / (nearest.stiffness_mpa_per_mm * width);
             v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
             v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
         }
     }
 
     fn answer(&mut self, change: f32, out: &mut Contact) {
-        let share_max = self.model.header().share_max;
+        let Header { share_max, depth_max_mm, .. } = *self.model.header();
+        let deepest = self.candidates.iter().map(|(free, _)| -free).fold(0.0, f64::max);
+        let is_deep = depth_max_mm > 0.0 && deepest > f64::from(depth_max_mm);
         let v = &self.patch.values;
-        for slot in 0..self.patch.vertices().len() {
+        let slots = self.patch.vertices().len();
+        let least = v.gap[..slots].iter().copied().fold(0.0, f32::min);
+        for slot in 0..slots {
             let deep = f64::from(v.object[slot] * v.size[slot] - v.gap[slot]);
             out.penetration_mm = out.penetration_mm.max(deep);
         }
         out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
-        out.quality.out_of_range = self.overflow || !(out.quality.share <= share_max);
-        out.quality.settled = change <= UNSETTLED_MM;
+        out.quality.out_of_range = self.overflow || is_deep || !(out.quality.share <= share_max);
+        out.quality.settled = change <= UNSETTLED_MM && least >= -INSIDE_MAX_MM;
         collect(&self.model, &self.patch, self.settings.person, out);
         if self.settings.stiffness {
             out.stiffness_n_per_mm = self.stiffness(out);
@@ -263,6 +342,7 @@ impl Solver {
         let symmetric = Symmetric { values: matrix, stride: patch.stride(), norm: *norm };
         let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
         let Person { width, stiffness } = self.settings.person;
-        Some(f64::from(force / scale) * stiffness * width)
+        let found = f64::from(force / scale) * stiffness * width;
+        Some(found).filter(|s| s.is_finite() && *s >= 0.0)
     }
 }

@@ -9,6 +9,8 @@ pub(crate) mod replay;
 pub(crate) mod testing;
 mod tier;
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
@@ -65,7 +67,7 @@ pub(crate) struct Catalogue {
     pub(crate) default: usize,
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
-    pub(crate) skin: Raster,
+    pub(crate) skin: Arc<Raster>,
     /// The pixels of `skin`.
     pub(crate) skin_mask: PixelMask,
     /// The pixels of `skin` at its edge.
@@ -111,7 +113,7 @@ impl Catalogue {
             atlas_json: Bytes::new(),
             skin_mask: PixelMask::from(skin.mask()),
             rim: rim(skin.mask()),
-            skin,
+            skin: Arc::new(skin),
             interface,
             atlas,
             replay: Replay::default(),
@@ -212,7 +214,7 @@ impl Catalogue {
             atlas_json,
             skin_mask: PixelMask::from(skin.mask()),
             rim: rim(skin.mask()),
-            skin,
+            skin: Arc::new(skin),
             interface,
             replay,
             ladder_json,

@@ -8,6 +8,7 @@ use std::{
 use bytes::{Bytes, BytesMut};
 use papilla_codec::{Input, Output};
 use papilla_proto::{FrameHeader, FrameKind, Problem, Window, effects::OutOfRange};
+use papilla_session_contact::Finger;
 use papilla_session_effects::Effects;
 
 use crate::core::metrics::Stage;
@@ -43,6 +44,8 @@ pub(crate) struct JobOptions {
     /// The session's effects. Only the thread that renders the frame locks them, and a session
     /// has one frame with a thread at a time.
     pub(crate) effects: Option<Arc<Mutex<Effects>>>,
+    /// The session's finger that the frame is of, in version 3; locked as the effects are.
+    pub(crate) finger: Option<Arc<Mutex<Finger>>>,
     /// How the sink tells one answer from another; handed back as it is.
     pub(crate) header: Option<FrameHeader>,
 }

@@ -3,15 +3,16 @@
 use std::{
     mem,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::{Arc, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
-use papilla_codec::{Map, Quantity, decode, encode};
+use papilla_codec::{Input, Map, Quantity, decode, encode};
 use papilla_engine::Session;
 use papilla_proto::{
-    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
+    ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
 };
+use papilla_session_contact::Finger;
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
@@ -143,30 +144,39 @@ impl Worker {
         let start = Instant::now();
         // The frame's memory goes back to its session before the network is asked.
         let payload = mem::take(&mut job.payload);
-        let (mut summary, range) = self.decode(job, &payload)?;
+        let options = &job.options;
+        let mut effects = options.effects.as_ref().map(|e| lock(e));
+        let mut finger = options.finger.as_ref().map(|f| lock(f));
+        // Without anything that shows SED, poses go in and forces come out.
+        let shows_sed = finger.is_none() || effects.as_ref().is_none_or(|e| e.shows_sed());
+        let (mut summary, range) = match &mut finger {
+            Some(finger) => self.take(job, finger, &payload, shows_sed, meta)?,
+            None => self.decode(job, &payload)?,
+        };
         drop(payload);
         let tier = &self.catalogue.tiers[job.tier];
-        let &JobOptions { headroom, time_us, ref effects, .. } = &job.options;
-        let mut effects =
-            effects.as_ref().map(|effects| effects.lock().unwrap_or_else(PoisonError::into_inner));
+        let &JobOptions { headroom, time_us, .. } = options;
         if let Some(effects) = &mut effects {
             let peak_pa = effects.before(&mut self.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
-        meta.flags |= if range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
+        meta.flags |= if shows_sed && range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
         let least_pa = RIM_SHARE * summary.peak_pa;
-        let is_cut_off = self.catalogue.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
+        let is_cut_off =
+            shows_sed && self.catalogue.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
         meta.flags |= if is_cut_off { flags::CUT_OFF } else { 0 };
         let is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
         let seen_pa = if is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
         let is_out_of_distribution =
-            !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
+            shows_sed && !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
         meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
         let decoded = Instant::now();
         times.decode = decoded - start;
 
-        if summary.is_zero() {
+        if !shows_sed {
+            // The map is not even drawn.
+        } else if summary.is_zero() {
             // Nothing touches the finger: SED is zero, and no network is asked.
             self.sed_j_per_m3.fill(0.0);
             self.metrics.zero_maps.inc();
@@ -185,9 +195,17 @@ impl Worker {
         }
 
         let start = Instant::now();
+        let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
+        if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
+            self.scale_up(finger.stiffness());
+        }
+        let tier = &self.catalogue.tiers[job.tier];
         let (bytes, scale) = if let Some(effects) = &mut effects {
-            let buffer = recycler.claim(HEADROOM + effects.size_hint());
+            let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
             buffer.resize(headroom, 0);
+            if let Some(finger) = &mut finger {
+                finger.write(buffer);
+            }
             let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
             let written = effects
                 .write(pressure_pa, sed, time_us, buffer)
@@ -195,8 +213,11 @@ impl Worker {
             (meta.kind, meta.window) = (written.kind, written.window);
             (buffer.split(), written.scale)
         } else {
-            let buffer = recycler.claim(headroom + job.output.size_hint());
+            let buffer = recycler.claim(headroom + job.output.size_hint() + extra);
             buffer.resize(headroom, 0);
+            if let Some(finger) = &mut finger {
+                finger.write(buffer);
+            }
             let map =
                 Map { quantity: Quantity::Sed, values: &self.sed_j_per_m3, source: &tier.name };
             let scale = encode(job.output, map, buffer)
@@ -207,6 +228,47 @@ impl Worker {
         Ok(Outcome::Map { bytes, scale })
     }
 
+    /// Reads a frame of version 3; pressure on a finger of reference stiffness is left.
+    fn take(
+        &mut self,
+        job: &Job,
+        finger: &mut Finger,
+        payload: &[u8],
+        shows_sed: bool,
+        meta: &mut OutputMeta,
+    ) -> Result<(MapSummary, PressureRange), Problem> {
+        if finger.reads_windows() {
+            let (summary, range) = self.decode(job, payload)?;
+            let part = 1.0 / finger.stiffness();
+            scale(&mut self.pressure_pa, part);
+            return Ok((MapSummary { peak_pa: summary.peak_pa * part }, range));
+        }
+        let Input::Window { sample_type, scale, .. } = job.input else {
+            return Err(Problem::new(ErrorCode::Internal, "a frame that is no window"));
+        };
+        let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
+        let taken = finger.take(payload, sample_type, scale, map_pa)?;
+        meta.flags |= taken.flags;
+        let range = self.range(job);
+        if finger.takes_pressure() {
+            range.check(&self.pressure_pa).map_err(problem::of_map)?;
+        }
+        Ok((MapSummary { peak_pa: taken.peak_pa }, range))
+    }
+
+    /// From the finger of reference stiffness to one that is so many times as stiff.
+    fn scale_up(&mut self, stiffness: f32) {
+        scale(&mut self.pressure_pa, stiffness);
+        scale(&mut self.sed_j_per_m3, stiffness);
+    }
+
+    fn range(&self, job: &Job) -> PressureRange {
+        PressureRange {
+            trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
+            beyond: job.options.out_of_range,
+        }
+    }
+
     /// Decodes and checks the pressure; what lies off the skin is taken off.
     fn decode(
         &mut self,
@@ -214,13 +276,22 @@ impl Worker {
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
         decode(job.input, payload, &mut self.pressure_pa)?;
-        let range = PressureRange {
-            trained_max_pa: self.catalogue.tiers[job.tier].pressure_max_pa,
-            beyond: job.options.out_of_range,
-        };
+        let range = self.range(job);
         range.check(&self.pressure_pa).map_err(problem::of_map)?;
         let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);
         Ok((summary, range))
+    }
+}
+
+/// One job of a session is with a thread at a time, so nobody waits here.
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Multiplies all values, unless by one.
+fn scale(values: &mut [f32], factor: f32) {
+    if factor.to_bits() != 1.0f32.to_bits() {
+        values.iter_mut().for_each(|value| *value *= factor);
     }
 }
 

@@ -101,7 +101,7 @@ fn rasterised(
 ) -> Result<Content, Problem> {
     let state = &catalogue.replay.states[state];
     let (raster, vertex_values, white) = match quantity {
-        Quantity::Pressure => (&catalogue.skin, &state.pressure_pa, "x-pressure-max-pa"),
+        Quantity::Pressure => (&*catalogue.skin, &state.pressure_pa, "x-pressure-max-pa"),
         Quantity::Sed => (&catalogue.interface, &state.sed_j_per_m3, "x-sed-max-j-per-m3"),
     };
     let mut values = vec![0.0; MAP_LEN];

@@ -32,8 +32,13 @@ use crate::{
 pub(super) struct Session {
     pub(super) number: u64,
     pub(super) terms: Terms,
-    pub(super) fresh: Freshness,
-    pub(super) slot: Arc<Slot>,
+    lanes: Vec<Lane>,
+}
+
+/// The way of one finger's frames.
+struct Lane {
+    fresh: Freshness,
+    slot: Arc<Slot>,
 }
 
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
@@ -58,12 +63,33 @@ pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> 
 }
 
 impl Session {
+    /// A session on these terms.
+    pub(super) fn new(number: u64, terms: Terms, connection: &Connection) -> Self {
+        let mut session = Self { number, terms, lanes: Vec::new() };
+        session.open_lanes(connection);
+        session
+    }
+
+    /// Begins anew on the terms; slots are kept, so that answers stay in order.
+    fn open_lanes(&mut self, connection: &Connection) {
+        let fresh = || Freshness::new(self.terms.stale_after_us);
+        for lane in &mut self.lanes {
+            lane.fresh = fresh();
+        }
+        let fingers = self.terms.hand.as_ref().map_or(1, |hand| hand.fingers().len());
+        for _ in self.lanes.len()..fingers {
+            let answers = connection.app.store.answers(self.terms.answer_len_max());
+            let slot = Arc::new(Slot::new(answers, Arc::clone(&connection.reply) as Arc<_>));
+            self.lanes.push(Lane { fresh: fresh(), slot });
+        }
+    }
+
     /// Takes a hello for new terms, such as another tier.
     async fn renew(&mut self, connection: &mut Connection, text: &Bytes) {
         match hello::renew(&connection.app, text, self.number).await {
             Ok((terms, ready)) => {
-                self.fresh = Freshness::new(terms.stale_after_us);
                 self.terms = terms;
+                self.open_lanes(connection);
                 connection.reply.send_message(&ServerMessage::Ready(ready));
             }
             Err(problem) => connection.reply.send_error(problem, None),
@@ -80,9 +106,11 @@ impl Session {
             Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
         };
         let Some(header) = job.options.header else { return };
+        let finger = header.extension.and_then(|e| e.finger).map_or(0, usize::from);
+        let Some(lane) = self.lanes.get_mut(finger) else { return };
         // In version 1 sequences mean nothing to the server.
         let is_new = header.extension.is_some();
-        if is_new && self.fresh.is_stale(header.sequence, header.client_time_us, received) {
+        if is_new && lane.fresh.is_stale(header.sequence, header.client_time_us, received) {
             metrics.of(Transport::Session).stale.inc();
             return reply.send_status(&header, job.tier, FrameStatus::Stale, received);
         }
@@ -91,7 +119,7 @@ impl Session {
             return reply.send_status(&header, job.tier, FrameStatus::Late, received);
         }
         reply.begin();
-        match connection.app.pool.submit(&self.slot, job) {
+        match connection.app.pool.submit(&lane.slot, job) {
             Ok(None) => {}
             Ok(Some(Job { tier, received, options: JobOptions { header, .. }, .. })) => {
                 if let Some(header) = header {
@@ -121,10 +149,12 @@ impl Session {
     /// The job a frame asks for.
     fn job(&self, frame: &Bytes, received: Instant) -> Result<Job, Problem> {
         let header = FrameHeader::decode(frame).map_err(problem::of_frame)?;
-        self.check(&header)?;
+        let finger = self.check(&header)?;
         let payload = frame.slice(header.header_len()..);
-        if payload.len() != header.payload_len() {
-            let (found, due) = (payload.len(), header.payload_len());
+        let hand = self.terms.hand.as_ref();
+        let due = hand.map_or(header.payload_len(), |hand| hand.form().payload_len(&header));
+        if payload.len() != due {
+            let found = payload.len();
             let message = format!("the payload has {found} bytes, {due} are due");
             return Err(Problem::new(ErrorCode::WrongLength, message).at("payload"));
         }
@@ -152,23 +182,25 @@ impl Session {
                 headroom: HEADROOM + header.header_len(),
                 out_of_range: self.terms.out_of_range,
                 time_us: header.client_time_us,
-                effects: self.terms.effects.clone(),
+                effects: self.terms.effects.get(finger).cloned(),
+                finger: hand.and_then(|hand| hand.fingers().get(finger).cloned()),
                 header: Some(header),
             },
         })
     }
 
-    /// Whether a header is that of a frame this session takes.
-    fn check(&self, header: &FrameHeader) -> Result<(), Problem> {
+    /// Whether a header is that of a frame this session takes; the number of its finger.
+    fn check(&self, header: &FrameHeader) -> Result<usize, Problem> {
         let wrong_type =
             |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
-        let version = if header.extension.is_some() { 2 } else { 1 };
+        let version = u32::from(header.version());
         if version != self.terms.version {
             let agreed = self.terms.version;
             let message = format!("the hello had version {agreed}, the frame has {version}");
             return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
         }
-        if header.kind != FrameKind::Pressure {
+        let finger = self.terms.hand.as_ref().map(|hand| hand.form().check(header)).transpose()?;
+        if finger.is_none() && header.kind != FrameKind::Pressure {
             return wrong_type("kind", "clients send pressure, kind 1".to_owned());
         }
         if header.status != FrameStatus::Ok {
@@ -181,7 +213,8 @@ impl Session {
             return wrong_type("sample_type", message);
         }
         let window = header.window();
-        if header.extension.is_some() && !window.is_inside() {
+        let is_window = self.terms.hand.as_ref().is_none_or(|hand| hand.form().is_window());
+        if is_window && header.extension.is_some() && !window.is_inside() {
             let Window { x, y, width, height } = window;
             let message =
                 format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
@@ -192,6 +225,6 @@ impl Session {
             let message = format!("the frame is {width} x {height}, 224 x 224 is due");
             return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
         }
-        Ok(())
+        Ok(finger.unwrap_or(0))
     }
 }

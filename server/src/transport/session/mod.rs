@@ -27,9 +27,8 @@ use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
 use tokio::sync::watch;
 use tungstenite::handshake::derive_accept_key;
 
-use self::{connection::Connection, fresh::Freshness};
+use self::connection::Connection;
 use crate::{
-    core::scheduler::Slot,
     problem,
     transport::{
         answer::{Answer, HttpProblem},
@@ -120,13 +119,7 @@ async fn converse(connection: &mut Connection, number: u64) -> End {
     connection
         .inbound
         .expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
-    let reply = Arc::clone(&connection.reply);
-    let session = frames::Session {
-        number,
-        fresh: Freshness::new(terms.stale_after_us),
-        slot: Arc::new(Slot::new(connection.app.store.answers(terms.answer_len_max()), reply)),
-        terms,
-    };
+    let session = frames::Session::new(number, terms, connection);
     frames::serve(connection, session).await
 }
 

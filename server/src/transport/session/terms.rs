@@ -9,14 +9,20 @@ use papilla_codec::{Output, scale_of};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
     SampleType,
+    contact::FINGERS_MAX,
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
 };
+use papilla_session_contact::{Hand, Skin};
 use papilla_session_effects::Effects;
+use tokio::sync::OwnedSemaphorePermit;
 
 use super::{budget::Budget, reply::tier_number};
 use crate::{
-    core::{buffers::HEADROOM, catalogue::Tier},
+    core::{
+        buffers::HEADROOM,
+        catalogue::{Catalogue, Tier},
+    },
     transport::app::App,
 };
 
@@ -40,8 +46,11 @@ pub(super) struct Terms {
     pub(super) out_of_range: OutOfRange,
     /// Longest delay on the way of a frame that is not stale, us.
     pub(super) stale_after_us: Option<u32>,
-    /// What was asked for beside the bare map.
-    pub(super) effects: Option<Arc<Mutex<Effects>>>,
+    /// What was asked for beside the bare map, of each finger; none of the bare map.
+    pub(super) effects: Vec<Arc<Mutex<Effects>>>,
+    /// The fingers, in version 3.
+    pub(super) hand: Option<Hand>,
+    _fingers: Option<OwnedSemaphorePermit>,
     /// What the client is told of them.
     info: ReadyInfo,
     permit: Permit,
@@ -57,8 +66,10 @@ impl Terms {
     /// Most bytes of an answer, its heads included.
     pub(super) fn answer_len_max(&self) -> usize {
         let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
-        let effects = self.effects.as_ref();
+        let effects = self.effects.first();
+        let touch = self.hand.as_ref().map_or(0, Hand::sections_len);
         HEADROOM
+            + touch
             + effects.map_or(plain, |effects| {
                 effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
             })
@@ -82,12 +93,13 @@ impl Drop for Permit {
 }
 
 /// What `ready` says of the effects of a session.
-#[derive(Default)]
 struct ReadyInfo {
     names: Vec<RuntimeEffect>,
     sections: Vec<Section>,
     /// Greatest value that the map shows.
     value_max: Option<f32>,
+    /// Whether the network is asked.
+    shows_sed: bool,
 }
 
 fn check_version(hello: &Hello) -> Result<(), Problem> {
@@ -95,15 +107,37 @@ fn check_version(hello: &Hello) -> Result<(), Problem> {
         Err(Problem::new(ErrorCode::UnknownVersion, message).at(field))
     };
     if !PROTOCOL_VERSIONS.map(u32::from).contains(&hello.version) {
-        let message = format!("version {} is not spoken here, 1 and 2 are", hello.version);
+        let message = format!("version {} is not spoken here, 1 to 3 are", hello.version);
         return refuse(message, "version");
     }
-    match hello.member_of_version_2() {
-        Some(member) if hello.version < 2 => {
+    match (hello.member_of_version_2(), hello.member_of_version_3()) {
+        (Some(member), _) if hello.version < 2 => {
             refuse(format!("'{member}' needs version 2 of the protocol"), member)
+        }
+        (_, Some(member)) if hello.version < 3 => {
+            refuse(format!("'{member}' needs version 3 of the protocol"), member)
         }
         _ => Ok(()),
     }
+}
+
+impl Default for ReadyInfo {
+    /// The bare map.
+    fn default() -> Self {
+        Self { names: Vec::new(), sections: Vec::new(), value_max: None, shows_sed: true }
+    }
+}
+
+/// The fingers of a hello of version 3, and their places.
+fn hand(
+    app: &App,
+    catalogue: &Catalogue,
+    hello: &Hello,
+) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
+    let places = app.admit_fingers(hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX))?;
+    let model = app.contact.as_ref().map(|contact| &contact.model);
+    let skin = Skin { atlas: &catalogue.atlas, raster: &catalogue.skin, model };
+    Ok((Hand::of(hello, skin)?, places))
 }
 
 /// The effects of the session that a hello names; all others are the tier's.
@@ -141,11 +175,18 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
-    let effects = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
-    let info = effects.as_ref().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
+    let hand = (hello.version > 2).then(|| hand(app, &catalogue, hello)).transpose()?;
+    let (hand, fingers) = hand.unzip();
+    let mut effects = Vec::new();
+    for _ in 0..hand.as_ref().map_or(1, |hand| hand.fingers().len()) {
+        let own = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
+        effects.extend(own);
+    }
+    let info = effects.first().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
         names: effects.names().to_vec(),
         sections: effects.sections().to_vec(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
+        shows_sed: hand.is_none() || effects.shows_sed(),
     });
     // Answers of version 1 could not tell of another tier.
     let by_budget = budget_us.filter(|_| hello.version > 1 && hello.tier.is_none());
@@ -163,7 +204,9 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
             _ => OutOfRange::Clamp,
         }),
         stale_after_us: hello.stale_after_us,
-        effects: effects.map(|effects| Arc::new(Mutex::new(effects))),
+        effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
+        hand,
+        _fingers: fingers,
         info,
         permit: Permit::take(tier),
     })
@@ -173,8 +216,16 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
 pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     let catalogue = app.catalogue();
     let tier = &catalogue.tiers[terms.tier];
-    let predicted_latency_us = catalogue
-        .predicted_latency_us(terms.tier)
+    let of_solve = |hand: &Hand| !hand.form().takes_pressure();
+    let contact_us = terms.hand.as_ref().filter(|hand| of_solve(hand)).and(app.contact.as_ref());
+    let contact_us = contact_us.map(|contact| contact.frame_us);
+    let of_tier = if terms.info.shows_sed {
+        catalogue.predicted_latency_us(terms.tier)
+    } else {
+        catalogue.overhead.us()
+    };
+    let predicted_latency_us = of_tier
+        .saturating_add(contact_us.unwrap_or(0))
         .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
     let is_new = terms.version > 1;
     let value_max = terms.info.value_max.unwrap_or(tier.sed_max_j_per_m3);
@@ -183,10 +234,17 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);
         vec![Section { name: SectionName::Map, offset, bytes }]
     };
-    let sections = || match &terms.effects {
-        Some(_) => terms.info.sections.clone(),
-        None => bare_map(),
+    let sections = || {
+        let rest = match terms.effects.first() {
+            Some(_) => terms.info.sections.clone(),
+            None => bare_map(),
+        };
+        let Some(hand) = &terms.hand else { return rest };
+        let behind = hand.sections_len() as u32;
+        let moved = rest.into_iter().map(|s| Section { offset: s.offset + behind, ..s });
+        hand.sections().iter().copied().chain(moved).collect()
     };
+    let fingers = terms.hand.as_ref().map(|hand| hand.fingers().len() as u32);
     Ready {
         version: terms.version,
         session: number,
@@ -209,5 +267,8 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         answer_sample_type: is_new.then_some(terms.answer_sample_type),
         session_effects: is_new.then(|| terms.info.names.clone()),
         sections: is_new.then(sections),
+        vertices: fingers.map(|_| catalogue.atlas.vertex_count() as u32),
+        fingers,
+        contact_us,
     }
 }

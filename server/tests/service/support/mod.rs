@@ -1,6 +1,7 @@
 //! A service with small models of its own, and clients that can misbehave.
 
 mod binary;
+pub(crate) mod contact;
 pub(crate) mod flood;
 mod http;
 mod onnx;

@@ -109,3 +109,22 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
     }
     Ok(())
 }
+
+pub(crate) fn check_touch(expect: &Value, answer: &Answer, finger: u8) -> Result<()> {
+    if let Status::Error(problem) = &answer.status {
+        return check_problem(expect, problem);
+    }
+    ensure!(expect["status"] != "error", "the frame is not refused");
+    ensure!(answer.is_ok() && answer.finger == finger, "{answer:?}");
+    let Some(touch) = answer.touch else { bail!("the answer carries no touch") };
+    let all = touch.encode();
+    let numbers: Vec<f32> = all.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+    check_list("touch", &numbers[..15], &expect["touch"])?;
+    if let Some(due) = expect.get("pressure_sum") {
+        check_pair("the pressure", answer.pressure_pa.iter().map(|p| f64::from(*p)).sum(), due)?;
+    }
+    let flags = if answer.no_contact { json!(["no_contact"]) } else { json!([]) };
+    ensure!(expect["flags"] == flags, "flags are {flags}");
+    ensure!(!answer.out_of_range && !answer.unsettled, "{answer:?}");
+    Ok(())
+}

@@ -6,17 +6,20 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{Contact, Frame, PapillaError, Session, Skin, Status, atlas, sed};
-use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch};
+use papilla_client::{Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed};
+use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch, contact::Pose};
 use papilla_tests::{
-    conformance::inputs::{self, Pressure, Vertices},
+    conformance::{
+        depth,
+        inputs::{self, Pressure, Vertices},
+    },
     http::Request,
 };
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use tokio::{task::spawn_blocking, time};
 
-use crate::checks::{check_answer, check_map, check_pair, check_problem};
+use crate::checks::{check_answer, check_map, check_pair, check_problem, check_touch};
 
 /// One case.
 pub(crate) struct Run {
@@ -56,6 +59,7 @@ impl Run {
             "http" => self.post(step).await,
             "rasterise" => self.rasterise(step).await,
             "contacts" => self.contacts(step).await,
+            "touch" | "gaps" => self.touch(step).await,
             other => bail!("there is no step {other}"),
         }
     }
@@ -115,6 +119,30 @@ impl Run {
             return check_answer(&step["expect"], &answer);
         }
         bail!("no attempt")
+    }
+
+    async fn touch(&self, step: &Value) -> Result<()> {
+        let finger = member::<Option<u8>>(step, "finger")?.unwrap_or(0);
+        let net = member::<Option<[f32; 4]>>(step, "net")?;
+        let net = net.map(|[x, y, z, force_n]| NetForce { direction: [x, y, z], force_n });
+        let session = self.session()?;
+        let outcome = if step["do"] == "gaps" {
+            let (server, sphere) = (self.server.clone(), member(step, "sphere")?);
+            let atlas = spawn_blocking(move || atlas(&server)).await??;
+            let places = &atlas.patch(Patch::Skin).positions_mm;
+            let depths: Vec<f32> = places.iter().map(|p| depth(*p, sphere)).collect();
+            session.send_gaps(finger, &depths, net)?
+        } else {
+            let pose = |[x, y, z, a, b, c, d]: [f32; 7]| Pose {
+                origin_mm: [x, y, z],
+                quaternion: [a, b, c, d],
+            };
+            let poses: Vec<[f32; 7]> = member(step, "poses")?;
+            let poses: Vec<Pose> = poses.into_iter().map(pose).collect();
+            session.send_poses(finger, &poses, net)?
+        };
+        let answer = time::timeout(self.patience, outcome).await??;
+        check_touch(&step["expect"], &answer, finger)
     }
 
     async fn reconnect(&mut self, step: &Value) -> Result<()> {

@@ -1,0 +1,18 @@
+"""A ball that goes down on a finger, and what pushes back. Needs `papilla-server --contact FILE`.
+
+python examples/touch.py [URL]
+"""
+
+import sys
+
+from papilla import DEFAULT_URL, Session
+
+ball = {"shape": {"shape": "sphere", "radius_mm": 10.0}}
+url = sys.argv[1] if len(sys.argv) > 1 else DEFAULT_URL
+with Session(url, input="objects", objects=[ball], map=False) as session:
+    for step in range(11):
+        depth_mm = 0.1 * step
+        # The pad's lowest point is at (11.25, 0, -6.53); a ball's origin is its centre.
+        touch = session.touch([11.25, 0.0, -16.53 + depth_mm, 0, 0, 0, 1]).touch
+        assert touch is not None
+        print(f"{depth_mm:.1f} mm: {touch.force_n[2]:.3f} N on {touch.area_mm2:.1f} mm2")

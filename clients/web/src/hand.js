@@ -1,0 +1,254 @@
+// Fingers that touch things: objects or gaps in, forces out. docs/reference/protocol.md, version 3.
+
+import { PapillaError, missed } from './error.js';
+import { Link, sessionUrl } from './link.js';
+import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
+
+/** @typedef {import('./types.js').HandHello} HandHello */
+/** @typedef {import('./types.js').Ready} Ready */
+/** @typedef {import('./types.js').Problem} Problem */
+/** @typedef {import('./types.js').Pose} Pose */
+/** @typedef {import('./types.js').NetForce} NetForce */
+/** @typedef {import('./types.js').Touch} Touch */
+
+/**
+ * What came of a frame of a finger. Arrays are views of the message and stay as they are.
+ * @typedef {object} HandAnswer
+ * @property {number} sequence
+ * @property {number} finger
+ * @property {Touch} touch
+ * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
+ * @property {Float32Array | null} vertices SED at the vertices, J/m3, if asked for
+ * @property {Float32Array | null} map SED, 224 x 224, J/m3, if asked for
+ * @property {Float32Array | null} summary
+ * @property {Float32Array | null} points
+ * @property {Float32Array | null} actuators
+ * @property {boolean} noContact
+ * @property {boolean} outOfRange
+ * @property {boolean} unsettled
+ * @property {number} totalUs receipt to sending, in the server
+ */
+
+const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
+const VERSION = 3;
+const KIND = { objects: 4, gaps: 5 };
+const ROW = 7;
+const MAP_SIDE_PX = 224;
+const TWO_POW_32 = 4294967296;
+const DRAIN_MS = 1;
+
+/** A finger's newest frame that has not left, and who waits for it. */
+class Waiting {
+  /** @param {number} sequence @param {ArrayBuffer} message @param {(answer: HandAnswer) => void} resolve @param {(error: Error) => void} reject */
+  constructor(sequence, message, resolve, reject) {
+    this.sequence = sequence;
+    this.message = message;
+    this.resolve = resolve;
+    this.reject = reject;
+  }
+}
+
+/**
+ * One to ten fingers in one session. The newest frame of each finger wins, here and in the service; the connection is
+ * made anew by itself.
+ */
+export class Hand {
+  /** @type {Ready | null} */ ready = null;
+  /** @type {(problem: Problem) => void} */ onrefused = () => {};
+  #hello;
+  #link;
+  #sequence = 0;
+  #drainTimer = false;
+  /** @type {Map<number, Waiting>} */ #waiting = new Map();
+  /** @type {Map<number, Waiting>} */ #sent = new Map();
+  /** @type {(() => void) | null} */ #opened = null;
+
+  /** @param {string} base @param {HandHello} hello @param {string} [token] */
+  constructor(base, hello, token) {
+    this.#hello = { input: hello.objects ? 'objects' : 'gaps', map: false, ...hello, type: 'hello', version: VERSION };
+    this.#link = new Link(sessionUrl(base, token), {
+      connecting: () => {},
+      opened: () => this.#link.send(JSON.stringify(this.#hello)),
+      text: (text) => this.#text(JSON.parse(text)),
+      binary: (data) => this.#binary(data),
+      lost: () => this.#lost(),
+    });
+  }
+
+  /**
+   * A hand that is ready to touch.
+   * @param {string} base http(s)://host[:port]; '' for the server of the page
+   * @param {HandHello} hello
+   * @param {string} [token]
+   * @returns {Promise<Hand>} rejected with a PapillaError where the hello is refused
+   */
+  static connect(base, hello, token) {
+    const hand = new Hand(base, hello, token);
+    return new Promise((resolve, reject) => {
+      hand.#opened = () => resolve(hand);
+      hand.onrefused = (problem) => {
+        hand.close();
+        reject(new PapillaError(problem));
+      };
+      hand.#link.connect();
+    });
+  }
+
+  /** Ends the session; frames without an answer are lost. */
+  close() {
+    this.#link.drop();
+    this.#lost();
+    for (const waiting of this.#waiting.values()) waiting.reject(new PapillaError(missed('lost', waiting.sequence)));
+    this.#waiting.clear();
+  }
+
+  /**
+   * Sends where the objects of the hello are in a finger's frame, and waits for what pushes back.
+   * @param {Pose[]} poses
+   * @param {{finger?: number, net?: NetForce}} [more]
+   * @returns {Promise<HandAnswer>} rejected with a PapillaError where there is none (`superseded`, `stale`, `lost`, or refused)
+   */
+  touch(poses, { finger = 0, net } = {}) {
+    const rows = new Float32Array(ROW * (poses.length + (net ? 1 : 0)));
+    poses.forEach(({ at, turn = [0, 0, 0, 1] }, i) => rows.set([...at, ...turn], ROW * i));
+    if (net) rows.set([...net.direction, net.forceN], ROW * poses.length);
+    return this.#put(KIND.objects, finger, ROW, rows.length / ROW, rows);
+  }
+
+  /**
+   * Sends how deep the undeformed skin lies in things, mm, negative in air.
+   * @param {Float32Array} depthMm at the vertices, or 224 x 224, as the hello says
+   * @param {{finger?: number, net?: NetForce}} [more]
+   * @returns {Promise<HandAnswer>}
+   */
+  touchGaps(depthMm, { finger = 0, net } = {}) {
+    const samples = new Float32Array(depthMm.length + (net ? ROW : 0));
+    samples.set(depthMm);
+    if (net) samples.set([...net.direction, net.forceN], depthMm.length);
+    const isMap = depthMm.length === MAP_SIDE_PX * MAP_SIDE_PX;
+    const [width, height] = isMap ? [MAP_SIDE_PX, MAP_SIDE_PX] : [depthMm.length, 1];
+    return this.#put(KIND.gaps, finger, width, height, samples);
+  }
+
+  /** @param {number} kind @param {number} finger @param {number} width @param {number} height @param {Float32Array} samples */
+  #put(kind, finger, width, height, samples) {
+    const sequence = (this.#sequence = (this.#sequence + 1) >>> 0);
+    const message = new ArrayBuffer(HEADER_BYTES + samples.byteLength);
+    const view = new DataView(message);
+    const timeUs = Math.round((performance.timeOrigin + performance.now()) * 1000);
+    view.setUint32(0, MAGIC, true);
+    view.setUint8(4, VERSION);
+    view.setUint8(5, kind);
+    view.setUint32(8, sequence, true);
+    view.setUint16(12, width, true);
+    view.setUint16(14, height, true);
+    view.setUint32(16, timeUs % TWO_POW_32, true);
+    view.setUint32(20, timeUs / TWO_POW_32, true);
+    view.setFloat32(28, 1, true);
+    view.setUint8(47, finger);
+    new Float32Array(message, HEADER_BYTES).set(samples);
+    return new Promise((resolve, reject) => {
+      const old = this.#waiting.get(finger);
+      if (old) old.reject(new PapillaError(missed('superseded', old.sequence)));
+      this.#waiting.set(finger, new Waiting(sequence, message, resolve, reject));
+      this.#flush();
+    });
+  }
+
+  #flush() {
+    if (!this.ready || !this.#link.isOpen) return;
+    for (const [finger, waiting] of this.#waiting) {
+      if (this.#link.bufferedBytes > 0) {
+        if (!this.#drainTimer) setTimeout(() => { this.#drainTimer = false; this.#flush(); }, DRAIN_MS);
+        this.#drainTimer = true;
+        return;
+      }
+      this.#waiting.delete(finger);
+      this.#sent.set(waiting.sequence, waiting);
+      this.#link.send(waiting.message);
+    }
+  }
+
+  #lost() {
+    this.ready = null;
+    for (const sent of this.#sent.values()) sent.reject(new PapillaError(missed('lost', sent.sequence)));
+    this.#sent.clear();
+  }
+
+  /** @param {Ready | Problem} message */
+  #text(message) {
+    if (message.type === 'ready') {
+      this.#link.succeeded();
+      this.ready = message;
+      this.#opened?.();
+      this.#opened = null;
+      this.#flush();
+      return;
+    }
+    const sent = this.#take(message.sequence ?? -1);
+    if (sent) sent.reject(new PapillaError(message));
+    else this.onrefused(message);
+  }
+
+  /** @param {number} sequence */
+  #take(sequence) {
+    const sent = this.#sent.get(sequence);
+    this.#sent.delete(sequence);
+    return sent;
+  }
+
+  /** @param {ArrayBuffer} data */
+  #binary(data) {
+    const view = new DataView(data);
+    if (data.byteLength < HEADER_BYTES || view.getUint32(0, true) !== MAGIC || !this.ready) return;
+    const sequence = view.getUint32(8, true);
+    const sent = this.#take(sequence);
+    if (!sent) return;
+    const status = STATUS[view.getUint8(7)] ?? 'error';
+    if (status !== 'ok') {
+      sent.reject(new PapillaError(missed(status, sequence)));
+      return;
+    }
+    sent.resolve(read(data, view, this.ready));
+  }
+}
+
+/** @param {ArrayBuffer} data @param {DataView} view @param {Ready} ready @returns {HandAnswer} */
+function read(data, view, ready) {
+  const of = (/** @type {string} */ name) => {
+    const section = ready.sections.find((s) => s.name === name);
+    return section ? new Float32Array(data, section.offset, section.bytes / 4) : null;
+  };
+  const flags = view.getUint8(46);
+  return {
+    sequence: view.getUint32(8, true),
+    finger: view.getUint8(47),
+    touch: touchOf(of('touch') ?? new Float32Array(16)),
+    pressurePa: of('pressure'),
+    vertices: of('vertices'),
+    map: of('map'),
+    summary: of('summary'),
+    points: of('points'),
+    actuators: of('actuators'),
+    noContact: (flags & FLAG.noContact) !== 0,
+    outOfRange: (flags & FLAG.outOfRange) !== 0,
+    unsettled: (flags & FLAG.unsettled) !== 0,
+    totalUs: view.getUint32(24, true),
+  };
+}
+
+/** @param {Float32Array} v @returns {Touch} */
+function touchOf(v) {
+  return {
+    forceN: [v[0], v[1], v[2]],
+    torqueNMm: [v[3], v[4], v[5]],
+    areaMm2: v[6],
+    centreMm: [v[7], v[8], v[9]],
+    penetrationMm: v[10],
+    stiffnessNPerMm: v[11],
+    travelMm: v[12],
+    pressureMaxPa: v[13],
+    share: v[14],
+    solveUs: v[15],
+  };
+}

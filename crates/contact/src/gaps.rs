@@ -1,0 +1,172 @@
+//! Gaps of the undeformed skin in place of objects.
+//!
+//! Distances of neighbouring vertices from a thing tell the direction of its surface: their slope
+//! along the skin is the tangential part of the thing's outward normal, and a distance has a slope
+//! of one. A displaced vertex is then `gap + n . u` away; the thing's curvature is not known.
+
+use crate::error::ContactError;
+use crate::model::ContactModel;
+use crate::objects::{Nearest, require_stiffness};
+
+/// How deep each vertex of the undeformed finger lies in things.
+#[derive(Clone, Copy, Debug)]
+pub struct Gaps<'a> {
+    /// Depth of each vertex, mm of this person; negative in air.
+    pub depth_mm: &'a [f32],
+    /// As [`Object`](crate::Object)'s, of all things.
+    pub stiffness_mpa_per_mm: f64,
+}
+
+/// Deepest, and farthest, that a vertex may be said to be, mm.
+const DEPTH_MAX_MM: f32 = 1e5;
+/// Largest slope along the skin that is taken for a distance's.
+const SLOPE_MAX: f32 = 0.98;
+
+/// Gaps and normals at the vertices, in the units of the reference finger.
+#[derive(Debug, Default)]
+pub(crate) struct Field {
+    gap_mm: Vec<f32>,
+    normal: Vec<[f32; 3]>,
+    /// Area of the triangles that told each normal.
+    area_mm2: Vec<f32>,
+    stiffness_mpa_per_mm: f64,
+}
+
+/// What a triangle adds to slopes at its corners.
+#[derive(Debug)]
+pub(crate) struct Slopes {
+    /// Gradients of the hat functions of its corners, times its area.
+    corners: [[f32; 3]; 3],
+    area_mm2: f32,
+}
+
+impl Field {
+    /// Reads `gaps` as a finger `length` times as wide as the reference has them; normals are made
+    /// where less than `reach_mm` is free.
+    ///
+    /// # Errors
+    /// [`ContactError`] for another number of gaps than vertices, or what is no depth.
+    pub(crate) fn read(
+        &mut self,
+        model: &ContactModel,
+        gaps: Gaps<'_>,
+        length: f64,
+        reach_mm: f32,
+    ) -> Result<(), ContactError> {
+        let (found, expected) = (gaps.depth_mm.len(), model.vertices());
+        if found != expected {
+            return Err(ContactError::Gaps { found, expected });
+        }
+        if let Some(vertex) = gaps.depth_mm.iter().position(|d| !(d.abs() <= DEPTH_MAX_MM)) {
+            return Err(ContactError::Depth { vertex, value: gaps.depth_mm[vertex] });
+        }
+        require_stiffness("stiffness_mpa_per_mm", gaps.stiffness_mpa_per_mm)?;
+        self.stiffness_mpa_per_mm = gaps.stiffness_mpa_per_mm;
+        let per = (1.0 / length) as f32;
+        self.gap_mm.clear();
+        self.gap_mm.extend(gaps.depth_mm.iter().map(|d| -d * per));
+        self.normal.clear();
+        self.normal.resize(expected, [0.0; 3]);
+        self.area_mm2.clear();
+        self.area_mm2.resize(expected, 0.0);
+        for (corners, slopes) in model.triangles.iter().zip(&model.slopes) {
+            let gap = corners.map(|c| self.gap_mm[c as usize]);
+            if !gap.iter().any(|g| *g < reach_mm) {
+                continue;
+            }
+            let slope =
+                [0, 1, 2].map(|i| (0..3).map(|k| gap[k] * slopes.corners[k][i]).sum::<f32>());
+            for corner in corners {
+                self.area_mm2[*corner as usize] += slopes.area_mm2;
+                for (sum, s) in self.normal[*corner as usize].iter_mut().zip(slope) {
+                    *sum += s;
+                }
+            }
+        }
+        for (vertex, normal) in self.normal.iter_mut().enumerate() {
+            if self.gap_mm[vertex] < reach_mm {
+                let own = model.normals[vertex];
+                let slope = normal.map(|s| s / self.area_mm2[vertex].max(f32::MIN_POSITIVE));
+                *normal = thing_normal(slope, own);
+            }
+        }
+        Ok(())
+    }
+
+    /// What lies at a vertex that has moved by `moved` (reference mm).
+    #[inline]
+    pub(crate) fn at(&self, vertex: usize, moved: [f64; 3]) -> Nearest {
+        let normal = self.normal[vertex].map(f64::from);
+        let along: f64 = (0..3).map(|i| normal[i] * moved[i]).sum();
+        let gap_mm = f64::from(self.gap_mm[vertex]) + along;
+        Nearest { gap_mm, normal, stiffness_mpa_per_mm: self.stiffness_mpa_per_mm }
+    }
+
+    pub(crate) fn with_capacity(vertices: usize) -> Self {
+        Self {
+            gap_mm: Vec::with_capacity(vertices),
+            normal: Vec::with_capacity(vertices),
+            area_mm2: Vec::with_capacity(vertices),
+            stiffness_mpa_per_mm: f64::INFINITY,
+        }
+    }
+}
+
+/// The outward normal of a thing whose distance has this slope along the skin; it faces the skin.
+fn thing_normal(slope: [f32; 3], skin: [f32; 3]) -> [f32; 3] {
+    let up: f32 = (0..3).map(|i| slope[i] * skin[i]).sum();
+    let flat: [f32; 3] = std::array::from_fn(|i| slope[i] - up * skin[i]);
+    let size = flat.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let part = if size > SLOPE_MAX { SLOPE_MAX / size } else { 1.0 };
+    let down = (1.0 - (part * size).powi(2)).max(0.0).sqrt();
+    std::array::from_fn(|i| part * flat[i] - down * skin[i])
+}
+
+/// Slopes of each triangle.
+pub(crate) fn slopes(positions_mm: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<Slopes> {
+    let of = |corners: &[u32; 3]| {
+        let x = corners.map(|c| positions_mm[c as usize]);
+        let side = |a: usize, b: usize| -> [f64; 3] { std::array::from_fn(|i| x[b][i] - x[a][i]) };
+        let cross = |p: [f64; 3], q: [f64; 3]| {
+            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+        };
+        let double = cross(side(0, 1), side(0, 2));
+        let size = double.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let unit = double.map(|v| if size > 0.0 { v / size } else { 0.0 });
+        // The gradient of a corner's hat function is the unit normal turned across the opposite
+        // side, over twice the area.
+        let across = |k: usize| cross(unit, side((k + 1) % 3, (k + 2) % 3));
+        let corners = [0, 1, 2].map(|k| across(k).map(|v| (0.5 * v) as f32));
+        Slopes { corners, area_mm2: (0.5 * size) as f32 }
+    };
+    triangles.iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_field_tells_the_plane() {
+        let skin = [0.0, 0.0, -1.0];
+        // A thing whose surface is tilted by 30 degrees: its distance rises by a half along x.
+        let found = thing_normal([0.5, 0.0, 0.3], skin);
+        let due = [0.5, 0.0, 0.75f32.sqrt()];
+        assert!(found.iter().zip(due).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
+        let steep = thing_normal([3.0, 4.0, 0.0], skin);
+        assert!((steep.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-5, "{steep:?}");
+    }
+
+    #[test]
+    fn slopes_are_those_of_a_linear_function() {
+        let x = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.5, 1.5, 0.0]];
+        let slopes = slopes(&x, &[[0, 1, 2]]);
+        let value = |p: [f64; 3]| (3.0 * p[0] - 2.0 * p[1]) as f32;
+        assert!((slopes[0].area_mm2 - 1.5).abs() < 1e-6);
+        for (i, due) in [3.0, -2.0, 0.0].into_iter().enumerate() {
+            let found: f32 =
+                (0..3).map(|k| value(x[k]) * slopes[0].corners[k][i]).sum::<f32>() / 1.5;
+            assert!((found - due).abs() < 1e-5, "{i}: {found}");
+        }
+    }
+}

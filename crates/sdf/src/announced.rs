@@ -1,0 +1,253 @@
+//! Shapes as a program tells them over a wire: nothing is read from files.
+
+use super::rules::{BadValue, ShapeError, length, require};
+use super::{
+    AnyOf, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, MeshError, Placed, Placement,
+    Plate, Punch, Ring, SignedDistance, Sphere, Wedge,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+/// A shape of a scene, or a mesh; a height map lists its heights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "shape", rename_all = "snake_case")]
+pub enum AnnouncedShape {
+    /// Flat plate with rounded edges.
+    Plate(Plate),
+    /// Sphere.
+    Sphere(Sphere),
+    /// Lying cylinder.
+    Cylinder(Cylinder),
+    /// Wedge, or an edge.
+    Wedge(Wedge),
+    /// Upright cylinder with a flat end.
+    Punch(Punch),
+    /// Upright tube.
+    Ring(Ring),
+    /// Parallel ridges.
+    Grating(Grating),
+    /// Braille-like dots.
+    Dots(Dots),
+    /// Surface of listed heights.
+    Heightmap(HeightGrid),
+    /// Closed triangle mesh.
+    Mesh(Mesh),
+    /// Several of them, each moved and turned.
+    Union(AnnouncedUnion),
+}
+
+/// Why what was announced is no shape.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AnnouncedError {
+    /// A dimension makes no sense.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// A mesh bounds no body.
+    #[error("{field}: {source}")]
+    Mesh {
+        /// The mesh, dotted.
+        field: String,
+        /// What is wrong with it.
+        source: MeshError,
+    },
+}
+
+impl From<BadValue> for AnnouncedError {
+    fn from(error: BadValue) -> Self {
+        Self::Shape(error.into())
+    }
+}
+
+/// A plate with a face of listed heights, see [`crate::Heightmap`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeightGrid {
+    /// Heights along x.
+    pub columns: usize,
+    /// From one height to the next along x and y, mm.
+    pub pixel_mm: [f64; 2],
+    /// Heights over the origin, mm, by rows from the lowest y.
+    pub heights_mm: Vec<f64>,
+}
+
+/// Parts that move as one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AnnouncedUnion {
+    /// The parts.
+    pub parts: Vec<AnnouncedPart>,
+}
+
+/// A part of a union, moved and turned as [`crate::Part`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AnnouncedPart {
+    /// What it is: no union.
+    pub part: Box<AnnouncedShape>,
+    /// Where its own origin lies in the union's frame, mm.
+    #[serde(default)]
+    pub at_mm: [f64; 3],
+    /// Turn about the union's y, degrees.
+    #[serde(default)]
+    pub pitch_deg: f64,
+    /// Turn about the union's x, degrees.
+    #[serde(default)]
+    pub roll_deg: f64,
+    /// Turn about its own z, degrees; the first of the three.
+    #[serde(default)]
+    pub yaw_deg: f64,
+}
+
+/// Most heights of a height map.
+const HEIGHTS_MAX: usize = 65_536;
+/// Most parts of a union.
+const PARTS_MAX: usize = 64;
+
+impl AnnouncedShape {
+    /// The shape.
+    ///
+    /// # Errors
+    /// [`AnnouncedError`] names the member, `field` before it, and its rule.
+    pub fn build(&self, field: &str) -> Result<Arc<dyn SignedDistance>, AnnouncedError> {
+        let plain = match self {
+            Self::Plate(s) => IndenterSpec::Plate(*s),
+            Self::Sphere(s) => IndenterSpec::Sphere(*s),
+            Self::Cylinder(s) => IndenterSpec::Cylinder(*s),
+            Self::Wedge(s) => IndenterSpec::Wedge(*s),
+            Self::Punch(s) => IndenterSpec::Punch(*s),
+            Self::Ring(s) => IndenterSpec::Ring(*s),
+            Self::Grating(s) => IndenterSpec::Grating(*s),
+            Self::Dots(s) => IndenterSpec::Dots(*s),
+            Self::Heightmap(s) => return Ok(Arc::new(s.build().map_err(|e| e.under(field))?)),
+            Self::Mesh(s) => {
+                let refuse = |source| AnnouncedError::Mesh { field: field.to_owned(), source };
+                return Ok(Arc::new(s.build().map_err(refuse)?));
+            }
+            Self::Union(s) => return Ok(Arc::new(s.build(field)?)),
+        };
+        plain.validate_part().map_err(|e| e.under(field))?;
+        Ok(plain.build(Path::new(""))?)
+    }
+
+    /// Numbers that it takes memory for: triangles of meshes and heights.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        match self {
+            Self::Mesh(s) => s.triangles.len(),
+            Self::Heightmap(s) => s.heights_mm.len(),
+            Self::Union(s) => s.parts.iter().map(|p| p.part.size()).sum(),
+            _ => 0,
+        }
+    }
+}
+
+impl HeightGrid {
+    fn build(&self) -> Result<HeightField, BadValue> {
+        let n = self.heights_mm.len();
+        let fits = self.columns >= 2 && n >= 2 * self.columns && n.is_multiple_of(self.columns);
+        let rule = "has to be two or more, and heights_mm two or more whole rows of it";
+        require(fits, "columns", &self.columns, rule)?;
+        require(n <= HEIGHTS_MAX, "heights_mm", &n, "has to list 65536 heights at most")?;
+        for pixel_mm in self.pixel_mm {
+            length("pixel_mm", pixel_mm)?;
+        }
+        let low = self.heights_mm.iter().find(|h| !(h.abs() <= 1000.0));
+        require(low.is_none(), "heights_mm", &low, "has to be within 1000 mm")?;
+        let count = [self.columns, n / self.columns];
+        Ok(HeightField::new(count, self.pixel_mm, self.heights_mm.clone()))
+    }
+}
+
+impl AnnouncedUnion {
+    fn build(&self, field: &str) -> Result<AnyOf, AnnouncedError> {
+        let some = (1..=PARTS_MAX).contains(&self.parts.len());
+        require(some, "parts", &self.parts.len(), "has to list 1 to 64 parts")
+            .map_err(|e| e.under(field))?;
+        let parts = self.parts.iter().enumerate();
+        let parts = parts.map(|(i, part)| part.build(&format!("{field}.parts[{i}]")));
+        Ok(AnyOf { parts: parts.collect::<Result<_, AnnouncedError>>()? })
+    }
+}
+
+impl AnnouncedPart {
+    fn build(&self, field: &str) -> Result<Placed, AnnouncedError> {
+        let check = || {
+            let near = self.at_mm.iter().all(|v| v.abs() <= 1000.0);
+            require(near, "at_mm", &self.at_mm, "has to be within 1000 mm")?;
+            let turns = [self.pitch_deg, self.roll_deg, self.yaw_deg];
+            let turned = turns.iter().all(|v| v.abs() <= 180.0);
+            require(turned, "pitch_deg", &turns, "roll_deg and yaw_deg have to be within 180")?;
+            let nested = matches!(*self.part, AnnouncedShape::Union(_));
+            require(!nested, "part", &"union", "has to be no union: list its parts here")?;
+            let flat = turns[0] == 0.0 && turns[1] == 0.0;
+            let level = flat || !matches!(*self.part, AnnouncedShape::Heightmap(_));
+            require(level, "pitch_deg", &turns, "and roll_deg have to be 0 for a height map")
+        };
+        check().map_err(|e| e.under(field))?;
+        let [pitch, roll, yaw] = [self.pitch_deg, self.roll_deg, self.yaw_deg];
+        let placement = Placement::turned(pitch, roll, yaw, self.at_mm);
+        Ok(Placed { part: self.part.build(&format!("{field}.part"))?, placement })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn built(text: &str) -> Result<Arc<dyn SignedDistance>, String> {
+        let shape: AnnouncedShape = toml::from_str(text).map_err(|e| e.to_string())?;
+        shape.build("objects[2].shape").map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_a_scene_names_is_what_it_is_there() {
+        let names = ["plate", "sphere", "cylinder", "wedge", "punch", "ring", "grating", "dots"];
+        for name in names {
+            let text = format!("shape = \"{name}\"");
+            let found = built(&text).expect("a shape");
+            let scene: IndenterSpec = toml::from_str(&text).expect("a scene's shape");
+            let due = scene.build(Path::new("")).expect("a shape");
+            for p in [[0.3, 0.2, 4.0], [1.0, -2.0, -1.0]] {
+                assert_eq!(found.distance(p), due.distance(p), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn heights_and_unions_are_told_whole() {
+        let text = "shape = \"union\"\nparts = [{ part = { shape = \"heightmap\", columns = 2, \
+                    pixel_mm = [1.0, 1.0], heights_mm = [1.0, 1.0, 1.0, 1.0] } }, { at_mm = \
+                    [0.0, 0.0, 9.0], part = { shape = \"sphere\", radius_mm = 1.0 } }]";
+        let shape = built(text).expect("a shape");
+        assert!((shape.distance([5.0, 0.0, 2.0]).gap_mm - 1.0).abs() < 1e-12);
+        assert!((shape.distance([0.0, 0.0, 11.0]).gap_mm - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_makes_no_shape_is_named() {
+        let cases = [
+            ("shape = \"sphere\"\nradius_mm = 0.0", "objects[2].shape.radius_mm"),
+            ("shape = \"sphere\"\nradius_mm = nan", "objects[2].shape.radius_mm"),
+            ("shape = \"cube\"", "cube"),
+            ("shape = \"mesh\"\nvertices_mm = []\ntriangles = []", "objects[2].shape: triangles"),
+            (
+                "shape = \"heightmap\"\ncolumns = 3\npixel_mm = [1, 1]\nheights_mm = [1.0]",
+                "columns",
+            ),
+            ("shape = \"heightmap\"\nfile = \"/etc/passwd\"", "file"),
+            (
+                "shape = \"union\"\nparts = [{ part = { shape = \"union\", parts = [] } }]",
+                "objects[2].shape.parts[0].part",
+            ),
+            (
+                "shape = \"union\"\nparts = [{ part = { shape = \"ring\", inner_radius_mm = 9.0 } }]",
+                "objects[2].shape.parts[0].part.inner_radius_mm",
+            ),
+        ];
+        for (text, word) in cases {
+            let error = built(text).err().expect("refused");
+            assert!(error.contains(word), "{error} should name {word}");
+        }
+    }
+}

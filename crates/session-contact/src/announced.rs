@@ -1,0 +1,105 @@
+//! What a hello announces: objects and fingers.
+
+use papilla_contact::{Object, Person};
+use papilla_proto::{
+    Hello, Problem, SampleType,
+    contact::{AnnouncedFinger, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
+    sdf::Placement,
+};
+
+use super::unusable;
+
+/// Most triangles and heights of all shapes of a session: some 10 MB.
+const SIZE_MAX: usize = 32_768;
+/// Where an object is before its first pose: beyond all reach, mm.
+const AWAY_MM: f64 = 9e4;
+
+/// Whether the members go together.
+pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> {
+    let of_solve = [
+        (hello.method.is_some(), "method"),
+        (hello.force_target.is_some(), "force_target"),
+        (hello.stiffness.is_some(), "stiffness"),
+        (hello.pressure.is_some(), "pressure"),
+    ];
+    if let (Input::Pressure, Some((_, member))) = (input, of_solve.iter().find(|(there, _)| *there))
+    {
+        let message = format!("'{member}' is of input 'objects' or 'gaps'");
+        return Err(unusable(*member, message));
+    }
+    if input == Input::Objects && hello.input_layout.is_some() {
+        return Err(unusable("input_layout", "objects have no layout: each has one pose"));
+    }
+    let exact = match input {
+        Input::Pressure => true,
+        Input::Objects => hello.sample_type == SampleType::F32,
+        Input::Gaps => matches!(hello.sample_type, SampleType::F32 | SampleType::F16),
+    };
+    if !exact {
+        let message = "poses are f32, gaps f32 or f16; 'answer_sample_type' says what answers are";
+        return Err(unusable("sample_type", message));
+    }
+    Ok(())
+}
+
+/// The objects, each as far away as can be.
+pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Problem> {
+    let list = match (&hello.objects, input) {
+        (Some(list), Input::Objects) => list,
+        (None, Input::Objects) => {
+            return Err(unusable("objects", "the input 'objects' needs the member 'objects'"));
+        }
+        (Some(_), _) => return Err(unusable("objects", "'input' has to be 'objects' with them")),
+        (None, _) => return Ok(Vec::new()),
+    };
+    if !(1..=OBJECTS_MAX).contains(&list.len()) {
+        let message = format!("{} objects; announce 1 to {OBJECTS_MAX}", list.len());
+        return Err(unusable("objects", message));
+    }
+    let size: usize = list.iter().map(|object| object.shape.size()).sum();
+    if size > SIZE_MAX {
+        let message = format!("{size} triangles and heights in all; {SIZE_MAX} at most");
+        return Err(unusable("objects", message));
+    }
+    let object = |(index, announced): (usize, &papilla_proto::contact::AnnouncedObject)| {
+        let field = format!("objects[{index}].shape");
+        let shape = announced.shape.build(&field);
+        let shape = shape.map_err(|error| unusable(field, error.to_string()))?;
+        let stiffness_mpa_per_mm = announced.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
+        if !(stiffness_mpa_per_mm > 0.0) {
+            let message = format!("{stiffness_mpa_per_mm} MPa/mm; a stiffness is positive");
+            let field = format!("objects[{index}].stiffness_mpa_per_mm");
+            return Err(unusable(field, message));
+        }
+        let mut placement = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
+        placement.origin_mm[2] = -AWAY_MM;
+        Ok(Object { shape, placement, stiffness_mpa_per_mm })
+    };
+    list.iter().enumerate().map(object).collect()
+}
+
+/// The factors of each finger.
+pub(crate) fn persons(hello: &Hello) -> Result<Vec<Person>, Problem> {
+    let default = [AnnouncedFinger::default()];
+    let list = hello.fingers.as_deref().unwrap_or(&default);
+    if !(1..=FINGERS_MAX).contains(&list.len()) {
+        let message = format!("{} fingers; announce 1 to {FINGERS_MAX}", list.len());
+        return Err(unusable("fingers", message));
+    }
+    let person = |(index, finger): (usize, &AnnouncedFinger)| {
+        let AnnouncedFinger { width, stiffness } = *finger;
+        for (member, value) in [("width", width), ("stiffness", stiffness)] {
+            if !(0.25..=4.0).contains(&value) {
+                let message = format!("{value} is no factor of a finger; 0.25 to 4 are taken");
+                return Err(unusable(format!("fingers[{index}].{member}"), message));
+            }
+        }
+        Ok(Person { width, stiffness })
+    };
+    list.iter().enumerate().map(person).collect()
+}
+
+/// Where samples are.
+pub(crate) fn layout(hello: &Hello) -> SampleLayout {
+    hello.input_layout.unwrap_or_default()
+}

@@ -1,0 +1,326 @@
+//! One finger of a session: its solver, from frame to frame.
+
+use std::{fmt, sync::Arc, time::Instant};
+
+use bytes::BytesMut;
+use papilla_contact::{
+    Contact, ContactError, ContactModel, Gaps, Method, NetForce, Object, Person, Scene, Settings,
+    Solver,
+};
+use papilla_proto::{
+    ErrorCode, Hello, MAP_LEN, Problem, SampleType,
+    atlas::{Raster, VertexSampler},
+    contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
+    flags,
+};
+
+use super::{FrameForm, Skin, unusable};
+
+/// A finger.
+pub struct Finger {
+    form: FrameForm,
+    person: Person,
+    solver: Option<Solver>,
+    out: Contact,
+    objects: Vec<Object>,
+    /// Samples of a frame, and of what follows them.
+    samples: Vec<f32>,
+    depth_mm: Vec<f32>,
+    raster: Arc<Raster>,
+    sampler: Option<VertexSampler>,
+    pressure: Option<SampleLayout>,
+    /// The pressure that is sent, if as a map.
+    sent_pa: Vec<f32>,
+    touch: Touch,
+}
+
+impl fmt::Debug for Finger {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Finger").field("form", &self.form).finish_non_exhaustive()
+    }
+}
+
+/// What a frame came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taken {
+    /// Greatest pressure on a finger of reference stiffness, Pa.
+    pub peak_pa: f32,
+    /// Bits of [`papilla_proto::flags`].
+    pub flags: u8,
+}
+
+impl Finger {
+    pub(crate) fn new(
+        hello: &Hello,
+        form: FrameForm,
+        skin: Skin<'_>,
+        model: Option<&Arc<ContactModel>>,
+        objects: Vec<Object>,
+        person: Person,
+    ) -> Result<Self, Problem> {
+        let vertices = skin.atlas.vertex_count();
+        let settings = Settings {
+            method: match hello.method.unwrap_or_default() {
+                ContactMethod::Springs => Method::Springs,
+                ContactMethod::SmallStrain => Method::SmallStrain,
+                ContactMethod::SecondOrder => Method::SecondOrder,
+            },
+            person,
+            stiffness: hello.stiffness == Some(true),
+        };
+        let solver = model.map(|model| Solver::new(Arc::clone(model), settings)).transpose();
+        let of_map = form.layout == SampleLayout::Map;
+        let is_gaps = form.input == Input::Gaps;
+        let samples = match form.input {
+            Input::Objects => 0,
+            Input::Pressure if of_map => 0,
+            _ => form.payload_len_max(1),
+        };
+        let sends_map = hello.pressure == Some(SampleLayout::Map);
+        Ok(Self {
+            form,
+            person,
+            solver: solver.map_err(|error| of_contact(&error))?,
+            out: Contact::new(if form.is_window() { 0 } else { vertices }),
+            objects,
+            samples: vec![0.0; samples],
+            depth_mm: vec![0.0; if is_gaps { vertices } else { 0 }],
+            raster: Arc::clone(skin.raster),
+            sampler: (is_gaps && of_map).then(|| VertexSampler::new(skin.atlas, skin.raster)),
+            pressure: hello.pressure,
+            sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
+            touch: Touch::default(),
+        })
+    }
+
+    /// Whether frames are windows of pressure, which the codec reads.
+    #[must_use]
+    pub fn reads_windows(&self) -> bool {
+        self.form.is_window()
+    }
+
+    /// Whether frames are pressure, which a client may have wrong.
+    #[must_use]
+    pub fn takes_pressure(&self) -> bool {
+        self.form.input == Input::Pressure
+    }
+
+    /// Bytes that [`Self::write`] appends.
+    #[must_use]
+    pub fn sections_len(&self) -> usize {
+        let touch = if self.form.input == Input::Pressure { 0 } else { TOUCH_LEN };
+        let pressure = self.pressure.map_or(0, |layout| match layout {
+            SampleLayout::Map => 4 * self.sent_pa.len(),
+            SampleLayout::Vertices => 4 * self.out.pressure_pa.len(),
+        });
+        (touch + pressure).next_multiple_of(16)
+    }
+
+    /// Stiffness of the tissue over that of the reference finger: the network is asked about
+    /// pressure over it, and SED grows with it.
+    #[must_use]
+    pub fn stiffness(&self) -> f32 {
+        self.person.stiffness as f32
+    }
+
+    /// Reads a frame whose header fits, and finds what presses. Pressure on a finger of reference
+    /// stiffness goes into `map_pa` (224 x 224, Pa), if there is one.
+    ///
+    /// # Errors
+    /// What cannot be placed, is no depth or no pressure; the finger stays as it was.
+    pub fn take(
+        &mut self,
+        payload: &[u8],
+        sample_type: SampleType,
+        scale: f32,
+        map_pa: Option<&mut [f32]>,
+    ) -> Result<Taken, Problem> {
+        let net = match self.form.input {
+            Input::Pressure => {
+                self.read_samples(payload, sample_type, scale)?;
+                self.take_pressure()?;
+                return Ok(self.taken(map_pa));
+            }
+            Input::Objects => self.place(payload)?,
+            Input::Gaps => {
+                self.read_samples(payload, sample_type, 1.0)?;
+                self.read_gaps()?
+            }
+        };
+        let start = Instant::now();
+        let Self { solver: Some(solver), out, objects, depth_mm, .. } = self else {
+            return Err(Problem::new(ErrorCode::Internal, "a finger without a solver"));
+        };
+        let scene = match self.form.input {
+            Input::Gaps => Scene::Gaps(Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY }),
+            _ => Scene::Objects(objects),
+        };
+        let solved = match net {
+            Some(net) => solver.solve_for_force(scene, net, out),
+            None => solver.solve(scene, out).map(|()| 0.0),
+        };
+        let travel_mm = solved.map_err(|error| of_contact(&error))?;
+        let peak = out.touched().iter().map(|v| out.pressure_pa[*v as usize]).fold(0.0, f32::max);
+        self.touch = Touch {
+            force_n: out.force_n.map(|v| v as f32),
+            torque_n_mm: out.torque_n_mm.map(|v| v as f32),
+            area_mm2: out.area_mm2 as f32,
+            centre_mm: out.centre_mm.map(|v| v as f32),
+            penetration_mm: out.penetration_mm as f32,
+            stiffness_n_per_mm: out.stiffness_n_per_mm.unwrap_or(0.0) as f32,
+            travel_mm: travel_mm as f32,
+            pressure_max_pa: peak,
+            share: out.quality.share,
+            solve_us: start.elapsed().as_secs_f32() * 1e6,
+        };
+        Ok(self.taken(map_pa))
+    }
+
+    /// What the pressure at the vertices comes to.
+    fn taken(&mut self, map_pa: Option<&mut [f32]>) -> Taken {
+        let quality = self.out.quality;
+        let peak_pa = self.touch.pressure_max_pa / self.stiffness();
+        if let Some(map_pa) = map_pa {
+            if peak_pa > 0.0 {
+                // Both lengths are those of the atlas.
+                let _ = self.raster.rasterise(&self.out.pressure_pa, map_pa);
+            } else {
+                map_pa.fill(0.0);
+            }
+            let part = 1.0 / self.stiffness();
+            if part.to_bits() != 1.0f32.to_bits() {
+                map_pa.iter_mut().for_each(|p| *p *= part);
+            }
+        }
+        let is_solved = self.form.input != Input::Pressure;
+        let told = |on: bool, flag: u8| if on && is_solved { flag } else { 0 };
+        let flags = told(quality.out_of_range, flags::OUT_OF_RANGE)
+            | told(!quality.settled, flags::UNSETTLED)
+            | if peak_pa > 0.0 { 0 } else { flags::NO_CONTACT };
+        Taken { peak_pa, flags }
+    }
+
+    /// Appends what pushes back, and the pressure if it was asked for, each up to a multiple of 16.
+    pub fn write(&mut self, bytes: &mut BytesMut) {
+        if self.form.input != Input::Pressure {
+            bytes.extend_from_slice(&self.touch.encode());
+        }
+        let values = match self.pressure {
+            None => return,
+            Some(SampleLayout::Vertices) => &self.out.pressure_pa,
+            Some(SampleLayout::Map) => {
+                // Both lengths are those of the atlas.
+                let _ = self.raster.rasterise(&self.out.pressure_pa, &mut self.sent_pa);
+                &self.sent_pa
+            }
+        };
+        for value in values {
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+        bytes.resize(bytes.len().next_multiple_of(16), 0);
+    }
+
+    fn read_samples(
+        &mut self,
+        payload: &[u8],
+        sample_type: SampleType,
+        scale: f32,
+    ) -> Result<(), Problem> {
+        let decoded = sample_type.decode(payload, scale, &mut self.samples);
+        decoded
+            .map_err(|error| Problem::new(ErrorCode::WrongLength, error.to_string()).at("payload"))
+    }
+
+    fn take_pressure(&mut self) -> Result<(), Problem> {
+        let mut peak = 0.0f32;
+        for (vertex, p) in self.samples.iter().enumerate() {
+            if !(*p >= 0.0 && p.is_finite()) {
+                let code =
+                    if p.is_finite() { ErrorCode::NegativePressure } else { ErrorCode::NotFinite };
+                let message = format!("the pressure at vertex {vertex} is {p} Pa");
+                return Err(Problem::new(code, message).at("pressure_pa"));
+            }
+            peak = peak.max(*p);
+        }
+        self.out.pressure_pa.copy_from_slice(&self.samples);
+        self.touch.pressure_max_pa = peak;
+        Ok(())
+    }
+
+    /// Puts the objects where the frame says; all of them or none.
+    fn place(&mut self, payload: &[u8]) -> Result<Option<NetForce>, Problem> {
+        let rows = payload.as_chunks::<POSE_LEN>().0;
+        let mut rows = rows.iter().map(|row| Pose::decode(row).unwrap_or_default());
+        for pass in [false, true] {
+            let poses = rows.clone().zip(&mut self.objects).enumerate();
+            for (index, (pose, object)) in poses {
+                let at = |member: &str| format!("objects[{index}].{member}");
+                let Some(rotation) = pose.rotation() else {
+                    let message = format!(
+                        "{:?} is no rotation: a quaternion x y z w has length 1",
+                        pose.quaternion
+                    );
+                    return Err(unusable(at("quaternion"), message));
+                };
+                if !pose.origin_mm.iter().all(|v| v.abs() <= 1e5) {
+                    let message = format!("{:?} mm is not within 100 m", pose.origin_mm);
+                    return Err(unusable(at("origin_mm"), message));
+                }
+                if pass {
+                    object.placement.rotation = rotation;
+                    object.placement.origin_mm = pose.origin_mm.map(f64::from);
+                }
+            }
+        }
+        let row = self.form.has_force.then(|| rows.nth(self.objects.len())).flatten();
+        row.map_or(Ok(None), |row| {
+            let [x, y, z] = row.origin_mm;
+            net_force([x, y, z, row.quaternion[0]])
+        })
+    }
+
+    fn read_gaps(&mut self) -> Result<Option<NetForce>, Problem> {
+        let gaps = self.samples.len() - if self.form.has_force { ROW } else { 0 };
+        let (depths, row) = self.samples.split_at(gaps);
+        match &self.sampler {
+            // A NaN anywhere on the skin shows at a vertex, and is refused there.
+            Some(sampler) => _ = sampler.sample(depths, &mut self.depth_mm),
+            None => self.depth_mm.copy_from_slice(depths),
+        }
+        match row {
+            [x, y, z, force, ..] => net_force([*x, *y, *z, *force]),
+            _ => Ok(None),
+        }
+    }
+}
+
+/// The net force of a row: a direction and its size, N; none of size 0.
+fn net_force([x, y, z, force_n]: [f32; 4]) -> Result<Option<NetForce>, Problem> {
+    if force_n == 0.0 {
+        return Ok(None);
+    }
+    if !(force_n > 0.0 && force_n.is_finite()) {
+        return Err(unusable("force_n", format!("{force_n} N is no net force; 0 asks for none")));
+    }
+    let direction = [x, y, z].map(f64::from);
+    let size = direction.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if !((size - 1.0).abs() < 1e-3) {
+        return Err(unusable("direction", format!("a unit vector is due; this has length {size}")));
+    }
+    let direction = direction.map(|v| v / size);
+    Ok(Some(NetForce { direction, force_n: f64::from(force_n) }))
+}
+
+fn of_contact(error: &ContactError) -> Problem {
+    let field = match error {
+        ContactError::Value { member, .. } => (*member).to_owned(),
+        ContactError::Rotation { object, .. } => format!("objects[{object}].quaternion"),
+        ContactError::Gaps { .. } => "payload".to_owned(),
+        ContactError::Depth { vertex, .. } => format!("depth_mm[{vertex}]"),
+        ContactError::Force { .. } => "force_n".to_owned(),
+        ContactError::Diverged => {
+            return Problem::new(ErrorCode::BadContact, error.to_string());
+        }
+    };
+    unusable(field, error.to_string())
+}

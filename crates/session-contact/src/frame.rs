@@ -1,0 +1,110 @@
+//! Which frames a session takes.
+
+use papilla_proto::{
+    ErrorCode, FrameHeader, FrameKind, Hello, MAP_SIDE_PX, Problem, Window,
+    contact::{Input, ROW, SampleLayout},
+};
+
+use super::{announced, unusable};
+
+/// The form of a session's frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameForm {
+    pub(crate) input: Input,
+    pub(crate) layout: SampleLayout,
+    pub(crate) has_force: bool,
+    objects: usize,
+    fingers: usize,
+    vertices: usize,
+}
+
+impl FrameForm {
+    pub(crate) fn of(hello: &Hello, objects: usize, fingers: usize, vertices: usize) -> Self {
+        let layout = announced::layout(hello);
+        let has_force = hello.force_target == Some(true);
+        Self {
+            input: hello.input.unwrap_or_default(),
+            layout,
+            has_force,
+            objects,
+            fingers,
+            vertices,
+        }
+    }
+
+    /// Kind of the frames.
+    #[must_use]
+    pub fn kind(&self) -> FrameKind {
+        match self.input {
+            Input::Pressure => FrameKind::Pressure,
+            Input::Gaps => FrameKind::Gaps,
+            Input::Objects => FrameKind::Objects,
+        }
+    }
+
+    /// Whether frames are pressure: nothing is solved.
+    #[must_use]
+    pub fn takes_pressure(&self) -> bool {
+        self.input == Input::Pressure
+    }
+
+    /// Whether the samples are a window of the map that the codec reads.
+    #[must_use]
+    pub fn is_window(&self) -> bool {
+        self.input == Input::Pressure && self.layout == SampleLayout::Map
+    }
+
+    /// Width and height that a header has to say; none if any window will do.
+    #[must_use]
+    pub fn size(&self) -> Option<[usize; 2]> {
+        match (self.input, self.layout) {
+            (Input::Pressure, SampleLayout::Map) => None,
+            (Input::Objects, _) => Some([ROW, self.objects + usize::from(self.has_force)]),
+            (_, SampleLayout::Vertices) => Some([self.vertices, 1]),
+            (Input::Gaps, SampleLayout::Map) => Some([MAP_SIDE_PX, MAP_SIDE_PX]),
+        }
+    }
+
+    /// Samples of a net force behind those of gaps.
+    fn extra(&self) -> usize {
+        if self.has_force && self.input == Input::Gaps { ROW } else { 0 }
+    }
+
+    /// Bytes of the payload that goes with a header of this form.
+    #[must_use]
+    pub fn payload_len(&self, header: &FrameHeader) -> usize {
+        header.payload_len() + self.extra() * header.sample_type.bytes()
+    }
+
+    /// Most bytes of a payload of these samples.
+    #[must_use]
+    pub fn payload_len_max(&self, sample_bytes: usize) -> usize {
+        let [width, height] = self.size().unwrap_or([MAP_SIDE_PX, MAP_SIDE_PX]);
+        (width * height + self.extra()) * sample_bytes
+    }
+
+    /// Checks finger, kind and size of a frame of version 3.
+    ///
+    /// # Errors
+    /// The first that does not fit; the problem names the field of the header.
+    pub fn check(&self, header: &FrameHeader) -> Result<usize, Problem> {
+        let finger = header.extension.and_then(|e| e.finger).map_or(0, usize::from);
+        if finger >= self.fingers {
+            let message = format!("finger {finger} was not announced; there are {}", self.fingers);
+            return Err(unusable("finger", message));
+        }
+        if header.kind != self.kind() {
+            let (found, due) = (header.kind as u8, self.kind() as u8);
+            let message = format!("the hello's input is of kind {due}, the frame of kind {found}");
+            return Err(Problem::new(ErrorCode::WrongType, message).at("kind"));
+        }
+        let Window { width, height, .. } = header.window();
+        if let Some([columns, rows]) = self.size()
+            && [usize::from(width), usize::from(height)] != [columns, rows]
+        {
+            let message = format!("the frame is {width} x {height}, {columns} x {rows} is due");
+            return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
+        }
+        Ok(finger)
+    }
+}

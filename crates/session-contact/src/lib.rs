@@ -1,0 +1,150 @@
+//! Contact of a session's fingers: what a hello of version 3 announces, frame by frame.
+//!
+//! A [`Hand`] is made of a hello; it says which frames fit. Each of its fingers is a [`Finger`] with
+//! a solver of its own: [`Finger::take`] reads a frame into pressure, [`Finger::write`] appends what
+//! pushes back. All memory is taken at the hello, and what the hello did not name costs nothing.
+//!
+//! ```
+//! use papilla_proto::{ErrorCode, Hello, contact::Input};
+//! use papilla_session_contact::{Hand, Skin};
+//! # use papilla_proto::atlas::{Atlas, Patch, PatchVertices, Raster};
+//! # let uv_px = vec![[20.0, 20.0], [200.0, 20.0], [200.0, 200.0], [20.0, 200.0]];
+//! # let positions_mm = uv_px.iter().map(|[u, v]| [0.1 * v, -0.1 * u, 0.0]).collect();
+//! # let patch = PatchVertices { positions_mm, uv_px };
+//! # let atlas = Atlas::new(0.1, vec![[0, 2, 1], [0, 3, 2]], patch.clone(), patch)?;
+//!
+//! // A service without a contact model takes pressure alone.
+//! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
+//! let skin = Skin { atlas: &atlas, raster: &raster, model: None };
+//! let hello = Hello { version: 3, ..Hello::default() };
+//! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
+//! let objects = Hello { input: Some(Input::Objects), ..hello };
+//! let refused = Hand::of(&objects, skin).map(|_| ()).unwrap_err();
+//! assert_eq!(refused.code, ErrorCode::BadContact);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod announced;
+mod assets;
+mod finger;
+mod frame;
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, Mutex};
+
+use papilla_contact::ContactModel;
+use papilla_proto::{
+    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem,
+    atlas::{Atlas, Raster},
+    contact::{Input, SampleLayout, TOUCH_LEN},
+    effects::{Section, SectionName},
+};
+
+pub use assets::ContactAssets;
+pub use finger::{Finger, Taken};
+pub use frame::FrameForm;
+
+/// The skin that things press on.
+#[derive(Clone, Copy)]
+pub struct Skin<'a> {
+    /// Both surfaces of the finger.
+    pub atlas: &'a Atlas,
+    /// Pixels of the skin.
+    pub raster: &'a Arc<Raster>,
+    /// What is known of the finger; none if the service has no contact model.
+    pub model: Option<&'a Arc<ContactModel>>,
+}
+
+/// The fingers of one session.
+pub struct Hand {
+    form: FrameForm,
+    fingers: Vec<Arc<Mutex<Finger>>>,
+    sections: Vec<Section>,
+}
+
+/// A refusal of what was announced or sent.
+fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
+    Problem::new(ErrorCode::BadContact, message).at(field)
+}
+
+impl Hand {
+    /// The fingers that a hello of version 3 announces.
+    ///
+    /// Takes some milliseconds, and up to 11 MB a finger once it is pressed all over.
+    ///
+    /// # Errors
+    /// A member is unusable or missing; the problem names it.
+    pub fn of(hello: &Hello, skin: Skin<'_>) -> Result<Self, Problem> {
+        let input = hello.input.unwrap_or_default();
+        announced::check_members(hello, input)?;
+        let persons = announced::persons(hello)?;
+        let vertices = skin.atlas.vertex_count();
+        let objects = announced::objects(hello, input)?;
+        let form = FrameForm::of(hello, objects.len(), persons.len(), vertices);
+        let model = match (input, skin.model) {
+            (Input::Pressure, _) => None,
+            (_, None) => {
+                let message = "this service has no contact model; start it with --contact FILE, or \
+                               send pressure";
+                return Err(unusable("input", message));
+            }
+            (_, Some(model)) => Some(model),
+        };
+        if let Some(model) = model {
+            model.require_atlas(skin.atlas.hash()).map_err(|e| unusable("input", e.to_string()))?;
+        }
+        let finger = |person| {
+            let finger = Finger::new(hello, form, skin, model, objects.clone(), person)?;
+            Ok(Arc::new(Mutex::new(finger)))
+        };
+        let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
+        let sections = sections(hello, input, vertices);
+        Ok(Self { form, fingers, sections })
+    }
+
+    /// Which frames the session takes.
+    #[must_use]
+    pub fn form(&self) -> FrameForm {
+        self.form
+    }
+
+    /// The fingers, by their numbers.
+    #[must_use]
+    pub fn fingers(&self) -> &[Arc<Mutex<Finger>>] {
+        &self.fingers
+    }
+
+    /// What [`Finger::write`] puts first into the payload of an answer.
+    #[must_use]
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Bytes of these sections, a multiple of 16.
+    #[must_use]
+    pub fn sections_len(&self) -> usize {
+        self.sections
+            .last()
+            .map_or(0, |s| (s.offset + s.bytes) as usize - HEADER_LEN_V2)
+            .next_multiple_of(16)
+    }
+}
+
+fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {
+    let samples = |layout: SampleLayout| match layout {
+        SampleLayout::Map => MAP_LEN,
+        SampleLayout::Vertices => vertices,
+    };
+    let touch = (input != Input::Pressure).then_some(TOUCH_LEN);
+    let pressure = hello.pressure.map(|layout| 4 * samples(layout));
+    let mut offset = HEADER_LEN_V2;
+    let mut sections = Vec::new();
+    for (name, bytes) in [(SectionName::Touch, touch), (SectionName::Pressure, pressure)] {
+        let Some(bytes) = bytes else { continue };
+        sections.push(Section { name, offset: offset as u32, bytes: bytes as u32 });
+        offset = (offset + bytes).next_multiple_of(16);
+    }
+    sections
+}

@@ -1,0 +1,259 @@
+use papilla_contact::{Arrays, Header};
+use papilla_proto::{
+    FrameHeader, FrameKind, SampleType,
+    atlas::{Patch, PatchVertices},
+    contact::{AnnouncedFinger, AnnouncedObject, POSE_LEN, Pose, ROW, Touch},
+    flags,
+    sdf::{AnnouncedShape, Mesh, Sphere},
+};
+
+use super::*;
+
+const SIDE: usize = 19;
+
+/// A plane finger, 0.1 mm a pixel, skin looking down, on a half-space.
+struct Plane {
+    atlas: Atlas,
+    raster: Arc<Raster>,
+    model: Arc<ContactModel>,
+}
+
+impl Plane {
+    fn new() -> Self {
+        let at = |i: usize| [i % SIDE, i / SIDE].map(|k| 10.0 * k as f32 + 20.0);
+        let uv_px: Vec<[f32; 2]> = (0..SIDE * SIDE).map(at).collect();
+        let mut triangles = Vec::new();
+        for y in 0..SIDE - 1 {
+            for x in 0..SIDE - 1 {
+                let (a, s) = ((y * SIDE + x) as u32, SIDE as u32);
+                triangles.extend([[a, a + s, a + 1], [a + 1, a + s, a + s + 1]]);
+            }
+        }
+        let positions_mm: Vec<[f32; 3]> =
+            uv_px.iter().map(|[u, v]| [0.1 * (v - 110.0), -0.1 * (u - 110.0), 0.0]).collect();
+        let patch = PatchVertices { positions_mm: positions_mm.clone(), uv_px };
+        let atlas = Atlas::new(0.1, triangles.clone(), patch.clone(), patch).expect("an atlas");
+        let header = Header {
+            vertices: SIDE * SIDE,
+            triangles: triangles.len(),
+            share_max: 1.0,
+            atlas_hash: atlas.hash().to_owned(),
+            ..Header::current()
+        };
+        let arrays = Arrays::half_space(
+            positions_mm.into_flattened(),
+            (0..SIDE * SIDE).flat_map(|_| [0.0, 0.0, -1.0]).collect(),
+            vec![1.0; SIDE * SIDE],
+            triangles.into_flattened(),
+            0.2,
+        );
+        let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
+        let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
+        Self { atlas, raster, model }
+    }
+
+    fn hand(&self, hello: &Hello) -> Result<Hand, Problem> {
+        let skin = Skin { atlas: &self.atlas, raster: &self.raster, model: Some(&self.model) };
+        Hand::of(hello, skin)
+    }
+}
+
+fn ball(radius_mm: f64) -> AnnouncedObject {
+    let shape = AnnouncedShape::Sphere(Sphere { radius_mm });
+    AnnouncedObject { shape, stiffness_mpa_per_mm: None }
+}
+
+fn objects() -> Hello {
+    Hello {
+        version: 3,
+        input: Some(Input::Objects),
+        objects: Some(vec![ball(20.0)]),
+        ..Hello::default()
+    }
+}
+
+fn pose(depth_mm: f32) -> [u8; POSE_LEN] {
+    Pose { origin_mm: [0.0, 0.0, depth_mm - 20.0], ..Pose::default() }.encode()
+}
+
+fn touch(hand: &Hand, finger: usize, payload: &[u8]) -> Result<(Touch, Taken), Problem> {
+    let mut finger = hand.fingers()[finger].lock().expect("no panic");
+    let mut map_pa = vec![0.0; MAP_LEN];
+    let taken = finger.take(payload, SampleType::F32, 1.0, Some(&mut map_pa))?;
+    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    finger.write(&mut bytes);
+    assert_eq!(bytes.len(), HEADER_LEN_V2 + hand.sections_len());
+    let peak = map_pa.iter().copied().fold(0.0, f32::max);
+    assert!(peak <= 1.0001 * taken.peak_pa, "{peak} {taken:?}");
+    Ok((Touch::decode(&bytes[HEADER_LEN_V2..]).expect("it lies there"), taken))
+}
+
+use bytes::BytesMut;
+
+#[test]
+fn a_pose_becomes_a_force_and_air_becomes_none() {
+    let plane = Plane::new();
+    let hello =
+        Hello { stiffness: Some(true), pressure: Some(SampleLayout::Vertices), ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let (pressed, taken) = touch(&hand, 0, &pose(0.3)).expect("an answer");
+    // Hertz: 4/3 E* sqrt(R) d^1.5, on vertices that are a millimetre apart.
+    let due = 4.0 / 3.0 * 0.2 * 20f32.sqrt() * 0.3f32.powf(1.5);
+    assert!((pressed.force_n[2] / due - 1.0).abs() < 0.1, "{pressed:?} for {due}");
+    assert!(pressed.stiffness_n_per_mm > 0.0 && taken.flags == 0, "{pressed:?} {taken:?}");
+    let (air, taken) = touch(&hand, 0, &pose(-5.0)).expect("an answer");
+    assert_eq!((air.force_n.map(f32::to_bits), taken.flags), ([0; 3], flags::NO_CONTACT));
+}
+
+#[test]
+fn a_net_force_is_met_by_poses_and_by_gaps() {
+    let plane = Plane::new();
+    let hello = Hello { force_target: Some(true), ..objects() };
+    let row = Pose { origin_mm: [0.0, 0.0, 1.0], quaternion: [0.05, 0.0, 0.0, 0.0] }.encode();
+    let (found, _) =
+        touch(&plane.hand(&hello).expect("a hand"), 0, &[pose(-1.0), row].concat()).expect("met");
+    assert!((found.force_n[2] / 0.05 - 1.0).abs() < 3e-3 && found.travel_mm > 1.0, "{found:?}");
+    let hello = Hello {
+        input: Some(Input::Gaps),
+        input_layout: Some(SampleLayout::Vertices),
+        objects: None,
+        ..hello
+    };
+    let hand = plane.hand(&hello).expect("a hand");
+    let gap = |p: &[f32; 3]| 20.0 - (p[0] * p[0] + p[1] * p[1] + 21.0 * 21.0).sqrt();
+    let depth = plane.atlas.patch(Patch::Skin).positions_mm.iter().map(gap);
+    let mut payload: Vec<u8> = depth.flat_map(f32::to_le_bytes).collect();
+    payload.extend(row);
+    let (by_gaps, _) = touch(&hand, 0, &payload).expect("met");
+    assert!((by_gaps.force_n[2] / 0.05 - 1.0).abs() < 3e-3, "{by_gaps:?}");
+    assert!((by_gaps.travel_mm - found.travel_mm).abs() < 0.02, "{by_gaps:?} {found:?}");
+}
+
+#[test]
+fn a_map_of_gaps_presses_as_vertices_do() {
+    let plane = Plane::new();
+    let hello = Hello { input: Some(Input::Gaps), objects: None, ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let depth = |i: usize| {
+        let [u, v] = [i % 224, i / 224].map(|k| 0.1 * (k as f32 + 0.5 - 110.0));
+        20.0 - (u * u + v * v + 19.7 * 19.7).sqrt()
+    };
+    let payload: Vec<u8> = (0..MAP_LEN).flat_map(|i| depth(i).to_le_bytes()).collect();
+    let (found, _) = touch(&hand, 0, &payload).expect("an answer");
+    let due = touch(&plane.hand(&objects()).expect("a hand"), 0, &pose(0.3)).expect("an answer").0;
+    assert!((found.force_n[2] / due.force_n[2] - 1.0).abs() < 0.05, "{found:?} {due:?}");
+}
+
+/// Fingers know nothing of each other, and a finger twice as stiff answers twice the force.
+#[test]
+fn each_finger_has_its_own_state_and_factors() {
+    let plane = Plane::new();
+    let fingers = [1.0, 2.0].map(|stiffness| AnnouncedFinger { width: 1.0, stiffness });
+    let hello = Hello { fingers: Some(fingers.to_vec()), ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let (first, one) = touch(&hand, 0, &pose(0.2)).expect("an answer");
+    let (other, two) = touch(&hand, 1, &pose(0.2)).expect("an answer");
+    assert!((other.force_n[2] / first.force_n[2] - 2.0).abs() < 1e-3, "{first:?} {other:?}");
+    // What the network is asked about is the same.
+    assert!((one.peak_pa / two.peak_pa - 1.0).abs() < 1e-3, "{one:?} {two:?}");
+}
+
+#[test]
+fn bad_hellos_are_refused_by_member() {
+    let plane = Plane::new();
+    let open = Mesh { vertices_mm: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 4] };
+    let open = AnnouncedObject { shape: AnnouncedShape::Mesh(open), stiffness_mpa_per_mm: None };
+    let soft = AnnouncedObject { stiffness_mpa_per_mm: Some(-1.0), ..ball(1.0) };
+    let thin = AnnouncedFinger { width: 0.0, stiffness: 1.0 };
+    let with = |objects_: Vec<AnnouncedObject>| Hello { objects: Some(objects_), ..objects() };
+    let cases = [
+        (Hello { objects: None, ..objects() }, "objects"),
+        (with(Vec::new()), "objects"),
+        (with(vec![ball(1.0); 17]), "objects"),
+        (with(vec![ball(1.0), ball(0.0)]), "objects[1].shape"),
+        (with(vec![open]), "objects[0].shape"),
+        (with(vec![soft]), "objects[0].stiffness_mpa_per_mm"),
+        (Hello { fingers: Some(Vec::new()), ..objects() }, "fingers"),
+        (Hello { fingers: Some(vec![AnnouncedFinger::default(); 11]), ..objects() }, "fingers"),
+        (Hello { fingers: Some(vec![thin]), ..objects() }, "fingers[0].width"),
+        (Hello { sample_type: SampleType::U8, ..objects() }, "sample_type"),
+        (Hello { input_layout: Some(SampleLayout::Map), ..objects() }, "input_layout"),
+        (Hello { input: None, ..objects() }, "objects"),
+        (Hello { input: None, objects: None, stiffness: Some(true), ..objects() }, "stiffness"),
+    ];
+    for (hello, field) in cases {
+        let problem = plane.hand(&hello).map(|_| ()).expect_err(field);
+        assert_eq!((problem.code, problem.field.as_deref()), (ErrorCode::BadContact, Some(field)));
+    }
+}
+
+#[test]
+fn bad_frames_are_refused_by_member_and_the_finger_lives_on() {
+    let plane = Plane::new();
+    let hello = Hello { force_target: Some(true), ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let none = [0; POSE_LEN];
+    let turned = Pose { quaternion: [0.0, 0.0, 0.5, 1.0], ..Pose::default() }.encode();
+    let nan = Pose { origin_mm: [f32::NAN, 0.0, 0.0], ..Pose::default() }.encode();
+    let lost = Pose { origin_mm: [0.0, 1e9, 0.0], ..Pose::default() }.encode();
+    let net = |v: [f32; 3], n: f32| Pose { origin_mm: v, quaternion: [n, 0.0, 0.0, 0.0] }.encode();
+    let cases = [
+        ([none, none], "objects[0].quaternion"),
+        ([turned, none], "objects[0].quaternion"),
+        ([nan, none], "objects[0].origin_mm"),
+        ([lost, none], "objects[0].origin_mm"),
+        ([pose(0.1), net([0.0, 0.0, 2.0], 1.0)], "direction"),
+        ([pose(0.1), net([0.0, 0.0, 1.0], f32::NAN)], "force_n"),
+        ([pose(0.1), net([0.0, 0.0, 1.0], -1.0)], "force_n"),
+        ([pose(0.1), net([0.0, 0.0, -1.0], 1.0)], "force_n"),
+    ];
+    for (payload, field) in cases {
+        let problem = touch(&hand, 0, &payload.concat()).expect_err(field);
+        assert_eq!(problem.field.as_deref(), Some(field), "{problem}");
+        let (found, _) = touch(&hand, 0, &[pose(0.2), none].concat()).expect("it lives on");
+        assert!(found.force_n[2] > 0.0);
+    }
+}
+
+#[test]
+fn frames_of_another_form_are_refused_by_field() {
+    let plane = Plane::new();
+    let hand = plane.hand(&Hello { force_target: Some(true), ..objects() }).expect("a hand");
+    let header = FrameHeader::pressure(1, 0, 0, SampleType::F32, 1.0);
+    let of = |kind, finger, size| hand.form().check(&header.of_finger(kind, finger, size));
+    assert_eq!(of(FrameKind::Objects, 0, [ROW as u16, 2]), Ok(0));
+    let field = |found: Result<usize, Problem>| found.expect_err("refused").field.expect("named");
+    assert_eq!(field(of(FrameKind::Objects, 1, [ROW as u16, 2])), "finger");
+    assert_eq!(field(of(FrameKind::Gaps, 0, [ROW as u16, 2])), "kind");
+    assert_eq!(field(of(FrameKind::Objects, 0, [ROW as u16, 1])), "width");
+}
+
+/// Whatever bytes come, of the right length or not: an answer or a refusal, and the finger lives on.
+#[test]
+fn any_bytes_are_answered_or_refused() {
+    let plane = Plane::new();
+    let mut random = fastrand::Rng::with_seed(3);
+    let gaps = Hello {
+        input: Some(Input::Gaps),
+        input_layout: Some(SampleLayout::Vertices),
+        objects: None,
+        force_target: Some(true),
+        ..objects()
+    };
+    for hello in [Hello { force_target: Some(true), ..objects() }, gaps] {
+        let hand = plane.hand(&hello).expect("a hand");
+        let due = hand.form().payload_len_max(4);
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        for _ in 0..300 {
+            let len = if random.u8(..8) == 0 { random.usize(..2 * due) } else { due };
+            let mut bytes: Vec<u8> = (0..len).map(|_| random.u8(..)).collect();
+            if random.bool() {
+                // Numbers that may be meant.
+                let small = |_: &[u8; 4]| (2.0 * random.f32() - 1.0).to_le_bytes();
+                bytes = bytes.as_chunks::<4>().0.iter().flat_map(small).collect();
+            }
+            let taken = finger.take(&bytes, SampleType::F32, 1.0, None);
+            assert!(taken.is_err() || taken.is_ok_and(|taken| taken.peak_pa.is_finite()));
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! `model-export contact`.
+
+use super::{bar, load_model, print_json};
+use papilla_engine::Backend;
+use papilla_model_export::contact::{Models, Row, Rung, measure};
+use papilla_model_export::dataset::Dataset;
+use papilla_model_export::{ExportError, evaluate};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The contact model, a file of `fe-datagen contact`.
+    model: PathBuf,
+    /// Datasets of the same finger; their held-out indentations are taken.
+    #[arg(required = true)]
+    datasets: Vec<PathBuf>,
+    /// A network, `.onnx`, that makes SED of the pressure.
+    #[arg(long, value_name = "FILE")]
+    network: Option<PathBuf>,
+    /// Take one state of so many.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    every: usize,
+}
+
+pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let models = Models::read(&options.model)?;
+    let network = options.network.as_deref();
+    let network = network.map(|path| load_model(path, Backend::default(), None)).transpose()?;
+    let mut session = None;
+    if let (Some(network), Some(path)) = (&network, &options.network) {
+        let failed = |source| ExportError::Engine { path: path.clone(), source };
+        session = Some(network.session().map_err(failed)?);
+    }
+    let mut rows = Vec::new();
+    let progress = bar(json, options.datasets.len() * Rung::ALL.len(), "rungs")?;
+    for folder in &options.datasets {
+        let dataset = Dataset::open(folder)?;
+        models.require_atlas(&dataset, folder)?;
+        if let Some(network) = &network {
+            let what = folder.display().to_string();
+            evaluate::require_atlas(&what, dataset.atlas.hash(), network.info())?;
+        }
+        for rung in Rung::ALL {
+            let session = session.as_deref_mut();
+            rows.push(measure(&models, rung, &dataset, session, options.every)?);
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    if json {
+        return print_json(&rows);
+    }
+    println!("| rung | set | pressure, % | force, % | SED, % | cold, us | warm, us | flagged |");
+    println!("|---|---|---|---|---|---|---|---|");
+    rows.iter().for_each(print_row);
+    println!(
+        "\nRelative L2 against FE and processor time, median / 95 %; unsettled + out of range of all."
+    );
+    Ok(())
+}
+
+fn print_row(row: &Row) {
+    let percent = |[median, p95]: [f64; 2]| format!("{:.1} / {:.1}", 100.0 * median, 100.0 * p95);
+    let us = |[median, p95]: [f64; 2]| format!("{median:.0} / {p95:.0}");
+    let [unsettled, outside, all] = row.told;
+    println!(
+        "| {} | {} | {} | {} | {} | {} | {} | {unsettled} + {outside} of {all} |",
+        row.rung,
+        row.set,
+        percent(row.pressure),
+        percent(row.force),
+        row.sed.map_or_else(|| "-".to_owned(), percent),
+        us(row.cold_us),
+        us(row.warm_us),
+    );
+}

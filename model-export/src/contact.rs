@@ -1,0 +1,292 @@
+//! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
+//! takes.
+
+use crate::dataset::{Dataset, Indentation, Shard};
+use crate::metrics::{SampleMetrics, quantile};
+use crate::{ExportError, read};
+use papilla_contact::{Contact, ContactModel, Gaps, Method, Object, Scene, Settings, Solver};
+use papilla_engine::{MAP_LEN, Session};
+use papilla_proto::atlas::Patch;
+use papilla_proto::sdf::{Placement, first_touch_travel};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Frames of a warm path: to and fro by 10 um, which is 0.9 mm/s at 90 frames a second.
+const WARM: usize = 10;
+/// How far the warm path goes, mm.
+const STEP_MM: f64 = 0.01;
+
+/// A way from poses to pressure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rung {
+    /// A spring for each vertex.
+    Springs,
+    /// A half-space whose modulus fits the finger's own compliance.
+    HalfSpace,
+    /// The finger's compliance at small strain.
+    SmallStrain,
+    /// The same with the second order, told gaps at the vertices in place of the object.
+    Gaps,
+    /// The same, told the object.
+    SecondOrder,
+}
+
+impl Rung {
+    /// All of them, from fast and rough to slow and exact.
+    pub const ALL: [Self; 5] =
+        [Self::Springs, Self::HalfSpace, Self::SmallStrain, Self::Gaps, Self::SecondOrder];
+
+    /// Name in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Springs => "springs",
+            Self::HalfSpace => "half-space",
+            Self::SmallStrain => "small strain",
+            Self::Gaps => "second order, gaps",
+            Self::SecondOrder => "second order",
+        }
+    }
+}
+
+/// Figures of a rung on a dataset; pairs are median and 95th percentile.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Name of the rung.
+    pub rung: &'static str,
+    /// Campaign.
+    pub set: String,
+    /// Relative L2 of pressure at the vertices.
+    pub pressure: [f64; 2],
+    /// Relative error of the size of the force.
+    pub force: [f64; 2],
+    /// Relative L2 of the SED map that a network makes of the pressure, with a network.
+    pub sed: Option<[f64; 2]>,
+    /// Processor time of a frame from nothing, us.
+    pub cold_us: [f64; 2],
+    /// Processor time of a frame that moved by 10 um, us.
+    pub warm_us: [f64; 2],
+    /// Answers told to be unsettled, and out of range, of all.
+    pub told: [usize; 3],
+}
+
+/// The two models that rungs are of.
+pub struct Models {
+    finger: Arc<ContactModel>,
+    half_space: Arc<ContactModel>,
+}
+
+impl Models {
+    /// Reads a file of `fe-datagen contact`.
+    ///
+    /// # Errors
+    /// [`ExportError::Io`], [`ExportError::Contact`].
+    pub fn read(path: &Path) -> Result<Self, ExportError> {
+        let refused = |source| ExportError::Contact { path: path.to_owned(), source };
+        let finger = ContactModel::read(&read(path)?).map_err(refused)?;
+        let half_space = Arc::new(finger.on_half_space().map_err(refused)?);
+        Ok(Self { finger: Arc::new(finger), half_space })
+    }
+
+    /// Refuses a dataset of another atlas.
+    ///
+    /// # Errors
+    /// [`ExportError::Contact`], with the dataset's path.
+    pub fn require_atlas(&self, dataset: &Dataset, path: &Path) -> Result<(), ExportError> {
+        let refused = |source| ExportError::Contact { path: path.to_owned(), source };
+        self.finger.require_atlas(dataset.atlas.hash()).map_err(refused)
+    }
+
+    fn solver(&self, rung: Rung) -> Option<Solver> {
+        let (model, method) = match rung {
+            Rung::Springs => (&self.finger, Method::Springs),
+            Rung::HalfSpace => (&self.half_space, Method::SmallStrain),
+            Rung::SmallStrain => (&self.finger, Method::SmallStrain),
+            Rung::Gaps | Rung::SecondOrder => (&self.finger, Method::SecondOrder),
+        };
+        Solver::new(Arc::clone(model), Settings { method, ..Settings::default() }).ok()
+    }
+}
+
+/// Processor time of this thread, s: what else the machine does does not count.
+fn thread_s() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Where an indenter is at a depth, in the finger's frame: as the dataset's simulations place it, at
+/// the first touch of a vertex.
+fn placed(
+    dataset: &Dataset,
+    indentation: &Indentation,
+    depth_mm: f64,
+) -> Result<Option<Object>, ExportError> {
+    let path = dataset.shard_path(indentation);
+    let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+    let Some(spec) = dataset.indenter(indentation) else {
+        return Err(bad("the manifest does not say what pressed".into()));
+    };
+    let shape = spec.build(Path::new("")).map_err(|error| bad(error.to_string()))?;
+    let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm: [a, b], .. } = *indentation;
+    let mut placement = Placement::turned(pitch_deg, roll_deg, yaw_deg, [0.0; 3]);
+    let axis = |k: usize| [0, 1, 2].map(|i| placement.rotation[i][k]);
+    let (x, y, normal) = (axis(0), axis(1), axis(2));
+    let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
+    let points: Vec<[f64; 3]> = skin.iter().map(|p| p.map(f64::from)).collect();
+    let along = |p: &[f64; 3]| (0..3).map(|i| p[i] * normal[i]).sum::<f64>();
+    let least = points.iter().map(along).fold(f64::INFINITY, f64::min);
+    let touching: Vec<_> = points.iter().filter(|p| along(p) <= least + 1e-5).collect();
+    let top_mm = spec.top_mm();
+    let from: [f64; 3] = std::array::from_fn(|i| {
+        let first = touching.iter().map(|p| p[i]).sum::<f64>() / touching.len() as f64;
+        first - top_mm * normal[i] + a * x[i] + b * y[i]
+    });
+    placement.origin_mm = from;
+    let touch = match first_touch_travel(shape.as_ref(), &placement, normal, &points) {
+        Ok(travel) => travel,
+        // Inside by the rounding of positions to f32: there already.
+        Err(papilla_proto::sdf::TouchError::StartsInside { by_mm }) if by_mm < 1e-4 => 0.0,
+        Err(_) => return Ok(None),
+    };
+    placement.origin_mm = std::array::from_fn(|i| from[i] + (touch + depth_mm) * normal[i]);
+    Ok(Some(Object::rigid(shape, placement)))
+}
+
+/// Measures a rung on the held-out indentations of a dataset, every `every`th state.
+///
+/// # Errors
+/// [`ExportError`] of the dataset or the network.
+pub fn measure(
+    models: &Models,
+    rung: Rung,
+    dataset: &Dataset,
+    network: Option<&mut (dyn Session + '_)>,
+    every: usize,
+) -> Result<Row, ExportError> {
+    let mut network = network;
+    let mut figures = Figures::default();
+    let Some(mut solver) = models.solver(rung) else {
+        return Ok(figures.row(rung, dataset.name()));
+    };
+    let mut out = Contact::new(models.finger.vertices());
+    let mut count = 0;
+    for indentation in dataset.indentations("test")? {
+        let shard = dataset.load(indentation)?;
+        for state in 0..indentation.samples {
+            count += 1;
+            if (count - 1) % every.max(1) != 0 {
+                continue;
+            }
+            let depth_mm = f64::from(shard.depth_mm[state]);
+            let Some(object) = placed(dataset, indentation, depth_mm)? else { continue };
+            solver.reset();
+            let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);
+            figures.cold_us.push(cold);
+            figures.compare(dataset, indentation, &shard, state, &out, &mut network)?;
+            let mut moved = object;
+            let up = [0, 1, 2].map(|i| moved.placement.rotation[i][2]);
+            for frame in 0..WARM {
+                let by = if frame % 2 == 0 { STEP_MM } else { -STEP_MM };
+                for (at, up) in moved.placement.origin_mm.iter_mut().zip(up) {
+                    *at += by * up;
+                }
+                let warm = figures.frame(rung, &mut solver, &moved, dataset, &mut out);
+                figures.warm_us.push(warm);
+            }
+        }
+    }
+    Ok(figures.row(rung, dataset.name()))
+}
+
+/// Figures of all states.
+#[derive(Default)]
+struct Figures {
+    pressure: Vec<f64>,
+    force: Vec<f64>,
+    sed: Vec<f64>,
+    cold_us: Vec<f64>,
+    warm_us: Vec<f64>,
+    told: [usize; 3],
+    depth_mm: Vec<f32>,
+}
+
+impl Figures {
+    /// Solves a frame; its time, us. Gaps are the engine's to find, so that is not counted.
+    fn frame(
+        &mut self,
+        rung: Rung,
+        solver: &mut Solver,
+        object: &Object,
+        dataset: &Dataset,
+        out: &mut Contact,
+    ) -> f64 {
+        let objects = std::slice::from_ref(object);
+        let scene = if rung == Rung::Gaps {
+            let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
+            let depth = |p: &[f32; 3]| {
+                -object.placement.distance(object.shape.as_ref(), p.map(f64::from)).gap_mm as f32
+            };
+            self.depth_mm.clear();
+            self.depth_mm.extend(skin.iter().map(depth));
+            let depth_mm = &self.depth_mm;
+            Scene::Gaps(Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY })
+        } else {
+            Scene::Objects(objects)
+        };
+        let clock = thread_s();
+        let solved = solver.solve(scene, out);
+        let us = (thread_s() - clock) * 1e6;
+        self.told[0] += usize::from(solved.is_err());
+        us
+    }
+
+    /// Holds an answer against FE.
+    fn compare(
+        &mut self,
+        dataset: &Dataset,
+        indentation: &Indentation,
+        shard: &Shard,
+        state: usize,
+        out: &Contact,
+        network: &mut Option<&mut (dyn Session + '_)>,
+    ) -> Result<(), ExportError> {
+        let (mut miss, mut size) = (0.0, 0.0);
+        for (found, due) in out.pressure_pa.iter().zip(shard.pressure_pa.row(state)) {
+            miss += f64::from(found - due).powi(2);
+            size += f64::from(*due).powi(2);
+        }
+        let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
+        self.pressure.push((miss / size).sqrt());
+        self.force.push((norm(out.force_n) / due - 1.0).abs());
+        self.told[0] += usize::from(!out.quality.settled);
+        self.told[1] += usize::from(out.quality.out_of_range);
+        self.told[2] += 1;
+        let Some(network) = network else { return Ok(()) };
+        let [mut pressure_pa, mut sed, mut truth] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
+        let path = dataset.shard_path(indentation);
+        let refused = |source| ExportError::Atlas { path: path.clone(), source };
+        dataset.skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?;
+        let failed = |source| ExportError::Engine { path: path.clone(), source };
+        network.infer(&pressure_pa, &mut sed).map_err(failed)?;
+        dataset.draw_sed(indentation, shard, state, &mut truth)?;
+        let sample = SampleMetrics::measure(&sed, &truth, &dataset.ground);
+        self.sed.extend(sample.map(|sample| sample.relative_l2));
+        Ok(())
+    }
+
+    fn row(self, rung: Rung, set: &str) -> Row {
+        let both = |values: &[f64]| [0.5, 0.95].map(|q| quantile(values, q).unwrap_or(f64::NAN));
+        Row {
+            rung: rung.name(),
+            set: set.to_owned(),
+            pressure: both(&self.pressure),
+            force: both(&self.force),
+            sed: (!self.sed.is_empty()).then(|| both(&self.sed)),
+            cold_us: both(&self.cold_us),
+            warm_us: both(&self.warm_us),
+            told: self.told,
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! Version 3 of a session: objects and gaps in, forces out, several fingers.
+
+use papilla_proto::{
+    FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, MAP_LEN, SampleType,
+    contact::{POSE_LEN, Pose, TOUCH_LEN, Touch},
+    flags,
+};
+use serde_json::{Value, json};
+
+use crate::support::{
+    GAIN, Service, Socket,
+    contact::{deep, hello_3, hertz_n, rows, service},
+    floats_of, hello,
+};
+
+const VERTICES: usize = 361;
+
+/// The next answer's header and touch, and the whole payload.
+async fn hear(socket: &mut Socket) -> (FrameHeader, Touch, Vec<u8>) {
+    let (header, payload) = socket.hear_frame().await;
+    let payload = payload[HEADER_LEN_V2 - HEADER_LEN..].to_vec();
+    (header, Touch::decode(&payload).unwrap_or_default(), payload)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn poses_go_in_and_forces_come_out_without_a_network() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let ready = socket.open(hello_3(&json!({"map": false, "stiffness": true}))).await;
+    assert_eq!(ready["sections"], json!([{"name": "touch", "offset": 48, "bytes": TOUCH_LEN}]));
+    assert_eq!((&ready["vertices"], &ready["fingers"]), (&json!(VERTICES), &json!(1)));
+    for (sequence, depth) in [(1, 0.2), (2, 0.3)] {
+        socket.send(rows(sequence, 0, &[deep(depth)])).await;
+        let (header, touch, payload) = hear(&mut socket).await;
+        let extension = header.extension.unwrap();
+        assert_eq!((header.version(), header.sequence, payload.len()), (3, sequence, TOUCH_LEN));
+        assert_eq!((extension.infer_us, extension.flags, extension.finger), (0, 0, Some(0)));
+        assert!((touch.force_n[2] / hertz_n(depth) - 1.0).abs() < 0.1, "{touch:?}");
+        assert!(touch.stiffness_n_per_mm > 0.0 && touch.area_mm2 > 1.0, "{touch:?}");
+    }
+    socket.send(rows(3, 0, &[deep(-9.0)])).await;
+    let (header, touch, _) = hear(&mut socket).await;
+    assert_eq!(header.extension.unwrap().flags, flags::NO_CONTACT);
+    assert_eq!(touch.force_n.map(f32::to_bits), [0; 3]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_are_laid_out_apart_from_what_is_sent() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let ready = socket
+        .open(hello_3(
+            &json!({"pressure": "vertices", "answer_layout": "vertices", "effects": ["summary"]}),
+        ))
+        .await;
+    let at = |name: &str| {
+        let sections = ready["sections"].as_array().unwrap();
+        let section = sections.iter().find(|s| s["name"] == name).unwrap();
+        let number = |member: &str| section[member].as_u64().unwrap() as usize;
+        number("offset") - HEADER_LEN_V2..number("offset") - HEADER_LEN_V2 + number("bytes")
+    };
+    socket.send(rows(1, 0, &[deep(0.3)])).await;
+    let (_, touch, payload) = hear(&mut socket).await;
+    let pressure_pa = floats_of(&payload[at("pressure")]);
+    let sed = floats_of(&payload[at("vertices")]);
+    assert_eq!((pressure_pa.len(), sed.len()), (VERTICES, VERTICES));
+    let peak = pressure_pa.iter().copied().fold(0.0, f32::max);
+    assert!((peak - touch.pressure_max_pa).abs() <= 1e-3 * peak, "{touch:?}");
+    // The test model halves the map, and a vertex lies between four pixels.
+    let most = sed.iter().copied().fold(0.0, f32::max);
+    assert!(most > 0.9 * GAIN * peak && most <= GAIN * peak, "{most} of {peak}");
+    let summary = papilla_proto::Summary::decode(&payload[at("summary")]).unwrap();
+    assert!((summary.force_n / touch.force_n[2] - 1.0).abs() < 0.1, "{summary:?} {touch:?}");
+    // The map as ever, behind the touch.
+    let ready = socket.open(hello_3(&json!({}))).await;
+    assert_eq!(ready["sections"][1], json!({"name": "map", "offset": 112, "bytes": 4 * MAP_LEN}));
+    socket.send(rows(2, 0, &[deep(0.3)])).await;
+    let (_, _, payload) = hear(&mut socket).await;
+    let map = floats_of(&payload[TOUCH_LEN..]);
+    let most = map.iter().copied().fold(0.0, f32::max);
+    assert!(most > 0.9 * GAIN * peak && most <= GAIN * peak, "{most} of {peak}");
+}
+
+/// Pressure at the vertices is what the map of it is.
+#[tokio::test(flavor = "multi_thread")]
+async fn pressure_and_gaps_may_be_told_at_the_vertices() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let members = json!({"version": 3, "input_layout": "vertices", "answer_layout": "vertices"});
+    socket.open(hello(&members)).await;
+    let frame = |sequence: u32, kind, values: &[f32]| {
+        let header = FrameHeader::pressure(sequence, 0, 0, SampleType::F32, 1.0);
+        let header = header.of_finger(kind, 0, [values.len() as u16, 1]);
+        let values = values.iter().flat_map(|v| v.to_le_bytes());
+        header.encode().iter().copied().chain(values).collect::<Vec<u8>>()
+    };
+    socket.send(frame(1, FrameKind::Pressure, &[1000.0; VERTICES])).await;
+    let (_, _, payload) = hear(&mut socket).await;
+    assert!(floats_of(&payload).iter().all(|s| (s - 1000.0 * GAIN).abs() < 1.0), "{payload:?}");
+    let mut bad = [1000.0; VERTICES];
+    bad[7] = f32::NAN;
+    socket.send(frame(2, FrameKind::Pressure, &bad)).await;
+    assert!(
+        socket.hear_refusal("not_finite").await["message"].as_str().unwrap().contains("vertex 7")
+    );
+    let members = json!({"version": 3, "input": "gaps", "input_layout": "vertices", "map": false});
+    socket.open(hello(&members)).await;
+    let depths: Vec<f32> = crate::support::contact::atlas()
+        .patch(papilla_proto::atlas::Patch::Skin)
+        .positions_mm
+        .iter()
+        .map(|p| 20.0 - (p[0] * p[0] + p[1] * p[1] + 19.7 * 19.7).sqrt())
+        .collect();
+    socket.send(frame(3, FrameKind::Gaps, &depths)).await;
+    let (_, touch, _) = hear(&mut socket).await;
+    assert!((touch.force_n[2] / hertz_n(0.3) - 1.0).abs() < 0.1, "{touch:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn fingers_have_slots_and_states_of_their_own() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let fingers = json!([{}, {"stiffness": 2.0}, {"width": 1.5}]);
+    socket.open(hello_3(&json!({"map": false, "fingers": fingers}))).await;
+    // The same sequence on each finger: none supersedes another, none is stale.
+    for finger in 0..3 {
+        socket.send(rows(5, finger, &[deep(0.2)])).await;
+    }
+    let mut found = [0.0; 3];
+    for _ in 0..3 {
+        let (header, touch, _) = hear(&mut socket).await;
+        assert_eq!((header.status, header.sequence), (FrameStatus::Ok, 5));
+        found[usize::from(header.extension.unwrap().finger.unwrap())] = touch.force_n[2];
+    }
+    assert!((found[1] / found[0] - 2.0).abs() < 1e-3 && found[2] > 0.0, "{found:?}");
+    socket.send(rows(6, 3, &[deep(0.2)])).await;
+    assert_eq!(socket.hear_refusal("bad_contact").await["field"], "finger");
+    socket.send(rows(5, 0, &[deep(0.2)])).await;
+    assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Stale);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_net_force_is_met() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    socket.open(hello_3(&json!({"map": false, "force_target": true}))).await;
+    let net = |force_n| Pose { origin_mm: [0.0, 0.0, 1.0], quaternion: [force_n, 0.0, 0.0, 0.0] };
+    for (sequence, force) in [(1, 0.03), (2, 0.04)] {
+        socket.send(rows(sequence, 0, &[deep(-1.0), net(force)])).await;
+        let (_, touch, _) = hear(&mut socket).await;
+        assert!((touch.force_n[2] / force - 1.0).abs() < 3e-3, "{touch:?}");
+        assert!(touch.travel_mm > 1.0, "{touch:?}");
+    }
+    socket.send(rows(3, 0, &[deep(-1.0), net(0.0)])).await;
+    assert_eq!(hear(&mut socket).await.1.force_n.map(f32::to_bits), [0; 3]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_is_named_and_nobody_else_notices() {
+    let service = service().await;
+    let (mut good, mut bad) = (service.socket().await, service.socket().await);
+    good.open(hello_3(&json!({"map": false}))).await;
+    let open_mesh = json!({"shape": "mesh", "vertices_mm": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        "triangles": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 1, 2]]});
+    let crowd = json!({"shape": "mesh", "vertices_mm": [], "triangles": vec![[0, 0, 0]; 30_000]});
+    let shape = |shape: Value| json!({"objects": [{"shape": shape}]});
+    let refused = [
+        (shape(json!({"shape": "sphere", "radius_mm": 0.0})), "bad_contact", "objects[0].shape"),
+        (shape(open_mesh), "bad_contact", "objects[0].shape"),
+        (shape(crowd), "bad_contact", "objects[0].shape"),
+        (json!({"fingers": []}), "bad_contact", "fingers"),
+        (json!({"version": 2}), "unknown_version", "input"),
+        (json!({"input": "pressure"}), "bad_contact", "objects"),
+    ];
+    for (members, code, field) in refused {
+        bad.send(hello_3(&members).to_string()).await;
+        assert_eq!(bad.hear_refusal(code).await["field"], field, "{members}");
+    }
+    bad.open(hello_3(&json!({"map": false}))).await;
+    let nan = Pose { origin_mm: [f32::NAN; 3], ..deep(0.2) };
+    let turned = Pose { quaternion: [1.0; 4], ..deep(0.2) };
+    let frames = [
+        (rows(1, 0, &[nan]), "bad_contact", "objects[0].origin_mm"),
+        (rows(2, 0, &[turned]), "bad_contact", "objects[0].quaternion"),
+        (rows(3, 0, &[deep(0.2); 2]), "wrong_shape", "width"),
+        (rows(4, 9, &[deep(0.2)]), "bad_contact", "finger"),
+        (
+            rows(5, 0, &[deep(0.2)])[..HEADER_LEN_V2 + POSE_LEN - 1].to_vec(),
+            "wrong_length",
+            "payload",
+        ),
+    ];
+    for (sequence, (frame, code, field)) in (1..).zip(frames) {
+        bad.send(frame).await;
+        let error = bad.hear_refusal(code).await;
+        assert_eq!((&error["field"], &error["sequence"]), (&json!(field), &json!(sequence)));
+        good.send(rows(sequence, 0, &[deep(0.2)])).await;
+        assert!(hear(&mut good).await.1.force_n[2] > 0.0);
+    }
+    bad.send(rows(9, 0, &[deep(0.2)])).await;
+    assert!(hear(&mut bad).await.1.force_n[2] > 0.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn places_for_fingers_are_bounded_and_come_back() {
+    let service = service().await;
+    let mut socket = service.socket().await;
+    let ten: Vec<Value> = vec![json!({}); 10];
+    let mut open = Vec::new();
+    for _ in 0..6 {
+        let mut socket = service.socket().await;
+        socket.open(hello_3(&json!({"map": false, "fingers": ten}))).await;
+        open.push(socket);
+    }
+    socket.send(hello_3(&json!({"map": false, "fingers": ten})).to_string()).await;
+    assert_eq!(socket.hear_refusal("overloaded").await["field"], "fingers");
+    socket.open(hello_3(&json!({"map": false, "fingers": [{}, {}, {}, {}]}))).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn without_a_contact_model_objects_are_refused() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    socket.send(hello_3(&json!({})).to_string()).await;
+    let error = socket.hear_refusal("bad_contact").await;
+    assert!(error["message"].as_str().unwrap().contains("--contact"), "{error}");
+}

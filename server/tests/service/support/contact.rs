@@ -1,0 +1,92 @@
+//! A finger that is a plane of an elastic half-space, and frames of version 3 for it.
+
+use std::path::PathBuf;
+
+use papilla_contact::{Arrays, Header};
+use papilla_proto::{
+    FrameHeader, FrameKind, SampleType,
+    atlas::{Atlas, PatchVertices},
+    contact::{Pose, ROW},
+};
+use serde_json::{Value, json};
+
+use super::{Service, hello, model_folder_on, write};
+
+const SIDE: usize = 19;
+/// E / (1 - nu^2), MPa.
+pub(crate) const MODULUS_MPA: f32 = 0.2;
+/// Radius of the ball that presses, mm.
+pub(crate) const RADIUS_MM: f32 = 20.0;
+
+/// Vertices every 10 px from 20 to 200 both ways, 1 mm apart; the middle at the origin.
+pub(crate) fn atlas() -> Atlas {
+    let patch = |z: f32| {
+        let at = |i: usize| [i % SIDE, i / SIDE].map(|k| 10.0 * k as f32 + 20.0);
+        let uv_px: Vec<[f32; 2]> = (0..SIDE * SIDE).map(at).collect();
+        let place = |&[u, v]: &[f32; 2]| [0.1 * (v - 110.0), -0.1 * (u - 110.0), z];
+        PatchVertices { positions_mm: uv_px.iter().map(place).collect(), uv_px }
+    };
+    let mut triangles = Vec::new();
+    for y in 0..SIDE - 1 {
+        for x in 0..SIDE - 1 {
+            let (a, s) = ((y * SIDE + x) as u32, SIDE as u32);
+            triangles.extend([[a, a + s, a + 1], [a + 1, a + s, a + s + 1]]);
+        }
+    }
+    Atlas::new(0.1, triangles, patch(0.0), patch(0.5)).unwrap()
+}
+
+/// A service of this finger, with its contact model.
+pub(crate) async fn service() -> Service {
+    let (atlas, folder) = (atlas(), model_folder_on(&atlas()));
+    let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
+    let vertices = skin.positions_mm.len();
+    let header = Header {
+        vertices,
+        triangles: atlas.triangles().len(),
+        share_max: 1.0,
+        atlas_hash: atlas.hash().to_owned(),
+        ..Header::current()
+    };
+    let arrays = Arrays::half_space(
+        skin.positions_mm.as_flattened().to_vec(),
+        (0..vertices).flat_map(|_| [0.0, 0.0, -1.0]).collect(),
+        vec![1.0; vertices],
+        atlas.triangles().as_flattened().to_vec(),
+        MODULUS_MPA.into(),
+    );
+    write(folder.path(), "finger.contact", &arrays.to_bytes(&header).unwrap());
+    let file: PathBuf = folder.path().join("finger.contact");
+    Service::on(folder, |config| config.contact = Some(file)).await.unwrap()
+}
+
+/// A hello of version 3 for one ball, with more members.
+pub(crate) fn hello_3(members: &Value) -> Value {
+    let mut hello = hello(&json!({
+        "version": 3, "input": "objects",
+        "objects": [{"shape": {"shape": "sphere", "radius_mm": RADIUS_MM}}],
+    }));
+    for (name, value) in members.as_object().unwrap() {
+        hello[name] = value.clone();
+    }
+    hello
+}
+
+/// A frame of rows for a finger.
+pub(crate) fn rows(sequence: u32, finger: u8, rows: &[Pose]) -> Vec<u8> {
+    let header =
+        FrameHeader::pressure(sequence, 1000 * u64::from(sequence), 0, SampleType::F32, 1.0);
+    let header = header.of_finger(FrameKind::Objects, finger, [ROW as u16, rows.len() as u16]);
+    let rows = rows.iter().flat_map(|row| row.encode());
+    header.encode().iter().copied().chain(rows).collect()
+}
+
+/// The ball so deep in the skin.
+pub(crate) fn deep(depth_mm: f32) -> Pose {
+    Pose { origin_mm: [0.0, 0.0, depth_mm - RADIUS_MM], ..Pose::default() }
+}
+
+/// Hertz, N.
+pub(crate) fn hertz_n(depth_mm: f32) -> f32 {
+    4.0 / 3.0 * MODULUS_MPA * RADIUS_MM.sqrt() * depth_mm.powf(1.5)
+}

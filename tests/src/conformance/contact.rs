@@ -1,0 +1,258 @@
+//! Contact as the script expects it (`proto/conformance-contact.json`): the skin of the shipped finger
+//! on a half-space, so that no FE is needed to make the model.
+
+use std::{path::Path, sync::Arc};
+
+use papilla_contact::{
+    Arrays, Contact, ContactModel, Gaps, Header, Method, NetForce, Object, Person, Scene, Settings,
+    Solver,
+};
+use papilla_proto::{
+    Hello,
+    atlas::{Atlas, Patch},
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Pose},
+    sdf::Placement,
+};
+use serde_json::{Value, json};
+
+use super::{ConformanceError, member, read};
+
+/// Modulus of the half-space, E / (1 - nu^2), MPa.
+const MODULUS_MPA: f64 = 0.1;
+
+/// What a touch may be off: share of the value, and beside it, in its unit. In the order of the wire.
+const TOLERANCES: [(f64, f64); 15] = [
+    (0.02, 2e-3),
+    (0.02, 2e-3),
+    (0.02, 2e-3),
+    (0.02, 2e-2),
+    (0.02, 2e-2),
+    (0.02, 2e-2),
+    (0.1, 0.2),
+    (0.0, 0.05),
+    (0.0, 0.05),
+    (0.0, 0.05),
+    (0.0, 5e-3),
+    (0.1, 1e-3),
+    (0.0, 0.02),
+    (0.05, 10.0),
+    (0.0, 1e-2),
+];
+
+/// The finger and, in a case, its solvers.
+pub struct ContactRecorder {
+    atlas: Atlas,
+    header: Header,
+    arrays: Arrays,
+    model: Arc<ContactModel>,
+}
+
+struct Hand {
+    objects: Vec<AnnouncedObject>,
+    has_force: bool,
+    solvers: Vec<Solver>,
+}
+
+impl ContactRecorder {
+    /// Of the atlas in the folder of models.
+    ///
+    /// # Errors
+    /// The atlas is missing or damaged.
+    pub fn new(folder: &Path) -> Result<Self, ConformanceError> {
+        let text = String::from_utf8_lossy(&read(folder.join("atlas.json"))?).into_owned();
+        let atlas = Atlas::from_json(&text)?;
+        let skin = &atlas.patch(Patch::Skin).positions_mm;
+        let (normals, areas) = normals_and_areas(skin, atlas.triangles());
+        let header = Header {
+            software: "conformance-record".to_owned(),
+            atlas_hash: atlas.hash().to_owned(),
+            vertices: skin.len(),
+            triangles: atlas.triangles().len(),
+            share_max: 1.0,
+            depth_max_mm: 2.0,
+            ..Header::current()
+        };
+        let triangles = atlas.triangles().as_flattened().to_vec();
+        let positions = skin.as_flattened().to_vec();
+        let arrays = Arrays::half_space(positions, normals, areas, triangles, MODULUS_MPA);
+        // As the service reads it.
+        let model = Arc::new(ContactModel::read(&arrays.to_bytes(&header)?)?);
+        Ok(Self { atlas, header, arrays, model })
+    }
+
+    /// The contact model that the service is to be started with.
+    ///
+    /// # Errors
+    /// [`ConformanceError::Contact`].
+    pub fn file(&self) -> Result<Vec<u8>, ConformanceError> {
+        Ok(self.arrays.to_bytes(&self.header)?)
+    }
+
+    /// Writes what is expected into every step.
+    ///
+    /// # Errors
+    /// A step is not of the format; it says which.
+    pub fn fill(&self, file: &mut Value) -> Result<(), ConformanceError> {
+        file["atlas_hash"] = json!(self.atlas.hash());
+        for case in file["cases"].as_array_mut().into_iter().flatten() {
+            let name = case["name"].as_str().unwrap_or_default().to_owned();
+            let mut hand = None;
+            for (number, step) in case["steps"].as_array_mut().into_iter().flatten().enumerate() {
+                self.step(step, &mut hand).map_err(|reason| ConformanceError::Step {
+                    case: name.clone(),
+                    step: number,
+                    reason,
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn step(&self, step: &mut Value, hand: &mut Option<Hand>) -> Result<(), String> {
+        let refused = step["expect"]["status"].as_str().is_some_and(|status| status != "ok");
+        match step["do"].as_str() {
+            Some(_) if refused => {}
+            Some("hello") => {
+                let mut hello = step["hello"].clone();
+                hello["version"] = json!(3);
+                let hello: Hello = serde_json::from_value(hello).map_err(|e| e.to_string())?;
+                *hand = Some(self.hand(hello)?);
+            }
+            Some("touch" | "gaps") => {
+                let hand = hand.as_mut().ok_or("a touch without a hello")?;
+                let (touch, pressure_pa) = self.touch(step, hand)?;
+                let pairs: Vec<Value> = touch.iter().zip(TOLERANCES).map(pair).collect();
+                step["expect"]["touch"] = json!(pairs);
+                if step["expect"].get("pressure_sum").is_some() {
+                    let sum: f64 = pressure_pa.iter().map(|p| f64::from(*p)).sum();
+                    step["expect"]["pressure_sum"] = pair((&sum, (0.02, 10.0)));
+                }
+                let flags = if touch[13] > 0.0 { json!([]) } else { json!(["no_contact"]) };
+                step["expect"]["flags"] = flags;
+            }
+            other => return Err(format!("there is no step '{other:?}'")),
+        }
+        Ok(())
+    }
+
+    fn hand(&self, hello: Hello) -> Result<Hand, String> {
+        let fingers = hello.fingers.unwrap_or_else(|| vec![AnnouncedFinger::default()]);
+        let solver = |finger: &AnnouncedFinger| {
+            let settings = Settings {
+                method: match hello.method.unwrap_or_default() {
+                    ContactMethod::Springs => Method::Springs,
+                    ContactMethod::SmallStrain => Method::SmallStrain,
+                    ContactMethod::SecondOrder => Method::SecondOrder,
+                },
+                person: Person { width: finger.width, stiffness: finger.stiffness },
+                stiffness: hello.stiffness == Some(true),
+            };
+            Solver::new(Arc::clone(&self.model), settings).map_err(|error| error.to_string())
+        };
+        let solvers = fingers.iter().map(solver).collect::<Result<_, _>>()?;
+        let objects = hello.objects.unwrap_or_default();
+        Ok(Hand { objects, has_force: hello.force_target == Some(true), solvers })
+    }
+
+    /// The numbers of a touch and the pressure at the vertices.
+    fn touch(&self, step: &Value, hand: &mut Hand) -> Result<([f64; 15], Vec<f32>), String> {
+        let finger: Option<usize> = member(step, "finger")?;
+        let solver = hand.solvers.get_mut(finger.unwrap_or(0)).ok_or("no such finger")?;
+        let net: Option<[f64; 4]> = member(step, "net")?;
+        if net.is_some() != hand.has_force {
+            return Err("'net' is due where the hello has force_target, and there alone".to_owned());
+        }
+        let mut out = Contact::new(self.model.vertices());
+        let (mut objects, mut depth_mm) = (Vec::new(), Vec::new());
+        let scene = if step["do"] == "gaps" {
+            let sphere: [f64; 4] = member(step, "sphere")?;
+            depth_mm.extend(
+                self.atlas.patch(Patch::Skin).positions_mm.iter().map(|p| depth(*p, sphere)),
+            );
+            Scene::Gaps(Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY })
+        } else {
+            let poses: Vec<[f32; 7]> = member(step, "poses")?;
+            for (pose, object) in poses.iter().zip(&hand.objects) {
+                objects.push(placed(*pose, object)?);
+            }
+            Scene::Objects(&objects)
+        };
+        let solved = match net {
+            Some([x, y, z, force_n]) => {
+                solver.solve_for_force(scene, NetForce { direction: [x, y, z], force_n }, &mut out)
+            }
+            None => solver.solve(scene, &mut out).map(|()| 0.0),
+        };
+        let travel_mm = solved.map_err(|error| error.to_string())?;
+        let ([fx, fy, fz], [tx, ty, tz], [cx, cy, cz]) =
+            (out.force_n, out.torque_n_mm, out.centre_mm);
+        let most = out.pressure_pa.iter().copied().fold(0.0, f32::max);
+        let stiffness = out.stiffness_n_per_mm.unwrap_or(0.0);
+        let (area, left) = (out.area_mm2, out.penetration_mm);
+        let share = f64::from(out.quality.share);
+        let numbers = [
+            fx,
+            fy,
+            fz,
+            tx,
+            ty,
+            tz,
+            area,
+            cx,
+            cy,
+            cz,
+            left,
+            stiffness,
+            travel_mm,
+            most.into(),
+            share,
+        ];
+        Ok((numbers, out.pressure_pa))
+    }
+}
+
+/// How deep a place of the skin lies in a ball (x, y, z, radius), in f64 and rounded to f32.
+#[must_use]
+pub fn depth(at_mm: [f32; 3], [x, y, z, radius]: [f64; 4]) -> f32 {
+    let [p, q, r] = at_mm.map(f64::from);
+    (radius - ((p - x).powi(2) + (q - y).powi(2) + (r - z).powi(2)).sqrt()) as f32
+}
+
+fn placed([x, y, z, a, b, c, d]: [f32; 7], object: &AnnouncedObject) -> Result<Object, String> {
+    let pose = Pose { origin_mm: [x, y, z], quaternion: [a, b, c, d] };
+    let rotation = pose.rotation().ok_or("a pose that is no rotation")?;
+    let shape = object.shape.build("objects").map_err(|error| error.to_string())?;
+    let placement = Placement { rotation, origin_mm: pose.origin_mm.map(f64::from) };
+    let stiffness_mpa_per_mm = object.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
+    Ok(Object { shape, placement, stiffness_mpa_per_mm })
+}
+
+/// A value to seven digits and its tolerance to two.
+fn pair((value, (share, beside)): (&f64, (f64, f64))) -> Value {
+    let digits = |v: f64, n: usize| format!("{v:.n$e}").parse::<f64>().unwrap_or(v);
+    json!([digits(*value, 6), digits(share * value.abs() + beside, 1)])
+}
+
+/// Outward normals and areas of the vertices of a surface, each triangle in thirds.
+fn normals_and_areas(places: &[[f32; 3]], triangles: &[[u32; 3]]) -> (Vec<f32>, Vec<f32>) {
+    let mut sums = vec![[0.0f64; 3]; places.len()];
+    let mut areas = vec![0.0f64; places.len()];
+    for corners in triangles {
+        let [a, b, c] = corners.map(|corner| places[corner as usize].map(f64::from));
+        let side = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - a[i]) };
+        let (u, v) = (side(b), side(c));
+        let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let third = n.iter().map(|c| c * c).sum::<f64>().sqrt() / 6.0;
+        for corner in corners {
+            areas[*corner as usize] += third;
+            for (sum, n) in sums[*corner as usize].iter_mut().zip(n) {
+                *sum += n;
+            }
+        }
+    }
+    let unit = |v: &[f64; 3]| {
+        let size = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+        v.map(|c| (c / size) as f32)
+    };
+    (sums.iter().flat_map(unit).collect(), areas.iter().map(|a| *a as f32).collect())
+}
