@@ -75,7 +75,7 @@ def encode(
     return head + samples
 
 
-FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "cut_off"}
+FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 16: "cut_off"}
 """Bits of an answer's flags."""
 
 
