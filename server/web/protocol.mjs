@@ -16,7 +16,7 @@ const BACK_OFF_MS = { first: 250, last: 400 };
 /** A server that says nothing for so many of these is given up; counted by a timer, which stands still where the page does. */
 const WATCH_MS = 250;
 const SILENT_WATCHES = 7;
-const FLAG = { outOfRange: 1, unfamiliar: 4, cutOff: 8 };
+const FLAG = { outOfRange: 1, unfamiliar: 4, cutOff: 16 };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
 export class RequestFrame {

@@ -103,7 +103,7 @@ def encode_rows(
 
 INPUTS: Final = {"objects": 4, "gaps": 5}
 """Kinds of frames of version 3."""
-FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "cut_off", 16: "unsettled"}
+FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "unsettled", 16: "cut_off"}
 """Bits of an answer's flags."""
 
 

@@ -17,7 +17,7 @@ namespace Papilla
         public const int MessageBytesMax = 1 << 20;
 
         internal const uint Magic = 0x314c5050;
-        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagCutOff = 8;
+        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagCutOff = 16;
         const float HalfMax = 65504;
 
         static readonly float[] Halves = HalfTable();

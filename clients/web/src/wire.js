@@ -10,7 +10,7 @@ export const STATUS = /** @type {const} */ (['ok', 'superseded', 'late', 'error'
 export const SAMPLE_TYPES = /** @type {const} */ (['f32', 'f16', 'u16', 'u8']);
 export const SAMPLE_BYTES = [4, 2, 2, 1];
 export const KIND = { pressure: 1, sed: 2, rate: 3 };
-export const FLAG = { outOfRange: 1, noContact: 2, unfamiliar: 4, cutOff: 8, unsettled: 16 };
+export const FLAG = { outOfRange: 1, noContact: 2, unfamiliar: 4, unsettled: 8, cutOff: 16 };
 
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
 const VERSION = 2;

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use tokio::time::{sleep, timeout};
 
 use crate::support::{
-    Received, Request, Running, Socket, add_model_of_gain, atlas, bytes_of, frame, hello,
+    Logged, Received, Request, Running, Socket, add_model_of_gain, atlas, bytes_of, frame, hello,
     metric_at, model_folder, papilla, ramp, signal, write,
 };
 
@@ -235,4 +235,13 @@ async fn it_listens_while_its_models_are_loaded_and_measured() {
     }
     let measured = seen.iter().find(|body| body["tiers_done"] == json!(["quick"]));
     assert!(measured.is_some(), "the fastest is measured first: {seen:?}");
+}
+
+#[test]
+fn a_log_that_no_terminal_shows_has_no_colours() {
+    let folder = model_folder();
+    let logged = Logged::start(folder.path(), &["--log", "info"]);
+    let log = logged.log();
+    assert!(log.contains("INFO"), "{log}");
+    assert!(!log.contains('\u{1b}'), "{log:?}");
 }

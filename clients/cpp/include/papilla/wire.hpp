@@ -50,7 +50,7 @@ struct Header {
 namespace wire {
 
 /// Bits of an answer's flags.
-enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4, cut_off = 8 };
+enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4, cut_off = 16 };
 
 /// Little-endian, whatever the machine is; compilers make one move of it.
 template <class T>

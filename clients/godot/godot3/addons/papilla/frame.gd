@@ -59,7 +59,7 @@ static func read_header(packet):
 	answer.out_of_range = flags & 1 != 0
 	answer.no_contact = flags & 2 != 0
 	answer.unfamiliar = flags & 4 != 0
-	answer.cut_off = flags & 8 != 0
+	answer.cut_off = flags & 16 != 0
 	return answer
 
 
