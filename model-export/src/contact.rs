@@ -257,9 +257,11 @@ impl Figures {
             size += f64::from(*due).powi(2);
         }
         let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
         self.pressure.push((miss / size).sqrt());
-        self.force.push((norm(out.force_n) / due - 1.0).abs());
+        if let Some(force_n) = &shard.force_n {
+            let due = norm([0, 1, 2].map(|i| f64::from(force_n[[state, i]])));
+            self.force.push((norm(out.force_n) / due - 1.0).abs());
+        }
         self.told[0] += usize::from(!out.quality.settled);
         self.told[1] += usize::from(out.quality.out_of_range);
         self.told[2] += 1;

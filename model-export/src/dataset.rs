@@ -88,8 +88,8 @@ pub struct Shard {
     pub sed_j_per_m3: Array2<f32>,
     /// Depth of each sample, mm; `[D]`.
     pub depth_mm: Array1<f32>,
-    /// Force on the finger, N; `[D, 3]`.
-    pub force_n: Array2<f32>,
+    /// Force on the finger, N; `[D, 3]`; none if the shard does not hold it.
+    pub force_n: Option<Array2<f32>>,
 }
 
 /// A dataset whose manifest and atlas have been read and agree.
@@ -224,7 +224,7 @@ impl Dataset {
             pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
             sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
-            force_n: read_array(&mut npz, "force_n").map_err(unreadable)?,
+            force_n: read_array(&mut npz, "force_n").ok(),
         };
         let expected = (indentation.samples, self.manifest.vertex_count);
         for (name, array) in
