@@ -1,10 +1,11 @@
 //! `model-export contact`.
 
-use super::{bar, load_model, print_json};
+use super::{load_model, print_json};
 use papilla_engine::Backend;
 use papilla_model_export::contact::{Models, Row, Rung, measure};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::{ExportError, evaluate};
+use papilla_progress::Progress;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -32,7 +33,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         session = Some(network.session().map_err(failed)?);
     }
     let mut rows = Vec::new();
-    let progress = bar(json, options.datasets.len() * Rung::ALL.len(), "rungs")?;
+    let progress = Progress::new("rungs", options.datasets.len() * Rung::ALL.len(), 0, json);
     for folder in &options.datasets {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
@@ -43,10 +44,10 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         for rung in Rung::ALL {
             let session = session.as_deref_mut();
             rows.push(measure(&models, rung, &dataset, session, options.every)?);
-            progress.inc(1);
+            progress.inc();
         }
     }
-    progress.finish_and_clear();
+    drop(progress);
     if json {
         return print_json(&rows);
     }

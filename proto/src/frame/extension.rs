@@ -10,17 +10,17 @@ pub mod flags {
     pub const NO_CONTACT: u8 = 2;
     /// Rougher or heavier than any map the tier was trained on ([`crate::input_statistics`]).
     pub const UNFAMILIAR: u8 = 4;
-    /// The contact reaches the edge of the atlas: what lies beyond is missing from the map.
-    pub const CUT_OFF: u8 = 16;
     /// The contact solve did not settle: its answer is rough. Version 3.
     pub const UNSETTLED: u8 = 8;
+    /// The contact reaches the edge of the atlas: what lies beyond is missing from the map.
+    pub const CUT_OFF: u8 = 16;
     /// All of them by name.
     pub const NAMED: [(u8, &str); 5] = [
         (OUT_OF_RANGE, "out_of_range"),
         (NO_CONTACT, "no_contact"),
         (UNFAMILIAR, "unfamiliar"),
-        (CUT_OFF, "cut_off"),
         (UNSETTLED, "unsettled"),
+        (CUT_OFF, "cut_off"),
     ];
 }
 
