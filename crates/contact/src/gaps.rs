@@ -6,7 +6,7 @@
 
 use crate::error::ContactError;
 use crate::model::ContactModel;
-use crate::objects::{Nearest, require_stiffness};
+use crate::nearest::{Nearest, require_stiffness};
 
 /// How deep each vertex of the undeformed finger lies in things.
 #[derive(Clone, Copy, Debug)]
@@ -30,14 +30,6 @@ pub(crate) struct Field {
     /// Area of the triangles that told each normal.
     area_mm2: Vec<f32>,
     stiffness_mpa_per_mm: f64,
-}
-
-/// What a triangle adds to slopes at its corners.
-#[derive(Debug)]
-pub(crate) struct Slopes {
-    /// Gradients of the hat functions of its corners, times its area.
-    corners: [[f32; 3]; 3],
-    area_mm2: f32,
 }
 
 impl Field {
@@ -122,26 +114,6 @@ fn thing_normal(slope: [f32; 3], skin: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|i| part * flat[i] - down * skin[i])
 }
 
-/// Slopes of each triangle.
-pub(crate) fn slopes(positions_mm: &[[f64; 3]], triangles: &[[u32; 3]]) -> Vec<Slopes> {
-    let of = |corners: &[u32; 3]| {
-        let x = corners.map(|c| positions_mm[c as usize]);
-        let side = |a: usize, b: usize| -> [f64; 3] { std::array::from_fn(|i| x[b][i] - x[a][i]) };
-        let cross = |p: [f64; 3], q: [f64; 3]| {
-            [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
-        };
-        let double = cross(side(0, 1), side(0, 2));
-        let size = double.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let unit = double.map(|v| if size > 0.0 { v / size } else { 0.0 });
-        // The gradient of a corner's hat function is the unit normal turned across the opposite
-        // side, over twice the area.
-        let across = |k: usize| cross(unit, side((k + 1) % 3, (k + 2) % 3));
-        let corners = [0, 1, 2].map(|k| across(k).map(|v| (0.5 * v) as f32));
-        Slopes { corners, area_mm2: (0.5 * size) as f32 }
-    };
-    triangles.iter().map(of).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -155,18 +127,5 @@ mod tests {
         assert!(found.iter().zip(due).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
         let steep = thing_normal([3.0, 4.0, 0.0], skin);
         assert!((steep.iter().map(|v| v * v).sum::<f32>() - 1.0).abs() < 1e-5, "{steep:?}");
-    }
-
-    #[test]
-    fn slopes_are_those_of_a_linear_function() {
-        let x = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.5, 1.5, 0.0]];
-        let slopes = slopes(&x, &[[0, 1, 2]]);
-        let value = |p: [f64; 3]| (3.0 * p[0] - 2.0 * p[1]) as f32;
-        assert!((slopes[0].area_mm2 - 1.5).abs() < 1e-6);
-        for (i, due) in [3.0, -2.0, 0.0].into_iter().enumerate() {
-            let found: f32 =
-                (0..3).map(|k| value(x[k]) * slopes[0].corners[k][i]).sum::<f32>() / 1.5;
-            assert!((found - due).abs() < 1e-5, "{i}: {found}");
-        }
     }
 }

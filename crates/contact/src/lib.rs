@@ -37,9 +37,11 @@ mod half_space;
 mod kernels;
 mod ladder;
 mod model;
+mod nearest;
 mod objects;
 mod patch;
 mod second_order;
+mod slopes;
 mod solver;
 mod springs;
 

@@ -2,8 +2,8 @@
 
 use crate::clusters::Clusters;
 use crate::error::ModelError;
-use crate::gaps::{Slopes, slopes};
 use crate::second_order::SecondOrder;
+use crate::slopes::{Slopes, slopes};
 use serde::{Deserialize, Serialize};
 
 /// Version of the file.

@@ -3,6 +3,7 @@
 use crate::error::ContactError;
 use crate::gaps::{Field, Gaps};
 use crate::model::ContactModel;
+use crate::nearest::{Nearest, require_stiffness};
 use papilla_sdf::{Placement, SignedDistance};
 use std::sync::Arc;
 
@@ -64,12 +65,6 @@ impl<'a> From<Gaps<'a>> for Scene<'a> {
     }
 }
 
-/// Refuses a stiffness that is none.
-pub(crate) fn require_stiffness(member: &'static str, value: f64) -> Result<(), ContactError> {
-    let rule = "has to be positive";
-    if value > 0.0 { Ok(()) } else { Err(ContactError::Value { member, value, rule }) }
-}
-
 /// Refuses what cannot be placed.
 pub(crate) fn validate(objects: &[Object]) -> Result<(), ContactError> {
     for (index, object) in objects.iter().enumerate() {
@@ -114,14 +109,6 @@ pub(crate) struct View<'a> {
 pub(crate) enum Things<'a> {
     Objects(&'a [Object]),
     Field(&'a Field),
-}
-
-/// The nearest thing.
-#[derive(Clone, Copy)]
-pub(crate) struct Nearest {
-    pub gap_mm: f64,
-    pub normal: [f64; 3],
-    pub stiffness_mpa_per_mm: f64,
 }
 
 impl View<'_> {

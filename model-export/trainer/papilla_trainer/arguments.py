@@ -18,7 +18,8 @@ From a dataset to a model that the server loads:
 
   python -m papilla_trainer train    --dataset data/s1 --network s1-base8 --out runs/s1-base8
   python -m papilla_trainer export   runs/s1-base8 --out runs/s1-base8/s1-base8.onnx
-  python -m papilla_trainer check    runs/s1-base8/s1-base8.onnx --dataset data/s1 --run runs/s1-base8
+  python -m papilla_trainer check    runs/s1-base8/s1-base8.onnx --dataset data/s1 \\
+                                     --run runs/s1-base8
 
 `COMMAND --help` explains each one."""
 

@@ -69,7 +69,8 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         f"{config.network}: {state.epoch} epochs in {state.seconds:.0f} s, epoch "
         f"{state.best_epoch} chosen\nheld-out presses ({metrics['samples']} samples of "
         f"{metrics['presses']} presses):\n{_table(metrics, metrics_table)}\n"
-        f"next: python -m papilla_trainer export {options.out} --out {options.out}/{config.network}.onnx"
+        f"next: python -m papilla_trainer export {options.out} "
+        f"--out {options.out}/{config.network}.onnx"
     )
     return result, text
 

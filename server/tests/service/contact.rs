@@ -50,7 +50,8 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
     let mut socket = service.socket().await;
     let ready = socket
         .open(hello_3(
-            &json!({"pressure": "vertices", "answer_layout": "vertices", "effects": ["summary"]}),
+            &json!({"pressure": "vertices", "answer_layout": "vertices", "effects": ["summary"],
+                "out_of_range": "flag"}),
         ))
         .await;
     let at = |name: &str| {
@@ -72,7 +73,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
     let summary = papilla_proto::Summary::decode(&payload[at("summary")]).unwrap();
     assert!((summary.force_n / touch.force_n[2] - 1.0).abs() < 0.1, "{summary:?} {touch:?}");
     // The map as ever, behind the touch.
-    let ready = socket.open(hello_3(&json!({}))).await;
+    let ready = socket.open(hello_3(&json!({"out_of_range": "flag"}))).await;
     assert_eq!(ready["sections"][1], json!({"name": "map", "offset": 112, "bytes": 4 * MAP_LEN}));
     socket.send(rows(2, 0, &[deep(0.3)])).await;
     let (_, _, payload) = hear(&mut socket).await;

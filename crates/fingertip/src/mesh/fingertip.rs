@@ -11,12 +11,15 @@ use super::extrude::Cells;
 use super::grading::{Closeness, Contact, Spacing};
 use super::half_cube::{Grid, GridSize};
 use super::nail;
-use super::refined::{self, Refined, Vertices};
+use super::patch::patch_of;
+use super::refined::{self, Refined};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::tissue::Tissue;
 use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use super::patch::Patch;
 
 /// Named mesh densities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -144,31 +147,6 @@ impl Density {
     }
 }
 
-/// The patch that the atlas shows, as indices into the mesh.
-#[derive(Clone, Debug)]
-pub struct Patch {
-    /// Skin nodes that are read: one a vertex, or those that `vertices` names.
-    pub skin: Vec<u32>,
-    /// Interface node straight below each.
-    pub interface: Vec<u32>,
-    /// Triangles of vertices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-    /// Where vertices are not nodes: how they are read off these.
-    pub vertices: Option<Vertices>,
-}
-
-impl Patch {
-    /// Undeformed places of the vertices on the skin and on the interface below, mm.
-    #[must_use]
-    pub fn places_mm(&self, mesh: &Mesh) -> (Vec<[f64; 3]>, Vec<[f64; 3]>) {
-        let at = |nodes: &[u32]| nodes.iter().map(|&n| mesh.nodes[n as usize]).collect();
-        match &self.vertices {
-            Some(v) => (v.skin_mm.clone(), v.interface_mm.clone()),
-            None => (at(&self.skin), at(&self.interface)),
-        }
-    }
-}
-
 /// A meshed fingertip.
 ///
 /// Node sets: `bone`, the bone's outer surface, and `nail`, the skin under the
@@ -187,10 +165,6 @@ pub struct FingertipMesh {
     /// What the atlas shows.
     pub patch: Patch,
 }
-
-/// Fraction of the lateral sides that the atlas shows, from the palmar edge:
-/// three quarters, about 112 degrees from the palmar line.
-pub(super) const PATCH_SIDE_QUARTERS: u32 = 3;
 
 /// Meshes a fingertip; of [`Order::Graded`] with cells as small as `contact` wants them.
 ///
@@ -290,47 +264,6 @@ fn extrude(
         layer(Tissue::Bone, CORTEX, &|s| [bounds[s][3], shape.marrow(grid.parameters[s])]);
     }
     Ok((nodes, tissue))
-}
-
-/// Vertices and triangles of the palmar and lateral part of the grid. Quads are
-/// cut so that the mirror image of the patch is cut alike.
-pub(super) fn patch_of(grid: &Grid, size: GridSize, step: usize, interface_offset: u32) -> Patch {
-    let side_max = size.side * PATCH_SIDE_QUARTERS / 4;
-    let inside = |s: u32| grid.lattice[s as usize][1] <= side_max;
-    let w = step + 1;
-    let mut vertex = vec![u32::MAX; grid.parameters.len()];
-    let mut skin = Vec::new();
-    let mut triangles = Vec::new();
-    for cell in &grid.cells {
-        for r in 0..step {
-            for c in 0..step {
-                let corner = [
-                    cell[r * w + c],
-                    cell[(r + 1) * w + c],
-                    cell[(r + 1) * w + c + 1],
-                    cell[r * w + c + 1],
-                ];
-                if !corner.iter().all(|&s| inside(s)) {
-                    continue;
-                }
-                let v = corner.map(|s| {
-                    if vertex[s as usize] == u32::MAX {
-                        vertex[s as usize] = skin.len() as u32;
-                        skin.push(s);
-                    }
-                    vertex[s as usize]
-                });
-                let left: u32 = corner.iter().map(|&s| grid.lattice[s as usize][0]).sum();
-                if left < 2 * size.across {
-                    triangles.extend([[v[0], v[1], v[2]], [v[0], v[2], v[3]]]);
-                } else {
-                    triangles.extend([[v[0], v[1], v[3]], [v[1], v[2], v[3]]]);
-                }
-            }
-        }
-    }
-    let interface = skin.iter().map(|s| s + interface_offset).collect();
-    Patch { skin, interface, triangles, vertices: None }
 }
 
 #[cfg(test)]

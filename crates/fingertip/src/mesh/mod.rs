@@ -7,6 +7,7 @@ mod half_cube;
 mod leaves;
 mod mirror;
 mod nail;
+mod patch;
 #[cfg(test)]
 mod quality;
 mod refined;

@@ -1,9 +1,9 @@
 //! The skin's grid with cells split for a contact, and how the atlas is read off it.
 
-use super::fingertip::{PATCH_SIDE_QUARTERS, Patch, patch_of};
 use super::grading::Spacing;
 use super::half_cube::{Grid, GridSize};
 use super::leaves::{Leaf, Leaves};
+use super::patch::{PATCH_SIDE_QUARTERS, Patch, Vertices, patch_of};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use papilla_fem::element::shape::{hat_1d, quadratic_1d};
 use papilla_fem::mesh::{HangingNode, Mesh};
@@ -21,53 +21,6 @@ pub(super) struct Refined {
     /// Nodes that hang, and what they follow, as numbers of the grid.
     pub hanging: Vec<HangingNode>,
     leaves: Leaves,
-}
-
-/// Values at the vertices of the atlas from those at nodes.
-#[derive(Clone, Debug)]
-pub struct Vertices {
-    /// Undeformed places on the skin and on the interface below, mm.
-    pub skin_mm: Vec<[f64; 3]>,
-    /// See `skin_mm`.
-    pub interface_mm: Vec<[f64; 3]>,
-    /// Nine of [`Patch::skin`] a vertex, as indices into it.
-    nodes: Vec<[u32; 9]>,
-    /// Their shape functions.
-    quadratic: Vec<[f64; 9]>,
-    /// Functions that are linear between neighbouring nodes.
-    linear: Vec<[f64; 9]>,
-}
-
-impl Vertices {
-    /// SED at the vertices from its values below [`Patch::skin`].
-    #[must_use]
-    pub fn sed(&self, nodal: &[f64]) -> Vec<f64> {
-        self.scalar(&self.quadratic, nodal)
-    }
-
-    /// Pressure, which is linear between nodes, at the vertices from its values at [`Patch::skin`].
-    #[must_use]
-    pub fn pressure(&self, nodal: &[f64]) -> Vec<f64> {
-        self.scalar(&self.linear, nodal)
-    }
-
-    fn scalar(&self, functions: &[[f64; 9]], nodal: &[f64]) -> Vec<f64> {
-        let sum = |(nodes, values): (&[u32; 9], &[f64; 9])| {
-            nodes.iter().zip(values).map(|(&n, w)| w * nodal[n as usize]).sum::<f64>().max(0.0)
-        };
-        self.nodes.iter().zip(functions).map(sum).collect()
-    }
-
-    /// A vector field at the vertices from its values at [`Patch::skin`], or straight below.
-    #[must_use]
-    pub fn vector(&self, nodal: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let sum = |(nodes, values): (&[u32; 9], &[f64; 9])| {
-            let of =
-                |i: usize| nodes.iter().zip(values).map(|(&n, w)| w * nodal[n as usize][i]).sum();
-            [of(0), of(1), of(2)]
-        };
-        self.nodes.iter().zip(&self.quadratic).map(sum).collect()
-    }
 }
 
 impl Refined {

@@ -1,0 +1,17 @@
+//! What a vertex meets first, of whatever a frame describes.
+
+use crate::error::ContactError;
+
+/// The nearest thing.
+#[derive(Clone, Copy)]
+pub(crate) struct Nearest {
+    pub gap_mm: f64,
+    pub normal: [f64; 3],
+    pub stiffness_mpa_per_mm: f64,
+}
+
+/// Refuses a stiffness that is none.
+pub(crate) fn require_stiffness(member: &'static str, value: f64) -> Result<(), ContactError> {
+    let rule = "has to be positive";
+    if value > 0.0 { Ok(()) } else { Err(ContactError::Value { member, value, rule }) }
+}
