@@ -3,7 +3,7 @@
 use crate::answer::{Contact, Effort};
 use crate::error::ContactError;
 use crate::objects::{Scene, View};
-use crate::solver::Solver;
+use crate::solver::{Reached, Solver};
 
 /// Farthest that things travel, mm.
 const TRAVEL_MAX_MM: f64 = 30.0;
@@ -18,13 +18,6 @@ const TRIES_MAX: u32 = 40;
 const ITERATIONS_MAX: u32 = 400;
 /// A travel this near an end of its bracket, as part of it, goes to the middle.
 const MARGIN: f64 = 0.02;
-
-/// Where a net force was met; the next frame starts there.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Reached {
-    travel_mm: f64,
-    slope_n_per_mm: f64,
-}
 
 /// A net force to be met.
 #[derive(Clone, Copy, Debug, PartialEq)]

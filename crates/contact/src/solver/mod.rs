@@ -13,7 +13,6 @@ mod iteration;
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
 use crate::error::ContactError;
-use crate::force_target::Reached;
 use crate::gaps::Field;
 use crate::ladder::Method;
 use crate::model::{ContactModel, Header};
@@ -73,6 +72,13 @@ pub struct Settings {
     pub person: Person,
     /// Whether to find the local stiffness too.
     pub stiffness: bool,
+}
+
+/// Where a net force was met; the next frame starts there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached {
+    pub(crate) travel_mm: f64,
+    pub(crate) slope_n_per_mm: f64,
 }
 
 /// Contact of one finger. All memory is taken at construction.
