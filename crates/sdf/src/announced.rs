@@ -1,6 +1,6 @@
 //! Shapes as a program tells them over a wire: nothing is read from files.
 
-use super::rules::{BadValue, ShapeError, length, require};
+use super::rules::{BadValue, ShapeError, length, parts, placed, require};
 use super::{
     AnyOf, Cylinder, Dots, Grating, HeightField, IndenterSpec, Mesh, MeshError, Placed, Placement,
     Plate, Punch, Ring, SignedDistance, Sphere, Wedge,
@@ -101,8 +101,6 @@ pub struct AnnouncedPart {
 
 /// Most heights of a height map.
 const HEIGHTS_MAX: usize = 65_536;
-/// Most parts of a union.
-const PARTS_MAX: usize = 64;
 
 impl AnnouncedShape {
     /// The shape.
@@ -161,9 +159,7 @@ impl HeightGrid {
 
 impl AnnouncedUnion {
     fn build(&self, field: &str) -> Result<AnyOf, AnnouncedError> {
-        let some = (1..=PARTS_MAX).contains(&self.parts.len());
-        require(some, "parts", &self.parts.len(), "has to list 1 to 64 parts")
-            .map_err(|e| e.under(field))?;
+        parts(self.parts.len()).map_err(|e| e.under(field))?;
         let parts = self.parts.iter().enumerate();
         let parts = parts.map(|(i, part)| part.build(&format!("{field}.parts[{i}]")));
         Ok(AnyOf { parts: parts.collect::<Result<_, AnnouncedError>>()? })
@@ -173,11 +169,8 @@ impl AnnouncedUnion {
 impl AnnouncedPart {
     fn build(&self, field: &str) -> Result<Placed, AnnouncedError> {
         let check = || {
-            let near = self.at_mm.iter().all(|v| v.abs() <= 1000.0);
-            require(near, "at_mm", &self.at_mm, "has to be within 1000 mm")?;
             let turns = [self.pitch_deg, self.roll_deg, self.yaw_deg];
-            let turned = turns.iter().all(|v| v.abs() <= 180.0);
-            require(turned, "pitch_deg", &turns, "roll_deg and yaw_deg have to be within 180")?;
+            placed(self.at_mm, turns)?;
             let nested = matches!(*self.part, AnnouncedShape::Union(_));
             require(!nested, "part", &"union", "has to be no union: list its parts here")?;
             let flat = turns[0] == 0.0 && turns[1] == 0.0;

@@ -68,6 +68,24 @@ pub(super) fn lengths(field: &str, values_mm: &[f64]) -> Result<(), BadValue> {
     require(ok, field, &values_mm, "has to be positive and at most 1000 mm")
 }
 
+/// Most parts of a union.
+const PARTS_MAX: usize = 64;
+
+/// A union of so many parts.
+pub(super) fn parts(count: usize) -> Result<(), BadValue> {
+    require((1..=PARTS_MAX).contains(&count), "parts", &count, "has to list 1 to 64 parts")
+}
+
+/// Where a part of a union lies, mm, and its pitch, roll and yaw, degrees.
+pub(super) fn placed(at_mm: [f64; 3], turns_deg: [f64; 3]) -> Result<(), BadValue> {
+    let near = at_mm.iter().all(|v| v.abs() <= LENGTH_MAX_MM);
+    require(near, "at_mm", &at_mm, "has to be within 1000 mm")?;
+    for (field, turn) in ["pitch_deg", "roll_deg", "yaw_deg"].into_iter().zip(turns_deg) {
+        require(turn.abs() <= 180.0, field, &turn, "has to be within -180 to 180")?;
+    }
+    Ok(())
+}
+
 /// A radius that rounds edges has to be positive, or the normal would jump
 /// there, and leave the faces between them.
 pub(super) fn rounding(

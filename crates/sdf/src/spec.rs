@@ -1,6 +1,6 @@
 //! Indenters in scenes and campaigns.
 
-use super::rules::{BadValue, ShapeError, require};
+use super::rules::{BadValue, ShapeError, parts, placed, require};
 use super::{
     AnyOf, Cylinder, Dots, Grating, Heightmap, Placed, Placement, Plate, Punch, Ring, RoundedPlate,
     SignedDistance, Sphere, Wedge,
@@ -174,13 +174,9 @@ pub struct Part {
     pub yaw_deg: f64,
 }
 
-/// Most parts of a union.
-const PARTS_MAX: usize = 64;
-
 impl Union {
     fn validate(&self) -> Result<(), BadValue> {
-        let some = (1..=PARTS_MAX).contains(&self.parts.len());
-        require(some, "parts", &self.parts.len(), "has to list 1 to 64 parts")?;
+        parts(self.parts.len())?;
         for (i, part) in self.parts.iter().enumerate() {
             part.validate().map_err(|e| e.under(&format!("parts[{i}]")))?;
         }
@@ -203,13 +199,7 @@ impl Union {
 
 impl Part {
     fn validate(&self) -> Result<(), BadValue> {
-        let near = self.at_mm.iter().all(|v| v.abs() <= 1000.0);
-        require(near, "at_mm", &self.at_mm, "has to be within 1000 mm")?;
-        let angles =
-            [("pitch_deg", self.pitch_deg), ("roll_deg", self.roll_deg), ("yaw_deg", self.yaw_deg)];
-        for (field, angle) in angles {
-            require(angle.abs() <= 180.0, field, &angle, "has to be within -180 to 180")?;
-        }
+        placed(self.at_mm, [self.pitch_deg, self.roll_deg, self.yaw_deg])?;
         let level = self.pitch_deg == 0.0 && self.roll_deg == 0.0;
         require(
             level || !matches!(self.part, IndenterSpec::Heightmap(_)),

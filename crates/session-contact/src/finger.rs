@@ -118,9 +118,21 @@ impl Finger {
 
     /// Stiffness of the tissue over that of the reference finger: the network is asked about
     /// pressure over it, and SED grows with it.
-    #[must_use]
-    pub fn stiffness(&self) -> f32 {
+    fn stiffness(&self) -> f32 {
         self.person.stiffness as f32
+    }
+
+    /// Turns a map of the finger of reference stiffness (Pa or J/m3) into this person's.
+    pub fn to_person(&self, map: &mut [f32]) {
+        scale(map, self.stiffness());
+    }
+
+    /// Turns this person's pressure (Pa) into that on the finger of reference stiffness; returns
+    /// the factor.
+    pub fn to_reference(&self, map_pa: &mut [f32]) -> f32 {
+        let part = 1.0 / self.stiffness();
+        scale(map_pa, part);
+        part
     }
 
     /// Reads a frame whose header fits, and finds what presses. Pressure on a finger of reference
@@ -187,10 +199,7 @@ impl Finger {
             } else {
                 map_pa.fill(0.0);
             }
-            let part = 1.0 / self.stiffness();
-            if part.to_bits() != 1.0f32.to_bits() {
-                map_pa.iter_mut().for_each(|p| *p *= part);
-            }
+            self.to_reference(map_pa);
         }
         let is_solved = self.form.input != Input::Pressure;
         let told = |on: bool, flag: u8| if on && is_solved { flag } else { 0 };
@@ -291,6 +300,13 @@ impl Finger {
             [x, y, z, force, ..] => net_force([*x, *y, *z, *force]),
             _ => Ok(None),
         }
+    }
+}
+
+/// Multiplies all values, unless by one.
+fn scale(values: &mut [f32], factor: f32) {
+    if factor.to_bits() != 1.0f32.to_bits() {
+        values.iter_mut().for_each(|value| *value *= factor);
     }
 }
 

@@ -28,14 +28,10 @@ impl HangingNode {
         std::array::from_fn(|i| (0..3).map(|k| Self::WEIGHTS[k] * at[k][i]).sum())
     }
 
-    /// Moves what acts on the node to its masters: nothing is left there.
-    pub(crate) fn condense(&self, force_n: &mut [f64]) {
-        for i in 0..3 {
-            let own = std::mem::take(&mut force_n[3 * self.node as usize + i]);
-            for (&m, w) in self.masters.iter().zip(Self::WEIGHTS) {
-                force_n[3 * m as usize + i] += w * own;
-            }
-        }
+    /// The same in another numbering of nodes.
+    #[must_use]
+    pub fn renumbered(&self, number: impl Fn(u32) -> u32) -> Self {
+        Self { node: number(self.node), masters: self.masters.map(number) }
     }
 }
 
@@ -46,8 +42,8 @@ pub(crate) struct HangingInElement {
     local: usize,
     /// Local number and weight.
     own: [(usize, f64); 2],
-    /// Weight of the master that takes the node's place.
-    other: f64,
+    /// The master that takes the node's place, and its weight.
+    other: (u32, f64),
 }
 
 impl HangingInElement {
@@ -62,14 +58,14 @@ impl HangingInElement {
                 for (m, w) in self.own {
                     row[3 * m + i] += w * v;
                 }
-                row[h] = self.other * v;
+                row[h] = self.other.1 * v;
             }
             for c in 0..size {
                 let v = dense[h * size + c];
                 for (m, w) in self.own {
                     dense[(3 * m + i) * size + c] += w * v;
                 }
-                dense[h * size + c] = self.other * v;
+                dense[h * size + c] = self.other.1 * v;
             }
         }
     }
@@ -83,16 +79,34 @@ impl Mesh {
         Some(&self.hanging[at])
     }
 
+    /// Gives nodes that hang what a nodal vector field has at them.
+    pub(crate) fn follow(&self, field: &mut [[f64; 3]]) {
+        for h in &self.hanging {
+            field[h.node as usize] = h.of(|n| field[n as usize]);
+        }
+    }
+
+    /// Moves what acts on nodes that hang (three components a node) to their masters: nothing is
+    /// left there.
+    pub(crate) fn condense(&self, force_n: &mut [f64]) {
+        for h in &self.hanging {
+            for i in 0..3 {
+                let own = std::mem::take(&mut force_n[3 * h.node as usize + i]);
+                for (&m, w) in h.masters.iter().zip(HangingNode::WEIGHTS) {
+                    force_n[3 * m as usize + i] += w * own;
+                }
+            }
+        }
+    }
+
     /// Nodes whose unknowns an element couples: its own, but for one that hangs the master that
     /// the element does not have.
     pub(crate) fn coupled_nodes(&self, block: &Block, element: usize) -> Vec<u32> {
-        let own = block.element(element);
-        own.iter()
-            .map(|&n| match self.hanging_node(n) {
-                Some(h) => h.masters.into_iter().find(|m| !own.contains(m)).unwrap_or(n),
-                None => n,
-            })
-            .collect()
+        let mut nodes = block.element(element).to_vec();
+        for h in self.hanging_in_element(block, element) {
+            nodes[h.local] = h.other.0;
+        }
+        nodes
     }
 
     /// How nodes of an element hang.
@@ -105,11 +119,11 @@ impl Mesh {
         let place = |n: u32| own.iter().position(|&o| o == n);
         let in_element = |(local, &node): (usize, &u32)| {
             let hanging = self.hanging_node(node)?;
-            let (mut of, mut other) = (Vec::new(), 0.0);
+            let (mut of, mut other) = (Vec::new(), (node, 0.0));
             for (&m, w) in hanging.masters.iter().zip(HangingNode::WEIGHTS) {
                 match place(m) {
                     Some(at) => of.push((at, w)),
-                    None => other = w,
+                    None => other = (m, w),
                 }
             }
             Some(HangingInElement { local, own: [of[0], of[1]], other })

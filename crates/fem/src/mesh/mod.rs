@@ -117,8 +117,7 @@ impl Mesh {
         }
         self.hanging.retain(|h| number[h.node as usize] != u32::MAX);
         for h in &mut self.hanging {
-            h.node = number[h.node as usize];
-            h.masters = h.masters.map(|m| number[m as usize]);
+            *h = h.renumbered(|n| number[n as usize]);
         }
         for set in self.node_sets.values_mut() {
             set.retain(|n| number[*n as usize] != u32::MAX);

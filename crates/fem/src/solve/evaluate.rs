@@ -91,7 +91,7 @@ pub fn evaluate_body(
             reference += force * force;
         }
     }
-    problem.mesh.hanging.iter().for_each(|h| h.condense(&mut out.residual_n));
+    problem.mesh.condense(&mut out.residual_n);
     out.mixed_norm = lag.norm_n(problem, &out.residual_n);
     let mut norm = 0.0;
     for (r, &e) in out.residual_n.iter().zip(&problem.system.dofs.of_dof) {
@@ -206,8 +206,7 @@ fn contact(
         }
         square += out.add_contact_force(support, c.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            let free = problem.mesh.free_support(support.nodes, support.values);
-            problem.system.add_point(t, &free, &c.stiffness);
+            problem.add_point(t, support, &c.stiffness);
             out.curvature.extend(c.curvature.map(|k| (at, k)));
         }
     }
@@ -239,8 +238,7 @@ fn add_friction(
         out.potential_mj += f.energy_mj;
         square += out.add_contact_force(support, f.force_n);
         if let Some(t) = tangent.as_deref_mut() {
-            let free = problem.mesh.free_support(support.nodes, support.values);
-            problem.system.add_point(t, &free, &f.stiffness);
+            problem.add_point(t, support, &f.stiffness);
         }
     }
     square

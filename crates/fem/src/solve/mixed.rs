@@ -80,7 +80,7 @@ impl Lag {
     /// Moves what acts on nodes that hang to those that they follow.
     pub(super) fn condense(&mut self, problem: &Problem) {
         if !self.force_n.is_empty() {
-            problem.mesh.hanging.iter().for_each(|h| h.condense(&mut self.force_n));
+            problem.mesh.condense(&mut self.force_n);
         }
     }
 

@@ -38,8 +38,6 @@ impl Solver<'_> {
         for &(dof, value) in &self.loading.prescribed_mm {
             u[dof / 3][dof % 3] = fraction * value;
         }
-        for h in &self.newton.problem.mesh.hanging {
-            u[h.node as usize] = h.of(|n| u[n as usize]);
-        }
+        self.newton.problem.mesh.follow(u);
     }
 }

@@ -1,9 +1,9 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
 use super::history_layout::HistoryLayout;
-use crate::contact::{ContactRule, ContactSurface};
+use crate::contact::{ContactRule, ContactSurface, Support};
 use crate::element::{BlockGeometry, Materials, ShapeError};
-use crate::linear::{SymbolicError, SymbolicSystem};
+use crate::linear::{SymbolicError, SymbolicSystem, SymmetricMatrix};
 use crate::mesh::Mesh;
 
 /// A body ready to be loaded. Shared by every indentation of a campaign.
@@ -99,6 +99,17 @@ impl Problem {
         };
         let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
         Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
+    }
+
+    /// Adds `N_a N_b stiffness` (N/mm) between the unknowns that carry a point of the surface.
+    pub(super) fn add_point(
+        &self,
+        tangent: &mut SymmetricMatrix,
+        support: Support<'_>,
+        stiffness: &[[f64; 3]; 3],
+    ) {
+        let free = self.mesh.free_support(support.nodes, support.values);
+        self.system.add_point(tangent, &free, stiffness);
     }
 
     /// Contact penalty from material and mesh, MPa/mm: [`ContactRule::penalty_factor`] times the

@@ -143,7 +143,7 @@ pub(super) fn hang(mesh: &mut Mesh, hanging: &[HangingNode], n: usize) {
     for layer in 0..layers {
         let of_layer = |s: u32| (layer * n) as u32 + s;
         for h in hanging {
-            let own = HangingNode { node: of_layer(h.node), masters: h.masters.map(of_layer) };
+            let own = h.renumbered(of_layer);
             mesh.nodes[own.node as usize] = own.of(|m| mesh.nodes[m as usize]);
             mesh.hanging.push(own);
         }

@@ -197,9 +197,9 @@ impl Worker {
         let start = Instant::now();
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
         if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
-            self.scale_up(finger.stiffness());
+            finger.to_person(&mut self.pressure_pa);
+            finger.to_person(&mut self.sed_j_per_m3);
         }
-        let tier = &self.catalogue.tiers[job.tier];
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
             buffer.resize(headroom, 0);
@@ -239,8 +239,7 @@ impl Worker {
     ) -> Result<(MapSummary, PressureRange), Problem> {
         if finger.reads_windows() {
             let (summary, range) = self.decode(job, payload)?;
-            let part = 1.0 / finger.stiffness();
-            scale(&mut self.pressure_pa, part);
+            let part = finger.to_reference(&mut self.pressure_pa);
             return Ok((MapSummary { peak_pa: summary.peak_pa * part }, range));
         }
         let Input::Window { sample_type, scale, .. } = job.input else {
@@ -254,12 +253,6 @@ impl Worker {
             range.check(&self.pressure_pa).map_err(problem::of_map)?;
         }
         Ok((MapSummary { peak_pa: taken.peak_pa }, range))
-    }
-
-    /// From the finger of reference stiffness to one that is so many times as stiff.
-    fn scale_up(&mut self, stiffness: f32) {
-        scale(&mut self.pressure_pa, stiffness);
-        scale(&mut self.sed_j_per_m3, stiffness);
     }
 
     fn range(&self, job: &Job) -> PressureRange {
@@ -286,13 +279,6 @@ impl Worker {
 /// One job of a session is with a thread at a time, so nobody waits here.
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Multiplies all values, unless by one.
-fn scale(values: &mut [f32], factor: f32) {
-    if factor.to_bits() != 1.0f32.to_bits() {
-        values.iter_mut().for_each(|value| *value *= factor);
-    }
 }
 
 /// How far a job has come.

@@ -20,14 +20,14 @@ const SHARE_TO_CLIMB: f64 = 0.8;
 
 /// How the frames of a session fare: counted where answers are sent.
 #[derive(Debug, Default)]
-pub(super) struct Fared {
+pub(super) struct FrameCounts {
     /// The tier that the counts are of: answers of the one before do not count.
     tier: AtomicUsize,
     late: AtomicU32,
     good: AtomicU32,
 }
 
-impl Fared {
+impl FrameCounts {
     /// A frame of this tier was late.
     pub(super) fn late(&self, tier: usize) {
         if tier == self.tier.load(Ordering::Relaxed) {
@@ -74,22 +74,22 @@ impl Budget {
         &mut self,
         catalogue: &Catalogue,
         tier: usize,
-        fared: &Fared,
+        counts: &FrameCounts,
         now: Instant,
     ) -> Option<usize> {
         let Some(changed) = self.changed else {
             self.changed = Some(now);
-            fared.begin(tier);
+            counts.begin(tier);
             return None;
         };
         let since = now.saturating_duration_since(changed);
-        let next = if fared.late.load(Ordering::Relaxed) >= LATE_MOST {
+        let next = if counts.late.load(Ordering::Relaxed) >= LATE_MOST {
             let faster = self.faster(catalogue, tier);
             if faster.is_none() {
-                fared.begin(tier);
+                counts.begin(tier);
             }
             faster
-        } else if since >= self.try_after && fared.good.load(Ordering::Relaxed) >= GOOD_LEAST {
+        } else if since >= self.try_after && counts.good.load(Ordering::Relaxed) >= GOOD_LEAST {
             self.more_accurate(catalogue, tier)
         } else {
             None
@@ -102,7 +102,7 @@ impl Budget {
             (false, _) => self.try_after,
         };
         (self.changed, self.has_climbed) = (Some(now), climbs);
-        fared.begin(next);
+        counts.begin(next);
         Some(next)
     }
 

@@ -139,7 +139,7 @@ impl Session {
     fn keep_budget(&mut self, connection: &Connection, now: Instant) {
         let Some(budget) = &mut self.terms.budget else { return };
         let (catalogue, old) = (connection.app.catalogue(), self.terms.tier);
-        if let Some(place) = budget.next(&catalogue, old, &connection.reply.fared, now) {
+        if let Some(place) = budget.next(&catalogue, old, &connection.reply.counts, now) {
             let (from, to) = (&catalogue.tiers[old], &catalogue.tiers[place]);
             tracing::debug!(session = self.number, from = from.name, to = to.name, "another tier");
             self.terms.move_to(place, to);

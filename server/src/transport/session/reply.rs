@@ -16,7 +16,7 @@ use papilla_proto::{
 };
 
 use super::{
-    budget::Fared,
+    budget::FrameCounts,
     outbox::Outbox,
     wire::{self, OUT_HEAD_MAX, opcode},
 };
@@ -39,7 +39,7 @@ pub(super) struct Reply {
     is_awaited: AtomicBool,
     is_over: AtomicBool,
     /// How the frames fare by their deadlines.
-    pub(super) fared: Fared,
+    pub(super) counts: FrameCounts,
     app: Arc<App>,
 }
 
@@ -50,7 +50,7 @@ impl Reply {
             outstanding: AtomicUsize::new(0),
             is_awaited: AtomicBool::new(false),
             is_over: AtomicBool::new(false),
-            fared: Fared::default(),
+            counts: FrameCounts::default(),
             app,
         }
     }
@@ -109,7 +109,7 @@ impl Reply {
         received: Instant,
     ) {
         if status == FrameStatus::Late {
-            self.fared.late(tier);
+            self.counts.late(tier);
         }
         let total_us = us(received.elapsed());
         let head = numbered(header.answer(status, total_us, 1.0), tier).encode();
@@ -151,7 +151,7 @@ impl Reply {
         }
         // Counted before it is sent: whoever has the answer finds it in the metrics.
         self.app.metrics.of(Transport::Session).ok.inc();
-        self.fared.good(done.tier);
+        self.counts.good(done.tier);
         let timers = self.app.metrics.tier(done.tier);
         let start = Instant::now();
         self.send(bytes, &head);

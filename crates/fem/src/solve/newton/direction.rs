@@ -5,7 +5,6 @@
 //! when that takes too many iterations.
 
 use super::{Fixed, Held, Newton};
-use crate::contact::Support;
 use crate::element::Dilatation;
 use crate::linear::{DofMap, FactorKind, FactorMemory, NumericFactor, conjugate_gradient};
 use crate::solve::loading::Loading;
@@ -98,9 +97,7 @@ impl Newton<'_> {
         let Some(surface) = &self.problem.contact else { return any };
         let points = surface.points(loading.contact());
         for (point, k) in self.current.curvature.drain(..) {
-            let Support { nodes, values } = points.support(point);
-            let free = self.problem.mesh.free_support(nodes, values);
-            self.problem.system.add_point(&mut self.tangent, &free, &k);
+            self.problem.add_point(&mut self.tangent, points.support(point), &k);
         }
         any
     }

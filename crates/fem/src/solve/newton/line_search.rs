@@ -20,9 +20,7 @@ impl Newton<'_> {
                 }
             }
         }
-        for h in &self.problem.mesh.hanging {
-            self.trial_u[h.node as usize] = h.of(|n| self.trial_u[n as usize]);
-        }
+        self.problem.mesh.follow(&mut self.trial_u);
         self.trial_independent.clear();
         for (c, n) in independent.iter().zip(&self.next) {
             self.trial_independent.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));

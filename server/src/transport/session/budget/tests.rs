@@ -28,7 +28,7 @@ const FRAME: Duration = Duration::from_millis(11);
 struct Simulated {
     catalogue: Catalogue,
     budget: Budget,
-    fared: Fared,
+    counts: FrameCounts,
     tier: usize,
     now: Instant,
 }
@@ -43,21 +43,21 @@ impl Simulated {
         let catalogue = testing::catalogue(TIERS.map(tier).into());
         let tier = catalogue.choose(Some(BUDGET_US), &[]).unwrap();
         let budget = Budget::new(BUDGET_US, Vec::new());
-        Self { catalogue, budget, fared: Fared::default(), tier, now: Instant::now() }
+        Self { catalogue, budget, counts: FrameCounts::default(), tier, now: Instant::now() }
     }
 
     /// One frame; whether it was late.
     fn frame(&mut self, slower: f64) -> bool {
         self.now += FRAME;
-        let next = self.budget.next(&self.catalogue, self.tier, &self.fared, self.now);
+        let next = self.budget.next(&self.catalogue, self.tier, &self.counts, self.now);
         self.tier = next.unwrap_or(self.tier);
         let us = (slower * TIERS[self.tier].1 as f64) as u64;
         self.catalogue.tiers[self.tier].latency.learn(Duration::from_micros(us));
         let is_late = us + self.catalogue.overhead.us() > BUDGET_US.into();
         if is_late {
-            self.fared.late(self.tier);
+            self.counts.late(self.tier);
         } else {
-            self.fared.good(self.tier);
+            self.counts.good(self.tier);
         }
         is_late
     }
