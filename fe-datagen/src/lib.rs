@@ -29,7 +29,7 @@
 //! )?;
 //! let (atlas, folder) = (testing::atlas(4), tempfile::tempdir()?);
 //! let solver = || Ok(Formula(atlas.vertex_count()));
-//! let report = run(&spec, &atlas, solver, folder.path(), &RunOptions::default())?;
+//! let report = run(&spec, (&atlas, None), solver, folder.path(), &RunOptions::default())?;
 //! assert_eq!((report.is_complete(), report.samples), (true, 4));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

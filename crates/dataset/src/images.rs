@@ -1,7 +1,7 @@
 //! The surface-pressure study's image pairs: 224 x 224 gray PNG of pressure and SED.
 
-use super::{Dataset, DatasetError, Split};
-use papilla_atlas::{MAP_LEN, Patch, Raster};
+use super::{Dataset, DatasetError, MapReader, Maps, Split};
+use papilla_atlas::{MAP_LEN, Patch};
 use papilla_output::map_image::{Bits, MapScale, MapView, Quantity};
 use papilla_output::{OutputError, atomic};
 use serde::Serialize;
@@ -47,19 +47,19 @@ pub struct ImagesReport {
     pub folder: PathBuf,
 }
 
-/// Rasterises one quantity of a dataset with one scale for all samples.
-struct Painter {
-    raster: Raster,
+/// Draws one quantity of a dataset with one scale for all samples.
+struct Painter<'a> {
+    mask: &'a [bool],
     quantity: Quantity,
     white: f64,
     mm_per_px: f64,
     pixels: Vec<f32>,
 }
 
-impl Painter {
-    fn new(dataset: &Dataset, patch: Patch, quantity: Quantity, max: f64) -> Self {
+impl<'a> Painter<'a> {
+    fn new(dataset: &Dataset, mask: &'a [bool], quantity: Quantity, max: f64) -> Self {
         Self {
-            raster: Raster::new(dataset.atlas(), patch),
+            mask,
             quantity,
             // A dataset of zeros has no maximum to normalise by.
             white: if max > 0.0 { max } else { 1.0 },
@@ -72,16 +72,20 @@ impl Painter {
         MapView {
             quantity: self.quantity,
             pixels: &self.pixels,
-            mask: self.raster.mask(),
+            mask: self.mask,
             mm_per_px: self.mm_per_px,
             white: self.white,
         }
     }
 
-    fn write(&mut self, values: &[f32], bits: Bits, path: &Path) -> Result<(), DatasetError> {
-        self.raster
-            .rasterise(values, &mut self.pixels)
-            .map_err(|source| DatasetError::Atlas { path: path.to_path_buf(), source })?;
+    fn write(
+        &mut self,
+        reader: &MapReader<'_>,
+        values: &[f32],
+        bits: Bits,
+        path: &Path,
+    ) -> Result<(), DatasetError> {
+        reader.draw(values, &mut self.pixels);
         // Not synced one by one: index.json, written last, says all are there.
         let bytes = self.view().encode_gray(bits)?;
         Ok(std::fs::write(path, bytes).map_err(OutputError::io("write", path))?)
@@ -102,13 +106,15 @@ pub fn images(
     let dataset = Dataset::open(folder)?;
     let manifest = dataset.manifest();
     atomic::create_folder(out)?;
-    let mut pressure =
-        Painter::new(&dataset, Patch::Skin, Quantity::Pressure, manifest.pressure_max_pa);
-    let mut sed =
-        Painter::new(&dataset, Patch::Interface, Quantity::Sed, manifest.sed_max_j_per_m3);
+    let maps = Maps::of(&dataset)?;
+    let [skin, interface] = Patch::ALL.map(|patch| maps.raster(patch).mask());
+    let mut pressure = Painter::new(&dataset, skin, Quantity::Pressure, manifest.pressure_max_pa);
+    let mut sed = Painter::new(&dataset, interface, Quantity::Sed, manifest.sed_max_j_per_m3);
     let mut samples = Vec::new();
     for press in &manifest.presses {
         let shard = dataset.shard(press)?;
+        let on_skin = maps.reader(Patch::Skin, shard.cells.as_ref())?;
+        let below = maps.reader(Patch::Interface, shard.cells.as_ref())?;
         for sample in 0..shard.len() {
             let depth_mm = shard.depth_mm[sample];
             let name =
@@ -121,9 +127,9 @@ pub fn images(
                 sed: name(Quantity::Sed),
             };
             let values = shard.pressure_pa.row(sample).to_vec();
-            pressure.write(&values, options.bits, &out.join(&entry.pressure))?;
+            pressure.write(&on_skin, &values, options.bits, &out.join(&entry.pressure))?;
             let values = shard.sed_dermis_j_per_m3.row(sample).to_vec();
-            sed.write(&values, options.bits, &out.join(&entry.sed))?;
+            sed.write(&below, &values, options.bits, &out.join(&entry.sed))?;
             samples.push(entry);
         }
     }

@@ -24,6 +24,7 @@ mod error;
 mod images;
 mod limits;
 mod manifest;
+mod maps;
 mod reader;
 mod record;
 mod replay;
@@ -41,14 +42,17 @@ pub use limits::{
     BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIVE_MAX, fault, worst_checks,
 };
 pub use manifest::{
-    DroppedSample, FORMAT, FailedIndentation, IndentationEntry, Manifest, Split, Splits, Units,
-    dataset_sha256, sha256_hex,
+    DroppedSample, FORMAT, FORMATS, FailedIndentation, IndentationEntry, Manifest, Split, Splits,
+    Units, dataset_sha256, sha256_hex,
 };
+pub use maps::{MapReader, Maps};
 pub use reader::{Dataset, VerifyReport, verify};
-pub use record::{Checks, Pose, Sample};
+pub use record::{Cells, Checks, Pose, Sample};
 pub use replay::replay;
 pub use schema::{ArraySpec, FormatSchema, RASTER_ARRAYS, SHARD_ARRAYS, schema};
-pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
+pub use shard::{
+    CHECK_COLUMNS, Encoded, Shard, TriangleOnLattice, encode, raster_npz, write_atlas,
+};
 pub use sheet::contact_sheet;
 pub use stats::{DepthStats, Range, StatsReport, stats};
 

@@ -40,14 +40,15 @@ pub fn fault(record: &Sample, vertex_count: usize) -> Option<String> {
     if let Some(force) = record.force_n.iter().find(|f| !f.is_finite()) {
         return Some(format!("a component of force_n is {force}"));
     }
+    let values_due = record.cells.as_ref().map_or(vertex_count, |c| c.node_count());
     let fields = [
         ("pressure_mpa", &record.pressure_mpa),
         ("sed_dermis_mpa", &record.sed_dermis_mpa),
         ("sed_epidermis_mpa", &record.sed_epidermis_mpa),
     ];
     for (name, values) in fields {
-        if values.len() != vertex_count {
-            return Some(format!("{name} has {} values, not {vertex_count}", values.len()));
+        if values.len() != values_due {
+            return Some(format!("{name} has {} values, not {values_due}", values.len()));
         }
         let bad = values.iter().position(|v| !(v.is_finite() && *v >= 0.0));
         if let Some(vertex) = bad {
@@ -58,9 +59,9 @@ pub fn fault(record: &Sample, vertex_count: usize) -> Option<String> {
         }
     }
     let shear = record.shear_mpa.as_flattened();
-    if !shear.is_empty() && shear.len() != 3 * vertex_count {
+    if !shear.is_empty() && shear.len() != 3 * values_due {
         let found = record.shear_mpa.len();
-        return Some(format!("shear_mpa has {found} values, not {vertex_count}"));
+        return Some(format!("shear_mpa has {found} values, not {values_due}"));
     }
     if let Some(vertex) = shear.iter().position(|v| !v.is_finite()) {
         return Some(format!("shear_mpa is {} at vertex {}", shear[vertex], vertex / 3));

@@ -4,9 +4,13 @@ use crate::record::{Checks, Pose};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::ops::RangeInclusive;
 
 /// Format number of manifests written here.
-pub const FORMAT: u32 = 1;
+pub const FORMAT: u32 = 2;
+
+/// Format numbers that are read: a dataset of 1 has all values at the atlas' vertices.
+pub const FORMATS: RangeInclusive<u32> = 1..=FORMAT;
 
 /// The manifest. Its bytes depend on campaign and shards alone: no time, no
 /// host, no thread count.

@@ -1,7 +1,9 @@
 //! Opening a dataset, and making sure that it is what it says.
 
 use super::shard::{Shard, raster_npz};
-use super::{DatasetError, FORMAT, IndentationEntry, Manifest, dataset_sha256, sha256_hex};
+use super::{
+    DatasetError, FORMAT, FORMATS, IndentationEntry, Manifest, dataset_sha256, sha256_hex,
+};
 use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, Patch};
 use papilla_output::npz::NpzArrays;
@@ -28,7 +30,7 @@ impl Dataset {
         // The format first: another one may have other fields.
         let raw: serde_json::Value = atomic::read_json(&path)?;
         let found = raw.get("format").and_then(serde_json::Value::as_u64).unwrap_or(0) as u32;
-        if found != FORMAT {
+        if !FORMATS.contains(&found) {
             return Err(DatasetError::Format { path, found, expected: FORMAT });
         }
         let manifest: Manifest =
@@ -165,7 +167,7 @@ fn verify_values(path: &Path, manifest: &Manifest, shard: &Shard) -> Result<(), 
 
 fn verify_raster(path: &Path, atlas: &Atlas) -> Result<(), DatasetError> {
     let stored = std::fs::read(path).map_err(OutputError::io("read", path))?;
-    let fresh = raster_npz(atlas)?;
+    let fresh = raster_npz(atlas, None)?;
     let (mut a, mut b) = (NpzArrays::new(path, &stored)?, NpzArrays::new(path, &fresh)?);
     for patch in Patch::ALL.map(Patch::name) {
         let (pixel, vertex, weight) =

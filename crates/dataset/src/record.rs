@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Self-checks of one equilibrium; dimensionless unless the name says otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,11 +32,32 @@ pub struct Checks {
     pub cg_iterations: u32,
 }
 
-/// One equilibrium on its way into a shard: values at the atlas' vertices.
+/// Cells of the skin on a fixed lattice ([`crate`]), with nodes at which a field is known:
+/// within a cell SED is the quadratic through its nine nodes, pressure linear between
+/// neighbouring ones.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Cells {
+    /// Side of the half cube, first row, first column, rows, columns.
+    pub place: Vec<[u32; 5]>,
+    /// Nodes row by row.
+    pub nodes: Vec<[u32; 9]>,
+}
+
+impl Cells {
+    /// Nodes S: one more than the greatest number.
+    #[must_use]
+    pub fn node_count(&self) -> usize {
+        self.nodes.iter().flatten().max().map_or(0, |n| *n as usize + 1)
+    }
+}
+
+/// One equilibrium on its way into a shard: values at the atlas' vertices, or at nodes of cells.
 ///
 /// MPa = N/mm2 = mJ/mm3, as finite elements have them; a shard stores Pa and J/m3.
 #[derive(Clone, Debug)]
 pub struct Sample {
+    /// Where values are known; `None`: at the atlas' vertices. Below, V is their number.
+    pub cells: Option<Arc<Cells>>,
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,
     /// Force of the plate on the finger in the finger's frame, N.

@@ -11,7 +11,8 @@ pub struct ArraySpec {
     pub name: &'static str,
     /// `f32`, `f64` or `u32`, little-endian.
     pub dtype: &'static str,
-    /// Length of each axis: D samples, V vertices, C check columns, N pixels, or a number.
+    /// Length of each axis: D samples, V vertices (or nodes, where there are cells), L cells, C check
+    /// columns, N pixels, or a number.
     pub shape: &'static [&'static str],
     /// Unit, `1` for none.
     pub unit: &'static str,
@@ -29,25 +30,31 @@ const fn array(
 }
 
 /// Arrays of a shard.
-pub const SHARD_ARRAYS: [ArraySpec; 8] = [
+pub const SHARD_ARRAYS: [ArraySpec; 10] = [
     array("pressure_pa", "f32", &["D", "V"], "Pa"),
     array("sed_dermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
     array("sed_epidermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
     array("depth_mm", "f32", &["D"], "mm"),
     array("force_n", "f32", &["D", "3"], "N"),
     array("checks", "f64", &["D", "C"], "1"),
+    ArraySpec { optional: true, ..array("cell_place", "u32", &["L", "5"], "1") },
+    ArraySpec { optional: true, ..array("cell_nodes", "u32", &["L", "9"], "1") },
     ArraySpec { optional: true, ..array("shear_pa", "f32", &["D", "V", "3"], "Pa") },
     ArraySpec { optional: true, ..array("outside_calibration", "f32", &["D"], "1") },
 ];
 
 /// Arrays of `raster.npz`.
-pub const RASTER_ARRAYS: [ArraySpec; 6] = [
+pub const RASTER_ARRAYS: [ArraySpec; 10] = [
     array("skin_pixel", "u32", &["N"], "1"),
     array("skin_vertex", "u32", &["N", "3"], "1"),
     array("skin_weight", "f32", &["N", "3"], "1"),
     array("interface_pixel", "u32", &["N"], "1"),
     array("interface_vertex", "u32", &["N", "3"], "1"),
     array("interface_weight", "f32", &["N", "3"], "1"),
+    ArraySpec { optional: true, ..array("skin_side", "u32", &["N"], "1") },
+    ArraySpec { optional: true, ..array("skin_place", "f32", &["N", "2"], "1") },
+    ArraySpec { optional: true, ..array("interface_side", "u32", &["N"], "1") },
+    ArraySpec { optional: true, ..array("interface_place", "f32", &["N", "2"], "1") },
 ];
 
 /// The whole format; `docs/reference/dataset.schema.json` is its JSON.
@@ -58,9 +65,9 @@ pub struct FormatSchema {
     /// JSON schema of `manifest.json`.
     pub manifest: Schema,
     /// Arrays of each shard.
-    pub shard: [ArraySpec; 8],
+    pub shard: [ArraySpec; 10],
     /// Arrays of `raster.npz`.
-    pub raster: [ArraySpec; 6],
+    pub raster: [ArraySpec; 10],
 }
 
 /// The format, from the types and tables that write it.
@@ -73,12 +80,13 @@ pub fn schema() -> FormatSchema {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{atlas, record};
-    use crate::{CHECK_COLUMNS, Sample, encode, raster_npz};
+    use crate::testing::{atlas, record, two_cells};
+    use crate::{CHECK_COLUMNS, Sample, TriangleOnLattice, encode, raster_npz};
     use ndarray_npy::NpzReader;
     use std::collections::BTreeMap;
     use std::io::{Cursor, Read as _};
     use std::path::Path;
+    use std::sync::Arc;
 
     /// Name, type and shape of each array, from the archive's own headers.
     fn headers(archive: &[u8]) -> BTreeMap<String, (String, Vec<usize>)> {
@@ -117,11 +125,12 @@ mod tests {
 
     #[test]
     fn archives_hold_the_arrays_that_are_declared() {
-        let (d, v) = (2, 5);
+        let (d, v) = (2, two_cells().node_count());
         let samples: Vec<Sample> = [0.5, 1.0]
             .map(|depth| {
                 let shear_mpa = vec![[0.0, 0.0, 0.1]; v];
-                Sample { shear_mpa, outside_calibration: 0.1, ..record(depth, v) }
+                let cells = Some(Arc::new(two_cells()));
+                Sample { cells, shear_mpa, outside_calibration: 0.1, ..record(depth, v) }
             })
             .into();
         let whole = encode(&samples, v).unwrap().unwrap();
@@ -135,7 +144,10 @@ mod tests {
         let least = encode(&[record(0.5, v), record(1.0, v)], v).unwrap().unwrap();
         let always: Vec<_> = SHARD_ARRAYS.into_iter().filter(|a| !a.optional).collect();
         assert_declared(&headers(&least.bytes), &always, &axes);
-        let raster = raster_npz(&atlas(4)).unwrap();
+        let atlas = atlas(4);
+        let on = TriangleOnLattice { side: 1, place: [[0.0; 2]; 3] };
+        let lattice = vec![on; atlas.triangles().len()];
+        let raster = raster_npz(&atlas, Some(&lattice)).unwrap();
         assert_declared(&headers(&raster), &RASTER_ARRAYS, &|axis| axis.parse().ok());
     }
 

@@ -1,9 +1,9 @@
 //! Shards: the vertex values of one indentation in one archive.
 
 use super::{DatasetError, fault, worst_checks};
-use crate::record::{Checks, Sample};
+use crate::record::{Cells, Checks, Sample};
 use ndarray::{Array1, Array2, Array3, Ix1, Ix2, Ix3};
-use papilla_atlas::{Atlas, Patch, Raster};
+use papilla_atlas::{Atlas, Patch, Pixel, Raster};
 use papilla_output::atomic;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
 use std::path::Path;
@@ -42,9 +42,11 @@ fn check_row(c: &Checks) -> [f64; 11] {
     ]
 }
 
-/// The arrays of one shard: D samples on V vertices.
+/// The arrays of one shard: D samples on V vertices, or nodes of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shard {
+    /// Cells whose nodes the values belong to; `None`: they belong to the atlas' vertices.
+    pub cells: Option<Cells>,
     /// Pressure on the skin, Pa \[D, V\].
     pub pressure_pa: Array2<f32>,
     /// SED on the dermis side of the interface, J/m3 \[D, V\].
@@ -63,6 +65,17 @@ pub struct Shard {
     /// Share of the volume beyond the calibrated stretches of its law \[D\]; only if
     /// a sample has any.
     pub outside_calibration: Option<Array1<f32>>,
+}
+
+/// The nearest number of 11 significant bits (4.9e-4 off at most): the rest of a map is twice the
+/// bytes and far below what a mesh resolves. What is not finite stays that.
+fn stored(value: f32) -> f32 {
+    const DROPPED: u32 = f32::MANTISSA_DIGITS - 11;
+    if !value.is_finite() {
+        return value;
+    }
+    let bits = value.to_bits() + (1 << (DROPPED - 1));
+    f32::from_bits(bits & !((1 << DROPPED) - 1))
 }
 
 /// A shard ready to be written, and what the manifest says of it.
@@ -102,12 +115,13 @@ pub fn encode(
         return Ok(Err(dropped));
     };
     let field = |values: fn(&Sample) -> &[f64]| -> Vec<f32> {
-        kept.iter().flat_map(|r| values(r)).map(|v| (v * PA_PER_MPA) as f32).collect()
+        kept.iter().flat_map(|r| values(r)).map(|v| stored((v * PA_PER_MPA) as f32)).collect()
     };
     let max = |values: &[f32]| f64::from(values.iter().copied().fold(0.0, f32::max));
     let pressure = field(|r| &r.pressure_mpa);
     let dermis = field(|r| &r.sed_dermis_mpa);
-    let (d, v) = (kept.len(), vertex_count);
+    let cells = kept.first().and_then(|r| r.cells.as_deref());
+    let (d, v) = (kept.len(), cells.map_or(vertex_count, Cells::node_count));
     let depth: Vec<f32> = kept.iter().map(|r| r.depth_mm as f32).collect();
     let force: Vec<f32> = kept.iter().flat_map(|r| r.force_n).map(|f| f as f32).collect();
     let check_rows: Vec<f64> = kept.iter().flat_map(|r| check_row(&r.checks)).collect();
@@ -118,6 +132,11 @@ pub fn encode(
     npz.add_slice("depth_mm", &[d], &depth)?;
     npz.add_slice("force_n", &[d, 3], &force)?;
     npz.add_slice("checks", &[d, CHECK_COLUMNS.len()], &check_rows)?;
+    if let Some(cells) = cells {
+        let (places, nodes) = (cells.place.as_flattened(), cells.nodes.as_flattened());
+        npz.add_slice("cell_place", &[cells.place.len(), 5], places)?;
+        npz.add_slice("cell_nodes", &[cells.nodes.len(), 9], nodes)?;
+    }
     if kept.iter().any(|r| !r.shear_mpa.is_empty()) {
         npz.add_slice("shear_pa", &[d, v, 3], &field(|r| r.shear_mpa.as_flattened()))?;
     }
@@ -135,6 +154,21 @@ pub fn encode(
     }))
 }
 
+fn read_cells(path: &Path, npz: &mut NpzArrays<'_>) -> Result<Cells, DatasetError> {
+    let place = npz.get::<u32, Ix2>("cell_place")?;
+    let nodes = npz.get::<u32, Ix2>("cell_nodes")?;
+    let (found, expected) = ([place.dim(), nodes.dim()], [(place.nrows(), 5), (place.nrows(), 9)]);
+    if found != expected {
+        let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
+        let what = "shapes of cell_place and cell_nodes";
+        return Err(DatasetError::Mismatch { path: path.into(), what, found, expected });
+    }
+    Ok(Cells {
+        place: place.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect(),
+        nodes: nodes.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect(),
+    })
+}
+
 impl Shard {
     /// Decodes an archive; `path` is only for messages.
     ///
@@ -144,7 +178,10 @@ impl Shard {
     pub fn decode(path: &Path, bytes: &[u8], vertex_count: usize) -> Result<Self, DatasetError> {
         let mut npz = NpzArrays::new(path, bytes)?;
         let (rubs, flagged) = (npz.has("shear_pa")?, npz.has("outside_calibration")?);
+        let cells = if npz.has("cell_place")? { Some(read_cells(path, &mut npz)?) } else { None };
+        let vertex_count = cells.as_ref().map_or(vertex_count, Cells::node_count);
         let shard = Self {
+            cells,
             pressure_pa: npz.get::<f32, Ix2>("pressure_pa")?,
             sed_dermis_j_per_m3: npz.get::<f32, Ix2>("sed_dermis_j_per_m3")?,
             sed_epidermis_j_per_m3: npz.get::<f32, Ix2>("sed_epidermis_j_per_m3")?,
@@ -200,12 +237,25 @@ impl Shard {
     }
 }
 
+/// Where the corners of a triangle of the atlas lie on the lattice of [`Cells`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleOnLattice {
+    /// Side of the half cube.
+    pub side: u32,
+    /// Row and column of each corner.
+    pub place: [[f64; 2]; 3],
+}
+
 /// The bytes of `raster.npz`: for `skin` and `interface` the arrays `_pixel`
-/// u32 \[N\] (row * 224 + column), `_vertex` u32 \[N, 3\] and `_weight` f32 \[N, 3\].
+/// u32 \[N\] (row * 224 + column), `_vertex` u32 \[N, 3\] and `_weight` f32 \[N, 3\]; where
+/// the atlas' triangles lie on a lattice also `_side` u32 \[N\] and `_place` f32 \[N, 2\].
 ///
 /// # Errors
 /// [`DatasetError::Output`] when the archive cannot be built.
-pub fn raster_npz(atlas: &Atlas) -> Result<Vec<u8>, DatasetError> {
+pub fn raster_npz(
+    atlas: &Atlas,
+    lattice: Option<&[TriangleOnLattice]>,
+) -> Result<Vec<u8>, DatasetError> {
     let mut npz = NpzBuilder::new();
     for patch in Patch::ALL {
         let raster = Raster::new(atlas, patch);
@@ -215,6 +265,17 @@ pub fn raster_npz(atlas: &Atlas) -> Result<Vec<u8>, DatasetError> {
         npz.add_slice(&format!("{name}_pixel"), &[n], raster.indices())?;
         npz.add_slice(&format!("{name}_vertex"), &[n, 3], &vertices)?;
         npz.add_slice(&format!("{name}_weight"), &[n, 3], &weights)?;
+        let Some(lattice) = lattice else { continue };
+        let of = |p: &Pixel| lattice[p.triangle as usize];
+        let place = |p: &Pixel| -> [f32; 2] {
+            let corners = of(p).place.into_iter().zip(p.weights);
+            let sum = |k: usize| corners.clone().map(|(c, w)| c[k] * f64::from(w)).sum::<f64>();
+            [sum(0) as f32, sum(1) as f32]
+        };
+        let sides: Vec<u32> = raster.pixels().iter().map(|p| of(p).side).collect();
+        let places: Vec<f32> = raster.pixels().iter().flat_map(place).collect();
+        npz.add_slice(&format!("{name}_side"), &[n], &sides)?;
+        npz.add_slice(&format!("{name}_place"), &[n, 2], &places)?;
     }
     Ok(npz.finish()?)
 }
@@ -223,21 +284,26 @@ pub fn raster_npz(atlas: &Atlas) -> Result<Vec<u8>, DatasetError> {
 ///
 /// # Errors
 /// [`DatasetError::Output`] when the folder is not writable.
-pub fn write_atlas(folder: &Path, atlas: &Atlas) -> Result<(), DatasetError> {
+pub fn write_atlas(
+    folder: &Path,
+    atlas: &Atlas,
+    lattice: Option<&[TriangleOnLattice]>,
+) -> Result<(), DatasetError> {
     let path = folder.join("atlas.json");
     let mut text =
         atlas.to_json().map_err(|source| DatasetError::Atlas { path: path.clone(), source })?;
     text.push('\n');
     atomic::write(&path, text.as_bytes())?;
-    atomic::write(&folder.join("raster.npz"), &raster_npz(atlas)?)?;
+    atomic::write(&folder.join("raster.npz"), &raster_npz(atlas, lattice)?)?;
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{atlas, record};
+    use crate::testing::{atlas, record, two_cells};
     use papilla_atlas::MAP_LEN;
+    use std::sync::Arc;
 
     #[test]
     fn values_come_back_in_outside_units() {
@@ -248,10 +314,34 @@ mod tests {
         assert_eq!((encoded.samples, encoded.dropped.len()), (2, 1));
         let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
         assert_eq!(shard.depth_mm.to_vec(), [0.25, 1.0]);
-        let expected = (records[2].pressure_mpa[3] * 1e6) as f32;
-        assert_eq!(shard.pressure_pa[[1, 3]].to_bits(), expected.to_bits());
+        let due = (records[2].pressure_mpa[3] * 1e6) as f32;
+        assert!((shard.pressure_pa[[1, 3]] / due - 1.0).abs() <= 0.5f32.powi(11));
         assert_eq!(shard.checks[[0, 4]].to_bits(), records[0].checks.j_min.to_bits());
         assert!(Shard::decode(Path::new("x"), &encoded.bytes, 5).is_err());
+    }
+
+    #[test]
+    fn maps_keep_eleven_bits() {
+        let exact = [0.0, 1.0, -1024.0, 2047.0];
+        assert_eq!(exact.map(stored), exact);
+        assert!(stored(f32::NAN).is_nan() && stored(f32::INFINITY).is_infinite());
+        for value in [4097.0f32, 0.3, -1.7e-12, 3.3e30, 1.999_999_9] {
+            let kept = stored(value);
+            assert!((kept / value - 1.0).abs() <= 0.5f32.powi(11), "{value} {kept}");
+            assert_eq!(kept.to_bits() & 0x1fff, 0);
+        }
+    }
+
+    #[test]
+    fn cells_come_back_with_the_values_at_their_nodes() {
+        let cells = two_cells();
+        let n = cells.node_count();
+        let with = |r: Sample| Sample { cells: Some(Arc::new(cells.clone())), ..r };
+        let encoded = encode(&[with(record(0.5, n))], 4).unwrap().unwrap();
+        let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
+        assert_eq!((shard.cells, shard.pressure_pa.dim()), (Some(cells.clone()), (1, n)));
+        let short = encode(&[with(record(0.5, n - 1))], 4).unwrap();
+        assert!(short.is_err_and(|dropped| dropped[0].1.contains("values")));
     }
 
     #[test]
@@ -282,7 +372,7 @@ mod tests {
     #[test]
     fn the_stored_raster_draws_what_the_code_draws() {
         let atlas = atlas(6);
-        let bytes = raster_npz(&atlas).unwrap();
+        let bytes = raster_npz(&atlas, None).unwrap();
         let mut npz = NpzArrays::new(Path::new("raster.npz"), &bytes).unwrap();
         let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| (i as f32).sin().abs()).collect();
         for patch in Patch::ALL {

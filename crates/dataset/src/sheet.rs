@@ -1,7 +1,7 @@
 //! A contact sheet: pressure and SED of many indentations on one picture.
 
-use super::{Dataset, DatasetError};
-use papilla_atlas::{MAP_LEN, Patch, Raster};
+use super::{Dataset, DatasetError, MapReader, Maps};
+use papilla_atlas::{MAP_LEN, Patch};
 use papilla_output::atomic;
 use papilla_output::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX};
 use papilla_output::map_image::{MapView, Quantity, white_of};
@@ -39,10 +39,12 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
     canvas.text((GAP_PX, 6), title, BLACK);
     let note = "each map from 0 (dark) to its own maximum, printed above it; fingertip up";
     canvas.text((GAP_PX, 6 + TEXT_HEIGHT_PX), note, [110; 3]);
-    let rasters = Patch::ALL.map(|patch| Raster::new(dataset.atlas(), patch));
+    let maps = Maps::of(dataset)?;
     for (row, &index) in rows.iter().enumerate() {
         let press = &presses[index];
         let shard = dataset.shard(press)?;
+        let reader = |patch| maps.reader(patch, shard.cells.as_ref());
+        let readers = [reader(Patch::Skin)?, reader(Patch::Interface)?];
         let y = HEAD_PX + row * row_px;
         let lines = [
             format!("press {}", press.id),
@@ -64,7 +66,9 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
             for (i, (quantity, values)) in fields.iter().enumerate() {
                 let corner = (x + i * (CELL_PX + GAP_PX), y);
                 let before = if i == 0 { format!("{depth_mm} mm ") } else { String::new() };
-                cell(&mut canvas, dataset, &rasters[i], *quantity, values, corner, &before)?;
+                let mm_per_px = f64::from(dataset.atlas().mm_per_px());
+                let label = (*quantity, before.as_str());
+                cell(&mut canvas, &readers[i], values, label, mm_per_px, corner);
             }
         }
     }
@@ -73,24 +77,19 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
 
 fn cell(
     canvas: &mut Canvas,
-    dataset: &Dataset,
-    raster: &Raster,
-    quantity: Quantity,
+    reader: &MapReader<'_>,
     values: &[f32],
+    (quantity, before): (Quantity, &str),
+    mm_per_px: f64,
     (x, y): (usize, usize),
-    before: &str,
-) -> Result<(), DatasetError> {
+) {
     let mut pixels = vec![0.0; MAP_LEN];
-    raster.rasterise(values, &mut pixels).map_err(|source| DatasetError::Atlas {
-        path: dataset.folder().join("atlas.json"),
-        source,
-    })?;
-    let (mask, mm_per_px) = (raster.mask(), f64::from(dataset.atlas().mm_per_px()));
+    reader.draw(values, &mut pixels);
+    let mask = reader.mask();
     let white = white_of(&pixels);
     let view = MapView { quantity, pixels: &pixels, mask, mm_per_px, white };
     canvas.text((x, y), &format!("{before}{}", quantity.label(white)), BLACK);
     view.draw(canvas, (x, y + TEXT_HEIGHT_PX + 2), CELL_PX);
-    Ok(())
 }
 
 #[cfg(test)]

@@ -2,8 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "for tests")]
 
-use crate::record::{Checks, Pose, Sample};
+use crate::record::{Cells, Checks, Pose, Sample};
 use papilla_atlas::{Atlas, PatchVertices};
+
+/// Two cells beside each other.
+#[must_use]
+pub fn two_cells() -> Cells {
+    let nodes = |first: u32| std::array::from_fn(|n| first + n as u32 / 3 * 5 + n as u32 % 3);
+    Cells {
+        place: vec![[1, 0, 0, 128, 128], [1, 0, 128, 128, 128]],
+        nodes: vec![nodes(0), nodes(2)],
+    }
+}
 
 /// A well-formed record whose numbers follow from depth and vertex.
 #[must_use]
@@ -20,6 +30,7 @@ pub fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> Sample {
         (0..vertex_count).map(|i| scale * depth_mm * wave(i)).collect()
     };
     Sample {
+        cells: None,
         depth_mm,
         force_n: [0.0, 0.0, depth_mm * depth_mm],
         pressure_mpa: field(0.01),

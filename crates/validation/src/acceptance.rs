@@ -8,6 +8,7 @@ use papilla_fingertip::simulation::record::IncrementRecord;
 pub fn sample(record: &IncrementRecord) -> Sample {
     let c = record.checks;
     Sample {
+        cells: None,
         depth_mm: record.depth_mm,
         force_n: record.force_n,
         pressure_mpa: record.pressure_mpa.clone(),

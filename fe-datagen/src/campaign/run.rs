@@ -5,7 +5,7 @@ use super::state::{IndentationState, Outcome, Workspace};
 use super::{BoxError, CampaignError, CampaignReport};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
-use papilla_dataset::Sample;
+use papilla_dataset::{Sample, TriangleOnLattice};
 use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
 use papilla_output::atomic;
 use papilla_progress::Progress;
@@ -47,7 +47,7 @@ impl Default for RunOptions {
 
 /// Runs a campaign, or goes on with one that was interrupted, and writes its
 /// dataset into `folder`. `solver` builds one solver per worker thread, with
-/// values on `atlas`.
+/// values on `atlas`, or on cells of a lattice on which its triangles lie.
 ///
 /// # Errors
 /// [`CampaignError`] when the campaign makes no sense, the folder belongs to
@@ -55,7 +55,7 @@ impl Default for RunOptions {
 /// or every indentation failed. Single failures are in the report and the manifest.
 pub fn run<S: IndentationSolver>(
     spec: &CampaignSpec,
-    atlas: &Atlas,
+    (atlas, lattice): (&Atlas, Option<&[TriangleOnLattice]>),
     solver: impl Fn() -> Result<S, BoxError> + Sync,
     folder: &Path,
     options: &RunOptions,
@@ -63,7 +63,7 @@ pub fn run<S: IndentationSolver>(
     let start = Instant::now();
     spec.validate()?;
     let workspace = Workspace::open(folder, spec, atlas)?;
-    dataset::write_atlas(folder, atlas)?;
+    dataset::write_atlas(folder, atlas, lattice)?;
     let (mut done, mut todo) = (Vec::new(), Vec::new());
     for press in indentations(spec) {
         match workspace.load(&press) {

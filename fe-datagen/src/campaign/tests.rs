@@ -56,7 +56,7 @@ fn go(folder: &Path, threads: usize, trouble: Trouble) -> Result<CampaignReport,
     let options =
         RunOptions { threads: NonZero::new(threads), progress: false, retry_failed: true };
     let build = || Ok(Formula { vertex_count, trouble, calls: &calls });
-    run(&spec(), &atlas, build, folder, &options)
+    run(&spec(), (&atlas, None), build, folder, &options)
 }
 
 /// All files of the dataset; `progress` holds wall times and is not part of it.
@@ -179,12 +179,12 @@ fn a_folder_serves_one_campaign() {
     let vertex_count = atlas.vertex_count();
     let build = || Ok(Formula { vertex_count, trouble: Trouble::None, calls: &calls });
     let other = CampaignSpec { seed: 4, ..spec() };
-    let error = run(&other, &atlas, build, folder.path(), &options).unwrap_err();
+    let error = run(&other, (&atlas, None), build, folder.path(), &options).unwrap_err();
     assert!(matches!(error, CampaignError::Occupied { .. }), "{error}");
     // Nor do two processes write at once.
     let lock = std::fs::File::open(folder.path().join("progress/lock")).unwrap();
     lock.lock().unwrap();
-    let error = run(&spec(), &atlas, build, folder.path(), &options).unwrap_err();
+    let error = run(&spec(), (&atlas, None), build, folder.path(), &options).unwrap_err();
     assert!(matches!(error, CampaignError::Busy { .. }), "{error}");
 }
 
@@ -193,7 +193,7 @@ fn a_solver_that_cannot_be_built_stops_the_campaign() {
     let folder = tempfile::tempdir().unwrap();
     let build = || -> Result<Formula<'static>, BoxError> { Err("mesh has no elements".into()) };
     let options = RunOptions { progress: false, ..RunOptions::default() };
-    let error = run(&spec(), &atlas(6), build, folder.path(), &options).unwrap_err();
+    let error = run(&spec(), (&atlas(6), None), build, folder.path(), &options).unwrap_err();
     assert!(error.to_string().contains("mesh has no elements"), "{error}");
     assert!(!folder.path().join("manifest.json").exists());
 }
@@ -226,7 +226,7 @@ fn the_manifest_names_the_indenter_of_every_press() {
     let options = RunOptions { progress: false, ..RunOptions::default() };
     let build = || Ok(Formula { vertex_count, trouble: Trouble::Fail(1), calls: &calls });
     let spec = CampaignSpec { presses: 8, ..several() };
-    let report = run(&spec, &atlas, build, folder.path(), &options).unwrap();
+    let report = run(&spec, (&atlas, None), build, folder.path(), &options).unwrap();
     // Four indentations of two depths, four of three, one of them failed.
     assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
     assert_eq!((report.samples_due, report.failed.len()), (20, 1));

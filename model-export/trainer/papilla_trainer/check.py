@@ -12,12 +12,13 @@ import onnx
 import onnxruntime
 
 from papilla_trainer.checkpoint import Checkpoint
-from papilla_trainer.dataset import SIDE_PX, Dataset
+from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import CheckError
 from papilla_trainer.evaluation import chosen_epoch, predict, served_model, spread
 from papilla_trainer.export import INPUT, OPSET, OUTPUT
 from papilla_trainer.files import write_atomic
 from papilla_trainer.metrics import F32
+from papilla_trainer.raster import SIDE_PX
 
 OPERATORS = frozenset(
     {

@@ -18,40 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from papilla_trainer.errors import DatasetError
+from papilla_trainer.lattice import (
+    CELL_NODES,
+    CELL_PLACE,
+    Functions,
+    Lattice,
+    hats,
+    quadratics,
+)
+from papilla_trainer.raster import MAP_LEN, SIDE_PX, Raster
+from papilla_trainer.sampling import vertex_sampler
 
-SIDE_PX = 224
-MAP_LEN = SIDE_PX * SIDE_PX
-FORMAT = 1
+FORMATS = (1, 2)
 
 F32 = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Raster:
-    """Sparse linear map from the vertex values of one patch to pixels."""
-
-    pixel: NDArray[np.int64]
-    vertex: NDArray[np.int64]
-    weight: F32
-
-    def rasterise(self, values: F32) -> F32:
-        """``[D, V]`` vertex values to ``[D, 224, 224]`` pixels; 0 outside the patch.
-
-        Float32 throughout and summed in the order of the triangle's corners, as the Rust
-        rasteriser does.
-        """
-        maps = np.zeros((values.shape[0], MAP_LEN), dtype=np.float32)
-        corners = values[:, self.vertex]
-        maps[:, self.pixel] = (
-            corners[..., 0] * self.weight[:, 0] + corners[..., 1] * self.weight[:, 1]
-        ) + corners[..., 2] * self.weight[:, 2]
-        return maps.reshape(-1, SIDE_PX, SIDE_PX)
-
-    def mask(self) -> F32:
-        """``[224, 224]``: 1 on the patch, 0 outside."""
-        mask = np.zeros(MAP_LEN, dtype=np.float32)
-        mask[self.pixel] = 1.0
-        return mask.reshape(SIDE_PX, SIDE_PX)
 
 
 @dataclass(frozen=True)
@@ -112,6 +92,7 @@ class Dataset:
         self._check_splits(labels)
         self.skin = self._read_raster("skin")
         self.interface = self._read_raster("interface")
+        self._samplers: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
 
     def load(self, ids: list[int]) -> Maps:
         """Rasterise the given indentations, in this order, all depths of each."""
@@ -124,8 +105,8 @@ class Dataset:
         for i in ids:
             shard = self._read_shard(self.presses[i])
             end = start + self.presses[i].samples
-            pressure[start:end] = self.skin.rasterise(shard["pressure_pa"])
-            sed[start:end] = self.interface.rasterise(shard["sed_dermis_j_per_m3"])
+            pressure[start:end] = _maps(self.skin, hats, shard, "pressure_pa")
+            sed[start:end] = _maps(self.interface, quadratics, shard, "sed_dermis_j_per_m3")
             press_id[start:end] = i
             depth[start:end] = shard["depth_mm"]
             start = end
@@ -135,9 +116,27 @@ class Dataset:
         """Pressure (Pa) and SED (J/m3) at the vertices, ``[N, V]`` each, of all depths."""
         shards = [self._read_shard(self.presses[i]) for i in ids]
         return (
-            np.concatenate([shard["pressure_pa"] for shard in shards]),
-            np.concatenate([shard["sed_dermis_j_per_m3"] for shard in shards]),
+            np.concatenate([self._at_vertices("skin", hats, s, "pressure_pa") for s in shards]),
+            np.concatenate(
+                [
+                    self._at_vertices("interface", quadratics, s, "sed_dermis_j_per_m3")
+                    for s in shards
+                ]
+            ),
         )
+
+    def _at_vertices(
+        self, patch: str, functions: Functions, shard: dict[str, NDArray[Any]], name: str
+    ) -> F32:
+        """What a map says about the vertices, where a shard has values elsewhere."""
+        if CELL_PLACE not in shard:
+            return shard[name]
+        raster: Raster = getattr(self, patch)
+        if patch not in self._samplers:
+            self._samplers[patch] = vertex_sampler(raster, self.vertex_count)
+        pixels, weights = self._samplers[patch]
+        maps = _maps(raster, functions, shard, name).reshape(-1, MAP_LEN)
+        return (maps[:, pixels] * weights).sum(axis=2).clip(min=0.0).astype(np.float32)
 
     def _check_identity(self) -> None:
         hashes = "".join(self.presses[i].sha256 for i in sorted(self.presses))
@@ -184,18 +183,20 @@ class Dataset:
                 f"{path}: patch '{patch}' names vertex {int(vertex.max())}, but the manifest "
                 f"says {self.vertex_count} vertices"
             )
-        return Raster(pixel, vertex, weight)
+        return Raster(pixel, vertex, weight, _lattice(arrays, patch, path, pixel.size))
 
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
         path = press.directory / press.file
         arrays = _read_npz(path, press.file, sha256=press.sha256)
+        columns = self.vertex_count
+        if CELL_PLACE in arrays:
+            columns = int(arrays[CELL_NODES].max()) + 1
         for name in ("pressure_pa", "sed_dermis_j_per_m3"):
             values = arrays.get(name)
-            if values is None or values.shape != (press.samples, self.vertex_count):
+            if values is None or values.shape != (press.samples, columns):
                 shape = None if values is None else values.shape
                 raise DatasetError(
-                    f"{path}: array {name} has shape {shape}, expected "
-                    f"{(press.samples, self.vertex_count)}"
+                    f"{path}: array {name} has shape {shape}, expected {(press.samples, columns)}"
                 )
             if values.dtype != np.float32 or not np.isfinite(values).all():
                 raise DatasetError(f"{path}: array {name} is not finite float32")
@@ -232,8 +233,8 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         ) from error
     except (OSError, ValueError) as error:
         raise DatasetError(f"{path}: {error}") from error
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise DatasetError(f"{path}: not a dataset manifest of format {FORMAT}")
+    if not isinstance(manifest, dict) or manifest.get("format") not in FORMATS:
+        raise DatasetError(f"{path}: not a dataset manifest of a format among {FORMATS}")
     return manifest
 
 
@@ -249,6 +250,25 @@ def _read_npz(path: Path, name: str, sha256: str | None = None) -> dict[str, NDA
             return {key: archive[key] for key in archive.files}
     except (ValueError, OSError, zipfile.BadZipFile) as error:
         raise DatasetError(f"{path}: not a readable .npz ({error})") from error
+
+
+def _lattice(arrays: dict[str, Any], patch: str, path: Path, pixels: int) -> Lattice | None:
+    if f"{patch}_side" not in arrays:
+        return None
+    side, place = arrays[f"{patch}_side"].astype(np.int64), arrays[f"{patch}_place"]
+    if side.shape != (pixels,) or place.shape != (pixels, 2):
+        raise DatasetError(f"{path}: the places of patch '{patch}' are not its pixels'")
+    return Lattice(side, place.astype(np.float64))
+
+
+def _maps(raster: Raster, functions: Functions, shard: dict[str, NDArray[Any]], name: str) -> F32:
+    """``[D, 224, 224]`` of a shard's array, whatever its values belong to."""
+    if CELL_PLACE not in shard:
+        return raster.rasterise(shard[name])
+    if raster.lattice is None:
+        raise DatasetError("raster.npz does not say where pixels lie among cells")
+    nodes, weights = raster.lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
+    return raster.scattered((shard[name][:, nodes] * weights).sum(axis=2).clip(min=0.0))
 
 
 def _positive(manifest: dict[str, Any], key: str) -> float:

@@ -17,10 +17,10 @@ from torch import nn
 from papilla_trainer import __version__
 from papilla_trainer.checkpoint import Checkpoint, Served
 from papilla_trainer.config import TrainConfig
-from papilla_trainer.dataset import SIDE_PX
 from papilla_trainer.evaluation import chosen_epoch, read_metrics, served_model
 from papilla_trainer.files import write_atomic
 from papilla_trainer.network import parameter_count
+from papilla_trainer.raster import SIDE_PX
 
 OPSET = 17
 INPUT = "pressure_pa"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from papilla_trainer.dataset import Raster
+from papilla_trainer.raster import Raster
 
 I64 = NDArray[np.int64]
 F64 = NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from papilla_trainer.dataset import MAP_LEN, SIDE_PX, Raster
 from papilla_trainer.face_network import FaceNet
+from papilla_trainer.raster import MAP_LEN, SIDE_PX, Raster
 from papilla_trainer.sampling import vertex_sampler
 
 

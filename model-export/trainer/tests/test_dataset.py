@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from papilla_trainer.dataset import SIDE_PX, Dataset, validation_split
+from papilla_trainer.dataset import Dataset, validation_split
 from papilla_trainer.errors import DatasetError
+from papilla_trainer.raster import SIDE_PX
 
 
 def edited(dataset: Dataset, out: Path, edit: Callable[[dict[str, Any]], None]) -> Path:
@@ -72,8 +73,8 @@ def test_a_manifest_that_does_not_match_its_shards_is_refused(
 
 
 def test_another_format_is_refused(tiny: Dataset, tmp_path: Path) -> None:
-    newer = edited(tiny, tmp_path / "d", lambda m: m.update(format=2))
-    with pytest.raises(DatasetError, match="format 1"):
+    newer = edited(tiny, tmp_path / "d", lambda m: m.update(format=3))
+    with pytest.raises(DatasetError, match="format among"):
         Dataset(newer)
 
 

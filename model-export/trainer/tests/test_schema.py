@@ -68,7 +68,7 @@ def test_the_reader_asks_for_nothing_that_the_format_lacks(
     always = [a for a in SCHEMA["shard"] + SCHEMA["raster"] if not a["optional"]]
     assert len(archives) > 5
     assert archives <= names(always)
-    assert SCHEMA["format"] == reader.FORMAT
+    assert SCHEMA["format"] == reader.FORMATS[-1]
 
 
 def test_the_tests_own_dataset_is_of_the_format(tiny: Dataset) -> None:

@@ -1,6 +1,7 @@
 //! Load stepping: equilibria at increasing load fractions, cutting steps that fail.
 
 use super::effort::Effort;
+use super::evaluate::Evaluation;
 use super::history::{self, EnergySplit};
 use super::loading::Loading;
 use super::newton::{Fixed, Newton};
@@ -123,6 +124,43 @@ impl<'a> Solver<'a> {
         Ok(report)
     }
 
+    /// Makes the work of a straight indenter more exact: equilibria are found between those of
+    /// the path since `known` (the first where it began) until energy and work part by no more
+    /// than `relative`, a dozen at most. The present equilibrium stays as it is.
+    ///
+    /// Does nothing where work is lost (friction, viscosity), since the way there matters then.
+    pub fn mend_work(&mut self, known: &[Mark], relative: f64) -> Effort {
+        const PROBES_MAX: usize = 12;
+        let first = self.newton.effort;
+        let is_lost = self.loading.friction > 0.0 || self.newton.problem.history_layout.is_some();
+        let (Some(indenter), Some(start), false) = (&self.loading.indenter, known.first(), is_lost)
+        else {
+            return Effort::default();
+        };
+        let (indenter, from) = (indenter.clone(), start.state.fraction);
+        let doubtful = |work: &Work| {
+            work.doubtful(&indenter, from).filter(|d| d.relative > relative).map(|d| d.middle)
+        };
+        if doubtful(&self.work).is_none() {
+            return Effort::default();
+        }
+        let (end, current) = (self.mark(), self.newton.current.clone());
+        let mut known: Vec<State> = known.iter().chain([&end]).map(|m| m.state.clone()).collect();
+        for _ in 0..PROBES_MAX {
+            let Some(middle) = doubtful(&self.work) else { break };
+            let right = known.partition_point(|s| s.fraction < middle);
+            self.before = Some(known[right - 1].clone());
+            self.state = known[right].clone();
+            if let Err(cause) = self.try_step(middle) {
+                tracing::debug!(middle, %cause, "no equilibrium to mend the work with");
+                break;
+            }
+            known.insert(right, self.state.clone());
+        }
+        (self.state, self.before, self.newton.current) = (end.state, end.before, current);
+        self.newton.effort.since(&first)
+    }
+
     fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {
         let mut step = self.within_time_step(target - self.state.fraction);
         let (mut cuts, mut steps) = (0, 0);
@@ -229,7 +267,8 @@ impl<'a> Solver<'a> {
         friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
-            self.work.add(indenter, next, self.newton.current.contact_force_n);
+            let Evaluation { contact_force_n, stored_mj, contact_mj, .. } = self.newton.current;
+            self.work.add(indenter, next, contact_force_n, stored_mj + contact_mj);
         }
         Ok(())
     }

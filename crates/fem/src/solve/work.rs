@@ -8,8 +8,8 @@ const DEFAULT_EXPONENT: f64 = 1.5;
 /// Force along the path so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Work {
-    /// `(load fraction, force along the travel)` of a straight path, N.
-    straight: Vec<(f64, f64)>,
+    /// Equilibria of a straight path by rising load fraction, the first at rest.
+    straight: Vec<Found>,
     /// Displacement and force at the last equilibrium of any other path.
     last: ([f64; 3], [f64; 3]),
     /// Trapezoidal sum of any other path, mJ.
@@ -18,14 +18,40 @@ pub(super) struct Work {
     pub largest_mj: f64,
 }
 
+/// An equilibrium of a straight path.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    fraction: f64,
+    /// Force along the travel, N.
+    force_n: f64,
+    stored_mj: f64,
+}
+
+/// A part of a straight path whose energy and work part the most.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Doubtful {
+    /// Load fraction of its middle.
+    pub middle: f64,
+    /// What energy and work of the whole path part by, over the work.
+    pub relative: f64,
+}
+
 impl Work {
-    /// Takes the contact force (N, on the body) of an equilibrium.
-    pub(super) fn add(&mut self, indenter: &MovingIndenter, fraction: f64, force: [f64; 3]) {
+    /// Takes the contact force (N, on the body) and the stored energy of an equilibrium.
+    pub(super) fn add(
+        &mut self,
+        indenter: &MovingIndenter,
+        fraction: f64,
+        force: [f64; 3],
+        stored_mj: f64,
+    ) {
         if let Some((_, direction)) = indenter.straight_travel() {
             if self.straight.is_empty() {
-                self.straight.push((0.0, 0.0));
+                self.straight.push(Found::default());
             }
-            self.straight.push((fraction, (0..3).map(|i| force[i] * direction[i]).sum()));
+            let force_n = (0..3).map(|i| force[i] * direction[i]).sum();
+            let at = self.straight.partition_point(|f| f.fraction < fraction);
+            self.straight.insert(at, Found { fraction, force_n, stored_mj });
             return;
         }
         let offset = indenter.offset_mm(fraction);
@@ -40,9 +66,32 @@ impl Work {
     /// change smoothly from equilibrium to equilibrium, which is exact for Hertz-like contact.
     pub(super) fn total_mj(&self, indenter: &MovingIndenter) -> f64 {
         match indenter.straight_travel() {
-            Some((length, _)) => integral(&self.straight) * length,
+            Some((length, _)) => self.pieces().iter().sum::<f64>() * length,
             None => self.sum_mj,
         }
+    }
+
+    /// The part beyond the load fraction `from` in which energy and work part the most; none of a
+    /// path that is not straight or has not come so far.
+    pub(super) fn doubtful(&self, indenter: &MovingIndenter, from: f64) -> Option<Doubtful> {
+        let (length, _) = indenter.straight_travel()?;
+        let work: Vec<f64> = self.pieces().iter().map(|w| w * length).collect();
+        let total: f64 = work.iter().sum();
+        let stored = self.straight.last()?.stored_mj;
+        let miss = |i: usize| {
+            (self.straight[i + 1].stored_mj - self.straight[i].stored_mj - work[i]).abs()
+        };
+        let (a, b) = (0..work.len())
+            .filter(|&i| self.straight[i].fraction >= from)
+            .max_by(|&i, &j| miss(i).total_cmp(&miss(j)))
+            .map(|i| (self.straight[i].fraction, self.straight[i + 1].fraction))?;
+        Some(Doubtful { middle: 0.5 * (a + b), relative: ((stored - total) / total).abs() })
+    }
+
+    fn pieces(&self) -> Vec<f64> {
+        let points: Vec<(f64, f64)> =
+            self.straight.iter().map(|f| (f.fraction, f.force_n)).collect();
+        pieces(&points)
     }
 }
 
@@ -54,38 +103,40 @@ const GAUSS_4: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_9),
 ];
 
-/// Integral from `x = 0` of `(x, f)` points, the first of them `(0, 0)`: `ln f` is a cubic
+/// Integrals between `(x, f)` points, the first of them `(0, 0)`: `ln f` is a cubic
 /// polynomial of `ln x` between points, with the slope of the parabola through three of them, and
 /// linear before the first; trapezia where a force is not positive.
-fn integral(points: &[(f64, f64)]) -> f64 {
+fn pieces(points: &[(f64, f64)]) -> Vec<f64> {
     let pushed = points.iter().skip(1).take_while(|p| p.1 > 0.0).count();
     let logs: Vec<(f64, f64)> =
         points[1.min(points.len())..][..pushed].iter().map(|(x, f)| (x.ln(), f.ln())).collect();
     let slopes = slopes(&logs);
     let trapezium = |a: (f64, f64), b: (f64, f64)| 0.5 * (b.0 - a.0) * (a.1 + b.1);
-    let mut total = match (points.get(1), slopes.first()) {
-        (Some(&(x, f)), Some(m)) if *m > -1.0 => x * f / (m + 1.0),
-        (Some(&b), _) => trapezium(points[0], b),
-        (None, _) => 0.0,
+    let mut out = match (points.get(1), slopes.first()) {
+        (Some(&(x, f)), Some(m)) if *m > -1.0 => vec![x * f / (m + 1.0)],
+        (Some(&b), _) => vec![trapezium(points[0], b)],
+        (None, _) => Vec::new(),
     };
     for i in 2..points.len() {
         let (a, b) = (points[i - 1], points[i]);
         if i > pushed {
-            total += trapezium(a, b);
+            out.push(trapezium(a, b));
             continue;
         }
         let ((s, p), (t, q)) = (logs[i - 2], logs[i - 1]);
         let (m, n) = ((t - s) * slopes[i - 2], (t - s) * slopes[i - 1]);
+        let mut sum = 0.0;
         for (at, weight) in GAUSS_4 {
             let x = 0.5 * ((1.0 - at) * a.0 + (1.0 + at) * b.0);
             let r = (x.ln() - s) / (t - s);
             let rest = 1.0 - r;
             let value = rest * rest * ((1.0 + 2.0 * r) * p + r * m)
                 + r * r * ((3.0 - 2.0 * r) * q - rest * n);
-            total += 0.5 * (b.0 - a.0) * weight * value.exp();
+            sum += 0.5 * (b.0 - a.0) * weight * value.exp();
         }
+        out.push(sum);
     }
-    total
+    out
 }
 
 /// Slope at each of some points of the parabola through it and its neighbours.
@@ -112,6 +163,37 @@ fn slopes(points: &[(f64, f64)]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use papilla_sdf::{Placement, Sphere};
+    use std::sync::Arc;
+
+    fn integral(points: &[(f64, f64)]) -> f64 {
+        pieces(points).iter().sum()
+    }
+
+    /// Where a plate comes down beside a dot the force has a kink: the part that holds it is the
+    /// doubtful one, and equilibria in its middle, again and again, mend the work.
+    #[test]
+    fn work_is_mended_where_the_force_has_a_kink() {
+        let force = |x: f64| x.powf(1.5) + 8.0 * (x - 0.5).max(0.0).powf(1.2);
+        let energy = |x: f64| x.powf(2.5) / 2.5 + 8.0 * (x - 0.5).max(0.0).powf(2.2) / 2.2;
+        let ball = Arc::new(Sphere { radius_mm: 1.0 });
+        let start = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
+        let straight = MovingIndenter::straight(ball, start, [0.0, 0.0, 1.0]);
+        let mut work = Work::default();
+        for x in [0.1, 0.25, 0.6, 1.0] {
+            work.add(&straight, x, [0.0, 0.0, force(x)], energy(x));
+        }
+        let before = work.doubtful(&straight, 0.0).unwrap();
+        assert!(before.relative > 5e-3, "{before:?}");
+        for _ in 0..6 {
+            let x = work.doubtful(&straight, 0.0).unwrap().middle;
+            work.add(&straight, x, [0.0, 0.0, force(x)], energy(x));
+        }
+        let after = work.doubtful(&straight, 0.0).unwrap();
+        assert!(after.relative < 0.1 * before.relative, "{before:?} {after:?}");
+        assert!((work.total_mj(&straight) / energy(1.0) - 1.0).abs() < 1e-3);
+        assert!(work.doubtful(&straight, 1.0).is_none());
+    }
 
     #[test]
     fn the_work_of_a_power_law_is_exact_to_the_quadrature() {

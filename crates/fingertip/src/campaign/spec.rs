@@ -77,6 +77,9 @@ pub struct CampaignSpec {
     pub test_fraction: f64,
     /// Density of the mesh.
     pub density: Density,
+    /// Elements and layout of the mesh, as in a scene's geometry.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub order: Order,
     /// Effects, as in a scene.
     #[serde(default = "usual")]
     pub effects: Vec<EffectName>,
@@ -152,7 +155,7 @@ impl CampaignSpec {
         Scene {
             geometry: Geometry::Fingertip {
                 density: self.density,
-                order: Order::default(),
+                order: self.order,
                 shape: FingertipShape::default(),
             },
             materials: self.materials.clone(),

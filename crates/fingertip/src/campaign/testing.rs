@@ -1,7 +1,7 @@
 //! Campaigns that tests of this crate and of others share.
 
 use super::{CampaignSpec, Candidate, DepthRange, PoseRanges};
-use crate::mesh::fingertip::Density;
+use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
 use crate::scene::{Friction, TissueTable};
 use papilla_sdf::{IndenterSpec, Plate, Sphere};
@@ -18,6 +18,7 @@ pub fn spec() -> CampaignSpec {
         depths: None,
         test_fraction: 0.3,
         density: Density::Coarse,
+        order: Order::default(),
         effects: usual(),
         materials: TissueTable::default(),
         friction: Friction::default(),

@@ -19,7 +19,8 @@ use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use super::patch::Patch;
+pub use super::leaves::Leaf;
+pub use super::patch::{Patch, Vertices};
 
 /// Named mesh densities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -82,6 +83,9 @@ struct Resolution {
 /// Node positions through the bone's cortex: two `Hex8` or one `Hex27`.
 const CORTEX: &[f64] = &[0.0, 0.5, 1.0];
 
+/// The even lattice of medium density, whose nodes are the atlas' vertices.
+pub(super) const MEDIUM: GridSize = GridSize { across: 22, side: 16, cap: 12, body: 10 };
+
 impl Density {
     fn resolution(self, order: Order) -> Resolution {
         let (grid, dermis, fat): (_, &'static [f64], &'static [f64]) = match self {
@@ -90,11 +94,7 @@ impl Density {
                 &[0.0, 0.35, 1.0],
                 &[0.0, 0.2, 0.45, 0.7, 1.0],
             ),
-            Self::Medium => (
-                GridSize { across: 22, side: 16, cap: 12, body: 10 },
-                &[0.0, 0.15, 0.35, 0.65, 1.0],
-                &[0.0, 0.15, 0.35, 0.65, 1.0],
-            ),
+            Self::Medium => (MEDIUM, &[0.0, 0.15, 0.35, 0.65, 1.0], &[0.0, 0.15, 0.35, 0.65, 1.0]),
             Self::Fine => (
                 GridSize { across: 32, side: 24, cap: 20, body: 16 },
                 &[0.0, 0.1, 0.25, 0.45, 0.7, 1.0],
@@ -125,7 +125,6 @@ impl Density {
     /// Two elements through the epidermis and a dermis whose first is .08 mm thick: SED at
     /// the interface of a plane section is then within 1 to 3 % of that of many more layers.
     fn graded(self) -> Resolution {
-        let grid = GridSize { across: 8, side: 4, cap: 4, body: 6 };
         let (dermis, fat): (&'static [f64], &'static [f64]) = match self {
             Self::Fine => (
                 &[0.0, 0.03, 0.06, 0.13, 0.2, 0.35, 0.5, 0.75, 1.0],
@@ -133,7 +132,7 @@ impl Density {
             ),
             _ => (&[0.0, 0.04, 0.08, 0.2, 0.35, 0.65, 1.0], &[0.0, 0.2, 0.4, 0.7, 1.0]),
         };
-        Resolution { grid, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
+        Resolution { grid: refined::BASE, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
     }
 
     /// How close nodes are under an indenter.
@@ -182,14 +181,14 @@ pub fn build(
     let step = order.step();
     let refined = (order == Order::Graded).then(|| {
         let spacing = contact.map(|c| Spacing::new(shape, c, density.closeness()));
-        Refined::new(resolution.grid, shape, spacing.as_ref())
+        Refined::new(shape, spacing.as_ref())
     });
     let lattice;
     let (grid, size, hanging) = match &refined {
         Some(r) => (&r.grid, r.size, &r.hanging[..]),
         None => {
             let size = resolution.grid;
-            lattice = size.build(step, size.first_body_fraction(shape));
+            lattice = size.build(step, &size.body_fractions(shape));
             (&lattice, size, &[][..])
         }
     };

@@ -39,10 +39,17 @@ impl GridSize {
         *map.entry(at).or_insert(next)
     }
 
-    /// Length of the body's first row over that of the body: as long as the cap's rows.
-    pub(super) fn first_body_fraction(self, shape: &FingertipShape) -> f64 {
+    /// The lattice with each interval cut into as many.
+    pub(super) const fn times(self, n: u32) -> Self {
+        let Self { across, side, cap, body } = self;
+        Self { across: n * across, side: n * side, cap: n * cap, body: n * body }
+    }
+
+    /// Fractions of the body's length at its rows: the first as long as the cap's, the others
+    /// growing from it.
+    pub(super) fn body_fractions(self, shape: &FingertipShape) -> Vec<f64> {
         let cap_row_mm = shape.cap_length_mm * FRAC_PI_4 / f64::from(self.cap);
-        cap_row_mm / (shape.length_mm - shape.cap_length_mm)
+        geometric_fractions(self.body, cap_row_mm / (shape.length_mm - shape.cap_length_mm))
     }
 
     /// Rows and columns of a side of the half cube.
@@ -68,25 +75,27 @@ impl GridSize {
         }
     }
 
-    /// A side and the place on it of a lattice address.
-    pub(super) const fn place(self, [i, j, k]: [u32; 3]) -> (usize, [u32; 2]) {
-        if k == 0 {
-            (0, [j, i])
-        } else if j == 0 {
-            (1, [i, k])
-        } else if i == 0 {
-            (2, [self.side - j, k])
-        } else if j == self.side {
-            (3, [self.across - i, k])
-        } else {
-            (4, [j, k])
+    /// The row and column of a lattice address on a side, if it lies on it.
+    pub(super) fn place_on(self, side: usize, [i, j, k]: [u32; 3]) -> Option<[u32; 2]> {
+        match side {
+            0 => (k == 0).then_some([j, i]),
+            1 => (j == 0).then_some([i, k]),
+            2 => (i == 0).then(|| [self.side - j, k]),
+            3 => (j == self.side).then(|| [self.across - i, k]),
+            _ => (i == self.across).then_some([j, k]),
         }
     }
 
+    /// A side and the place on it of a lattice address.
+    pub(super) fn place(self, at: [u32; 3]) -> (usize, [u32; 2]) {
+        let on = |side| self.place_on(side, at).map(|place| (side, place));
+        // Every address of the surface lies on one.
+        (0..SIDES).find_map(on).unwrap_or_default()
+    }
+
     /// The grid with cells of `step` lattice intervals (1, or 2 for quadratic
-    /// elements, which needs even sizes). The body's first row
-    /// takes `first_body_fraction` of its length and the others grow from it.
-    pub(super) fn build(self, step: u32, first_body_fraction: f64) -> Grid {
+    /// elements, which needs even sizes); `body` holds the fraction of each of the body's rows.
+    pub(super) fn build(self, step: u32, body: &[f64]) -> Grid {
         let mut map = BTreeMap::new();
         let mut cells = Vec::new();
         for side in 0..SIDES {
@@ -108,8 +117,7 @@ impl GridSize {
         for (at, id) in map {
             lattice[id as usize] = at;
         }
-        let body = geometric_fractions(self.body, first_body_fraction);
-        let parameters = lattice.iter().map(|&at| self.parameter(at, &body)).collect();
+        let parameters = lattice.iter().map(|&at| self.parameter(at, body)).collect();
         Grid { parameters, lattice, cells }
     }
 
@@ -166,7 +174,7 @@ mod tests {
     fn the_grid_is_a_closed_tube_with_one_open_end() {
         let size = GridSize { across: 6, side: 4, cap: 2, body: 4 };
         for step in [1, 2] {
-            let grid = size.build(step, 0.2);
+            let grid = size.build(step, &geometric_fractions(4, 0.2));
             let perimeter = 2 * (size.across + size.side);
             let nodes = (size.across + 1) * (size.side + 1) + (size.cap + size.body) * perimeter;
             assert_eq!(grid.parameters.len(), nodes as usize);

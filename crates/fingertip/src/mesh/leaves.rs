@@ -12,13 +12,16 @@ use papilla_fem::tensor::norm;
 use std::collections::{BTreeMap, HashSet};
 
 /// Times that a cell can be halved along each of its sides.
-pub(super) const HALVINGS_MAX: u32 = 6;
+const HALVINGS_MAX: u32 = 6;
+/// Intervals of the finest lattice in one of the base's.
+const TIMES: u32 = 1 << HALVINGS_MAX;
 /// Largest ratio of a cell's sides.
 const ASPECT_MAX: f64 = 5.0;
 
 /// A cell: a rectangle of a side of the half cube, in intervals of the finest lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Leaf {
+pub struct Leaf {
+    /// Side of the half cube: front, palmar, left, dorsal, right.
     pub side: usize,
     /// Its first row and column.
     pub first: [u32; 2],
@@ -37,26 +40,16 @@ pub(super) struct Leaves {
     /// The finest lattice.
     pub size: GridSize,
     pub leaves: Vec<Leaf>,
+    /// Fractions of the body's length at its rows.
     body: Vec<f64>,
 }
 
 impl Leaves {
     /// The cells of `base` (two lattice intervals each way), split as `wanted`.
-    pub(super) fn new(
-        base: GridSize,
-        body: &[f64],
-        shape: &FingertipShape,
-        wanted: Wanted<'_>,
-    ) -> Self {
-        let times = 1 << HALVINGS_MAX;
-        let size = GridSize {
-            across: base.across * times,
-            side: base.side * times,
-            cap: base.cap * times,
-            body: base.body * times,
-        };
-        let mut out = Self { size, leaves: Vec::new(), body: finer(body, times) };
-        let cell = 2 * times;
+    pub(super) fn new(base: GridSize, shape: &FingertipShape, wanted: Wanted<'_>) -> Self {
+        let size = base.times(TIMES);
+        let mut out = Self { size, leaves: Vec::new(), body: size.body_fractions(shape) };
+        let cell = 2 * TIMES;
         let mut stack = Vec::new();
         for side in 0..SIDES {
             let [rows, columns] = size.extent(side);
@@ -80,6 +73,33 @@ impl Leaves {
     /// Parameter of an address of the finest lattice.
     pub(super) fn parameter(&self, at: Address) -> SurfaceParameter {
         self.size.parameter(at, &self.body)
+    }
+
+    /// Row and column of the finest lattice at those of another one, whose rows of the body are at
+    /// `body`: both have the same angles on the cap and the same fractions on the body.
+    pub(super) fn place(
+        &self,
+        of: GridSize,
+        body: &[f64],
+        side: usize,
+        [row, column]: [f64; 2],
+    ) -> [f64; 2] {
+        let along = |k: f64| {
+            let beyond = k - f64::from(of.cap);
+            if beyond <= 0.0 {
+                return k * f64::from(self.size.cap) / f64::from(of.cap);
+            }
+            let below = (beyond as usize).min(body.len() - 2);
+            let fraction = body[below] + (beyond - below as f64) * (body[below + 1] - body[below]);
+            let next = self.body.partition_point(|f| *f < fraction).clamp(1, self.body.len() - 1);
+            let (from, to) = (self.body[next - 1], self.body[next]);
+            f64::from(self.size.cap) + (next - 1) as f64 + (fraction - from) / (to - from)
+        };
+        let [rows, columns] = of.extent(side).map(f64::from);
+        let [all_rows, all_columns] = self.size.extent(side).map(f64::from);
+        let column = if side == 0 { column * all_columns / columns } else { along(column) };
+        // Rounding must not lead over the edge.
+        [(row * all_rows / rows).clamp(0.0, all_rows), column.clamp(0.0, all_columns)]
     }
 
     /// Along which of its directions a cell has to be halved.
@@ -184,23 +204,6 @@ fn middle(a: Address, b: Address) -> Address {
     std::array::from_fn(|i| u32::midpoint(a[i], b[i]))
 }
 
-/// Fractions between given ones, `times` as many, their steps growing within each as from one to
-/// the next.
-fn finer(fractions: &[f64], times: u32) -> Vec<f64> {
-    let steps: Vec<f64> = fractions.windows(2).map(|w| w[1] - w[0]).collect();
-    let ratio = if steps.len() > 1 { steps[1] / steps[0] } else { 1.0 };
-    let part = |k: u32| {
-        let t = f64::from(k) / f64::from(times);
-        if (ratio - 1.0).abs() < 1e-9 { t } else { (ratio.powf(t) - 1.0) / (ratio - 1.0) }
-    };
-    let mut out = Vec::new();
-    for (from, step) in fractions.iter().zip(&steps) {
-        out.extend((0..times).map(|k| from + part(k) * step));
-    }
-    out.push(1.0);
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -215,8 +218,7 @@ mod tests {
             let away = |p: &[f64; 3]| norm(std::array::from_fn(|i| p[i] - centre[i]));
             least_mm + 0.5 * points.iter().map(away).fold(f64::INFINITY, f64::min)
         };
-        let body: Vec<f64> = (0..=6).map(|k| f64::from(k) / 6.0).collect();
-        Leaves::new(BASE, &body, &shape, &wanted)
+        Leaves::new(BASE, &shape, &wanted)
     }
 
     #[test]
@@ -264,15 +266,5 @@ mod tests {
         assert_eq!(leaf.reference([8.0, 18.0]), Some([-1.0, 0.0]));
         assert_eq!(leaf.reference([14.0, 20.0]), Some([0.5, 1.0]));
         assert_eq!(leaf.reference([7.9, 18.0]), None);
-    }
-
-    #[test]
-    fn fractions_between_keep_those_given_and_rise() {
-        let fine = finer(&[0.0, 0.1, 0.3, 1.0], 4);
-        assert_eq!(fine.len(), 13);
-        for (k, due) in [(0, 0.0), (4, 0.1), (8, 0.3), (12, 1.0)] {
-            assert!((fine[k] - due).abs() < 1e-12);
-        }
-        assert!(fine.windows(2).all(|w| w[1] > w[0]));
     }
 }

@@ -1,6 +1,7 @@
 //! The part of the skin that the atlas shows.
 
 use super::half_cube::{Grid, GridSize};
+use super::leaves::Leaf;
 use papilla_fem::mesh::Mesh;
 
 /// Fraction of the lateral sides that the atlas shows, from the palmar edge:
@@ -45,6 +46,11 @@ pub struct Vertices {
     pub(super) quadratic: Vec<[f64; 9]>,
     /// Functions that are linear between neighbouring nodes.
     pub(super) linear: Vec<[f64; 9]>,
+    /// Where the corners of each of [`Patch::triangles`] lie among the cells: a side of the half cube,
+    /// rows and columns.
+    pub corners: Vec<(usize, [[f64; 2]; 3])>,
+    /// Cells of the skin that hold them, with nodes as indices into [`Patch::skin`].
+    pub cells: Vec<(Leaf, [u32; 9])>,
 }
 
 impl Vertices {

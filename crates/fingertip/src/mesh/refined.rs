@@ -1,7 +1,7 @@
 //! The skin's grid with cells split for a contact, and how the atlas is read off it.
 
 use super::grading::Spacing;
-use super::half_cube::{Grid, GridSize};
+use super::half_cube::{Grid, GridSize, SIDES};
 use super::leaves::{Leaf, Leaves};
 use super::patch::{PATCH_SIDE_QUARTERS, Patch, Vertices, patch_of};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
@@ -9,8 +9,12 @@ use papilla_fem::element::shape::{hat_1d, quadratic_1d};
 use papilla_fem::mesh::{HangingNode, Mesh};
 use std::collections::BTreeMap;
 
-/// Lattice of the atlas' vertices on a mesh whose nodes are elsewhere for each contact.
-const ATLAS: GridSize = GridSize { across: 44, side: 32, cap: 24, body: 20 };
+/// The lattice whose cells are split.
+pub(super) const BASE: GridSize = GridSize { across: 8, side: 4, cap: 4, body: 6 };
+
+/// Lattice of the atlas' vertices on a mesh whose nodes are elsewhere for each contact: that of the
+/// even mesh of medium density.
+const ATLAS: GridSize = super::fingertip::MEDIUM;
 
 /// A grid whose cells were split.
 pub(super) struct Refined {
@@ -24,13 +28,13 @@ pub(super) struct Refined {
 }
 
 impl Refined {
-    /// Splits the cells of a lattice as far as `spacing` asks, but those under the nail.
-    pub(super) fn new(base: GridSize, shape: &FingertipShape, spacing: Option<&Spacing>) -> Self {
+    /// Splits the cells of [`BASE`] as far as `spacing` asks, but those under the nail.
+    pub(super) fn new(shape: &FingertipShape, spacing: Option<&Spacing>) -> Self {
         let wanted = |at: &[[f64; 3]; 9], direction| match spacing {
             Some(s) if !at.iter().any(|&p| shape.under_nail(p)) => s.wanted_mm(at, direction),
             _ => f64::INFINITY,
         };
-        let leaves = Leaves::new(base, &body(base, shape), shape, &wanted);
+        let leaves = Leaves::new(BASE, shape, &wanted);
         let size = leaves.size;
         let mut map = BTreeMap::new();
         let cells = leaves
@@ -59,9 +63,23 @@ impl Refined {
         shape: &FingertipShape,
         interface: u32,
     ) -> Result<Patch, FingertipShapeError> {
-        let atlas = ATLAS.build(1, ATLAS.first_body_fraction(shape));
+        let body = ATLAS.body_fractions(shape);
+        let atlas = ATLAS.build(1, &body);
         let Patch { skin: shown, triangles, .. } = patch_of(&atlas, ATLAS, 1, 0);
         let skin = self.shown();
+        let corners_of = |triangle: &[u32; 3]| {
+            let at = triangle.map(|v| atlas.lattice[shown[v as usize] as usize]);
+            let on = |side| {
+                let place = |a| {
+                    let found = ATLAS.place_on(side, a)?.map(f64::from);
+                    Some(self.leaves.place(ATLAS, &body, side, found))
+                };
+                let [a, b, c] = at.map(place);
+                Some((side, [a?, b?, c?]))
+            };
+            // A triangle of the surface lies on one side.
+            (0..SIDES).find_map(on).unwrap_or_default()
+        };
         let index = |node: u32| skin.partition_point(|&s| s < node) as u32;
         let mut out = Vertices {
             skin_mm: vec![],
@@ -69,9 +87,11 @@ impl Refined {
             nodes: vec![],
             quadratic: vec![],
             linear: vec![],
+            corners: triangles.iter().map(corners_of).collect(),
+            cells: self.shown_cells().map(|(leaf, nodes)| (leaf, nodes.map(index))).collect(),
         };
-        for v in shown {
-            let (leaf, at) = self.find(atlas.lattice[v as usize]);
+        for &v in &shown {
+            let (leaf, at) = self.find(atlas.lattice[v as usize], &body);
             let cell = &self.grid.cells[leaf];
             out.nodes.push(std::array::from_fn(|n| index(cell[n])));
             let product = |of: &dyn Fn(i8, f64) -> f64| -> [f64; 9] {
@@ -89,51 +109,33 @@ impl Refined {
 
     /// Nodes of the cells that the atlas shows, in whole or in part, sorted.
     fn shown(&self) -> Vec<u32> {
-        let last = self.size.side * PATCH_SIDE_QUARTERS / 4;
-        let lattice = &self.grid.lattice;
-        let is_shown = |cell: &&Vec<u32>| cell.iter().any(|&s| lattice[s as usize][1] < last);
-        let mut nodes: Vec<u32> =
-            self.grid.cells.iter().filter(is_shown).flatten().copied().collect();
+        let mut nodes: Vec<u32> = self.shown_cells().flat_map(|(_, nodes)| nodes).collect();
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
 
-    /// The cell that holds a vertex of the atlas, and where in it.
-    fn find(&self, vertex: [u32; 3]) -> (usize, [f64; 2]) {
+    /// Those cells with their nodes.
+    fn shown_cells(&self) -> impl Iterator<Item = (Leaf, [u32; 9])> {
+        let last = self.size.side * PATCH_SIDE_QUARTERS / 4;
+        let is_shown = move |&s: &u32| self.grid.lattice[s as usize][1] < last;
+        let cells = self.leaves.leaves.iter().zip(&self.grid.cells);
+        cells
+            .map(|(leaf, nodes)| (*leaf, std::array::from_fn(|n| nodes[n])))
+            .filter(move |(_, nodes): &(Leaf, [u32; 9])| nodes.iter().any(is_shown))
+    }
+
+    /// The cell that holds a vertex of the atlas, and where in it; `body` are the fractions at the
+    /// rows of the atlas' lattice.
+    fn find(&self, vertex: [u32; 3], body: &[f64]) -> (usize, [f64; 2]) {
         let (side, [row, column]) = ATLAS.place(vertex);
-        let [rows, columns] = ATLAS.extent(side);
-        let [all_rows, all_columns] = self.leaves.size.extent(side);
-        // Cap and body are finer each by its own factor.
-        let scaled = |x: u32, of: u32, to: u32| f64::from(x) * f64::from(to) / f64::from(of);
-        let along = |x: u32| {
-            let (cap, body) = (self.size.cap, self.size.body);
-            if x <= ATLAS.cap {
-                scaled(x, ATLAS.cap, cap)
-            } else {
-                f64::from(cap) + scaled(x - ATLAS.cap, ATLAS.body, body)
-            }
-        };
-        let column = if side == 0 { scaled(column, columns, all_columns) } else { along(column) };
-        let place = [scaled(row, rows, all_rows), column];
+        let place = self.leaves.place(ATLAS, body, side, [row, column].map(f64::from));
         let found = self.leaves.leaves.iter().enumerate().find_map(|(n, leaf): (_, &Leaf)| {
             (leaf.side == side).then(|| leaf.reference(place)).flatten().map(|at| (n, at))
         });
         // Cells cover every side.
         found.unwrap_or((0, [0.0; 2]))
     }
-}
-
-/// Fractions of the body's length at a lattice's rows: those of the atlas, so that both
-/// lattices are one but for how often they are halved.
-fn body(base: GridSize, shape: &FingertipShape) -> Vec<f64> {
-    let atlas = super::half_cube::geometric_fractions(ATLAS.body, ATLAS.first_body_fraction(shape));
-    let at = |k: u32| {
-        let x = f64::from(k) * f64::from(ATLAS.body) / f64::from(base.body);
-        let below = (x.floor() as usize).min(atlas.len() - 2);
-        atlas[below] + (x - below as f64) * (atlas[below + 1] - atlas[below])
-    };
-    (0..=base.body).map(at).collect()
 }
 
 /// Puts nodes that hang where the edges of their neighbours are, in each of the layers of `n` nodes,

@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 
 /// How often the way between stored depths is made finer for the work integral.
 const REFINEMENTS: [u32; 3] = [1, 2, 4];
+/// Part of the accepted difference of energy and work to which the work is mended on its way: what
+/// is missed before one stored depth stays with the next.
+const MENDED: f64 = 0.5;
 /// A finer path over time that leaves more than this share of what the last one missed is the last.
 const GAIN_MIN: f64 = 0.5;
 /// Most equilibria for one stored state of a path over time, for the same.
@@ -111,7 +114,8 @@ impl Body {
     ) -> Taken<T> {
         let mut once = |drive: &Drive, refinement: u32| {
             let (mut kept, mut depths_mm, mut excess) = (Vec::new(), Vec::new(), 0.0f64);
-            let pressed = self.press(solver, approach, drive, refinement, &mut |s, record, r| {
+            let path = (refinement, Some(MENDED * energy_vs_work_max));
+            let pressed = self.press_to(solver, approach, drive, path, &mut |s, record, r| {
                 let found = record.checks.energy_vs_work / energy_vs_work_max;
                 excess = if found <= excess { excess } else { found };
                 depths_mm.push(record.depth_mm);

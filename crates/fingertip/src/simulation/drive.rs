@@ -108,7 +108,21 @@ impl Body {
         refinement: u32,
         visit: Visit<'_>,
     ) -> Result<(), SimulationError> {
+        self.press_to(solver, approach, drive, (refinement, None), visit)
+    }
+
+    /// As [`Self::press`]; at stored depths work is mended ([`Solver::mend_work`]) until
+    /// it parts from energy by no more than a number that comes with the refinement.
+    pub(super) fn press_to(
+        &self,
+        solver: &mut Solver<'_>,
+        approach: &Approach,
+        drive: &Drive,
+        path: (u32, Option<f64>),
+        visit: Visit<'_>,
+    ) -> Result<(), SimulationError> {
         drive.validate()?;
+        let (refinement, _) = path;
         let duration_s = match drive {
             Drive::Path(points) => points.last().map_or(0.0, |p| p.time_s),
             _ => 0.0,
@@ -120,7 +134,7 @@ impl Body {
             ..Loading::default()
         });
         match drive {
-            Drive::Depths(depths) => self.to_depths(solver, depths, refinement, visit),
+            Drive::Depths(depths) => self.to_depths(solver, depths, path, visit),
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
             Drive::Path(points) => self.along(solver, points, refinement, visit),
         }
@@ -130,7 +144,7 @@ impl Body {
         &self,
         solver: &mut Solver<'_>,
         depths_mm: &[f64],
-        refinement: u32,
+        (refinement, energy_vs_work_max): (u32, Option<f64>),
         visit: Visit<'_>,
     ) -> Result<(), SimulationError> {
         let last = depths_mm.last().copied().unwrap_or(1.0);
@@ -138,10 +152,15 @@ impl Body {
             let clock = Instant::now();
             let at = |source| SimulationError::Solve { depth_mm, source };
             let mut effort = Effort::default();
+            let mut known = vec![solver.mark()];
             for between in path_mm(depths_mm, i, refinement, self.graded) {
                 effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
+                known.push(solver.mark());
             }
             let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
+            if let Some(limit) = energy_vs_work_max {
+                effort = effort.plus(&solver.mend_work(&known, limit));
+            }
             report.effort = report.effort.plus(&effort);
             let mut record = self.record(solver, depth_mm, &report)?;
             record.seconds = clock.elapsed().as_secs_f64();

@@ -27,6 +27,7 @@ fn spec() -> CampaignSpec {
         depths: None,
         test_fraction: 0.5,
         density: Density::Medium,
+        order: Order::default(),
         effects: usual(),
         materials: TissueTable::default(),
         friction: Friction::default(),

@@ -1,0 +1,76 @@
+"""Reads fields that are known at the nodes of cells: meshes that differ from press to press.
+
+Cells are rectangles of one lattice on the skin, halved where a contact asked for it, each with nine
+nodes. Where a pixel lies on the lattice is fixed (``raster.npz``), so a cell is found without a
+search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from papilla_trainer.errors import DatasetError
+
+CELL_PLACE, CELL_NODES = "cell_place", "cell_nodes"
+
+F64 = NDArray[np.float64]
+Functions = Callable[[F64], F64]
+
+# A place on the last row or column belongs to the cell before it.
+_BEFORE = 1e-3
+
+
+def quadratics(x: F64) -> F64:
+    """``[N]`` in -1 to 1 to ``[N, 3]``: quadratic functions of nodes at -1, 0 and 1."""
+    return np.stack([0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)], axis=1)
+
+
+def hats(x: F64) -> F64:
+    """The same, linear between neighbouring nodes."""
+    return np.stack([np.maximum(-x, 0.0), 1.0 - np.abs(x), np.maximum(x, 0.0)], axis=1)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Where N pixels lie: ``side`` ``[N]`` of the half cube, ``place`` ``[N, 2]`` row, column."""
+
+    side: NDArray[np.int64]
+    place: F64
+
+    def read(
+        self, place: NDArray[Any], nodes: NDArray[Any], functions: Functions
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """``[N, 9]`` nodes and weights of pixels, from cells ``[L, 5]``, their nodes ``[L, 9]``."""
+        cell = self._cells(place.astype(np.int64))
+        if (cell < 0).any():
+            raise DatasetError(f"{int((cell < 0).sum())} pixels lie in no cell")
+        first, size = place[cell, 1:3].astype(np.float64), place[cell, 3:5].astype(np.float64)
+        xi = 2.0 * (self.place - first) / size - 1.0
+        row, column = functions(xi[:, 0]), functions(xi[:, 1])
+        weights = (row[:, :, None] * column[:, None, :]).reshape(len(xi), 9)
+        return nodes[cell].astype(np.int64), weights.astype(np.float32)
+
+    def _cells(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The cell of each pixel, -1 where none is: cells begin at multiples of their sizes."""
+        found = np.full(len(self.side), -1)
+        for back in ((0.0, 0.0), (_BEFORE, 0.0), (0.0, _BEFORE), (_BEFORE, _BEFORE)):
+            at = np.maximum(self.place - back, 0.0).astype(np.int64)
+            for size in np.unique(place[:, 3:5], axis=0):
+                index = np.flatnonzero((place[:, 3:5] == size).all(axis=1))
+                own = _key(place[index, 0], place[index, 1:3])
+                order = np.argsort(own)
+                wanted = _key(self.side, at // size * size)
+                near = np.searchsorted(own[order], wanted).clip(max=len(own) - 1)
+                hit = (own[order][near] == wanted) & (found < 0)
+                found[hit] = index[order][near][hit]
+        return found
+
+
+def _key(side: NDArray[np.int64], first: NDArray[np.int64]) -> NDArray[np.int64]:
+    """One number for a side, a row and a column (of at most 2^16 each)."""
+    return (side * 65536 + first[:, 0]) * 65536 + first[:, 1]
