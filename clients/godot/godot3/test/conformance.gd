@@ -285,6 +285,49 @@ func step_rasterise(step, expect):
 	check_map(expect, atlas.pressure_map(values))
 
 
+func step_touch(step, expect):
+	check_touch(step, expect, session.send_poses(step.poses, int(step.get("finger", 0)), step.get("net")))
+
+
+func step_gaps(step, expect):
+	var ball = step.sphere
+	var depth_mm = PoolRealArray()
+	for i in atlas.vertex_count():
+		var d2 = 0.0
+		for k in 3:
+			d2 += pow(atlas.skin_mm[3 * i + k] - ball[k], 2)
+		depth_mm.append(ball[3] - sqrt(d2))
+	check_touch(step, expect, session.send_gaps(depth_mm, int(step.get("finger", 0)), step.get("net")))
+
+
+func check_touch(step, expect, sequence):
+	if not wait_for("has_outcome", sequence):
+		return
+	var outcome = outcomes[sequence]
+	same("status (%s)" % outcome.get("problem"), outcome.status, expect.get("status", "ok"))
+	same("finger", outcome.finger, int(step.get("finger", 0)))
+	for member in ["code", "field"]:
+		if expect.has(member):
+			same(member, outcome.problem[member], expect[member])
+	if outcome.status != "ok" or why != "":
+		return
+	var t = outcome.touch
+	var found = []
+	for three in [t.force_n, t.torque_n_mm]:
+		found += [three.x, three.y, three.z]
+	found += [t.area_mm2, t.centre_mm.x, t.centre_mm.y, t.centre_mm.z, t.penetration_mm]
+	found += [t.stiffness_n_per_mm, t.travel_mm, t.pressure_max_pa, t.share]
+	all_near("touch", found, expect.touch)
+	if expect.has("pressure_sum"):
+		var sum = 0.0
+		for value in outcome.pressure:
+			sum += value
+		near("pressure", sum, expect.pressure_sum[0], expect.pressure_sum[1])
+	same("no_contact", outcome.no_contact, expect.flags.has("no_contact"))
+	if outcome.out_of_range or outcome.unsettled:
+		fail("out of range or unsettled")
+
+
 func step_contacts(step, expect):
 	var map = atlas.contact_map(step.contacts)
 	check_map(expect, map)
