@@ -77,6 +77,7 @@ struct Ready {
   };
   json::Value message;                ///< as it came
   std::uint8_t version = 2;
+  std::size_t fingers = 1;
   SampleType sample_type = SampleType::f32;
   std::string tier;
   std::uint64_t tier_number = 0;

@@ -38,6 +38,8 @@ class Core {
   /// Whether `take` would give a frame.
   bool can_take() const { return is_ready_ && outbox_.any() && sent_.size() < sent_max; }
   std::size_t in_flight() const { return sent_.size(); }
+  /// Fingers of the session.
+  std::size_t fingers() const { return ready().fingers; }
   std::uint64_t superseded_by_client() const { return superseded_; }
 
   /// Takes a frame: the samples of a window, Pa, row by row (none: no contact). Replaces one of the
@@ -188,6 +190,7 @@ class Core {
       if (at) *at = {section["offset"].whole(), section["bytes"].whole(), true};
     }
     ready.version = static_cast<std::uint8_t>(message["version"].whole());
+    ready.fingers = message.has("fingers") ? message["fingers"].whole() : 1;
     ready.message = message;
     // Reserved here, so that no answer allocates.
     scratch_.values.reserve(map_len);
