@@ -87,8 +87,9 @@ namespace Papilla
         unsafe void ReadContact(byte* m, int bytes, Ready terms)
         {
             if (Finger >= Session.FingersMax) throw new FormatException("an answer to finger " + Finger);
-            if (terms.TouchAt + sizeof(Touch) > bytes || terms.VerticesAt + terms.VerticesBytes > bytes) throw Short(bytes);
             HasTouch = terms.TouchAt >= 0;
+            int touchEnd = HasTouch ? terms.TouchAt + sizeof(Touch) : 0;
+            if (touchEnd > bytes || terms.VerticesAt + terms.VerticesBytes > bytes) throw Short(bytes);
             if (HasTouch) Touch = *(Touch*)(m + terms.TouchAt);
             PressurePa = Sized(PressurePa, terms.PressureCount);
             Copy(m, terms.PressureAt, terms.PressureCount, bytes, PressurePa);
