@@ -5,6 +5,8 @@ const PLATE_MM = { size: 20, edge: 0.5, halfHeight: 2.5 };
 const BAR_MM = { length: 20, end: 0.5 };
 /** Hellos are rare: a slider that moves announces at most so often. */
 const ANNOUNCE_MS = 300;
+/** A lifted indenter stands so far off: at depth 0 it would still graze the skin. */
+const LIFTED_MM = 0.1;
 
 /** The shape of a press as a scene file has it; it presses towards +z of its own frame. */
 export function shapeOf({ shape, radiusMm }) {
@@ -13,11 +15,11 @@ export function shapeOf({ shape, radiusMm }) {
   return { shape: 'cylinder', radius_mm: radiusMm, length_mm: BAR_MM.length, end_radius_mm: BAR_MM.end };
 }
 
-/** Origin (mm) and unit quaternion x y z w of a press in the finger's frame, into seven numbers. */
-export function poseOf(press, out) {
+/** Origin (mm) and unit quaternion x y z w of a press so deep in the finger's frame, into seven numbers. */
+export function poseOf(press, depthMm, out) {
   const { pointMm, normal: n, tangent: t, bitangent: b, heightMm } = press;
   // Its lowest point stands at `heightMm` over the skin; its z goes into the finger, so its y is -b.
-  const reachMm = press.shape === 'plate' ? PLATE_MM.halfHeight : press.radiusMm;
+  const reachMm = (press.shape === 'plate' ? PLATE_MM.halfHeight : press.radiusMm) + (depthMm > 0 ? 0 : LIFTED_MM);
   for (let k = 0; k < 3; k++) out[k] = pointMm[k] + (heightMm + reachMm) * n[k];
   quaternionOf(t, b, n, out);
 }

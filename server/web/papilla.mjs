@@ -214,7 +214,7 @@ class Page {
     this.views.pressure.setMarker(press.uvPx);
     this.finger?.setPress(press);
     if (this.solves) {
-      poseOf(press, this.session.poseFrame.values);
+      poseOf(press, control.depthMm, this.session.poseFrame.values);
       return true;
     }
     this.atlas.skin.raster.rasterise(press.pressurePa, map);
