@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::Response,
 };
+use papilla_metrics::Metrics;
 use papilla_proto::Problem;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -16,7 +17,6 @@ use crate::{
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
-        metrics::Metrics,
     },
     problem, progress,
     transport::answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
