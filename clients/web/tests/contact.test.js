@@ -1,8 +1,9 @@
 // The WebXR scene on a server with a contact model: several fingers touch. PAPILLA_URL: a server with --xr-dir dist and --contact.
 
 import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
-import { launch } from './browser.js';
+import { launch, openPage } from './browser.js';
 import { PATIENCE_MS, lower, nextAnswer, onScreen, openHeadset, openScene, shot, until } from './scene.js';
 
 /** @type {import('playwright-core').Browser} */
@@ -17,6 +18,19 @@ const felt = (page) => page.evaluate(() => {
   return fingers.filter((/** @type {any} */ f) => f.mesh.visible).map((/** @type {any} */ f) => ({
     name: f.name, touched: f.touched?.name ?? null, forceN: f.forceN, sedMax: f.sedMax, arrow: f.arrow.visible, at: f.mesh.position.toArray(),
   }));
+});
+
+test('the code of the page tells what pushes back', async () => {
+  const text = await readFile(new URL('../../../docs/reference/clients/web.md', import.meta.url), 'utf8');
+  const blocks = [...text.matchAll(/```html\n<script type="module">\n([\s\S]*?)<\/script>\n```/g)];
+  assert.equal(blocks.length, 2, 'docs/reference/clients/web.md has a script for a map and one for a force');
+  const page = await openPage(browser);
+  const said = page.waitForEvent('console', { timeout: PATIENCE_MS });
+  await page.addScriptTag({ type: 'module', content: blocks[1][1] });
+  const words = (await said).text();
+  const forceN = Number(words.match(/^pushes back with ([0-9.e-]+) N$/)?.[1]);
+  assert.ok(forceN > 0.01 && forceN < 1, words);
+  await page.close();
 });
 
 test('two fingers press two objects with the mouse, and what pushes back is drawn', async () => {
