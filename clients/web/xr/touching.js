@@ -59,6 +59,8 @@ export class Solved {
   #fingers;
   #objects;
   #busy;
+  #onstate;
+  /** @type {import('../src/types.js').Ready | null} */ #told = null;
   #map = new Float32Array(MAP_LEN);
   #toFinger = new Matrix4();
   #shape = new Matrix4();
@@ -81,15 +83,21 @@ export class Solved {
       fingers: fingers.map(() => ({})),
       answer_layout: 'vertices',
       map: true,
-    }).then((hand) => {
-      this.session = hand;
-      onstate(`ready: ${hand.ready?.tier}, some ${((hand.ready?.predicted_latency_us ?? 0) / 1000).toFixed(1)} ms a finger`);
-    }, (error) => onstate(`refused: ${error.message}`));
+    }).then((hand) => { this.session = hand; }, (error) => onstate(`refused: ${error.message}`));
+    this.#onstate = onstate;
+  }
+
+  /** Says when the connection comes and goes. @param {import('../src/types.js').Ready | null} ready */
+  #tell(ready) {
+    if (ready === this.#told) return;
+    this.#told = ready;
+    this.#onstate(ready ? `ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a finger` : 'connection lost; trying again');
   }
 
   /** Sends where the objects are, of every finger that is shown. */
   step() {
     const hand = this.session;
+    if (hand) this.#tell(hand.ready);
     if (!hand?.ready) return;
     this.#fingers.forEach((finger, number) => {
       if (!finger.mesh.visible) return;

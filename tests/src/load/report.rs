@@ -251,7 +251,8 @@ impl fmt::Display for Report {
             self.source
         )?;
         if let Some(contact) = self.contact {
-            writeln!(f, "{} fingers, poses in, {contact:?} out", self.fingers)?;
+            let plural = if self.fingers == 1 { "" } else { "s" };
+            writeln!(f, "{} finger{plural}, poses in, {contact:?} out", self.fingers)?;
         }
         write!(f, "tier {}", self.tier)?;
         if let Some(us) = self.predicted_latency_us {

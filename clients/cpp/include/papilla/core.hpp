@@ -70,7 +70,9 @@ class Core {
     Header header = header_of(Kind::objects, {0, 0, row_len, height}, client_time_us, finger);
     Outgoing& frame = put(header, 4 * row_len * height);
     std::uint8_t* at = frame.data() + header_bytes;
-    for (std::size_t i = 0; i < std::min(count, std::size_t{height}); ++i, at += 4 * row_len) wire::put_pose(at, poses[i]);
+    for (std::size_t i = 0; i < std::min(count, std::size_t{height}); ++i, at += 4 * row_len) {
+      wire::put_pose(at, poses[i]);
+    }
     if (net && rows == height) wire::put_net(at, *net);
     return frame.id.sequence;
   }
