@@ -35,7 +35,7 @@ test('the code of the page tells what pushes back', async () => {
 
 test('two fingers press two objects with the mouse, and what pushes back is drawn', async () => {
   const { page, complaints } = await openScene(browser);
-  assert.match((await page.textContent('#state')) ?? '', /solved by the server/);
+  await until(page, 'never said', () => /^ready: .*solved by the server/.test(document.getElementById('state')?.textContent ?? ''), 'solved');
   const [x, y] = await onScreen(page, 'hard ball');
   await page.mouse.move(x, y);
   await page.mouse.down();
@@ -51,7 +51,7 @@ test('two fingers press two objects with the mouse, and what pushes back is draw
   assert.deepEqual([index.name, index.touched, middle.name, middle.touched], ['index', 'hard ball', 'middle', 'soft ball'], found);
   assert.ok(index.arrow && middle.arrow && middle.forceN > 0.01, found);
   assert.ok(index.forceN > 2 * middle.forceN && index.sedMax > 2 * middle.sedMax, `the soft ball gives way: ${found}`);
-  assert.match((await page.textContent('#figures')) ?? '', /index: hard ball.* N, .*\nmiddle: soft ball/);
+  await until(page, 'never told', () => /index: hard ball.* N, .*\nmiddle: soft ball/.test(document.getElementById('figures')?.textContent ?? ''), 'both fingers');
   await page.mouse.up();
   await until(page, 'never left', () => /** @type {any} */ (globalThis).papillaXr.fingers.every((/** @type {any} */ f) => f.forceN === 0 && !f.arrow.visible), 'hard ball');
   assert.deepEqual(complaints, []);

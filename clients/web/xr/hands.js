@@ -36,6 +36,8 @@ function place(mesh, place, turn) {
   mesh.updateMatrixWorld();
 }
 
+const BESIDE = new Vector3();
+
 /** Puts the first finger to a place and the second beside it; the others are not there. @param {Mesh[]} meshes @param {Vector3} at @param {Quaternion} turn */
 function spread(meshes, at, turn) {
   meshes.forEach((mesh, n) => {
@@ -43,8 +45,6 @@ function spread(meshes, at, turn) {
     if (mesh.visible) place(mesh, BESIDE.set(n * SPACING, 0, 0).add(at), turn);
   });
 }
-const BESIDE = new Vector3();
-
 /** The mouse points at a place of an object or the table; pressed, the finger comes down there. */
 export class Pointer {
   /** @param {HTMLCanvasElement} canvas @param {import('three').Camera} camera @param {import('./objects.js').Touchable[]} objects */

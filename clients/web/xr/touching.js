@@ -11,6 +11,8 @@ import { Hand, MAP_LEN, Session, SUMMARY } from '../papilla.js';
 
 /** So many late maps in a row, and the budget is doubled. */
 const LATE_MOST = 30;
+/** What becomes of a frame that was not refused. */
+const MISSED = ['superseded', 'stale', 'late', 'lost'];
 
 /** The flags of an answer in words. @param {{outOfRange: boolean, unfamiliar?: boolean, unsettled?: boolean, cutOff?: boolean}} answer */
 const inWords = ({ outOfRange, unfamiliar, unsettled, cutOff }) => [
@@ -20,8 +22,6 @@ const inWords = ({ outOfRange, unfamiliar, unsettled, cutOff }) => [
 /** One finger, its pressure by springs. */
 export class Springs {
   static words = 'pressure of springs, one finger: the server has no contact model (--contact)';
-  /** Fingers that feel. */
-  count = 1;
   #late = 0;
   #finger;
 
@@ -55,7 +55,6 @@ export class Springs {
 export class Solved {
   static words = 'contact solved by the server';
   /** @type {Hand | null} */ session = null;
-  count;
   #fingers;
   #objects;
   #busy;
@@ -73,7 +72,6 @@ export class Solved {
     this.#fingers = fingers;
     this.#objects = objects;
     this.#busy = fingers.map(() => false);
-    this.count = fingers.length;
     Hand.connect('', {
       tier,
       atlas_hash,
@@ -106,8 +104,10 @@ export class Solved {
       if (this.#busy[number]) return;
       this.#busy[number] = true;
       hand.touch(this.#objects.map((object) => this.#poseOf(object, finger)), { finger: number })
-        // A frame that was lost or late is followed by the next.
-        .then((answer) => this.#feel(finger, answer), () => {})
+        .then((answer) => this.#feel(finger, answer), ({ code, message }) => {
+          // Such a frame is followed by the next.
+          if (!MISSED.includes(code)) this.#onstate(`refused: ${message}`);
+        })
         .finally(() => { this.#busy[number] = false; });
     });
   }
