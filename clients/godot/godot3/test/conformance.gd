@@ -5,6 +5,7 @@ const Session = preload("res://addons/papilla/session.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
 const Patterns = preload("res://test/patterns.gd")
+const Touch = preload("res://addons/papilla/touch.gd")
 
 var url = OS.get_environment("PAPILLA_URL")
 var atlas
@@ -285,7 +286,23 @@ func step_rasterise(step, expect):
 	check_map(expect, atlas.pressure_map(values))
 
 
+# A transform with this pose has this row.
+func check_row(row):
+	var turn = Quat(row[3], row[4], row[5], row[6])
+	var made = Touch.row_of(Transform(Basis(turn), Vector3(row[0], row[1], row[2])))
+	var dot = 0.0
+	for k in 4:
+		dot += made[3 + k] * row[3 + k]
+	for k in 3:
+		near("origin", made[k], row[k], 1e-4)
+	# A quaternion and its negative are one turn.
+	near("turn", abs(dot), 1.0, 1e-5)
+
+
 func step_touch(step, expect):
+	if expect.get("status") != "error":
+		for row in step.poses:
+			check_row(row)
 	check_touch(step, expect, session.send_poses(step.poses, int(step.get("finger", 0)), step.get("net")))
 
 
