@@ -36,6 +36,9 @@ impl Contact {
     pub(super) fn ask(self, fingers: u8, hello: &mut Hello) {
         let shape = AnnouncedShape::Sphere(Sphere { radius_mm: f64::from(RADIUS_MM) });
         hello.version = 3;
+        // Poses are f32; --sample-type is that of the answers.
+        hello.answer_sample_type = Some(hello.sample_type);
+        hello.sample_type = SampleType::F32;
         hello.input = Some(Input::Objects);
         hello.objects = Some(vec![AnnouncedObject { shape, stiffness_mpa_per_mm: None }]);
         hello.fingers = Some(vec![AnnouncedFinger::default(); fingers.into()]);

@@ -231,6 +231,32 @@ impl Report {
     }
 }
 
+impl Report {
+    fn write_times(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
+        for (name, times) in [
+            ("round trip", self.round_trip_us),
+            ("  of it in the server", self.server_us),
+            ("    waiting", self.queue_us),
+            ("    solving the contact", self.solve_us),
+            ("    in the network", self.infer_us),
+            ("    the service's own", self.service_us),
+            ("bare echo of the bytes", self.echo_us),
+            ("trip without network", self.overhead_us),
+            ("age of the newest map", self.age_us),
+            ("sent late by", self.send_delay_us),
+        ] {
+            write!(f, "{name:24}")?;
+            let columns = times.map(|p| [p.p50, p.p90, p.p99, p.p99_9, p.max]);
+            for column in columns.map_or([None; 5], |times| times.map(Some)) {
+                write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.speak {
@@ -282,26 +308,7 @@ impl fmt::Display for Report {
             format!(" within {us} us of the instant they were meant to leave")
         });
         writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
-        writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
-        for (name, times) in [
-            ("round trip", self.round_trip_us),
-            ("  of it in the server", self.server_us),
-            ("    waiting", self.queue_us),
-            ("    solving the contact", self.solve_us),
-            ("    in the network", self.infer_us),
-            ("    the service's own", self.service_us),
-            ("bare echo of the bytes", self.echo_us),
-            ("trip without network", self.overhead_us),
-            ("age of the newest map", self.age_us),
-            ("sent late by", self.send_delay_us),
-        ] {
-            write!(f, "{name:24}")?;
-            let columns = times.map(|p| [p.p50, p.p90, p.p99, p.p99_9, p.max]);
-            for column in columns.map_or([None; 5], |times| times.map(Some)) {
-                write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
-            }
-            writeln!(f)?;
-        }
+        self.write_times(f)?;
         if let Some(percent) = self.stolen_percent {
             writeln!(f, "the host withheld {percent:.2} % of this machine's processor time")?;
         }

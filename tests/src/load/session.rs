@@ -215,7 +215,7 @@ impl<'a> Ear<'a> {
         self.tally.infer.record(infer);
         let mut known = queue + infer;
         if let Some(touch) = extension.finger.and_then(|_| Touch::decode(payload)) {
-            let solve = Duration::from_secs_f32(touch.solve_us.max(0.0) * 1e-6);
+            let solve = Duration::try_from_secs_f32(touch.solve_us * 1e-6).unwrap_or_default();
             self.tally.solve.record(solve);
             known += solve;
         }
