@@ -60,6 +60,10 @@ sealed class Outcome
     internal ulong ClientTimeUs;
     internal int TierNumber;
     internal uint TotalUs, QueueUs, InferUs;
+    internal bool HasTouch, Unsettled;
+    internal Touch Touch;
+    internal int Finger;
+    internal float[] PressurePa;
 }
 
 /// <summary>One case.</summary>
@@ -103,6 +107,8 @@ sealed partial class Run : IDisposable
             case "http": Http(step, expect); break;
             case "rasterise": Rasterise(step, expect); break;
             case "contacts": Contacts(step, expect); break;
+            case "touch": Touch(step, expect); break;
+            case "gaps": Gaps(step, expect); break;
             default: throw new Missed("no step " + step["do"]);
         }
     }
@@ -151,6 +157,7 @@ sealed partial class Run : IDisposable
                 Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
                 Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
                 Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
+                HasTouch = a.HasTouch, Touch = a.Touch, Finger = a.Finger, Unsettled = a.Unsettled, PressurePa = a.PressurePa == null ? null : (float[])a.PressurePa.Clone(),
                 ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
             };
             order.Add(a.Sequence);

@@ -50,6 +50,7 @@ use std::{net::SocketAddr, sync::Arc, time::Duration};
 pub use check::{Finding, Report, check};
 pub use config::{Cli, Command, Config, ConfigError, SettingError};
 pub use error::{DrainError, StartError};
+use papilla_metrics::Metrics;
 pub use telemetry::Telemetry;
 use tokio::{
     sync::watch,
@@ -58,7 +59,7 @@ use tokio::{
 };
 
 use crate::{
-    core::{metrics::Metrics, scheduler::Pool},
+    core::scheduler::Pool,
     progress::Progress,
     runtime::IoRuntime,
     start::Opened,

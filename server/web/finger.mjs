@@ -5,14 +5,16 @@ import { MAP_LEN, SIDE_PX } from './protocol.mjs';
 import { TABLES, TABLE_LEN } from './colour.mjs';
 import { computeNormals } from './atlas.mjs';
 import { fringeOf } from './mask.mjs';
-import { indenterMesh } from './indenter.mjs';
-import { GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
+import { arrowMesh, indenterMesh } from './indenter.mjs';
+import { ARROW_FRAGMENT, GLASS_FRAGMENT, GLASS_VERTEX, SKIN_FRAGMENT, SKIN_VERTEX, program, texture } from './gl.mjs';
 
 const FIELD_OF_VIEW_RAD = 0.5;
 const PITCH_LIMIT_RAD = 1.5;
 // The glass stands this far off the skin: coplanar faces would flicker.
 const GLASS_OFFSET_MM = 0.06;
 const UNIT = { sed: 0, table: 1 };
+/** A force's arrow: so long a newton, at most so long, and none below so much. */
+const ARROW = { mmPerN: 12, mostMm: 30, leastN: 0.005 };
 /** The texture holds 16-bit floats, which a filter can read everywhere; this is below their greatest. */
 const TEXTURE_MAX = 60000;
 
@@ -31,6 +33,9 @@ export class FingerView {
     this.sedMax = 1;
     this.decades = 0;
     this.press = null;
+    /** What pushes back; null: nothing is drawn. */
+    this.force = null;
+    this.forceText = document.getElementById('finger-force');
     this.yaw = 0.5;
     this.pitch = 0.35;
     this.zoom = 1;
@@ -84,6 +89,13 @@ export class FingerView {
     this.dirty = true;
   }
 
+  /** Draws what pushes back (a touch of contact.mjs) as an arrow with its number; null takes it away. */
+  setForce(touch) {
+    this.force = touch && touch.forceN > ARROW.leastN ? touch : null;
+    this.forceText.textContent = touch ? `${touch.forceN.toFixed(2)} N` : '';
+    this.dirty = true;
+  }
+
   orbit(yaw, pitch) {
     this.yaw += yaw;
     this.pitch = Math.max(-PITCH_LIMIT_RAD, Math.min(PITCH_LIMIT_RAD, this.pitch + pitch));
@@ -131,6 +143,7 @@ export class FingerView {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     this.#drawSkin();
+    if (this.force) this.#drawForce();
     if (this.press) this.#drawIndenter();
   }
 
@@ -144,6 +157,29 @@ export class FingerView {
     gl.uniform3fv(skin.uniforms.u_clay, this.clay);
     gl.bindVertexArray(this.skinArray);
     gl.drawElements(gl.TRIANGLES, this.atlas.triangles.length, gl.UNSIGNED_INT, 0);
+  }
+
+  #drawForce() {
+    const { gl, arrow, model } = this;
+    const { force, forceN, centreMm } = this.force;
+    const z = force.map((c) => c / forceN);
+    const axis = Math.abs(z[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
+    const x = perpendicular(axis, z);
+    const lengthMm = Math.min(ARROW.mostMm, ARROW.mmPerN * forceN);
+    for (let k = 0; k < 3; k++) {
+      model[k] = x[k];
+      model[4 + k] = z[(k + 1) % 3] * x[(k + 2) % 3] - z[(k + 2) % 3] * x[(k + 1) % 3];
+      model[8 + k] = lengthMm * z[k];
+      model[12 + k] = centreMm[k];
+    }
+    model[15] = 1;
+    gl.useProgram(arrow.handle);
+    gl.uniformMatrix4fv(arrow.uniforms.u_view, false, this.view);
+    gl.uniformMatrix4fv(arrow.uniforms.u_projection, false, this.projection);
+    gl.uniformMatrix4fv(arrow.uniforms.u_model, false, model);
+    gl.uniform3fv(arrow.uniforms.u_tint, this.forceTint);
+    gl.bindVertexArray(this.arrowArray);
+    gl.drawArrays(gl.TRIANGLES, 0, this.arrowCount);
   }
 
   #drawIndenter() {
@@ -237,6 +273,7 @@ export class FingerView {
     const rgb = (name) => style.getPropertyValue(name).trim().split(/\s+/).map((x) => Number(x) / 255);
     this.clay = rgb('--clay');
     this.glassTint = rgb('--glass');
+    this.forceTint = rgb('--force');
     this.dirty = true;
   }
 
@@ -244,6 +281,7 @@ export class FingerView {
     const { gl, atlas } = this;
     this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT);
     this.glass = program(gl, GLASS_VERTEX, GLASS_FRAGMENT);
+    this.arrow = program(gl, GLASS_VERTEX, ARROW_FRAGMENT);
     this.buffers = {};
     const buffer = (name, data, usage) => {
       this.buffers[name] = gl.createBuffer();
@@ -271,6 +309,13 @@ export class FingerView {
     attribute(1, 3, 24, 12);
     this.glassKey = '';
     this.glassCount = 0;
+    const arrow = arrowMesh();
+    this.arrowCount = arrow.length / 6;
+    this.arrowArray = gl.createVertexArray();
+    gl.bindVertexArray(this.arrowArray);
+    buffer('arrow', arrow, gl.STATIC_DRAW);
+    attribute(0, 3, 24);
+    attribute(1, 3, 24, 12);
     gl.bindVertexArray(null);
     texture(gl, UNIT.table, gl.RGBA, TABLE_LEN, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(TABLES.inferno.buffer), gl.LINEAR);
     texture(gl, UNIT.sed, gl.R16F, SIDE_PX, SIDE_PX, gl.RED, gl.FLOAT, this.sed, gl.LINEAR);
@@ -279,4 +324,12 @@ export class FingerView {
     gl.uniform1i(this.skin.uniforms.u_table, UNIT.table);
     this.#readTheme();
   }
+}
+
+/** Unit vector of `a` less its part along the unit vector `n`. */
+function perpendicular(a, n) {
+  const along = a[0] * n[0] + a[1] * n[1] + a[2] * n[2];
+  const rest = a.map((c, k) => c - along * n[k]);
+  const size = Math.hypot(...rest);
+  return rest.map((c) => c / size);
 }

@@ -104,6 +104,16 @@ void main() {
   gl_Position = u_projection * p;
 }`;
 
+export const ARROW_FRAGMENT = `#version 300 es
+precision highp float;
+uniform vec3 u_tint;
+in vec3 v_view;
+in vec3 v_normal;
+out vec4 colour;
+void main() {
+  colour = vec4(u_tint * (0.55 + 0.45 * abs(dot(normalize(v_normal), normalize(v_view)))), 1.0);
+}`;
+
 export const GLASS_FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec3 u_tint;

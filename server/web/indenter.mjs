@@ -1,9 +1,11 @@
 // Meshes of the indenters, in their own frame: x along the first tangent, y along the second, z out
-// of the finger; the lowest point at the origin; mm.
+// of the finger; the lowest point at the origin; mm. And of the arrow that shows a force.
 
 const PLATE_MM = { half: 10, thick: 1.2 };
 const BAR_HALF_MM = 10;
 const ROUND = 48;
+/** Radii of an arrow, and where its head begins: shares of its length. */
+const ARROW = { shaftMm: 0.45, headMm: 1.1, head: 0.35 };
 
 /** Interleaved positions and normals (6 floats a vertex), plain triangles. */
 export function indenterMesh(shape, radiusMm) {
@@ -11,6 +13,24 @@ export function indenterMesh(shape, radiusMm) {
   if (shape === 'plate') box(vertices);
   else if (shape === 'sphere') sphere(vertices, radiusMm);
   else bar(vertices, radiusMm);
+  return Float32Array.from(vertices);
+}
+
+/** An arrow along z, one long, its tip at the origin; radii in mm. */
+export function arrowMesh() {
+  const vertices = [];
+  const { shaftMm, headMm, head } = ARROW;
+  const profile = [[0, -1], [shaftMm, -1], [shaftMm, -head], [headMm, -head], [0, 0]];
+  const at = ([radius, z], round) => [radius * Math.cos(round), radius * Math.sin(round), z];
+  for (let k = 0; k + 1 < profile.length; k++) {
+    const [from, to] = [profile[k], profile[k + 1]];
+    // A cap looks along z, all else away from the axis.
+    const out = from[1] === to[1] ? () => [0, 0, -1] : (round) => [Math.cos(round), Math.sin(round), 0];
+    for (let j = 0; j < ROUND; j++) {
+      const [a, b] = [(j * 2 * Math.PI) / ROUND, ((j + 1) * 2 * Math.PI) / ROUND];
+      quad(vertices, [at(from, a), at(from, b), at(to, b), at(to, a)], [out(a), out(b), out(b), out(a)]);
+    }
+  }
   return Float32Array.from(vertices);
 }
 

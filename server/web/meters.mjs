@@ -130,9 +130,11 @@ export class Meters {
 
   #showPress() {
     if (!this.pressNow) return;
-    const { forceN, areaMm2 } = this.pressNow;
-    put('force', `≈ ${forceN.toFixed(2)} N`);
-    put('area', `≈ ${areaMm2.toFixed(0)} mm²`);
+    const { forceN, areaMm2, isEstimate } = this.pressNow;
+    // Of the page's own estimate it is only about so much.
+    const about = isEstimate ? '≈ ' : '';
+    put('force', `${about}${forceN.toFixed(2)} N`);
+    put('area', `${about}${areaMm2.toFixed(0)} mm²`);
   }
 
   #showErrors() {

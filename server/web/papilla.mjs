@@ -1,6 +1,7 @@
 // The page: wires atlas, press, session, maps and figures together. One loop, driven by the display.
 
 import { Atlas } from './atlas.mjs';
+import { Contact, poseOf, readTouch } from './contact.mjs';
 import { PressControl } from './control.mjs';
 import { FingerView } from './finger.mjs';
 import { LadderView, listTiers } from './ladder.mjs';
@@ -24,6 +25,9 @@ class Page {
     this.ladder = new LadderView(listing, (tier) => this.#switchTo(tier));
     this.mode = 'press';
     this.press = new Press(atlas);
+    /** Null where the server has no contact model: pressure is then this page's estimate. */
+    this.contact = listing.contact_us === null ? null : new Contact(this.press);
+    document.body.toggleAttribute('data-contact', this.contact !== null);
     this.unsent = true;
     this.stream = byId('stream');
     this.log = false;
@@ -82,7 +86,18 @@ class Page {
   #open() {
     const budgetUs = Number(byId('budget').value);
     this.meters.restart(budgetUs / 1000);
-    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash });
+    this.#hello(performance.now());
+  }
+
+  #hello(nowMs) {
+    const announced = this.solves ? this.contact.hello(nowMs) : {};
+    const budgetUs = Number(byId('budget').value);
+    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash, ...announced });
+  }
+
+  /** Whether the server finds the pressure of this press. */
+  get solves() {
+    return this.contact !== null && this.mode === 'press';
   }
 
   #switchTo(tier) {
@@ -109,14 +124,23 @@ class Page {
     if (nowMs - noticedAtMs > NOTICE_MS) notify('');
     this.#followTier(answer.tierNumber);
     showFlags(answer, this.session.ready?.pressure_max_pa);
+    if (answer.touch) this.#showTouch(answer, nowMs);
     this.answered.sequence = answer.sequence;
     this.answered.tier = this.session.ready?.tier;
-    this.answered.pressurePa.set(this.sent.pressurePa);
+    this.answered.pressurePa.set(answer.pressurePa ?? this.sent.pressurePa);
     if (!equal(this.answered.sedJPerM3, answer.sedJPerM3)) {
       this.answered.sedJPerM3.set(answer.sedJPerM3);
       this.#showSed(nowMs);
     }
     if (this.sent.mode === 'replay' && this.mode === 'replay' && !this.replay.judged) this.#showErrors(nowMs);
+  }
+
+  /** What the server found for a pose. */
+  #showTouch({ pressurePa, touch }, nowMs) {
+    const found = readTouch(touch);
+    this.views.pressure.show(pressurePa, nowMs);
+    this.meters.press(found);
+    this.finger?.setForce(found);
   }
 
   /** The budget may go on with another tier while the session lasts. */
@@ -149,12 +173,13 @@ class Page {
   /** One display frame: newest press, its map, and the map on its way if no answer is due. */
   #frame(nowMs) {
     requestAnimationFrame(this.tick);
-    const map = this.session.frame.pressurePa;
+    if (this.solves && this.session.ready && this.contact.isDue(nowMs)) this.#hello(nowMs);
+    const map = this.session.mapFrame.values;
     const changed = this.mode === 'press' ? this.#stepPress(nowMs, map) : this.#stepReplay(nowMs, map);
     if (changed) {
       if (this.unsent && this.session.inFlight) this.meters.skip();
       this.unsent = true;
-      this.views.pressure.show(map, nowMs);
+      if (!this.solves) this.views.pressure.show(map, nowMs);
     } else {
       this.views.pressure.settle(nowMs);
     }
@@ -173,7 +198,9 @@ class Page {
   }
 
   #send(nowMs, map) {
-    if (!this.session.send(nowMs)) return;
+    // A pose is of the announced indenter.
+    if (this.solves && this.contact.isOther) return;
+    if (!this.session.send(nowMs, this.solves ? this.session.poseFrame : this.session.mapFrame)) return;
     this.unsent = false;
     this.sent.mode = this.mode;
     this.sent.pressurePa.set(map);
@@ -184,9 +211,13 @@ class Page {
     if (!this.control.step(nowMs)) return false;
     const { press, control } = this;
     press.evaluate(control.depthMm);
-    this.atlas.skin.raster.rasterise(press.pressurePa, map);
     this.views.pressure.setMarker(press.uvPx);
     this.finger?.setPress(press);
+    if (this.solves) {
+      poseOf(press, control.depthMm, this.session.poseFrame.values);
+      return true;
+    }
+    this.atlas.skin.raster.rasterise(press.pressurePa, map);
     this.meters.press(press);
     return true;
   }
@@ -223,9 +254,12 @@ class Page {
     this.control.changed = true;
     this.replay.changed = true;
     this.replay.judged = false;
+    // Replayed are maps, whatever a press is.
+    if (this.contact) this.#open();
     if (mode === 'replay') {
       this.views.pressure.setMarker(null);
       this.finger?.setPress(null);
+      this.finger?.setForce(null);
       if (!this.replay.loaded) this.#loadPresses();
     }
   }
@@ -270,10 +304,11 @@ function showState(state, detail) {
 }
 
 /** What a network says that has not learnt such a press. */
-function showFlags({ outOfRange, unfamiliar, cutOff }, mostPa) {
+function showFlags({ outOfRange, unfamiliar, unsettled, cutOff }, mostPa) {
   const words = [];
   if (outOfRange) words.push(`harder than any press it learnt: it saw ${(mostPa / 1000).toFixed(0)} kPa at most`);
   if (unfamiliar) words.push('unlike any press it learnt: this may mean nothing');
+  if (unsettled) words.push('the contact did not settle: rough');
   if (cutOff) words.push('cut off at the edge of the map');
   const text = words.join('; ');
   if (byId('flags').textContent === text) return;

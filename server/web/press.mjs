@@ -36,6 +36,7 @@ export class Press {
     /** Overlap of each vertex with the indenter, mm: what the drawing flattens. */
     this.overlapMm = new Float32Array(atlas.vertexCount);
     this.gapMm = new Float32Array(atlas.vertexCount);
+    this.isEstimate = true;
     this.forceN = 0;
     this.areaMm2 = 0;
     this.peakPa = 0;

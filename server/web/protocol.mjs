@@ -1,5 +1,5 @@
-// Papilla's session protocol, version 2, client side: one WebSocket, a JSON hello, a JSON ready, then
-// binary frames of a 48-byte little-endian header and a row-major 224 x 224 payload (here always f32).
+// Papilla's session protocol, versions 2 and 3, client side: one WebSocket, a JSON hello, a JSON ready, then binary frames
+// of a 48-byte little-endian header and a payload (here always f32): a row-major 224 x 224 map, or an object's pose.
 
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
@@ -7,8 +7,9 @@ export const HEADER_BYTES = 48;
 
 const STATUS = ['ok', 'superseded', 'late', 'error', 'late'];
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
-const VERSION = 2;
-const KIND = { pressure: 1, sed: 2 };
+const KIND = { pressure: 1, sed: 2, objects: 4 };
+const POSE_LEN = 7;
+const TOUCH_LEN = 16;
 const SAMPLE_F32 = 0;
 const TWO_POW_32 = 4294967296;
 const PASSING = new Set(['overloaded', 'shutting_down', 'timeout', 'internal']);
@@ -16,22 +17,34 @@ const BACK_OFF_MS = { first: 250, last: 400 };
 /** A server that says nothing for so many of these is given up; counted by a timer, which stands still where the page does. */
 const WATCH_MS = 250;
 const SILENT_WATCHES = 7;
-const FLAG = { outOfRange: 1, unfamiliar: 4, cutOff: 16 };
+const FLAG = { outOfRange: 1, unfamiliar: 4, unsettled: 8, cutOff: 16 };
+/** Where the sections of an answer begin. */
+const BARE_MAP = { map: HEADER_BYTES };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
 export class RequestFrame {
-  constructor() {
-    this.buffer = new ArrayBuffer(HEADER_BYTES + 4 * MAP_LEN);
+  constructor(version, kind, width, height) {
+    this.buffer = new ArrayBuffer(HEADER_BYTES + 4 * width * height);
     this.header = new DataView(this.buffer, 0, HEADER_BYTES);
-    /** Pressure on the skin, Pa, row-major: write the map here. */
-    this.pressurePa = new Float32Array(this.buffer, HEADER_BYTES, MAP_LEN);
+    /** What is sent: write it here. */
+    this.values = new Float32Array(this.buffer, HEADER_BYTES, width * height);
     this.header.setUint32(0, MAGIC, true);
-    this.header.setUint8(4, VERSION);
-    this.header.setUint8(5, KIND.pressure);
+    this.header.setUint8(4, version);
+    this.header.setUint8(5, kind);
     this.header.setUint8(6, SAMPLE_F32);
-    this.header.setUint16(12, SIDE_PX, true);
-    this.header.setUint16(14, SIDE_PX, true);
+    this.header.setUint16(12, width, true);
+    this.header.setUint16(14, height, true);
     this.header.setFloat32(28, 1, true);
+  }
+
+  /** Of pressure on the skin, Pa, row-major. */
+  static map() {
+    return new RequestFrame(2, KIND.pressure, SIDE_PX, SIDE_PX);
+  }
+
+  /** Of where an object is: origin, mm, and quaternion. */
+  static pose() {
+    return new RequestFrame(3, KIND.objects, POSE_LEN, 1);
   }
 
   /** Stamps the frame; the time is split by hand because a BigInt would be an allocation. */
@@ -42,14 +55,14 @@ export class RequestFrame {
   }
 }
 
-/** Reads an answer's header into `into`; throws an Error that says what is wrong with the frame. */
-export function readAnswer(data, into) {
+/** Reads an answer into `into`; `at` is where its sections begin. Throws an Error that says what is wrong with the frame. */
+export function readAnswer(data, into, at = BARE_MAP) {
   if (data.byteLength < HEADER_BYTES) {
     throw new Error(`answer of ${data.byteLength} bytes is shorter than its ${HEADER_BYTES}-byte header`);
   }
   const view = new DataView(data);
   if (view.getUint32(0, true) !== MAGIC) throw new Error('answer does not start with PPL1');
-  if (view.getUint8(4) !== VERSION) throw new Error(`answer has protocol version ${view.getUint8(4)}`);
+  if (![2, 3].includes(view.getUint8(4))) throw new Error(`answer has protocol version ${view.getUint8(4)}`);
   if (view.getUint8(5) !== KIND.sed) throw new Error(`answer is of kind ${view.getUint8(5)}, not SED`);
   into.status = STATUS[view.getUint8(7)] ?? 'error';
   into.sequence = view.getUint32(8, true);
@@ -58,13 +71,16 @@ export function readAnswer(data, into) {
   into.outOfRange = (view.getUint8(46) & FLAG.outOfRange) !== 0;
   into.cutOff = (view.getUint8(46) & FLAG.cutOff) !== 0;
   into.unfamiliar = (view.getUint8(46) & FLAG.unfamiliar) !== 0;
-  into.sedJPerM3 = null;
+  into.unsettled = (view.getUint8(46) & FLAG.unsettled) !== 0;
+  into.sedJPerM3 = into.pressurePa = into.touch = null;
   if (into.status === 'ok') {
     const sampleType = view.getUint8(6);
-    if (sampleType !== SAMPLE_F32 || data.byteLength !== HEADER_BYTES + 4 * MAP_LEN) {
+    if (sampleType !== SAMPLE_F32 || data.byteLength !== at.map + 4 * MAP_LEN) {
       throw new Error(`answer of sample type ${sampleType} and ${data.byteLength} bytes is not an f32 map`);
     }
-    into.sedJPerM3 = new Float32Array(data, HEADER_BYTES, MAP_LEN);
+    into.sedJPerM3 = new Float32Array(data, at.map, MAP_LEN);
+    if (at.pressure) into.pressurePa = new Float32Array(data, at.pressure, MAP_LEN);
+    if (at.touch) into.touch = new Float32Array(data, at.touch, TOUCH_LEN);
   }
   return into;
 }
@@ -80,8 +96,13 @@ export class Session {
   constructor(url, callbacks) {
     this.url = url;
     this.callbacks = callbacks;
-    this.frame = new RequestFrame();
-    this.answer = { status: 'error', sequence: 0, serverUs: 0, sedJPerM3: null, tierNumber: 0, outOfRange: false, unfamiliar: false, cutOff: false };
+    this.mapFrame = RequestFrame.map();
+    this.poseFrame = RequestFrame.pose();
+    this.answer = {
+      status: 'error', sequence: 0, serverUs: 0, tierNumber: 0, sedJPerM3: null, pressurePa: null, touch: null,
+      outOfRange: false, unfamiliar: false, unsettled: false, cutOff: false,
+    };
+    this.sections = BARE_MAP;
     this.sequence = 0;
     this.inFlight = false;
     this.sentAtMs = 0;
@@ -111,17 +132,18 @@ export class Session {
   }
 
   #hello(socket) {
-    socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
+    const version = this.wish.input ? 3 : 2;
+    socket.send(JSON.stringify({ type: 'hello', version, effects: [], sample_type: 'f32', ...this.wish }));
   }
 
-  /** Sends the map in `frame.pressurePa`; false while an answer is due or the session is not ready. */
-  send(nowMs) {
+  /** Sends the frame; false while an answer is due or the session is not ready. */
+  send(nowMs, frame) {
     if (!this.ready || this.inFlight) return false;
     this.sequence = (this.sequence + 1) >>> 0;
-    this.frame.stamp(this.sequence, Math.round((performance.timeOrigin + nowMs) * 1000));
+    frame.stamp(this.sequence, Math.round((performance.timeOrigin + nowMs) * 1000));
     this.sentAtMs = performance.now();
     this.inFlight = true;
-    this.socket.send(this.frame.buffer);
+    this.socket.send(frame.buffer);
     return true;
   }
 
@@ -173,6 +195,7 @@ export class Session {
     }
     if (message.type === 'ready') {
       this.ready = message;
+      this.sections = Object.fromEntries(message.sections.map(({ name, offset }) => [name, offset]));
       this.delayMs = BACK_OFF_MS.first;
       this.callbacks.onready(message);
       this.callbacks.onstate('ready', '');
@@ -193,15 +216,16 @@ export class Session {
 
   #binary(data) {
     const nowMs = performance.now();
+    // A stale sequence is the answer to a frame given up before, on other terms: it says nothing about this one.
+    const isWhole = data.byteLength >= HEADER_BYTES;
+    if (!this.inFlight || (isWhole && new DataView(data).getUint32(8, true) !== this.sequence)) return;
     try {
-      readAnswer(data, this.answer);
+      readAnswer(data, this.answer, this.sections);
     } catch (error) {
       this.inFlight = false;
       this.callbacks.onfault('bad_frame', error.message);
       return;
     }
-    // A stale sequence is the answer to a frame given up before: it says nothing about this one.
-    if (this.answer.sequence !== this.sequence || !this.inFlight) return;
     this.inFlight = false;
     this.callbacks.onanswer(this.answer, nowMs - this.sentAtMs);
   }

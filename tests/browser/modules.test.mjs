@@ -20,12 +20,13 @@ const { HEADER_BYTES, MAP_LEN, RequestFrame, readAnswer } = await load('protocol
 const { AutoRange, TABLES, digits, roundUp } = await load('colour.mjs');
 const { Atlas } = await load('atlas.mjs');
 const { HERTZ, Press } = await load('press.mjs');
+const { poseOf } = await load('contact.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
 const { logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 
 test('a request frame has the documented bytes', () => {
-  const frame = new RequestFrame();
+  const frame = RequestFrame.map();
   frame.stamp(0x04030201, 0x0102 * 2 ** 32 + 0x03040506);
   const bytes = [...new Uint8Array(frame.buffer, 0, HEADER_BYTES)];
   assert.deepEqual(bytes, [
@@ -34,6 +35,27 @@ test('a request frame has the documented bytes', () => {
     ...Array(16).fill(0),
   ]);
   assert.equal(frame.buffer.byteLength, HEADER_BYTES + 4 * MAP_LEN);
+  const pose = RequestFrame.pose();
+  assert.deepEqual([...new Uint8Array(pose.buffer, 4, 12)], [3, 4, 0, 0, 0, 0, 0, 0, 7, 0, 1, 0]);
+  assert.equal(pose.buffer.byteLength, HEADER_BYTES + 28);
+});
+
+test('the pose of a press turns the indenter into the finger, wherever it stands', () => {
+  for (const [normal, tangent] of [[[0, 0, -1], [1, 0, 0]], [[0, 0, 1], [0, 1, 0]], [[0, -1, 0], [0.6, 0, 0.8]], [[0.48, 0.64, -0.6], [0.8, -0.6, 0]]]) {
+    const bitangent = [0, 1, 2].map((k) => normal[(k + 1) % 3] * tangent[(k + 2) % 3] - normal[(k + 2) % 3] * tangent[(k + 1) % 3]);
+    const out = new Float32Array(7);
+    poseOf({ shape: 'sphere', radiusMm: 4, heightMm: -0.5, pointMm: [1, 2, 3], normal, tangent, bitangent }, 1, out);
+    const [x, y, z, w] = out.slice(3);
+    assert.ok(Math.abs(Math.hypot(x, y, z, w) - 1) < 1e-6, String(out));
+    // The rotation's columns are where the shape's axes go: it presses towards +z.
+    const columns = [
+      [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)],
+      [2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)],
+      [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)],
+    ];
+    [tangent, bitangent.map((c) => -c), normal.map((c) => -c)].forEach((due, n) => due.forEach((c, k) => assert.ok(Math.abs(columns[n][k] - c) < 1e-6, `${normal}: column ${n}`)));
+    normal.forEach((c, k) => assert.ok(Math.abs(out[k] - ([1, 2, 3][k] + 3.5 * c)) < 1e-6));
+  }
 });
 
 function answerFrame(status, payload) {

@@ -80,7 +80,8 @@ test('the page connects, shows an answered press and agrees with the server on t
   await settled();
   await until(() => document.getElementById('mask-check').textContent !== '');
   assert.match(await text('mask-check'), /masks equal the server/);
-  assert.match(await text('estimate'), /estimate/);
+  assert.match(await text('estimate'), /estimate.*without a contact model/);
+  assert.equal(await page.locator('#solved').isVisible(), false);
   assert.ok(largest((await answered()).sedJPerM3) > 0);
   assert.equal(await page.locator('#notice').isVisible(), false);
   const atlas = await (await fetch(new URL('v1/atlas', BASE))).json();

@@ -1,5 +1,5 @@
 // Round trips of the C++ client at a steady rate, as one line of JSON (docs/reports/clients.md).
-//   bench [--rate-hz 90] [--duration-s 60]     PAPILLA_URL names the service
+//   bench [--rate-hz 90] [--duration-s 60] [--input objects]     PAPILLA_URL names the service
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -22,9 +22,11 @@ void operator delete(void* block, std::size_t) noexcept { std::free(block); }
 
 int main(int argc, char** argv) {
   double rate_hz = 90.0, duration_s = 60.0;
+  bool sends_poses = false;
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::strcmp(argv[i], "--rate-hz") == 0) rate_hz = std::atof(argv[i + 1]);
     if (std::strcmp(argv[i], "--duration-s") == 0) duration_s = std::atof(argv[i + 1]);
+    if (std::strcmp(argv[i], "--input") == 0) sends_poses = std::strcmp(argv[i + 1], "objects") == 0;
   }
   const auto frames = static_cast<std::size_t>(rate_hz * duration_s);
   const auto warm_up = static_cast<std::size_t>(rate_hz);
@@ -33,7 +35,12 @@ int main(int argc, char** argv) {
   papilla::Session::Options options;
   const char* const url = std::getenv("PAPILLA_URL");
   if (url) options.url = url;
-  options.hello = "\"tier\": \"half-space\"";
+  options.hello = R"("tier": "half-space")";
+  if (sends_poses) {
+    options.hello += R"(, "input": "objects", "pressure": "vertices", "answer_layout": "vertices",
+                        "objects": [{"shape": {"shape": "sphere", "radius_mm": 10}}])";
+  }
+  const papilla::Pose ball{{11.25F, 0.0F, -16.2F}};
   // The client time is the instant at which the frame was meant to leave.
   options.on_answer = [&](const papilla::Answer& answer) {
     if (answer.status == papilla::Status::ok) {
@@ -54,7 +61,8 @@ int main(int argc, char** argv) {
     const std::uint64_t now = papilla::now_us();
     if (due_us > now) std::this_thread::sleep_for(std::chrono::microseconds(due_us - now));
     if (i == warm_up) before = allocations;
-    session.send(pressure_pa.data(), {}, due_us);
+    if (sends_poses) session.send_poses(&ball, 1, 0, nullptr, due_us);
+    else session.send(pressure_pa.data(), {}, due_us);
   }
   const unsigned long long made = allocations - before;
   std::this_thread::sleep_for(std::chrono::seconds(1));

@@ -141,3 +141,25 @@ inline void check_answer(const Value& expect, const Answer& answer) {
   if (expect.has("points")) check_list("points", answer.points, expect["points"]);
   if (expect.has("actuators")) check_list("actuators", answer.actuators, expect["actuators"]);
 }
+
+inline void check_touch(const Value& expect, const Answer& answer, std::uint8_t finger) {
+  const std::string status = name_of(answer.status);
+  must(status == due_status(expect), "the status is " + status + " " + answer.problem.message);
+  must(answer.finger == finger, "another finger");
+  if (answer.status == Status::error) return check_problem(expect, answer.problem);
+  must(answer.has_touch, "there is no touch");
+  const Touch& t = answer.touch;
+  const auto& [fx, fy, fz] = t.force_n;
+  const auto& [tx, ty, tz] = t.torque_n_mm;
+  const auto& [cx, cy, cz] = t.centre_mm;
+  const std::vector<float> found = {fx, fy, fz, tx, ty, tz, t.area_mm2, cx, cy, cz, t.penetration_mm,
+                                    t.stiffness_n_per_mm, t.travel_mm, t.pressure_max_pa, t.share};
+  check_list("touch", found, expect["touch"]);
+  if (expect.has("pressure_sum")) {
+    double sum = 0.0;
+    for (const float value : answer.pressure_pa) sum += value;
+    near("pressure_sum", sum, expect["pressure_sum"]);
+  }
+  must(answer.no_contact == (expect["flags"].size() == 1), "no_contact is another");
+  must(!answer.out_of_range && !answer.unsettled, "out of range or unsettled");
+}

@@ -32,7 +32,7 @@ class Run {
     const auto steps = std::map<std::string, void (Run::*)(const Value&)>{
         {"hello", &Run::hello},         {"frame", &Run::frame},         {"burst", &Run::burst},
         {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
-        {"contacts", &Run::contacts}};
+        {"contacts", &Run::contacts},   {"touch", &Run::touch},         {"gaps", &Run::gaps}};
     must(steps.count(name) != 0, "there is no step " + name);
     (this->*steps.at(name))(step);
   }
@@ -183,6 +183,40 @@ class Run {
       must(atlas_->parse(http(url_, "GET", "/v1/atlas").body), "the atlas cannot be read");
     }
     return *atlas_;
+  }
+
+  /// The step's net force; null without one.
+  static const NetForce* net_of(const Value& step, NetForce& room) {
+    const Value& net = step["net"];
+    if (net.is_null()) return nullptr;
+    for (std::size_t i = 0; i < 3; ++i) room.direction[i] = float(net[i].number);
+    room.force_n = float(net[3].number);
+    return &room;
+  }
+
+  void touch(const Value& step) {
+    std::vector<Pose> poses;
+    for (const Value& row : step["poses"].items) {
+      Pose& pose = poses.emplace_back();
+      for (std::size_t i = 0; i < 3; ++i) pose.origin_mm[i] = float(row[i].number);
+      for (std::size_t i = 0; i < 4; ++i) pose.quaternion[i] = float(row[3 + i].number);
+    }
+    NetForce room;
+    const auto finger = std::uint8_t(step["finger"].whole());
+    check_touch(step["expect"], session().touch(poses, finger, net_of(step, room), timeout_ms_), finger);
+  }
+
+  void gaps(const Value& step) {
+    const Value& sphere = step["sphere"];
+    std::vector<float> depth_mm;
+    for (const auto& p : atlas().positions_mm) {
+      double squared = 0.0;
+      for (std::size_t i = 0; i < 3; ++i) squared += (p[i] - sphere[i].number) * (p[i] - sphere[i].number);
+      depth_mm.push_back(float(sphere[3].number - std::sqrt(squared)));
+    }
+    NetForce room;
+    const auto finger = std::uint8_t(step["finger"].whole());
+    check_touch(step["expect"], session().touch_gaps(depth_mm, finger, net_of(step, room), timeout_ms_), finger);
   }
 
   void rasterise(const Value& step) {

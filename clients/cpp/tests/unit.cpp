@@ -58,7 +58,7 @@ static void messages() {
   int outcomes = 0;
   core.on_answer = [&](const papilla::Answer&) { ++outcomes; };
   CHECK(core.text("no json") == papilla::Core::Event::broken);
-  CHECK(core.text(R"({"type": "ready", "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
+  CHECK(core.text(R"({"type": "ready", "version": 2, "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
         papilla::Core::Event::ready);
   const std::vector<float> map(papilla::map_len, 1.0F);
   const std::uint32_t sequence = core.send(map.data(), {}, 7);
@@ -77,6 +77,32 @@ static void messages() {
   CHECK(!core.waiting() && sequence == 1);
 }
 
+static void fingers() {
+  // The newest frame of each finger leaves, in turns, in the version and at the place of the protocol.
+  papilla::Core core("\"input\": \"objects\"");
+  CHECK(core.hello() == R"({"type":"hello","version":3,"input": "objects"})");
+  CHECK(papilla::Core("\"tier\": \"nano\"").hello() == R"({"type":"hello","version":2,"tier": "nano"})");
+  std::vector<int> superseded;
+  core.on_answer = [&](const papilla::Answer& answer) { superseded.push_back(answer.finger); };
+  core.text(R"({"type": "ready", "version": 3, "sample_type": "u16", "sections": [{"name": "touch", "offset": 48, "bytes": 64}]})");
+  const papilla::Pose pose{{1.0F, 2.0F, 3.0F}};
+  const papilla::NetForce net{{0.0F, 1.0F, 0.0F}, 0.5F};
+  core.send_poses(&pose, 1, 7, 0);
+  core.send_poses(&pose, 1, 7, 4);
+  core.send_poses(&pose, 1, 7, 0, &net);
+  CHECK(superseded == std::vector<int>{0});
+  std::vector<int> left;
+  while (papilla::Outgoing* const frame = core.take()) {
+    const std::uint8_t* const at = frame->data();
+    CHECK(at[4] == 3 && at[5] == 4 && at[6] == 0 && at[12] == 7 && papilla::wire::get_float(at + 52) == 2.0F);
+    if (at[47] == 0) CHECK(at[14] == 2 && frame->size == 48 + 56 && papilla::wire::get_float(at + 88) == 0.5F);
+    left.push_back(at[47]);
+  }
+  CHECK((left == std::vector<int>{4, 0}) || (left == std::vector<int>{0, 4}));
+  core.lost();
+  CHECK(superseded.size() == 3 && superseded[1] + superseded[2] == 4);
+}
+
 static void proofs() {
   // RFC 6455, 1.3.
   const auto digest = papilla::detail::sha1("dGhlIHNhbXBsZSBub25jZQ==258EAFA5-E914-47DA-95CA-C5AB0DC85B11");
@@ -90,6 +116,7 @@ int main() {
   halves();
   json();
   messages();
+  fingers();
   proofs();
   std::printf(failures ? "%d checks failed\n" : "all checks passed\n", failures);
   return failures ? 1 : 0;

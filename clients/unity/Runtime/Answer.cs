@@ -24,6 +24,17 @@ namespace Papilla
         public readonly float[] Actuators = new float[1024];
         public int PointCount, ActuatorCount;
         public bool HasSummary, OutOfRange, NoContact;
+        /// <summary>What pushes back: of poses and of gaps.</summary>
+        public Touch Touch;
+        public bool HasTouch;
+        /// <summary>The pressure that was found (Pa), a map or a value a vertex; null where the hello does not ask for it.</summary>
+        public float[] PressurePa;
+        /// <summary>SED at the atlas' vertices, J/m3; null where the hello does not ask for it in place of the map.</summary>
+        public float[] Vertices;
+        /// <summary>The finger of the frame; 0 where the frame never got an answer.</summary>
+        public int Finger;
+        /// <summary>The contact solve did not settle: its answer is rough.</summary>
+        public bool Unsettled;
         /// <summary>The map is rougher or heavier than any the tier was trained on: its answer may mean nothing.</summary>
         public bool Unfamiliar;
         /// <summary>The contact reaches the edge of the atlas; what lies beyond is missing.</summary>
@@ -47,12 +58,15 @@ namespace Papilla
                 QueueUs = *(uint*)(m + 36);
                 InferUs = *(uint*)(m + 40);
                 TierNumber = *(ushort*)(m + 44);
+                Finger = m[4] == 3 ? m[47] : 0;
                 OutOfRange = (m[46] & Wire.FlagOutOfRange) != 0;
                 NoContact = (m[46] & Wire.FlagNoContact) != 0;
                 Unfamiliar = (m[46] & Wire.FlagUnfamiliar) != 0;
                 CutOff = (m[46] & Wire.FlagCutOff) != 0;
+                Unsettled = (m[46] & Wire.FlagUnsettled) != 0;
                 if (Status != Status.Ok) return;
                 Clear();
+                ReadContact(m, bytes, terms);
                 HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);
                 PointCount = Copy(m, terms.PointsAt, terms.PointsCount, bytes, Points) ? terms.PointsCount : 0;
                 ActuatorCount = Copy(m, terms.ActuatorsAt, terms.ActuatorsCount, bytes, Actuators) ? terms.ActuatorsCount : 0;
@@ -65,15 +79,42 @@ namespace Papilla
             if (bytes < Wire.HeaderBytes) throw new FormatException("an answer of " + bytes + " bytes has no header");
             fixed (byte* m = message)
             {
-                if (*(uint*)m != Wire.Magic || m[4] != 2) throw new FormatException("an answer does not start with PPL1 and version 2");
+                if (*(uint*)m != Wire.Magic || m[4] != 2 && m[4] != 3) throw new FormatException("an answer does not start with PPL1 and version 2 or 3");
                 return *(uint*)(m + 8);
             }
+        }
+
+        unsafe void ReadContact(byte* m, int bytes, Ready terms)
+        {
+            if (Finger >= Session.FingersMax) throw new FormatException("an answer to finger " + Finger);
+            HasTouch = terms.TouchAt >= 0;
+            int touchEnd = HasTouch ? terms.TouchAt + sizeof(Touch) : 0;
+            if (touchEnd > bytes || terms.VerticesAt + terms.VerticesBytes > bytes) throw Short(bytes);
+            if (HasTouch) Touch = *(Touch*)(m + terms.TouchAt);
+            PressurePa = Sized(PressurePa, terms.PressureCount);
+            Copy(m, terms.PressureAt, terms.PressureCount, bytes, PressurePa);
+            var type = (SampleType)m[6];
+            Vertices = Sized(Vertices, type > SampleType.U8 ? 0 : terms.VerticesBytes / Wire.Bytes(type));
+            if (Vertices == null) return;
+            fixed (float* to = Vertices) Wire.Decode(m + terms.VerticesAt, Vertices.Length, type, *(float*)(m + 28), to);
+        }
+
+        /// <summary>Memory for so many values, the same where it fits; null for none.</summary>
+        static float[] Sized(float[] values, int count)
+        {
+            if (count == 0) return null;
+            return values != null && values.Length == count ? values : new float[count];
+        }
+
+        static FormatException Short(int bytes)
+        {
+            return new FormatException("an answer of " + bytes + " bytes ends before its sections");
         }
 
         static unsafe bool Copy(byte* m, int at, int count, int bytes, float[] to)
         {
             if (at < 0) return false;
-            if (at + 4 * count > bytes) throw new FormatException("an answer of " + bytes + " bytes ends before its sections");
+            if (at + 4 * count > bytes) throw Short(bytes);
             for (int k = 0; k < count; k++) to[k] = ((float*)(m + at))[k];
             return true;
         }

@@ -5,9 +5,10 @@ namespace Papilla
     /// <summary>A request whose buffer is made once and filled anew for every frame.</summary>
     sealed class Frame
     {
-        internal readonly byte[] Buffer = new byte[Headroom.Bytes + Wire.HeaderBytes + 4 * Wire.MapLength];
+        internal readonly byte[] Buffer = new byte[Headroom.Bytes + Wire.HeaderBytes + 4 * (Wire.MapLength + Wire.RowLength)];
         internal int Bytes;
         internal uint Sequence;
+        const byte KindPressure = 1, KindObjects = 4, KindGaps = 5;
 
         /// <summary>
         /// Encodes a window; sample (x, y) is <c>values[first + y * stride + x]</c>. A scale of 0 is chosen so that the
@@ -24,14 +25,7 @@ namespace Papilla
                 else if (!(scale > 0)) scale = Greatest(from + first, stride, width, height) / most;
                 if (!(scale > 0)) scale = 1;
                 byte* m = start + Headroom.Bytes;
-                for (int k = 0; k < Wire.HeaderBytes; k++) m[k] = 0;
-                *(uint*)m = Wire.Magic;
-                m[4] = 2;
-                m[5] = 1;
-                m[6] = (byte)type;
-                *(ushort*)(m + 12) = (ushort)width;
-                *(ushort*)(m + 14) = (ushort)height;
-                *(float*)(m + 28) = scale;
+                PutHeader(m, KindPressure, type, width, height, scale, 0);
                 *(ushort*)(m + 32) = (ushort)column;
                 *(ushort*)(m + 34) = (ushort)row;
                 for (int y = 0; y < height; y++)
@@ -39,6 +33,58 @@ namespace Papilla
                     Wire.Encode(from + first + y * stride, width, type, 1.0 / scale, m + Wire.HeaderBytes + y * width * sampleBytes);
                 }
             }
+        }
+
+        internal unsafe void EncodePoses(Pose[] poses, int finger, NetForce? net)
+        {
+            int rows = poses.Length + (net == null ? 0 : 1);
+            Bytes = Wire.HeaderBytes + 4 * Wire.RowLength * rows;
+            fixed (byte* start = Buffer)
+            {
+                byte* m = start + Headroom.Bytes;
+                PutHeader(m, KindObjects, SampleType.F32, Wire.RowLength, rows, 1, finger);
+                for (int k = 0; k < poses.Length; k++) ((Pose*)(m + Wire.HeaderBytes))[k] = poses[k];
+                PutNet(m + Wire.HeaderBytes + poses.Length * sizeof(Pose), net);
+            }
+        }
+
+        internal unsafe void EncodeGaps(float[] depthMm, int finger, NetForce? net)
+        {
+            bool isMap = depthMm.Length == Wire.MapLength;
+            Bytes = Wire.HeaderBytes + 4 * (depthMm.Length + (net == null ? 0 : Wire.RowLength));
+            fixed (byte* start = Buffer)
+            {
+                byte* m = start + Headroom.Bytes;
+                PutHeader(m, KindGaps, SampleType.F32, isMap ? Wire.SidePx : depthMm.Length, isMap ? Wire.SidePx : 1, 1, finger);
+                for (int k = 0; k < depthMm.Length; k++) ((float*)(m + Wire.HeaderBytes))[k] = depthMm[k];
+                PutNet(m + Wire.HeaderBytes + 4 * depthMm.Length, net);
+            }
+        }
+
+        static unsafe void PutHeader(byte* m, byte kind, SampleType type, int width, int height, float scale, int finger)
+        {
+            for (int k = 0; k < Wire.HeaderBytes; k++) m[k] = 0;
+            *(uint*)m = Wire.Magic;
+            m[5] = kind;
+            m[6] = (byte)type;
+            *(ushort*)(m + 12) = (ushort)width;
+            *(ushort*)(m + 14) = (ushort)height;
+            *(float*)(m + 28) = scale;
+            m[47] = (byte)finger;
+        }
+
+        static unsafe void PutNet(byte* m, NetForce? net)
+        {
+            if (net == null) return;
+            var row = (float*)m;
+            for (int k = 0; k < Wire.RowLength; k++) row[k] = 0;
+            *(NetForce*)m = net.Value;
+        }
+
+        /// <summary>The version of the session that the frame leaves in.</summary>
+        internal void StampVersion(byte version)
+        {
+            Buffer[Headroom.Bytes + 4] = version;
         }
 
         internal unsafe void Stamp(uint sequence, ulong timeUs, uint deadlineUs)

@@ -17,10 +17,15 @@ namespace Papilla
         /// <summary>Effects of the tier and of the session, by name.</summary>
         public readonly List<string> Effects = new List<string>();
         /// <summary>
-        /// Other members as on the wire: <c>contact_pa</c>, <c>out_of_range</c>, <c>stale_after_us</c>, <c>atlas_hash</c>, <c>map</c>, and
-        /// the parameters of effects.
+        /// Other members as on the wire: <c>contact_pa</c>, <c>out_of_range</c>, <c>stale_after_us</c>, <c>atlas_hash</c>, <c>map</c>, the
+        /// parameters of effects, and those of version 3: <c>input</c>, <c>objects</c>, <c>fingers</c>, ...
         /// </summary>
         public readonly JObject Members = new JObject();
+
+        static readonly string[] OfVersion3 =
+        {
+            "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure",
+        };
 
         /// <summary>A hello from its members on the wire, without type and version.</summary>
         public static Hello FromJson(JObject json)
@@ -46,7 +51,7 @@ namespace Papilla
         {
             var json = (JObject)Members.DeepClone();
             json["type"] = "hello";
-            json["version"] = 2;
+            json["version"] = System.Array.Exists(OfVersion3, name => Members[name] != null) ? 3 : 2;
             json["effects"] = new JArray(Effects);
             json["sample_type"] = SampleType.ToString().ToLowerInvariant();
             if (Tier != null) json["tier"] = Tier;
@@ -69,11 +74,14 @@ namespace Papilla
         public readonly float PressureMaxPa;
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;
+        internal readonly byte Version;
+        internal readonly int TouchAt = -1, PressureAt = -1, PressureCount, VerticesAt = -1, VerticesBytes;
         internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
 
         internal Ready(JObject json)
         {
             Json = json;
+            Version = (byte)json["version"];
             Tier = (string)json["tier"];
             TierNumber = (int)json["tier_number"];
             Session = (long)json["session"];
@@ -85,6 +93,9 @@ namespace Papilla
                 int at = (int)section["offset"], bytes = (int)section["bytes"];
                 switch ((string)section["name"])
                 {
+                    case "touch": TouchAt = at; break;
+                    case "pressure": PressureAt = at; PressureCount = bytes / 4; break;
+                    case "vertices": VerticesAt = at; VerticesBytes = bytes; break;
                     case "summary": SummaryAt = at; break;
                     case "points": PointsAt = at; PointsCount = bytes / 4; break;
                     case "actuators": ActuatorsAt = at; ActuatorsCount = bytes / 4; break;

@@ -17,12 +17,14 @@ namespace Papilla
                 ITransport open;
                 lock (gate)
                 {
-                    while (!isClosed && !(isWaiting && ready != null && transport != null && outstanding.Count < OutstandingMax)) Monitor.Wait(gate);
+                    Finger next = null;
+                    while (!isClosed && (ready == null || transport == null || outstanding.Count >= OutstandingMax || (next = NextWaiting()) == null)) Monitor.Wait(gate);
                     if (isClosed) return;
-                    var frame = waiting;
-                    waiting = leaving;
+                    var frame = next.Waiting;
+                    next.Waiting = leaving;
                     leaving = frame;
-                    isWaiting = false;
+                    leaving.StampVersion(ready.Version);
+                    next.IsWaiting = false;
                     open = transport;
                     outstanding.Add(leaving.Sequence);
                     Sent++;
@@ -182,10 +184,11 @@ namespace Papilla
                 var answeredEvent = Answered;
                 if (answeredEvent != null) answeredEvent(filling);
                 if (filling.Status != Status.Ok) return;
-                var old = newest;
-                newest = filling;
+                var of = fingers[filling.Finger];
+                var old = of.Newest;
+                of.Newest = filling;
+                of.IsFresh = true;
                 filling = old;
-                isFresh = true;
             }
         }
 

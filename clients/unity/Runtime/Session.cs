@@ -6,7 +6,7 @@ using System.Threading;
 namespace Papilla
 {
     /// <summary>
-    /// A session that keeps itself connected: pressure maps (Pa) out, maps of strain energy density (J/m3) in. Two threads of its own
+    /// A session that keeps itself connected: pressure maps (Pa) or poses of objects out, maps of strain energy density (J/m3) and forces in. Two threads of its own
     /// move the bytes; <see cref="Send(float[])"/> never blocks, and the newest frame wins: one that has not left this client is superseded by a
     /// newer one. Frames and answers allocate nothing.
     /// </summary>
@@ -42,9 +42,9 @@ namespace Papilla
         readonly byte[] message = new byte[Wire.MessageBytesMax];
         readonly Answer brief = new Answer();
         readonly Random random = new Random();
-        Answer filling = new Answer(), newest = new Answer(), taken = new Answer();
-        Frame waiting = new Frame(), leaving = new Frame();
-        bool isWaiting, isFresh, isClosed, isRefused, toldRefusal, toldRange;
+        Answer filling = new Answer();
+        Frame leaving = new Frame();
+        bool isClosed, isRefused, toldRefusal, toldRange;
         uint sequence, renewedFrom;
         Hello hello, helloBefore;
         Ready readyBefore, olderReady;
@@ -100,11 +100,9 @@ namespace Papilla
         public void Renew(Hello next)
         {
             ITransport open;
-            uint superseded;
-            bool didSupersede;
+            TellWaiting(Status.Superseded);
             lock (gate)
             {
-                didSupersede = TakeWaiting(out superseded);
                 if (ready != null)
                 {
                     helloBefore = hello;
@@ -117,7 +115,6 @@ namespace Papilla
                 open = transport;
                 Monitor.PulseAll(gate);
             }
-            if (didSupersede) Tell(superseded, Status.Superseded, null);
             if (open != null) Greet(open);
         }
 
@@ -134,25 +131,6 @@ namespace Papilla
             bool fits = column >= 0 && row >= 0 && width >= 0 && height >= 0 && column + width <= Wire.SidePx && row + height <= Wire.SidePx;
             if (!fits || width * height > samplesPa.Length) throw new PapillaException(new Problem("wrong_shape", "the window does not fit the map or its samples"));
             return Put(samplesPa, column, row, width, height);
-        }
-
-        /// <summary>The newest rendered answer that was not taken yet; valid until the next call. For one thread, as a game's Update.</summary>
-        public bool TryTakeLatest(out Answer answer)
-        {
-            lock (telling)
-            {
-                if (isFresh)
-                {
-                    isFresh = false;
-                    var old = taken;
-                    taken = newest;
-                    newest = old;
-                    answer = taken;
-                    return true;
-                }
-            }
-            answer = null;
-            return false;
         }
 
         static void Print(string words)
@@ -181,29 +159,13 @@ namespace Papilla
         uint Put(float[] values, int column, int row, int width, int height)
         {
             ulong timeUs = ClockUs();
-            uint superseded, own;
-            bool didSupersede;
+            Handed handed;
             lock (gate)
             {
-                didSupersede = TakeWaiting(out superseded);
-                own = ++sequence;
-                waiting.Encode(values, 0, width, column, row, width, height, hello.SampleType, hello.PressureScalePa);
-                waiting.Stamp(own, timeUs, DeadlineUs);
-                isWaiting = true;
-                Monitor.PulseAll(gate);
+                draft.Encode(values, 0, width, column, row, width, height, hello.SampleType, hello.PressureScalePa);
+                handed = HandOver(0, timeUs);
             }
-            if (didSupersede) Tell(superseded, Status.Superseded, null);
-            return own;
-        }
-
-        /// <summary>Empties the place of the frame that waits; true if one did.</summary>
-        bool TakeWaiting(out uint superseded)
-        {
-            superseded = waiting.Sequence;
-            if (!isWaiting) return false;
-            isWaiting = false;
-            SupersededByClient++;
-            return true;
+            return Told(handed);
         }
 
         /// <summary>Ends the session. Frames without an answer are lost.</summary>
@@ -220,7 +182,7 @@ namespace Papilla
             if (Thread.CurrentThread != receiver) receiver.Join(2 * AttemptMs);
             if (Thread.CurrentThread != sender) sender.Join(AttemptMs);
             LoseAll();
-            if (isWaiting) Tell(waiting.Sequence, Status.Lost, null);
+            TellWaiting(Status.Lost);
         }
     }
 }

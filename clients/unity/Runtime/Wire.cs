@@ -8,16 +8,18 @@ namespace Papilla
     /// <summary>What became of a frame.</summary>
     public enum Status : byte { Ok = 0, Superseded = 1, Late = 2, Error = 3, Stale = 4, Lost = 255 }
 
-    /// <summary>Sizes and samples of the protocol, version 2.</summary>
+    /// <summary>Sizes and samples of the protocol, versions 2 and 3.</summary>
     public static class Wire
     {
         public const int SidePx = 224;
         public const int MapLength = SidePx * SidePx;
         public const int HeaderBytes = 48;
         public const int MessageBytesMax = 1 << 20;
+        /// <summary>Objects of a session, and numbers of a pose or of a net force.</summary>
+        public const int ObjectsMax = 16, RowLength = 7;
 
         internal const uint Magic = 0x314c5050;
-        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagCutOff = 16;
+        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagUnsettled = 8, FlagCutOff = 16;
         const float HalfMax = 65504;
 
         static readonly float[] Halves = HalfTable();

@@ -1,14 +1,17 @@
-// The finger: the atlas's skin as a mesh, dented where it touches, painted with the last map of SED.
+// A finger: the atlas's skin as a mesh, dented where it touches, painted with the last map of SED, and what pushes back on it.
 
 import {
   BufferAttribute, BufferGeometry, DataTexture, DoubleSide, LinearFilter, Matrix4, Mesh, RedFormat, ShaderMaterial, Vector3,
 } from 'three';
 import { Foundation, MAP_LEN, SIDE_PX } from '../papilla.js';
+import { Arrow } from './arrow.js';
 
 /** Deepest that an object may go; beyond it the finger is held back. */
 const DEEPEST_MM = 1.8;
 const STEPS_MOST = 4;
 const GRADIENT_STEP_MM = 0.01;
+/** The brightest colour is never of less than a light touch makes, J/m3. */
+const LEAST_SED = 40;
 
 const VERTEX = `
 varying vec2 place;
@@ -42,8 +45,9 @@ void main() {
 }`;
 
 export class Finger {
-  /** @param {import('../papilla.js').Atlas} atlas */
-  constructor(atlas) {
+  /** @param {import('../papilla.js').Atlas} atlas @param {string} name */
+  constructor(atlas, name) {
+    this.name = name;
     this.atlas = atlas;
     this.foundation = new Foundation();
     this.restMm = atlas.skin.positionsMm;
@@ -53,7 +57,11 @@ export class Finger {
     /** What is touched, and how deep; null for nothing. @type {import('./objects.js').Touchable | null} */
     this.touched = null;
     this.deepestMm = 0;
-    this.greatestSed = 1;
+    this.greatestSed = LEAST_SED;
+    this.sedMax = 0;
+    this.forceN = 0;
+    this.flags = '';
+    this.answers = 0;
     this.#gradient = new Vector3();
     this.#toObject = new Matrix4();
     this.#middle = new Vector3();
@@ -70,6 +78,10 @@ export class Finger {
     this.texture.magFilter = this.texture.minFilter = LinearFilter;
     this.texture.needsUpdate = true;
     this.material = new ShaderMaterial({ uniforms: { sed: { value: this.texture } }, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: DoubleSide });
+    /** Where it is in the world. */
+    this.mesh = this.picture();
+    this.arrow = new Arrow();
+    this.mesh.add(this.arrow);
   }
 
   #bytes = new Uint8Array(MAP_LEN);
@@ -79,15 +91,16 @@ export class Finger {
   #point = new Vector3();
 
   /** Another picture of the same finger. */
-  mesh() {
+  picture() {
     return new Mesh(this.geometry, this.material);
   }
 
   /**
    * Penetration of every vertex where the mesh stands now; if the finger is deeper in an object than skin gives way, the mesh is moved out.
-   * @param {Mesh} mesh @param {import('./objects.js').Touchable[]} objects
+   * @param {import('./objects.js').Touchable[]} objects
    */
-  touch(mesh, objects) {
+  touch(objects) {
+    const { mesh } = this;
     this.#measure(mesh, objects);
     for (let step = 0; this.touched && this.deepestMm > DEEPEST_MM && step < STEPS_MOST; step++) {
       // The way out is that of the deepest vertex; which one that is may change on the way.
@@ -138,9 +151,14 @@ export class Finger {
     ).normalize();
   }
 
-  /** The pressure map of the touch, none above `mostPa`. @param {number} mostPa */
-  pressureMap(mostPa) {
+  /** Pressure of springs where it touches, none above `mostPa`. @param {number} mostPa */
+  press(mostPa) {
     this.foundation.pressures(this.penetrationMm, this.pressuresPa, this.touched?.objectPaPerMm, mostPa);
+  }
+
+  /** The map of that pressure. @param {number} mostPa */
+  pressureMap(mostPa) {
+    this.press(mostPa);
     return this.atlas.pressureMap(this.pressuresPa, this.map);
   }
 
@@ -155,8 +173,23 @@ export class Finger {
     this.position.needsUpdate = true;
   }
 
+  /**
+   * What an answer says: SED (J/m3), its greatest, the force, and where it pushes if that is known.
+   * @param {Float32Array} sed @param {number} sedMax @param {number} forceN @param {import('../src/types.js').Touch | null} touch @param {string} flags
+   */
+  feel(sed, sedMax, forceN, touch, flags) {
+    this.answers++;
+    this.sedMax = sedMax;
+    this.forceN = forceN;
+    this.flags = flags;
+    // Grows at once, shrinks slowly.
+    this.greatestSed = Math.max(LEAST_SED, sedMax, 0.99 * this.greatestSed);
+    this.#paint(sed, this.greatestSed);
+    this.arrow.show(touch);
+  }
+
   /** @param {Float32Array} sed @param {number} most J/m3 of the brightest colour */
-  paint(sed, most) {
+  #paint(sed, most) {
     const data = this.#bytes;
     const scale = 255 / most;
     for (let i = 0; i < MAP_LEN; i++) data[i] = Math.min(255, sed[i] * scale);

@@ -1,6 +1,9 @@
-// What moves the finger: a tracked hand or a controller in VR, the mouse (or a touch) otherwise.
+// What moves the fingers: a tracked hand or a controller in VR, the mouse (or a touch) otherwise.
 
+import { SPACING } from './objects.js';
 import { Plane, Quaternion, Raycaster, Vector2, Vector3 } from 'three';
+
+/** @typedef {import('three').Mesh} Mesh */
 
 /** Where the pad is in the finger's frame, mm: the point that a hand or the mouse moves. */
 const PAD_MM = new Vector3(9, 0, -6.4);
@@ -11,6 +14,14 @@ const FRAME = new Quaternion(-0.5, -0.5, -0.5, 0.5);
 /** With the mouse the finger comes down a little steeply. */
 const TILT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.35);
 
+/** Fingers by number, as a tracked hand names their tips. */
+export const FINGERS = /** @type {const} */ (['index', 'middle', 'ring', 'little', 'thumb']);
+const TIPS = /** @type {const} */ ([
+  'index-finger-tip', 'middle-finger-tip', 'ring-finger-tip', 'pinky-finger-tip', 'thumb-tip',
+]);
+/** With the mouse or a controller there are so many, spread so that each meets an object of its own. */
+const SPREAD_COUNT = 2;
+
 /** Where the table is: beside it the finger stays at its edge, and never behind what it is shown on. */
 const TABLE = { near: new Vector3(-1.2, 0.9, -1.25), far: new Vector3(1.2, 0.9, -0.25) };
 
@@ -18,13 +29,22 @@ const TABLE = { near: new Vector3(-1.2, 0.9, -1.25), far: new Vector3(1.2, 0.9, 
 const ABOVE = new Vector3(0, 2, -0.75);
 const DOWN = new Vector3(0, -1, 0);
 
-/** Puts the pad of the mesh to a place of the world. @param {import('three').Mesh} mesh @param {Vector3} place @param {Quaternion} turn */
+/** Puts the pad of the mesh to a place of the world. @param {Mesh} mesh @param {Vector3} place @param {Quaternion} turn */
 function place(mesh, place, turn) {
   mesh.quaternion.copy(turn).multiply(FRAME);
   mesh.position.copy(PAD_MM).multiply(mesh.scale).applyQuaternion(mesh.quaternion).negate().add(place);
   mesh.updateMatrixWorld();
 }
 
+const BESIDE = new Vector3();
+
+/** Puts the first finger to a place and the second beside it; the others are not there. @param {Mesh[]} meshes @param {Vector3} at @param {Quaternion} turn */
+function spread(meshes, at, turn) {
+  meshes.forEach((mesh, n) => {
+    mesh.visible = n < SPREAD_COUNT;
+    if (mesh.visible) place(mesh, BESIDE.set(n * SPACING, 0, 0).add(at), turn);
+  });
+}
 /** The mouse points at a place of an object or the table; pressed, the finger comes down there. */
 export class Pointer {
   /** @param {HTMLCanvasElement} canvas @param {import('three').Camera} camera @param {import('./objects.js').Touchable[]} objects */
@@ -57,8 +77,8 @@ export class Pointer {
     }, { passive: false });
   }
 
-  /** @param {import('three').Mesh} mesh @param {number} seconds since the last call */
-  move(mesh, seconds) {
+  /** @param {Mesh[]} meshes of the fingers @param {number} seconds since the last call */
+  move(meshes, seconds) {
     if (this.#at) this.#ray.setFromCamera(this.#at, this.camera);
     else this.#ray.set(ABOVE, DOWN);
     const [hit] = this.#ray.intersectObjects(this.meshes);
@@ -68,12 +88,12 @@ export class Pointer {
     const step = LOWER_MM_PER_S * seconds;
     this.#heightMm += Math.min(step, Math.max(-step, goal - this.#heightMm));
     this.#place.copy(this.#aim);
-    this.#place.y += this.#heightMm * mesh.scale.x;
-    place(mesh, this.#place, TILT);
+    this.#place.y += this.#heightMm * meshes[0].scale.x;
+    spread(meshes, this.#place, TILT);
   }
 }
 
-/** The first tracked index finger, or else the first controller. */
+/** The first hand whose index finger is tracked, or else the first controller. */
 export class Hands {
   /** @param {import('three').WebXRManager} xr @param {import('three').Object3D} scene */
   constructor(xr, scene) {
@@ -85,15 +105,36 @@ export class Hands {
   #place = new Vector3();
   #turn = new Quaternion();
 
-  /** False where nothing is tracked. @param {import('three').Mesh} mesh */
-  move(mesh) {
-    const tip = this.hands.map((hand) => hand.joints['index-finger-tip']).find((joint) => joint?.visible);
-    const found = tip ?? this.controllers.find((controller) => controller.visible);
-    if (!found) return false;
-    found.updateMatrixWorld();
-    found.getWorldPosition(this.#place);
-    found.getWorldQuaternion(this.#turn);
+  #index = new Vector3();
+
+  /** Meshes of what is not tracked are hidden. @param {Mesh[]} meshes */
+  move(meshes) {
+    const hand = this.hands.find(({ joints }) => joints[TIPS[0]]?.visible);
+    const controller = this.controllers.find((one) => one.visible);
+    if (hand) {
+      meshes.forEach((mesh, n) => this.#follow(mesh, hand.joints[TIPS[n]], n));
+    } else if (controller) {
+      this.#look(controller);
+      spread(meshes, this.#place, this.#turn);
+    } else {
+      for (const mesh of meshes) mesh.visible = false;
+    }
+  }
+
+  /** @param {import('three').Object3D} one */
+  #look(one) {
+    one.updateMatrixWorld();
+    one.getWorldPosition(this.#place);
+    one.getWorldQuaternion(this.#turn);
+  }
+
+  /** The index finger is where its tip is; the others are as far from it as a hand as large as the finger has them. @param {Mesh} mesh @param {import('three').Object3D | undefined} tip @param {number} n */
+  #follow(mesh, tip, n) {
+    mesh.visible = tip?.visible ?? false;
+    if (!tip || !mesh.visible) return;
+    this.#look(tip);
+    if (n === 0) this.#index.copy(this.#place);
+    else this.#place.sub(this.#index).multiplyScalar(1000 * mesh.scale.x).add(this.#index);
     place(mesh, this.#place, this.#turn);
-    return true;
   }
 }

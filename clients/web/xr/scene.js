@@ -1,21 +1,22 @@
-// A finger that touches objects: penetration -> pressure (elastic foundation) -> the server -> SED, painted on the finger.
+// Fingers that touch objects: where these are -> the server -> force, drawn, and SED, painted on the finger.
 
 import {
   CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
-import { Atlas, SUMMARY, Session } from '../papilla.js';
+import { Atlas } from '../papilla.js';
 import { Finger } from './finger.js';
-import { Hands, Pointer } from './hands.js';
+import { FINGERS, Hands, Pointer } from './hands.js';
 import { makeObjects } from './objects.js';
+import { Solved, Springs } from './touching.js';
 
 /** The finger and what it touches are drawn twelve times as large as they are. */
 const MM_TO_WORLD = 0.012;
 const SHOWN_MM_TO_WORLD = 0.03;
 const WORDS_MS = 200;
+/** A line for each finger. */
+const BOARD_PX = { width: 768, height: 184 };
 /** So far from the middle the outermost object reaches, in the world's units. */
 const OBJECTS_HALF_WIDTH = 0.85;
-/** So many late maps in a row, and the budget is doubled. */
-const LATE_MOST = 30;
 /** One frame of a headset; `?tier=NAME&budget_us=N` in the address says otherwise. */
 const BUDGET_US = 11000;
 
@@ -32,22 +33,22 @@ const element = (/** @type {string} */ id) => /** @type {HTMLElement} */ (docume
 class Board {
   constructor() {
     this.canvas = document.createElement('canvas');
-    this.canvas.width = 512;
-    this.canvas.height = 96;
+    this.canvas.width = BOARD_PX.width;
+    this.canvas.height = BOARD_PX.height;
     this.texture = new CanvasTexture(this.canvas);
     this.texture.colorSpace = SRGBColorSpace;
-    this.mesh = new Mesh(new PlaneGeometry(0.8, 0.15), new MeshBasicMaterial({ map: this.texture }));
-    this.mesh.position.set(0, 1.08, -1.4);
+    this.mesh = new Mesh(new PlaneGeometry(1.2, (1.2 * BOARD_PX.height) / BOARD_PX.width), new MeshBasicMaterial({ map: this.texture }));
+    this.mesh.position.set(-0.95, 1.95, -1.5);
   }
 
   /** @param {string} text */
   write(text) {
     const context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext('2d'));
     context.fillStyle = '#20242a';
-    context.fillRect(0, 0, 512, 96);
+    context.fillRect(0, 0, BOARD_PX.width, BOARD_PX.height);
     context.fillStyle = '#e8e8e8';
     context.font = '26px system-ui, sans-serif';
-    text.split('; ').forEach((line, n) => context.fillText(line, 12, 38 + 36 * n));
+    text.split('\n').forEach((line, n) => context.fillText(line, 12, 34 + 34 * n));
     this.texture.needsUpdate = true;
   }
 }
@@ -99,49 +100,39 @@ function makeWorld(onResize) {
   return { renderer, camera, scene };
 }
 
+/** What a finger feels: the object, depth, force and greatest SED. @param {Finger} finger */
+function inWords({ name, touched, deepestMm, forceN, sedMax, flags }) {
+  const tail = flags && ` (${flags})`;
+  return `${name}: ${touched?.name}, ${deepestMm.toFixed(1)} mm, ${forceN.toFixed(2)} N, ${sedMax.toFixed(0)} J/m3${tail}`;
+}
+
 async function start() {
   const atlas = await Atlas.load();
-  const finger = new Finger(atlas);
-  // The same finger, larger, its pad towards the viewer and its tip up.
-  const shown = finger.mesh();
+  const { contact_us } = await (await fetch('/v1/tiers')).json();
+  const isSolved = contact_us !== null;
+  const fingers = FINGERS.slice(0, isSolved ? FINGERS.length : 1).map((name) => new Finger(atlas, name));
+  const [finger] = fingers;
+  // The first finger, larger, its pad towards the viewer and its tip up.
+  const shown = finger.picture();
   const { renderer, camera, scene } = makeWorld((aspect) => {
     shown.scale.setScalar(SHOWN_MM_TO_WORLD * (aspect < 1 ? 1.9 : 1));
-    shown.position.set(0, aspect < 1 ? 3.05 : 1.95, -1.5);
+    shown.position.set(0, aspect < 1 ? 2.9 : 1.95, -1.5);
   });
   const objects = makeObjects(MM_TO_WORLD);
   for (const { mesh } of objects) scene.add(mesh);
   scene.updateMatrixWorld(true);
 
-  const mesh = finger.mesh();
-  mesh.scale.setScalar(MM_TO_WORLD);
+  const meshes = fingers.map(({ mesh }) => mesh);
+  for (const mesh of meshes) mesh.scale.setScalar(MM_TO_WORLD);
   shown.setRotationFromMatrix(new Matrix4().makeBasis(new Vector3(0, -1, 0), new Vector3(-1, 0, 0), new Vector3(0, 0, -1)));
   const board = new Board();
-  scene.add(mesh, shown, board.mesh);
+  scene.add(...meshes, shown, board.mesh);
 
-  let hello = wish();
-  let late = 0;
-  const session = new Session('', hello);
+  const hello = { ...wish(), atlas_hash: atlas.hash };
+  const tell = (/** @type {string} */ words) => { element('state').textContent = `${words}; ${(isSolved ? Solved : Springs).words}`; };
+  const touching = isSolved ? new Solved(fingers, objects, hello, tell) : new Springs(fingers, hello, tell);
   scene.userData.camera = camera;
-  const state = { renderer, scene, finger, mesh, objects, session, sedMax: 0, forceN: 0, flags: '', answers: 0, frames: 0, isPresenting: false };
-  session.onstate = (now, why) => { element('state').textContent = why ? `${now}: ${why}` : now; };
-  session.onready = (ready) => { element('state').textContent = `ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a map`; };
-  session.onanswer = (answer) => {
-    late = answer.status === 'late' ? late + 1 : answer.status === 'ok' ? 0 : late;
-    if (late >= LATE_MOST && session.ready) {
-      late = 0;
-      hello = { ...hello, budget_us: 2 * (hello.budget_us ?? BUDGET_US) };
-      session.renew(hello);
-    }
-    if (answer.status !== 'ok' || !answer.summary) return;
-    state.answers++;
-    state.flags = [answer.outOfRange && 'harder than learnt', answer.unfamiliar && 'unlike anything learnt', answer.cutOff && 'cut off at the edge'].filter(Boolean).join(', ');
-    state.sedMax = answer.summary[SUMMARY.indexOf('sed_max_j_per_m3')];
-    state.forceN = answer.summary[SUMMARY.indexOf('force_n')];
-    // Grows at once, shrinks slowly, and never below what a light touch makes.
-    finger.greatestSed = Math.max(40, state.sedMax, 0.99 * finger.greatestSed);
-    finger.paint(answer.map, finger.greatestSed);
-  };
-  session.open();
+  const state = { renderer, scene, finger, fingers, objects, touching, frames: 0, isPresenting: false };
 
   const pointer = new Pointer(renderer.domElement, camera, objects);
   const hands = new Hands(renderer.xr, scene);
@@ -152,17 +143,15 @@ async function start() {
     state.isPresenting = renderer.xr.isPresenting;
     // The page's own words say the same.
     board.mesh.visible = state.isPresenting;
-    mesh.visible = true;
-    if (!state.isPresenting) pointer.move(mesh, seconds);
-    else mesh.visible = hands.move(mesh);
-    if (mesh.visible) finger.touch(mesh, objects);
-    if (session.ready) session.send(finger.pressureMap(Infinity));
-    finger.dent();
+    if (!state.isPresenting) pointer.move(meshes, seconds);
+    else hands.move(meshes);
+    for (const one of fingers) if (one.mesh.visible) one.touch(objects);
+    touching.step();
+    for (const one of fingers) one.dent();
     if (nowMs - wordsMs > WORDS_MS) {
       wordsMs = nowMs;
-      const what = finger.touched ? `${finger.touched.name}, ${finger.deepestMm.toFixed(1)} mm` : 'nothing touched';
-      const flags = state.flags && `; ${state.flags}`;
-      const text = `${what}; ${state.forceN.toFixed(2)} N, SED up to ${state.sedMax.toFixed(0)} J/m3${flags}`;
+      const lines = fingers.filter((one) => one.mesh.visible && one.touched).map(inWords);
+      const text = lines.length ? lines.join('\n') : 'nothing touched';
       element('figures').textContent = text;
       board.write(text);
     }

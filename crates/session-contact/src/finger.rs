@@ -47,6 +47,8 @@ pub struct Taken {
     pub peak_pa: f32,
     /// Bits of [`papilla_proto::flags`].
     pub flags: u8,
+    /// Linearisations that the solve took; none if nothing was solved.
+    pub iterations: Option<u32>,
 }
 
 impl Finger {
@@ -206,7 +208,8 @@ impl Finger {
         let flags = told(quality.out_of_range, flags::OUT_OF_RANGE)
             | told(!quality.settled, flags::UNSETTLED)
             | if peak_pa > 0.0 { 0 } else { flags::NO_CONTACT };
-        Taken { peak_pa, flags }
+        let iterations = is_solved.then_some(self.out.effort.iterations);
+        Taken { peak_pa, flags, iterations }
     }
 
     /// Appends what pushes back, and the pressure if it was asked for, each up to a multiple of 16.

@@ -9,6 +9,5 @@ pub(crate) mod cache;
 pub(crate) mod catalogue;
 pub(crate) mod digest;
 pub(crate) mod latency;
-pub(crate) mod metrics;
 pub(crate) mod reload;
 pub(crate) mod scheduler;

@@ -5,6 +5,7 @@ mod remeasure;
 
 use std::{path::Path, sync::Arc, thread};
 
+use papilla_metrics::Metrics;
 use papilla_proto::contact::FINGERS_MAX;
 use papilla_session_contact::ContactAssets;
 use tokio::sync::{oneshot, watch};
@@ -14,7 +15,6 @@ use crate::{
     config::Config,
     core::{
         catalogue::{Catalogue, Step, assets::Assets, calibrate},
-        metrics::Metrics,
         reload,
         scheduler::Pool,
     },

@@ -5,6 +5,7 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
+use papilla_metrics::{Metrics, Shed};
 use papilla_proto::{ErrorCode, Problem};
 use papilla_session_contact::ContactAssets;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
@@ -15,7 +16,6 @@ use crate::{
     core::{
         buffers::Store,
         catalogue::Catalogue,
-        metrics::{Metrics, Shed},
         reload::Reloader,
         scheduler::{Pool, PoolHandle},
     },

@@ -9,6 +9,7 @@ use axum::{
     response::Response,
 };
 use bytes::Bytes;
+use papilla_metrics::Metrics;
 use papilla_proto::Problem;
 use serde_json::json;
 use tokio::{
@@ -21,7 +22,7 @@ use super::{
     answer::{json_answer, refusal::refused},
     http::info,
 };
-use crate::{core::metrics::Metrics, drain::begun, problem, progress::Progress};
+use crate::{drain::begun, problem, progress::Progress};
 
 /// The way to the routes, which are there once the models are loaded.
 pub(crate) struct Front {

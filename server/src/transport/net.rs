@@ -7,6 +7,7 @@ use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
+use papilla_metrics::Metrics;
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpSocket, TcpStream},
@@ -20,7 +21,7 @@ use super::{
     gate::{Peer, Place, PlaceHandle, Places},
     stream::TimeoutStream,
 };
-use crate::{config::Timeouts, core::metrics::Metrics, drain::begun};
+use crate::{config::Timeouts, drain::begun};
 
 /// Read buffer of a connection, bytes: bounds the head, and keeps the reads of a body few.
 pub(crate) const BUFFER_MAX: usize = 128 * 1024;

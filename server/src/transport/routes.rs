@@ -15,6 +15,7 @@ use axum::{
     response::Response,
     routing::{MethodRouter, get, post},
 };
+use papilla_metrics::Shed;
 use papilla_proto::{ErrorCode, Problem, error::shortened};
 use tokio::time::sleep;
 
@@ -25,7 +26,7 @@ use super::{
     http::{admin, atlas, effects, info, page, replay, sed, xr},
     oip, session,
 };
-use crate::{core::metrics::Shed, telemetry};
+use crate::telemetry;
 
 /// Every route: method, path, handler. The OpenAPI document lists the same, and a test
 /// holds the two against each other.

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::support::{
     GAIN, Service, Socket,
     contact::{deep, hello_3, hertz_n, rows, service},
-    floats_of, hello,
+    floats_of, frame, hello,
 };
 
 const VERTICES: usize = 361;
@@ -42,6 +42,28 @@ async fn poses_go_in_and_forces_come_out_without_a_network() {
     let (header, touch, _) = hear(&mut socket).await;
     assert_eq!(header.extension.unwrap().flags, flags::NO_CONTACT);
     assert_eq!(touch.force_n.map(f32::to_bits), [0; 3]);
+}
+
+/// One in the air, two in contact; a session that sends pressure is not counted.
+#[tokio::test(flavor = "multi_thread")]
+async fn solves_are_counted_by_what_they_came_to() {
+    let service = service().await;
+    assert!(service.json("/v1/tiers").await["contact_us"].is_u64());
+    let mut socket = service.socket().await;
+    socket.open(hello_3(&json!({"map": false}))).await;
+    for (sequence, depth) in [(1, -9.0), (2, 0.2), (3, 0.3)] {
+        socket.send(rows(sequence, 0, &[deep(depth)])).await;
+        hear(&mut socket).await;
+    }
+    let mut other = service.socket().await;
+    other.open(hello(&json!({}))).await;
+    other.send(frame(1, 0, SampleType::F32, 1.0, &vec![5e3; MAP_LEN])).await;
+    other.hear_frame().await;
+    let of = |outcome| format!("papilla_contact_solves_total{{outcome=\"{outcome}\"}}");
+    for (outcome, due) in [("in_air", 1), ("settled", 2), ("unsettled", 0)] {
+        assert_eq!(service.metric(&of(outcome)).await as u32, due, "{outcome}");
+    }
+    assert!(service.metric("papilla_contact_iterations_total").await >= 2.0);
 }
 
 #[tokio::test(flavor = "multi_thread")]

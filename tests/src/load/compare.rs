@@ -51,7 +51,7 @@ pub async fn compare(options: &Options, against: &str) -> Result<Comparison, Loa
     }
     let report = |which: usize| {
         let options = Options { duration_s: options.duration_s, ..both[which].clone() };
-        Report::new(&options, &targets[which], &tallies[which])
+        Report::new(&options, &targets[which], &tallies[which], None)
     };
     Ok(Comparison::new(report(0), report(1)))
 }

@@ -87,7 +87,7 @@ fn draw(raster: &Raster, vertex_values: &[f32]) -> Result<Vec<f32>, LoadError> {
     Ok(map)
 }
 
-async fn get<T: DeserializeOwned>(server: &str, path: &str) -> Result<T, LoadError> {
+pub(super) async fn get<T: DeserializeOwned>(server: &str, path: &str) -> Result<T, LoadError> {
     let bad = |reason: String| LoadError::Service { path: path.to_owned(), reason };
     let answer = Request::get(path).send(server).await?;
     if answer.status != 200 {

@@ -46,13 +46,8 @@ pub async fn floor(seconds: f64) -> io::Result<Floor> {
     let half = Duration::from_secs_f64(seconds / 2.0);
     let cores = thread::available_parallelism()?.get();
     let late = tokio::task::spawn_blocking(move || sleeps(cores, half)).await?;
-    let listener = TcpListener::bind("127.0.0.1:0")?;
-    let near = dial(&listener.local_addr()?.to_string()).await?.into_std()?;
-    let exchange = tokio::task::spawn_blocking(move || {
-        let (far, _) = listener.accept()?;
-        exchanges(near, far, half)
-    });
-    let (exchange, none) = (exchange.await??, || io::Error::other("no time to measure anything"));
+    let exchange = echo([FRAME_BYTES; 2], half).await?;
+    let none = || io::Error::other("no time to measure anything");
     let beyond = |us: u64| {
         let (count, all) = (late.0.count_between(us, u64::MAX), late.0.len());
         100.0 * count as f64 / all.max(1) as f64
@@ -64,6 +59,17 @@ pub async fn floor(seconds: f64) -> io::Result<Floor> {
         exchange_us: Percentiles::new(&exchange).ok_or_else(none)?,
         bytes: FRAME_BYTES,
     })
+}
+
+/// So many bytes over loopback TCP, and so many back, between two blocking threads.
+pub(super) async fn echo(bytes: [usize; 2], time: Duration) -> io::Result<Times> {
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let near = dial(&listener.local_addr()?.to_string()).await?.into_std()?;
+    let exchange = tokio::task::spawn_blocking(move || {
+        let (far, _) = listener.accept()?;
+        exchanges(near, far, bytes, time)
+    });
+    exchange.await?
 }
 
 fn sleeps(cores: usize, time: Duration) -> Times {
@@ -89,22 +95,28 @@ fn sleeps(cores: usize, time: Duration) -> Times {
     all
 }
 
-fn exchanges(mut near: TcpStream, mut far: TcpStream, time: Duration) -> io::Result<Times> {
+fn exchanges(
+    mut near: TcpStream,
+    mut far: TcpStream,
+    [there, back]: [usize; 2],
+    time: Duration,
+) -> io::Result<Times> {
     near.set_nonblocking(false)?;
     far.set_nodelay(true)?;
     let echo = thread::spawn(move || -> io::Result<()> {
-        let mut bytes = vec![0; FRAME_BYTES];
+        let (mut heard, said) = (vec![0; there], vec![0; back]);
         loop {
-            far.read_exact(&mut bytes)?;
-            far.write_all(&bytes)?;
+            far.read_exact(&mut heard)?;
+            far.write_all(&said)?;
         }
     });
-    let (mut bytes, mut times, begun) = (vec![0; FRAME_BYTES], Times::default(), Instant::now());
+    let (said, mut heard) = (vec![0; there], vec![0; back]);
+    let (mut times, begun) = (Times::default(), Instant::now());
     while begun.elapsed() < time {
         thread::sleep(GAP);
         let start = Instant::now();
-        near.write_all(&bytes)?;
-        near.read_exact(&mut bytes)?;
+        near.write_all(&said)?;
+        near.read_exact(&mut heard)?;
         times.record(start.elapsed());
     }
     drop(near);

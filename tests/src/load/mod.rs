@@ -7,6 +7,7 @@
 //! hears; clients of HTTP share one thread that keeps the beat.
 
 mod compare;
+mod contact;
 mod content;
 mod floor;
 mod options;
@@ -34,6 +35,7 @@ use tokio::{
 };
 
 pub use compare::{Comparison, Ratios, compare};
+pub use contact::Contact;
 pub use content::Content;
 pub use floor::{Floor, floor};
 pub use options::{Arrivals, Options, Speak};
@@ -102,6 +104,9 @@ pub enum LoadError {
     Task(String),
 }
 
+/// Time for the echo beside a run of poses.
+const ECHO: Duration = Duration::from_secs(2);
+
 /// Time between the last preparation and the first frame.
 const RUN_UP: Duration = Duration::from_millis(100);
 
@@ -112,13 +117,20 @@ const RUN_UP: Duration = Duration::from_millis(100);
 pub async fn run(options: &Options) -> Result<Report, LoadError> {
     let target = Target::new(options).await?;
     let tally = target.load(options).await?;
-    Ok(Report::new(options, &target, &tally))
+    let echo = match options.contact {
+        Some(_) if tally.ok > 0 => Some(floor::echo(tally.bytes, ECHO).await?),
+        _ => None,
+    };
+    Ok(Report::new(options, &target, &tally, echo.as_ref()))
 }
 
 /// A service and what it is to be loaded with.
 struct Target {
-    content: Content,
+    /// Where the frames are from, for people.
+    source: String,
     encoded: Encoded,
+    /// Version of the protocol.
+    version: u32,
     tier: String,
     predicted_latency_us: Option<u64>,
     opening: Opening,
@@ -133,13 +145,20 @@ enum Opening {
 
 impl Target {
     async fn new(options: &Options) -> Result<Self, LoadError> {
-        let content = match &options.dataset {
-            Some(folder) => Content::from_dataset(folder, &options.split, options.maps.get())?,
-            None => Content::from_server(&options.server, options.maps.get()).await?,
+        let (encoded, source, atlas_hash) = if options.contact.is_some() {
+            let (encoded, atlas_hash) = contact::poses(&options.server).await?;
+            (encoded, "a ball that goes down and up".to_owned(), atlas_hash)
+        } else {
+            let content = match &options.dataset {
+                Some(folder) => Content::from_dataset(folder, &options.split, options.maps.get())?,
+                None => Content::from_server(&options.server, options.maps.get()).await?,
+            };
+            let encoded = Encoded::new(&content, options.sample_type)?;
+            (encoded, content.source, content.atlas_hash)
         };
-        let encoded = Encoded::new(&content, options.sample_type)?;
+        let version = if options.contact.is_some() { 3 } else { options.protocol };
         let (tier, predicted_latency_us, opening) = match options.speak {
-            Speak::Session => Self::agree(options, &content).await?,
+            Speak::Session => Self::agree(options, atlas_hash).await?,
             speak => {
                 let tier = options.tier.clone().ok_or(LoadError::NoTier)?;
                 if options.sample_type != SampleType::F32 {
@@ -154,23 +173,26 @@ impl Target {
         } else {
             None
         };
-        Ok(Self { content, encoded, tier, predicted_latency_us, opening, reference })
+        Ok(Self { source, encoded, version, tier, predicted_latency_us, opening, reference })
     }
 
     /// Opens a first session, which learns the tier: all others ask for that one, so that all
     /// load the same.
     async fn agree(
         options: &Options,
-        content: &Content,
+        atlas_hash: String,
     ) -> Result<(String, Option<u64>, Opening), LoadError> {
         let mut hello = Hello {
             version: options.protocol,
             budget_us: options.budget(),
             tier: options.tier.clone(),
             sample_type: options.sample_type,
-            atlas_hash: Some(content.atlas_hash.clone()),
+            atlas_hash: Some(atlas_hash),
             ..Hello::default()
         };
+        if let Some(contact) = options.contact {
+            contact.ask(options.fingers, &mut hello);
+        }
         let (ready, mut probe, _) = socket::open(&options.server, &hello).await?;
         probe.close().await;
         hello.tier = Some(ready.tier.clone());
@@ -188,7 +210,7 @@ impl Target {
             encoded: self.encoded.clone(),
             reference: self.reference.clone(),
             deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
-            version: options.protocol,
+            version: self.version,
             drain: Duration::from_secs(options.drain_s),
         });
         let (mut beats, mut tasks) = (Vec::new(), Vec::new());

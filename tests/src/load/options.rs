@@ -8,6 +8,8 @@ use std::{
 use clap::{Parser, ValueEnum};
 use papilla_proto::SampleType;
 
+use super::contact::Contact;
+
 const HELP_TAIL: &str = "\
 Frames leave at their instants whether or not answers come (open loop), and times are
 counted from the instant a frame was meant to leave, so that no wait is hidden.
@@ -25,6 +27,8 @@ Examples:
   papilla-load --against 127.0.0.1:7225         two services in turn, and how they compare
   papilla-load --speak oip --tier nano --sessions 8 --against 127.0.0.1:8000 --dataset data/heldout
                                                 beside any other Open Inference server
+  papilla-load --contact touch --rate-hz 1000 --fingers 2
+                                                poses in, forces out, beside an echo of the bytes
   papilla-load --floor                          what the machine itself does
   papilla-load --allow-miss-percent 1 --json    for a script
 
@@ -76,6 +80,15 @@ pub struct Options {
     /// come meanwhile replace each other, and those that never leave count as superseded.
     #[arg(long, value_enum, default_value = "session", value_name = "WHAT")]
     pub speak: Speak,
+
+    /// Sends poses of a ball in place of pressure, to a service with --contact; answers carry this
+    /// beside what pushes back.
+    #[arg(long, value_enum, value_name = "WHAT", conflicts_with_all = ["dataset", "verify", "floor", "speak"])]
+    pub contact: Option<Contact>,
+
+    /// Fingers of a session with --contact; each sends a frame at every instant.
+    #[arg(long, default_value = "1", requires = "contact", value_name = "N", value_parser = clap::value_parser!(u8).range(1..=10))]
+    pub fingers: u8,
 
     /// Sessions at a time, their frames evenly staggered.
     #[arg(long, default_value = "1", value_name = "K")]
@@ -232,6 +245,7 @@ mod tests {
             ["--duration-s", "-1"],
             ["--sample-type", "f64"],
             ["--allow-miss-percent", "-1"],
+            ["--fingers", "2"],
         ] {
             assert!(parse(&wrong).is_err(), "{wrong:?}");
         }

@@ -19,6 +19,8 @@ pub(super) struct Plan {
     burst: u32,
     /// Seconds after the start, by session and frame; only where no formula gives them.
     drawn_s: Vec<Vec<f64>>,
+    /// Frames that leave at one instant, one a finger.
+    pub(super) fingers: u32,
     /// Frames of each session that come before the counted ones.
     pub(super) warmup: u32,
     /// Frames of each session in all.
@@ -28,12 +30,13 @@ pub(super) struct Plan {
 impl Plan {
     pub(super) fn new(options: &Options, start: Instant) -> Self {
         let (warmup, counted) = options.frames();
-        let (sessions, frames) = (options.sessions.get(), warmup + counted);
+        let (sessions, instants) = (options.sessions.get(), warmup + counted);
+        let fingers = u32::from(options.fingers);
         let drawn_s = match options.arrivals {
             Arrivals::Steady | Arrivals::Burst => Vec::new(),
             Arrivals::Poisson => {
                 let mut random = fastrand::Rng::with_seed(options.seed);
-                (0..sessions).map(|_| poisson(&mut random, frames, options.rate_hz)).collect()
+                (0..sessions).map(|_| poisson(&mut random, instants, options.rate_hz)).collect()
             }
         };
         Self {
@@ -43,13 +46,15 @@ impl Plan {
             arrivals: options.arrivals,
             burst: options.burst.get(),
             drawn_s,
-            warmup,
-            frames,
+            fingers,
+            warmup: warmup * fingers,
+            frames: instants * fingers,
         }
     }
 
     /// When `frame` of `session` is meant to leave.
     pub(super) fn intended(&self, session: usize, frame: u32) -> Instant {
+        let frame = frame / self.fingers;
         let stagger = session as f64 / self.sessions as f64;
         let seconds = match self.arrivals {
             Arrivals::Steady => (f64::from(frame) + stagger) / self.rate_hz,

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt};
 use papilla_proto::SampleType;
 use serde::{Deserialize, Serialize};
 
-use super::{Arrivals, Options, Speak, TOLERANCE, Target, tally::Tally, tally::Times};
+use super::{Arrivals, Contact, Options, Speak, TOLERANCE, Target, tally::Tally, tally::Times};
 
 /// Percentiles of a time, us.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,6 +70,10 @@ pub struct Report {
     pub arrivals: Arrivals,
     /// Version of the protocol.
     pub protocol: u32,
+    /// What answers to poses carried; none: frames were pressure.
+    pub contact: Option<Contact>,
+    /// Fingers of a session.
+    pub fingers: u8,
     /// Samples on the wire.
     pub sample_type: SampleType,
     /// Budget of a frame, us; none: nothing is dropped.
@@ -114,6 +118,13 @@ pub struct Report {
     pub queue_us: Option<Percentiles>,
     /// Of that, in the network, us; version 2.
     pub infer_us: Option<Percentiles>,
+    /// Of that, solving the contact, us; version 3.
+    pub solve_us: Option<Percentiles>,
+    /// Of that, neither waiting, solving nor in the network, us: the service's own; version 2.
+    pub service_us: Option<Percentiles>,
+    /// The bytes of such a frame and its answer over loopback TCP, between two threads, with
+    /// nothing done; with --contact.
+    pub echo_us: Option<Percentiles>,
     /// From the sending to the map, but for the network, us: what transport and service add;
     /// version 2.
     pub overhead_us: Option<Percentiles>,
@@ -134,7 +145,7 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) fn new(options: &Options, target: &Target, t: &Tally) -> Self {
+    pub(super) fn new(options: &Options, target: &Target, t: &Tally, echo: Option<&Times>) -> Self {
         let verification = options.verify.then_some(Verification {
             maps: t.verified,
             wrong: t.wrong,
@@ -148,14 +159,16 @@ impl Report {
             rate_hz: options.rate_hz,
             duration_s: options.duration_s,
             arrivals: options.arrivals,
-            protocol: options.protocol,
+            protocol: target.version,
+            contact: options.contact,
+            fingers: options.fingers,
             sample_type: options.sample_type,
             budget_us: options.budget(),
             deadline_us: options.deadline(),
             tier: target.tier.clone(),
             predicted_latency_us: target.predicted_latency_us,
-            source: target.content.source.clone(),
-            maps: target.content.maps_pa.len(),
+            source: target.source.clone(),
+            maps: target.encoded.payloads.len(),
             frames: t.frames,
             ok: t.ok,
             superseded: t.superseded,
@@ -171,6 +184,9 @@ impl Report {
             server_us: Percentiles::new(&t.server),
             queue_us: Percentiles::new(&t.queue),
             infer_us: Percentiles::new(&t.infer),
+            solve_us: Percentiles::new(&t.solve),
+            service_us: Percentiles::new(&t.rest),
+            echo_us: echo.and_then(Percentiles::new),
             overhead_us: Percentiles::new(&t.overhead),
             age_us: Percentiles::new(&t.age),
             send_delay_us: Percentiles::new(&t.send_delay),
@@ -215,6 +231,32 @@ impl Report {
     }
 }
 
+impl Report {
+    fn write_times(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
+        for (name, times) in [
+            ("round trip", self.round_trip_us),
+            ("  of it in the server", self.server_us),
+            ("    waiting", self.queue_us),
+            ("    solving the contact", self.solve_us),
+            ("    in the network", self.infer_us),
+            ("    the service's own", self.service_us),
+            ("bare echo of the bytes", self.echo_us),
+            ("trip without network", self.overhead_us),
+            ("age of the newest map", self.age_us),
+            ("sent late by", self.send_delay_us),
+        ] {
+            write!(f, "{name:24}")?;
+            let columns = times.map(|p| [p.p50, p.p90, p.p99, p.p99_9, p.max]);
+            for column in columns.map_or([None; 5], |times| times.map(Some)) {
+                write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self.speak {
@@ -234,6 +276,10 @@ impl fmt::Display for Report {
             self.maps,
             self.source
         )?;
+        if let Some(contact) = self.contact {
+            let plural = if self.fingers == 1 { "" } else { "s" };
+            writeln!(f, "{} finger{plural}, poses in, {contact:?} out", self.fingers)?;
+        }
         write!(f, "tier {}", self.tier)?;
         if let Some(us) = self.predicted_latency_us {
             write!(f, ", expected {us} us")?;
@@ -262,23 +308,7 @@ impl fmt::Display for Report {
             format!(" within {us} us of the instant they were meant to leave")
         });
         writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
-        writeln!(f, "{:24}{:>9}{:>9}{:>9}{:>9}{:>9}", "us", "p50", "p90", "p99", "p99.9", "max")?;
-        for (name, times) in [
-            ("round trip", self.round_trip_us),
-            ("  of it in the server", self.server_us),
-            ("    waiting", self.queue_us),
-            ("    in the network", self.infer_us),
-            ("trip without network", self.overhead_us),
-            ("age of the newest map", self.age_us),
-            ("sent late by", self.send_delay_us),
-        ] {
-            write!(f, "{name:24}")?;
-            let columns = times.map(|p| [p.p50, p.p90, p.p99, p.p99_9, p.max]);
-            for column in columns.map_or([None; 5], |times| times.map(Some)) {
-                write!(f, "{:>9}", column.map_or_else(|| "-".to_owned(), |us| us.to_string()))?;
-            }
-            writeln!(f)?;
-        }
+        self.write_times(f)?;
         if let Some(percent) = self.stolen_percent {
             writeln!(f, "the host withheld {percent:.2} % of this machine's processor time")?;
         }

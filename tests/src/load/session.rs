@@ -6,7 +6,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{FrameHeader, FrameStatus, SessionError, Window};
+use papilla_proto::{
+    FrameHeader, FrameKind, FrameStatus, SessionError, Window,
+    contact::{ROW, Touch},
+};
 
 use super::{
     TOLERANCE,
@@ -71,9 +74,13 @@ fn send(shared: &Shared, session: usize, mut mouth: Mouth) -> (Mouth, Times) {
         let time_us = plan.start.elapsed().as_micros() as u64;
         let mut header =
             FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
-        if shared.version > 1 {
-            header = header.windowed(Window::WHOLE);
-        }
+        header = match shared.version {
+            1 => header,
+            2 => header.windowed(Window::WHOLE),
+            _ => {
+                header.of_finger(FrameKind::Objects, (number % plan.fingers) as u8, [ROW as u16, 1])
+            }
+        };
         if number >= plan.warmup {
             delay.record(intended.elapsed());
         }
@@ -92,10 +99,17 @@ pub(super) struct Ear<'a> {
     tally: Tally,
     answered: Vec<bool>,
     outstanding: u32,
-    last_map: Option<u32>,
-    /// Up to when the age of the newest map has been noted.
-    aged_until: Option<Instant>,
+    /// By finger.
+    newest: Vec<Newest>,
     scratch: Vec<f32>,
+}
+
+/// The newest map of a finger.
+#[derive(Clone, Copy, Default)]
+struct Newest {
+    number: Option<u32>,
+    /// Up to when its age has been noted.
+    aged_until: Option<Instant>,
 }
 
 /// Time between two looks at the age of the newest map.
@@ -110,8 +124,7 @@ impl<'a> Ear<'a> {
             tally: Tally { frames: u64::from(frames - shared.plan.warmup), ..Tally::default() },
             answered: vec![false; frames as usize],
             outstanding: frames,
-            last_map: None,
-            aged_until: None,
+            newest: vec![Newest::default(); shared.plan.fingers as usize],
             scratch: Vec::new(),
         }
     }
@@ -164,7 +177,9 @@ impl<'a> Ear<'a> {
                 self.tally.in_time += u64::from(self.shared.deadline.is_none_or(|d| time <= d));
                 self.tally.round_trip.record(time);
                 self.tally.server.record(Duration::from_micros(header.time_us.into()));
-                self.version_2(now, header);
+                self.version_2(now, header, payload);
+                let sent = &self.shared.encoded.payloads[0][..];
+                self.tally.bytes = [sent, payload].map(|part| header.header_len() + part.len());
             }
             FrameStatus::Stale => self.tally.stale += 1,
             FrameStatus::Superseded => self.tally.superseded += 1,
@@ -190,13 +205,22 @@ impl<'a> Ear<'a> {
         }
     }
 
-    /// Where the time went, as answers of version 2 tell.
-    fn version_2(&mut self, now: Instant, header: &FrameHeader) {
+    /// Where the time went, as answers of versions 2 and 3 tell.
+    fn version_2(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
         let Some(extension) = header.extension else { return };
         let infer = Duration::from_micros(extension.infer_us.into());
         let sent = self.shared.plan.start + Duration::from_micros(header.client_time_us);
-        self.tally.queue.record(Duration::from_micros(extension.queue_us.into()));
+        let queue = Duration::from_micros(extension.queue_us.into());
+        self.tally.queue.record(queue);
         self.tally.infer.record(infer);
+        let mut known = queue + infer;
+        if let Some(touch) = extension.finger.and_then(|_| Touch::decode(payload)) {
+            let solve = Duration::try_from_secs_f32(touch.solve_us * 1e-6).unwrap_or_default();
+            self.tally.solve.record(solve);
+            known += solve;
+        }
+        let server = Duration::from_micros(header.time_us.into());
+        self.tally.rest.record(server.saturating_sub(known));
         let overhead = now.saturating_duration_since(sent).saturating_sub(infer);
         self.tally.overhead.record(overhead);
     }
@@ -204,24 +228,27 @@ impl<'a> Ear<'a> {
     /// Takes note of how old the newest map was, each millisecond until this one came.
     fn age(&mut self, now: Instant, number: u32) {
         let plan = &self.shared.plan;
-        let Some(last) = self.last_map.filter(|&last| last < number) else { return };
+        let of_finger = &mut self.newest[(number % plan.fingers) as usize];
+        let Some(last) = of_finger.number.filter(|&last| last < number) else { return };
         if number < plan.warmup {
             return;
         }
         let intended = plan.intended(self.session, last);
-        let mut look = self.aged_until.unwrap_or(now);
+        let mut look = of_finger.aged_until.unwrap_or(now);
         while look < now {
             self.tally.age.record(look.saturating_duration_since(intended));
             look += LOOK;
         }
-        self.aged_until = Some(look);
+        of_finger.aged_until = Some(look);
     }
 
     fn order(&mut self, number: u32) {
-        if self.last_map.is_some_and(|last| number < last) {
+        let fingers = self.shared.plan.fingers;
+        let newest = &mut self.newest[(number % fingers) as usize].number;
+        if newest.is_some_and(|last| number < last) {
             self.tally.out_of_order += 1;
         }
-        self.last_map = self.last_map.max(Some(number));
+        *newest = (*newest).max(Some(number));
     }
 
     fn verify(&mut self, header: &FrameHeader, payload: &[u8]) {

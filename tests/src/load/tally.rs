@@ -59,6 +59,10 @@ pub(super) struct Tally {
     pub(super) queue: Times,
     /// Of that, in the network; version 2.
     pub(super) infer: Times,
+    /// Of that, solving the contact; version 3.
+    pub(super) solve: Times,
+    /// Of that, none of the three.
+    pub(super) rest: Times,
     /// From the sending to the map, but for the network; version 2.
     pub(super) overhead: Times,
     /// Age of the newest map, every millisecond: since the instant its frame was meant to leave.
@@ -69,6 +73,8 @@ pub(super) struct Tally {
     pub(super) verified: u64,
     pub(super) wrong: u64,
     pub(super) difference_max: f64,
+    /// Bytes of a frame's message, and of the last answer's.
+    pub(super) bytes: [usize; 2],
     /// Processor time of the machine meanwhile.
     pub(super) processor: Ticks,
     /// Why sessions ended before their time.
@@ -102,6 +108,8 @@ impl Tally {
             (&mut self.server, &other.server),
             (&mut self.queue, &other.queue),
             (&mut self.infer, &other.infer),
+            (&mut self.solve, &other.solve),
+            (&mut self.rest, &other.rest),
             (&mut self.overhead, &other.overhead),
             (&mut self.age, &other.age),
             (&mut self.send_delay, &other.send_delay),
@@ -109,6 +117,7 @@ impl Tally {
             sum.add(part);
         }
         self.difference_max = self.difference_max.max(other.difference_max);
+        self.bytes = [0, 1].map(|way| self.bytes[way].max(other.bytes[way]));
         self.ended.extend_from_slice(&other.ended);
     }
 

@@ -3,12 +3,16 @@
 use std::{path::Path, process::Command};
 
 use clap::Parser;
-use papilla_tests::load::{self, LoadError, Options, Report};
+use papilla_tests::{
+    conformance::ContactRecorder,
+    load::{self, LoadError, Options, Report},
+};
 use tempfile::TempDir;
 
 use crate::{
     scene::PRESSED,
     service::{Service, model_folder, replaced, tiny_models},
+    shipped::folder,
 };
 
 fn models() -> TempDir {
@@ -53,6 +57,34 @@ async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
         let again: Report = serde_json::from_str(&serde_json::to_string(&report).unwrap()).unwrap();
         assert_eq!(again.round_trip_us, report.round_trip_us);
     }
+}
+
+/// Two fingers send poses: each frame has its outcome, and the parts of its time add up.
+#[tokio::test(flavor = "multi_thread")]
+async fn fingers_are_loaded_with_poses_beside_an_echo_of_their_bytes() {
+    let room = tempfile::tempdir().unwrap();
+    let file = room.path().join("half-space.contact");
+    let model = ContactRecorder::new(&folder("models")).unwrap().file().unwrap();
+    std::fs::write(&file, model).unwrap();
+    let service = Service::with_contact(&file).await;
+    for (what, asks) in [("touch", false), ("summary", true), ("vertices", true)] {
+        let arguments = ["--contact", what, "--fingers", "2", "--tier", "nano", "--budget-us", "0"];
+        let report = run(&service, &arguments).await.unwrap();
+        assert_eq!(report.faults(), Vec::<String>::new(), "{report}");
+        assert_eq!((report.frames, report.protocol), (40, 3), "{report}");
+        assert!(report.ok > 0 && report.ok + report.superseded == 40, "{report}");
+        let (solve, own) = (report.solve_us.unwrap(), report.service_us.unwrap());
+        assert_eq!((solve.count, own.count), (report.ok, report.ok));
+        assert!(solve.max > 1, "{report}");
+        assert_eq!(report.infer_us.unwrap().max > 0, asks, "{report}");
+        assert!(report.echo_us.unwrap().p50 > 0, "{report}");
+        assert!(report.to_string().contains("bare echo of the bytes"), "{report}");
+    }
+    // A service without a model says so.
+    let models = models();
+    let bare = Service::on(models.path()).await;
+    let refused = run(&bare, &["--contact", "touch"]).await.unwrap_err();
+    assert!(refused.to_string().contains("no contact model"), "{refused}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

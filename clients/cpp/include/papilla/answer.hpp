@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "json.hpp"
-#include "wire.hpp"
+#include "outbox.hpp"
 
 namespace papilla {
 
@@ -36,6 +36,8 @@ struct Answer {
   bool no_contact = false;            ///< the map is zero; no network was asked
   bool cut_off = false;               ///< the contact reaches the edge of the atlas
   bool unfamiliar = false;            ///< rougher or heavier than any map the tier was trained on
+  bool unsettled = false;             ///< the contact solve did not settle: its answer is rough
+  std::uint8_t finger = 0;
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`
   std::uint64_t client_time_us = 0;
@@ -44,6 +46,10 @@ struct Answer {
   std::uint32_t infer_us = 0;         ///< in the network
   bool has_map = false;
   std::vector<float> values;          ///< the window's samples, J/m3 (or Hz), row by row
+  bool has_touch = false;
+  Touch touch;                        ///< of poses and of gaps
+  std::vector<float> pressure_pa;     ///< that was found, if asked for: a map, or a value a vertex
+  std::vector<float> vertices;        ///< SED at the atlas' vertices, if asked for in place of a map
   bool has_summary = false;
   std::array<float, 16> summary{};    ///< see SummaryMember
   std::vector<float> points;
@@ -70,22 +76,26 @@ struct Ready {
     bool there = false;
   };
   json::Value message;                ///< as it came
+  std::uint8_t version = 2;
+  std::size_t fingers = 1;
   SampleType sample_type = SampleType::f32;
   std::string tier;
   std::uint64_t tier_number = 0;
   float pressure_max_pa = 0.0F;
   std::string atlas_hash;
-  Section summary, points, actuators, map;
-};
+  Section touch, pressure, vertices, summary, points, actuators, map;
 
-/// The bytes of a frame, with room before them for a transport's own header.
-struct Outgoing {
-  static constexpr std::size_t headroom = 16;
-  std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(headroom + header_bytes + 4 * map_len);
-  std::size_t size = 0;               ///< without the headroom
-  std::uint32_t sequence = 0;
-  std::uint64_t client_time_us = 0;
-  std::uint8_t* data() { return bytes.data() + headroom; }
+  /// The section of that name; null if there is no such section.
+  Section* section(std::string_view name) {
+    return name == "touch"       ? &touch
+           : name == "pressure"  ? &pressure
+           : name == "vertices"  ? &vertices
+           : name == "summary"   ? &summary
+           : name == "points"    ? &points
+           : name == "actuators" ? &actuators
+           : name == "map"       ? &map
+                                 : nullptr;
+  }
 };
 
 }  // namespace papilla

@@ -25,7 +25,8 @@ class Core {
 
   std::string hello() const { return hello_text(hello_); }
   static std::string hello_text(const std::string& members) {
-    return "{\"type\":\"hello\",\"version\":2" + (members.empty() ? "" : "," + members) + "}";
+    return "{\"type\":\"hello\",\"version\":" + std::string(is_of_version_3(members) ? "3" : "2") +
+           (members.empty() ? "" : "," + members) + "}";
   }
   /// What to say again after a reconnect.
   void set_hello(std::string hello) { hello_ = std::move(hello); }
@@ -33,63 +34,84 @@ class Core {
   bool is_ready() const { return is_ready_; }
   const Ready& ready() const { return history_.back(); }
   const Problem& refusal() const { return refusal_; }
-  bool waiting() const { return is_waiting_; }
+  bool waiting() const { return outbox_.any(); }
   /// Whether `take` would give a frame.
-  bool can_take() const { return is_waiting_ && is_ready_ && sent_.size() < sent_max; }
+  bool can_take() const { return is_ready_ && outbox_.any() && sent_.size() < sent_max; }
   std::size_t in_flight() const { return sent_.size(); }
+  /// Fingers of the session.
+  std::size_t fingers() const { return ready().fingers; }
   std::uint64_t superseded_by_client() const { return superseded_; }
 
-  /// Takes a frame: the samples of a window, Pa, row by row (none: no contact). Replaces one that
-  /// has not left. Returns its sequence. Copies; allocates nothing.
+  /// Takes a frame: the samples of a window, Pa, row by row (none: no contact). Replaces one of the
+  /// finger that has not left. Returns its sequence. Copies; allocates nothing.
   std::uint32_t send(const float* pressure_pa, Window window, std::uint64_t client_time_us,
-                     std::uint32_t deadline_us = 0) {
-    if (is_waiting_) {
-      ++superseded_;
-      outcome(waiting_.sequence, waiting_.client_time_us, Status::superseded, true);
-    }
+                     std::uint32_t deadline_us = 0, std::uint8_t finger = 0) {
     if (!pressure_pa) window = {0, 0, 0, 0};
     // A window larger than the map goes without samples: the service says what is wrong with it.
     const std::size_t count = window.pixels() > map_len ? 0 : window.pixels();
     const SampleType type = history_.back().sample_type;
     Header header;
     header.sample_type = type;
-    header.sequence = ++sequence_;
+    header.finger = finger;
     header.window = window;
     header.client_time_us = client_time_us;
     header.time_us = deadline_us;
     header.scale = scale_for(type, pressure_pa, count);
-    wire::encode(header, waiting_.data());
-    encode_samples(type, pressure_pa, count, header.scale, waiting_.data() + header_bytes);
-    waiting_.size = header_bytes + count * sample_bytes(type);
-    waiting_.sequence = header.sequence;
-    waiting_.client_time_us = client_time_us;
-    is_waiting_ = true;
-    return header.sequence;
+    Outgoing& frame = put(header, count * sample_bytes(type));
+    encode_samples(type, pressure_pa, count, header.scale, frame.data() + header_bytes);
+    return frame.id.sequence;
+  }
+
+  /// Takes where the objects of the hello are (at most 16), as `send` takes a map.
+  std::uint32_t send_poses(const Pose* poses, std::size_t count, std::uint64_t client_time_us,
+                           std::uint8_t finger = 0, const NetForce* net = nullptr) {
+    const std::size_t rows = count + (net ? 1 : 0);
+    const auto height = static_cast<std::uint16_t>(std::min<std::size_t>(rows, objects_max + 1));
+    Header header = header_of(Kind::objects, {0, 0, row_len, height}, client_time_us, finger);
+    Outgoing& frame = put(header, 4 * row_len * height);
+    std::uint8_t* at = frame.data() + header_bytes;
+    for (std::size_t i = 0; i < std::min(count, std::size_t{height}); ++i, at += 4 * row_len) {
+      wire::put_pose(at, poses[i]);
+    }
+    if (net && rows == height) wire::put_net(at, *net);
+    return frame.id.sequence;
+  }
+
+  /// Takes how deep the undeformed skin lies in things, mm, negative in air: 224 x 224, or a value
+  /// a vertex, as the hello says.
+  std::uint32_t send_gaps(const float* depth_mm, std::size_t count, std::uint64_t client_time_us,
+                          std::uint8_t finger = 0, const NetForce* net = nullptr) {
+    count = std::min(count, map_len);
+    const bool is_map = count == map_len;
+    const Window window = is_map ? Window{} : Window{0, 0, static_cast<std::uint16_t>(count), 1};
+    Header header = header_of(Kind::gaps, window, client_time_us, finger);
+    Outgoing& frame = put(header, 4 * (count + (net ? row_len : 0)));
+    encode_samples(SampleType::f32, depth_mm, count, 1.0F, frame.data() + header_bytes);
+    if (net) wire::put_net(frame.data() + header_bytes + 4 * count, *net);
+    return frame.id.sequence;
   }
 
   /// The frame that waits, if there is one and a session to send it in; it then counts as sent.
   /// The bytes stay until the next call. A frame encoded for older terms is encoded anew.
   Outgoing* take() {
     if (!can_take()) return nullptr;
-    is_waiting_ = false;
-    std::swap(waiting_, leaving_);
+    outbox_.take(leaving_);
     recode(leaving_);
-    sent_.push_back({leaving_.sequence, leaving_.client_time_us, history_.size() - 1});
+    sent_.push_back({leaving_.id, history_.size() - 1});
     return &leaving_;
   }
 
   /// The connection broke: what was sent is lost; what waits goes on waiting.
   void lost() {
     is_ready_ = false;
-    for (const Sent& sent : sent_) outcome(sent.sequence, sent.client_time_us, Status::lost);
+    for (const Sent& sent : sent_) outcome(sent.id, Status::lost);
     sent_.clear();
   }
 
   /// No more sessions will follow.
   void end() {
     lost();
-    if (is_waiting_) outcome(waiting_.sequence, waiting_.client_time_us, Status::lost);
-    is_waiting_ = false;
+    outbox_.clear([this](const Outgoing& frame) { outcome(frame.id, Status::lost); });
   }
 
   /// A text message: ready, refused (see `refusal`), or the error of a frame (its outcome).
@@ -103,7 +125,7 @@ class Core {
     Sent sent;
     if (forget(sequence, sent)) {
       scratch_.problem = problem;
-      outcome(sequence, sent.client_time_us, Status::error);
+      outcome(sent.id, Status::error);
     }
     return Event::nothing;
   }
@@ -112,15 +134,17 @@ class Core {
   Event binary(const std::uint8_t* bytes, std::size_t size) {
     Header header;
     Sent sent;
-    if (!wire::decode(bytes, size, header) || !header.window.inside()) return Event::broken;
+    if (!wire::decode(bytes, size, header)) return Event::broken;
     if (!forget(header.sequence, sent)) return Event::nothing;
     const Ready& ready = history_[sent.ready];
+    if (ready.map.there && !header.window.inside()) return Event::broken;
     Answer& answer = scratch_;
     answer.kind = header.kind;
     answer.out_of_range = (header.flags & wire::out_of_range) != 0;
     answer.no_contact = (header.flags & wire::no_contact) != 0;
     answer.unfamiliar = (header.flags & wire::unfamiliar) != 0;
     answer.cut_off = (header.flags & wire::cut_off) != 0;
+    answer.unsettled = (header.flags & wire::unsettled) != 0;
     answer.window = header.window;
     answer.total_us = header.time_us;
     answer.queue_us = header.queue_us;
@@ -132,25 +156,25 @@ class Core {
     const auto& names = ready.message["tier_names"].items;
     if (header.tier < names.size()) answer.tier = names[header.tier].string;
     if (header.status == Status::ok && !read(bytes, size, header, ready)) return Event::broken;
-    outcome(header.sequence, header.client_time_us, header.status);
+    outcome({header.sequence, header.client_time_us, header.finger}, header.status);
     return Event::nothing;
   }
 
  private:
   struct Sent {
-    std::uint32_t sequence = 0;
-    std::uint64_t client_time_us = 0;
+    FrameId id;
     std::size_t ready = 0;            ///< place in history_
   };
   static constexpr std::size_t sent_max = 256;
+  static constexpr std::size_t objects_max = 16;
 
   std::string hello_;
   std::vector<Ready> history_ = std::vector<Ready>(1);
   bool is_ready_ = false;
   Problem refusal_;
   std::uint32_t sequence_ = 0;
-  Outgoing waiting_, leaving_;
-  bool is_waiting_ = false;
+  Outbox outbox_;
+  Outgoing leaving_;
   std::vector<Sent> sent_;
   std::vector<float> recoded_ = std::vector<float>(map_len);
   std::uint64_t superseded_ = 0;
@@ -164,16 +188,16 @@ class Core {
     ready.pressure_max_pa = static_cast<float>(message["pressure_max_pa"].number);
     ready.atlas_hash = message["atlas_hash"].string;
     for (const json::Value& section : message["sections"].items) {
-      const std::string& name = section["name"].string;
-      Ready::Section& at = name == "summary"     ? ready.summary
-                           : name == "points"    ? ready.points
-                           : name == "actuators" ? ready.actuators
-                                                 : ready.map;
-      at = {section["offset"].whole(), section["bytes"].whole(), true};
+      Ready::Section* const at = ready.section(section["name"].string);
+      if (at) *at = {section["offset"].whole(), section["bytes"].whole(), true};
     }
+    ready.version = static_cast<std::uint8_t>(message["version"].whole());
+    ready.fingers = message.has("fingers") ? message["fingers"].whole() : 1;
     ready.message = message;
     // Reserved here, so that no answer allocates.
     scratch_.values.reserve(map_len);
+    scratch_.pressure_pa.reserve(ready.pressure.bytes / 4);
+    scratch_.vertices.reserve(ready.vertices.bytes);
     scratch_.points.reserve(ready.points.bytes / 4);
     scratch_.actuators.reserve(ready.actuators.bytes / 4);
     history_.push_back(std::move(ready));
@@ -188,6 +212,14 @@ class Core {
       return true;
     };
     Answer& answer = scratch_;
+    answer.has_touch = ready.touch.there && ready.touch.offset + wire::touch_bytes <= size;
+    if (answer.has_touch) answer.touch = wire::get_touch(bytes + ready.touch.offset);
+    answer.pressure_pa.resize(ready.pressure.bytes / 4);
+    if (!floats(ready.pressure, answer.pressure_pa.data())) return false;
+    answer.vertices.resize(ready.vertices.bytes / sample_bytes(header.sample_type));
+    if (ready.vertices.offset + ready.vertices.bytes > size) return false;
+    decode_samples(header.sample_type, bytes + ready.vertices.offset, answer.vertices.size(), header.scale,
+                   answer.vertices.data());
     answer.has_summary = ready.summary.there && ready.summary.bytes == 64;
     answer.points.resize(ready.points.bytes / 4);
     answer.actuators.resize(ready.actuators.bytes / 4);
@@ -206,7 +238,7 @@ class Core {
 
   bool forget(std::uint32_t sequence, Sent& found) {
     for (std::size_t i = 0; i < sent_.size(); ++i) {
-      if (sent_[i].sequence != sequence) continue;
+      if (sent_[i].id.sequence != sequence) continue;
       found = sent_[i];
       sent_.erase(sent_.begin() + static_cast<std::ptrdiff_t>(i));
       return true;
@@ -214,20 +246,55 @@ class Core {
     return false;
   }
 
-  void outcome(std::uint32_t sequence, std::uint64_t client_time_us, Status status,
-               bool by_client = false) {
+  void outcome(const FrameId& id, Status status, bool by_client = false) {
     Answer& answer = scratch_;
-    answer.sequence = sequence;
-    answer.client_time_us = client_time_us;
+    answer.sequence = id.sequence;
+    answer.client_time_us = id.client_time_us;
+    answer.finger = id.finger;
     answer.status = status;
     answer.by_client = by_client;
-    if (status != Status::ok) answer.has_map = answer.has_summary = false;
+    if (status != Status::ok) answer.has_map = answer.has_summary = answer.has_touch = false;
     if (on_answer) on_answer(answer);
   }
 
-  /// A frame that was encoded before the terms changed.
+  static bool is_of_version_3(const std::string& members) {
+    json::Value hello;
+    if (!json::parse("{" + members + "}", hello)) return false;  // the service says what is wrong
+    for (const char* name : {"input", "input_layout", "answer_layout", "objects", "fingers", "method",
+                             "force_target", "stiffness", "pressure"}) {
+      if (hello.has(name)) return true;
+    }
+    return false;
+  }
+
+  static Header header_of(Kind kind, Window window, std::uint64_t client_time_us, std::uint8_t finger) {
+    Header header;
+    header.kind = kind;
+    header.window = window;
+    header.client_time_us = client_time_us;
+    header.finger = finger;
+    return header;
+  }
+
+  /// Room for the finger's next frame, its header written; what waited is superseded.
+  Outgoing& put(Header& header, std::size_t payload_bytes) {
+    if (const Outgoing* const old = outbox_.waiting(header.finger)) {
+      ++superseded_;
+      outcome(old->id, Status::superseded, true);
+    }
+    header.sequence = ++sequence_;
+    Outgoing& frame = outbox_.put(header.finger);
+    wire::encode(header, frame.data());
+    frame.size = header_bytes + payload_bytes;
+    frame.id = {header.sequence, header.client_time_us, header.finger};
+    return frame;
+  }
+
+  /// A frame that was encoded before the terms changed. Poses and gaps are f32 in all of them.
   void recode(Outgoing& frame) {
     std::uint8_t* at = frame.data();
+    at[4] = history_.back().version;
+    if (at[5] != static_cast<std::uint8_t>(Kind::pressure)) return;
     const auto old = static_cast<SampleType>(at[6]);
     const SampleType now = history_.back().sample_type;
     if (old == now) return;

@@ -1,6 +1,8 @@
 // A session over a socket of its own: two threads, latest wins, reconnects by itself.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
@@ -76,37 +78,48 @@ class Session {
   /// and returns its sequence at once. Replaces one that has not left. Allocates nothing.
   std::uint32_t send(const float* pressure_pa, Window window = {}, std::uint64_t client_time_us = now_us(),
                      std::uint32_t deadline_us = 0) {
-    std::uint32_t sequence;
-    {
-      std::lock_guard<std::mutex> lock(mutex_);
-      sequence = core_.send(pressure_pa, window, client_time_us, deadline_us);
-    }
-    changed_.notify_all();
-    return sequence;
+    return hand_over([&] { return core_.send(pressure_pa, window, client_time_us, deadline_us); });
   }
 
-  /// The newest answer with status ok, once; false if none came since. Swaps, so that nothing is
-  /// copied: `mine` is what a game loop calls this with every frame.
-  bool latest(Answer& mine) {
+  /// Hands over where the objects of the hello are in a finger's frame, as `send` does a map.
+  std::uint32_t send_poses(const Pose* poses, std::size_t count, std::uint8_t finger = 0,
+                           const NetForce* net = nullptr, std::uint64_t client_time_us = now_us()) {
+    return hand_over([&] { return core_.send_poses(poses, count, client_time_us, finger, net); });
+  }
+
+  /// Hands over how deep the undeformed skin lies in things, mm, negative in air.
+  std::uint32_t send_gaps(const float* depth_mm, std::size_t count, std::uint8_t finger = 0,
+                          const NetForce* net = nullptr, std::uint64_t client_time_us = now_us()) {
+    return hand_over([&] { return core_.send_gaps(depth_mm, count, client_time_us, finger, net); });
+  }
+
+  /// The finger's newest answer with status ok, once; false if none came since. Swaps, so that
+  /// nothing is copied: `mine` is what a game loop calls this with every frame.
+  bool latest(Answer& mine, std::uint8_t finger = 0) {
     std::lock_guard<std::mutex> lock(mutex_);
-    if (!fresh_) return false;
-    fresh_ = false;
-    std::swap(mine, latest_);
+    if (finger >= fingers_max || !latest_[finger].fresh) return false;
+    latest_[finger].fresh = false;
+    std::swap(mine, latest_[finger].answer);
     return true;
   }
 
   /// `send`, and waits for the outcome, at most so long; status lost if it does not come.
   const Answer& render(const float* pressure_pa, Window window = {}, std::uint64_t client_time_us = now_us(),
                        std::uint32_t deadline_us = 0, int timeout_ms = 30000) {
-    std::unique_lock<std::mutex> lock(mutex_);
-    wanted_ = core_.send(pressure_pa, window, client_time_us, deadline_us);
-    wants_ = true;
-    rendered_.status = Status::lost;
-    rendered_.has_map = false;
-    changed_.notify_all();
-    changed_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !wants_ || closed_; });
-    wants_ = false;
-    return rendered_;
+    return await([&] { return core_.send(pressure_pa, window, client_time_us, deadline_us); }, timeout_ms);
+  }
+
+  /// `send_poses`, and waits for the outcome; its `touch` holds the force.
+  const Answer& touch(const std::vector<Pose>& poses, std::uint8_t finger = 0, const NetForce* net = nullptr,
+                      int timeout_ms = 30000) {
+    return await([&] { return core_.send_poses(poses.data(), poses.size(), now_us(), finger, net); }, timeout_ms);
+  }
+
+  /// `send_gaps`, and waits for the outcome.
+  const Answer& touch_gaps(const std::vector<float>& depth_mm, std::uint8_t finger = 0,
+                           const NetForce* net = nullptr, int timeout_ms = 30000) {
+    return await([&] { return core_.send_gaps(depth_mm.data(), depth_mm.size(), now_us(), finger, net); },
+                 timeout_ms);
   }
 
   /// Says hello again in the open session; false: `problem()` says why not, and the old terms stand.
@@ -148,6 +161,12 @@ class Session {
   }
 
  private:
+  static constexpr std::size_t fingers_max = 10;
+  struct Latest {
+    Answer answer;
+    bool fresh = false;
+  };
+
   Options options_;
   net::Address address_;
   mutable std::mutex mutex_;
@@ -160,13 +179,37 @@ class Session {
   bool sending_ = false;              ///< the writer has the socket
   Problem problem_;
   std::uint64_t connections_ = 0;
-  Answer latest_, rendered_;
-  bool fresh_ = false;
+  std::array<Latest, fingers_max> latest_;
+  Answer rendered_;
   bool wants_ = false;
   std::uint32_t wanted_ = 0;
   std::string new_hello_, pong_;
   bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
   bool told_refusal_ = false, told_range_ = false;
+
+  template <class Send>
+  std::uint32_t hand_over(const Send& send) {
+    std::uint32_t sequence;
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      sequence = send();
+    }
+    changed_.notify_all();
+    return sequence;
+  }
+
+  template <class Send>
+  const Answer& await(const Send& send, int timeout_ms) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    wanted_ = send();
+    wants_ = true;
+    rendered_.status = Status::lost;
+    rendered_.has_map = rendered_.has_touch = false;
+    changed_.notify_all();
+    changed_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !wants_ || closed_; });
+    wants_ = false;
+    return rendered_;
+  }
 
   /// Says once what a program that looks at maps alone would not see.
   void warn(const Answer& answer) {
@@ -183,8 +226,9 @@ class Session {
     warn(answer);
     if (options_.on_answer) options_.on_answer(answer);
     if (answer.status == Status::ok) {
-      latest_ = answer;               // keeps its room: no allocation
-      fresh_ = true;
+      Latest& latest = latest_[std::min<std::size_t>(answer.finger, fingers_max - 1)];
+      latest.answer = answer;         // keeps its room: no allocation
+      latest.fresh = true;
     }
     if (wants_ && answer.sequence == wanted_) {
       rendered_ = answer;

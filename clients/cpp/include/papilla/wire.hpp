@@ -1,4 +1,4 @@
-// Frames of version 2 of the protocol (docs/reference/protocol.md): headers and samples. No allocation.
+// Frames of versions 2 and 3 of the protocol (docs/reference/protocol.md): headers and samples. No allocation.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@ enum class SampleType : std::uint8_t { f32 = 0, f16 = 1, u16 = 2, u8 = 3 };
 /// What became of a frame. The first five are the wire's numbers.
 enum class Status : std::uint8_t { ok = 0, superseded = 1, late = 2, error = 3, stale = 4, lost = 5 };
 
-enum class Kind : std::uint8_t { pressure = 1, sed = 2, sa1_rate = 3 };
+enum class Kind : std::uint8_t { pressure = 1, sed = 2, sa1_rate = 3, objects = 4, gaps = 5 };
 
 /// A rectangle of the map, pixels; the default is all of it.
 struct Window {
@@ -45,12 +45,13 @@ struct Header {
   std::uint32_t infer_us = 0;
   std::uint16_t tier = 0;
   std::uint8_t flags = 0;               ///< bits of wire::Flag
+  std::uint8_t finger = 0;              ///< version 3
 };
 
 namespace wire {
 
 /// Bits of an answer's flags.
-enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4, cut_off = 16 };
+enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4, unsettled = 8, cut_off = 16 };
 
 /// Little-endian, whatever the machine is; compilers make one move of it.
 template <class T>
@@ -94,11 +95,12 @@ inline void encode(const Header& header, std::uint8_t* at) {
   put_float(at + 28, header.scale);
   put(at + 32, header.window.column);
   put(at + 34, header.window.row);
+  at[47] = header.finger;
 }
 
 /// Reads an answer's header; false if it is none.
 inline bool decode(const std::uint8_t* at, std::size_t size, Header& header) {
-  if (size < header_bytes || std::memcmp(at, "PPL1", 4) != 0 || at[4] != 2) return false;
+  if (size < header_bytes || std::memcmp(at, "PPL1", 4) != 0 || (at[4] != 2 && at[4] != 3)) return false;
   if ((at[5] != 2 && at[5] != 3) || at[6] > 3 || at[7] > 4) return false;
   header.kind = static_cast<Kind>(at[5]);
   header.sample_type = static_cast<SampleType>(at[6]);
@@ -113,6 +115,7 @@ inline bool decode(const std::uint8_t* at, std::size_t size, Header& header) {
   header.infer_us = get<std::uint32_t>(at + 40);
   header.tier = get<std::uint16_t>(at + 44);
   header.flags = at[46];
+  header.finger = at[4] == 3 ? at[47] : 0;
   return true;
 }
 

@@ -5,6 +5,7 @@ const Session = preload("res://addons/papilla/session.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
 const Patterns = preload("res://test/patterns.gd")
+const Touch = preload("res://addons/papilla/touch.gd")
 
 var url = OS.get_environment("PAPILLA_URL")
 var atlas
@@ -283,6 +284,65 @@ func step_rasterise(step, expect):
 			d2 += pow(atlas.skin_mm[3 * i + k] - g[k], 2)
 		values.append(g[4] * exp(-d2 / (2 * g[3] * g[3])))
 	check_map(expect, atlas.pressure_map(values))
+
+
+# A transform with this pose has this row.
+func check_row(row):
+	var turn = Quat(row[3], row[4], row[5], row[6])
+	var made = Touch.row_of(Transform(Basis(turn), Vector3(row[0], row[1], row[2])))
+	var dot = 0.0
+	for k in 4:
+		dot += made[3 + k] * row[3 + k]
+	for k in 3:
+		near("origin", made[k], row[k], 1e-4)
+	# A quaternion and its negative are one turn.
+	near("turn", abs(dot), 1.0, 1e-5)
+
+
+func step_touch(step, expect):
+	if expect.get("status") != "error":
+		for row in step.poses:
+			check_row(row)
+	check_touch(step, expect, session.send_poses(step.poses, int(step.get("finger", 0)), step.get("net")))
+
+
+func step_gaps(step, expect):
+	var ball = step.sphere
+	var depth_mm = PoolRealArray()
+	for i in atlas.vertex_count():
+		var d2 = 0.0
+		for k in 3:
+			d2 += pow(atlas.skin_mm[3 * i + k] - ball[k], 2)
+		depth_mm.append(ball[3] - sqrt(d2))
+	check_touch(step, expect, session.send_gaps(depth_mm, int(step.get("finger", 0)), step.get("net")))
+
+
+func check_touch(step, expect, sequence):
+	if not wait_for("has_outcome", sequence):
+		return
+	var outcome = outcomes[sequence]
+	same("status (%s)" % outcome.get("problem"), outcome.status, expect.get("status", "ok"))
+	same("finger", outcome.finger, int(step.get("finger", 0)))
+	for member in ["code", "field"]:
+		if expect.has(member):
+			same(member, outcome.problem[member], expect[member])
+	if outcome.status != "ok" or why != "":
+		return
+	var t = outcome.touch
+	var found = []
+	for three in [t.force_n, t.torque_n_mm]:
+		found += [three.x, three.y, three.z]
+	found += [t.area_mm2, t.centre_mm.x, t.centre_mm.y, t.centre_mm.z, t.penetration_mm]
+	found += [t.stiffness_n_per_mm, t.travel_mm, t.pressure_max_pa, t.share]
+	all_near("touch", found, expect.touch)
+	if expect.has("pressure_sum"):
+		var sum = 0.0
+		for value in outcome.pressure:
+			sum += value
+		near("pressure", sum, expect.pressure_sum[0], expect.pressure_sum[1])
+	same("no_contact", outcome.no_contact, expect.flags.has("no_contact"))
+	if outcome.out_of_range or outcome.unsettled:
+		fail("out of range or unsettled")
 
 
 func step_contacts(step, expect):

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
 use papilla_engine::card::Index;
+use papilla_metrics::TierLabels;
 use papilla_proto::{
     ErrorCode, MAP_SIDE_PX, PixelMask, Problem,
     atlas::{Atlas, Patch, Raster},
@@ -29,7 +30,7 @@ use self::{
 };
 use crate::{
     StartError,
-    core::{cache::Cache, latency::Overhead, metrics::TierLabels},
+    core::{cache::Cache, latency::Overhead},
 };
 
 /// How far loading has come.

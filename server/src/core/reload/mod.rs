@@ -5,6 +5,7 @@ mod watch;
 use std::sync::{Arc, atomic::Ordering};
 
 use arc_swap::ArcSwap;
+use papilla_metrics::{Metrics, TIERS_MAX};
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
 use tokio::sync::{Mutex, OwnedMutexGuard, watch::Sender};
@@ -21,7 +22,6 @@ use crate::{
             calibrate,
             golden::{self, GoldenError},
         },
-        metrics::{Metrics, TIERS_MAX},
         scheduler::Exchange,
     },
 };

@@ -7,11 +7,10 @@ use std::{
 
 use bytes::{Bytes, BytesMut};
 use papilla_codec::{Input, Output};
+use papilla_metrics::Stage;
 use papilla_proto::{FrameHeader, FrameKind, Problem, Window, effects::OutOfRange};
 use papilla_session_contact::Finger;
 use papilla_session_effects::Effects;
-
-use crate::core::metrics::Stage;
 
 /// One pressure map on its way to a thread.
 #[derive(Debug)]

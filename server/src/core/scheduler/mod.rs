@@ -16,15 +16,14 @@ use std::{
     time::Duration,
 };
 
+use papilla_metrics::Metrics;
+
 pub(crate) use exchange::Exchange;
 pub(crate) use job::{Done, Job, JobOptions, Outcome, OutputMeta, is_past};
 pub(crate) use slot::{Sink, Slot};
 
 use self::{exchange::Inbox, queue::Queue, work::Worker};
-use crate::{
-    StartError,
-    core::{catalogue::Catalogue, metrics::Metrics},
-};
+use crate::{StartError, core::catalogue::Catalogue};
 use job::Times;
 use slot::Offer;
 

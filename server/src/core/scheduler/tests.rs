@@ -13,6 +13,7 @@ use std::{
 
 use bytes::Bytes;
 use papilla_codec::{Input, Output};
+use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType};
 use tokio::sync::mpsc;
 
@@ -21,7 +22,6 @@ use super::{Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot};
 use crate::core::{
     buffers::{HEADROOM, Recycler},
     catalogue::testing,
-    metrics::{Metrics, Stage},
 };
 
 /// A pool of one thread and the handles of its gate.

@@ -9,6 +9,7 @@ use std::{
 
 use papilla_codec::{Input, Map, Quantity, decode, encode};
 use papilla_engine::Session;
+use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{
     ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
 };
@@ -24,7 +25,6 @@ use crate::{
     core::{
         buffers::{HEADROOM, Recycler},
         catalogue::Catalogue,
-        metrics::{Metrics, Stage},
     },
     problem,
 };
@@ -248,6 +248,9 @@ impl Worker {
         let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
         let taken = finger.take(payload, sample_type, scale, map_pa)?;
         meta.flags |= taken.flags;
+        if let Some(iterations) = taken.iterations {
+            self.metrics.contact.solved(taken.flags, iterations);
+        }
         let range = self.range(job);
         if finger.takes_pressure() {
             range.check(&self.pressure_pa).map_err(problem::of_map)?;

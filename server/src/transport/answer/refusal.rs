@@ -5,12 +5,13 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, Uri, header},
     response::{IntoResponse, Response},
 };
+use papilla_metrics::Metrics;
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
 use serde_json::json;
 
 use super::json_answer;
-use crate::{core::metrics::Metrics, problem::bounded};
+use crate::problem::bounded;
 
 /// A problem on its way to an HTTP client: `{"error": {code, message, field}}`.
 #[derive(Debug)]

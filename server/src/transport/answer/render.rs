@@ -7,13 +7,13 @@ use axum::{
     response::Response,
 };
 use bytes::BytesMut;
+use papilla_metrics::{Stage, Transport};
 use papilla_proto::{ErrorCode, Problem, flags};
 use tokio::{sync::mpsc, time::timeout};
 
 use crate::{
     core::{
         buffers::Recycler,
-        metrics::{Stage, Transport},
         scheduler::{Done, Job, Outcome, Slot, is_past},
     },
     problem, telemetry,

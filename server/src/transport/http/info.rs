@@ -7,6 +7,7 @@ use axum::{
     http::{HeaderMap, HeaderValue, StatusCode, header},
     response::Response,
 };
+use papilla_metrics::Metrics;
 use papilla_proto::Problem;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -16,7 +17,6 @@ use crate::{
     core::{
         cache::Content,
         catalogue::{Catalogue, Document},
-        metrics::Metrics,
     },
     problem, progress,
     transport::answer::{Answer, Shared, answer, cached, json_answer, refusal::label, refuse},
@@ -76,7 +76,8 @@ pub(crate) async fn tiers(State(app): Shared) -> Response {
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
-        r#"{{"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
+        r#"{{"contact_us":{},"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
+        json!(app.contact.as_ref().map(|contact| contact.frame_us)),
         json!(catalogue.tiers[catalogue.default].name),
         json!(catalogue.judged_on),
         catalogue.ladder_json,

@@ -9,13 +9,11 @@ use axum::{
     response::Response,
 };
 use papilla_codec::Output;
+use papilla_metrics::Transport;
 use papilla_proto::Problem;
 
 use crate::{
-    core::{
-        metrics::Transport,
-        scheduler::{Job, JobOptions},
-    },
+    core::scheduler::{Job, JobOptions},
     transport::{
         answer::{
             Answer, Shared, answer, body, refuse,

@@ -18,16 +18,14 @@ use axum::{
 use bytes::Bytes;
 use papilla_codec::{Input, Output};
 use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
+use papilla_metrics::Transport;
 use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType, error::shortened};
 use serde_json::json;
 use tokio::task::spawn_blocking;
 
 use self::{request::Wish, response::Tensor};
 use crate::{
-    core::{
-        metrics::Transport,
-        scheduler::{Job, JobOptions},
-    },
+    core::scheduler::{Job, JobOptions},
     problem,
     transport::{
         answer::{

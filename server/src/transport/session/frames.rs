@@ -7,6 +7,7 @@ use std::{
 
 use bytes::Bytes;
 use papilla_codec::{Input, Output};
+use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
 };
@@ -22,7 +23,6 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
-        metrics::{Stage, Transport},
         scheduler::{Job, JobOptions, Slot},
     },
     problem,

@@ -11,6 +11,7 @@ use std::{
 
 use bytes::BytesMut;
 use papilla_codec::Output;
+use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
     Extension, FrameHeader, FrameStatus, HEADER_LEN_V2, Problem, ServerMessage, SessionError,
 };
@@ -23,7 +24,6 @@ use super::{
 use crate::{
     core::{
         buffers::{HEADROOM, Recycler},
-        metrics::{Stage, Transport},
         scheduler::{Done, Outcome, Sink, is_past},
     },
     problem,

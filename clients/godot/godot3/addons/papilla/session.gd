@@ -1,17 +1,20 @@
-# A session of Papilla: pressure maps (Pa) out, maps of strain energy density (J/m3) in.
+# A session of Papilla: pressure maps (Pa) or poses of objects out, maps of strain energy density (J/m3) and forces in.
 #
-# Put the node into the scene, connect `map_received`, call `send` or `send_window`. The newest frame wins here too: with
-# `in_flight_max` frames without an answer a frame waits, and a newer one takes its place. A lost connection is made anew
-# by itself.
+# Put the node into the scene, connect `map_received` or `touched`, call `send`, `send_window` or `send_poses`. The newest
+# frame of a finger wins here too: with `in_flight_max` of its frames without an answer a frame waits, and a newer one
+# takes its place. A lost connection is made anew by itself.
 extends Node
 
 const Compat = preload("compat.gd")
 const Frame = preload("frame.gd")
 const Link = preload("link.gd")
 const Samples = preload("samples.gd")
+const Touch = preload("touch.gd")
 
 # An answer with a map; see `map_of`, `image_of`.
 signal map_received(answer)
+# An answer with what pushes back: `answer.finger`, `answer.touch.force_n`, ... (touch.gd).
+signal touched(answer)
 # What became of a frame, once for each: `answer.status` is ok, superseded, late, stale, error or lost.
 signal answered(answer)
 # A session began, on the terms of the server's `ready`.
@@ -22,6 +25,8 @@ signal refused(problem)
 const ATTEMPT_MS = 5000
 const RETRY_LEAST_MS = 100
 const RETRY_MOST_MS = 250
+const OBJECTS_MAX = 16
+const FINGERS_MAX = 10
 const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_limited"]
 
 # Address of the server.
@@ -32,7 +37,7 @@ export var token = ""
 export var hello = {}
 # Connect when the scene starts.
 export var auto_open = true
-# Frames that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
+# Frames of a finger that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
 export var in_flight_max = 3
 
 # The server's `ready`; null while there is no session. (`ready` itself is a signal of every Node.)
@@ -51,9 +56,10 @@ var _is_refused = false
 var _next_try_ms = 0
 var _gives_up_ms = 0
 var _sequence = 0
-var _waiting = null
-var _waiting_sequence = 0
-var _outstanding = []
+# By finger, those that came last at the end: [frame, sequence].
+var _waiting = {}
+# Finger by sequence.
+var _outstanding = {}
 var _asked = {}
 var _before = null
 var _older_ready = null
@@ -86,14 +92,12 @@ func close():
 	_open = false
 	_drop()
 	_lose_all()
-	if _waiting != null:
-		_waiting = null
-		_tell({"status": "lost", "sequence": _waiting_sequence})
+	_end_waiting("lost")
 
 
 # Says hello again in the open session: `session_ready`, or `refused` and the old terms stand.
 func renew(next):
-	_supersede_waiting()
+	_end_waiting("superseded")
 	if server_ready != null:
 		_before = {"asked": _asked, "server_ready": server_ready}
 	_asked = next.duplicate(true)
@@ -117,14 +121,54 @@ func send_window(samples_pa, column, row, width, height):
 	if column < 0 or row < 0 or column + width > Samples.SIDE_PX or row + height > Samples.SIDE_PX or samples_pa.size() != width * height:
 		push_error("%d samples are no window of %d x %d at %d, %d" % [samples_pa.size(), width, height, column, row])
 		return -1
-	_supersede_waiting()
-	_sequence = (_sequence + 1) & 0xffffffff
-	var stamp = client_time_us if client_time_us > 0 else OS.get_ticks_usec()
 	var type = _asked.get("sample_type", "f32")
-	_waiting = Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, stamp, deadline_us)
-	_waiting_sequence = _sequence
+	_step()
+	return _put(0, Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, _stamp(), deadline_us))
+
+
+# Sends where the objects of the hello are in a finger's frame: rows of seven, `Touch.row_of(transform)`. `net`: [x, y, z, N],
+# a net force to be met. Returns the frame's sequence; -1 where there is no such frame.
+func send_poses(rows, finger = 0, net = null):
+	if rows.size() > OBJECTS_MAX or not _is_finger(finger):
+		return -1
+	_step()
+	var height = rows.size() + (0 if net == null else 1)
+	return _put(finger, Frame.encode_rows(Frame.KIND_OBJECTS, Touch.poses(rows, net), Touch.ROW_LEN, height, finger, _sequence, _stamp(), deadline_us))
+
+
+# Sends how deep the undeformed skin lies in things, mm, negative in air: at the atlas' vertices, or 224 x 224.
+func send_gaps(depth_mm, finger = 0, net = null):
+	if depth_mm.size() > Samples.MAP_LEN or not _is_finger(finger):
+		return -1
+	_step()
+	var is_map = depth_mm.size() == Samples.MAP_LEN
+	var width = Samples.SIDE_PX if is_map else depth_mm.size()
+	var height = Samples.SIDE_PX if is_map else 1
+	return _put(finger, Frame.encode_rows(Frame.KIND_GAPS, Touch.gaps(depth_mm, net), width, height, finger, _sequence, _stamp(), deadline_us))
+
+
+func _is_finger(finger):
+	if finger < 0 or finger >= FINGERS_MAX:
+		push_error("there is no finger %d; a session has 10 at most" % finger)
+		return false
+	return true
+
+
+func _step():
+	_sequence = (_sequence + 1) & 0xffffffff
+
+
+func _stamp():
+	return client_time_us if client_time_us > 0 else OS.get_ticks_usec()
+
+
+func _put(finger, frame):
+	var own = _sequence
+	if _waiting.has(finger):
+		_end_one(finger, "superseded")
+	_waiting[finger] = [frame, own]
 	_flush()
-	return _sequence
+	return own
 
 
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
@@ -182,7 +226,7 @@ func _connect():
 func _greet():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
-	message["version"] = 2
+	message["version"] = 3 if Touch.is_asked(_asked) else 2
 	_link.send_text(Compat.json_text(message))
 	_gives_up_ms = OS.get_ticks_msec() + ATTEMPT_MS
 
@@ -206,28 +250,35 @@ func _lost():
 # What went out on a lost connection is never answered.
 func _lose_all():
 	var lost = _outstanding
-	_outstanding = []
+	_outstanding = {}
 	for sequence in lost:
-		_tell({"status": "lost", "sequence": sequence})
+		_tell({"status": "lost", "sequence": sequence, "finger": lost[sequence]})
 
 
-func _supersede_waiting():
-	if _waiting == null:
-		return
-	_waiting = null
-	superseded_by_client += 1
-	_tell({"status": "superseded", "sequence": _waiting_sequence})
+func _end_waiting(status):
+	for finger in _waiting.keys():
+		_end_one(finger, status)
+
+
+func _end_one(finger, status):
+	var sequence = _waiting[finger][1]
+	_waiting.erase(finger)
+	superseded_by_client += int(status == "superseded")
+	_tell({"status": status, "sequence": sequence, "finger": finger})
 
 
 func _flush():
-	if _waiting == null or server_ready == null or _outstanding.size() >= in_flight_max:
-		return
-	var frame = _waiting
-	_waiting = null
-	_outstanding.append(_waiting_sequence)
-	sent += 1
-	if not _link.send_bytes(frame):
-		_lost()
+	for finger in _waiting.keys():
+		if server_ready == null or not _waiting.has(finger) or _outstanding.values().count(finger) >= in_flight_max:
+			continue
+		var frame = _waiting[finger][0]
+		frame[4] = int(server_ready.version)
+		_outstanding[_waiting[finger][1]] = finger
+		_waiting.erase(finger)
+		sent += 1
+		if not _link.send_bytes(frame):
+			_lost()
+			return
 
 
 func _text(message):
@@ -240,9 +291,10 @@ func _text(message):
 	elif message.get("sequence") != null:
 		var sequence = int(message.sequence)
 		if _outstanding.has(sequence):
+			var finger = _outstanding[sequence]
 			_outstanding.erase(sequence)
 			_warn("error", "a frame was refused: " + message.message)
-			_tell({"status": "error", "sequence": sequence, "problem": message})
+			_tell({"status": "error", "sequence": sequence, "finger": finger, "problem": message})
 			_flush()
 	else:
 		_on_refusal(message)
@@ -295,3 +347,5 @@ func _tell(answer):
 	emit_signal("answered", answer)
 	if answer.status == "ok":
 		emit_signal("map_received", answer)
+	if answer.has("touch"):
+		emit_signal("touched", answer)

@@ -1,11 +1,15 @@
 # Made of clients/godot/godot3/addons/papilla/frame.gd by clients/godot/generate: edit that one.
-# Frames of the protocol, version 2: a header of 48 bytes, little-endian, and what follows.
+# Frames of the protocol, versions 2 and 3: a header of 48 bytes, little-endian, and what follows.
 extends RefCounted
 
 const Compat = preload("compat.gd")
 const Samples = preload("samples.gd")
+const Touch = preload("touch.gd")
 const STATUS = ["ok", "superseded", "late", "error", "stale"]
 const HEADER_BYTES = 48
+const KIND_PRESSURE = 1
+const KIND_OBJECTS = 4
+const KIND_GAPS = 5
 
 
 # A request. `scale`: Pa per unit of u16 and u8; null or 0: so that the greatest pressure is the greatest unit.
@@ -19,23 +23,38 @@ static func encode(values, column, row, width, height, type_name, scale, sequenc
 			scale = most / (65535.0 if type == 2 else 255.0) if most > 0 else 1.0
 	if type < 2:
 		scale = 1.0
+	var window = [column, row, width, height]
+	var frame = _header(KIND_PRESSURE, type, window, scale, 0, sequence, time_us, deadline_us)
+	frame.append_array(Samples.encode(values, type, scale))
+	return frame
+
+
+# A request of poses or gaps (`bytes`, f32) of a finger.
+static func encode_rows(kind, bytes, width, height, finger, sequence, time_us, deadline_us):
+	var frame = _header(kind, 0, [0, 0, width, height], 1.0, finger, sequence, time_us, deadline_us)
+	frame.append_array(bytes)
+	return frame
+
+
+# The header; its version is that of the session in which it leaves.
+static func _header(kind, type, window, scale, finger, sequence, time_us, deadline_us):
 	var head = StreamPeerBuffer.new()
 	head.put_data("PPL1".to_ascii_buffer())
-	for byte in [2, 1, type, 0]:
+	for byte in [2, kind, type, 0]:
 		head.put_u8(byte)
 	head.put_u32(sequence)
-	head.put_u16(width)
-	head.put_u16(height)
+	head.put_u16(window[2])
+	head.put_u16(window[3])
 	head.put_u64(time_us)
 	head.put_u32(deadline_us)
 	head.put_float(scale)
-	head.put_u16(column)
-	head.put_u16(row)
-	head.put_u32(0)
+	head.put_u16(window[0])
+	head.put_u16(window[1])
 	head.put_u64(0)
-	var frame = head.data_array
-	frame.append_array(Samples.encode(values, type, scale))
-	return frame
+	head.put_u16(0)
+	head.put_u8(0)
+	head.put_u8(finger)
+	return head.data_array
 
 
 # What the header of an answer says.
@@ -43,7 +62,7 @@ static func read_header(packet):
 	var head = StreamPeerBuffer.new()
 	head.data_array = packet.slice(0, HEADER_BYTES)
 	head.seek(4)
-	head.get_u8()
+	var version = head.get_u8()
 	var answer = {"kind": "sa1_rate" if head.get_u8() == 3 else "sed", "sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
 	answer.sequence = head.get_u32()
 	answer.width = head.get_u16()
@@ -60,7 +79,9 @@ static func read_header(packet):
 	answer.out_of_range = flags & 1 != 0
 	answer.no_contact = flags & 2 != 0
 	answer.unfamiliar = flags & 4 != 0
+	answer.unsettled = flags & 8 != 0
 	answer.cut_off = flags & 16 != 0
+	answer.finger = head.get_u8() if version == 3 else 0
 	return answer
 
 
@@ -74,6 +95,10 @@ static func read_sections(answer, packet, sections):
 			has_map = true
 			if from < packet.size():
 				answer.samples = packet.slice(from, packet.size())
+		elif section.name == "vertices":
+			answer.vertices = Samples.decode(packet.slice(from, from + int(section.bytes)), answer.sample_type, answer.scale)
+		elif section.name == "touch":
+			answer.touch = Touch.read(Compat.bytes_to_floats(packet.slice(from, from + int(section.bytes))))
 		else:
 			answer[section.name] = Compat.bytes_to_floats(packet.slice(from, from + int(section.bytes)))
 	if not has_map:

@@ -21,6 +21,22 @@ std::string ToUtf8(const FString& Text)
     return std::string(TCHAR_TO_UTF8(*Text));
 }
 
+FVector ToFVector(const std::array<float, 3>& Three)
+{
+    return FVector(Three[0], Three[1], Three[2]);
+}
+
+FPapillaTouch ToTouch(const papilla::Touch& From)
+{
+    FPapillaTouch Touch;
+    Touch.ForceN = ToFVector(From.force_n);
+    Touch.TorqueNMm = ToFVector(From.torque_n_mm);
+    Touch.AreaMm2 = From.area_mm2;
+    Touch.CentreMm = ToFVector(From.centre_mm);
+    Touch.StiffnessNPerMm = From.stiffness_n_per_mm;
+    return Touch;
+}
+
 uint64 NowUs()
 {
     return static_cast<uint64>(FPlatformTime::Seconds() * 1e6);
@@ -48,6 +64,7 @@ void UPapillaSessionComponent::BeginPlay()
         Answer = Outcome;
         bHasAnswer = true;
         OnMapReceived.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
+        if (Outcome.has_touch) OnTouched.Broadcast(Outcome.finger, ToTouch(Outcome.touch));
     };
     FetchAtlas();
     Connect();
@@ -143,7 +160,9 @@ void UPapillaSessionComponent::HandlePiece(const void* Data, SIZE_T Size, bool b
 
 void UPapillaSessionComponent::Pump()
 {
-    while (Socket && Core->in_flight() < static_cast<size_t>(InFlightMax))
+    // The service has a place for each finger.
+    const size_t Most = static_cast<size_t>(InFlightMax) * Core->fingers();
+    while (Socket && Core->in_flight() < Most)
     {
         papilla::Outgoing* const Frame = Core->take();
         if (!Frame) return;
@@ -193,6 +212,30 @@ int32 UPapillaSessionComponent::SendContacts(const TArray<FPapillaContact>& Cont
     }
     Atlas.contacts(Points.data(), Points.size(), Drawn.GetData());
     return SendWindow(Drawn.GetData(), {});
+}
+
+int32 UPapillaSessionComponent::SendPoses(const TArray<FTransform>& Objects, int32 Finger)
+{
+    if (!Core) return 0;
+    Poses.clear();
+    for (const FTransform& Object : Objects)
+    {
+        const FVector At = Object.GetLocation();
+        const FQuat Turn = Object.GetRotation();
+        Poses.push_back({{float(At.X), float(At.Y), float(At.Z)}, {float(Turn.X), float(Turn.Y), float(Turn.Z), float(Turn.W)}});
+    }
+    const uint32 Sequence = Core->send_poses(Poses.data(), Poses.size(), NowUs(), static_cast<uint8>(Finger));
+    Pump();
+    return static_cast<int32>(Sequence);
+}
+
+int32 UPapillaSessionComponent::SendGaps(const TArray<float>& DepthMm, int32 Finger)
+{
+    if (!Core) return 0;
+    const auto Count = static_cast<size_t>(DepthMm.Num());
+    const uint32 Sequence = Core->send_gaps(DepthMm.GetData(), Count, NowUs(), static_cast<uint8>(Finger));
+    Pump();
+    return static_cast<int32>(Sequence);
 }
 
 bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const

@@ -29,12 +29,39 @@ struct FPapillaContact
     double RadiusMm = 0.0;  // 0: the finger's own on a flat object
 };
 
+/** What pushes back on a finger, in its frame; all of it is in Latest(). */
+USTRUCT(BlueprintType)
+struct FPapillaTouch
+{
+    GENERATED_BODY()
+
+    UPROPERTY(BlueprintReadOnly, Category = "Papilla")
+    FVector ForceN = FVector::ZeroVector;
+
+    /** About the frame's origin. */
+    UPROPERTY(BlueprintReadOnly, Category = "Papilla")
+    FVector TorqueNMm = FVector::ZeroVector;
+
+    UPROPERTY(BlueprintReadOnly, Category = "Papilla")
+    double AreaMm2 = 0.0;
+
+    /** Centre of the pressure, on the deformed skin. */
+    UPROPERTY(BlueprintReadOnly, Category = "Papilla")
+    FVector CentreMm = FVector::ZeroVector;
+
+    /** Change of force for a small travel of the objects along it; 0: not asked for. */
+    UPROPERTY(BlueprintReadOnly, Category = "Papilla")
+    double StiffnessNPerMm = 0.0;
+};
+
 DECLARE_DYNAMIC_MULTICAST_DELEGATE(FPapillaReady);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaRefused, const FString&, Code, const FString&, Message);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaMapReceived, int32, Sequence, float, SedMaxJPerM3);
+DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaTouched, int32, Finger, const FPapillaTouch&, Touch);
 
 /**
- * Sends pressure maps (Pa) and gives the newest strain energy density map (J/m3), 224 x 224 each.
+ * Sends pressure maps (Pa) or poses of objects and gives the newest strain energy density map (J/m3), 224 x 224 each,
+ * and what pushes back.
  * The latest frame wins: sending never blocks or queues. Reconnects by itself. Game thread only.
  */
 UCLASS(ClassGroup = (Haptics), meta = (BlueprintSpawnableComponent))
@@ -53,7 +80,7 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     FString Hello = TEXT("\"budget_us\": 11000");
 
-    /** Frames that may be on their way at once. IWebSocket queues without bound, so this bounds it. */
+    /** Frames of a finger that may be on their way at once. IWebSocket queues without bound, so this bounds it. */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "1", ClampMax = "8"))
     int32 InFlightMax = 2;
 
@@ -69,6 +96,10 @@ public:
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
     FPapillaMapReceived OnMapReceived;
 
+    /** What pushes back on a finger: of poses and gaps. */
+    UPROPERTY(BlueprintAssignable, Category = "Papilla")
+    FPapillaTouched OnTouched;
+
     /** Sends a whole map, row by row, Pa; an empty one is no contact. Returns the frame's sequence. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     int32 SendPressure(const TArray<float>& PressurePa);
@@ -76,6 +107,17 @@ public:
     /** Sends the pressure of contact points; nothing before the atlas has come (a moment after BeginPlay). */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     int32 SendContacts(const TArray<FPapillaContact>& Contacts);
+
+    /**
+     * Sends where the objects of the hello are in a finger's frame, mm. That frame is right-handed: from Unreal's, mirror y
+     * (location y, and x and z of the rotation, change sign). Returns the frame's sequence.
+     */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    int32 SendPoses(const TArray<FTransform>& Objects, int32 Finger = 0);
+
+    /** Sends how deep the undeformed skin lies in things, mm, negative in air: at the atlas' vertices, or 224 x 224. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    int32 SendGaps(const TArray<float>& DepthMm, int32 Finger = 0);
 
     /** The newest map, 224 x 224, J/m3; false if none came yet. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
@@ -106,6 +148,7 @@ private:
     papilla::Atlas Atlas;
     TArray<float> Drawn;
     std::vector<papilla::Contact> Points;
+    std::vector<papilla::Pose> Poses;
     bool bHasAtlas = false;
     bool bHasAnswer = false;
     bool bHasWarned = false;

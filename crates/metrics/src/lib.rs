@@ -3,6 +3,7 @@
 //! Handles that the hot path uses are made once per tier, so that counting a
 //! frame looks nothing up and allocates nothing.
 
+mod contact;
 mod labels;
 mod process;
 
@@ -19,20 +20,21 @@ use prometheus_client::{
     registry::{Metric, Registry, Unit},
 };
 
+pub use contact::ContactMetrics;
 use labels::{
     CodeLabels, LateLabels, MapLabels, ModelLabels, ReloadLabels, RequestLabels, ShedLabels,
     StageLabels, Word,
 };
-pub(crate) use labels::{Shed, Stage, TierLabels, Transport};
+pub use labels::{Shed, Stage, TierLabels, Transport};
 
 /// Greatest number of tiers, counting every name since the start: handles have fixed places, so
 /// that the hot path takes no lock.
-pub(crate) const TIERS_MAX: usize = 64;
+pub const TIERS_MAX: usize = 64;
 
 /// Buckets of every stage, seconds: from a memory copy to a dropped session.
 ///
 /// Dense around the budgets that matter: 1 ms (force loop), 5.5 ms (tap), 11.1 ms (90 Hz).
-pub(crate) const BUCKETS_S: [f64; 18] = [
+pub const BUCKETS_S: [f64; 18] = [
     50e-6, 100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 3e-3, 4e-3, 5.5e-3, 8e-3, 11.1e-3, 16e-3, 25e-3,
     50e-3, 100e-3, 200e-3, 500e-3, 2.0,
 ];
@@ -45,51 +47,52 @@ type Requests = Family<RequestLabels, Histogram, fn() -> Histogram>;
 
 /// A histogram of one stage of one tier.
 #[derive(Debug, Clone)]
-pub(crate) struct Timer(Histogram);
+pub struct Timer(Histogram);
 
 impl Timer {
-    pub(crate) fn observe(&self, time: Duration) {
+    /// Takes note of a time.
+    pub fn observe(&self, time: Duration) {
         self.0.observe(time.as_secs_f64());
     }
 }
 
 /// The timers of one tier.
 #[derive(Debug)]
-pub(crate) struct TierMetrics {
+pub struct TierMetrics {
     /// Waiting for a thread.
-    pub(crate) queue: Timer,
+    pub queue: Timer,
     /// Decoding and checking.
-    pub(crate) decode: Timer,
+    pub decode: Timer,
     /// In the network.
-    pub(crate) infer: Timer,
+    pub infer: Timer,
     /// Encoding the answer.
-    pub(crate) encode: Timer,
+    pub encode: Timer,
     /// Handing the answer of a session to the socket.
-    pub(crate) send: Timer,
+    pub send: Timer,
     /// From receipt until the answer was handed to the socket.
-    pub(crate) total: Timer,
+    pub total: Timer,
 }
 
 /// The counts of one transport.
 #[derive(Debug)]
-pub(crate) struct TransportMetrics {
+pub struct TransportMetrics {
     /// Answered with a map.
-    pub(crate) ok: Counter,
+    pub ok: Counter,
     /// Replaced by a newer frame.
-    pub(crate) superseded: Counter,
+    pub superseded: Counter,
     /// Answered late.
-    pub(crate) late: Counter,
+    pub late: Counter,
     /// Answered stale.
-    pub(crate) stale: Counter,
+    pub stale: Counter,
     /// Refused.
-    pub(crate) error: Counter,
+    pub error: Counter,
     /// Not rendered, since its session had ended.
-    pub(crate) gone: Counter,
+    pub gone: Counter,
 }
 
 /// Everything that is counted.
 #[derive(Debug)]
-pub(crate) struct Metrics {
+pub struct Metrics {
     registry: Registry,
     stages: Stages,
     /// In the catalogue's order.
@@ -105,21 +108,23 @@ pub(crate) struct Metrics {
     oip: TransportMetrics,
     late: Family<LateLabels, Counter>,
     errors: Family<CodeLabels, Counter>,
+    /// Contact of sessions of version 3.
+    pub contact: ContactMetrics,
     /// Zero maps, answered without inference.
-    pub(crate) zero_maps: Counter,
+    pub zero_maps: Counter,
     /// Slots that wait for a thread.
-    pub(crate) queue_length: Gauge<i64, AtomicI64>,
+    pub queue_length: Gauge<i64, AtomicI64>,
     /// Open sessions.
-    pub(crate) sessions_open: Gauge<i64, AtomicI64>,
+    pub sessions_open: Gauge<i64, AtomicI64>,
     /// Sessions ever opened.
-    pub(crate) sessions: Counter<u64, AtomicU64>,
+    pub sessions: Counter<u64, AtomicU64>,
     /// Open connections.
-    pub(crate) connections_open: Gauge<i64, AtomicI64>,
+    pub connections_open: Gauge<i64, AtomicI64>,
 }
 
 impl Metrics {
     /// All metrics at zero; no tiers yet.
-    pub(crate) fn new() -> Arc<Self> {
+    pub fn new() -> Arc<Self> {
         let mut root = Registry::default();
         root.register_collector(Box::new(process::Process::default()));
         let registry = root.sub_registry_with_prefix("papilla");
@@ -145,6 +150,7 @@ impl Metrics {
             oip: transport_metrics(&maps, "oip"),
             late: registered(registry, "late", "Late maps by the stage that found them so"),
             errors: registered(registry, "errors", "Errors sent to clients by code"),
+            contact: ContactMetrics::new(registry),
             zero_maps: registered(registry, "zero_maps", "Zero maps, answered without inference"),
             queue_length: registered(registry, "queue_length", "Slots that wait for a thread"),
             sessions_open: registered(registry, "sessions_open", "Open sessions"),
@@ -169,7 +175,7 @@ impl Metrics {
     }
 
     /// Gives every tier its timers, in this order, and lists the models on offer.
-    pub(crate) fn name_tiers<'a>(&self, tiers: impl IntoIterator<Item = TierLabels<'a>>) {
+    pub fn name_tiers<'a>(&self, tiers: impl IntoIterator<Item = TierLabels<'a>>) {
         self.models.clear();
         for (place, tier) in self.tiers.iter().zip(tiers) {
             place.get_or_init(|| {
@@ -192,28 +198,28 @@ impl Metrics {
     }
 
     /// The timers of the tier at `place`.
-    pub(crate) fn tier(&self, place: usize) -> &TierMetrics {
+    pub fn tier(&self, place: usize) -> &TierMetrics {
         self.tiers.get(place).and_then(OnceLock::get).unwrap_or(&self.stray)
     }
 
     /// Takes note of a request.
-    pub(crate) fn request(&self, route: &'static str, status: u16, time: Duration) {
+    pub fn request(&self, route: &'static str, status: u16, time: Duration) {
         let labels = RequestLabels { route: Word(route), status };
         self.requests.get_or_create(&labels).observe(time.as_secs_f64());
     }
 
     /// Counts work that was turned away.
-    pub(crate) fn shed(&self, shed: Shed) {
+    pub fn shed(&self, shed: Shed) {
         self.shed.get_or_create(&ShedLabels { reason: shed.word() }).inc();
     }
 
     /// Counts a reload that was done, or changed nothing.
-    pub(crate) fn reload(&self, is_ok: bool) {
+    pub fn reload(&self, is_ok: bool) {
         self.count_reload(RELOADS[usize::from(!is_ok)]);
     }
 
     /// Counts a reload that came while another was under way.
-    pub(crate) fn reload_busy(&self) {
+    pub fn reload_busy(&self) {
         self.count_reload(RELOADS[2]);
     }
 
@@ -222,7 +228,7 @@ impl Metrics {
     }
 
     /// The counts of `transport`.
-    pub(crate) fn of(&self, transport: Transport) -> &TransportMetrics {
+    pub fn of(&self, transport: Transport) -> &TransportMetrics {
         match transport {
             Transport::Http => &self.http,
             Transport::Session => &self.session,
@@ -231,18 +237,18 @@ impl Metrics {
     }
 
     /// Counts a late map.
-    pub(crate) fn late(&self, transport: Transport, stage: Stage) {
+    pub fn late(&self, transport: Transport, stage: Stage) {
         self.of(transport).late.inc();
         self.late.get_or_create(&LateLabels { stage: stage.word() }).inc();
     }
 
     /// Counts an error sent to a client.
-    pub(crate) fn error(&self, code: ErrorCode) {
+    pub fn error(&self, code: ErrorCode) {
         self.errors.get_or_create(&CodeLabels { code: Word(code.as_str()) }).inc();
     }
 
     /// The text a scraper reads.
-    pub(crate) fn encode(&self) -> Result<String, std::fmt::Error> {
+    pub fn encode(&self) -> Result<String, std::fmt::Error> {
         let mut out = String::with_capacity(16 * 1024);
         text::encode(&mut out, &self.registry)?;
         Ok(out)

@@ -18,7 +18,7 @@ const TICK_S: f64 = 0.01;
 
 /// The collector.
 #[derive(Debug)]
-pub(super) struct Process {
+pub(crate) struct Process {
     started_s: f64,
 }
 

@@ -3,54 +3,59 @@
 use prometheus_client::encoding::{EncodeLabelSet, EncodeLabelValue, LabelValueEncoder};
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct StageLabels {
-    pub(super) tier: String,
-    pub(super) stage: &'static str,
+pub(crate) struct StageLabels {
+    pub(crate) tier: String,
+    pub(crate) stage: &'static str,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct MapLabels {
-    pub(super) transport: Word,
-    pub(super) outcome: Word,
+pub(crate) struct MapLabels {
+    pub(crate) transport: Word,
+    pub(crate) outcome: Word,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct LateLabels {
-    pub(super) stage: Word,
+pub(crate) struct LateLabels {
+    pub(crate) stage: Word,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct CodeLabels {
-    pub(super) code: Word,
+pub(crate) struct CodeLabels {
+    pub(crate) code: Word,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct ShedLabels {
-    pub(super) reason: Word,
+pub(crate) struct ShedLabels {
+    pub(crate) reason: Word,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct ReloadLabels {
-    pub(super) outcome: Word,
+pub(crate) struct ReloadLabels {
+    pub(crate) outcome: Word,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct RequestLabels {
-    pub(super) route: Word,
-    pub(super) status: u16,
+pub(crate) struct RequestLabels {
+    pub(crate) route: Word,
+    pub(crate) status: u16,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct ModelLabels {
-    pub(super) tier: String,
-    pub(super) atlas_hash: String,
-    pub(super) onnx_sha256: String,
-    pub(super) default: Word,
+pub(crate) struct ModelLabels {
+    pub(crate) tier: String,
+    pub(crate) atlas_hash: String,
+    pub(crate) onnx_sha256: String,
+    pub(crate) default: Word,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct SolveLabels {
+    pub(crate) outcome: Word,
 }
 
 /// A label value that is one of a few fixed words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Word(pub(super) &'static str);
+pub(crate) struct Word(pub(crate) &'static str);
 
 impl EncodeLabelValue for Word {
     fn encode(&self, encoder: &mut LabelValueEncoder<'_>) -> Result<(), std::fmt::Error> {
@@ -60,7 +65,7 @@ impl EncodeLabelValue for Word {
 
 /// Why work was turned away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Shed {
+pub enum Shed {
     /// Every place for sessions is taken.
     Sessions,
     /// Every place for posted maps is taken.
@@ -72,10 +77,10 @@ pub(crate) enum Shed {
 }
 
 impl Shed {
-    pub(super) const ALL: [Self; 4] =
+    pub(crate) const ALL: [Self; 4] =
         [Self::Sessions, Self::Requests, Self::TokenSessions, Self::Rate];
 
-    pub(super) fn word(self) -> Word {
+    pub(crate) fn word(self) -> Word {
         Word(match self {
             Self::Sessions => "sessions",
             Self::Requests => "requests",
@@ -87,7 +92,7 @@ impl Shed {
 
 /// How a map came in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Transport {
+pub enum Transport {
     /// Posted.
     Http,
     /// In a session.
@@ -98,7 +103,7 @@ pub(crate) enum Transport {
 
 /// Where a deadline was found to have passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Stage {
+pub enum Stage {
     /// Before the map entered the slot.
     Admission,
     /// When a thread took it from the slot.
@@ -110,10 +115,10 @@ pub(crate) enum Stage {
 }
 
 impl Stage {
-    pub(super) const ALL: [Self; 4] =
+    pub(crate) const ALL: [Self; 4] =
         [Self::Admission, Self::Dequeue, Self::Inference, Self::Sending];
 
-    pub(super) fn word(self) -> Word {
+    pub(crate) fn word(self) -> Word {
         Word(match self {
             Self::Admission => "admission",
             Self::Dequeue => "dequeue",
@@ -125,12 +130,15 @@ impl Stage {
 
 /// What the labels of a tier say.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TierLabels<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) atlas_hash: &'a str,
-    pub(crate) onnx_sha256: &'a str,
+pub struct TierLabels<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Hash of its atlas.
+    pub atlas_hash: &'a str,
+    /// SHA-256 of its file.
+    pub onnx_sha256: &'a str,
     /// Whether clients get it unasked.
-    pub(crate) is_default: bool,
+    pub is_default: bool,
     /// Whether new clients get it at all.
-    pub(crate) is_offered: bool,
+    pub is_offered: bool,
 }
