@@ -45,6 +45,7 @@ pub(super) struct ModelLabels {
     pub(super) tier: String,
     pub(super) atlas_hash: String,
     pub(super) onnx_sha256: String,
+    pub(super) backend: String,
     pub(super) default: Word,
 }
 
@@ -129,6 +130,8 @@ pub(crate) struct TierLabels<'a> {
     pub(crate) name: &'a str,
     pub(crate) atlas_hash: &'a str,
     pub(crate) onnx_sha256: &'a str,
+    /// What runs it, with version.
+    pub(crate) backend: &'a str,
     /// Whether clients get it unasked.
     pub(crate) is_default: bool,
     /// Whether new clients get it at all.
