@@ -1,0 +1,106 @@
+//! What one core can do at most.
+
+use pulp::{Arch, Simd, WithSimd};
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+/// Rates of one core; the best of many tries, since what disturbs one makes it slower.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Bytes read in a second, of a buffer that is read again and again.
+    pub bytes_per_s: f64,
+    /// Additions and multiplications of f32 in a second.
+    pub operations_per_s: f64,
+}
+
+/// Time of all tries of one rate.
+const TRIES: Duration = Duration::from_millis(300);
+/// Sums that do not wait for each other: more than two units with a delay of four cycles hold.
+const SUMS: usize = 12;
+const ROUNDS: usize = 20_000;
+
+/// Measures the rates for a model that reads so many bytes for each map.
+#[must_use]
+pub fn measure(bytes: u64) -> Rates {
+    let arch = Arch::new();
+    let buffer = vec![1.0_f32; usize::try_from(bytes / 4).unwrap_or(0).max(1 << 12)];
+    let read_s = least(|| arch.dispatch(Read(black_box(&buffer))));
+    let mut operations = 0;
+    let computed_s = least(|| {
+        let (sum, lanes) = arch.dispatch(Compute(black_box(0.5)));
+        operations = 2 * SUMS * ROUNDS * lanes;
+        sum
+    });
+    Rates {
+        bytes_per_s: 4.0 * buffer.len() as f64 / read_s,
+        operations_per_s: operations as f64 / computed_s,
+    }
+}
+
+/// Least time of one call, s.
+fn least(mut work: impl FnMut() -> f32) -> f64 {
+    let (begun, mut least) = (Instant::now(), Duration::MAX);
+    while begun.elapsed() < TRIES {
+        let start = Instant::now();
+        black_box(work());
+        least = start.elapsed().min(least);
+    }
+    least.as_secs_f64()
+}
+
+/// The sum of all values: every byte is read once.
+struct Read<'a>(&'a [f32]);
+
+impl WithSimd for Read<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f32 {
+        let (vectors, _) = S::as_simd_f32s(self.0);
+        let mut sums = [simd.splat_f32s(0.0); 8];
+        let (chunks, _) = vectors.as_chunks::<8>();
+        for chunk in chunks {
+            for (sum, vector) in sums.iter_mut().zip(chunk) {
+                *sum = simd.add_f32s(*sum, *vector);
+            }
+        }
+        sums.into_iter().map(|sum| simd.reduce_sum_f32s(sum)).sum()
+    }
+}
+
+/// Products and sums in registers alone: the result, and values in a vector.
+struct Compute(f32);
+
+impl WithSimd for Compute {
+    type Output = (f32, usize);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> (f32, usize) {
+        let (factor, term) = (simd.splat_f32s(self.0), simd.splat_f32s(1.0));
+        let mut sums = [term; SUMS];
+        for _ in 0..ROUNDS {
+            for sum in &mut sums {
+                *sum = simd.mul_add_e_f32s(*sum, factor, term);
+            }
+        }
+        (sums.into_iter().map(|sum| simd.reduce_sum_f32s(sum)).sum(), S::F32_LANES)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_is_read_and_every_product_is_done() {
+        let arch = Arch::new();
+        let values: Vec<f32> = (0..4096).map(|i| (i % 7) as f32).collect();
+        let sum: f32 = values.iter().sum();
+        assert_eq!(arch.dispatch(Read(&values)).to_bits(), sum.to_bits());
+        // x = x / 2 + 1 ends at 2 in every lane.
+        let (sum, lanes) = arch.dispatch(Compute(0.5));
+        assert!((sum - (2 * SUMS * lanes) as f32).abs() < 1e-3, "{sum}");
+        let rates = measure(1 << 20);
+        assert!(rates.bytes_per_s > 0.0 && rates.operations_per_s > 0.0);
+    }
+}
