@@ -79,7 +79,7 @@ async fn what_arrives_is_the_engines_own_answer() {
         let pressure_pa = contact(0.5 * card.pressure_range_pa[1]);
         let mut due = vec![0.0; MAP_LEN];
         model.session().unwrap().infer(&pressure_pa, &mut due).unwrap();
-        let bytes = pressure_pa.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let bytes: Vec<u8> = pressure_pa.iter().flat_map(|value| value.to_le_bytes()).collect();
         let request = Request::post(&format!("/v1/sed?tier={name}"), bytes);
         let answer = request.send(&address).await.unwrap();
         assert_eq!(answer.status, 200, "{name}");

@@ -6,7 +6,7 @@
 use super::{Progress, Timing, machine, model};
 use crate::{ExportError, read, read_text};
 use papilla_engine::ladder::{Kind, Ladder, LatencyByEngine, Percentiles, Rung};
-use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX};
+use papilla_engine::{EngineError, MAP_LEN, MAP_SIDE_PX};
 use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
@@ -36,13 +36,13 @@ pub fn measure(models: &Path, progress: &dyn Progress) -> Result<Ladder, ExportE
 }
 
 fn times(path: &Path, rung: &Rung) -> Result<LatencyByEngine, ExportError> {
-    let failed = ExportError::engine(path);
     let onnx = read(path)?;
-    let tract = papilla_engine::load_with(Backend::Tract, &onnx, None).map_err(&failed)?;
+    let tract = papilla_engine::load(&onnx, None).map_err(ExportError::engine(path))?;
     let info = tract.info();
     if let Some(measured) = rung.onnx_sha256.as_ref().filter(|hash| **hash != info.onnx_sha256) {
         let (card, model) = (measured.clone(), info.onnx_sha256.clone());
-        return Err(failed(EngineError::CardMismatch { field: "onnx_sha256", card, model }));
+        let mismatch = EngineError::CardMismatch { field: "onnx_sha256", card, model };
+        return Err(ExportError::engine(path)(mismatch));
     }
     let maps = contacts(info.pressure_max_pa);
     let tract = model::time(tract.as_ref(), path, &maps, TIMING)?;

@@ -170,9 +170,9 @@ pub fn measure(
 pub fn machine() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let entry = |key: &str| {
-        let of = |line: &'_ str| line.split_once(':').filter(|(name, _)| name.trim() == key);
-        let found = info.lines().find_map(|line| of(line).map(|(_, value)| value.trim()));
-        found.unwrap_or("unknown").to_owned()
+        let mut entries = info.lines().filter_map(|line| line.split_once(':'));
+        let found = entries.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim());
+        found.unwrap_or("unknown")
     };
     let processor = format!(
         "{} (family {}, model {})",
