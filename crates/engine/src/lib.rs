@@ -35,6 +35,7 @@ mod onnx;
 mod operators;
 #[cfg(feature = "ort")]
 mod ort_backend;
+mod products;
 mod profile;
 mod sparse;
 mod tract_backend;

