@@ -1,6 +1,6 @@
 //! `model-export operators`.
 
-use papilla_model_export::operators::{Profile, markdown, rates};
+use papilla_model_export::operators::{Profile, markdown, rates::Rates};
 use papilla_model_export::{ExportError, read, write};
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
         let refused = |source| ExportError::Engine { path: path.clone(), source };
         profiles.push(Profile::measure(&read(path)?).map_err(refused)?);
     }
-    let page = markdown(&profiles, rates::measure);
+    let page = markdown(&profiles, &Rates::measure());
     write(&options.out, page.as_bytes())?;
     print!("{page}");
     Ok(())

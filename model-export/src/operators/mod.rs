@@ -8,7 +8,7 @@ pub mod rates;
 
 use crate::ladder::machine;
 use papilla_engine::{EngineError, Operator, profile};
-use rates::Rates;
+use rates::{LEAST_BYTES, Rates};
 use std::fmt::Write;
 use std::time::Duration;
 
@@ -40,38 +40,46 @@ impl Profile {
 }
 
 /// Least time of an operator, us.
-fn bound_us(operator: &Operator, rates: Rates) -> f64 {
-    let bytes = (operator.constant_bytes + operator.map_bytes) as f64;
-    1e6 * (bytes / rates.bytes_per_s).max(operator.operations as f64 / rates.operations_per_s)
+fn bound_us(operator: &Operator, rates: &Rates) -> f64 {
+    let read_s = rates.read_s(operator.constant_bytes + operator.map_bytes);
+    1e6 * read_s.max(operator.operations as f64 / rates.operations_per_s)
 }
 
 fn us(time: Duration) -> f64 {
     1e6 * time.as_secs_f64()
 }
 
-/// The page; `rates` measures the core for a model that reads so many bytes.
+/// The page.
 #[must_use]
-pub fn markdown(profiles: &[Profile], rates: impl Fn(u64) -> Rates) -> String {
+pub fn markdown(profiles: &[Profile], rates: &Rates) -> String {
     let mut text = include_str!("head.md").to_owned();
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "\nMeasured on {}, {RUNS} runs a model.", machine());
+    let _ = writeln!(
+        text,
+        "\nMeasured on {}, {RUNS} runs a model. The core does {:.0} operations a ns and reads, in GB/s, of",
+        machine(),
+        rates.operations_per_s / 1e9
+    );
+    let sizes = rates
+        .bytes_per_s
+        .iter()
+        .zip(0..)
+        .map(|(rate, size)| format!("{} kB {:.0}", (LEAST_BYTES << size) >> 10, rate / 1e9));
+    let _ = writeln!(text, "{}.", sizes.collect::<Vec<_>>().join(", "));
     for profile in profiles {
-        let rates = rates(profile.bytes());
         let _ = writeln!(
             text,
-            "\n## `{}`\n\n{:.2} MB of weights and maps, read here at {:.0} GB/s; {:.1} million operations, of which a core does {:.0} a ns.\n",
+            "\n## `{}`\n\n{:.2} MB of weights and maps, {:.1} million operations.\n",
             profile.name,
             profile.bytes() as f64 / 1e6,
-            rates.bytes_per_s / 1e9,
             profile.operators.iter().map(|o| o.operations).sum::<u64>() as f64 / 1e6,
-            rates.operations_per_s / 1e9,
         );
         table(&mut text, &profile.operators, rates);
     }
     text
 }
 
-fn table(text: &mut String, operators: &[Operator], rates: Rates) {
+fn table(text: &mut String, operators: &[Operator], rates: &Rates) {
     text.push_str(
         "| operator | constants, kB | maps, kB | operations, k | bound, us | time, us | times the bound |\n\
          |---|---|---|---|---|---|---|\n",
@@ -90,7 +98,7 @@ fn table(text: &mut String, operators: &[Operator], rates: Rates) {
     row(text, "**all**", &operators.iter().collect::<Vec<_>>(), rates);
 }
 
-fn row(text: &mut String, name: &str, operators: &[&Operator], rates: Rates) {
+fn row(text: &mut String, name: &str, operators: &[&Operator], rates: &Rates) {
     let sum = |of: &dyn Fn(&Operator) -> f64| operators.iter().map(|o| of(o)).sum::<f64>();
     let (bound, time) = (sum(&|o| bound_us(o, rates)), sum(&|o| us(o.median)));
     let _ = writeln!(
@@ -109,7 +117,7 @@ mod tests {
 
     #[test]
     fn the_bound_is_the_slower_of_reading_and_computing() {
-        let rates = Rates { bytes_per_s: 1e9, operations_per_s: 4e9 };
+        let rates = Rates { bytes_per_s: vec![1e9], operations_per_s: 4e9 };
         let operator = |constant_bytes, operations| Operator {
             name: "a".into(),
             kind: "MatMul".into(),
@@ -118,14 +126,11 @@ mod tests {
             operations,
             median: Duration::from_micros(12),
         };
-        assert!((bound_us(&operator(2000, 4), rates) - 3.0).abs() < 1e-9);
-        assert!((bound_us(&operator(2000, 40_000), rates) - 10.0).abs() < 1e-9);
+        assert!((bound_us(&operator(2000, 4), &rates) - 3.0).abs() < 1e-9);
+        assert!((bound_us(&operator(2000, 40_000), &rates) - 10.0).abs() < 1e-9);
         let operators = vec![operator(2000, 4), operator(3000, 40_000)];
         let profile = Profile { name: "two".into(), operators };
-        let page = markdown(&[profile], |bytes| {
-            assert_eq!(bytes, 7000);
-            rates
-        });
+        let page = markdown(&[profile], &rates);
         assert!(page.contains("| **all** | 5.0 | 2.0 | 40.0 | 13.0 | 24.0 | 1.8 |"), "{page}");
     }
 

@@ -5,35 +5,52 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Rates of one core; the best of many tries, since what disturbs one makes it slower.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Rates {
-    /// Bytes read in a second, of a buffer that is read again and again.
-    pub bytes_per_s: f64,
+    /// Bytes read in a second of a buffer that is read again and again, from [`LEAST_BYTES`] on each
+    /// twice as large as the one before.
+    pub bytes_per_s: Vec<f64>,
     /// Additions and multiplications of f32 in a second.
     pub operations_per_s: f64,
 }
 
+/// Size of the smallest buffer.
+pub const LEAST_BYTES: u64 = 16 << 10;
+/// Up to 32 MiB, more than an operator reads.
+const BUFFERS: u32 = 12;
 /// Time of all tries of one rate.
-const TRIES: Duration = Duration::from_millis(300);
+const TRIES: Duration = Duration::from_millis(80);
 /// Sums that do not wait for each other: more than two units with a delay of four cycles hold.
 const SUMS: usize = 12;
 const ROUNDS: usize = 20_000;
 
-/// Measures the rates for a model that reads so many bytes for each map.
-#[must_use]
-pub fn measure(bytes: u64) -> Rates {
-    let arch = Arch::new();
-    let buffer = vec![1.0_f32; usize::try_from(bytes / 4).unwrap_or(0).max(1 << 12)];
-    let read_s = least(|| arch.dispatch(Read(black_box(&buffer))));
-    let mut operations = 0;
-    let computed_s = least(|| {
-        let (sum, lanes) = arch.dispatch(Compute(black_box(0.5)));
-        operations = 2 * SUMS * ROUNDS * lanes;
-        sum
-    });
-    Rates {
-        bytes_per_s: 4.0 * buffer.len() as f64 / read_s,
-        operations_per_s: operations as f64 / computed_s,
+impl Rates {
+    /// Measures this core.
+    #[must_use]
+    pub fn measure() -> Self {
+        let arch = Arch::new();
+        let read = |size: u32| {
+            let buffer = vec![1.0_f32; (LEAST_BYTES << size) as usize / size_of::<f32>()];
+            size_of_val(&buffer[..]) as f64 / least(|| arch.dispatch(Read(black_box(&buffer))))
+        };
+        let mut operations = 0;
+        let computed_s = least(|| {
+            let (sum, lanes) = arch.dispatch(Compute(black_box(0.5)));
+            operations = 2 * SUMS * ROUNDS * lanes;
+            sum
+        });
+        Self {
+            bytes_per_s: (0..BUFFERS).map(read).collect(),
+            operations_per_s: operations as f64 / computed_s,
+        }
+    }
+
+    /// Least time for so many bytes, s: as if they lay in the nearest cache that holds them.
+    #[must_use]
+    pub fn read_s(&self, bytes: u64) -> f64 {
+        let size = bytes.div_ceil(LEAST_BYTES).next_power_of_two().ilog2() as usize;
+        let rate = self.bytes_per_s.get(size).or(self.bytes_per_s.last());
+        bytes as f64 / rate.copied().unwrap_or(f64::INFINITY)
     }
 }
 
@@ -100,7 +117,19 @@ mod tests {
         // x = x / 2 + 1 ends at 2 in every lane.
         let (sum, lanes) = arch.dispatch(Compute(0.5));
         assert!((sum - (2 * SUMS * lanes) as f32).abs() < 1e-3, "{sum}");
-        let rates = measure(1 << 20);
-        assert!(rates.bytes_per_s > 0.0 && rates.operations_per_s > 0.0);
+    }
+
+    #[test]
+    fn bytes_are_read_at_the_rate_of_the_least_buffer_that_holds_them() {
+        let rates = Rates { bytes_per_s: vec![4.0, 2.0, 1.0], operations_per_s: 1.0 };
+        for (bytes, due_s) in [
+            (LEAST_BYTES / 2, LEAST_BYTES as f64 / 8.0),
+            (LEAST_BYTES, LEAST_BYTES as f64 / 4.0),
+            (LEAST_BYTES + 4, (LEAST_BYTES + 4) as f64 / 2.0),
+            (3 * LEAST_BYTES, 3.0 * LEAST_BYTES as f64),
+            (99 * LEAST_BYTES, 99.0 * LEAST_BYTES as f64),
+        ] {
+            assert!((rates.read_s(bytes) - due_s).abs() < 1e-6, "{bytes}");
+        }
     }
 }
