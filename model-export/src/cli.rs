@@ -3,8 +3,10 @@
 mod check;
 mod contact;
 mod evaluate;
+mod here;
 mod index;
 mod ladder;
+mod operators;
 mod patterns;
 
 use clap::{Parser, Subcommand};
@@ -36,7 +38,8 @@ A new model, from the trainer's file to the service:
   model-export patterns models --dataset data/s1
   model-export table    models/*.json
 All models and the solver itself, error against time:
-  model-export ladder   --data data --models models --fe out/rungs --out docs/reports/accuracy-vs-time";
+  model-export ladder   --data data --models models --fe out/rungs --out docs/reports/accuracy-vs-time
+  model-export here     --out out/here";
 
 /// Parsed command line.
 #[derive(Debug, Parser)]
@@ -94,6 +97,18 @@ enum Command {
     /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
     #[command(after_long_help = EXIT_CODES)]
     Ladder(ladder::Options),
+    /// Measure the shipped models on this machine, in each engine, in about a minute.
+    ///
+    /// Errors are the shipped ladder's. ONNX Runtime takes part in programs built with
+    /// `--features ort`, if ORT_DYLIB_PATH names its library.
+    #[command(after_long_help = EXIT_CODES)]
+    Here(here::Options),
+    /// Hold the operators of models against what one core of this machine can do.
+    ///
+    /// For each operator, as tract runs it: bytes of weights and maps, operations, its time, and the
+    /// least time in which this core reads the bytes and does the operations.
+    #[command(after_long_help = EXIT_CODES)]
+    Operators(operators::Options),
     /// Measure the contact ladder: from where an indenter is to pressure, force and SED.
     ///
     /// Springs, a half-space, the finger's compliance, and its second order told gaps or the object,
@@ -118,6 +133,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Index(options) => index::run(options, json),
         Command::Patterns(options) => patterns::run(options, json),
         Command::Ladder(options) => ladder::run(options, json),
+        Command::Here(options) => here::run(options, json),
+        Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

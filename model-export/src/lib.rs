@@ -29,6 +29,7 @@ mod error;
 pub mod evaluate;
 pub mod ladder;
 pub mod metrics;
+pub mod operators;
 pub mod picture;
 pub mod reference;
 pub mod table;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::{
     StartError,
     config::Config,
-    core::catalogue::{Catalogue, assets::Assets, calibrate, golden},
+    core::catalogue::{Catalogue, Loading, assets::Assets, calibrate, golden},
     start::load_contact,
     transport::{gate::Gate, net, tls},
 };
@@ -96,7 +96,7 @@ pub fn check(config: &Config) -> Report {
         Err(error) => report.bad("tokens", 2, &error),
     }
     let assets = Assets::of(config);
-    match assets.and_then(|a| Catalogue::load(&a, config.default_tier.as_deref(), None)) {
+    match assets.and_then(|a| Catalogue::load(&a, Loading::of(config), None)) {
         Ok(catalogue) => {
             look_at_models(&mut report, config, &catalogue);
             look_at_contact(&mut report, config, &catalogue);
@@ -160,11 +160,13 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
             "default": is_default,
             "onnx_sha256": tier.model.info().onnx_sha256,
             "atlas_hash": tier.atlas_hash,
+            "backend": tier.model.info().backend,
             "golden": golden,
             "calibrated_us": tier.latency.calibrated_us(),
             "predicted_latency_us": predicted_us,
         });
-        report.good(&what, format!("{predicted_us} us, {answers}{default}"), values);
+        let backend = &tier.model.info().backend;
+        report.good(&what, format!("{predicted_us} us in {backend}, {answers}{default}"), values);
     }
 }
 

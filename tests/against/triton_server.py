@@ -1,7 +1,7 @@
 """NVIDIA Triton with ONNX Runtime behind it, as `nvidia-pytriton` ships and serves it."""
 
 import os
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import onnxruntime
@@ -10,12 +10,9 @@ from pytriton.triton import Triton, TritonConfig
 
 options = onnxruntime.SessionOptions()
 options.intra_op_num_threads = 1
-session = onnxruntime.InferenceSession(
-    os.environ["MODEL"], options, providers=["CPUExecutionProvider"]
-)
 
 
-def infer(requests):
+def infer(session, requests):
     feed = ({"pressure_pa": request["pressure_pa"]} for request in requests)
     return [{"sed_j_per_m3": session.run(None, inputs)[0]} for inputs in feed]
 
@@ -23,11 +20,14 @@ def infer(requests):
 shape = (1, 1, 224, 224)
 config = TritonConfig(http_address="127.0.0.1", http_port=int(os.environ["PORT"]), allow_grpc=False, allow_metrics=False)
 with Triton(config=config) as triton:
-    triton.bind(
-        model_name=Path(os.environ["MODEL"]).stem,
-        infer_func=infer,
-        inputs=[Tensor(name="pressure_pa", dtype=np.float32, shape=shape)],
-        outputs=[Tensor(name="sed_j_per_m3", dtype=np.float32, shape=shape)],
-        config=ModelConfig(batching=False),
-    )
+    for tier in os.environ["TIERS"].split():
+        model = os.path.join(os.environ["MODELS"], tier + ".onnx")
+        session = onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
+        triton.bind(
+            model_name=tier,
+            infer_func=partial(infer, session),
+            inputs=[Tensor(name="pressure_pa", dtype=np.float32, shape=shape)],
+            outputs=[Tensor(name="sed_j_per_m3", dtype=np.float32, shape=shape)],
+            config=ModelConfig(batching=False),
+        )
     triton.serve()

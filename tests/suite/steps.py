@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 from schedule import LIMIT_S, Step
 
@@ -63,6 +64,18 @@ def no_godot4() -> str | None:
     if os.environ.get("GODOT4") or shutil.which("godot4") or shutil.which("godot"):
         return None
     return "no Godot 4 here: set GODOT4 to its program"
+
+
+def onnxruntime() -> str:
+    """The library in the trainer's environment, for bash."""
+    return '"$(ls "$TARGET"/venv-trainer/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.*)"'
+
+
+def no_onnxruntime() -> str | None:
+    target = Path(os.environ.get("CARGO_TARGET_DIR", "target"))
+    if any(target.glob("venv-trainer/lib/python3*/site-packages/onnxruntime/capi/libonnxruntime.so.*")):
+        return None
+    return "no ONNX Runtime here: pip could not install it"
 
 
 def no_nightly() -> str | None:
@@ -173,6 +186,16 @@ def full() -> list[Step]:
             after=("build", "python"),
             tests_min=5,
         ),
+        Step(
+            "onnxruntime",
+            "the engine's tests and the service's golden answers in ONNX Runtime",
+            f"export ORT_DYLIB_PATH={onnxruntime()}\n"
+            f"cargo test --workspace --test infer --test shipped --test library --test onnxruntime "
+            f"{FEATURES},papilla-tests/ort -q",
+            after=("rust", "python"),
+            tests_min=26,
+            missing=no_onnxruntime,
+        ),
         Step("client-python", "the Python client", f"{client} python", ("build", "python"), 36),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build",), 33),
         Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 33),
@@ -246,16 +269,6 @@ def long() -> list[Step]:
             "every simulation in CalculiX",
             '"$BIN/fe-datagen" cross-check',
             after=("stability-long",),
-        ),
-        Step(
-            "onnxruntime",
-            "the engine's answers in ONNX Runtime",
-            'ORT_DYLIB_PATH=$(ls "$TARGET"/venv-trainer/lib/python3*/site-packages/onnxruntime/capi/'
-            "libonnxruntime.so.*)\n"
-            "export ORT_DYLIB_PATH\n"
-            f"cargo test --workspace --test infer {FEATURES},papilla-engine/ort -q",
-            after=("stability-long", "python"),
-            tests_min=10,
         ),
         Step(
             "sanitizers",

@@ -41,6 +41,7 @@ mod error;
 mod exact;
 #[cfg(feature = "flatten")]
 pub mod flatten;
+mod glb;
 mod obj;
 mod raster;
 mod validate;
@@ -235,6 +236,13 @@ impl Atlas {
     #[must_use]
     pub fn to_obj(&self) -> String {
         obj::write(self)
+    }
+
+    /// Both patches as binary glTF 2.0; `masks` are their pixels as PNG, in the order of
+    /// [`Patch::ALL`].
+    #[must_use]
+    pub fn to_glb(&self, masks: &[Vec<u8>; 2]) -> Vec<u8> {
+        glb::write(self, masks)
     }
 
     /// Refuses the atlas of somebody else.

@@ -4,7 +4,7 @@
 //! file, publishes it, and chooses rungs by it.
 
 use crate::card::{Metrics, Similarity, Spread};
-use crate::{EngineError, MODEL_FORMAT};
+use crate::{Backend, EngineError, MODEL_FORMAT};
 use papilla_proto::json;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -143,6 +143,14 @@ impl Rung {
     pub fn time_ms(&self) -> Option<f64> {
         let tract = self.latency_ms.as_ref().map(|latency| latency.tract.p50);
         tract.or(self.seconds.map(|seconds| 1e3 * seconds.p50))
+    }
+
+    /// The same in the engine that is named, if it was measured there.
+    #[must_use]
+    pub fn time_ms_in(&self, backend: Backend) -> Option<f64> {
+        let ort = self.latency_ms.as_ref().and_then(|latency| latency.ort);
+        let ort = ort.filter(|_| backend == Backend::Ort).map(|times| times.p50);
+        ort.or_else(|| self.time_ms())
     }
 
     /// Median relative L2 on a set.

@@ -21,10 +21,12 @@
 //! ```
 //!
 //! The backend is tract, pure Rust and embedded. The cargo feature `ort` adds ONNX
-//! Runtime, 2 to 3.5 times faster on the same networks; its shared library is opened at
-//! run time from `ORT_DYLIB_PATH`. Nothing outside this crate knows which one runs.
+//! Runtime, faster on large networks; its shared library is opened at
+//! run time from `ORT_DYLIB_PATH`. A [`Choice`] takes the faster of the two for each model.
 
+mod backend;
 pub mod card;
+mod choice;
 mod error;
 mod guard;
 mod info;
@@ -33,17 +35,23 @@ mod onnx;
 mod operators;
 #[cfg(feature = "ort")]
 mod ort_backend;
+mod products;
+mod profile;
 mod sparse;
 mod tract_backend;
 mod widen;
 
-use std::{fmt, str::FromStr, sync::Arc};
+use std::sync::Arc;
 
+pub use backend::Backend;
 pub use card::Card;
+pub use choice::Choice;
 pub use error::EngineError;
 pub use info::ModelInfo;
 pub use ladder::Ladder;
 pub use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+pub use profile::{Operator, profile};
+use tract_onnx::pb::ModelProto;
 
 /// Version of the metadata contract that this engine reads (`papilla.format`).
 pub const MODEL_FORMAT: u32 = 1;
@@ -56,6 +64,9 @@ pub const OUTPUT_NAME: &str = "sed_j_per_m3";
 pub trait Model: Send + Sync {
     /// What the model is: name, atlas, effects, scales, backend.
     fn info(&self) -> &ModelInfo;
+
+    /// What runs it.
+    fn backend(&self) -> Backend;
 
     /// Makes the pre-allocated state of one inference thread.
     ///
@@ -81,38 +92,6 @@ pub trait Session: Send {
     fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError>;
 }
 
-/// What runs the network.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Backend {
-    /// tract: pure Rust, always there.
-    #[default]
-    Tract,
-    /// ONNX Runtime: faster, needs the cargo feature `ort` and the shared library that
-    /// `ORT_DYLIB_PATH` names.
-    Ort,
-}
-
-impl fmt::Display for Backend {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Tract => "tract",
-            Self::Ort => "ort",
-        })
-    }
-}
-
-impl FromStr for Backend {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "tract" => Ok(Self::Tract),
-            "ort" => Ok(Self::Ort),
-            _ => Err(format!("no backend is called '{text}'; there are 'tract' and 'ort'")),
-        }
-    }
-}
-
 /// Loads a model with the default backend; see [`load_with`].
 ///
 /// # Errors
@@ -135,44 +114,40 @@ pub fn load_with(
     onnx: &[u8],
     card: Option<&Card>,
 ) -> Result<Arc<dyn Model>, EngineError> {
-    let mut proto = onnx::decode(onnx)?;
-    let mut info = ModelInfo::read(&proto, onnx)?;
+    let (proto, info) = checked(onnx, card)?;
+    let model: Arc<dyn Model> = match backend {
+        Backend::Tract => Arc::new(tract_backend::TractModel::load(proto, info)?),
+        #[cfg(feature = "ort")]
+        Backend::Ort => Arc::new(ort_backend::OrtModel::load(onnx, info)?),
+        #[cfg(not(feature = "ort"))]
+        Backend::Ort => return Err(choice::not_built(backend)),
+    };
+    let pressure_pa = trial_map(model.info().pressure_max_pa);
+    model.session()?.infer(&pressure_pa, &mut vec![0.0; MAP_LEN])?;
+    Ok(model)
+}
+
+/// A file that has passed the checks of the contract and is its card's, and what it says of itself.
+fn checked(onnx: &[u8], card: Option<&Card>) -> Result<(ModelProto, ModelInfo), EngineError> {
+    let proto = onnx::decode(onnx)?;
+    let info = ModelInfo::read(&proto, onnx)?;
     if let Some(card) = card {
         card.require_model(&info)?;
     }
     onnx::check(&proto)?;
-    let model: Arc<dyn Model> = match backend {
-        Backend::Tract => {
-            info.backend = tract_backend::LABEL.to_owned();
-            widen::widen(&mut proto);
-            Arc::new(tract_backend::TractModel::load(&proto, info)?)
-        }
-        #[cfg(feature = "ort")]
-        Backend::Ort => Arc::new(ort_backend::OrtModel::load(onnx, info)?),
-        #[cfg(not(feature = "ort"))]
-        Backend::Ort => {
-            return Err(EngineError::BackendMissing {
-                backend,
-                reason: "this program was built without the cargo feature 'ort'".to_owned(),
-            });
-        }
-    };
-    infer_trial_map(model.as_ref())?;
-    Ok(model)
+    Ok((proto, info))
 }
 
-/// One smooth contact, half as hard as the model was trained for, through a new session.
-fn infer_trial_map(model: &dyn Model) -> Result<(), EngineError> {
+/// One smooth contact, half as hard as the model was trained for, Pa.
+fn trial_map(pressure_max_pa: f32) -> Vec<f32> {
     let centre = MAP_SIDE_PX as f32 / 2.0;
-    let pressure_pa: Vec<f32> = (0..MAP_LEN)
+    (0..MAP_LEN)
         .map(|i| {
             let (row, column) = ((i / MAP_SIDE_PX) as f32, (i % MAP_SIDE_PX) as f32);
             let r2 = ((row - centre).powi(2) + (column - centre).powi(2)) / (40.0 * 40.0);
-            0.5 * model.info().pressure_max_pa * (1.0 - r2).max(0.0)
+            0.5 * pressure_max_pa * (1.0 - r2).max(0.0)
         })
-        .collect();
-    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
-    model.session()?.infer(&pressure_pa, &mut sed_j_per_m3)
+        .collect()
 }
 
 /// Refuses maps of another length than 224 x 224, and input that is not finite.

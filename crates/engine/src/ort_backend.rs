@@ -1,11 +1,15 @@
 //! ONNX Runtime, opened at run time as a shared library.
 
 use crate::{
-    Backend, EngineError, INPUT_NAME, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, OUTPUT_NAME, Session,
-    check_maps, check_output,
+    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, OUTPUT_NAME, Session, check_maps,
+    check_output,
 };
 use ort::environment::Environment;
-use ort::session::{Session as OrtRun, builder::GraphOptimizationLevel};
+use ort::memory::Allocator;
+use ort::session::{
+    HasSelectedOutputs, OutputSelector, RunOptions, Session as OrtRun,
+    builder::GraphOptimizationLevel,
+};
 use ort::value::Tensor;
 use std::fmt::Display;
 use std::sync::{Arc, OnceLock};
@@ -34,14 +38,17 @@ impl OrtModel {
     }
 }
 
-/// The one environment a process may have.
-fn environment() -> Result<Environment, EngineError> {
+/// The one environment a process may have; the first call opens the library.
+pub(crate) fn environment() -> Result<Environment, EngineError> {
     static ENVIRONMENT: OnceLock<Result<Environment, String>> = OnceLock::new();
     let made = ENVIRONMENT.get_or_init(|| {
         let path = std::env::var("ORT_DYLIB_PATH").ok().filter(|path| !path.is_empty());
         let path = path.unwrap_or_else(|| LIBRARY.to_owned());
         let builder = ort::init_from(&path).map_err(|error| {
-            format!("{error}; set ORT_DYLIB_PATH to the library of ONNX Runtime 1.17 or newer")
+            format!(
+                "{error}; set ORT_DYLIB_PATH to the library of ONNX Runtime 1.17 or newer \
+                 (`pip install onnxruntime` brings onnxruntime/capi/libonnxruntime.so.*)"
+            )
         })?;
         // Nobody is told what is rendered here.
         builder.with_telemetry(false).build().map_err(|error| error.to_string())
@@ -72,6 +79,10 @@ impl Model for OrtModel {
         &self.info
     }
 
+    fn backend(&self) -> Backend {
+        Backend::Ort
+    }
+
     fn session(&self) -> Result<Box<dyn Session>, EngineError> {
         let action = "set up a session";
         let run = OrtRun::builder(&self.environment)
@@ -85,7 +96,11 @@ impl Model for OrtModel {
             .map_err(failed("read the model"))?;
         let shape = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
         let input = Tensor::from_array((shape, vec![0.0f32; MAP_LEN])).map_err(failed(action))?;
-        Ok(Box::new(OrtSession { run, input }))
+        let output = Tensor::<f32>::new(&Allocator::default(), shape).map_err(failed(action))?;
+        let output =
+            OutputSelector::no_default().with(OUTPUT_NAME).preallocate(OUTPUT_NAME, output);
+        let options = RunOptions::new().map_err(failed(action))?.with_outputs(output);
+        Ok(Box::new(OrtSession { run, input, options }))
     }
 }
 
@@ -93,6 +108,8 @@ struct OrtSession {
     run: OrtRun,
     /// Filled anew for each map.
     input: Tensor<f32>,
+    /// Holds the tensor of every answer, so that none is made for a map.
+    options: RunOptions<HasSelectedOutputs>,
 }
 
 impl Session for OrtSession {
@@ -100,8 +117,9 @@ impl Session for OrtSession {
         check_maps(pressure_pa, sed_j_per_m3)?;
         let action = "infer a map";
         self.input.extract_tensor_mut().1.copy_from_slice(pressure_pa);
-        let outputs =
-            self.run.run(ort::inputs![INPUT_NAME => &self.input]).map_err(failed(action))?;
+        // By place, which allocates nothing; the contract has one input.
+        let inputs = ort::inputs![&self.input];
+        let outputs = self.run.run_with_options(inputs, &self.options).map_err(failed(action))?;
         let (_, answer) =
             outputs[OUTPUT_NAME].try_extract_tensor::<f32>().map_err(failed(action))?;
         if answer.len() != MAP_LEN {

@@ -1,8 +1,8 @@
 //! tract, the backend that is always there.
 
 use crate::{
-    EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps, check_output,
-    guard::guarded, sparse,
+    Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
+    check_output, guard::guarded, products, sparse, widen::widen,
 };
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
@@ -22,17 +22,28 @@ pub(crate) struct TractModel {
 }
 
 impl TractModel {
-    pub(crate) fn load(proto: &ModelProto, info: ModelInfo) -> Result<Self, EngineError> {
+    /// `proto` has passed the checks of the contract.
+    pub(crate) fn load(mut proto: ModelProto, mut info: ModelInfo) -> Result<Self, EngineError> {
+        info.backend = LABEL.to_owned();
+        widen(&mut proto);
         let typed = guarded("read the model", || {
-            tract_onnx::onnx().model_for_proto_model(proto)?.into_typed()
+            products::keep_joined(tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()?)
         })?;
         check_sizes(&typed)?;
         let plan = guarded("optimise the model", || {
-            sparse::fuse(typed.into_decluttered()?)?.into_optimized()?.into_runnable()
+            let fused = sparse::fuse(typed.into_decluttered()?)?;
+            products::stack(fused)?.into_optimized()?.into_runnable()
         })?;
         Ok(Self { info, plan })
     }
+
+    pub(crate) fn plan(&self) -> &Arc<TypedRunnableModel> {
+        &self.plan
+    }
 }
+
+/// What every map is, in tract and ONNX.
+pub(crate) const SHAPE: [usize; 4] = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
 
 fn check_sizes(model: &TypedModel) -> Result<(), EngineError> {
     let mut left = TENSOR_LEN_MAX;
@@ -59,10 +70,13 @@ impl Model for TractModel {
         &self.info
     }
 
+    fn backend(&self) -> Backend {
+        Backend::Tract
+    }
+
     fn session(&self) -> Result<Box<dyn Session>, EngineError> {
-        let shape = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
         let (state, input) = guarded("set up a session", || {
-            Ok((self.plan.spawn()?, Tensor::zero::<f32>(&shape)?.into_arc_tensor()))
+            Ok((self.plan.spawn()?, Tensor::zero::<f32>(&SHAPE)?.into_arc_tensor()))
         })?;
         Ok(Box::new(TractSession { plan: Arc::clone(&self.plan), state, input }))
     }

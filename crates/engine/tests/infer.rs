@@ -5,10 +5,11 @@
 
 mod common;
 
-use common::{TINY, altered, expected, graph, press_pa, set_metadata};
+use common::{TINY, altered, backends, expected, graph, press_pa, set_metadata};
 use half::f16;
-use papilla_engine::{Backend, EngineError, MAP_LEN, MAP_SIDE_PX, load, load_with};
+use papilla_engine::{Backend, Choice, EngineError, MAP_LEN, MAP_SIDE_PX, Model, load, load_with};
 use sha2::{Digest, Sha256};
+use std::{sync::Arc, time::Duration};
 use tract_onnx::pb::{
     AttributeProto, NodeProto, attribute_proto::AttributeType, tensor_proto::DataType,
 };
@@ -28,13 +29,24 @@ fn assert_equals_reference(sed_j_per_m3: &[f32]) {
     assert!((sum / expected.sum_j_per_m3 - 1.0).abs() < 1e-5, "sum {sum}");
 }
 
+/// The same file in every backend of this build.
+fn in_each(onnx: &[u8]) -> impl Iterator<Item = Arc<dyn Model>> {
+    backends().into_iter().map(|backend| {
+        let model = load_with(backend, onnx, None).unwrap();
+        assert_eq!(model.backend(), backend);
+        model
+    })
+}
+
 #[test]
-fn tract_answers_as_onnx_runtime_does() {
-    let model = load(TINY, None).unwrap();
-    let mut session = model.session().unwrap();
-    let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
-    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
-    assert_equals_reference(&sed_j_per_m3);
+fn every_backend_answers_as_onnx_runtime_did() {
+    for model in in_each(TINY) {
+        let mut session = model.session().unwrap();
+        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+        session.infer(&vec![1_000.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
+        session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+        assert_equals_reference(&sed_j_per_m3);
+    }
 }
 
 #[test]
@@ -69,33 +81,35 @@ fn constants_stored_in_16_bits_are_the_same_network() {
         };
         graph.node.insert(0, cast);
     });
-    let [plain, stored] = [plain, stored].map(|onnx| {
-        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
-        let model = load(&onnx, None).unwrap();
-        model.session().unwrap().infer(&press_pa(), &mut sed_j_per_m3).unwrap();
-        sed_j_per_m3
-    });
-    assert!(plain == stored, "the answers differ");
-    assert!(plain.iter().any(|&v| v > 0.0));
+    for (plain, stored) in in_each(&plain).zip(in_each(&stored)) {
+        let [plain, stored] = [plain, stored].map(|model| {
+            let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+            model.session().unwrap().infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+            sed_j_per_m3
+        });
+        assert!(plain == stored, "the answers differ");
+        assert!(plain.iter().any(|&v| v > 0.0));
+    }
 }
 
 #[test]
 fn sessions_run_in_threads_and_agree_bit_for_bit() {
-    let model = load(TINY, None).unwrap();
-    let mut first = vec![0.0; MAP_LEN];
-    model.session().unwrap().infer(&press_pa(), &mut first).unwrap();
-    std::thread::scope(|scope| {
-        for _ in 0..3 {
-            scope.spawn(|| {
-                let mut session = model.session().unwrap();
-                let mut again = vec![0.0; MAP_LEN];
-                // Other maps between must leave no trace.
-                session.infer(&vec![1_000.0; MAP_LEN], &mut again).unwrap();
-                session.infer(&press_pa(), &mut again).unwrap();
-                assert_eq!(first, again);
-            });
-        }
-    });
+    for model in in_each(TINY) {
+        let mut first = vec![0.0; MAP_LEN];
+        model.session().unwrap().infer(&press_pa(), &mut first).unwrap();
+        std::thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| {
+                    let mut session = model.session().unwrap();
+                    let mut again = vec![0.0; MAP_LEN];
+                    // Other maps between must leave no trace.
+                    session.infer(&vec![1_000.0; MAP_LEN], &mut again).unwrap();
+                    session.infer(&press_pa(), &mut again).unwrap();
+                    assert_eq!(first, again);
+                });
+            }
+        });
+    }
 }
 
 #[test]
@@ -144,19 +158,20 @@ fn the_named_tract_version_is_the_locked_one() {
 
 #[test]
 fn refuses_maps_of_another_length_and_goes_on() {
-    let model = load(TINY, None).unwrap();
-    let mut session = model.session().unwrap();
-    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
-    for length in [0, MAP_LEN - 1, MAP_LEN + 1] {
-        let error = session.infer(&vec![0.0; length], &mut sed_j_per_m3).unwrap_err();
-        assert!(
-            matches!(error, EngineError::WrongLength { map: "pressure_pa", found, .. } if found == length)
-        );
+    for model in in_each(TINY) {
+        let mut session = model.session().unwrap();
+        let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+        for length in [0, MAP_LEN - 1, MAP_LEN + 1] {
+            let error = session.infer(&vec![0.0; length], &mut sed_j_per_m3).unwrap_err();
+            assert!(
+                matches!(error, EngineError::WrongLength { map: "pressure_pa", found, .. } if found == length)
+            );
+        }
+        let error = session.infer(&press_pa(), &mut sed_j_per_m3[1..]).unwrap_err();
+        assert!(matches!(error, EngineError::WrongLength { map: "sed_j_per_m3", .. }));
+        session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+        assert_equals_reference(&sed_j_per_m3);
     }
-    let error = session.infer(&press_pa(), &mut sed_j_per_m3[1..]).unwrap_err();
-    assert!(matches!(error, EngineError::WrongLength { map: "sed_j_per_m3", .. }));
-    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
-    assert_equals_reference(&sed_j_per_m3);
 }
 
 #[test]
@@ -166,35 +181,43 @@ fn an_infinite_answer_is_an_error_not_a_map() {
         let scale = graph(model).initializer.iter_mut().find(|t| t.name == "scale_out").unwrap();
         scale.raw_data = 1e36f32.to_le_bytes().to_vec();
     });
-    let mut session = load(&onnx, None).unwrap().session().unwrap();
-    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
-    let hard: Vec<f32> = press_pa().iter().map(|p| 1e4 * p).collect();
-    let error = session.infer(&hard, &mut sed_j_per_m3).unwrap_err();
-    assert!(matches!(error, EngineError::NonFiniteOutput { .. }), "{error}");
-    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    for model in in_each(&onnx) {
+        let mut session = model.session().unwrap();
+        let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+        let hard: Vec<f32> = press_pa().iter().map(|p| 1e4 * p).collect();
+        let error = session.infer(&hard, &mut sed_j_per_m3).unwrap_err();
+        assert!(matches!(error, EngineError::NonFiniteOutput { .. }), "{error}");
+        session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    }
 }
 
 #[test]
 fn input_that_is_not_finite_is_refused() {
-    let mut session = load(TINY, None).unwrap().session().unwrap();
-    let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
-    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let mut pressure_pa = press_pa();
-        pressure_pa[3 * MAP_SIDE_PX + 5] = bad;
-        let error = session.infer(&pressure_pa, &mut sed_j_per_m3).unwrap_err();
-        assert!(matches!(error, EngineError::NonFiniteInput { row: 3, column: 5, .. }), "{error}");
+    for model in in_each(TINY) {
+        let mut session = model.session().unwrap();
+        let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut pressure_pa = press_pa();
+            pressure_pa[3 * MAP_SIDE_PX + 5] = bad;
+            let error = session.infer(&pressure_pa, &mut sed_j_per_m3).unwrap_err();
+            assert!(
+                matches!(error, EngineError::NonFiniteInput { row: 3, column: 5, .. }),
+                "{error}"
+            );
+        }
+        session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+        assert_equals_reference(&sed_j_per_m3);
     }
-    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
-    assert_equals_reference(&sed_j_per_m3);
 }
 
 #[test]
 fn zero_in_leaves_only_the_biases() {
-    let model = load(TINY, None).unwrap();
-    let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
-    model.session().unwrap().infer(&vec![0.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
-    let max = sed_j_per_m3.iter().copied().fold(0.0, f32::max);
-    assert!(f64::from(max) < 0.2 * expected().max_j_per_m3, "{max}");
+    for model in in_each(TINY) {
+        let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
+        model.session().unwrap().infer(&vec![0.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
+        let max = sed_j_per_m3.iter().copied().fold(0.0, f32::max);
+        assert!(f64::from(max) < 0.2 * expected().max_j_per_m3, "{max}");
+    }
 }
 
 #[cfg(not(feature = "ort"))]
@@ -204,17 +227,28 @@ fn ort_is_refused_where_it_was_not_built() {
     assert!(matches!(error, EngineError::BackendMissing { backend: Backend::Ort, .. }));
 }
 
-/// Needs the shared library: `ORT_DYLIB_PATH=... cargo test --features ort`.
-#[cfg(feature = "ort")]
 #[test]
-fn onnx_runtime_answers_as_recorded() {
-    let library = std::env::var_os("ORT_DYLIB_PATH");
-    assert!(library.is_some(), "ORT_DYLIB_PATH has to name the library of ONNX Runtime");
-    let model = load_with(Backend::Ort, TINY, None).unwrap();
-    assert!(model.info().backend.starts_with("onnxruntime "), "{}", model.info().backend);
-    let mut session = model.session().unwrap();
+fn a_choice_reads_back_as_it_is_written() {
+    for text in ["auto", "tract", "ort"] {
+        assert_eq!(text.parse::<Choice>().unwrap().to_string(), text);
+    }
+    let error = "onnx".parse::<Choice>().unwrap_err();
+    assert!(["auto", "tract", "ort"].iter().all(|name| error.contains(name)), "{error}");
+}
+
+#[test]
+fn auto_takes_what_is_there_and_without_time_tract() {
+    let at_once = Choice::Auto.load(TINY, None, Duration::ZERO).unwrap();
+    assert_eq!(at_once.backend(), Backend::Tract);
+    let chosen = Choice::Auto.load(TINY, None, Duration::from_millis(5)).unwrap();
+    assert!(backends().contains(&chosen.backend()));
     let mut sed_j_per_m3 = vec![f32::NAN; MAP_LEN];
-    session.infer(&vec![1_000.0; MAP_LEN], &mut sed_j_per_m3).unwrap();
-    session.infer(&press_pa(), &mut sed_j_per_m3).unwrap();
+    chosen.session().unwrap().infer(&press_pa(), &mut sed_j_per_m3).unwrap();
     assert_equals_reference(&sed_j_per_m3);
+    for backend in backends() {
+        let model = Choice::Only(backend).load(TINY, None, Duration::ZERO).unwrap();
+        assert_eq!(model.backend(), backend);
+        let name = if backend == Backend::Ort { "onnxruntime " } else { "tract " };
+        assert!(model.info().backend.starts_with(name), "{}", model.info().backend);
+    }
 }

@@ -6,7 +6,12 @@
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
-use papilla_engine::{Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Index, load};
+mod common;
+
+use common::backends;
+use papilla_engine::{
+    Backend, Card, EngineError, MAP_LEN, MAP_SIDE_PX, Session, card::Index, load_with,
+};
 use papilla_proto::{
     MapError, PressureRange, SampleType,
     atlas::{Atlas, Patch, Raster},
@@ -35,17 +40,23 @@ struct Tier {
     is_slow: bool,
 }
 
-/// All shipped models, one after another.
+/// All shipped models, one after another, in every backend of this build.
 fn each(mut look: impl FnMut(&mut Tier)) {
     for name in Index::from_json(&text("index.json")).unwrap().models {
-        let card = Card::from_json(&text(&format!("{name}.json"))).unwrap();
-        let model = load(&read(&format!("{name}.onnx")), Some(&card)).unwrap();
-        let (session, is_slow) = (model.session().unwrap(), name.starts_with("s1-base16"));
-        look(&mut Tier { card, session, is_slow });
+        for backend in backends() {
+            look(&mut Tier::load(&name, backend));
+        }
     }
 }
 
 impl Tier {
+    fn load(name: &str, backend: Backend) -> Self {
+        let card = Card::from_json(&text(&format!("{name}.json"))).unwrap();
+        let model = load_with(backend, &read(&format!("{name}.onnx")), Some(&card)).unwrap();
+        let (session, is_slow) = (model.session().unwrap(), name.starts_with("s1-base16"));
+        Self { card, session, is_slow }
+    }
+
     fn max_pa(&self) -> f32 {
         self.card.pressure_range_pa[1]
     }
@@ -239,4 +250,25 @@ fn sample_types_change_sed_within_the_stated_bounds_at_any_force() {
             }
         }
     });
+}
+
+/// The project's bar: 1e-5 of the maximum.
+#[cfg(feature = "ort")]
+#[test]
+fn onnx_runtime_answers_as_tract_does() {
+    let [_, interface] = masks();
+    let mm_per_px = Atlas::from_json(&text("atlas.json")).unwrap().mm_per_px();
+    for name in Index::from_json(&text("index.json")).unwrap().models {
+        let mut tiers = backends().into_iter().map(|backend| Tier::load(&name, backend));
+        let [mut tract, mut ort] = [tiers.next().unwrap(), tiers.next().unwrap()];
+        for force_n in [0.05, 1.0, 10.0] {
+            let pressure_pa = press(force_n, mm_per_px);
+            let due = tract.map("tract", &pressure_pa, &interface);
+            let found = ort.map("ONNX Runtime", &pressure_pa, &interface);
+            let greatest = due.iter().copied().fold(0.0, f32::max);
+            let apart = due.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            println!("{name} {force_n} N: {:.2e}", apart / greatest);
+            assert!(apart <= 1e-5 * greatest, "{name} {force_n} N: {:.2e}", apart / greatest);
+        }
+    }
 }

@@ -45,6 +45,7 @@ pub(crate) struct ModelLabels {
     pub(crate) tier: String,
     pub(crate) atlas_hash: String,
     pub(crate) onnx_sha256: String,
+    pub(crate) backend: String,
     pub(crate) default: Word,
 }
 
@@ -137,6 +138,8 @@ pub struct TierLabels<'a> {
     pub atlas_hash: &'a str,
     /// SHA-256 of its file.
     pub onnx_sha256: &'a str,
+    /// What runs it, with version.
+    pub backend: &'a str,
     /// Whether clients get it unasked.
     pub is_default: bool,
     /// Whether new clients get it at all.

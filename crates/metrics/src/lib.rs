@@ -191,6 +191,7 @@ impl Metrics {
                 tier: tier.name.to_owned(),
                 atlas_hash: tier.atlas_hash.to_owned(),
                 onnx_sha256: tier.onnx_sha256.to_owned(),
+                backend: tier.backend.to_owned(),
                 default: Word(if tier.is_default { "true" } else { "false" }),
             };
             self.models.get_or_create(&labels).set(1);

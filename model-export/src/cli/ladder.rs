@@ -90,7 +90,7 @@ fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>>
     Ok(files.into_iter().map(|(path, _)| path).collect())
 }
 
-struct Shown(papilla_progress::Progress);
+pub(super) struct Shown(pub(super) papilla_progress::Progress);
 
 impl Progress for Shown {
     fn total(&self, steps: u64) {

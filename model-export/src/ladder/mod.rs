@@ -6,6 +6,7 @@
 //! table and [`plot`] the pictures.
 
 pub mod fe;
+pub mod here;
 mod model;
 pub mod plot;
 pub mod report;
@@ -163,13 +164,22 @@ pub fn measure(
     Ok(ladder)
 }
 
-/// Processor and system, for a reader who compares times.
-fn machine() -> String {
+/// Processor and system, for a reader who compares times. A virtual machine may tell no more than
+/// the maker by name; family and model then say which processor it is.
+#[must_use]
+pub fn machine() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let processor = info
-        .lines()
-        .find_map(|line| line.strip_prefix("model name")?.split_once(':'))
-        .map_or("unknown processor", |(_, name)| name.trim());
+    let entry = |key: &str| {
+        let mut entries = info.lines().filter_map(|line| line.split_once(':'));
+        let found = entries.find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim());
+        found.unwrap_or("unknown")
+    };
+    let processor = format!(
+        "{} (family {}, model {})",
+        entry("model name"),
+        entry("cpu family"),
+        entry("model")
+    );
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     format!(
         "{processor}, {cores} cores, {} {}; one thread",

@@ -198,7 +198,7 @@ fn timed_maps(
 
 /// Percentiles of the quietest of several rounds, ms: another program at work in a round
 /// says nothing about the model.
-fn time(
+pub(super) fn time(
     model: &dyn Model,
     path: &Path,
     maps: &[Vec<f32>],
@@ -236,7 +236,7 @@ fn time(
 }
 
 /// Time in ONNX Runtime; none where the program was built without it or it is not installed.
-fn time_ort(
+pub(super) fn time_ort(
     onnx: &[u8],
     path: &Path,
     maps: &[Vec<f32>],

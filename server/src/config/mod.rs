@@ -13,6 +13,7 @@ use std::{
 };
 
 use clap::{Args, Parser, Subcommand};
+use papilla_engine::Choice;
 use serde::Serialize;
 
 pub use error::{ConfigError, SettingError};
@@ -107,6 +108,11 @@ pub struct Config {
     #[arg(long, env = "PAPILLA_DEFAULT_TIER", value_name = "NAME")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default_tier: Option<String>,
+
+    /// What runs the networks: tract, ort (ONNX Runtime; needs a binary built with the cargo feature
+    /// `ort`, and ORT_DYLIB_PATH), or for each tier the one that is faster here: auto.
+    #[arg(long, env = "PAPILLA_BACKEND", default_value = "auto", value_name = "NAME")]
+    pub backend: Choice,
 
     /// Time for measuring the tiers on this machine at the start, milliseconds; slow tiers take
     /// two runs each whatever they need. 0: none, the shipped times stand.
@@ -213,6 +219,7 @@ impl Default for Config {
             watch_models: false,
             threads: None,
             default_tier: None,
+            backend: Choice::Auto,
             calibration_ms: 1500,
             log: "info".to_owned(),
             json: false,

@@ -2,6 +2,7 @@
 
 use std::{num::NonZeroUsize, time::Duration};
 
+use papilla_engine::Choice;
 use papilla_proto::MAP_LEN;
 
 use super::{Config, SettingError, range};
@@ -63,6 +64,9 @@ impl Config {
                 let reason = format!("'{origin}' is not scheme://host[:port] without a path");
                 return refuse("allow_origin", reason);
             }
+        }
+        if let Choice::Only(backend) = self.backend {
+            backend.require().or_else(|error| refuse("backend", error.to_string()))?;
         }
         if self.otlp_endpoint.is_some() && !cfg!(feature = "otlp") {
             let reason = "this binary was built without the cargo feature 'otlp'";

@@ -125,6 +125,8 @@ fn settings_at_odds_are_refused_by_field() {
     assert_eq!(refused(|s| s.watch_models = true), "watch_models");
     assert_eq!(refused(|s| s.xr_dir = Some("/no/such/folder".into())), "xr_dir");
     assert_eq!(refused(|s| s.max_body_bytes = 1000), "max_body_bytes");
+    #[cfg(not(feature = "ort"))]
+    assert_eq!(refused(|s| s.backend = Choice::Only(papilla_engine::Backend::Ort)), "backend");
     for origin in ["lab.example", "https://", "https://a/b", "ftp://a", "*"] {
         let settings = Config { allow_origin: vec![origin.into()], ..Config::default() };
         assert_eq!(settings.validate().unwrap_err().field, "allow_origin", "{origin}");

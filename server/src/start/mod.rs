@@ -5,6 +5,7 @@ mod remeasure;
 
 use std::{path::Path, sync::Arc, thread};
 
+use papilla_engine::{Backend, Choice};
 use papilla_metrics::Metrics;
 use papilla_proto::contact::FINGERS_MAX;
 use papilla_session_contact::ContactAssets;
@@ -14,7 +15,7 @@ use crate::{
     SettingError, StartError,
     config::Config,
     core::{
-        catalogue::{Catalogue, Step, assets::Assets, calibrate},
+        catalogue::{Catalogue, Loading, Step, assets::Assets, calibrate, golden},
         reload,
         scheduler::Pool,
     },
@@ -98,11 +99,14 @@ fn load(
     progress: &Progress,
 ) -> Result<(Arc<Catalogue>, Pool, Option<ContactAssets>), StartError> {
     let assets = Assets::of(config)?;
-    let default = config.default_tier.as_deref();
-    let catalogue = Catalogue::load_noting(&assets, default, None, &mut |step| match step {
+    let loading = Loading::of(config);
+    let catalogue = Catalogue::load_noting(&assets, loading, None, &mut |step| match step {
         Step::Listed(names) => progress.enter(Stage::Loading, names.to_vec()),
         Step::Loaded(name) => progress.done(name),
     })?;
+    if config.backend == Choice::Only(Backend::Ort) {
+        require_golden_answers(&catalogue)?;
+    }
     let catalogue = Arc::new(catalogue);
     progress.enter(Stage::Warming, Vec::new());
     metrics.name_tiers(catalogue.tier_labels());
@@ -111,6 +115,19 @@ fn load(
     let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
     let contact = config.contact.as_deref().map(|file| load_contact(file, &catalogue));
     Ok((catalogue, pool, contact.transpose()?))
+}
+
+/// Holds all tiers to their golden answers: the library of ONNX Runtime is not the one that the models
+/// were tried with. A backend that is chosen for its speed has been compared with tract already.
+fn require_golden_answers(catalogue: &Catalogue) -> Result<(), StartError> {
+    for tier in &catalogue.tiers {
+        golden::check(catalogue, tier).map_err(|error| StartError::Unusable {
+            file: format!("{}.onnx", tier.name),
+            origin: tier.model.info().backend.clone(),
+            reason: format!("{error}; --backend tract does without ONNX Runtime"),
+        })?;
+    }
+    Ok(())
 }
 
 /// Reads the contact model, which has to be of the models' finger.

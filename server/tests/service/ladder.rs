@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use papilla_engine::{Backend, Choice};
 use papilla_proto::{FrameStatus, Window};
 use papilla_server::{Config, StartError};
 use serde_json::{Value, json};
@@ -53,6 +54,18 @@ async fn tiers_are_chosen_by_the_ladder_and_it_is_published() {
     let mut socket = service.socket().await;
     let ready = socket.open(hello(&json!({"budget_us": 60_000_000}))).await;
     assert_eq!(ready["tier"], "quick", "the card says slow, the ladder says quick");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_runs_a_tier_is_told() {
+    let tract = |config: &mut Config| config.backend = Choice::Only(Backend::Tract);
+    let service = Service::start_with(tract).await;
+    let tiers = service.json("/v1/tiers").await;
+    let backend = tiers["tiers"][0]["backend"].as_str().unwrap();
+    assert!(backend.starts_with("tract "), "{backend}");
+    let metrics = service.get("/metrics").send().await.text();
+    let line = metrics.lines().find(|line| line.starts_with("papilla_model{tier=\"quick\""));
+    assert!(line.is_some_and(|line| line.contains(&format!("backend=\"{backend}\""))), "{metrics}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

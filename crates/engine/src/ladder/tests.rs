@@ -64,6 +64,16 @@ fn the_front_is_what_nothing_beats() {
 }
 
 #[test]
+fn a_rung_has_a_time_in_each_engine_it_was_measured_in() {
+    let mut rung = rung("both", 4.0, 0.1);
+    let in_each = |rung: &Rung| [Backend::Tract, Backend::Ort].map(|b| rung.time_ms_in(b));
+    assert_eq!(in_each(&rung), [Some(4.0), Some(4.0)]);
+    let ort = Some(Percentiles { p50: 3.0, p99: 5.0 });
+    rung.latency_ms = rung.latency_ms.map(|latency| LatencyByEngine { ort, ..latency });
+    assert_eq!(in_each(&rung), [Some(4.0), Some(3.0)]);
+}
+
+#[test]
 fn what_is_no_ladder_is_refused() {
     assert!(matches!(Ladder::from_json("{}"), Err(EngineError::BadLadder { .. })));
     let other = Ladder { format: 2, ..Ladder::default() }.to_json().unwrap();

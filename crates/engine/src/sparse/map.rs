@@ -74,6 +74,18 @@ impl SparseMap {
     }
 }
 
+impl SparseMap {
+    /// Bytes and terms of the table.
+    pub(super) fn size(&self) -> (u64, u64) {
+        let terms = self.table.weight.len();
+        let index_bytes = match self.table.index {
+            Index::Near(_) => size_of::<u16>(),
+            Index::Far(_) => size_of::<u32>(),
+        };
+        ((terms * (size_of::<f32>() + index_bytes)) as u64, terms as u64)
+    }
+}
+
 /// A table of near sources at work.
 struct Near<'a> {
     table: &'a Table,

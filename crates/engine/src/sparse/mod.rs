@@ -38,6 +38,11 @@ pub(crate) fn fuse(mut model: TypedModel) -> TractResult<TypedModel> {
     Ok(model)
 }
 
+/// Bytes and terms of the table of a node that is a sparse map.
+pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
+    node.op_as::<SparseMap>().map(SparseMap::size)
+}
+
 /// The longest chain that ends at a node: where it starts, and what it does.
 fn chain(model: &TypedModel, end: usize) -> TractResult<Option<(OutletId, SparseMap)>> {
     let mut nodes = Vec::new();

@@ -1,13 +1,19 @@
 //! The small model the tests share, and a pressure map for it.
 #![allow(dead_code, reason = "each test program uses a part")]
 
-use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
+use papilla_engine::{Backend, MAP_LEN, MAP_SIDE_PX};
 use prost::Message;
 use serde::Deserialize;
 use tract_onnx::pb::{GraphProto, ModelProto, NodeProto};
 
 /// A network of the operators that Papilla's models use; made by `assets/make.py`.
 pub(crate) const TINY: &[u8] = include_bytes!("../assets/tiny.onnx");
+
+/// What this build runs models in. ONNX Runtime's library is named by `ORT_DYLIB_PATH`.
+pub(crate) fn backends() -> Vec<Backend> {
+    let ort = cfg!(feature = "ort").then_some(Backend::Ort);
+    [Backend::Tract].into_iter().chain(ort).collect()
+}
 
 /// What ONNX Runtime answers for [`press_pa`].
 #[derive(Deserialize)]

@@ -9,7 +9,7 @@
 
 use super::extrude::Cells;
 use super::grading::{Closeness, Contact, Spacing};
-use super::half_cube::{Grid, GridSize};
+use super::half_cube::{Grid, GridSize, MEDIUM};
 use super::nail;
 use super::patch::patch_of;
 use super::refined::{self, Refined};
@@ -82,9 +82,6 @@ struct Resolution {
 
 /// Node positions through the bone's cortex: two `Hex8` or one `Hex27`.
 const CORTEX: &[f64] = &[0.0, 0.5, 1.0];
-
-/// The even lattice of medium density, whose nodes are the atlas' vertices.
-pub(super) const MEDIUM: GridSize = GridSize { across: 22, side: 16, cap: 12, body: 10 };
 
 impl Density {
     fn resolution(self, order: Order) -> Resolution {

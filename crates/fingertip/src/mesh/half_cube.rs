@@ -22,6 +22,9 @@ pub(super) struct GridSize {
     pub body: u32,
 }
 
+/// The even lattice of medium density, whose nodes are the atlas' vertices.
+pub(super) const MEDIUM: GridSize = GridSize { across: 22, side: 16, cap: 12, body: 10 };
+
 /// A surface grid: nodes with their parameters, cells of `step x step` lattice
 /// intervals listed with `(step + 1)^2` nodes row by row.
 pub(super) struct Grid {

@@ -14,7 +14,7 @@ pub(super) const BASE: GridSize = GridSize { across: 8, side: 4, cap: 4, body: 6
 
 /// Lattice of the atlas' vertices on a mesh whose nodes are elsewhere for each contact: that of the
 /// even mesh of medium density.
-const ATLAS: GridSize = super::fingertip::MEDIUM;
+const ATLAS: GridSize = super::half_cube::MEDIUM;
 
 /// A grid whose cells were split.
 pub(super) struct Refined {

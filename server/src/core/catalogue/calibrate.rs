@@ -53,7 +53,8 @@ pub(crate) fn calibrate_noting(
     for tier in new {
         let mut times = runs(tier, share)?;
         tier.latency.calibrate(&mut times);
-        found.push(format!("{} {} us", tier.name, tier.latency.typical_us()));
+        let (us, backend) = (tier.latency.typical_us(), &tier.model.info().backend);
+        found.push(format!("{} {us} us in {backend}", tier.name));
         note(&tier.name);
     }
     if let Some(codec_us) = codec_us() {

@@ -3,14 +3,17 @@
 use std::{sync::Arc, time::Duration};
 
 use papilla_engine::{
-    Card, Ladder,
+    Card, Choice, EngineError, Ladder, Model,
     ladder::{Kind, SET_NAMES},
 };
 use papilla_proto::atlas::Atlas;
 use serde_json::Value;
 
 use super::Tier;
-use crate::core::{digest::sha256_hex, latency::Latency};
+use crate::{
+    config::Config,
+    core::{digest::sha256_hex, latency::Latency},
+};
 
 /// Reads the ladder. Rungs measured on another file than the tier's are left out: their figures
 /// are of a model that is not served.
@@ -34,11 +37,16 @@ pub(super) fn load_ladder(json: &[u8], atlas: &Atlas, tiers: &[Tier]) -> Result<
     Ok(ladder)
 }
 
+/// The shipped time of a tier, ms, in what runs it here.
+fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
+    ladder.rung_of(&tier.name)?.time_ms_in(tier.model.backend())
+}
+
 /// Gives the tiers the shipped times, and the errors of the first set that all were measured
 /// on; the name of that set.
 pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
     for tier in tiers.iter() {
-        if let Some(ms) = ladder.rung_of(&tier.name).and_then(|rung| rung.time_ms()) {
+        if let Some(ms) = shipped_ms(ladder, tier) {
             // A tier that goes on over a reload shares its times, which it has learnt here.
             if Arc::strong_count(&tier.latency) == 1 {
                 tier.latency.expect(milliseconds(ms));
@@ -53,7 +61,7 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
             tier.relative_l2_median = error;
         }
     }
-    let ms = |tier: &Tier| ladder.rung_of(&tier.name)?.time_ms();
+    let ms = |tier: &Tier| shipped_ms(ladder, tier);
     let beats = |better: &Tier, tier: &Tier| {
         let is_as_fast = ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b);
         is_as_fast
@@ -92,10 +100,39 @@ impl ReadCard {
     }
 }
 
+/// What the settings say of loading.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Loading<'a> {
+    /// The tier to take unasked, if not the index's.
+    pub(crate) default: Option<&'a str>,
+    backend: Choice,
+    calibration: Duration,
+}
+
+impl<'a> Loading<'a> {
+    pub(crate) fn of(config: &'a Config) -> Self {
+        let (default, calibration) = (config.default_tier.as_deref(), config.calibration());
+        Self { default, backend: config.backend, calibration }
+    }
+
+    /// Loads one of so many models. Finding out which backends are faster takes half as long as
+    /// the calibration.
+    pub(super) fn model(
+        self,
+        onnx: &[u8],
+        card: &Card,
+        of: usize,
+    ) -> Result<Arc<dyn Model>, EngineError> {
+        let shares = u32::try_from(2 * of).unwrap_or(u32::MAX).max(1);
+        self.backend.load(onnx, Some(card), self.calibration / shares)
+    }
+}
+
 pub(super) fn load_tier(
     name: &str,
     onnx: &[u8],
     ReadCard { card, shipped }: ReadCard,
+    load: impl Fn(&[u8], &Card) -> Result<Arc<dyn Model>, EngineError>,
     running: Option<&Tier>,
 ) -> Result<Tier, Box<dyn std::error::Error>> {
     let same = running.filter(|tier| {
@@ -107,7 +144,7 @@ pub(super) fn load_tier(
             card.require_model(tier.model.info())?;
             Arc::clone(&tier.model)
         }
-        None => papilla_engine::load(onnx, Some(&card))?,
+        None => load(onnx, &card)?,
     };
     let info = model.info();
     if info.name != name {

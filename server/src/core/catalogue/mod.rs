@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use papilla_codec::{Output, Quantity};
-use papilla_engine::card::Index;
+use papilla_engine::{Card, card::Index};
 use papilla_metrics::TierLabels;
 use papilla_proto::{
     ErrorCode, MAP_SIDE_PX, PixelMask, Problem,
@@ -22,12 +22,12 @@ use papilla_proto::{
 };
 use papilla_session_effects as effects;
 
-pub(crate) use self::tier::Tier;
 use self::{
     assets::Assets,
     load::{ReadCard, judge, load_ladder, load_tier, text},
     replay::Replay,
 };
+pub(crate) use self::{load::Loading, tier::Tier};
 use crate::{
     StartError,
     core::{cache::Cache, latency::Overhead},
@@ -133,10 +133,10 @@ impl Catalogue {
     /// A file is missing, unreadable, or at odds with another.
     pub(crate) fn load(
         assets: &Assets,
-        default: Option<&str>,
+        loading: Loading<'_>,
         running: Option<&Self>,
     ) -> Result<Self, StartError> {
-        Self::load_noting(assets, default, running, &mut |_| ())
+        Self::load_noting(assets, loading, running, &mut |_| ())
     }
 
     /// The same; `note` is told what comes.
@@ -145,7 +145,7 @@ impl Catalogue {
     /// As [`load`](Self::load).
     pub(crate) fn load_noting(
         assets: &Assets,
-        default: Option<&str>,
+        loading: Loading<'_>,
         running: Option<&Self>,
         note: &mut dyn FnMut(Step<'_>),
     ) -> Result<Self, StartError> {
@@ -170,13 +170,14 @@ impl Catalogue {
             .map_err(|e| bad("atlas.json", &e))?;
         note(Step::Listed(&index.models));
         let mut tiers = Vec::with_capacity(index.models.len());
+        let load = |onnx: &[u8], card: &Card| loading.model(onnx, card, index.models.len());
         for name in &index.models {
             let (onnx, file) = (format!("{name}.onnx"), format!("{name}.json"));
             let bytes = read(&onnx)?;
             let card = ReadCard::parse(read(&file)?).map_err(|e| bad(&file, &e))?;
             let running =
                 running.and_then(|running| running.tiers.iter().find(|t| t.name == *name));
-            let tier = load_tier(name, bytes, card, running).map_err(|e| bad(&onnx, &e))?;
+            let tier = load_tier(name, bytes, card, load, running).map_err(|e| bad(&onnx, &e))?;
             if tier.atlas_hash != atlas.hash() {
                 let (model, ours) = (&tier.atlas_hash, atlas.hash());
                 return Err(bad(
@@ -187,7 +188,7 @@ impl Catalogue {
             tiers.push(tier);
             note(Step::Loaded(name));
         }
-        let wanted = default.unwrap_or(&index.default);
+        let wanted = loading.default.unwrap_or(&index.default);
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
             StartError::UnknownDefault { name: wanted.to_owned(), known: index.models.join(", ") }
         })?;
@@ -288,6 +289,7 @@ impl Catalogue {
             name: &tier.name,
             atlas_hash: &tier.atlas_hash,
             onnx_sha256: &tier.model.info().onnx_sha256,
+            backend: &tier.model.info().backend,
             is_default: place == self.default,
             is_offered: !tier.retired,
         })

@@ -17,7 +17,7 @@ use crate::{
     config::Config,
     core::{
         catalogue::{
-            Catalogue, Tier,
+            Catalogue, Loading, Tier,
             assets::Assets,
             calibrate,
             golden::{self, GoldenError},
@@ -144,7 +144,7 @@ impl Reloader {
             .ok_or(ReloadError::Draining)?;
         let go_on = || if self.is_draining() { Err(ReloadError::Draining) } else { Ok(()) };
         let old = self.catalogue();
-        let new = Catalogue::load(&assets, self.config.default_tier.as_deref(), Some(&old))?;
+        let new = Catalogue::load(&assets, Loading::of(&self.config), Some(&old))?;
         if new.atlas.hash() != old.atlas.hash() {
             let [found, running] = [&new, &old].map(|c| c.atlas.hash().to_owned());
             return Err(ReloadError::OtherAtlas { found, running });

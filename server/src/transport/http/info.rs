@@ -92,6 +92,7 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
     json!({
         "name": tier.name,
         "kind": tier.kind,
+        "backend": tier.model.info().backend,
         "default": index == catalogue.default,
         "effects": tier.effects,
         "atlas_hash": tier.atlas_hash,

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use papilla_engine::{EngineError, Model, ModelInfo, Session};
+use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session};
 
 /// A model whose every inference, after those of the warm-up, waits for a go. What it is
 /// told to do, it does: that makes the order of events in these tests certain, which no real
@@ -38,6 +38,10 @@ struct GatedSession {
 impl Model for Gated {
     fn info(&self) -> &ModelInfo {
         &self.info
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Tract
     }
 
     fn session(&self) -> Result<Box<dyn Session>, EngineError> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use papilla_engine::{EngineError, Model, ModelInfo, Session};
+use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session};
 
 use super::*;
 use crate::core::catalogue::testing;
@@ -12,6 +12,10 @@ struct Named(ModelInfo);
 impl Model for Named {
     fn info(&self) -> &ModelInfo {
         &self.0
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Tract
     }
 
     fn session(&self) -> Result<Box<dyn Session>, EngineError> {

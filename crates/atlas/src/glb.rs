@@ -4,10 +4,8 @@
 //! `/v1/atlas`. Positions are the atlas's, in mm; a node scales them to glTF's metres. glTF's
 //! texture coordinates begin at the upper left, as the map does: `uv_px / 224`.
 
-use papilla_proto::{
-    MAP_SIDE_PX,
-    atlas::{Atlas, Patch},
-};
+use super::{Atlas, Patch};
+use crate::MAP_SIDE_PX;
 use serde_json::{Value, json};
 
 const FLOAT: u32 = 5126;

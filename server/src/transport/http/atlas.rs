@@ -1,7 +1,5 @@
 //! The atlas: as it was shipped, as OBJ and glTF, and its mask.
 
-mod glb;
-
 use std::sync::Arc;
 
 use axum::{
@@ -44,7 +42,7 @@ pub(crate) async fn obj(State(app): Shared, headers: HeaderMap) -> Answer {
 pub(crate) async fn glb(State(app): Shared, headers: HeaderMap) -> Answer {
     serve(&app, &headers, Document::AtlasGlb, |catalogue| {
         let masks = [png(&catalogue.skin)?, png(&catalogue.interface)?];
-        Ok(Content::new("model/gltf-binary", glb::write(&catalogue.atlas, &masks)))
+        Ok(Content::new("model/gltf-binary", catalogue.atlas.to_glb(&masks)))
     })
     .await
 }

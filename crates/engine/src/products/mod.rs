@@ -1,0 +1,91 @@
+//! Products with constant matrices, kept in a form that runs fast for one map at a time.
+//!
+//! tract takes a product with joined columns apart into one product for each part, and adds what
+//! they make: for a thousand rows of 49 values in seven parts that writes the result seven times.
+//! And it packs both sides of every product anew, which for many small products with two rows each
+//! takes longer than the products.
+
+mod joined;
+mod stacked;
+#[cfg(test)]
+mod tests;
+
+use joined::Joined;
+use stacked::Stacked;
+use tract_onnx::tract_core::internal::*;
+use tract_onnx::tract_core::ops::{array::TypedConcat, einsum::EinSum};
+
+/// Keeps what is joined together: to be done before the graph is decluttered.
+pub(crate) fn keep_joined(mut model: TypedModel) -> TractResult<TypedModel> {
+    for node in model.eval_order()? {
+        if model.nodes[node].op_is::<TypedConcat>()
+            && !model.nodes[node].outputs[0].successors.is_empty()
+        {
+            let name = format!("{}.joined", model.nodes[node].name);
+            TypedModelPatch::intercept(&model, node.into(), name, Joined, f32_fact(&model, node)?)?
+                .apply(&mut model)?;
+        }
+    }
+    Ok(model)
+}
+
+fn f32_fact(model: &TypedModel, node: usize) -> TractResult<TypedFact> {
+    Ok(model.outlet_fact(node.into())?.without_value())
+}
+
+/// Replaces products with stacks of constant matrices: in a graph that is decluttered.
+pub(crate) fn stack(mut model: TypedModel) -> TractResult<TypedModel> {
+    for node in model.eval_order()? {
+        let Some(product) = stacked(&model, node)? else { continue };
+        let mut patch = TypedModelPatch::new("stacked product");
+        let source = patch.tap_model(&model, model.nodes[node].inputs[0])?;
+        let name = format!("{}.stacked", model.nodes[node].name);
+        let made = patch.wire_node(name, product, &[source])?;
+        patch.shunt_outside(&model, node.into(), made[0])?;
+        patch.apply(&mut model)?;
+    }
+    model.compact()?;
+    Ok(model)
+}
+
+/// Bytes and products of the matrices of a node that is a stacked product.
+pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
+    node.op_as::<Stacked>().map(Stacked::size)
+}
+
+/// The product at a node, if its second side is a constant stack of matrices.
+fn stacked(model: &TypedModel, node: usize) -> TractResult<Option<Stacked>> {
+    let node = &model.nodes[node];
+    let Some(product) = node.op_as::<EinSum>() else { return Ok(None) };
+    let facts = model.node_input_facts(node.id)?;
+    let [rows, matrices] = facts[..] else { return Ok(None) };
+    let Some(matrices) = matrices.konst.as_ref().filter(|_| product.q_params.is_none()) else {
+        return Ok(None);
+    };
+    let is_f32 = |dt: DatumType| dt == f32::datum_type();
+    if !is_f32(product.operating_dt) || !is_f32(rows.datum_type) || !matrices.is_plain() {
+        return Ok(None);
+    }
+    let shapes = (rows.shape.as_concrete(), node.outputs[0].fact.shape.as_concrete());
+    let (Some(rows), Some(made), true) = (shapes.0, shapes.1, is_stack(&product.axes.to_string()))
+    else {
+        return Ok(None);
+    };
+    // The axes before the stack's have length 1.
+    let before = &rows[..rows.len() - 3];
+    if before.iter().any(|&len| len != 1) || matrices.shape()[0] < 2 {
+        return Ok(None);
+    }
+    Stacked::new(matrices, rows[rows.len() - 2], made).map(Some)
+}
+
+/// Whether the axes are `..smk,skn->..smn`: in each of `s`, rows by a matrix of its own.
+fn is_stack(axes: &str) -> bool {
+    let Some((sides, made)) = axes.split_once("->") else { return false };
+    let Some((rows, matrices)) = sides.split_once(',') else { return false };
+    let [rows, matrices, made] =
+        [rows, matrices, made].map(|side| side.chars().collect::<Vec<_>>());
+    let ([.., s, m, k], [t, l, n]) = (&rows[..], &matrices[..]) else { return false };
+    let before = &rows[..rows.len() - 3];
+    s == t && k == l && made == [before, &[*s, *m, *n]].concat()
+}

@@ -1,0 +1,33 @@
+//! `model-export here`.
+
+use super::{ladder::Shown, print_json};
+use papilla_model_export::ladder::{here, plot};
+use papilla_model_export::{ExportError, write};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Folder of the models, with ladder.json.
+    #[arg(long, default_value = "models", value_name = "FOLDER")]
+    models: PathBuf,
+    /// Writes STEM.md, STEM.svg and STEM.json.
+    #[arg(long, default_value = "out/here", value_name = "STEM")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let shown = Shown(papilla_progress::Progress::new("models", 0, 0, json));
+    let ladder = here::measure(&options.models, &shown)?;
+    let stem = options.out.file_name().and_then(|name| name.to_str()).unwrap_or("here");
+    let chart = |reason| ExportError::Chart { what: "error against time", reason };
+    let picture = plot::error_against_time(&here::by_engine(&ladder)).map_err(chart)?;
+    let page = here::markdown(&ladder, stem);
+    for (ending, text) in [("md", &page), ("svg", &picture), ("json", &ladder.to_json()?)] {
+        write(&options.out.with_file_name(format!("{stem}.{ending}")), text.as_bytes())?;
+    }
+    if json {
+        return print_json(&ladder);
+    }
+    print!("{page}");
+    Ok(())
+}

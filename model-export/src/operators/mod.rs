@@ -1,0 +1,148 @@
+//! The operators of a model against what one core can do.
+//!
+//! An operator reads its constants and maps and does its products and sums: it can take no less time
+//! than the core needs for the slower of the two. tract runs one operator after the other, so the
+//! bound of a model is their sum.
+
+pub mod rates;
+
+use crate::ladder::machine;
+use papilla_engine::{EngineError, Operator, profile};
+use rates::{LEAST_BYTES, Rates};
+use std::fmt::Write;
+use std::time::Duration;
+
+/// Runs of each model.
+const RUNS: usize = 400;
+/// An operator with less than this share of the time has no row of its own.
+const SHARE_MIN: f64 = 0.02;
+
+/// A model's operators, timed.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    name: String,
+    operators: Vec<Operator>,
+}
+
+impl Profile {
+    /// Runs the model.
+    ///
+    /// # Errors
+    /// As [`profile`].
+    pub fn measure(onnx: &[u8]) -> Result<Self, EngineError> {
+        let name = papilla_engine::load(onnx, None)?.info().name.clone();
+        Ok(Self { name, operators: profile(onnx, RUNS)? })
+    }
+
+    fn bytes(&self) -> u64 {
+        self.operators.iter().map(|o| o.constant_bytes + o.map_bytes).sum()
+    }
+}
+
+/// Least time of an operator, us.
+fn bound_us(operator: &Operator, rates: &Rates) -> f64 {
+    let read_s = rates.read_s(operator.constant_bytes + operator.map_bytes);
+    1e6 * read_s.max(operator.operations as f64 / rates.operations_per_s)
+}
+
+fn us(time: Duration) -> f64 {
+    1e6 * time.as_secs_f64()
+}
+
+/// The page.
+#[must_use]
+pub fn markdown(profiles: &[Profile], rates: &Rates) -> String {
+    let mut text = include_str!("head.md").to_owned();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "\nMeasured on {}, {RUNS} runs a model. The core does {:.0} operations a ns and reads, in GB/s, of",
+        machine(),
+        rates.operations_per_s / 1e9
+    );
+    let sizes = rates
+        .bytes_per_s
+        .iter()
+        .zip(0..)
+        .map(|(rate, size)| format!("{} kB {:.0}", (LEAST_BYTES << size) >> 10, rate / 1e9));
+    let _ = writeln!(text, "{}.", sizes.collect::<Vec<_>>().join(", "));
+    for profile in profiles {
+        let _ = writeln!(
+            text,
+            "\n## `{}`\n\n{:.2} MB of weights and maps, {:.1} million operations.\n",
+            profile.name,
+            profile.bytes() as f64 / 1e6,
+            profile.operators.iter().map(|o| o.operations).sum::<u64>() as f64 / 1e6,
+        );
+        table(&mut text, &profile.operators, rates);
+    }
+    text
+}
+
+fn table(text: &mut String, operators: &[Operator], rates: &Rates) {
+    text.push_str(
+        "| operator | constants, kB | maps, kB | operations, k | bound, us | time, us | times the bound |\n\
+         |---|---|---|---|---|---|---|\n",
+    );
+    let all_us: f64 = operators.iter().map(|o| us(o.median)).sum();
+    let (mut large, small): (Vec<&Operator>, Vec<&Operator>) =
+        operators.iter().partition(|o| us(o.median) >= SHARE_MIN * all_us);
+    large.sort_by_key(|operator| std::cmp::Reverse(operator.median));
+    for operator in &large {
+        let name = format!("{} `{}`", operator.kind, operator.name);
+        row(text, &name, &[operator], rates);
+    }
+    if !small.is_empty() {
+        row(text, &format!("{} others", small.len()), &small, rates);
+    }
+    row(text, "**all**", &operators.iter().collect::<Vec<_>>(), rates);
+}
+
+fn row(text: &mut String, name: &str, operators: &[&Operator], rates: &Rates) {
+    let sum = |of: &dyn Fn(&Operator) -> f64| operators.iter().map(|o| of(o)).sum::<f64>();
+    let (bound, time) = (sum(&|o| bound_us(o, rates)), sum(&|o| us(o.median)));
+    let _ = writeln!(
+        text,
+        "| {name} | {:.1} | {:.1} | {:.1} | {bound:.1} | {time:.1} | {:.1} |",
+        sum(&|o| o.constant_bytes as f64) / 1e3,
+        sum(&|o| o.map_bytes as f64) / 1e3,
+        sum(&|o| o.operations as f64) / 1e3,
+        time / bound,
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bound_is_the_slower_of_reading_and_computing() {
+        let rates = Rates { bytes_per_s: vec![1e9], operations_per_s: 4e9 };
+        let operator = |constant_bytes, operations| Operator {
+            name: "a".into(),
+            kind: "MatMul".into(),
+            constant_bytes,
+            map_bytes: 1000,
+            operations,
+            median: Duration::from_micros(12),
+        };
+        assert!((bound_us(&operator(2000, 4), &rates) - 3.0).abs() < 1e-9);
+        assert!((bound_us(&operator(2000, 40_000), &rates) - 10.0).abs() < 1e-9);
+        let operators = vec![operator(2000, 4), operator(3000, 40_000)];
+        let profile = Profile { name: "two".into(), operators };
+        let page = markdown(&[profile], &rates);
+        assert!(page.contains("| **all** | 5.0 | 2.0 | 40.0 | 13.0 | 24.0 | 1.8 |"), "{page}");
+    }
+
+    #[test]
+    fn a_shipped_model_is_taken_apart() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/nano.onnx");
+        let operators = profile(&std::fs::read(path).unwrap(), 1).unwrap();
+        let sum = |of: fn(&Operator) -> u64| operators.iter().map(of).sum::<u64>();
+        // Two maps in and out of 684 and 649 x 32 and 32 x 4032, 84 stencils of 48 x 48, in f32.
+        let products = 4 * (32 * (684 + 649 + 2 * 4032) + 84 * 48 * 48);
+        assert!(sum(|o| o.constant_bytes) > products, "{operators:?}");
+        assert!(sum(|o| o.operations) > products / 2, "{operators:?}");
+        assert!(operators.iter().filter(|o| o.kind == "SparseMap").count() > 1, "{operators:?}");
+    }
+}
