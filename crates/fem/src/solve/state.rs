@@ -49,4 +49,6 @@ pub struct StepReport {
     pub condition_at_least: f64,
     /// Work since the last report.
     pub effort: Effort,
+    /// What of it found equilibria for the indenter's work alone ([`super::Solver::mend_work`]).
+    pub mending: Effort,
 }

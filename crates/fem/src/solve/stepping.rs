@@ -234,6 +234,7 @@ impl<'a> Solver<'a> {
             j_min_at: e.j_min_at,
             condition_at_least: self.newton.condition,
             effort: self.newton.effort.since(since),
+            mending: Effort::default(),
         }
     }
 

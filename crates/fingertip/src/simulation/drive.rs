@@ -159,7 +159,8 @@ impl Body {
             }
             let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
             if let Some(limit) = energy_vs_work_max {
-                effort = effort.plus(&solver.mend_work(&known, limit));
+                report.mending = solver.mend_work(&known, limit);
+                effort = effort.plus(&report.mending);
             }
             report.effort = report.effort.plus(&effort);
             let mut record = self.record(solver, depth_mm, &report)?;

@@ -78,7 +78,7 @@ impl Finger {
         let drive = Drive::Depths(press.depths_mm.clone());
         let vertices = self.body.patch.as_ref().map_or(0, |p| p.patch.skin.len());
         let keep = &mut |_: usize, _: &Solver<'_>, r: &IncrementRecord, s: &StepReport| {
-            (fault(r, vertices), r.checks.j_min, s.effort)
+            (fault(r, vertices), r.checks.j_min, s.effort.since(&s.mending))
         };
         let solved = catch_unwind(AssertUnwindSafe(|| {
             self.body.press_balanced(solver, &approach, &drive, BALANCE_RELATIVE_MAX, keep)
