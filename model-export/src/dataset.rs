@@ -1,11 +1,13 @@
 //! Reads a dataset: `manifest.json`, `atlas.json` and one `.npz` shard per indentation.
 //!
-//! Shards hold values at the atlas's vertices; maps are rasterised from them here.
+//! Shards hold values at the atlas's vertices or at the nodes of cells; maps are drawn from them
+//! here.
 
 use crate::metrics::Ground;
 use crate::{ExportError, read, read_text};
-use ndarray::{Array1, Array2, OwnedRepr};
+use ndarray::{Array1, Array2, Ix2, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
+use papilla_dataset::{Cells, Maps};
 use papilla_proto::{
     atlas::{Atlas, Patch, Raster},
     sdf::IndenterSpec,
@@ -13,10 +15,11 @@ use papilla_proto::{
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 use std::path::{Component, Path, PathBuf};
 
 /// Version of the manifest that is read here.
-const FORMAT: u32 = 1;
+const FORMATS: RangeInclusive<u32> = papilla_dataset::FORMATS;
 
 #[derive(Debug, Deserialize)]
 struct Manifest {
@@ -79,9 +82,11 @@ pub struct Indentation {
     pub yaw_deg: f64,
 }
 
-/// The samples of one indentation, values at the vertices.
+/// The samples of one indentation.
 #[derive(Clone, Debug)]
 pub struct Shard {
+    /// Cells whose V nodes the values belong to; `None`: they belong to the atlas' vertices.
+    pub cells: Option<Cells>,
     /// Pressure on the skin, Pa; `[D, V]`.
     pub pressure_pa: Array2<f32>,
     /// SED on the dermis side of the interface, J/m3; `[D, V]`.
@@ -105,6 +110,7 @@ pub struct Dataset {
     pub interface: Raster,
     /// Where errors are taken.
     pub ground: Ground,
+    maps: Maps,
 }
 
 impl Dataset {
@@ -117,9 +123,9 @@ impl Dataset {
         let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
         let manifest: Manifest = serde_json::from_str(&read_text(&path)?)
             .map_err(|error| bad(format!("not a manifest: {error}")))?;
-        if manifest.format != FORMAT {
+        if !FORMATS.contains(&manifest.format) {
             return Err(bad(format!(
-                "format {} is not supported, this program reads {FORMAT}",
+                "format {} is not supported, this program reads {FORMATS:?}",
                 manifest.format
             )));
         }
@@ -137,7 +143,8 @@ impl Dataset {
         manifest.check_identity().map_err(bad)?;
         let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
         let ground = Ground::new(&atlas, &interface);
-        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface, ground })
+        let maps = Maps::read(folder, &atlas).map_err(|error| bad(error.to_string()))?;
+        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface, ground, maps })
     }
 
     /// SHA-256 that names the dataset.
@@ -220,13 +227,23 @@ impl Dataset {
         }
         let unreadable = |error: ReadNpzError| bad(format!("unreadable: {error}"));
         let mut npz = NpzReader::new(Cursor::new(bytes)).map_err(unreadable)?;
+        let cells = match read_array::<u32, Ix2>(&mut npz, "cell_place") {
+            Ok(place) => {
+                let nodes = read_array(&mut npz, "cell_nodes").map_err(unreadable)?;
+                let cells = Cells::from_arrays(&place, &nodes);
+                Some(cells.ok_or_else(|| bad("its cells do not fit their nodes".into()))?)
+            }
+            Err(_) => None,
+        };
+        let values = cells.as_ref().map_or(self.manifest.vertex_count, Cells::node_count);
         let shard = Shard {
+            cells,
             pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
             sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
             force_n: read_array(&mut npz, "force_n").ok(),
         };
-        let expected = (indentation.samples, self.manifest.vertex_count);
+        let expected = (indentation.samples, values);
         for (name, array) in
             [("pressure_pa", &shard.pressure_pa), ("sed_dermis_j_per_m3", &shard.sed_j_per_m3)]
         {
@@ -248,7 +265,7 @@ impl Dataset {
     /// Draws the pressure of a sample of `press` on the skin, Pa; 224 x 224.
     ///
     /// # Errors
-    /// [`ExportError::Atlas`].
+    /// [`ExportError::Dataset`] where a pixel lies in no cell.
     pub fn draw_pressure(
         &self,
         indentation: &Indentation,
@@ -256,13 +273,13 @@ impl Dataset {
         index: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(indentation, &self.skin, &shard.pressure_pa.row(index).to_vec(), map)
+        self.draw(indentation, Patch::Skin, shard, &shard.pressure_pa.row(index).to_vec(), map)
     }
 
     /// Draws its SED on the interface, J/m3.
     ///
     /// # Errors
-    /// [`ExportError::Atlas`].
+    /// As [`Self::draw_pressure`].
     pub fn draw_sed(
         &self,
         indentation: &Indentation,
@@ -270,18 +287,28 @@ impl Dataset {
         index: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(indentation, &self.interface, &shard.sed_j_per_m3.row(index).to_vec(), map)
+        self.draw(
+            indentation,
+            Patch::Interface,
+            shard,
+            &shard.sed_j_per_m3.row(index).to_vec(),
+            map,
+        )
     }
 
     fn draw(
         &self,
         indentation: &Indentation,
-        raster: &Raster,
+        patch: Patch,
+        shard: &Shard,
         values: &[f32],
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        let refused = |source| ExportError::Atlas { path: self.shard_path(indentation), source };
-        raster.rasterise(values, map).map_err(refused)
+        let reader = self.maps.reader(patch, shard.cells.as_ref()).map_err(|error| {
+            ExportError::Dataset { path: self.shard_path(indentation), reason: error.to_string() }
+        })?;
+        reader.draw(values, map);
+        Ok(())
     }
 }
 

@@ -106,7 +106,7 @@ pub fn images(
     let dataset = Dataset::open(folder)?;
     let manifest = dataset.manifest();
     atomic::create_folder(out)?;
-    let maps = Maps::of(&dataset)?;
+    let maps = Maps::read(folder, dataset.atlas())?;
     let [skin, interface] = Patch::ALL.map(|patch| maps.raster(patch).mask());
     let mut pressure = Painter::new(&dataset, skin, Quantity::Pressure, manifest.pressure_max_pa);
     let mut sed = Painter::new(&dataset, interface, Quantity::Sed, manifest.sed_max_j_per_m3);

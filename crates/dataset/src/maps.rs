@@ -1,19 +1,22 @@
 //! Maps of a shard's values: drawn from the atlas' vertices, or read off the cells of its mesh.
 
-use super::{Cells, Dataset, DatasetError};
+use super::{Cells, DatasetError};
 use ndarray::{Ix1, Ix2};
-use papilla_atlas::{MAP_LEN, Patch, Raster};
+use papilla_atlas::{Atlas, MAP_LEN, Patch, Raster};
 use papilla_output::OutputError;
 use papilla_output::npz::NpzArrays;
 use std::collections::HashMap;
+use std::path::Path;
 
 /// Where the pixels of both patches lie among vertices and, in a dataset of meshes that
 /// differ, on the lattice of their cells.
+#[derive(Debug)]
 pub struct Maps {
     skin: Pixels,
     interface: Pixels,
 }
 
+#[derive(Debug)]
 struct Pixels {
     raster: Raster,
     /// Side, row and column of each pixel of the raster; empty where all values are at vertices.
@@ -21,16 +24,22 @@ struct Pixels {
 }
 
 impl Maps {
-    /// For the maps of a dataset.
+    /// For the maps of the dataset in `folder`, which is of this atlas. One without a `raster.npz` has
+    /// all its values at vertices.
     ///
     /// # Errors
     /// [`DatasetError::Output`] where `raster.npz` cannot be read.
-    pub fn of(dataset: &Dataset) -> Result<Self, DatasetError> {
-        let path = dataset.folder().join("raster.npz");
+    pub fn read(folder: &Path, atlas: &Atlas) -> Result<Self, DatasetError> {
+        let path = folder.join("raster.npz");
+        if !path.exists() {
+            let [skin, interface] = Patch::ALL
+                .map(|patch| Pixels { raster: Raster::new(atlas, patch), place: Vec::new() });
+            return Ok(Self { skin, interface });
+        }
         let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
         let mut npz = NpzArrays::new(&path, &bytes)?;
         let mut pixels = |patch: Patch| -> Result<Pixels, DatasetError> {
-            let raster = Raster::new(dataset.atlas(), patch);
+            let raster = Raster::new(atlas, patch);
             let name = |part: &str| format!("{}_{part}", patch.name());
             let mut place = Vec::new();
             if npz.has(&name("side"))? {

@@ -1,5 +1,6 @@
 //! What a dataset holds of one equilibrium.
 
+use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -44,6 +45,16 @@ pub struct Cells {
 }
 
 impl Cells {
+    /// From arrays \[L, 5\] and \[L, 9\]; `None` of other shapes.
+    #[must_use]
+    pub fn from_arrays(place: &Array2<u32>, nodes: &Array2<u32>) -> Option<Self> {
+        let fit = place.ncols() == 5 && nodes.dim() == (place.nrows(), 9);
+        fit.then(|| Self {
+            place: place.outer_iter().map(|row| std::array::from_fn(|k| row[k])).collect(),
+            nodes: nodes.outer_iter().map(|row| std::array::from_fn(|k| row[k])).collect(),
+        })
+    }
+
     /// Nodes S: one more than the greatest number.
     #[must_use]
     pub fn node_count(&self) -> usize {

@@ -157,15 +157,11 @@ pub fn encode(
 fn read_cells(path: &Path, npz: &mut NpzArrays<'_>) -> Result<Cells, DatasetError> {
     let place = npz.get::<u32, Ix2>("cell_place")?;
     let nodes = npz.get::<u32, Ix2>("cell_nodes")?;
-    let (found, expected) = ([place.dim(), nodes.dim()], [(place.nrows(), 5), (place.nrows(), 9)]);
-    if found != expected {
-        let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
-        let what = "shapes of cell_place and cell_nodes";
-        return Err(DatasetError::Mismatch { path: path.into(), what, found, expected });
-    }
-    Ok(Cells {
-        place: place.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect(),
-        nodes: nodes.rows().into_iter().map(|r| std::array::from_fn(|k| r[k])).collect(),
+    Cells::from_arrays(&place, &nodes).ok_or_else(|| DatasetError::Mismatch {
+        path: path.into(),
+        what: "shapes of cell_place and cell_nodes",
+        found: format!("{:?}, {:?}", place.dim(), nodes.dim()),
+        expected: "(L, 5), (L, 9)".into(),
     })
 }
 

@@ -39,7 +39,7 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
     canvas.text((GAP_PX, 6), title, BLACK);
     let note = "each map from 0 (dark) to its own maximum, printed above it; fingertip up";
     canvas.text((GAP_PX, 6 + TEXT_HEIGHT_PX), note, [110; 3]);
-    let maps = Maps::of(dataset)?;
+    let maps = Maps::read(dataset.folder(), dataset.atlas())?;
     for (row, &index) in rows.iter().enumerate() {
         let press = &presses[index];
         let shard = dataset.shard(press)?;

@@ -9,10 +9,11 @@ use crate::dataset::read_array;
 use crate::evaluate::require_same_atlas;
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::{ExportError, read, read_text};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 use ndarray_npy::{NpzReader, ReadNpzError};
 use papilla_engine::MAP_LEN;
 use papilla_engine::ladder::{Discretisation, Kind, Percentiles, Rung};
+use papilla_proto::atlas::Raster;
 use serde::Deserialize;
 use std::io::Cursor;
 use std::path::{Component, Path, PathBuf};
@@ -62,7 +63,11 @@ impl Folders {
     }
 
     /// Inputs and truths of the reference.
-    pub(super) fn reference_set(&self) -> SampleSet {
+    pub(super) fn reference_set(&self, canvas: &Canvas) -> SampleSet {
+        let shown = |raster: &Raster, values: ArrayView1<'_, f32>| {
+            let values = values.to_vec();
+            raster.pixels().iter().map(|pixel| pixel.value(&values)).collect()
+        };
         let mut set = SampleSet {
             name: SET,
             about: "not measured: no FE rungs were given".to_owned(),
@@ -75,8 +80,8 @@ impl Folders {
             for index in 0..solved.sed_j_per_m3.nrows() {
                 set.states.push(State {
                     origin: format!("{}, state {index}", solved.path.display()),
-                    pressure_pa: solved.pressure_pa.row(index).to_vec(),
-                    sed_j_per_m3: solved.sed_j_per_m3.row(index).to_vec(),
+                    pressure_pa: shown(&canvas.skin, solved.pressure_pa.row(index)),
+                    sed_j_per_m3: shown(&canvas.interface, solved.sed_j_per_m3.row(index)),
                 });
             }
         }

@@ -118,7 +118,7 @@ pub fn measure(
     let canvas = Canvas::read(&task.models)?;
     let fe = fe::Folders::read(&task.fe, &canvas)?;
     let mut sets = sets::load(&task.data, &canvas)?;
-    sets.push(fe.reference_set());
+    sets.push(fe.reference_set(&canvas));
     sets.sort_by_key(|set| SET_NAMES.iter().position(|name| *name == set.name));
     if task.quick {
         for set in &mut sets {

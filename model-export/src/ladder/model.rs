@@ -6,6 +6,7 @@ use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::{ExportError, read, read_text};
 use papilla_engine::ladder::{Kind, LatencyByEngine, Percentiles, Rung};
 use papilla_engine::{Backend, Card, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session};
+use papilla_proto::atlas::Raster;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -48,7 +49,7 @@ pub(super) fn measure(
     let zero_answer = judge.zero_answer(info)?;
     judge.hostile(info)?;
     let refused = judge.refused;
-    let maps = timed_maps(canvas, sets, info, path)?;
+    let maps = timed_maps(canvas, sets, info);
     let tract = time(model.as_ref(), path, &maps, timing)?;
     let footprint = footprint(path);
     Ok(Rung {
@@ -107,7 +108,7 @@ impl Judge<'_> {
         let mut samples = Vec::with_capacity(set.states.len());
         let [mut pressure, mut truth, mut answer] = std::array::from_fn(|_| vec![0.0; MAP_LEN]);
         for (index, state) in set.states.iter().enumerate() {
-            draw(self.canvas, state, &mut pressure, Some(&mut truth), self.path)?;
+            draw(self.canvas, state, &mut pressure, Some(&mut truth));
             if self.infer(&pressure, &mut answer)? {
                 let metrics = SampleMetrics::measure(&answer, &truth, &self.canvas.ground);
                 samples.push(metrics.ok_or_else(|| ExportError::Truth {
@@ -161,37 +162,32 @@ fn hostile_maps(most_pa: f32) -> Vec<Vec<f32>> {
     ]
 }
 
-fn draw(
-    canvas: &Canvas,
-    state: &State,
-    pressure: &mut [f32],
-    truth: Option<&mut Vec<f32>>,
-    path: &Path,
-) -> Result<(), ExportError> {
-    let failed = |source| ExportError::Atlas { path: path.to_owned(), source };
-    canvas.skin.rasterise(&state.pressure_pa, pressure).map_err(failed)?;
+/// Draws a state: overwrites both maps, 0 outside the patches.
+fn draw(canvas: &Canvas, state: &State, pressure: &mut [f32], truth: Option<&mut Vec<f32>>) {
+    let scatter = |raster: &Raster, values: &[f32], map: &mut [f32]| {
+        map.fill(0.0);
+        for (&pixel, value) in raster.indices().iter().zip(values) {
+            map[pixel as usize] = *value;
+        }
+    };
+    scatter(&canvas.skin, &state.pressure_pa, pressure);
     if let Some(truth) = truth {
-        canvas.interface.rasterise(&state.sed_j_per_m3, truth).map_err(failed)?;
+        scatter(&canvas.interface, &state.sed_j_per_m3, truth);
     }
-    Ok(())
 }
 
 /// Maps for the clock: of the first set there is, or else hostile ones.
-fn timed_maps(
-    canvas: &Canvas,
-    sets: &[SampleSet],
-    info: &ModelInfo,
-    path: &Path,
-) -> Result<Vec<Vec<f32>>, ExportError> {
+fn timed_maps(canvas: &Canvas, sets: &[SampleSet], info: &ModelInfo) -> Vec<Vec<f32>> {
     let Some(set) = sets.iter().find(|set| !set.states.is_empty()) else {
-        return Ok(hostile_maps(info.pressure_max_pa));
+        return hostile_maps(info.pressure_max_pa);
     };
     let step = set.states.len().div_ceil(TIMED_MAPS);
     let states = set.states.iter().step_by(step);
     states
         .map(|state| {
             let mut map = vec![0.0; MAP_LEN];
-            draw(canvas, state, &mut map, None, path).map(|()| map)
+            draw(canvas, state, &mut map, None);
+            map
         })
         .collect()
 }

@@ -4,13 +4,14 @@ use super::Canvas;
 use crate::ExportError;
 use crate::dataset::{Dataset, Indentation};
 use crate::evaluate::require_same_atlas;
-use papilla_engine::ladder::Set;
+use papilla_engine::{MAP_LEN, ladder::Set};
+use papilla_proto::atlas::Raster;
 use std::path::Path;
 
 /// The set `deep` takes the states pressed deeper than this, mm: beyond all training.
 pub const DEEP_MM: f32 = 2.0;
 
-/// One state: values at the vertices of the atlas.
+/// One state: values at the pixels of the atlas' patches, in the rasters' order.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Where it is from, for messages.
@@ -138,15 +139,21 @@ impl Source {
         states: &mut Vec<State>,
     ) -> Result<(), ExportError> {
         let shard = dataset.load(indentation)?;
+        let [mut on_skin, mut below] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
+        let shown = |raster: &Raster, map: &[f32]| {
+            raster.indices().iter().map(|&pixel| map[pixel as usize]).collect()
+        };
         for (index, depth_mm) in shard.depth_mm.iter().enumerate() {
             // Stored depths are rounded: 2.0 mm itself must not count as deeper.
             if self.deeper_than_mm.is_some_and(|limit| *depth_mm <= limit + 1e-4) {
                 continue;
             }
+            dataset.draw_pressure(indentation, &shard, index, &mut on_skin)?;
+            dataset.draw_sed(indentation, &shard, index, &mut below)?;
             states.push(State {
                 origin: format!("{}, sample {index}", dataset.shard_path(indentation).display()),
-                pressure_pa: shard.pressure_pa.row(index).to_vec(),
-                sed_j_per_m3: shard.sed_j_per_m3.row(index).to_vec(),
+                pressure_pa: shown(&dataset.skin, &on_skin),
+                sed_j_per_m3: shown(&dataset.interface, &below),
             });
         }
         Ok(())
