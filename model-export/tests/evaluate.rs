@@ -114,7 +114,7 @@ fn what_does_not_belong_together_is_refused() {
     for (old, new, word) in [
         ("\"train\":[0]", "\"train\":[0,1]", "both splits"),
         ("shards/1.npz", "../1.npz", "no path inside"),
-        ("\"format\":1", "\"format\":2", "format 2"),
+        ("\"format\":1", "\"format\":3", "format 3"),
         (trained.as_str(), &"1".repeat(64), "does not follow"),
     ] {
         assert!(manifest.contains(old), "{old}");
