@@ -197,6 +197,7 @@ async fn it_listens_while_its_models_are_loaded_and_measured() {
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let child = papilla(&["--models", models.path().to_str().unwrap(), "--threads", "1"])
         .args(["--bind", &address.to_string(), "--calibration-ms", "3000", "--log", "error"])
+        .args(["--rate-per-s", "0"])
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
