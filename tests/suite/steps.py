@@ -193,7 +193,7 @@ def full() -> list[Step]:
             f"cargo test --workspace --test infer --test shipped --test library --test onnxruntime "
             f"{FEATURES},papilla-tests/ort -q",
             after=("rust", "python"),
-            tests_min=26,
+            tests_min=23,
             missing=no_onnxruntime,
         ),
         Step("client-python", "the Python client", f"{client} python", ("build", "python"), 36),
