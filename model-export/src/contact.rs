@@ -269,7 +269,11 @@ impl Figures {
         let [mut pressure_pa, mut sed, mut truth] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
         let path = dataset.shard_path(indentation);
         let refused = |source| ExportError::Atlas { path: path.clone(), source };
-        dataset.skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?;
+        dataset
+            .maps
+            .raster(Patch::Skin)
+            .rasterise(&out.pressure_pa, &mut pressure_pa)
+            .map_err(refused)?;
         let failed = |source| ExportError::Engine { path: path.clone(), source };
         network.infer(&pressure_pa, &mut sed).map_err(failed)?;
         dataset.draw_sed(indentation, shard, state, &mut truth)?;

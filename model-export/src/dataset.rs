@@ -9,7 +9,7 @@ use ndarray::{Array1, Array2, Ix2, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
 use papilla_dataset::{Cells, Maps};
 use papilla_proto::{
-    atlas::{Atlas, Patch, Raster},
+    atlas::{Atlas, Patch},
     sdf::IndenterSpec,
 };
 use serde::Deserialize;
@@ -104,13 +104,10 @@ pub struct Dataset {
     manifest: Manifest,
     /// The atlas of all its maps.
     pub atlas: Atlas,
-    /// Draws pressure.
-    pub skin: Raster,
-    /// Draws SED.
-    pub interface: Raster,
     /// Where errors are taken.
     pub ground: Ground,
-    maps: Maps,
+    /// Draws pressure and SED.
+    pub maps: Maps,
 }
 
 impl Dataset {
@@ -141,10 +138,9 @@ impl Dataset {
             )));
         }
         manifest.check_identity().map_err(bad)?;
-        let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
-        let ground = Ground::new(&atlas, &interface);
         let maps = Maps::read(folder, &atlas).map_err(|error| bad(error.to_string()))?;
-        Ok(Self { folder: folder.to_owned(), manifest, atlas, skin, interface, ground, maps })
+        let ground = Ground::new(&atlas, maps.raster(Patch::Interface));
+        Ok(Self { folder: folder.to_owned(), manifest, atlas, ground, maps })
     }
 
     /// SHA-256 that names the dataset.
@@ -265,7 +261,7 @@ impl Dataset {
     /// Draws the pressure of a sample of `press` on the skin, Pa; 224 x 224.
     ///
     /// # Errors
-    /// [`ExportError::Dataset`] where a pixel lies in no cell.
+    /// [`ExportError::Dataset`] where a pixel lies in no cell, [`ExportError::Atlas`].
     pub fn draw_pressure(
         &self,
         indentation: &Indentation,
@@ -304,11 +300,11 @@ impl Dataset {
         values: &[f32],
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        let reader = self.maps.reader(patch, shard.cells.as_ref()).map_err(|error| {
-            ExportError::Dataset { path: self.shard_path(indentation), reason: error.to_string() }
-        })?;
-        reader.draw(values, map);
-        Ok(())
+        let path = || self.shard_path(indentation);
+        let reader = self.maps.reader(patch, shard.cells.as_ref());
+        let reader = reader
+            .map_err(|error| ExportError::Dataset { path: path(), reason: error.to_string() })?;
+        reader.draw(values, map).map_err(|source| ExportError::Atlas { path: path(), source })
     }
 }
 

@@ -9,7 +9,7 @@ use bench::{Bench, DEPTHS, contact, read_card};
 use papilla_engine::card::Index;
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX, ladder::Kind};
 use papilla_model_export::dataset::Dataset;
-use papilla_proto::InputStatistics;
+use papilla_proto::{InputStatistics, atlas::Patch};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -72,7 +72,7 @@ fn shipped_networks_tell_odd_maps_from_held_out_presses() {
             indentations.push(InputStatistics::of(&map));
         }
     }
-    let odd = odd_maps(dataset.skin.mask());
+    let odd = odd_maps(dataset.maps.raster(Patch::Skin).mask());
     let index = fs::read_to_string(root().join("models/index.json")).unwrap();
     for name in Index::from_json(&index).unwrap().models {
         let card = read_card(&root().join(format!("models/{name}.json")));

@@ -85,7 +85,9 @@ impl<'a> Painter<'a> {
         bits: Bits,
         path: &Path,
     ) -> Result<(), DatasetError> {
-        reader.draw(values, &mut self.pixels);
+        reader
+            .draw(values, &mut self.pixels)
+            .map_err(|source| DatasetError::Atlas { path: path.to_path_buf(), source })?;
         // Not synced one by one: index.json, written last, says all are there.
         let bytes = self.view().encode_gray(bits)?;
         Ok(std::fs::write(path, bytes).map_err(OutputError::io("write", path))?)

@@ -2,7 +2,7 @@
 
 use super::{Cells, DatasetError};
 use ndarray::{Ix1, Ix2};
-use papilla_atlas::{Atlas, MAP_LEN, Patch, Raster};
+use papilla_atlas::{Atlas, AtlasError, Patch, Raster};
 use papilla_output::OutputError;
 use papilla_output::npz::NpzArrays;
 use std::collections::HashMap;
@@ -32,8 +32,9 @@ impl Maps {
     pub fn read(folder: &Path, atlas: &Atlas) -> Result<Self, DatasetError> {
         let path = folder.join("raster.npz");
         if !path.exists() {
-            let [skin, interface] = Patch::ALL
-                .map(|patch| Pixels { raster: Raster::new(atlas, patch), place: Vec::new() });
+            let at_vertices =
+                |patch| Pixels { raster: Raster::new(atlas, patch), place: Vec::new() };
+            let [skin, interface] = Patch::ALL.map(at_vertices);
             return Ok(Self { skin, interface });
         }
         let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
@@ -117,20 +118,21 @@ impl MapReader<'_> {
     /// Overwrites a map of 224 x 224; 0 outside the patch. Where a quadratic overshoots, never
     /// negative.
     ///
+    /// # Errors
+    /// [`AtlasError::BufferLength`] if there are not as many values as vertices.
+    ///
     /// # Panics
-    /// If there are fewer values than vertices or nodes.
-    pub fn draw(&self, values: &[f32], map: &mut [f32]) {
-        map[..MAP_LEN].fill(0.0);
+    /// If there are fewer values than nodes of the cells.
+    pub fn draw(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
         if self.nodes.is_empty() {
-            for (&at, pixel) in self.raster.indices().iter().zip(self.raster.pixels()) {
-                map[at as usize] = pixel.value(values);
-            }
-            return;
+            return self.raster.rasterise(values, map);
         }
+        map.fill(0.0);
         for (&at, (nodes, weights)) in self.raster.indices().iter().zip(&self.nodes) {
             let sum: f32 = nodes.iter().zip(weights).map(|(n, w)| w * values[*n as usize]).sum();
             map[at as usize] = sum.max(0.0);
         }
+        Ok(())
     }
 }
 
@@ -168,6 +170,8 @@ impl Finder {
         None
     }
 }
+
+// The two families of `papilla_fem::element::shape`, which who reads a dataset does not compile.
 
 /// Quadratic functions of nodes at -1, 0 and 1.
 fn quadratics(x: f64) -> [f64; 3] {

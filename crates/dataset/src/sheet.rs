@@ -66,9 +66,7 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
             for (i, (quantity, values)) in fields.iter().enumerate() {
                 let corner = (x + i * (CELL_PX + GAP_PX), y);
                 let before = if i == 0 { format!("{depth_mm} mm ") } else { String::new() };
-                let mm_per_px = f64::from(dataset.atlas().mm_per_px());
-                let label = (*quantity, before.as_str());
-                cell(&mut canvas, &readers[i], values, label, mm_per_px, corner);
+                cell(&mut canvas, dataset, &readers[i], *quantity, values, corner, &before)?;
             }
         }
     }
@@ -77,19 +75,24 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
 
 fn cell(
     canvas: &mut Canvas,
+    dataset: &Dataset,
     reader: &MapReader<'_>,
+    quantity: Quantity,
     values: &[f32],
-    (quantity, before): (Quantity, &str),
-    mm_per_px: f64,
     (x, y): (usize, usize),
-) {
+    before: &str,
+) -> Result<(), DatasetError> {
     let mut pixels = vec![0.0; MAP_LEN];
-    reader.draw(values, &mut pixels);
-    let mask = reader.mask();
+    reader.draw(values, &mut pixels).map_err(|source| DatasetError::Atlas {
+        path: dataset.folder().join("atlas.json"),
+        source,
+    })?;
+    let (mask, mm_per_px) = (reader.mask(), f64::from(dataset.atlas().mm_per_px()));
     let white = white_of(&pixels);
     let view = MapView { quantity, pixels: &pixels, mask, mm_per_px, white };
     canvas.text((x, y), &format!("{before}{}", quantity.label(white)), BLACK);
     view.draw(canvas, (x, y + TEXT_HEIGHT_PX + 2), CELL_PX);
+    Ok(())
 }
 
 #[cfg(test)]

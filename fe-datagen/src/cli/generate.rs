@@ -10,7 +10,7 @@ use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Leaf, Order, Vertices};
 use papilla_fingertip::scene::Motion;
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::{Body, SimulationError};
+use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_validation::acceptance;
@@ -53,10 +53,7 @@ impl IndentationSolver for OneMesh<'_> {
             offset_mm: indentation.offset_mm,
             ..self.approaches[indentation.candidate].clone()
         };
-        let keep = &mut |_, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
-            Ok(acceptance::sample(record))
-        };
-        pressed(self.body, &mut self.solver, &approach, indentation, keep)
+        pressed(self.body, &mut self.solver, &approach, indentation, None)
     }
 }
 
@@ -74,16 +71,10 @@ impl IndentationSolver for OwnMesh<'_> {
             offset_mm: indentation.offset_mm,
             ..Motion::to_depth(deepest_mm, 1, indentation.pose)
         };
-        let Simulation { body, approach, .. } = Simulation::new(&scene)?;
-        let cells = body.patch.as_ref().and_then(|p| p.patch.vertices.as_ref()).map(cells);
-        let cells = Arc::new(cells.ok_or("a fingertip has a patch")?);
-        let keep = &mut |_, solver: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
-            let [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = body.fields_at_nodes(solver)?;
-            let cells = Some(cells.clone());
-            let sample = acceptance::sample(record);
-            Ok(Sample { cells, pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa, ..sample })
-        };
-        pressed(&body, &mut body.solver(Options::default())?, &approach, indentation, keep)
+        let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
+        let vertices = body.read_at_nodes().ok_or("a fingertip has a patch")?;
+        let cells = Arc::new(cells(&vertices));
+        pressed(&body, &mut body.solver(Options::default())?, &approach, indentation, Some(&cells))
     }
 }
 
@@ -98,25 +89,21 @@ fn cells(vertices: &Vertices) -> Cells {
     }
 }
 
-/// What is kept of a state.
-type Keep<'a> = &'a mut dyn FnMut(
-    usize,
-    &Solver<'_>,
-    &IncrementRecord,
-    &StepReport,
-) -> Result<Sample, SimulationError>;
-
 fn pressed(
     body: &Body,
     solver: &mut Solver<'_>,
     approach: &Approach,
     indentation: &Indentation,
-    keep: Keep<'_>,
+    cells: Option<&Arc<Cells>>,
 ) -> Result<Vec<Sample>, BoxError> {
+    let keep = &mut |_, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| Sample {
+        cells: cells.cloned(),
+        ..acceptance::sample(record)
+    };
     let drive = Drive::Depths(indentation.depths_mm.clone());
     let found = body.press_balanced(solver, approach, &drive, BALANCE_RELATIVE_MAX, keep);
     found.pressed?;
-    Ok(found.kept.into_iter().collect::<Result<_, _>>()?)
+    Ok(found.kept)
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {

@@ -5,7 +5,7 @@ use crate::ExportError;
 use crate::dataset::{Dataset, Indentation};
 use crate::evaluate::require_same_atlas;
 use papilla_engine::{MAP_LEN, ladder::Set};
-use papilla_proto::atlas::Raster;
+use papilla_proto::atlas::Patch;
 use std::path::Path;
 
 /// The set `deep` takes the states pressed deeper than this, mm: beyond all training.
@@ -140,8 +140,8 @@ impl Source {
     ) -> Result<(), ExportError> {
         let shard = dataset.load(indentation)?;
         let [mut on_skin, mut below] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
-        let shown = |raster: &Raster, map: &[f32]| {
-            raster.indices().iter().map(|&pixel| map[pixel as usize]).collect()
+        let shown = |patch, map: &[f32]| {
+            dataset.maps.raster(patch).indices().iter().map(|&pixel| map[pixel as usize]).collect()
         };
         for (index, depth_mm) in shard.depth_mm.iter().enumerate() {
             // Stored depths are rounded: 2.0 mm itself must not count as deeper.
@@ -152,8 +152,8 @@ impl Source {
             dataset.draw_sed(indentation, &shard, index, &mut below)?;
             states.push(State {
                 origin: format!("{}, sample {index}", dataset.shard_path(indentation).display()),
-                pressure_pa: shown(&dataset.skin, &on_skin),
-                sed_j_per_m3: shown(&dataset.interface, &below),
+                pressure_pa: shown(Patch::Skin, &on_skin),
+                sed_j_per_m3: shown(Patch::Interface, &below),
             });
         }
         Ok(())

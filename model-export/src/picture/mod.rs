@@ -9,7 +9,7 @@ use crate::evaluate::{Maps, Sample};
 use canvas::Canvas;
 use colour::Scale;
 use image::RgbImage;
-use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+use papilla_proto::{MAP_LEN, MAP_SIDE_PX, atlas::Patch};
 use std::path::Path;
 
 /// Pixels of the picture for one pixel of a map.
@@ -42,7 +42,7 @@ pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> R
     // Truth and prediction share a scale: equal colours are equal values.
     let sed_max = greatest(&truth).max(greatest(&predicted));
     let (pressure_max, error_max) = (greatest(&pressure), greatest(&error));
-    let inside = dataset.interface.mask();
+    let inside = dataset.maps.raster(Patch::Interface).mask();
     let panel = |title: &str, values, mask, ends, unit, scale| Panel {
         title: title.to_owned(),
         values,
@@ -52,7 +52,14 @@ pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> R
         scale,
     };
     let panels = [
-        panel("pressure", pressure, dataset.skin.mask(), [0.0, pressure_max], "kPa", Scale::Rising),
+        panel(
+            "pressure",
+            pressure,
+            dataset.maps.raster(Patch::Skin).mask(),
+            [0.0, pressure_max],
+            "kPa",
+            Scale::Rising,
+        ),
         panel("SED, finite elements", truth, inside, [0.0, sed_max], "J/m3", Scale::Rising),
         panel("SED, model", predicted, inside, [0.0, sed_max], "J/m3", Scale::Rising),
         panel(

@@ -49,11 +49,10 @@ impl Content {
         let mut maps_pa = Vec::new();
         for indentation in dataset.indentations(split)? {
             let shard = dataset.load(indentation)?;
-            for row in shard.pressure_pa.rows() {
-                if maps_pa.len() == count {
-                    break;
-                }
-                maps_pa.push(draw(&dataset.skin, &row.to_vec())?);
+            for state in 0..shard.depth_mm.len().min(count - maps_pa.len()) {
+                let mut map_pa = vec![0.0; MAP_LEN];
+                dataset.draw_pressure(indentation, &shard, state, &mut map_pa)?;
+                maps_pa.push(map_pa);
             }
         }
         let source = format!("split {split} of {}", folder.display());

@@ -129,7 +129,7 @@ impl<'a> Solver<'a> {
     /// than `relative`, a dozen at most. The present equilibrium stays as it is.
     ///
     /// Does nothing where work is lost (friction, viscosity), since the way there matters then.
-    pub fn mend_work(&mut self, known: &[Mark], relative: f64) -> Effort {
+    pub fn mend_work(&mut self, known: Vec<Mark>, relative: f64) -> Effort {
         const PROBES_MAX: usize = 12;
         let first = self.newton.effort;
         let is_lost = self.loading.friction > 0.0 || self.newton.problem.history_layout.is_some();
@@ -145,7 +145,8 @@ impl<'a> Solver<'a> {
             return Effort::default();
         }
         let (end, current) = (self.mark(), self.newton.current.clone());
-        let mut known: Vec<State> = known.iter().chain([&end]).map(|m| m.state.clone()).collect();
+        let mut known: Vec<State> = known.into_iter().map(|m| m.state).collect();
+        known.push(end.state.clone());
         for _ in 0..PROBES_MAX {
             let Some(middle) = doubtful(&self.work) else { break };
             let right = known.partition_point(|s| s.fraction < middle);

@@ -3,7 +3,7 @@
 use super::record::{Checks, IncrementRecord};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
 use crate::indenter::IndenterError;
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, build};
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, Vertices, build};
 use crate::mesh::grading::Contact;
 use crate::mesh::section::SectionMeshError;
 use crate::scene::error::{indenter_field, material_field};
@@ -254,6 +254,12 @@ impl Body {
         })
     }
 
+    /// From now on records hold what is known at the nodes of the patch, not at the atlas' vertices;
+    /// gives how vertices were read off them, if they are not nodes.
+    pub fn read_at_nodes(&mut self) -> Option<Vertices> {
+        self.patch.as_mut()?.patch.vertices.take()
+    }
+
     /// The atlas of the body's patch; `None` for a body without one and for a section.
     ///
     /// # Errors
@@ -369,17 +375,6 @@ impl Body {
             },
             seconds: 0.0,
         })
-    }
-
-    /// Pressure at the patch's skin nodes and SED of dermis and epidermis below, MPa, at the
-    /// solver's equilibrium; empty without a patch.
-    ///
-    /// # Errors
-    /// [`SimulationError::Inverted`] where SED cannot be read.
-    pub fn fields_at_nodes(&self, solver: &Solver<'_>) -> Result<[Vec<f64>; 3], SimulationError> {
-        let Some(p) = &self.patch else { return Ok(Default::default()) };
-        let skin = &self.problem.mesh.surfaces[&self.contact];
-        self.nodal_fields(solver, p, &solver.pressure_mpa(skin))
     }
 
     fn nodal_fields(

@@ -152,14 +152,15 @@ impl Body {
             let clock = Instant::now();
             let at = |source| SimulationError::Solve { depth_mm, source };
             let mut effort = Effort::default();
-            let mut known = vec![solver.mark()];
+            let mark = |solver: &Solver<'_>| energy_vs_work_max.map(|_| solver.mark());
+            let mut known: Vec<_> = mark(solver).into_iter().collect();
             for between in path_mm(depths_mm, i, refinement, self.graded) {
                 effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
-                known.push(solver.mark());
+                known.extend(mark(solver));
             }
             let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
             if let Some(limit) = energy_vs_work_max {
-                report.mending = solver.mend_work(&known, limit);
+                report.mending = solver.mend_work(known, limit);
                 effort = effort.plus(&report.mending);
             }
             report.effort = report.effort.plus(&effort);
