@@ -87,7 +87,7 @@ impl StatsReport {
         let c = &self.worst_checks;
         writeln!(f, "\nworst of the checks{:>44} {:>10}", "value", "limit")?;
         let rows = [
-            ("residual / internal force", c.residual_relative, RESIDUAL_RELATIVE_MAX),
+            ("residual / reference", c.residual_relative, RESIDUAL_RELATIVE_MAX),
             (
                 "contact beyond the recorded skin",
                 c.contact_force_vs_pressure_integral,

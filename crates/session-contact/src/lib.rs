@@ -72,7 +72,7 @@ fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
 impl Hand {
     /// The fingers that a hello of version 3 announces.
     ///
-    /// Takes some milliseconds, and up to 11 MB a finger once it is pressed all over.
+    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over.
     ///
     /// # Errors
     /// A member is unusable or missing; the problem names it.

@@ -25,11 +25,11 @@ macro_rules! choice {
 choice! {
     /// Named mesh densities.
     Density for fingertip::Density {
-        /// About 10 thousand unknowns: for tests and a first look.
+        /// About 12 thousand unknowns: for tests and a first look.
         Coarse,
-        /// About 60 thousand unknowns: the campaigns' density.
+        /// About 54 thousand unknowns: the campaigns' density.
         Medium,
-        /// About 200 thousand unknowns: the reference.
+        /// About 185 thousand unknowns: the reference.
         Fine,
     }
 }

@@ -72,7 +72,7 @@ impl IndentationSolver for OwnMesh<'_> {
             ..Motion::to_depth(deepest_mm, 1, indentation.pose)
         };
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
-        let vertices = body.read_at_nodes().ok_or("a fingertip has a patch")?;
+        let vertices = body.read_on_cells().ok_or("a fingertip has a patch")?;
         let cells = Arc::new(cells(&vertices));
         pressed(&body, &mut body.solver(Options::default())?, &approach, indentation, Some(&cells))
     }

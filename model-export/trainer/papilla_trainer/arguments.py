@@ -158,7 +158,7 @@ def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
 def _train_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
     add = parser.add_argument
-    add("--network", default="s1-base8", help="s1-baseN or face-... (s1-base8)")
+    add("--network", default="s1-base8", help="s1-baseN, map-... or face-... (s1-base8)")
     add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
     add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
     add("--epochs", type=int, default=40, help="passes over the training indentations (40)")
@@ -188,7 +188,7 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         choices=("auto", "mse", "relative"),
         default="auto",
         help="mse: the U-Net paper's, of max-normalised maps; relative: squared relative L2 of "
-        "each sample, the far field once more (auto: mse for s1-*, relative for face-*)",
+        "each sample, the far field once more (auto: mse for s1-*, else relative)",
     )
     add("--far-weight", type=float, default=0.2, help="of the far field in `relative` (0.2)")
     add("--operator", metavar="FILE.npz", help="linear operator that a face network starts from")

@@ -13,6 +13,7 @@ import torch
 from papilla_trainer.errors import RunError, UsageError
 from papilla_trainer.face_network import FaceSpec, parse_face_network
 from papilla_trainer.losses import LOSSES
+from papilla_trainer.map_network import MapSpec, parse_map_network
 from papilla_trainer.network import NetworkSpec, parse_network
 
 PRECISIONS = ("f32", "bf16")
@@ -63,10 +64,12 @@ class TrainConfig:
             raise UsageError(f"--threads must be at least 1, not {self.threads}")
 
     @property
-    def spec(self) -> NetworkSpec | FaceSpec:
+    def spec(self) -> NetworkSpec | FaceSpec | MapSpec:
         """The network asked for."""
         if self.network.startswith("face-"):
             return parse_face_network(self.network)
+        if self.network.startswith("map-"):
+            return parse_map_network(self.network)
         return parse_network(self.network)
 
     @property
@@ -74,7 +77,7 @@ class TrainConfig:
         """The loss in use: the U-Net paper's for its network, else what models are judged by."""
         if self.loss != "auto":
             return self.loss
-        return "relative" if isinstance(self.spec, FaceSpec) else "mse"
+        return "mse" if isinstance(self.spec, NetworkSpec) else "relative"
 
     def validation_count(self, train_presses: int) -> int:
         """How many training indentations to set aside: as asked, else a tenth (at least one)."""

@@ -16,6 +16,7 @@ from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
 from papilla_trainer.face_network import FaceSpec
 from papilla_trainer.files import write_json
+from papilla_trainer.map_network import MapSpec, ServedMapModel
 from papilla_trainer.metrics import F32, METRICS, evaluate, summarise
 from papilla_trainer.network import ServedModel
 from papilla_trainer.report import write_csv
@@ -33,6 +34,8 @@ def served_model(checkpoint: Checkpoint, weights: str = "best") -> nn.Module:
     network, served = trained_network(spec, chosen), checkpoint.served
     if isinstance(spec, FaceSpec):
         return ServedVertexModel(network, MapFrame(served.frame)).eval()
+    if isinstance(spec, MapSpec):
+        return ServedMapModel(network, served.mask.float()).eval()
     model = ServedModel(
         network, served.mask.float(), served.pressure_max_pa, served.sed_max_j_per_m3
     )

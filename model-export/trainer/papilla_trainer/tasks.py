@@ -1,7 +1,8 @@
-"""What a run trains: the network, its samples and its loss, for maps (U-Net) or for vertices."""
+"""What a run trains: the network, its samples and its loss, for maps or for vertices."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,24 +18,26 @@ from papilla_trainer.face_layout import FaceLayout
 from papilla_trainer.face_network import FaceNet, FaceSpec
 from papilla_trainer.linear_operator import Operator
 from papilla_trainer.losses import Loss, make_loss
+from papilla_trainer.map_network import MapNet, MapSpec
 from papilla_trainer.network import NetworkSpec, S1UNet, build_network
 from papilla_trainer.vertex_served import MapFrame
 
 
 @dataclass(frozen=True)
 class Samples:
-    """On the device: normalised maps ``[N, 1, 224, 224]``, or values ``[N, V]`` in Pa and J/m3."""
+    """On the device: maps ``[N, 1, 224, 224]`` or values ``[N, V]``, in Pa and J/m3.
+
+    The U-Net's are divided by the dataset's maxima, as in its paper.
+    """
 
     inputs: Tensor
     targets: Tensor
 
     @staticmethod
-    def of(maps: Maps, dataset: Dataset, device: torch.device) -> Samples:
-        """Divide by the dataset's maxima (the U-Net paper's normalisation)."""
-        inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / dataset.pressure_max_pa)
-        targets = (
-            torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / dataset.sed_max_j_per_m3)
-        )
+    def of(maps: Maps, device: torch.device, units: tuple[float, float] = (1.0, 1.0)) -> Samples:
+        """Maps in units of so many Pa and J/m3."""
+        inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / units[0])
+        targets = torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / units[1])
         return Samples(inputs.to(device), targets.to(device))
 
     def __len__(self) -> int:
@@ -60,14 +63,14 @@ def make_task(
 ) -> Task:
     """Load the indentations named, and no others, and build the network."""
     spec = config.spec
-    load = _load_vertices if isinstance(spec, FaceSpec) else _load_maps
+    load = _loader(spec)
     fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
     if isinstance(spec, FaceSpec):
         network = fresh_face_network(dataset, config, fit.inputs.cpu())
         weights = torch.from_numpy(pixels_of_vertices(dataset))
     else:
-        network = build_network(spec, config.seed).to(memory_format=torch.channels_last)
+        network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)
         weights = torch.from_numpy(dataset.interface.mask())
     loss = make_loss(config.loss_name, weights.to(device), config.far_weight)
     return Task(network.to(device), fit, validation, loss)
@@ -90,13 +93,26 @@ def fresh_face_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tenso
     return network
 
 
-def trained_network(spec: NetworkSpec | FaceSpec, weights: dict[str, Tensor]) -> nn.Module:
+def fresh_network(spec: NetworkSpec | MapSpec, seed: int) -> nn.Module:
+    """A network on maps; the same seed gives the same weights."""
+    if isinstance(spec, NetworkSpec):
+        return build_network(spec, seed)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return MapNet(spec)
+
+
+def trained_network(
+    spec: NetworkSpec | FaceSpec | MapSpec, weights: dict[str, Tensor]
+) -> nn.Module:
     """A network that holds these weights."""
-    network = (
-        FaceNet(spec, FaceLayout.of_weights(weights))
-        if isinstance(spec, FaceSpec)
-        else S1UNet(spec.base)
-    )
+    network: nn.Module
+    if isinstance(spec, FaceSpec):
+        network = FaceNet(spec, FaceLayout.of_weights(weights))
+    elif isinstance(spec, MapSpec):
+        network = MapNet(spec)
+    else:
+        network = S1UNet(spec.base)
     network.load_state_dict(weights)
     return network
 
@@ -115,8 +131,21 @@ def pixels_of_vertices(dataset: Dataset) -> F32:
     return counts.astype(np.float32)
 
 
+def _loader(
+    spec: NetworkSpec | FaceSpec | MapSpec,
+) -> Callable[[Dataset, list[int], torch.device], Samples]:
+    if isinstance(spec, FaceSpec):
+        return _load_vertices
+    return _load_normalised if isinstance(spec, NetworkSpec) else _load_maps
+
+
+def _load_normalised(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
+    units = (dataset.pressure_max_pa, dataset.sed_max_j_per_m3)
+    return Samples.of(dataset.load(ids), device, units)
+
+
 def _load_maps(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
-    return Samples.of(dataset.load(ids), dataset, device)
+    return Samples.of(dataset.load(ids), device)
 
 
 def _load_vertices(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:

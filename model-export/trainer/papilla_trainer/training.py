@@ -18,6 +18,7 @@ from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
 from papilla_trainer.dataset import Dataset, fewer, validation_split
 from papilla_trainer.errors import RunError, TrainerError
 from papilla_trainer.face_network import FaceNet
+from papilla_trainer.map_network import MapNet, mirrored
 from papilla_trainer.report import write_history
 from papilla_trainer.tasks import frame_of, make_task
 
@@ -59,6 +60,7 @@ class Trainer:
         self.network, self.loss = task.network, task.loss
         self.fit_samples, self.validation = task.fit, task.validation
         self.on_vertices = isinstance(self.network, FaceNet)
+        self.on_pixels = isinstance(self.network, MapNet)
         self.rates = _rates(self.network, config.base_rate)
         self.optimizer = torch.optim.Adam(
             [{"params": params} for _, params in self.rates], lr=config.learning_rate, fused=True
@@ -107,11 +109,15 @@ class Trainer:
         for chosen in self._batches(epoch):
             inputs = self.fit_samples.inputs[chosen]
             targets = self.fit_samples.targets[chosen]
+            if self.on_pixels:
+                # Every other sample of a batch as in the mirror: another choice in each epoch.
+                inputs = torch.cat([inputs[::2], mirrored(inputs[1::2])])
+                targets = torch.cat([targets[::2], mirrored(targets[1::2])])
             self.optimizer.zero_grad()
             loss = self.loss(self._forward(inputs), targets)
             loss.backward()
-            if self.on_vertices:
-                # Squares of squares: a first step too far would throw the operator away.
+            if self.on_vertices or self.on_pixels:
+                # Squares of squares: a first step too far would throw everything away.
                 torch.nn.utils.clip_grad_norm_(self.network.parameters(), _LARGEST_GRADIENT)
             self.optimizer.step()
             total += loss.item() * len(chosen)

@@ -26,11 +26,11 @@ pub use super::patch::{Patch, Vertices};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Density {
-    /// About 10 thousand unknowns: for tests and a first look.
+    /// About 12 thousand unknowns: for tests and a first look.
     Coarse,
-    /// About 60 thousand unknowns: the campaigns' density.
+    /// About 54 thousand unknowns: the campaigns' density.
     Medium,
-    /// About 200 thousand unknowns: the reference.
+    /// About 185 thousand unknowns: the reference.
     Fine,
 }
 

@@ -1,0 +1,210 @@
+"""Networks from maps of pressure to maps of SED, on blocks of pixels at three resolutions.
+
+As on faces, strain is linear in pressure to first order and SED a sum of squares. At every pixel a
+network forms C components e, linear in the pressure, corrects them for finite strain, and answers
+their squared length: never negative, and zero without pressure, for there is no bias anywhere.
+
+Two by two pixels are a block: its four pressures are channels, its four times C components too. The
+linear map adds three levels, of blocks of 2, 4 and 8 pixels, each a convolution over K by K blocks
+with weights that vary smoothly over the finger, and a global map of low rank on pixels of 8. Below
+the skin the fine part of a pressure is felt nearby alone, so few blocks do. What differs between
+bone and tip, the global map knows.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from papilla_trainer.errors import UsageError
+from papilla_trainer.face_network import PRESSURE_UNIT_PA, SED_UNIT_J_PER_M3
+from papilla_trainer.raster import SIDE_PX
+
+_NAME = re.compile(
+    r"map-c(?P<components>\d+)-k(?P<kernel>\d+)-r(?P<rank>\d+)(?:-h(?P<hidden>\d+))?"
+)
+# Pixels of a block.
+_BLOCK = 4
+_LEVELS = 3
+# Numbers of `_place`.
+_PLACES = 5
+
+
+@dataclass(frozen=True)
+class MapSpec:
+    """What decides a map network's shape.
+
+    ``components``: C; ``kernel``: K, odd; ``rank``: of the global map; ``hidden``: width of the
+    correction at each block (0: none).
+    """
+
+    components: int
+    kernel: int
+    rank: int
+    hidden: int = 0
+    kind: str = "map_net"
+
+    @property
+    def name(self) -> str:
+        """The name that `--network` reads."""
+        name = f"map-c{self.components}-k{self.kernel}-r{self.rank}"
+        return name + (f"-h{self.hidden}" if self.hidden else "")
+
+    def as_json(self) -> dict[str, Any]:
+        """The form that the model's metadata carry."""
+        return asdict(self)
+
+
+def parse_map_network(name: str) -> MapSpec:
+    """Read ``map-cC-kK-rR[-hH]``."""
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise UsageError(
+            f"unknown network '{name}': give map-cC-kK-rR[-hH] (components, blocks across a "
+            "convolution, rank of the global map, width of the correction), e.g. map-c6-k5-r32-h16"
+        )
+    number = {key: int(value) for key, value in match.groupdict().items() if value is not None}
+    if number["kernel"] % 2 == 0 or 0 in number.values():
+        raise UsageError(f"--network {name}: K must be odd and no number may be 0")
+    return MapSpec(**number)
+
+
+class Level(nn.Module):
+    """Components on blocks of one size, from their pressures and from those of the next size up."""
+
+    place: Tensor
+
+    def __init__(self, spec: MapSpec, side: int) -> None:
+        super().__init__()
+        channels = _BLOCK * spec.components
+        self.near = _convolution(_BLOCK, channels, spec.kernel)
+        self.above = _convolution(spec.components, channels, 3)
+        nn.init.normal_(self.near.weight, std=0.3 / (_BLOCK * spec.kernel**2) ** 0.5)
+        # At first a block's pixels have what their place has in the blocks above.
+        nn.init.zeros_(self.above.weight)
+        with torch.no_grad():
+            for channel in range(channels):
+                self.above.weight[channel, channel // _BLOCK, 1, 1] = 1.0
+        self.over_finger = nn.Parameter(torch.zeros(channels, _PLACES))
+        self.register_buffer("place", _place(side), persistent=False)
+
+    def forward(self, blocks: Tensor, above: Tensor) -> Tensor:
+        """``[N, 4, n, n]`` and ``[N, C, n, n]`` to ``[N, 4 C, n, n]``."""
+        side = self.place.shape[-1]
+        gain = 1.0 + (self.over_finger @ self.place.flatten(1)).reshape(1, -1, side, side)
+        linear: Tensor = self.near(blocks) * gain + self.above(above)
+        return linear
+
+
+class Correction(nn.Module):
+    """What finite strain adds at a block, from its components and pressures.
+
+    To lowest order it is quadratic in them, as it should be; for large ones it is linear.
+    """
+
+    place: Tensor
+
+    def __init__(self, spec: MapSpec) -> None:
+        super().__init__()
+        channels = _BLOCK * spec.components
+        inputs = channels + _BLOCK
+        self.value = _convolution(inputs, spec.hidden, 1)
+        self.gate = _convolution(inputs, spec.hidden, 1)
+        self.out = _convolution(spec.hidden, channels, 1)
+        for layer in (self.value, self.gate):
+            nn.init.normal_(layer.weight, std=inputs**-0.5)
+        nn.init.zeros_(self.out.weight)
+        self.over_finger = nn.Parameter(torch.zeros(spec.hidden, _PLACES))
+        self.register_buffer("place", _place(SIDE_PX // 2), persistent=False)
+
+    def forward(self, components: Tensor, blocks: Tensor) -> Tensor:
+        """``[N, 4 C, n, n]`` and ``[N, 4, n, n]`` to what is added to the components."""
+        inputs = torch.cat([components, blocks], dim=1)
+        side = self.place.shape[-1]
+        gain = 1.0 + (self.over_finger @ self.place.flatten(1)).reshape(1, -1, side, side)
+        added: Tensor = self.out(self.value(inputs) * self.gate(inputs).clamp(-1.0, 1.0) * gain)
+        return added
+
+
+class MapNet(nn.Module):
+    """``[N, 1, 224, 224]`` Pa to ``[N, 1, 224, 224]`` J/m3, >= 0."""
+
+    def __init__(self, spec: MapSpec) -> None:
+        super().__init__()
+        self.spec = spec
+        sides = [SIDE_PX >> level for level in range(1, _LEVELS + 1)]
+        self.levels = nn.ModuleList(Level(spec, side) for side in sides)
+        self.coarse_side = sides[-1]
+        pixels = self.coarse_side**2
+        self.reach_in = nn.Parameter(torch.randn(pixels, spec.rank) / pixels**0.5)
+        self.reach_out = nn.Parameter(
+            torch.randn(spec.rank, spec.components * pixels) * 0.05 / spec.rank**0.5
+        )
+        self.correction = Correction(spec) if spec.hidden else None
+
+    def forward(self, pressure_pa: Tensor) -> Tensor:
+        """Maps of pressure to maps of SED, also where the interface is not."""
+        blocks = functional.pixel_unshuffle(pressure_pa * (1.0 / PRESSURE_UNIT_PA), 2)
+        components = self._linear(blocks)
+        if self.correction is not None:
+            components = components + self.correction(components, blocks)
+        squares = components * components
+        shape = (-1, self.spec.components, _BLOCK, *squares.shape[2:])
+        sed = squares.reshape(shape).sum(dim=1)
+        return functional.pixel_shuffle(sed, 2) * SED_UNIT_J_PER_M3
+
+    def _linear(self, finest: Tensor) -> Tensor:
+        """Components on the finest blocks."""
+        blocks = [finest]
+        for _ in range(1, _LEVELS):
+            blocks.append(functional.pixel_unshuffle(_mean(blocks[-1]), 2))
+        coarse = _mean(blocks[-1]).flatten(1)
+        shape = (-1, self.spec.components, self.coarse_side, self.coarse_side)
+        above = ((coarse @ self.reach_in) @ self.reach_out).reshape(shape)
+        components = above
+        for level, own in zip(reversed(self.levels), reversed(blocks), strict=True):
+            components = level(own, above)
+            above = functional.pixel_shuffle(components, 2)
+        return components
+
+
+class ServedMapModel(nn.Module):
+    """The graph that is exported: blank outside the interface patch."""
+
+    mask: Tensor
+
+    def __init__(self, network: nn.Module, mask: Tensor) -> None:
+        """``mask``: float32 ``[224, 224]``, 1 on the interface patch and 0 outside."""
+        super().__init__()
+        self.network = network
+        self.register_buffer("mask", mask[None, None].contiguous())
+
+    def forward(self, pressure_pa: Tensor) -> Tensor:
+        """``[N, 1, 224, 224]`` Pa to ``[N, 1, 224, 224]`` J/m3."""
+        sed: Tensor = self.network(pressure_pa) * self.mask
+        return sed
+
+
+def mirrored(maps: Tensor) -> Tensor:
+    """Maps ``[..., 224, 224]`` of the mirror image: the middle column is the finger's axis."""
+    return maps.flip(-1)
+
+
+def _convolution(channels_in: int, channels_out: int, kernel: int) -> nn.Conv2d:
+    return nn.Conv2d(channels_in, channels_out, kernel, padding=kernel // 2, bias=False)
+
+
+def _mean(blocks: Tensor) -> Tensor:
+    return blocks.mean(dim=1, keepdim=True)
+
+
+def _place(side: int) -> Tensor:
+    """``[5, side, side]``: smooth numbers of size one, even in the mirror."""
+    at = (torch.arange(side) + 0.5) / side * 2.0 - 1.0
+    y, x = torch.meshgrid(at, at, indexing="ij")
+    return torch.stack([y, x * x - 0.5, y * y - 0.5, x * x * y, (y * y - 0.5) * y])
