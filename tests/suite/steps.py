@@ -198,9 +198,10 @@ def full() -> list[Step]:
         ),
         Step("client-python", "the Python client", f"{client} python", ("build", "python"), 36),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build",), 33),
+        Step("client-c", "the native library from C and C++", f"{client} c", ("build",), 20),
         Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 33),
         Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 36),
-        Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 60),
+        Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 80),
         Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/godot/generate --check"),
         Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 33),
         Step(
@@ -216,7 +217,7 @@ def full() -> list[Step]:
             "docs-clients",
             "the clients' pages as written",
             "clients/docs-test",
-            ("client-rust", "client-python", "client-cpp"),
+            ("client-rust", "client-python", "client-cpp", "client-c"),
         ),
         Step(
             "calculix",
@@ -272,9 +273,10 @@ def long() -> list[Step]:
         ),
         Step(
             "sanitizers",
-            "the C++ client under the thread, address and undefined-behaviour sanitizers",
-            "clients/test cpp-sanitizers",
-            after=("client-cpp",),
+            "the C++ client under the thread, address and undefined-behaviour sanitizers, the native library "
+            "under the last two",
+            "clients/test cpp-sanitizers c-sanitizers",
+            after=("client-cpp", "client-c"),
             tests_min=54,
         ),
         Step(
