@@ -78,6 +78,11 @@ def no_onnxruntime() -> str | None:
     return "no ONNX Runtime here: pip could not install it"
 
 
+def no_cmake() -> str | None:
+    there = shutil.which("cmake") and shutil.which("pkg-config")
+    return None if there else "no CMake and pkg-config here: apt install cmake pkg-config"
+
+
 def no_nightly() -> str | None:
     command = ["rustup", "run", "nightly", "rustc", "--version"]
     if shutil.which("rustup") and subprocess.run(command, capture_output=True, check=False).returncode == 0:
@@ -212,6 +217,21 @@ def full() -> list[Step]:
             33,
             missing=no_godot4,
         ),
+        Step(
+            "client-packages",
+            "wheel, npm package, Unity, Godot and Unreal folders, installed and used from there",
+            "clients/packages-test python npm unity addons",
+            after=("build", "python", "node"),
+            tests_min=4,
+        ),
+        Step(
+            "client-cmake",
+            "find_package(Papilla) and pkg-config, installed and used from there",
+            "clients/packages-test cmake",
+            after=("build",),
+            tests_min=4,
+            missing=no_cmake,
+        ),
         Step("client-gltf", "the atlas as glTF", f"{client} gltf", ("build", "node"), 1),
         Step(
             "docs-clients",
@@ -278,6 +298,13 @@ def long() -> list[Step]:
             "clients/test cpp-sanitizers c-sanitizers",
             after=("client-cpp", "client-c"),
             tests_min=54,
+        ),
+        Step(
+            "client-crates",
+            "the Rust client and what it is built on, compiled from their packages",
+            "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS clients/packages-test crates",
+            after=("doc",),
+            tests_min=1,
         ),
         Step(
             "deny",
