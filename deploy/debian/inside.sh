@@ -50,7 +50,8 @@ for page in papilla-server.1 papilla-server-check.1; do
 done
 check "bash completes" bash -c '. /usr/share/bash-completion/completions/papilla-server
   COMP_WORDS=(papilla-server --max-s) COMP_CWORD=1 COMP_LINE="papilla-server --max-s"
-  _papilla-server papilla-server --max-s papilla-server; [[ ${COMPREPLY[*]} == *--max-sessions* ]]'
+  complete=$(complete -p papilla-server); complete=${complete#*-F }
+  ${complete%% *} papilla-server --max-s papilla-server; [[ ${COMPREPLY[*]} == *--max-sessions* ]]'
 start
 stop
 echo 'rate_per_s = 500' >> /etc/papilla/papilla.toml
