@@ -78,6 +78,16 @@ def no_onnxruntime() -> str | None:
     return "no ONNX Runtime here: pip could not install it"
 
 
+def no_musl() -> str | None:
+    if os.geteuid() == 0 and shutil.which("musl-gcc") and shutil.which("dpkg"):
+        return None
+    return "needs root, dpkg and musl-gcc: apt install musl-tools"
+
+
+def no_buildah() -> str | None:
+    return no_musl() or (None if shutil.which("buildah") else "no buildah here: apt install buildah uidmap")
+
+
 def no_cmake() -> str | None:
     there = shutil.which("cmake") and shutil.which("pkg-config")
     return None if there else "no CMake and pkg-config here: apt install cmake pkg-config"
@@ -269,6 +279,30 @@ def long() -> list[Step]:
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS cargo build --release\n"
             '"$TARGET/release/papilla-server" check',
             after=("doc",),
+        ),
+        Step(
+            "debian",
+            "the Debian package, installed, started, upgraded and purged",
+            "deploy/debian/test",
+            after=("release",),
+            tests_min=32,
+            missing=no_musl,
+        ),
+        Step(
+            "container",
+            "the image FROM scratch, built without root, and a map rendered in it",
+            "deploy/container/test",
+            after=("debian",),
+            tests_min=1,
+            missing=no_buildah,
+        ),
+        Step(
+            "archive",
+            "the release archive, made twice, unpacked and used",
+            "deploy/release/test",
+            after=("container",),
+            tests_min=5,
+            missing=no_musl,
         ),
         Step(
             "rust-long",
