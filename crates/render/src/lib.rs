@@ -18,7 +18,7 @@
 //! let range = PressureRange { trained_max_pa, beyond: OutOfRange::Clamp };
 //!
 //! let mut maps = Maps::default();
-//! maps.pressure_pa[112 * 224 + 112] = 8e3;
+//! (95..115).for_each(|row| maps.pressure_pa[row * 224 + 105..][..25].fill(8e3));
 //! let summary = maps.check(range, &skin)?;
 //! let judged = maps.judge(summary, range, &skin, None);
 //! assert_eq!(judged.flags & flags::OUT_OF_RANGE, 0);
