@@ -2,6 +2,7 @@
 
 use std::{
     ffi::{CStr, CString, c_char},
+    mem::MaybeUninit,
     panic::{AssertUnwindSafe, catch_unwind},
     path::Path,
 };
@@ -184,14 +185,17 @@ pub(super) unsafe fn list<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(values, count) })
 }
 
-/// Where an answer goes.
+/// Where an answer goes; C may not have written there yet.
 ///
 /// # Safety
-/// `out` is null, or a value lies there that nobody else uses during the call.
-pub(super) unsafe fn room<'a, T>(name: &str, out: *mut T) -> Result<&'a mut T, Failure> {
+/// `out` is null, or there is room for a value that nobody else uses during the call.
+pub(super) unsafe fn room<'a, T>(
+    name: &str,
+    out: *mut T,
+) -> Result<&'a mut MaybeUninit<T>, Failure> {
     check(name, out)?;
     // SAFETY: neither null nor out of line; the rest as the caller promises.
-    Ok(unsafe { &mut *out })
+    Ok(unsafe { &mut *out.cast() })
 }
 
 fn check<T>(name: &str, pointer: *const T) -> Result<(), Failure> {

@@ -108,7 +108,7 @@ pub(crate) unsafe extern "C" fn papilla_model_info(
         let model = handle.loaded()?;
         let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| model.atlas.patch(p));
         let network = model.network.info();
-        *info = PapillaModelInfo {
+        info.write(PapillaModelInfo {
             name: handle.name.as_ptr(),
             atlas_hash: handle.atlas_hash.as_ptr(),
             pressure_max_pa: network.pressure_max_pa,
@@ -122,7 +122,7 @@ pub(crate) unsafe extern "C" fn papilla_model_info(
             skin_uv_px: skin.uv_px.as_flattened().as_ptr(),
             interface_mm: interface.positions_mm.as_flattened().as_ptr(),
             interface_uv_px: interface.uv_px.as_flattened().as_ptr(),
-        };
+        });
         Ok(())
     };
     // SAFETY: as the caller promises.
@@ -146,6 +146,11 @@ pub(crate) unsafe extern "C" fn papilla_model_rasterise(
         let (values, map) = unsafe {
             let map: *mut [f32; MAP_LEN] = map.cast();
             (handle::list("values", values, count)?, handle::room("map", map)?)
+        };
+        // SAFETY: zeros are floats.
+        let map = unsafe {
+            map.as_mut_ptr().write_bytes(0, 1);
+            map.assume_init_mut()
         };
         let drawn = handle.loaded()?.rasterise(values, map);
         drawn.map_err(|error| Failure::new(Status::WrongLength, error.to_string()))

@@ -1,6 +1,6 @@
 //! Functions of a session.
 
-use std::ffi::c_char;
+use std::{ffi::c_char, mem::MaybeUninit};
 
 use papilla_proto::contact::{OBJECTS_MAX, Pose};
 
@@ -32,14 +32,14 @@ impl PapillaSession {
     /// Sends a frame and tells what it came to.
     fn send(
         &mut self,
-        answer: &mut PapillaAnswer,
+        answer: &mut MaybeUninit<PapillaAnswer>,
         frame: impl FnOnce(&mut Session) -> Result<(), Problem>,
     ) -> Result<(), Failure> {
         let message = "the session is not open: call papilla_session_open first";
         let session = self.session.as_mut();
         let session = session.ok_or_else(|| Failure::new(Status::NotOpen, message))?;
         frame(session)?;
-        *answer = session.answer().into();
+        answer.write(session.answer().into());
         Ok(())
     }
 }
