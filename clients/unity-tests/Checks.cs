@@ -4,6 +4,28 @@ using System.Linq;
 using Newtonsoft.Json.Linq;
 using Papilla;
 
+sealed class Missed : Exception
+{
+    internal Missed(string message) : base(message) { }
+}
+
+/// <summary>What was seen of an answer, copied.</summary>
+sealed class Outcome
+{
+    internal Status Status;
+    internal string Code, Field;
+    internal float[] Map, Summary, Points, Actuators;
+    internal int[] Window;
+    internal bool IsRate, OutOfRange, NoContact, Unfamiliar, CutOff;
+    internal ulong ClientTimeUs;
+    internal int TierNumber;
+    internal uint TotalUs, QueueUs, InferUs;
+    internal bool HasTouch, Unsettled;
+    internal Touch Touch;
+    internal int Finger;
+    internal float[] PressurePa;
+}
+
 /// <content>What is expected, and the patterns.</content>
 sealed partial class Run
 {
@@ -31,6 +53,25 @@ sealed partial class Run
         All("points", expect, got.Points);
         All("actuators", expect, got.Actuators);
         CheckMap(expect, got.Map);
+    }
+
+    static void CheckTouch(JObject step, JObject expect, Outcome got)
+    {
+        Same("status (" + got.Code + ")", got.Status.ToString().ToLowerInvariant(), (string)expect["status"] ?? "ok");
+        if (expect["code"] != null) Same("code", got.Code, (string)expect["code"]);
+        if (expect["field"] != null) Same("field", got.Field, (string)expect["field"]);
+        if (got.Status != Status.Ok) return;
+        if (!got.HasTouch || got.Finger != ((int?)step["finger"] ?? 0)) throw new Missed("no touch, or of finger " + got.Finger);
+        var t = got.Touch;
+        var found = new[]
+        {
+            t.ForceXN, t.ForceYN, t.ForceZN, t.TorqueXNMm, t.TorqueYNMm, t.TorqueZNMm, t.AreaMm2, t.CentreXMm, t.CentreYMm, t.CentreZMm,
+            t.PenetrationMm, t.StiffnessNPerMm, t.TravelMm, t.PressureMaxPa, t.Share,
+        };
+        All("touch", expect, found);
+        if (expect["pressure_sum"] != null) Near("pressure", got.PressurePa.Sum(v => (double)v), (double)expect["pressure_sum"][0], (double)expect["pressure_sum"][1]);
+        if (got.NoContact != expect["flags"].Any(f => (string)f == "no_contact")) throw new Missed("no contact is " + got.NoContact);
+        if (got.OutOfRange || got.Unsettled) throw new Missed("out of range or unsettled");
     }
 
     static void CheckMap(JObject expect, float[] map)

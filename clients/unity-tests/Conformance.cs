@@ -44,28 +44,6 @@ static class Conformance
     }
 }
 
-sealed class Missed : Exception
-{
-    internal Missed(string message) : base(message) { }
-}
-
-/// <summary>What was seen of an answer, copied.</summary>
-sealed class Outcome
-{
-    internal Status Status;
-    internal string Code, Field;
-    internal float[] Map, Summary, Points, Actuators;
-    internal int[] Window;
-    internal bool IsRate, OutOfRange, NoContact, Unfamiliar, CutOff;
-    internal ulong ClientTimeUs;
-    internal int TierNumber;
-    internal uint TotalUs, QueueUs, InferUs;
-    internal bool HasTouch, Unsettled;
-    internal Touch Touch;
-    internal int Finger;
-    internal float[] PressurePa;
-}
-
 /// <summary>One case.</summary>
 sealed partial class Run : IDisposable
 {

@@ -36,20 +36,6 @@ sealed partial class Run
     {
         uint sequence = send();
         var got = Until("the outcome", () => Of(sequence), patienceMs);
-        Same("status (" + got.Code + ")", got.Status.ToString().ToLowerInvariant(), (string)expect["status"] ?? "ok");
-        if (expect["code"] != null) Same("code", got.Code, (string)expect["code"]);
-        if (expect["field"] != null) Same("field", got.Field, (string)expect["field"]);
-        if (got.Status != Status.Ok) return;
-        if (!got.HasTouch || got.Finger != ((int?)step["finger"] ?? 0)) throw new Missed("no touch, or of finger " + got.Finger);
-        var t = got.Touch;
-        var found = new[]
-        {
-            t.ForceXN, t.ForceYN, t.ForceZN, t.TorqueXNMm, t.TorqueYNMm, t.TorqueZNMm, t.AreaMm2, t.CentreXMm, t.CentreYMm, t.CentreZMm,
-            t.PenetrationMm, t.StiffnessNPerMm, t.TravelMm, t.PressureMaxPa, t.Share,
-        };
-        All("touch", expect, found);
-        if (expect["pressure_sum"] != null) Near("pressure", got.PressurePa.Sum(v => (double)v), (double)expect["pressure_sum"][0], (double)expect["pressure_sum"][1]);
-        if (got.NoContact != expect["flags"].Any(f => (string)f == "no_contact")) throw new Missed("no contact is " + got.NoContact);
-        if (got.OutOfRange || got.Unsettled) throw new Missed("out of range or unsettled");
+        CheckTouch(step, expect, got);
     }
 }

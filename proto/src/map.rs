@@ -1,6 +1,6 @@
 //! The map: 224 x 224 samples, row-major, row 0 at the fingertip's far end.
 
-use crate::{ErrorCode, effects::OutOfRange};
+use crate::{ErrorCode, Problem, effects::OutOfRange};
 
 pub use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 
@@ -66,6 +66,12 @@ impl MapError {
             Self::Negative { .. } => ErrorCode::NegativePressure,
             Self::OutOfRange { .. } => ErrorCode::OutOfRange,
         }
+    }
+}
+
+impl From<MapError> for Problem {
+    fn from(error: MapError) -> Self {
+        Self::new(error.code(), error.to_string()).at("pressure_pa")
     }
 }
 

@@ -1,6 +1,6 @@
 //! The refusals of the service, whatever carries them: typed, in words of bounded length.
 
-use papilla_proto::{ErrorCode, FrameError, MapError, Problem, error::shortened};
+use papilla_proto::{ErrorCode, FrameError, Problem, error::shortened};
 
 /// Most characters of a message.
 const MESSAGE_MAX: usize = 1000;
@@ -24,11 +24,6 @@ pub(crate) fn of_frame(error: FrameError) -> Problem {
         Some(field) => problem.at(field),
         None => problem,
     }
-}
-
-/// The problem a map makes.
-pub(crate) fn of_map(error: MapError) -> Problem {
-    Problem::new(error.code(), error.to_string()).at("pressure_pa")
 }
 
 /// A fault of our own: the details go to the log, not to the client.

@@ -78,6 +78,21 @@ def no_onnxruntime() -> str | None:
     return "no ONNX Runtime here: pip could not install it"
 
 
+def no_musl() -> str | None:
+    if os.geteuid() == 0 and shutil.which("musl-gcc") and shutil.which("dpkg"):
+        return None
+    return "needs root, dpkg and musl-gcc: apt install musl-tools"
+
+
+def no_buildah() -> str | None:
+    return no_musl() or (None if shutil.which("buildah") else "no buildah here: apt install buildah uidmap")
+
+
+def no_cmake() -> str | None:
+    there = shutil.which("cmake") and shutil.which("pkg-config")
+    return None if there else "no CMake and pkg-config here: apt install cmake pkg-config"
+
+
 def no_nightly() -> str | None:
     command = ["rustup", "run", "nightly", "rustc", "--version"]
     if shutil.which("rustup") and subprocess.run(command, capture_output=True, check=False).returncode == 0:
@@ -198,9 +213,10 @@ def full() -> list[Step]:
         ),
         Step("client-python", "the Python client", f"{client} python", ("build", "python"), 36),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build",), 33),
+        Step("client-c", "the native library from C and C++", f"{client} c", ("build",), 20),
         Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 33),
         Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 36),
-        Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 60),
+        Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 80),
         Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/godot/generate --check"),
         Step("client-godot3", "the Godot 3 add-on", f"{client} godot3", ("build", "packages"), 33),
         Step(
@@ -211,12 +227,27 @@ def full() -> list[Step]:
             33,
             missing=no_godot4,
         ),
+        Step(
+            "client-packages",
+            "wheel, npm package, Unity, Godot and Unreal folders, installed and used from there",
+            "clients/packages-test python npm unity addons",
+            after=("build", "python", "node"),
+            tests_min=4,
+        ),
+        Step(
+            "client-cmake",
+            "find_package(Papilla) and pkg-config, installed and used from there",
+            "clients/packages-test cmake",
+            after=("build",),
+            tests_min=1,
+            missing=no_cmake,
+        ),
         Step("client-gltf", "the atlas as glTF", f"{client} gltf", ("build", "node"), 1),
         Step(
             "docs-clients",
             "the clients' pages as written",
             "clients/docs-test",
-            ("client-rust", "client-python", "client-cpp"),
+            ("client-rust", "client-python", "client-cpp", "client-c"),
         ),
         Step(
             "calculix",
@@ -250,6 +281,30 @@ def long() -> list[Step]:
             after=("doc",),
         ),
         Step(
+            "debian",
+            "the Debian package, installed, started, upgraded and purged",
+            "deploy/debian/test",
+            after=("release",),
+            tests_min=32,
+            missing=no_musl,
+        ),
+        Step(
+            "container",
+            "the image FROM scratch, built without root, and a map rendered in it",
+            "deploy/container/test",
+            after=("debian",),
+            tests_min=1,
+            missing=no_buildah,
+        ),
+        Step(
+            "archive",
+            "the release archive, made twice, unpacked and used",
+            "deploy/release/test",
+            after=("container",),
+            tests_min=5,
+            missing=no_musl,
+        ),
+        Step(
             "rust-long",
             "tests marked long, every variant of every hard case among them",
             f"cargo test --workspace --all-targets {FEATURES} -q -- --ignored --skip started_by"
@@ -272,10 +327,18 @@ def long() -> list[Step]:
         ),
         Step(
             "sanitizers",
-            "the C++ client under the thread, address and undefined-behaviour sanitizers",
-            "clients/test cpp-sanitizers",
-            after=("client-cpp",),
+            "the C++ client under the thread, address and undefined-behaviour sanitizers, the native library "
+            "under the last two",
+            "clients/test cpp-sanitizers c-sanitizers",
+            after=("client-cpp", "client-c"),
             tests_min=54,
+        ),
+        Step(
+            "client-crates",
+            "the Rust client and what it is built on, compiled from their packages",
+            "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS clients/packages-test crates",
+            after=("doc",),
+            tests_min=1,
         ),
         Step(
             "deny",

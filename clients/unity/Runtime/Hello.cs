@@ -47,11 +47,12 @@ namespace Papilla
             return hello;
         }
 
-        internal string ToText()
+        /// <param name="isOf3">version 3 whatever its members are</param>
+        internal string ToText(bool isOf3 = false)
         {
             var json = (JObject)Members.DeepClone();
             json["type"] = "hello";
-            json["version"] = System.Array.Exists(OfVersion3, name => Members[name] != null) ? 3 : 2;
+            json["version"] = isOf3 || System.Array.Exists(OfVersion3, name => Members[name] != null) ? 3 : 2;
             json["effects"] = new JArray(Effects);
             json["sample_type"] = SampleType.ToString().ToLowerInvariant();
             if (Tier != null) json["tier"] = Tier;
@@ -121,10 +122,11 @@ namespace Papilla
             Closes = (bool?)json["closes"] ?? false;
         }
 
-        internal Problem(string code, string message)
+        internal Problem(string code, string message, string field = null)
         {
             Code = code;
             Message = message;
+            Field = field;
         }
 
         public override string ToString()

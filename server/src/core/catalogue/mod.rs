@@ -16,10 +16,11 @@ use papilla_codec::{Output, Quantity};
 use papilla_engine::{Card, card::Index};
 use papilla_metrics::TierLabels;
 use papilla_proto::{
-    ErrorCode, MAP_SIDE_PX, PixelMask, Problem,
+    ErrorCode, Problem,
     atlas::{Atlas, Patch, Raster},
     error::shortened,
 };
+use papilla_render::SkinPixels;
 use papilla_session_effects as effects;
 
 use self::{
@@ -69,10 +70,8 @@ pub(crate) struct Catalogue {
     pub(crate) atlas: Atlas,
     pub(crate) atlas_json: Bytes,
     pub(crate) skin: Arc<Raster>,
-    /// The pixels of `skin`.
-    pub(crate) skin_mask: PixelMask,
-    /// The pixels of `skin` at its edge.
-    pub(crate) rim: Vec<usize>,
+    /// Which pixels show `skin`.
+    pub(crate) skin_pixels: SkinPixels,
     pub(crate) interface: Raster,
     pub(crate) replay: Replay,
     /// All rungs as shipped, FE included, as JSON; `null` if the folder has no `ladder.json`.
@@ -86,23 +85,6 @@ pub(crate) struct Catalogue {
     pub(crate) cache: Cache<Document>,
 }
 
-/// The pixels of a mask that have a neighbour outside of it.
-fn rim(mask: &[bool]) -> Vec<usize> {
-    let is_inside = |row: usize, column: usize| {
-        row < MAP_SIDE_PX && column < MAP_SIDE_PX && mask[row * MAP_SIDE_PX + column]
-    };
-    let is_rim = |&i: &usize| {
-        let (row, column) = (i / MAP_SIDE_PX, i % MAP_SIDE_PX);
-        let sides = [(0, 1), (2, 1), (1, 0), (1, 2)];
-        // Before row or column 0 the difference wraps, and lies outside.
-        let is_off = |(down, across): (usize, usize)| {
-            !is_inside((row + down).wrapping_sub(1), (column + across).wrapping_sub(1))
-        };
-        mask[i] && sides.into_iter().any(is_off)
-    };
-    (0..mask.len()).filter(is_rim).collect()
-}
-
 impl Catalogue {
     /// These tiers on this atlas, and nothing else.
     #[cfg(test)]
@@ -112,8 +94,7 @@ impl Catalogue {
             tiers,
             default: 0,
             atlas_json: Bytes::new(),
-            skin_mask: PixelMask::from(skin.mask()),
-            rim: rim(skin.mask()),
+            skin_pixels: SkinPixels::from(&skin),
             skin: Arc::new(skin),
             interface,
             atlas,
@@ -214,8 +195,7 @@ impl Catalogue {
             default,
             atlas,
             atlas_json,
-            skin_mask: PixelMask::from(skin.mask()),
-            rim: rim(skin.mask()),
+            skin_pixels: SkinPixels::from(&skin),
             skin: Arc::new(skin),
             interface,
             replay,

@@ -10,9 +10,8 @@ use std::{
 use papilla_codec::{Input, Map, Quantity, decode, encode};
 use papilla_engine::Session;
 use papilla_metrics::{Metrics, Stage};
-use papilla_proto::{
-    ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
-};
+use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem};
+use papilla_render::{Judged, Maps};
 use papilla_session_contact::Finger;
 
 use super::{
@@ -29,20 +28,13 @@ use crate::{
     problem,
 };
 
-/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
-/// zero there in all of them.
-const RIM_SHARE: f32 = 0.01;
-
 /// Everything a thread owns; nothing is allocated after `prepare`.
 pub(super) struct Worker {
     catalogue: Arc<Catalogue>,
     metrics: Arc<Metrics>,
     /// One per tier, in the catalogue's order.
     sessions: Vec<Box<dyn Session>>,
-    pressure_pa: Vec<f32>,
-    /// What the network sees in place of pressure beyond its range.
-    clamped_pa: Vec<f32>,
-    sed_j_per_m3: Vec<f32>,
+    maps: Maps,
 }
 
 impl Worker {
@@ -55,12 +47,11 @@ impl Worker {
             sessions: Vec::with_capacity(catalogue.tiers.len()),
             catalogue: Arc::clone(catalogue),
             metrics,
-            pressure_pa: vec![0.0; MAP_LEN],
-            clamped_pa: vec![0.0; MAP_LEN],
-            sed_j_per_m3: vec![0.0; MAP_LEN],
+            maps: Maps::default(),
         };
         for tier in &catalogue.tiers {
-            let session = tier.warm_session(&mut worker.pressure_pa, &mut worker.sed_j_per_m3)?;
+            let Maps { pressure_pa, sed_j_per_m3, .. } = &mut worker.maps;
+            let session = tier.warm_session(pressure_pa, sed_j_per_m3)?;
             worker.sessions.push(session);
         }
         Ok(worker)
@@ -157,48 +148,40 @@ impl Worker {
         let tier = &self.catalogue.tiers[job.tier];
         let &JobOptions { headroom, time_us, .. } = options;
         if let Some(effects) = &mut effects {
-            let peak_pa = effects.before(&mut self.pressure_pa, time_us);
+            let peak_pa = effects.before(&mut self.maps.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
-        meta.flags |= if shows_sed && range.is_left_by(summary) { flags::OUT_OF_RANGE } else { 0 };
-        let least_pa = RIM_SHARE * summary.peak_pa;
-        let is_cut_off =
-            shows_sed && self.catalogue.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
-        meta.flags |= if is_cut_off { flags::CUT_OFF } else { 0 };
-        let is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
-        let seen_pa = if is_clamped { &self.clamped_pa } else { &self.pressure_pa };
-        let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
-        let is_out_of_distribution =
-            shows_sed && !summary.is_zero() && tier.input_statistics_max.is_some_and(is_outside);
-        meta.flags |= if is_out_of_distribution { flags::UNFAMILIAR } else { 0 };
+        // Without SED the map is not even drawn.
+        let judged = shows_sed.then(|| {
+            self.maps.judge(summary, range, &self.catalogue.skin_pixels, tier.input_statistics_max)
+        });
+        meta.flags |= judged.map_or(0, |judged| judged.flags);
         let decoded = Instant::now();
         times.decode = decoded - start;
 
-        if !shows_sed {
-            // The map is not even drawn.
-        } else if summary.is_zero() {
-            // Nothing touches the finger: SED is zero, and no network is asked.
-            self.sed_j_per_m3.fill(0.0);
-            self.metrics.zero_maps.inc();
-            meta.flags |= flags::NO_CONTACT;
-        } else if job.deadline.is_some_and(|deadline| {
-            tier.latency.will_miss(deadline.saturating_duration_since(decoded))
-        }) {
-            return Ok(Outcome::Late(Stage::Inference));
-        } else {
-            self.sessions[job.tier].infer(seen_pa, &mut self.sed_j_per_m3).map_err(|error| {
-                let error = format_args!("{}.onnx: {error}", tier.name);
-                problem::internal("the inference failed", &error)
-            })?;
-            times.infer = decoded.elapsed();
-            tier.latency.learn(times.infer);
+        let deadline = job.deadline;
+        let misses =
+            |deadline: Instant| tier.latency.will_miss(deadline.saturating_duration_since(decoded));
+        match judged {
+            None => (),
+            Some(Judged { is_zero: true, .. }) => {
+                self.metrics.zero_maps.inc();
+            }
+            Some(_) if deadline.is_some_and(misses) => return Ok(Outcome::Late(Stage::Inference)),
+            Some(_) => {
+                self.maps.infer(self.sessions[job.tier].as_mut()).map_err(|error| {
+                    let error = format_args!("{}.onnx: {error}", tier.name);
+                    problem::internal("the inference failed", &error)
+                })?;
+                times.infer = decoded.elapsed();
+                tier.latency.learn(times.infer);
+            }
         }
 
         let start = Instant::now();
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
         if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
-            finger.to_person(&mut self.pressure_pa);
-            finger.to_person(&mut self.sed_j_per_m3);
+            self.maps.to_person(finger);
         }
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
@@ -206,7 +189,7 @@ impl Worker {
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
             }
-            let (pressure_pa, sed) = (&self.pressure_pa, &self.sed_j_per_m3);
+            let Maps { pressure_pa, sed_j_per_m3: sed, .. } = &self.maps;
             let written = effects
                 .write(pressure_pa, sed, time_us, buffer)
                 .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
@@ -218,8 +201,11 @@ impl Worker {
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
             }
-            let map =
-                Map { quantity: Quantity::Sed, values: &self.sed_j_per_m3, source: &tier.name };
+            let map = Map {
+                quantity: Quantity::Sed,
+                values: &self.maps.sed_j_per_m3,
+                source: &tier.name,
+            };
             let scale = encode(job.output, map, buffer)
                 .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
@@ -239,21 +225,18 @@ impl Worker {
     ) -> Result<(MapSummary, PressureRange), Problem> {
         if finger.reads_windows() {
             let (summary, range) = self.decode(job, payload)?;
-            let part = finger.to_reference(&mut self.pressure_pa);
+            let part = finger.to_reference(&mut self.maps.pressure_pa);
             return Ok((MapSummary { peak_pa: summary.peak_pa * part }, range));
         }
         let Input::Window { sample_type, scale, .. } = job.input else {
             return Err(Problem::new(ErrorCode::Internal, "a frame that is no window"));
         };
-        let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
-        let taken = finger.take(payload, sample_type, scale, map_pa)?;
+        let range = self.range(job);
+        let frame = (payload, sample_type, scale);
+        let taken = self.maps.take(finger, frame, range, shows_sed)?;
         meta.flags |= taken.flags;
         if let Some(iterations) = taken.iterations {
             self.metrics.contact.solved(taken.flags, iterations);
-        }
-        let range = self.range(job);
-        if finger.takes_pressure() {
-            range.check(&self.pressure_pa).map_err(problem::of_map)?;
         }
         Ok((MapSummary { peak_pa: taken.peak_pa }, range))
     }
@@ -271,11 +254,9 @@ impl Worker {
         job: &Job,
         payload: &[u8],
     ) -> Result<(MapSummary, PressureRange), Problem> {
-        decode(job.input, payload, &mut self.pressure_pa)?;
+        decode(job.input, payload, &mut self.maps.pressure_pa)?;
         let range = self.range(job);
-        range.check(&self.pressure_pa).map_err(problem::of_map)?;
-        let summary = keep_inside(&mut self.pressure_pa, &self.catalogue.skin_mask);
-        Ok((summary, range))
+        Ok((self.maps.check(range, &self.catalogue.skin_pixels)?, range))
     }
 }
 

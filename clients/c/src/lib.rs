@@ -1,0 +1,33 @@
+//! Papilla inside a program: what `include/papilla_c.h` declares, for engines that open no socket.
+//!
+//! [`Model`] is a folder of models read once, [`Session`] the memory of one hand: frames in,
+//! answers out, on the caller's thread. Both are safe Rust; `border` makes C of them and is the one
+//! place with `unsafe`.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+//! use papilla_c::{Model, Session};
+//!
+//! let model = Model::load("models".as_ref(), Some("nano"), None)?.into();
+//! let mut session = Session::open(&model, r#"{"type": "hello", "version": 3}"#)?;
+//! let mut pressure_pa = vec![0.0; 224 * 224];
+//! (95..115).for_each(|row| pressure_pa[row * 224 + 105..][..25].fill(8e3));
+//! session.send_map(0, &pressure_pa, 0)?;
+//! assert!(session.answer().map.iter().any(|sed| *sed > 0.0));
+//! # Ok(())
+//! # }
+//! ```
+
+mod answer;
+mod border;
+mod hello;
+mod model;
+mod session;
+mod status;
+
+pub use answer::Answer;
+pub use model::{LoadError, Model};
+pub use papilla_proto::Problem;
+pub use session::Session;
+pub use status::Status;

@@ -1,0 +1,165 @@
+//! A folder of models: atlas, one network, and the contact model if there is one.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use papilla_contact::ContactModel;
+use papilla_engine::{Card, EngineError, card::Index};
+use papilla_proto::atlas::{Atlas, AtlasError, Patch, Raster};
+use papilla_render::SkinPixels;
+use papilla_session_effects as effects;
+
+use crate::Status;
+
+/// Why a folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// A file cannot be read.
+    #[error(
+        "{}: {source}; a folder of models holds index.json, atlas.json, NAME.onnx and NAME.json",
+        .file.display()
+    )]
+    File {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The index does not list the model.
+    #[error("no tier '{name}'; {} lists {known}", .file.display())]
+    Unknown {
+        /// The index.
+        file: PathBuf,
+        /// The model that was asked for.
+        name: String,
+        /// Those that there are.
+        known: String,
+    },
+    /// The network, its card or the index is no good.
+    #[error("{}: {source}", .file.display())]
+    Engine {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: EngineError,
+    },
+    /// The atlas is no good, or another one than the network's.
+    #[error("{}: {source}", .file.display())]
+    Atlas {
+        /// The file that does not fit.
+        file: PathBuf,
+        /// Why.
+        source: AtlasError,
+    },
+    /// The contact model is no good, or of another atlas.
+    #[error("{}: {source}", .file.display())]
+    Contact {
+        /// Which.
+        file: PathBuf,
+        /// Why.
+        source: papilla_contact::ModelError,
+    },
+}
+
+impl LoadError {
+    /// The status it has at the border.
+    #[must_use]
+    pub const fn status(&self) -> Status {
+        match self {
+            Self::File { .. } => Status::NoFile,
+            Self::Unknown { .. } => Status::UnknownTier,
+            Self::Engine { .. } | Self::Atlas { .. } | Self::Contact { .. } => Status::BadModel,
+        }
+    }
+}
+
+/// A model that sessions share.
+pub struct Model {
+    pub(crate) atlas: Atlas,
+    pub(crate) skin: Arc<Raster>,
+    pub(crate) interface: Raster,
+    pub(crate) pixels: SkinPixels,
+    pub(crate) shared: effects::Shared,
+    pub(crate) network: Arc<dyn papilla_engine::Model>,
+    pub(crate) card: Card,
+    pub(crate) contact: Option<Arc<ContactModel>>,
+}
+
+impl std::fmt::Debug for Model {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Model").field("name", &self.card.name).finish_non_exhaustive()
+    }
+}
+
+fn read(file: PathBuf) -> Result<(PathBuf, Vec<u8>), LoadError> {
+    match fs::read(&file) {
+        Ok(bytes) => Ok((file, bytes)),
+        Err(source) => Err(LoadError::File { file, source }),
+    }
+}
+
+fn read_text(file: PathBuf) -> Result<(PathBuf, String), LoadError> {
+    match fs::read_to_string(&file) {
+        Ok(text) => Ok((file, text)),
+        Err(source) => Err(LoadError::File { file, source }),
+    }
+}
+
+impl Model {
+    /// Reads a network of a folder, the index's default without a name, and a contact model.
+    /// Everything is checked as the service does it; the network runs once.
+    ///
+    /// # Errors
+    /// A file is missing, damaged, or of another atlas.
+    pub fn load(
+        folder: &Path,
+        tier: Option<&str>,
+        contact: Option<&Path>,
+    ) -> Result<Self, LoadError> {
+        let (file, json) = read_text(folder.join("index.json"))?;
+        let index = match Index::from_json(&json) {
+            Ok(index) => index,
+            Err(source) => return Err(LoadError::Engine { file, source }),
+        };
+        let name = tier.unwrap_or(&index.default);
+        if !index.models.iter().any(|listed| listed == name) {
+            let known = index.models.join(", ");
+            return Err(LoadError::Unknown { file, name: name.to_owned(), known });
+        }
+        let (file, json) = read_text(folder.join(format!("{name}.json")))?;
+        let card = Card::from_json(&json).map_err(|source| LoadError::Engine { file, source })?;
+        let (file, onnx) = read(folder.join(format!("{name}.onnx")))?;
+        let network = papilla_engine::load(&onnx, Some(&card))
+            .map_err(|source| LoadError::Engine { file, source })?;
+        let (file, json) = read_text(folder.join("atlas.json"))?;
+        let atlas = Atlas::from_json(&json)
+            .and_then(|atlas| atlas.require_hash(&network.info().atlas_hash).map(|()| atlas))
+            .map_err(|source| LoadError::Atlas { file, source })?;
+        let contact = contact.map(|file| read_contact(file, &atlas)).transpose()?;
+        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
+        let pixels = SkinPixels::from(&skin);
+        let shared = effects::Shared::default();
+        let skin = Arc::new(skin);
+        Ok(Self { atlas, skin, interface, pixels, shared, network, card, contact })
+    }
+
+    /// Draws values at the vertices of the skin as a map.
+    ///
+    /// # Errors
+    /// Another number of values than vertices, or of pixels than 224 x 224.
+    pub fn rasterise(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
+        self.skin.rasterise(values, map)
+    }
+}
+
+fn read_contact(file: &Path, atlas: &Atlas) -> Result<Arc<ContactModel>, LoadError> {
+    let (file, bytes) = read(file.to_owned())?;
+    let model = ContactModel::read(&bytes)
+        .and_then(|model| model.require_atlas(atlas.hash()).map(|()| model))
+        .map_err(|source| LoadError::Contact { file, source })?;
+    Ok(Arc::new(model))
+}

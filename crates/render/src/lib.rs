@@ -1,0 +1,148 @@
+//! One frame around the network: pressure is checked, judged and clamped before it, SED goes to the
+//! person after it.
+//!
+//! Whoever renders owns [`Maps`] and an engine session: a thread of the service, or a program that
+//! links the native library. Nothing here allocates after [`Maps::default`].
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
+//! use papilla_proto::{PressureRange, atlas::{Atlas, Patch, Raster}, effects::OutOfRange, flags};
+//! use papilla_render::{Maps, SkinPixels};
+//!
+//! let atlas = Atlas::from_json(&std::fs::read_to_string("models/atlas.json")?)?;
+//! let skin = SkinPixels::from(&Raster::new(&atlas, Patch::Skin));
+//! let model = papilla_engine::load(&std::fs::read("models/nano.onnx")?, None)?;
+//! let mut session = model.session()?;
+//! let trained_max_pa = model.info().pressure_max_pa;
+//! let range = PressureRange { trained_max_pa, beyond: OutOfRange::Clamp };
+//!
+//! let mut maps = Maps::default();
+//! (95..115).for_each(|row| maps.pressure_pa[row * 224 + 105..][..25].fill(8e3));
+//! let summary = maps.check(range, &skin)?;
+//! let judged = maps.judge(summary, range, &skin, None);
+//! assert_eq!(judged.flags & flags::OUT_OF_RANGE, 0);
+//! maps.infer(session.as_mut())?;
+//! assert!(maps.sed_j_per_m3.iter().any(|sed| *sed > 0.0));
+//! # Ok(())
+//! # }
+//! ```
+
+mod skin;
+
+use papilla_engine::{EngineError, Session};
+use papilla_proto::{
+    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, SampleType, flags, keep_inside,
+};
+use papilla_session_contact::{Finger, Taken};
+
+pub use skin::SkinPixels;
+
+/// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
+/// zero there in all of them.
+const RIM_SHARE: f32 = 0.01;
+
+/// The maps of one frame.
+#[derive(Debug)]
+pub struct Maps {
+    /// 224 x 224, Pa.
+    pub pressure_pa: Vec<f32>,
+    /// 224 x 224, J/m3.
+    pub sed_j_per_m3: Vec<f32>,
+    /// What the network sees in place of pressure beyond its range.
+    clamped_pa: Vec<f32>,
+    is_clamped: bool,
+}
+
+/// What [`Maps::judge`] found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Judged {
+    /// Bits of [`papilla_proto::flags`].
+    pub flags: u8,
+    /// Nothing touches the finger: SED is zero, and no network is to be asked.
+    pub is_zero: bool,
+}
+
+impl Default for Maps {
+    fn default() -> Self {
+        let [pressure_pa, sed_j_per_m3, clamped_pa] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
+        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false }
+    }
+}
+
+impl Maps {
+    /// Checks the pressure, and takes off what lies off the skin.
+    ///
+    /// # Errors
+    /// The first sample at fault.
+    pub fn check(
+        &mut self,
+        range: PressureRange,
+        skin: &SkinPixels,
+    ) -> Result<MapSummary, Problem> {
+        range.check(&self.pressure_pa)?;
+        Ok(keep_inside(&mut self.pressure_pa, &skin.mask))
+    }
+
+    /// Reads a frame that is no window into a finger; its pressure is drawn if SED is to be shown.
+    ///
+    /// # Errors
+    /// As [`Finger::take`], and pressure that is out of range.
+    pub fn take(
+        &mut self,
+        finger: &mut Finger,
+        (payload, sample_type, scale): (&[u8], SampleType, f32),
+        range: PressureRange,
+        shows_sed: bool,
+    ) -> Result<Taken, Problem> {
+        let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
+        let taken = finger.take(payload, sample_type, scale, map_pa)?;
+        if finger.takes_pressure() {
+            range.check(&self.pressure_pa)?;
+        }
+        Ok(taken)
+    }
+
+    /// Judges the pressure by what the network was trained on, and clamps it if `range` says so.
+    pub fn judge(
+        &mut self,
+        summary: MapSummary,
+        range: PressureRange,
+        skin: &SkinPixels,
+        trained_max: Option<InputStatistics>,
+    ) -> Judged {
+        let is_zero = summary.is_zero();
+        let least_pa = RIM_SHARE * summary.peak_pa;
+        let is_cut_off = skin.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
+        self.is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
+        let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
+        let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
+        let is_unfamiliar = !is_zero && trained_max.is_some_and(is_outside);
+        let flags = [
+            (range.is_left_by(summary), flags::OUT_OF_RANGE),
+            (is_cut_off, flags::CUT_OFF),
+            (is_unfamiliar, flags::UNFAMILIAR),
+            (is_zero, flags::NO_CONTACT),
+        ];
+        let flags = flags.into_iter().map(|(on, flag)| if on { flag } else { 0 }).sum();
+        if is_zero {
+            self.sed_j_per_m3.fill(0.0);
+        }
+        Judged { flags, is_zero }
+    }
+
+    /// Asks the network for SED under the pressure as [`judge`](Self::judge) left it.
+    ///
+    /// # Errors
+    /// As [`Session::infer`].
+    pub fn infer(&mut self, session: &mut dyn Session) -> Result<(), EngineError> {
+        let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
+        session.infer(seen_pa, &mut self.sed_j_per_m3)
+    }
+
+    /// Turns pressure and SED of the finger of reference stiffness into this person's.
+    pub fn to_person(&mut self, finger: &Finger) {
+        finger.to_person(&mut self.pressure_pa);
+        finger.to_person(&mut self.sed_j_per_m3);
+    }
+}
