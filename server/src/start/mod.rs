@@ -20,13 +20,14 @@ use crate::{
         scheduler::Pool,
     },
     progress::{Progress, Stage},
-    transport::{app::App, front::Front, gate::Gate, routes},
+    transport::{app::App, front::Front, gate::Gate, moves::Moves, routes},
 };
 
 /// What there is before the models are.
 pub(crate) struct Parts {
     pub(crate) config: Config,
     pub(crate) gate: Gate,
+    pub(crate) moves: Moves,
     pub(crate) metrics: Arc<Metrics>,
     pub(crate) progress: Arc<Progress>,
     pub(crate) front: Arc<Front>,
@@ -47,7 +48,7 @@ pub(crate) struct Opened {
 /// The models are missing or unusable, or do not run; a thread cannot be started; the folder
 /// cannot be watched.
 pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
-    let Parts { config, gate, metrics, progress, front, drain } = parts;
+    let Parts { config, gate, moves, metrics, progress, front, drain } = parts;
     let (loaded, loading) = oneshot::channel();
     let (measured, measuring) = oneshot::channel();
     let work = {
@@ -76,7 +77,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app = App::new(&config, catalogue, metrics, &pool, gate, drain, Arc::clone(&progress));
+    let app = App::new(&config, catalogue, metrics, &pool, (gate, moves), drain, Arc::clone(&progress));
     let app = Arc::new(app.with_contact(contact));
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
         reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {

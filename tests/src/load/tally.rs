@@ -67,6 +67,11 @@ pub(super) struct Tally {
     pub(super) overhead: Times,
     /// Age of the newest map, every millisecond: since the instant its frame was meant to leave.
     pub(super) age: Times,
+    /// From one map of a session to the next.
+    pub(super) gap: Times,
+    /// Times that a session went on over another connection: asked to, and after one broke.
+    pub(super) moved: u64,
+    pub(super) reopened: u64,
     /// From the intended instant to the sending.
     pub(super) send_delay: Times,
     /// Maps compared, those not equal, and the greatest difference.
@@ -97,6 +102,8 @@ impl Tally {
             (&mut self.processor.all, other.processor.all),
             (&mut self.processor.stolen, other.processor.stolen),
             (&mut self.wrong, other.wrong),
+            (&mut self.moved, other.moved),
+            (&mut self.reopened, other.reopened),
         ] {
             *sum += part;
         }
@@ -112,6 +119,7 @@ impl Tally {
             (&mut self.rest, &other.rest),
             (&mut self.overhead, &other.overhead),
             (&mut self.age, &other.age),
+            (&mut self.gap, &other.gap),
             (&mut self.send_delay, &other.send_delay),
         ] {
             sum.add(part);
