@@ -1,6 +1,7 @@
 //! From settings to a service that renders, behind a port that is open already: load, warm, serve,
 //! measure.
 
+mod load;
 mod remeasure;
 
 use std::{path::Path, sync::Arc, thread};
@@ -91,6 +92,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     if !config.calibration().is_zero() {
         tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
+    tokio::spawn(load::until_drain(Arc::clone(&app), config.thread_count()));
     Ok(Opened { app, pool, tiers, default_tier })
 }
 

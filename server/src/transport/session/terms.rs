@@ -72,6 +72,11 @@ impl Terms {
         self.permit = Permit::take(tier);
     }
 
+    /// Whether the network is asked.
+    pub(super) fn shows_sed(&self) -> bool {
+        self.info.shows_sed
+    }
+
     /// What answers depend on of the frames before.
     pub(super) fn memory(&self) -> Memory {
         let fingers = self.hand.as_ref().map_or(&[][..], Hand::fingers).to_vec();
