@@ -77,11 +77,13 @@ pub(super) struct Move<'a> {
     dialing: Option<oneshot::Receiver<Halves>>,
     /// The other connection, and what keeps frames from being sent meanwhile.
     next: Option<(Halves, MutexGuard<'a, ()>)>,
+    /// Since when.
+    held: Instant,
 }
 
 impl<'a> Move<'a> {
     pub(super) fn new(follow: &'a Follow, hold: &'a Mutex<()>) -> Self {
-        Self { follow, hold, dialing: None, next: None }
+        Self { follow, hold, dialing: None, next: None, held: Instant::now() }
     }
 
     /// The service asks for it.
@@ -98,6 +100,7 @@ impl<'a> Move<'a> {
             Some(Err(TryRecvError::Closed)) => self.dialing = None,
             Some(Ok(halves)) => {
                 self.dialing = None;
+                self.held = Instant::now();
                 let held = self.hold.lock().unwrap_or_else(PoisonError::into_inner);
                 // Err: the hearer hears of it too.
                 if hearer.seal().is_ok() {
@@ -107,15 +110,17 @@ impl<'a> Move<'a> {
         }
     }
 
-    /// Moves with what is remembered; false: the old connection goes on.
-    pub(super) fn end(&mut self, hearer: &mut Hearer, sealed: Vec<u8>) -> bool {
-        let Some((halves, _held)) = self.next.take() else { return false };
+    /// Moves with what is remembered, and says for how long frames were held back; none: the old
+    /// connection goes on.
+    pub(super) fn end(&mut self, hearer: &mut Hearer, sealed: Vec<u8>) -> Option<Duration> {
+        let (halves, _held) = self.next.take()?;
         let stream = self.follow.say(halves, Some(sealed));
         let moved = stream.is_ok_and(|stream| hearer.move_to(stream).is_ok());
-        if !moved {
-            self.begin();
+        if moved {
+            return Some(self.held.elapsed());
         }
-        moved
+        self.begin();
+        None
     }
 
     /// The connection broke.

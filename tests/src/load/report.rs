@@ -133,8 +133,8 @@ pub struct Report {
     pub age_us: Option<Percentiles>,
     /// From one map of a session to the next, us.
     pub gap_us: Option<Percentiles>,
-    /// Times that a session moved when it was asked to; with --follow.
-    pub moved: u64,
+    /// For how long frames were held back when a session moved, us; with --follow.
+    pub held_us: Option<Percentiles>,
     /// Times that a session was opened anew after its connection broke; with --follow.
     pub reopened: u64,
     /// From the intended instant to the sending, us: the generator's own part.
@@ -196,7 +196,7 @@ impl Report {
             overhead_us: Percentiles::new(&t.overhead),
             age_us: Percentiles::new(&t.age),
             gap_us: Percentiles::new(&t.gap),
-            moved: t.moved,
+            held_us: Percentiles::new(&t.held),
             reopened: t.reopened,
             send_delay_us: Percentiles::new(&t.send_delay),
             stolen_percent: t.processor.stolen_percent(),
@@ -254,6 +254,7 @@ impl Report {
             ("trip without network", self.overhead_us),
             ("age of the newest map", self.age_us),
             ("from map to map", self.gap_us),
+            ("held back in a move", self.held_us),
             ("sent late by", self.send_delay_us),
         ] {
             write!(f, "{name:24}")?;
@@ -319,8 +320,11 @@ impl fmt::Display for Report {
         });
         writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
         self.write_times(f)?;
-        if self.moved + self.reopened > 0 {
-            writeln!(f, "sessions moved {} times, were opened anew {} times", self.moved, self.reopened)?;
+        if let Some(held) = self.held_us {
+            writeln!(f, "sessions moved {} times", held.count)?;
+        }
+        if self.reopened > 0 {
+            writeln!(f, "sessions were opened anew {} times", self.reopened)?;
         }
         if let Some(percent) = self.stolen_percent {
             writeln!(f, "the host withheld {percent:.2} % of this machine's processor time")?;

@@ -172,7 +172,11 @@ impl<'a> Ear<'a> {
             };
             if let Some(moving) = &mut moving {
                 match said {
-                    Some(state) => self.tally.moved += u64::from(moving.end(hearer, state)),
+                    Some(state) => {
+                        if let Some(held) = moving.end(hearer, state) {
+                            self.tally.held.record(held);
+                        }
+                    }
                     None => moving.go_on(hearer),
                 }
             }

@@ -69,8 +69,9 @@ pub(super) struct Tally {
     pub(super) age: Times,
     /// From one map of a session to the next.
     pub(super) gap: Times,
-    /// Times that a session went on over another connection: asked to, and after one broke.
-    pub(super) moved: u64,
+    /// For how long frames were held back, once a move.
+    pub(super) held: Times,
+    /// Times that a session was opened anew after its connection broke.
     pub(super) reopened: u64,
     /// From the intended instant to the sending.
     pub(super) send_delay: Times,
@@ -102,7 +103,6 @@ impl Tally {
             (&mut self.processor.all, other.processor.all),
             (&mut self.processor.stolen, other.processor.stolen),
             (&mut self.wrong, other.wrong),
-            (&mut self.moved, other.moved),
             (&mut self.reopened, other.reopened),
         ] {
             *sum += part;
@@ -120,6 +120,7 @@ impl Tally {
             (&mut self.overhead, &other.overhead),
             (&mut self.age, &other.age),
             (&mut self.gap, &other.gap),
+            (&mut self.held, &other.held),
             (&mut self.send_delay, &other.send_delay),
         ] {
             sum.add(part);
