@@ -8,7 +8,8 @@ use papilla_proto::contact::{
 };
 use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
 use papilla_proto::{
-    ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage, Summary,
+    ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
+    Summary,
     effects::{
         Actuator, ActuatorInput, Afferents, ContactWindow, Layout, Moduli, OutOfRange, Place,
         PronyTerm, Relaxation, Section, SectionName, Tissue,

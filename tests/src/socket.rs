@@ -128,9 +128,7 @@ pub async fn say(
     .await
 }
 
-async fn in_time<T>(
-    work: impl Future<Output = Result<T, SocketError>>,
-) -> Result<T, SocketError> {
+async fn in_time<T>(work: impl Future<Output = Result<T, SocketError>>) -> Result<T, SocketError> {
     let done = timeout(Duration::from_secs(PATIENCE_S), work).await;
     done.map_err(|_| SocketError::Silent(PATIENCE_S))?
 }

@@ -228,9 +228,7 @@ class AsyncSession:
         try:
             raw = await dial(host, port)
             ws = f"{'wss' if secure else 'ws'}://{parts.netloc}/v1/session"
-            return await connect(
-                ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None
-            )
+            return await connect(ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None)
         except InvalidStatus as error:
             raise refusal(bytes(error.response.body or b""), str(error)) from None
         except (OSError, WebSocketException) as error:

@@ -1,5 +1,7 @@
 //! State as bytes, bit by bit the same when it is read.
 
+use super::SEALED_BYTES_MAX;
+
 /// Zeros in a row that end a run of values: fewer cost less than the two lengths of a new run.
 const GAP: usize = 3;
 
@@ -21,7 +23,7 @@ pub struct Writer(Vec<u8>);
 impl Writer {
     /// Writes a whole number.
     pub fn number(&mut self, number: u64) {
-        self.0.extend_from_slice(&number.to_le_bytes());
+        self.put(&number.to_le_bytes());
     }
 
     /// Writes a whole number that may be missing.
@@ -45,13 +47,20 @@ impl Writer {
             }
             self.number(((start - at) as u64) << 32 | (end - start) as u64);
             for value in &values[start..end] {
-                self.0.extend_from_slice(&value.to_le_bytes());
+                self.put(&value.to_le_bytes());
             }
             at = end;
         }
     }
 
-    /// The bytes.
+    /// What is too much to be sealed is not kept either: the length shows it.
+    fn put(&mut self, bytes: &[u8]) {
+        if self.0.len() <= SEALED_BYTES_MAX {
+            self.0.extend_from_slice(bytes);
+        }
+    }
+
+    /// The bytes; more than [`SEALED_BYTES_MAX`] are cut off.
     #[must_use]
     pub fn finish(self) -> Vec<u8> {
         self.0
@@ -173,6 +182,13 @@ mod tests {
             let _ = reader.floats(&mut vec![0.0; room]);
             let _ = reader.count(10, "a count");
         }
+    }
+
+    #[test]
+    fn more_than_can_be_sealed_is_not_kept() {
+        let mut writer = Writer::default();
+        writer.floats(&vec![1.0; SEALED_BYTES_MAX]);
+        assert!((1..8).contains(&(writer.finish().len() - SEALED_BYTES_MAX)));
     }
 
     #[test]

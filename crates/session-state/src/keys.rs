@@ -58,12 +58,12 @@ impl From<Unspecified> for SealError {
 
 /// What a state belongs to: it is of no use anywhere else.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Terms {
+pub struct SealedFor {
     tier: String,
     digest: [u8; DIGEST_LEN],
 }
 
-impl Terms {
+impl SealedFor {
     /// Those of a tier and of whatever else shapes the state; the version of the software is added.
     #[must_use]
     pub fn of(tier: &str, parts: &[&[u8]]) -> Self {
@@ -73,8 +73,9 @@ impl Terms {
             digest.update((part.len() as u64).to_le_bytes());
             digest.update(part);
         }
-        let tier = tier.chars().take(u8::MAX.into()).collect();
-        Self { tier, digest: digest.finalize().into() }
+        // A longer name is not told in clear: it has one byte for its length.
+        let tier = Some(tier).filter(|tier| tier.len() <= u8::MAX.into()).unwrap_or_default();
+        Self { tier: tier.to_owned(), digest: digest.finalize().into() }
     }
 }
 
@@ -141,7 +142,7 @@ impl Keys {
     /// It is too large, or the system gives no random numbers.
     pub fn seal(
         &self,
-        terms: &Terms,
+        terms: &SealedFor,
         state: &[u8],
         now: SystemTime,
     ) -> Result<Vec<u8>, SealError> {
@@ -176,7 +177,7 @@ impl Keys {
     /// Why the session starts anew: unreadable, expired, or of other terms.
     pub fn open(
         &self,
-        terms: &Terms,
+        terms: &SealedFor,
         sealed: &[u8],
         now: SystemTime,
     ) -> Result<Vec<u8>, Resumption> {
@@ -237,8 +238,8 @@ mod tests {
         UNIX_EPOCH + NOW
     }
 
-    fn terms(tier: &str) -> Terms {
-        Terms::of(tier, &[b"atlas"])
+    fn terms(tier: &str) -> SealedFor {
+        SealedFor::of(tier, &[b"atlas"])
     }
 
     #[test]
@@ -262,9 +263,12 @@ mod tests {
     fn a_state_is_good_for_its_terms_and_a_minute() {
         let keys = Keys::fresh().unwrap();
         let sealed = keys.seal(&terms("nano"), b"state", now()).unwrap();
-        let open = |terms, now| keys.open(&terms, &sealed, now);
+        let open = |terms: SealedFor, now| keys.open(&terms, &sealed, now);
         assert_eq!(open(terms("small"), now()), Err(Resumption::OtherTerms));
-        assert_eq!(open(Terms::of("nano", &[b"at", b"las"]), now()), Err(Resumption::OtherTerms));
+        assert_eq!(
+            open(SealedFor::of("nano", &[b"at", b"las"]), now()),
+            Err(Resumption::OtherTerms)
+        );
         assert!(open(terms("nano"), now() + GOOD_FOR).is_ok());
         let late = now() + GOOD_FOR + Duration::from_millis(1);
         assert_eq!(open(terms("nano"), late), Err(Resumption::Expired));

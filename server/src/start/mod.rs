@@ -78,7 +78,8 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app = App::new(&config, catalogue, metrics, &pool, (gate, moves), drain, Arc::clone(&progress));
+    let app =
+        App::new(&config, catalogue, metrics, &pool, (gate, moves), drain, Arc::clone(&progress));
     let app = Arc::new(app.with_contact(contact));
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
         reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {

@@ -50,9 +50,8 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
 async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), Problem>, End> {
     let text = match connection.next(Wait::FOR_DRAIN).await? {
         Event::Draining => return Err(drained()),
-        Event::Due | Event::Settled => return Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
         Event::Text(text) => text,
-        Event::Binary(..) => {
+        Event::Binary(..) | Event::Due | Event::Settled => {
             let message = "the first message is the JSON hello, in text";
             return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
         }

@@ -8,7 +8,7 @@ use std::{
 use papilla_proto::{Hello, Resumption};
 use papilla_session_contact::Finger;
 use papilla_session_effects::Effects;
-use papilla_session_state::{Reader, SealError, StateError, Terms as SealedFor, Writer};
+use papilla_session_state::{Reader, SealError, SealedFor, StateError, Writer};
 use sha2::{Digest, Sha256};
 
 use crate::{core::catalogue::Tier, transport::app::App};
