@@ -27,7 +27,7 @@ from .wire import Window
 
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
-_SEAL_PATIENCE_S: Final = 5.0
+_MOVE_PATIENCE_S: Final = 5.0
 _LOG: Final = logging.getLogger("papilla")
 NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
@@ -68,6 +68,7 @@ class AsyncSession:
         self._renewal: asyncio.Future[dict[str, Any]] | None = None
         self._writing = asyncio.Lock()
         self._tasks: list[asyncio.Task[None]] = []
+        self._reading: asyncio.Task[None] | None = None
         self._following: asyncio.Task[None] | None = None
         self._sealed: asyncio.Future[bytes] | None = None
         self._closed = False
@@ -91,7 +92,7 @@ class AsyncSession:
     async def close(self) -> None:
         """Ends the session; frames without an outcome are `lost`."""
         self._closed = True
-        tasks = [*self._tasks, *([self._following] if self._following else [])]
+        tasks = [task for task in [*self._tasks, self._reading, self._following] if task is not None]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -271,7 +272,11 @@ class AsyncSession:
                     assert old is not None
                     sealed = await self._seal(old)
                     resume = {} if sealed is None else {"resume": True}
-                    await self._begin(new, await self._say(new, {**self._hello, **resume}, sealed))
+                    saying = self._say(new, {**self._hello, **resume}, sealed)
+                    ready = await asyncio.wait_for(saying, _MOVE_PATIENCE_S)
+                    # Nothing, unless the service did not say what it remembers.
+                    self._lose_sent()
+                    await self._begin(new, ready)
             except (OSError, WebSocketException, Unreachable, Refused):
                 # The old connection goes on for as long as it is there.
                 if new is not None:
@@ -279,6 +284,8 @@ class AsyncSession:
                 await asyncio.sleep(_RETRY_S)
                 continue
             self._following = None
+            if self._reading is not None:
+                self._reading.cancel()
             await old.close()
             return
 
@@ -287,7 +294,7 @@ class AsyncSession:
         self._sealed = asyncio.get_running_loop().create_future()
         try:
             await socket.send(json.dumps({"type": "seal"}))
-            return await asyncio.wait_for(self._sealed, _SEAL_PATIENCE_S)
+            return await asyncio.wait_for(self._sealed, _MOVE_PATIENCE_S)
         except TimeoutError:
             return None
         finally:
@@ -303,7 +310,8 @@ class AsyncSession:
         while True:
             socket = self._socket
             assert socket is not None
-            await self._read(socket)
+            self._reading = asyncio.create_task(self._read(socket))
+            await asyncio.wait([self._reading])
             if self._socket is not socket:
                 # It has moved.
                 continue
@@ -314,9 +322,7 @@ class AsyncSession:
             self._wake.set()
             if self._renewal is not None and not self._renewal.done():
                 self._renewal.set_exception(Unreachable("the connection broke"))
-            for frame in list(self._sent.values()):
-                self._lose(frame)
-            self._sent.clear()
+            self._lose_sent()
             while not self._connected.is_set():
                 await asyncio.sleep(_RETRY_S)
                 try:
@@ -334,6 +340,11 @@ class AsyncSession:
                     self._waiting.clear()
                     return
             self._wake.set()
+
+    def _lose_sent(self) -> None:
+        for frame in list(self._sent.values()):
+            self._lose(frame)
+        self._sent.clear()
 
     async def _read(self, socket: ClientConnection) -> None:
         try:
