@@ -5,6 +5,7 @@ use std::{
     time::Duration,
 };
 
+use papilla_metrics::TIERS_MAX;
 use tokio::time::{Instant, sleep};
 
 use crate::{drain::begun, transport::app::App};
@@ -13,25 +14,24 @@ use crate::{drain::begun, transport::app::App};
 const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: usize = 10;
 
-/// What was asked for at a look: maps of each tier, contact solves.
-#[derive(Default)]
+/// What was asked for at a look: maps of each tier, contact solves. A look allocates nothing.
 struct Asked {
-    maps: Vec<u64>,
+    maps: [u64; TIERS_MAX],
     solves: u64,
 }
 
 impl Asked {
     fn now(app: &App) -> Self {
         let of_tier = |place| app.metrics.tier(place).asked.load(Ordering::Relaxed);
-        let maps = (0..app.catalogue().tiers.len()).map(of_tier).collect();
+        let maps = std::array::from_fn(of_tier);
         Self { maps, solves: app.metrics.contact.asked.load(Ordering::Relaxed) }
     }
 
     /// Thread time that what came since asks for, s, as long as each takes here now.
     fn seconds_since(&self, before: &Self, app: &App) -> f64 {
         let (catalogue, mut us) = (app.catalogue(), 0);
-        for (tier, maps) in self.maps.iter().enumerate() {
-            let new = maps - before.maps.get(tier).copied().unwrap_or(0);
+        for tier in 0..catalogue.tiers.len().min(TIERS_MAX) {
+            let new = self.maps[tier] - before.maps[tier];
             us += new * catalogue.predicted_latency_us(tier);
         }
         let of_solve = app.contact.as_ref().map_or(0, |contact| contact.frame_us);
