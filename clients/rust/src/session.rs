@@ -2,6 +2,7 @@
 
 mod hand;
 mod link;
+mod live;
 mod moving;
 mod state;
 
@@ -106,7 +107,7 @@ impl Session {
             moving: Notify::new(),
             opened: watch::Sender::new(1),
         });
-        let task = tokio::spawn(link::live(server, Arc::clone(&shared), link));
+        let task = tokio::spawn(live::live(server, Arc::clone(&shared), link));
         Ok(Self { shared, task })
     }
 

@@ -1,19 +1,15 @@
-//! The connection of a session, and the task that keeps one.
+//! A connection of a session.
 
-use std::{mem::replace, sync::Arc, time::Duration};
+use std::time::Duration;
 
 use futures_util::{
     SinkExt, StreamExt,
     stream::{SplitSink, SplitStream},
 };
 use papilla_proto::{ClientMessage, Hello, Problem, Ready, ServerMessage};
-use tokio::{
-    net::TcpStream,
-    time::{sleep, timeout},
-};
+use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{WebSocketStream, client_async, tungstenite::Message};
 
-use super::{Shared, moving::follow, state::Next};
 use crate::{PapillaError, dial::dial};
 
 /// Pause before the next attempt to connect.
@@ -22,29 +18,26 @@ pub(super) const RETRY: Duration = Duration::from_millis(150);
 /// Longest wait for the service's ready.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Longest wait for the service to take a close.
-const FAREWELL: Duration = Duration::from_secs(1);
-
-type Sink = SplitSink<WebSocketStream<TcpStream>, Message>;
-type Stream = SplitStream<WebSocketStream<TcpStream>>;
+pub(super) type Sink = SplitSink<WebSocketStream<TcpStream>, Message>;
+pub(super) type Stream = SplitStream<WebSocketStream<TcpStream>>;
 
 /// An open connection on which hello was said.
 pub(super) struct Link {
-    sink: Sink,
-    stream: Stream,
+    pub(super) sink: Sink,
+    pub(super) stream: Stream,
 }
 
-fn hello_message(hello: &Hello) -> Result<Message, PapillaError> {
+pub(super) fn hello_message(hello: &Hello) -> Result<Message, PapillaError> {
     text(&ClientMessage::Hello(hello.clone()))
 }
 
-fn text(message: &ClientMessage) -> Result<Message, PapillaError> {
+pub(super) fn text(message: &ClientMessage) -> Result<Message, PapillaError> {
     serde_json::to_string(message)
         .map(Message::from)
         .map_err(|error| PapillaError::Protocol(error.to_string()))
 }
 
-fn message(text: &str) -> Result<ServerMessage, PapillaError> {
+pub(super) fn message(text: &str) -> Result<ServerMessage, PapillaError> {
     serde_json::from_str(text).map_err(|error| PapillaError::Protocol(error.to_string()))
 }
 
@@ -90,92 +83,5 @@ impl Link {
             };
         }
         Err(PapillaError::unreachable(server, &"it closed the connection"))
-    }
-}
-
-/// Keeps a session until it is dropped, or until the service refuses it for good.
-pub(super) async fn live(server: String, shared: Arc<Shared>, link: Link) {
-    let mut link = link;
-    loop {
-        let Link { sink, stream } = &mut link;
-        let moved = tokio::select! {
-            () = write(&shared, sink) => None,
-            () = read(&shared, stream) => None,
-            moved = follow(&server, &shared) => Some(moved),
-        };
-        link = match moved {
-            Some((new, ready)) => {
-                shared.state().moved(Arc::new(ready));
-                let mut old = replace(&mut link, new);
-                tokio::spawn(async move { timeout(FAREWELL, old.sink.close()).await });
-                link
-            }
-            None => match reopen(&server, &shared).await {
-                Some(new) => new,
-                None => return shared.state().end(),
-            },
-        };
-        shared.opened.send_modify(|opened| *opened += 1);
-    }
-}
-
-/// Opens another session after the connection broke; none: the service refuses it for good.
-async fn reopen(server: &str, shared: &Shared) -> Option<Link> {
-    shared.state().lose();
-    loop {
-        sleep(RETRY).await;
-        let hello = shared.state().hello.clone();
-        match Link::open(server, &hello).await {
-            Ok((link, ready)) => {
-                shared.state().agree(Arc::new(ready));
-                return Some(link);
-            }
-            Err(error) if error.passes() => {}
-            Err(_) => return None,
-        }
-    }
-}
-
-/// Sends what waits, one message at a time, until the connection breaks.
-async fn write(shared: &Shared, sink: &mut Sink) {
-    loop {
-        let next = shared.state().next();
-        let message = match next {
-            Some(Next::Frame(message)) => Ok(Message::from(message)),
-            Some(Next::Hello(hello)) => hello_message(&hello),
-            Some(Next::Seal) => text(&ClientMessage::Seal),
-            None => {
-                shared.wake.notified().await;
-                continue;
-            }
-        };
-        let Ok(message) = message else { return };
-        if sink.send(message).await.is_err() {
-            return;
-        }
-    }
-}
-
-/// Takes what the service says until the connection breaks or the service leaves the protocol.
-async fn read(shared: &Shared, stream: &mut Stream) {
-    while let Some(Ok(received)) = stream.next().await {
-        match received {
-            Message::Binary(bytes) => {
-                let result = shared.state().on_binary(&bytes);
-                if result.is_err() {
-                    return;
-                }
-                shared.tell_of_move();
-            }
-            Message::Text(text) => {
-                let Ok(message) = message(&text) else { return };
-                shared.state().on_text(message);
-                // Frames may have waited for the terms.
-                shared.wake.notify_one();
-                shared.tell_of_move();
-            }
-            Message::Close(_) => return,
-            Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
-        }
     }
 }
