@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn a_map_without_contact_takes_no_room() {
         let mut writer = Writer::default();
-        writer.floats(&[0.0; 50_176]);
+        writer.floats(&vec![0.0; 50_176]);
         assert_eq!(writer.finish().len(), 8);
     }
 }

@@ -219,10 +219,8 @@ impl State {
                     let _ = reply.send(Ok(ready));
                 }
             }
-            ServerMessage::Reconnect(_) => {
-                if self.moving == Moving::Stays {
-                    self.moving = Moving::Asked;
-                }
+            ServerMessage::Reconnect(_) if self.moving == Moving::Stays => {
+                self.moving = Moving::Asked;
             }
             ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
                 let problem = Problem { code, message, field };

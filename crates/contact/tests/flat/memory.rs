@@ -72,7 +72,7 @@ fn a_memory_that_fits_no_patch_is_as_good_as_none() {
         Memory { stride: 0, ..good.clone() },
         Memory { stride: 1 << 20, ..good.clone() },
         Memory { forces_n: Vec::new(), ..good.clone() },
-        Memory { made_with: Vec::new(), ..good.clone() },
+        Memory { made_with: Vec::new(), ..good },
     ] {
         let (mut other, mut found) = solver(small_strain());
         assert!(!other.recall(&bad), "{bad:?}");
