@@ -68,7 +68,10 @@ pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
     keep_inside,
 };
-pub use message::{ClientMessage, Hello, MessageError, Ready, ServerMessage, SessionError};
+pub use message::{
+    ClientMessage, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,
+    SEALED_MAGIC, ServerMessage, SessionError,
+};
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;

@@ -1,9 +1,11 @@
 //! The JSON messages of a session: the client's hello, the server's ready and errors.
 
+mod moving;
 mod tagged;
 
 use serde::{Deserialize, Serialize};
 
+pub use self::moving::{Reconnect, ReconnectReason, Resumption, SEALED_MAGIC};
 use self::tagged::WithoutType;
 use crate::{
     ErrorCode, Problem, RuntimeEffect, SampleType,
@@ -20,9 +22,12 @@ pub const CLIENT_MESSAGE_BYTES_MAX: usize = 512 << 10;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
 #[non_exhaustive]
+#[expect(clippy::large_enum_variant, reason = "one is read at a time, and none is kept")]
 pub enum ClientMessage {
     /// Opens the session; must be the first message. Later ones set new terms.
     Hello(Hello),
+    /// Asks for what the session remembers, sealed, once every frame before it is answered.
+    Seal,
 }
 
 /// Why a text is no message of a client.
@@ -63,10 +68,14 @@ impl ClientMessage {
             return Err(MessageError::Unknown(JsonError { member: None, reason, place: None }));
         }
         let kind: Kind = json::read_bounded(text).map_err(MessageError::Unknown)?;
-        if kind.r#type != "hello" {
-            let reason = format!("'{}' is no message of a client; 'hello' is", kind.r#type);
-            let member = Some("type".to_owned());
-            return Err(MessageError::Unknown(JsonError { member, reason, place: None }));
+        match kind.r#type.as_str() {
+            "hello" => {}
+            "seal" => return Ok(Self::Seal),
+            other => {
+                let reason = format!("'{other}' is no message of a client; 'hello' is");
+                let member = Some("type".to_owned());
+                return Err(MessageError::Unknown(JsonError { member, reason, place: None }));
+            }
         }
         json::read_with(text, |deserializer| Hello::deserialize(WithoutType(deserializer)))
             .map(Self::Hello)
@@ -135,6 +144,12 @@ pub struct Hello {
     /// Parameters of the effect `relaxation`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
+    /// True: the client follows a [`Reconnect`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reconnect: Option<bool>,
+    /// True: the next message is what another session of this client remembers, sealed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resume: Option<bool>,
     /// What frames hold. Version 3, as all that follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<Input>,
@@ -179,6 +194,8 @@ impl Hello {
             (self.actuators.is_some(), "actuators"),
             (self.afferents.is_some(), "afferents"),
             (self.relaxation.is_some(), "relaxation"),
+            (self.reconnect.is_some(), "reconnect"),
+            (self.resume.is_some(), "resume"),
         ]
         .into_iter()
         .find_map(|(there, name)| there.then_some(name))
@@ -224,6 +241,8 @@ impl Default for Hello {
             actuators: None,
             afferents: None,
             relaxation: None,
+            reconnect: None,
+            resume: None,
             input: None,
             input_layout: None,
             answer_layout: None,
@@ -246,6 +265,8 @@ pub enum ServerMessage {
     Ready(Ready),
     /// Something was refused.
     Error(SessionError),
+    /// The client is to open another connection and to go on there.
+    Reconnect(Reconnect),
 }
 
 /// The session is open, and on these terms.
@@ -296,6 +317,9 @@ pub struct Ready {
     /// What the payload of an answer with status ok holds, and where.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sections: Option<Vec<Section>>,
+    /// What became of the state that the hello brought.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<Resumption>,
     /// Vertices of the atlas, for what is laid out by them. Version 3, as all that follows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vertices: Option<u32>,

@@ -8,7 +8,8 @@ use papilla_proto::contact::{
 };
 use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
 use papilla_proto::{
-    ClientMessage, Hello, Ready, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage, Summary,
+    ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
+    Summary,
     effects::{
         Actuator, ActuatorInput, Afferents, ContactWindow, Layout, Moduli, OutOfRange, Place,
         PronyTerm, Relaxation, Section, SectionName, Tissue,
@@ -181,6 +182,7 @@ proptest! {
             answer_sample_type: Some(SampleType::F16),
             session_effects: effects,
             sections: Some(vec![section]),
+            state: numbers.2.map(|_| Resumption::OtherTerms),
             vertices: Some(offset),
             fingers: numbers.2,
             contact_us: Some(numbers.1),

@@ -10,7 +10,7 @@ use crate::{
     config::Config,
     core::catalogue::{Catalogue, Loading, assets::Assets, calibrate, golden},
     start::load_contact,
-    transport::{gate::Gate, net, tls},
+    transport::{gate::Gate, moves::Moves, net, tls},
 };
 
 /// Bytes one connection, one session, its effects and one posted map can hold at most; see
@@ -94,6 +94,12 @@ pub fn check(config: &Config) -> Report {
     match Gate::new(config) {
         Ok(gate) => report.good("tokens", gate.describe(), Value::Null),
         Err(error) => report.bad("tokens", 2, &error),
+    }
+    if let Some(file) = &config.state_keys {
+        match Moves::new(config) {
+            Ok(_) => report.good("state_keys", format!("{}", file.display()), Value::Null),
+            Err(error) => report.bad("state_keys", 2, &error),
+        }
     }
     let assets = Assets::of(config);
     match assets.and_then(|a| Catalogue::load(&a, Loading::of(config), None)) {

@@ -67,6 +67,7 @@ use crate::{
         app::App,
         front::Front,
         gate::{Gate, Places},
+        moves::Moves,
         net::{self, ConnectionContext},
         tls,
     },
@@ -125,7 +126,8 @@ impl Drop for EndOnDrop {
 /// Settings do not go together, or the address cannot be bound; each says what to do.
 pub fn listen(config: &Config) -> Result<Starting, StartError> {
     config.validate()?;
-    let (gate, tls) = (Gate::new(config)?, tls::acceptor(config)?);
+    let (gate, moves) = (Gate::new(config)?, Moves::new(config)?);
+    let tls = tls::acceptor(config)?;
     let bind = |source| StartError::Bind { address: config.bind, source };
     let io = IoRuntime::start().map_err(StartError::Thread)?;
     let listener = {
@@ -146,6 +148,7 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
     let parts = start::Parts {
         config: config.clone(),
         gate,
+        moves,
         metrics: Arc::clone(&metrics),
         progress,
         front: Arc::clone(&front),

@@ -25,7 +25,8 @@ def test_every_family_is_there_with_its_type(families):
         ("papilla_build", "info"), ("papilla_stage_seconds", "histogram"), ("papilla_request_seconds", "histogram"),
         ("papilla_maps", "counter"), ("papilla_late", "counter"), ("papilla_shed", "counter"),
         ("papilla_errors", "counter"), ("papilla_reloads", "counter"), ("papilla_zero_maps", "counter"),
-        ("papilla_queue_length", "gauge"), ("papilla_sessions_open", "gauge"), ("papilla_sessions", "counter"),
+        ("papilla_queue_length", "gauge"), ("papilla_load_ratio", "gauge"), ("papilla_sessions_open", "gauge"),
+        ("papilla_sessions", "counter"),
         ("papilla_connections_open", "gauge"), ("papilla_model", "gauge"), ("process_resident_memory_bytes", "gauge"),
         ("process_open_fds", "gauge"), ("process_cpu_seconds", "counter"),
     ]:

@@ -83,23 +83,54 @@ pub enum Received {
 /// # Errors
 /// [`SocketError`]: nobody listens, the handshake or the hello is refused.
 pub async fn open(server: &str, hello: &Hello) -> Result<(Ready, Sender, Receiver), SocketError> {
+    let (sender, receiver) = connect(server).await?;
+    say(sender, receiver, hello, None).await
+}
+
+/// A connection to `server` on which nothing was said, `TCP_NODELAY` set.
+///
+/// # Errors
+/// [`SocketError`]: nobody listens, or the handshake is refused.
+pub async fn connect(server: &str) -> Result<(Sender, Receiver), SocketError> {
     let connect = |source| SocketError::Connect { server: server.to_owned(), source };
-    let opening = async {
+    in_time(async {
         let stream = dial(server).await.map_err(connect)?;
         let (stream, _) = client_async(format!("ws://{server}/v1/session"), stream).await?;
         let (sender, receiver) = stream.split();
-        let (mut sender, mut receiver) = (Sender(sender), Receiver(receiver));
+        Ok((Sender(sender), Receiver(receiver)))
+    })
+    .await
+}
+
+/// Says hello, with the state that it announces, and waits for ready.
+///
+/// # Errors
+/// [`SocketError`]: the hello is refused, or the connection breaks.
+pub async fn say(
+    mut sender: Sender,
+    mut receiver: Receiver,
+    hello: &Hello,
+    sealed: Option<Vec<u8>>,
+) -> Result<(Ready, Sender, Receiver), SocketError> {
+    in_time(async {
         let hello = serde_json::to_string(&ClientMessage::Hello(hello.clone()))
             .map_err(|error| SocketError::Text(error.to_string()))?;
         sender.send(hello).await?;
+        if let Some(sealed) = sealed {
+            sender.send(sealed).await?;
+        }
         match receiver.text_or_frame().await? {
             Said::Text(ServerMessage::Ready(ready)) => Ok((ready, sender, receiver)),
             Said::Text(ServerMessage::Error(error)) => Err(SocketError::Refused(Box::new(error))),
             Said::Text(_) | Said::Frame(..) => Err(SocketError::Text("ready is due".to_owned())),
         }
-    };
-    let opened = timeout(Duration::from_secs(PATIENCE_S), opening).await;
-    opened.map_err(|_| SocketError::Silent(PATIENCE_S))?
+    })
+    .await
+}
+
+async fn in_time<T>(work: impl Future<Output = Result<T, SocketError>>) -> Result<T, SocketError> {
+    let done = timeout(Duration::from_secs(PATIENCE_S), work).await;
+    done.map_err(|_| SocketError::Silent(PATIENCE_S))?
 }
 
 /// The connection of an open session with nothing under way, for whoever speaks over it by themselves.

@@ -93,6 +93,20 @@ def no_cmake() -> str | None:
     return None if there else "no CMake and pkg-config here: apt install cmake pkg-config"
 
 
+def no_haproxy() -> str | None:
+    # Debian has its daemons where a user's shell may not look.
+    if shutil.which("haproxy", path=os.environ["PATH"] + ":/usr/sbin"):
+        return None
+    return "no haproxy here: apt-get install haproxy"
+
+
+def no_validator() -> str | None:
+    target = Path(os.environ.get("CARGO_TARGET_DIR", "target"))
+    if (target / "venv-kubernetes/bin/kubernetes-validate").exists():
+        return None
+    return "no kubernetes-validate here: pip could not install it"
+
+
 def no_nightly() -> str | None:
     command = ["rustup", "run", "nightly", "rustc", "--version"]
     if shutil.which("rustup") and subprocess.run(command, capture_output=True, check=False).returncode == 0:
@@ -303,6 +317,30 @@ def long() -> list[Step]:
             after=("container",),
             tests_min=5,
             missing=no_musl,
+        ),
+        Step(
+            "balancer-installs",
+            "HAProxy and a validator of Kubernetes files, where they can be had",
+            f"{AS_ROOT} command -v haproxy /usr/sbin/haproxy || "
+            "as_root apt-get install -y -qq --no-install-recommends haproxy || true\n"
+            "tests/suite/environment kubernetes deploy/kubernetes/requirements.txt || true",
+            after=("release",),
+            installs="apt: haproxy; pip: kubernetes-validate (142 MB)",
+        ),
+        Step(
+            "balancer",
+            "HAProxy over three services, one drained every ten seconds, one killed",
+            "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS cargo build --release -p papilla-tests --bins\n"
+            'PATH="$PATH:/usr/sbin" tests/balancer/run',
+            after=("balancer-installs",),
+            missing=no_haproxy,
+        ),
+        Step(
+            "kubernetes",
+            "deploy/kubernetes against the schemas of its resources",
+            '"$TARGET/venv-kubernetes/bin/kubernetes-validate" --strict deploy/kubernetes/papilla.yaml',
+            after=("balancer-installs",),
+            missing=no_validator,
         ),
         Step(
             "rust-long",

@@ -32,6 +32,7 @@ class Run {
     const auto steps = std::map<std::string, void (Run::*)(const Value&)>{
         {"hello", &Run::hello},         {"frame", &Run::frame},         {"burst", &Run::burst},
         {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
+        {"move", &Run::moved},
         {"contacts", &Run::contacts},   {"touch", &Run::touch},         {"gaps", &Run::gaps}};
     must(steps.count(name) != 0, "there is no step " + name);
     (this->*steps.at(name))(step);
@@ -43,6 +44,7 @@ class Run {
   std::mutex mutex_;
   std::vector<Outcome> outcomes_;
   std::unique_ptr<Atlas> atlas_;
+  std::uint64_t moved_ = 1;           ///< connections at the last move
   // Last: its threads end before what they use.
   std::unique_ptr<Session> session_;
 
@@ -165,6 +167,16 @@ class Run {
       sleep_ms(5);
     }
     note = " (connected " + std::to_string(double(now_us() - begin) * 1e-6) + " s after the server was back)";
+  }
+
+  void moved(const Value& step) {
+    const std::uint64_t begin = now_us();
+    // It may have moved between the steps.
+    while (session().connections() == moved_) {
+      must(double(now_us() - begin) < 1e6 * step["within_s"].number, "it did not move in time");
+      sleep_ms(5);
+    }
+    moved_ = session().connections();
   }
 
   void post(const Value& step) {

@@ -27,6 +27,7 @@ from .wire import Window
 
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
+_MOVE_PATIENCE_S: Final = 5.0
 _LOG: Final = logging.getLogger("papilla")
 NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
@@ -43,7 +44,8 @@ class AsyncSession:
 
     The arguments after `url` and `token` are the members of the protocol's hello
     (docs/reference/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
-    so on. When the connection breaks, the session opens another by itself.
+    so on. When the connection breaks, or the service asks for it, the session opens another by itself;
+    where the service asked, no frame is lost and what it remembers goes along.
     """
 
     def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
@@ -66,6 +68,9 @@ class AsyncSession:
         self._renewal: asyncio.Future[dict[str, Any]] | None = None
         self._writing = asyncio.Lock()
         self._tasks: list[asyncio.Task[None]] = []
+        self._reading: asyncio.Task[None] | None = None
+        self._following: asyncio.Task[None] | None = None
+        self._sealed: asyncio.Future[bytes] | None = None
         self._closed = False
         self._fault: Refused | None = None
         self._warned: set[str] = set()
@@ -87,9 +92,10 @@ class AsyncSession:
     async def close(self) -> None:
         """Ends the session; frames without an outcome are `lost`."""
         self._closed = True
-        for task in self._tasks:
+        tasks = [task for task in [*self._tasks, self._reading, self._following] if task is not None]
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
         if self._socket is not None:
             await self._socket.close()
         for frame in [*self._sent.values(), *self._waiting.values()]:
@@ -207,9 +213,15 @@ class AsyncSession:
 
     def _words(self, hello: dict[str, Any]) -> str:
         version = 3 if _OF_VERSION_3 & hello.keys() else 2
-        return json.dumps({"type": "hello", "version": version, **hello})
+        return json.dumps({"type": "hello", "version": version, "reconnect": True, **hello})
 
     async def _connect(self) -> None:
+        socket = await self._dial()
+        await self._begin(socket, await self._say(socket, self._hello))
+        self._connected.set()
+
+    async def _dial(self) -> ClientConnection:
+        """A connection on which nothing was said."""
         parts = urlsplit(self.url)
         secure = parts.scheme in ("https", "wss")
         host, port = parts.hostname or "127.0.0.1", parts.port or (443 if secure else 80)
@@ -217,22 +229,76 @@ class AsyncSession:
         try:
             raw = await dial(host, port)
             ws = f"{'wss' if secure else 'ws'}://{parts.netloc}/v1/session"
-            self._socket = await connect(
-                ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None
-            )
-            await self._socket.send(self._words(self._hello))
-            said = await asyncio.wait_for(self._socket.recv(), _PATIENCE_S)
+            return await connect(ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None)
         except InvalidStatus as error:
             raise refusal(bytes(error.response.body or b""), str(error)) from None
         except (OSError, WebSocketException) as error:
             raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
-        message = json.loads(said)
+
+    async def _say(
+        self, socket: ClientConnection, hello: dict[str, Any], sealed: bytes | None = None
+    ) -> dict[str, Any]:
+        """Says hello, with the state that it announces; what the service agreed to."""
+        try:
+            await socket.send(self._words(hello))
+            if sealed is not None:
+                await socket.send(sealed)
+            message = json.loads(await asyncio.wait_for(socket.recv(), _PATIENCE_S))
+        except (OSError, WebSocketException, TimeoutError) as error:
+            raise Unreachable(f"{self.url}: {error}; is papilla-server running there?") from error
         if message["type"] != "ready":
-            await self._socket.close()
+            await socket.close()
             raise Refused(message["code"], message["message"], message.get("field"))
-        await self._agree(message)
+        ready: dict[str, Any] = message
+        return ready
+
+    async def _begin(self, socket: ClientConnection, ready: dict[str, Any]) -> None:
+        self._socket = socket
+        await self._agree(ready)
         self.connections += 1
-        self._connected.set()
+
+    async def _follow(self) -> None:
+        """Goes on over another connection, with what the service remembers.
+
+        Frames go on over the old one until the new one is there; then they wait for what was sent to
+        be answered, and for ready.
+        """
+        while True:
+            new = None
+            try:
+                new = await self._dial()
+                async with self._writing:
+                    old = self._socket
+                    assert old is not None
+                    sealed = await self._seal(old)
+                    resume = {} if sealed is None else {"resume": True}
+                    saying = self._say(new, {**self._hello, **resume}, sealed)
+                    ready = await asyncio.wait_for(saying, _MOVE_PATIENCE_S)
+                    # Nothing, unless the service did not say what it remembers.
+                    self._lose_sent()
+                    await self._begin(new, ready)
+            except (OSError, WebSocketException, Unreachable, Refused):
+                # The old connection goes on for as long as it is there.
+                if new is not None:
+                    await new.close()
+                await asyncio.sleep(_RETRY_S)
+                continue
+            self._following = None
+            if self._reading is not None:
+                self._reading.cancel()
+            await old.close()
+            return
+
+    async def _seal(self, socket: ClientConnection) -> bytes | None:
+        """What the service remembers, once it has answered what was sent; None: it does not say."""
+        self._sealed = asyncio.get_running_loop().create_future()
+        try:
+            await socket.send(json.dumps({"type": "seal"}))
+            return await asyncio.wait_for(self._sealed, _MOVE_PATIENCE_S)
+        except TimeoutError:
+            return None
+        finally:
+            self._sealed = None
 
     async def _agree(self, ready: dict[str, Any]) -> None:
         self.ready = ready
@@ -242,14 +308,21 @@ class AsyncSession:
     async def _live(self) -> None:
         """Reads until the connection breaks, and then opens another."""
         while True:
-            await self._read()
+            socket = self._socket
+            assert socket is not None
+            self._reading = asyncio.create_task(self._read(socket))
+            await asyncio.wait([self._reading])
+            if self._socket is not socket:
+                # It has moved.
+                continue
             self._connected.clear()
+            if self._following is not None:
+                self._following.cancel()
+                self._following = None
             self._wake.set()
             if self._renewal is not None and not self._renewal.done():
                 self._renewal.set_exception(Unreachable("the connection broke"))
-            for frame in list(self._sent.values()):
-                self._lose(frame)
-            self._sent.clear()
+            self._lose_sent()
             while not self._connected.is_set():
                 await asyncio.sleep(_RETRY_S)
                 try:
@@ -268,19 +341,27 @@ class AsyncSession:
                     return
             self._wake.set()
 
-    async def _read(self) -> None:
-        assert self._socket is not None
+    def _lose_sent(self) -> None:
+        for frame in list(self._sent.values()):
+            self._lose(frame)
+        self._sent.clear()
+
+    async def _read(self, socket: ClientConnection) -> None:
         try:
-            async for message in self._socket:
+            async for message in socket:
                 if isinstance(message, bytes):
                     self._answered(message)
                 else:
                     self._told(json.loads(message))
         except (OSError, WebSocketException, ValueError):
             # Broken, or no longer the protocol: either way this connection is over.
-            await self._socket.close()
+            await socket.close()
 
     def _answered(self, message: bytes) -> None:
+        if message.startswith(wire.SEALED):
+            if self._sealed is not None and not self._sealed.done():
+                self._sealed.set_result(message)
+            return
         header = wire.decode(message)
         frame = self._sent.pop(header.sequence, None)
         if frame is not None:
@@ -296,6 +377,10 @@ class AsyncSession:
             _LOG.warning("%s", words)
 
     def _told(self, message: dict[str, Any]) -> None:
+        if message["type"] == "reconnect":
+            if self._following is None:
+                self._following = asyncio.create_task(self._follow())
+            return
         frame = self._sent.pop(message.get("sequence", -1), None)
         if frame is not None:
             problem = Problem(message["code"], message["message"], message.get("field"))

@@ -129,6 +129,7 @@ class Run:
         self.timeout_s = float(file["timeout_s"])
         self.session: Session | None = None
         self.atlas: Atlas | None = None
+        self.moved = 1
         self.note = ""
 
     def open_session(self) -> Session:
@@ -229,6 +230,15 @@ class Run:
             must(time.monotonic() < begin + step["within_s"], "no new session in time")
             time.sleep(0.005)
         self.note = f"(connected {time.monotonic() - begin:.2f} s after the server was back)"
+
+    def move(self, step: Step) -> None:
+        session, before = self.open_session(), self.moved
+        begin = time.monotonic()
+        # It may have moved between the steps.
+        while session.connections == before:
+            must(time.monotonic() < begin + step["within_s"], "it did not move in time")
+            time.sleep(0.005)
+        self.moved = session.connections
 
     def http(self, step: Step) -> None:
         expect = step["expect"]

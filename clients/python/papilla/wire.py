@@ -25,6 +25,8 @@ _SAMPLES: Final[dict[str, tuple[int, str, float]]] = {
     "u8": (3, "u1", 255.0),
 }
 _NAMES: Final = {number: name for name, (number, _, _) in _SAMPLES.items()}
+SEALED: Final = b"PPS"
+"""What a sealed state begins with, as opposed to a frame."""
 STATUSES: Final = ("ok", "superseded", "late", "error", "stale")
 KINDS: Final = {2: "sed", 3: "sa1_rate"}
 

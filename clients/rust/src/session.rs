@@ -2,6 +2,8 @@
 
 mod hand;
 mod link;
+mod live;
+mod moving;
 mod state;
 
 use std::{
@@ -53,6 +55,8 @@ struct Shared {
     state: std::sync::Mutex<State>,
     /// The writer has something to do.
     wake: Notify,
+    /// The session is to move, or has what it takes along.
+    moving: Notify,
     /// Sessions opened so far; odd things happen between two of them.
     opened: watch::Sender<u64>,
 }
@@ -66,7 +70,8 @@ impl Shared {
 
 /// A session: pressure maps in, SED maps out, the latest frame wins.
 ///
-/// When the connection breaks, it opens another by itself, with the same hello. Needs a tokio
+/// When the connection breaks, or the service asks for it, it opens another by itself, with the same
+/// hello; where the service asked, no frame is lost and what it remembers goes along. Needs a tokio
 /// runtime; dropping it ends the session.
 #[derive(Debug)]
 pub struct Session {
@@ -74,10 +79,10 @@ pub struct Session {
     task: JoinHandle<()>,
 }
 
-/// The hello in the version that its members need.
+/// The hello in the version that its members need, of a client that moves when it is asked to.
 fn versioned(hello: Hello) -> Hello {
     let version = if hello.member_of_version_3().is_some() { 3 } else { 2 };
-    Hello { version, ..hello }
+    Hello { version, reconnect: Some(true), ..hello }
 }
 
 /// Microseconds of a steady clock.
@@ -99,9 +104,10 @@ impl Session {
         let shared = Arc::new(Shared {
             state: std::sync::Mutex::new(State::new(hello, ready)),
             wake: Notify::new(),
+            moving: Notify::new(),
             opened: watch::Sender::new(1),
         });
-        let task = tokio::spawn(link::live(server, Arc::clone(&shared), link));
+        let task = tokio::spawn(live::live(server, Arc::clone(&shared), link));
         Ok(Self { shared, task })
     }
 

@@ -2,6 +2,7 @@
 
 import { PapillaError, missed } from './error.js';
 import { Link, sessionUrl } from './link.js';
+import { Move } from './move.js';
 import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
 
 /** @typedef {import('./types.js').HandHello} HandHello */
@@ -62,17 +63,20 @@ export class Hand {
   /** @type {Map<number, Waiting>} */ #waiting = new Map();
   /** @type {Map<number, Waiting>} */ #sent = new Map();
   /** @type {(() => void) | null} */ #opened = null;
+  #move;
 
   /** @param {string} base @param {HandHello} hello @param {string} [token] */
   constructor(base, hello, token) {
-    this.#hello = { input: hello.objects ? 'objects' : 'gaps', map: false, ...hello, type: 'hello', version: VERSION };
+    this.#hello = { input: hello.objects ? 'objects' : 'gaps', map: false, ...hello, type: 'hello', version: VERSION, reconnect: true };
     this.#link = new Link(sessionUrl(base, token), {
       connecting: () => {},
-      opened: () => this.#link.send(JSON.stringify(this.#hello)),
+      opened: () => this.#greet(false),
+      prepared: () => this.#move.prepared(),
       text: (text) => this.#text(JSON.parse(text)),
       binary: (data) => this.#binary(data),
       lost: () => this.#lost(),
     });
+    this.#move = new Move(this.#link, (resume) => this.#greet(resume), () => this.#flush());
   }
 
   /**
@@ -156,7 +160,7 @@ export class Hand {
   }
 
   #flush() {
-    if (!this.ready || !this.#link.isOpen) return;
+    if (!this.ready || this.#move.holds || !this.#link.isOpen) return;
     for (const [finger, waiting] of this.#waiting) {
       if (this.#link.bufferedBytes > 0) {
         if (!this.#drainTimer) setTimeout(() => { this.#drainTimer = false; this.#flush(); }, DRAIN_MS);
@@ -169,16 +173,25 @@ export class Hand {
     }
   }
 
+  /** @param {boolean} resume */
+  #greet(resume) {
+    this.ready = null;
+    this.#link.send(JSON.stringify(resume ? { ...this.#hello, resume } : this.#hello));
+  }
+
   #lost() {
+    this.#move.end();
     this.ready = null;
     for (const sent of this.#sent.values()) sent.reject(new PapillaError(missed('lost', sent.sequence)));
     this.#sent.clear();
   }
 
-  /** @param {Ready | Problem} message */
+  /** @param {Ready | Problem | {type: 'reconnect'}} message */
   #text(message) {
+    if (message.type === 'reconnect') return this.#link.prepare();
     if (message.type === 'ready') {
       this.#link.succeeded();
+      this.#move.ready();
       this.ready = message;
       this.#opened?.();
       this.#opened = null;
@@ -199,6 +212,7 @@ export class Hand {
 
   /** @param {ArrayBuffer} data */
   #binary(data) {
+    if (this.#move.takes(data)) return;
     const view = new DataView(data);
     if (data.byteLength < HEADER_BYTES || view.getUint32(0, true) !== MAGIC || !this.ready) return;
     const sequence = view.getUint32(8, true);

@@ -17,11 +17,22 @@ export function sessionUrl(base, token) {
   return url.href;
 }
 
+const retryMs = () => RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random();
+
+/** @param {WebSocket} socket */
+function end(socket) {
+  socket.onmessage = socket.onclose = null;
+  // Browsers complain of a socket that is closed while it connects.
+  if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
+  else socket.close();
+}
+
 /**
  * What happens to a link. `connecting` and `lost` may be told many times.
  * @typedef {object} Ends
  * @property {() => void} connecting
  * @property {() => void} opened
+ * @property {() => void} prepared the connection that `prepare` asked for is there
  * @property {(text: string) => void} text
  * @property {(data: ArrayBuffer) => void} binary
  * @property {(why: string) => void} lost
@@ -37,6 +48,8 @@ export class Link {
   #url;
   #ends;
   /** @type {WebSocket | null} */ #socket = null;
+  // The one to go on over.
+  /** @type {WebSocket | null} */ #next = null;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #retry;
   /** @type {ReturnType<typeof setTimeout> | undefined} */ #attempt;
 
@@ -68,10 +81,43 @@ export class Link {
     this.drop();
     this.#ends.connecting();
     const socket = new WebSocket(this.#url);
+    this.#take(socket);
+    socket.onopen = () => this.#ends.opened();
+  }
+
+  /** Opens another connection while this one goes on, again and again until it is there. */
+  prepare() {
+    if (this.#next || !this.isOpen) return;
+    const socket = new WebSocket(this.#url);
+    this.#next = socket;
+    socket.onopen = () => this.#ends.prepared();
+    socket.onerror = () => {};
+    socket.onclose = () => {
+      if (socket !== this.#next) return;
+      this.#next = null;
+      this.#retry = setTimeout(() => this.prepare(), retryMs());
+    };
+  }
+
+  /** Goes on over that connection, and closes this one; false: it is not there any more. */
+  move() {
+    const [old, next] = [this.#socket, this.#next];
+    if (!next || next.readyState !== WebSocket.OPEN) return false;
+    this.#next = null;
+    if (old) {
+      old.onmessage = old.onclose = null;
+      old.close();
+    }
+    clearTimeout(this.#attempt);
+    this.#take(next);
+    return true;
+  }
+
+  /** Hears this connection from now on. @param {WebSocket} socket */
+  #take(socket) {
     socket.binaryType = 'arraybuffer';
     this.#socket = socket;
     this.#attempt = setTimeout(() => this.#lose(socket, `no session within ${ATTEMPT_MS} ms`), ATTEMPT_MS);
-    socket.onopen = () => this.#ends.opened();
     socket.onmessage = (event) => {
       if (typeof event.data === 'string') this.#ends.text(event.data);
       else this.#ends.binary(event.data);
@@ -85,13 +131,8 @@ export class Link {
   drop() {
     clearTimeout(this.#retry);
     clearTimeout(this.#attempt);
-    const socket = this.#socket;
-    this.#socket = null;
-    if (!socket) return;
-    socket.onmessage = socket.onclose = null;
-    // Browsers complain of a socket that is closed while it connects.
-    if (socket.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
-    else socket.close();
+    for (const socket of [this.#socket, this.#next]) if (socket) end(socket);
+    this.#socket = this.#next = null;
   }
 
   /** @param {WebSocket} socket @param {string} why */
@@ -99,7 +140,7 @@ export class Link {
     if (socket !== this.#socket) return;
     this.drop();
     // Before the owner is told: it may drop the link for good.
-    this.#retry = setTimeout(() => this.connect(), RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random());
+    this.#retry = setTimeout(() => this.connect(), retryMs());
     this.#ends.lost(why);
   }
 }

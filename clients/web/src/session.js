@@ -2,6 +2,7 @@
 
 import { PapillaError, missed, refusal } from './error.js';
 import { Link, sessionUrl } from './link.js';
+import { Move } from './move.js';
 import { Outbox } from './outbox.js';
 import { crop } from './window.js';
 import { Answer, MAP_LEN, SIDE_PX } from './wire.js';
@@ -24,7 +25,8 @@ const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 10
  *
  * The newest frame wins on this side too: while an earlier frame has not left the socket a frame waits, and
  * a newer one takes its place (`supersededByClient` counts). A lost connection is made anew by itself, with the terms of
- * the last hello; a frame that waits then goes out first.
+ * the last hello; a frame that waits then goes out first. Where the service asks for it, the session goes on over another
+ * connection without a lost frame, and `onready` is called again.
  *
  * `onanswer(answer)` is called exactly once for every frame, with `answer.status`: `ok`, `superseded` (by this client or the
  * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke before the answer). `onready(ready)`,
@@ -50,6 +52,7 @@ export class Session {
   #rectangle = { column: 0, row: 0, width: 0, height: 0 };
   #options;
   #link;
+  #move;
   /** @type {Hello} */ #hello;
   // Terms to go back to if a renewal is refused.
   /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
@@ -70,11 +73,13 @@ export class Session {
   constructor(base = '', hello = {}, options = {}) {
     this.#link = new Link(sessionUrl(base, options.token), {
       connecting: () => this.#enter('connecting', ''),
-      opened: () => this.#greet(),
+      opened: () => this.#greet(false),
+      prepared: () => this.#move.prepared(),
       text: (text) => this.#text(text),
       binary: (data) => this.#binary(data),
       lost: (why) => this.#lost(why),
     });
+    this.#move = new Move(this.#link, (resume) => this.#moved(resume), () => this.#flush());
     this.#hello = { ...DEFAULTS, ...hello };
     this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
@@ -129,7 +134,9 @@ export class Session {
     this.#hello = { ...DEFAULTS, ...hello };
     this.#termsFrom = (this.#outbox.sequence + 1) >>> 0;
     this.ready = null;
-    if (this.#link.isOpen) this.#greet();
+    // A session that moves says it where it goes on.
+    if (this.#move.holds) return;
+    if (this.#link.isOpen) this.#greet(false);
     else if (this.#opened && !this.#link.isBusy) this.#link.connect();
   }
 
@@ -210,15 +217,26 @@ export class Session {
   }
 
   #flush() {
-    if (this.ready) this.#outbox.flush(this.#link);
+    if (this.ready && !this.#move.holds) this.#outbox.flush(this.#link);
   }
 
-  #greet() {
-    this.#link.send(JSON.stringify({ ...this.#hello, type: 'hello', version: 2 }));
+  /** @param {boolean} resume */
+  #greet(resume) {
+    const state = resume ? { resume } : {};
+    this.#link.send(JSON.stringify({ ...this.#hello, ...state, type: 'hello', version: 2, reconnect: true }));
+  }
+
+  /** The session goes on over another connection; what went out was answered. @param {boolean} resume */
+  #moved(resume) {
+    this.ready = null;
+    this.#before = null;
+    this.#outbox.lose(false);
+    this.#greet(resume);
   }
 
   /** @param {string} why */
   #lost(why) {
+    this.#move.end();
     this.ready = null;
     this.#before = null;
     this.#outbox.lose(false);
@@ -229,6 +247,7 @@ export class Session {
   #end(state, why) {
     this.#opened = false;
     this.#link.drop();
+    this.#move.end();
     this.ready = null;
     this.#before = null;
     this.#outbox.lose(true);
@@ -246,6 +265,7 @@ export class Session {
     const message = JSON.parse(text);
     if (message.type === 'ready') this.#welcome(message);
     else if (message.type === 'error') this.#problem(message);
+    else if (message.type === 'reconnect') this.#link.prepare();
   }
 
   /** @param {Ready} ready */
@@ -254,6 +274,7 @@ export class Session {
     this.#viewsBefore = this.#views;
     this.#views = this.answer.views(ready.sections);
     this.#before = null;
+    this.#move.ready();
     this.ready = ready;
     this.#enter('ready', '');
     this.onready(ready);
@@ -283,6 +304,7 @@ export class Session {
 
   /** @param {ArrayBuffer} data */
   #binary(data) {
+    if (this.#move.takes(data)) return;
     const { answer } = this;
     try {
       answer.readHeader(data);

@@ -69,6 +69,8 @@ class Runner {
   /** @type {number[]} */ order = [];
   /** @type {Map<number, string>} */ tiers = new Map();
   clockUs = 0;
+  // The session before the last move.
+  /** @type {number | undefined} */ moved;
 
   /** @param {string} url @param {string} control @param {Atlas} atlas @param {number} patienceMs */
   constructor(url, control, atlas, patienceMs) {
@@ -115,6 +117,7 @@ class Runner {
       return;
     }
     if (reply.type !== 'ready') throw new Error(`${reply.code}: ${reply.message}`);
+    this.moved ??= reply.session;
     for (const [member, due] of Object.entries(expect.ready ?? {})) same(`ready.${member}`, reply[member], due);
   }
 
@@ -214,6 +217,14 @@ class Runner {
     session.onready = (ready) => { fresh = true; this.tiers.set(ready.tier_number, ready.tier); };
     await this.steer('restart');
     await this.until(`a session after ${before}`, () => fresh && session.ready, withinS * 1000);
+  }
+
+  /** @param {Step} step */
+  async move({ within_s: withinS }) {
+    const session = /** @type {Session} */ (this.session);
+    const before = this.moved;
+    await this.until('another connection', () => session.ready && session.ready.session !== before, withinS * 1000);
+    this.moved = session.ready?.session;
   }
 
   /** @param {Step} step */

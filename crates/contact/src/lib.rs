@@ -52,4 +52,4 @@ pub use gaps::Gaps;
 pub use ladder::Method;
 pub use model::{Arrays, ContactModel, Header};
 pub use objects::{Object, Scene};
-pub use solver::{Settings, Solver};
+pub use solver::{Memory, Settings, Solver};

@@ -165,6 +165,34 @@ impl Patch {
         }
     }
 
+    /// Holds these vertices in this order and none else, without force; the first `near` can carry
+    /// it. False: they cannot be held so.
+    pub(crate) fn refill(
+        &mut self,
+        model: &ContactModel,
+        vertices: &[u32],
+        near: usize,
+        stride: usize,
+    ) -> bool {
+        self.clear();
+        let fits = vertices.len() <= self.slots_max
+            && near <= vertices.len()
+            && (row_length(vertices.len())..=row_length(self.slots_max)).contains(&stride)
+            && row_length(stride) == stride;
+        if !fits {
+            return false;
+        }
+        self.stride = stride;
+        for &vertex in vertices {
+            if vertex as usize >= model.vertices() || self.slot(vertex).is_some() {
+                return false;
+            }
+            self.add(model, vertex);
+        }
+        self.near = near;
+        true
+    }
+
     /// Takes the vertex of a slot out; another one may take its slot.
     pub(crate) fn remove(&mut self, slot: usize) {
         let mut slot = slot;

@@ -1,5 +1,7 @@
 //! What contact takes: nothing is counted for a session that sends pressure.
 
+use std::sync::atomic::AtomicU64;
+
 use papilla_proto::flags;
 use prometheus_client::{
     metrics::{counter::Counter, family::Family},
@@ -18,6 +20,8 @@ pub struct ContactMetrics {
     unsettled: Counter,
     in_air: Counter,
     iterations: Counter,
+    /// Solves that were asked for, done or not.
+    pub asked: AtomicU64,
 }
 
 impl ContactMetrics {
@@ -29,6 +33,7 @@ impl ContactMetrics {
             settled: count("settled"),
             unsettled: count("unsettled"),
             in_air: count("in_air"),
+            asked: AtomicU64::new(0),
             iterations: registered(
                 registry,
                 "contact_iterations",

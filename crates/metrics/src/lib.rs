@@ -71,6 +71,8 @@ pub struct TierMetrics {
     pub send: Timer,
     /// From receipt until the answer was handed to the socket.
     pub total: Timer,
+    /// Maps that its network was asked for, rendered or not.
+    pub asked: AtomicU64,
 }
 
 /// The counts of one transport.
@@ -112,6 +114,8 @@ pub struct Metrics {
     pub contact: ContactMetrics,
     /// Zero maps, answered without inference.
     pub zero_maps: Counter,
+    /// Thread time that maps of the last seconds ask for, by what they take here, over what there is.
+    pub load: Gauge<f64, AtomicU64>,
     /// Slots that wait for a thread.
     pub queue_length: Gauge<i64, AtomicI64>,
     /// Open sessions.
@@ -152,6 +156,7 @@ impl Metrics {
             errors: registered(registry, "errors", "Errors sent to clients by code"),
             contact: ContactMetrics::new(registry),
             zero_maps: registered(registry, "zero_maps", "Zero maps, answered without inference"),
+            load: registered_ratio(registry),
             queue_length: registered(registry, "queue_length", "Slots that wait for a thread"),
             sessions_open: registered(registry, "sessions_open", "Open sessions"),
             sessions: registered(registry, "sessions", "Sessions ever opened"),
@@ -267,6 +272,13 @@ fn registered<M: Metric + Clone + Default>(
     metric
 }
 
+/// What autoscalers scale by.
+fn registered_ratio(registry: &mut Registry) -> Gauge<f64, AtomicU64> {
+    let (load, help) = (Gauge::default(), "Maps asked for, by what they take here, over capacity");
+    registry.register_with_unit("load", help, Unit::Other("ratio".to_owned()), load.clone());
+    load
+}
+
 fn tier_metrics(timer: impl Fn(&'static str) -> Timer) -> TierMetrics {
     TierMetrics {
         queue: timer("queue"),
@@ -275,6 +287,7 @@ fn tier_metrics(timer: impl Fn(&'static str) -> Timer) -> TierMetrics {
         encode: timer("encode"),
         send: timer("send"),
         total: timer("total"),
+        asked: AtomicU64::new(0),
     }
 }
 

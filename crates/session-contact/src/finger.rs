@@ -14,7 +14,9 @@ use papilla_proto::{
     flags,
 };
 
-use super::{FrameForm, Skin, unusable};
+use papilla_session_state::{Reader, StateError, Writer};
+
+use super::{FrameForm, Skin, unusable, warm_start};
 
 /// A finger.
 pub struct Finger {
@@ -210,6 +212,29 @@ impl Finger {
             | if peak_pa > 0.0 { 0 } else { flags::NO_CONTACT };
         let iterations = is_solved.then_some(self.out.effort.iterations);
         Taken { peak_pa, flags, iterations }
+    }
+
+    /// Whether an answer depends on the frames before it.
+    #[must_use]
+    pub fn has_state(&self) -> bool {
+        self.solver.is_some()
+    }
+
+    /// Writes what answers depend on of the frames before.
+    pub fn save(&self, state: &mut Writer) {
+        if let Some(solver) = &self.solver {
+            warm_start::write(&solver.memory(), state);
+        }
+    }
+
+    /// Goes on from what the same finger of the same hello has [saved](Self::save).
+    ///
+    /// # Errors
+    /// The state is of another finger.
+    pub fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        let Some(solver) = &mut self.solver else { return Ok(()) };
+        let memory = warm_start::read(state)?;
+        if solver.recall(&memory) { Ok(()) } else { Err(StateError::Value("a warm start")) }
     }
 
     /// Appends what pushes back, and the pressure if it was asked for, each up to a multiple of 16.

@@ -28,6 +28,7 @@ mod announced;
 mod assets;
 mod finger;
 mod frame;
+mod warm_start;
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@
 //! `sigma = sqrt(2 E_ref SED)`, and that a rate, `k_s (sigma - theta)+ + k_d (d sigma / dt)+`.
 
 use papilla_proto::{MAP_LEN, Problem, effects::Afferents as Parameters};
+use papilla_session_state::{Reader, StateError, Writer};
 
 use super::unusable;
 
@@ -65,6 +66,18 @@ impl Afferents {
                 + k_d_hz_per_kpa * (now_kpa - *before_kpa).max(0.0);
             *before_kpa = now_kpa;
         }
+    }
+
+    /// Writes what the last frame left.
+    pub(super) fn save(&self, state: &mut Writer) {
+        state.option(self.last_us);
+        state.floats(&self.sigma_kpa);
+    }
+
+    /// Goes on from what another one has written.
+    pub(super) fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        self.last_us = state.option()?;
+        state.floats(&mut self.sigma_kpa)
     }
 
     /// The rates of the last frame, Hz.

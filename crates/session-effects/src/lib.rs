@@ -62,6 +62,8 @@ use papilla_proto::{
     effects::{ActuatorInput, Section, SectionName},
 };
 
+use papilla_session_state::{Reader, StateError, Writer};
+
 pub use cost::measure;
 pub use finger::{Cost, Finger, Shared};
 
@@ -229,6 +231,36 @@ impl Effects {
     #[must_use]
     pub fn size_hint(&self) -> usize {
         self.sections.last().map_or(HEADER_LEN_V2, |s| (s.offset + s.bytes) as usize)
+    }
+
+    /// Whether an answer depends on the frames before it.
+    #[must_use]
+    pub fn has_state(&self) -> bool {
+        self.relaxation.is_some() || self.afferents.is_some()
+    }
+
+    /// Writes what answers depend on of the frames before.
+    pub fn save(&self, state: &mut Writer) {
+        if let Some(relaxation) = &self.relaxation {
+            relaxation.save(state);
+        }
+        if let Some(afferents) = &self.afferents {
+            afferents.save(state);
+        }
+    }
+
+    /// Goes on from what the effects of the same hello have [saved](Self::save).
+    ///
+    /// # Errors
+    /// The state is of other effects; these are of no use any more.
+    pub fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        if let Some(relaxation) = &mut self.relaxation {
+            relaxation.restore(state)?;
+        }
+        if let Some(afferents) = &mut self.afferents {
+            afferents.restore(state)?;
+        }
+        Ok(())
     }
 
     /// What acts before the network: turns the pressure that was sent into that which the elastic

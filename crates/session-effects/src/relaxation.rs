@@ -13,6 +13,7 @@ use papilla_proto::{
     MAP_LEN, Problem,
     effects::{Moduli, PronyTerm, Relaxation as Parameters},
 };
+use papilla_session_state::{Reader, StateError, Writer};
 
 use super::{summary::peak, unusable};
 
@@ -98,6 +99,20 @@ impl Relaxation {
             *pa = if *pa < NOTHING_PA { 0.0 } else { *pa };
         }
         peak(pressure_pa)
+    }
+
+    /// Writes the history of every pixel.
+    pub(super) fn save(&self, state: &mut Writer) {
+        state.option(self.last_us);
+        state.floats(&self.sent_pa);
+        self.branches.iter().for_each(|branch| state.floats(&branch.state_pa));
+    }
+
+    /// Goes on from the history that a filter of the same parameters has written.
+    pub(super) fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        self.last_us = state.option()?;
+        state.floats(&mut self.sent_pa)?;
+        self.branches.iter_mut().try_for_each(|branch| state.floats(&mut branch.state_pa))
     }
 
     /// The pressure as it was sent, Pa.

@@ -22,6 +22,19 @@ fn a_hello_of_version_1_keeps_its_form() {
 }
 
 #[test]
+fn a_session_that_moves_says_so_in_words() {
+    let seal = ClientMessage::from_json(br#"{"type":"seal"}"#);
+    assert_eq!(seal, Ok(ClientMessage::Seal));
+    let ask = Reconnect { reason: ReconnectReason::Drain, within_ms: Some(10_000) };
+    assert_eq!(
+        serde_json::to_value(ServerMessage::Reconnect(ask)).unwrap(),
+        json!({"type": "reconnect", "reason": "drain", "within_ms": 10_000})
+    );
+    let hello = Hello { resume: Some(true), ..Hello::default() };
+    assert_eq!(hello.member_of_version_2(), Some("resume"));
+}
+
+#[test]
 fn misspelt_and_mistyped_members_are_refused() {
     for bad in [
         json!({"type": "hello", "version": 1, "teir": "x"}),

@@ -159,6 +159,18 @@ pub struct Config {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub xr_dir: Option<PathBuf>,
 
+    /// Sessions whose clients follow are asked to open another connection after a random time, from
+    /// two thirds to four thirds of this, seconds, so that new machines get their share; up to a
+    /// day. 0: never.
+    #[arg(long, env = "PAPILLA_RECONNECT_AFTER_S", value_parser = |text: &str| range::parse::<u64>(text, &range::RECONNECT_S), default_value = "1800", value_name = "S")]
+    pub reconnect_after_s: u64,
+
+    /// Keys that seal what such a session takes along, 64 hexadecimal digits a line; the first seals,
+    /// all open. The same file on all machines [default: a key of this process alone].
+    #[arg(long, env = "PAPILLA_STATE_KEYS", value_name = "FILE")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub state_keys: Option<PathBuf>,
+
     /// Greatest number of open sessions; further ones are answered 503; 1 to 10000.
     #[arg(long, env = "PAPILLA_MAX_SESSIONS", value_parser = |text: &str| range::parse::<NonZeroUsize>(text, &range::PLACES), default_value = "64", value_name = "N")]
     pub max_sessions: NonZeroUsize,
@@ -229,6 +241,8 @@ impl Default for Config {
             tls_key: None,
             allow_origin: Vec::new(),
             xr_dir: None,
+            reconnect_after_s: 1800,
+            state_keys: None,
             max_sessions: n(64),
             max_fingers: n(64),
             max_requests: n(64),

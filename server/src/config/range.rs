@@ -15,6 +15,8 @@ pub(super) const RATE_PER_S: RangeInclusive<u64> = 0..=1_000_000;
 pub(super) const RATE_BURST: RangeInclusive<u64> = 1..=1_000_000;
 /// Up to a day.
 pub(super) const TIMEOUT_S: RangeInclusive<u64> = 1..=86_400;
+/// Up to a day; 0 asks nobody.
+pub(super) const RECONNECT_S: RangeInclusive<u64> = 0..=86_400;
 /// Up to a day; 0 waits for nobody.
 pub(super) const DRAIN_S: RangeInclusive<u64> = 0..=86_400;
 
@@ -46,6 +48,7 @@ pub(super) fn check(config: &Config) -> Result<(), SettingError> {
         ("calibration_ms", config.calibration_ms, CALIBRATION_MS),
         ("rate_per_s", config.rate_per_s.into(), RATE_PER_S),
         ("rate_burst", config.rate_burst.map_or(1, |burst| burst.get().into()), RATE_BURST),
+        ("reconnect_after_s", config.reconnect_after_s, RECONNECT_S),
         ("io_timeout_s", config.io_timeout_s, TIMEOUT_S),
         ("idle_timeout_s", config.idle_timeout_s, TIMEOUT_S),
         ("drain_timeout_s", config.drain_timeout_s, DRAIN_S),

@@ -1,6 +1,7 @@
 //! From settings to a service that renders, behind a port that is open already: load, warm, serve,
 //! measure.
 
+mod load;
 mod remeasure;
 
 use std::{path::Path, sync::Arc, thread};
@@ -20,13 +21,14 @@ use crate::{
         scheduler::Pool,
     },
     progress::{Progress, Stage},
-    transport::{app::App, front::Front, gate::Gate, routes},
+    transport::{app::App, front::Front, gate::Gate, moves::Moves, routes},
 };
 
 /// What there is before the models are.
 pub(crate) struct Parts {
     pub(crate) config: Config,
     pub(crate) gate: Gate,
+    pub(crate) moves: Moves,
     pub(crate) metrics: Arc<Metrics>,
     pub(crate) progress: Arc<Progress>,
     pub(crate) front: Arc<Front>,
@@ -47,7 +49,7 @@ pub(crate) struct Opened {
 /// The models are missing or unusable, or do not run; a thread cannot be started; the folder
 /// cannot be watched.
 pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
-    let Parts { config, gate, metrics, progress, front, drain } = parts;
+    let Parts { config, gate, moves, metrics, progress, front, drain } = parts;
     let (loaded, loading) = oneshot::channel();
     let (measured, measuring) = oneshot::channel();
     let work = {
@@ -76,7 +78,8 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app = App::new(&config, catalogue, metrics, &pool, gate, drain, Arc::clone(&progress));
+    let app =
+        App::new(&config, catalogue, metrics, &pool, (gate, moves), drain, Arc::clone(&progress));
     let app = Arc::new(app.with_contact(contact));
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
         reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {
@@ -90,6 +93,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     if !config.calibration().is_zero() {
         tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
+    tokio::spawn(load::until_drain(Arc::clone(&app), config.thread_count()));
     Ok(Opened { app, pool, tiers, default_tier })
 }
 

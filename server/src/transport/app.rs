@@ -10,7 +10,10 @@ use papilla_proto::{ErrorCode, Problem};
 use papilla_session_contact::ContactAssets;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
-use super::gate::{Gate, Principal};
+use super::{
+    gate::{Gate, Principal},
+    moves::Moves,
+};
 use crate::{
     config::{Config, Timeouts},
     core::{
@@ -27,6 +30,7 @@ use crate::{
 pub(crate) struct App {
     pub(crate) reloader: Arc<Reloader>,
     pub(crate) gate: Gate,
+    pub(crate) moves: Moves,
     /// Largest body of a request, bytes.
     pub(crate) body_max: usize,
     pub(crate) metrics: Arc<Metrics>,
@@ -53,7 +57,7 @@ impl App {
         catalogue: Arc<Catalogue>,
         metrics: Arc<Metrics>,
         pool: &Pool,
-        gate: Gate,
+        (gate, moves): (Gate, Moves),
         drain: Arc<watch::Sender<bool>>,
         progress: Arc<Progress>,
     ) -> Self {
@@ -62,6 +66,7 @@ impl App {
         Self {
             reloader: Arc::new(reloader),
             gate,
+            moves,
             body_max: config.max_body_bytes,
             pool: pool.handle(&metrics),
             metrics,

@@ -9,6 +9,7 @@ mod bucket;
 pub(crate) mod front;
 pub(crate) mod gate;
 mod http;
+pub(crate) mod moves;
 pub(crate) mod negotiate;
 pub(crate) mod net;
 pub(crate) mod oip;

@@ -69,6 +69,7 @@ async fn frames_that_come_during_the_drain_are_refused_by_name() {
                 assert_eq!((header.sequence, header.status), (1, FrameStatus::Ok));
                 answered += 1;
             }
+            Received::Sealed(_) => panic!("nobody asked for a state"),
             Received::Closed(code) => panic!("closed with {code:?} before both were answered"),
         }
     }

@@ -15,6 +15,7 @@ mod information;
 mod ladder;
 mod memory;
 mod messages;
+mod moving;
 mod network;
 mod oip;
 #[cfg(feature = "otlp")]

@@ -153,3 +153,21 @@ async fn posted_maps_beyond_the_places_are_refused_at_once() {
     let counted = service.metric("papilla_shed_total{reason=\"requests\"}").await;
     assert_eq!(counted as i32, shed);
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_figure_that_machines_are_added_by_rises_above_one() {
+    let service = Service::start().await;
+    assert!(service.metric("papilla_load_ratio").await < 0.01, "nobody asks for anything");
+    flood_all(service.address, 0, FRAMES).await;
+    // Every map asks for its time, whether it is rendered or superseded; the look comes within a
+    // second.
+    let mut most = 0.0;
+    for _ in 0..100 {
+        most = service.metric("papilla_load_ratio").await.max(most);
+        if most > 1.0 {
+            return;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    }
+    panic!("{most} of the capacity, though most maps were superseded");
+}

@@ -21,6 +21,10 @@ fn main() -> anyhow::Result<()> {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => {
             rewrite("proto/conformance.json", |file| Ok(Recorder::new(models)?.fill(file)?))?;
+            rewrite(
+                "proto/conformance-moving.json",
+                |file| Ok(Recorder::new(models)?.fill(file)?),
+            )?;
             rewrite("proto/conformance-contact.json", |file| {
                 Ok(ContactRecorder::new(models)?.fill(file)?)
             })

@@ -10,6 +10,7 @@ mod compare;
 mod contact;
 mod content;
 mod floor;
+mod follow;
 mod options;
 mod pacer;
 mod post;
@@ -30,6 +31,7 @@ use std::{
 
 use papilla_proto::{Hello, SampleError, SampleType, atlas::AtlasError};
 use tokio::{
+    runtime::Handle,
     sync::mpsc,
     task::{JoinHandle, spawn_blocking},
 };
@@ -44,6 +46,7 @@ pub use verify::TOLERANCE;
 
 use crate::{http::HttpError, socket, socket::SocketError};
 use content::Encoded;
+use follow::Follow;
 use pacer::Plan;
 use post::Letter;
 use tally::Tally;
@@ -188,6 +191,7 @@ impl Target {
             tier: options.tier.clone(),
             sample_type: options.sample_type,
             atlas_hash: Some(atlas_hash),
+            reconnect: options.follow.then_some(true),
             ..Hello::default()
         };
         if let Some(contact) = options.contact {
@@ -197,6 +201,18 @@ impl Target {
         probe.close().await;
         hello.tier = Some(ready.tier.clone());
         Ok((ready.tier, Some(ready.predicted_latency_us), Opening::Session(Box::new(hello))))
+    }
+
+    /// How sessions go on over another connection, if they are to.
+    fn follow(&self, options: &Options) -> Option<Follow> {
+        match &self.opening {
+            Opening::Session(hello) if options.follow => Some(Follow {
+                server: options.server.clone(),
+                hello: (**hello).clone(),
+                runtime: Handle::current(),
+            }),
+            _ => None,
+        }
     }
 
     /// Opens the sessions, lets the load run, and adds up what they saw.
@@ -211,6 +227,7 @@ impl Target {
             reference: self.reference.clone(),
             deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
             version: self.version,
+            follow: self.follow(options),
             drain: Duration::from_secs(options.drain_s),
         });
         let (mut beats, mut tasks) = (Vec::new(), Vec::new());

@@ -110,6 +110,10 @@ pub struct Options {
     #[arg(long, default_value = "0", value_name = "SEED")]
     pub seed: u64,
 
+    /// Go on over another connection when the service asks for it, and when one breaks.
+    #[arg(long, conflicts_with_all = ["floor", "speak"])]
+    pub follow: bool,
+
     /// Load nothing; measure for --duration-s what this machine does without any service: how
     /// late it wakes, and what the bytes of a frame cost over loopback.
     #[arg(long, conflicts_with = "against")]

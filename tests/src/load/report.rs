@@ -131,6 +131,12 @@ pub struct Report {
     /// Age of the newest map, looked at every millisecond, us: since the instant its frame was
     /// meant to leave.
     pub age_us: Option<Percentiles>,
+    /// From one map of a session to the next, us.
+    pub gap_us: Option<Percentiles>,
+    /// For how long frames were held back when a session moved, us; with --follow.
+    pub held_us: Option<Percentiles>,
+    /// Times that a session was opened anew after its connection broke; with --follow.
+    pub reopened: u64,
     /// From the intended instant to the sending, us: the generator's own part.
     pub send_delay_us: Option<Percentiles>,
     /// Share of all cores' time that the host of this virtual machine withheld, percent; none
@@ -189,6 +195,9 @@ impl Report {
             echo_us: echo.and_then(Percentiles::new),
             overhead_us: Percentiles::new(&t.overhead),
             age_us: Percentiles::new(&t.age),
+            gap_us: Percentiles::new(&t.gap),
+            held_us: Percentiles::new(&t.held),
+            reopened: t.reopened,
             send_delay_us: Percentiles::new(&t.send_delay),
             stolen_percent: t.processor.stolen_percent(),
             verification,
@@ -244,6 +253,8 @@ impl Report {
             ("bare echo of the bytes", self.echo_us),
             ("trip without network", self.overhead_us),
             ("age of the newest map", self.age_us),
+            ("from map to map", self.gap_us),
+            ("held back in a move", self.held_us),
             ("sent late by", self.send_delay_us),
         ] {
             write!(f, "{name:24}")?;
@@ -309,6 +320,12 @@ impl fmt::Display for Report {
         });
         writeln!(f, "{} missed ({:.2} %): no map{within}", self.missed, self.missed_percent)?;
         self.write_times(f)?;
+        if let Some(held) = self.held_us {
+            writeln!(f, "sessions moved {} times", held.count)?;
+        }
+        if self.reopened > 0 {
+            writeln!(f, "sessions were opened anew {} times", self.reopened)?;
+        }
         if let Some(percent) = self.stolen_percent {
             writeln!(f, "the host withheld {percent:.2} % of this machine's processor time")?;
         }

@@ -14,6 +14,7 @@ use papilla_proto::{
 use super::{
     TOLERANCE,
     content::Encoded,
+    follow::{Follow, Move},
     pacer::Plan,
     tally::Tally,
     tally::Times,
@@ -32,6 +33,8 @@ pub(super) struct Shared {
     pub(super) deadline: Option<Duration>,
     /// Version of the frames.
     pub(super) version: u32,
+    /// How sessions go on elsewhere; none: they do not.
+    pub(super) follow: Option<Follow>,
     /// How long to wait after the last frame.
     pub(super) drain: Duration,
 }
@@ -84,8 +87,9 @@ fn send(shared: &Shared, session: usize, mut mouth: Mouth) -> (Mouth, Times) {
         if number >= plan.warmup {
             delay.record(intended.elapsed());
         }
-        // Err: the listener hears of it too, and says why.
-        if mouth.send(&header, &encoded.payloads[encoded.index(session, number)]).is_err() {
+        let payload = &encoded.payloads[encoded.index(session, number)];
+        // Err: the listener hears of it too, and says why, or opens another connection.
+        if mouth.send(&header, payload).is_err() && shared.follow.is_none() {
             break;
         }
     }
@@ -99,6 +103,7 @@ pub(super) struct Ear<'a> {
     tally: Tally,
     answered: Vec<bool>,
     outstanding: u32,
+    last_map: Option<Instant>,
     /// By finger.
     newest: Vec<Newest>,
     scratch: Vec<f32>,
@@ -124,6 +129,7 @@ impl<'a> Ear<'a> {
             tally: Tally { frames: u64::from(frames - shared.plan.warmup), ..Tally::default() },
             answered: vec![false; frames as usize],
             outstanding: frames,
+            last_map: None,
             newest: vec![Newest::default(); shared.plan.fingers as usize],
             scratch: Vec::new(),
         }
@@ -133,13 +139,46 @@ impl<'a> Ear<'a> {
     fn listen(&mut self, hearer: &mut Hearer) {
         let Shared { plan, drain, .. } = self.shared;
         let last = plan.intended(self.session, plan.frames - 1) + *drain;
+        let (follow, hold) = (self.shared.follow.as_ref(), hearer.hold());
+        let mut moving = follow.map(|follow| Move::new(follow, &hold));
         while self.outstanding > 0 {
-            match hearer.receive(last) {
-                Ok(Some((now, Said::Frame(header, payload)))) => self.frame(now, &header, payload),
-                Ok(Some((_, Said::Error(error)))) => self.error(&error),
-                Err(error) => return self.end(&error),
+            let said = match hearer.receive(last) {
+                Ok(Some((now, Said::Frame(header, payload)))) => {
+                    self.frame(now, &header, payload);
+                    None
+                }
+                Ok(Some((_, Said::Error(error)))) => {
+                    self.error(&error);
+                    None
+                }
+                Ok(Some((_, Said::Reconnect))) => {
+                    moving.iter_mut().for_each(Move::begin);
+                    None
+                }
+                Ok(Some((_, Said::Sealed(state)))) => Some(state.to_vec()),
+                Err(error) => {
+                    let Some((follow, moving)) = follow.zip(moving.as_mut()) else {
+                        return self.end(&error);
+                    };
+                    moving.give_up();
+                    if !follow.reopen(hearer, last) {
+                        return self.end(&error);
+                    }
+                    self.tally.reopened += 1;
+                    None
+                }
                 // What is outstanding is lost.
                 Ok(None) => return,
+            };
+            if let Some(moving) = &mut moving {
+                match said {
+                    Some(state) => {
+                        if let Some(held) = moving.end(hearer, state) {
+                            self.tally.held.record(held);
+                        }
+                    }
+                    None => moving.go_on(hearer),
+                }
             }
         }
     }
@@ -152,7 +191,7 @@ impl<'a> Ear<'a> {
         if error.sequence.is_none_or(|number| self.settle(number)) {
             *self.tally.errors.entry(error.code.to_string()).or_default() += 1;
         }
-        if error.closes {
+        if error.closes && self.shared.follow.is_none() {
             self.tally.ended.push(format!("session {}: {}", self.session, error.message));
         }
     }
@@ -176,6 +215,9 @@ impl<'a> Ear<'a> {
                 self.tally.ok += 1;
                 self.tally.in_time += u64::from(self.shared.deadline.is_none_or(|d| time <= d));
                 self.tally.round_trip.record(time);
+                if let Some(before) = self.last_map.replace(now) {
+                    self.tally.gap.record(now.saturating_duration_since(before));
+                }
                 self.tally.server.record(Duration::from_micros(header.time_us.into()));
                 self.version_2(now, header, payload);
                 let sent = &self.shared.encoded.payloads[0][..];

@@ -67,6 +67,12 @@ pub(super) struct Tally {
     pub(super) overhead: Times,
     /// Age of the newest map, every millisecond: since the instant its frame was meant to leave.
     pub(super) age: Times,
+    /// From one map of a session to the next.
+    pub(super) gap: Times,
+    /// For how long frames were held back, once a move.
+    pub(super) held: Times,
+    /// Times that a session was opened anew after its connection broke.
+    pub(super) reopened: u64,
     /// From the intended instant to the sending.
     pub(super) send_delay: Times,
     /// Maps compared, those not equal, and the greatest difference.
@@ -97,6 +103,7 @@ impl Tally {
             (&mut self.processor.all, other.processor.all),
             (&mut self.processor.stolen, other.processor.stolen),
             (&mut self.wrong, other.wrong),
+            (&mut self.reopened, other.reopened),
         ] {
             *sum += part;
         }
@@ -112,6 +119,8 @@ impl Tally {
             (&mut self.rest, &other.rest),
             (&mut self.overhead, &other.overhead),
             (&mut self.age, &other.age),
+            (&mut self.gap, &other.gap),
+            (&mut self.held, &other.held),
             (&mut self.send_delay, &other.send_delay),
         ] {
             sum.add(part);

@@ -11,7 +11,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{FrameHeader, HEADER_LEN_V2, MAP_LEN, ServerMessage, SessionError};
+use papilla_proto::{
+    FrameHeader, HEADER_LEN_V2, MAP_LEN, SEALED_MAGIC, ServerMessage, SessionError,
+};
 
 use crate::socket::SocketError;
 
@@ -35,6 +37,8 @@ const ROOM: usize = 16 + HEADER_LEN_V2 + 8 * MAP_LEN;
 #[derive(Debug)]
 pub(super) struct Mouth {
     stream: Arc<Mutex<TcpStream>>,
+    /// Held while the session moves: frames wait.
+    hold: Arc<Mutex<()>>,
     random: fastrand::Rng,
     buffer: Vec<u8>,
 }
@@ -59,20 +63,30 @@ pub(super) enum Said<'a> {
     Frame(FrameHeader, &'a [u8]),
     /// A refusal.
     Error(SessionError),
+    /// The session is to go on over another connection.
+    Reconnect,
+    /// What the session remembers.
+    Sealed(&'a [u8]),
 }
 
 /// Both halves of a session.
 pub(super) fn halves(stream: TcpStream) -> io::Result<(Mouth, Hearer)> {
-    stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(LOOK))?;
-    let writer = Arc::new(Mutex::new(stream.try_clone()?));
+    let stream = blocking(stream)?;
+    let (writer, hold) = (Arc::new(Mutex::new(stream.try_clone()?)), Arc::default());
     let mouth = || Mouth {
         stream: Arc::clone(&writer),
+        hold: Arc::clone(&hold),
         random: fastrand::Rng::new(),
         buffer: Vec::with_capacity(ROOM),
     };
     let hearer = Hearer { stream, answers: mouth(), buffer: vec![0; ROOM], len: 0, spent: 0 };
     Ok((mouth(), hearer))
+}
+
+fn blocking(stream: TcpStream) -> io::Result<TcpStream> {
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    Ok(stream)
 }
 
 impl Mouth {
@@ -81,6 +95,8 @@ impl Mouth {
     /// # Errors
     /// The connection is gone.
     pub(super) fn send(&mut self, header: &FrameHeader, payload: &[u8]) -> io::Result<()> {
+        let hold = Arc::clone(&self.hold);
+        let _free = hold.lock().unwrap_or_else(PoisonError::into_inner);
         self.write(BINARY, &[&header.encode(), payload])
     }
 
@@ -145,6 +161,9 @@ impl Hearer {
             let now = Instant::now();
             let protocol = |what: String| Err(SocketError::Text(what));
             match self.buffer[0] {
+                BINARY if self.buffer[start..end].starts_with(&SEALED_MAGIC) => {
+                    return Ok(Some((now, Said::Sealed(&self.buffer[start..end]))));
+                }
                 BINARY => {
                     let frame = &self.buffer[start..end];
                     let header = FrameHeader::decode(frame)?;
@@ -153,6 +172,7 @@ impl Hearer {
                 }
                 TEXT => match serde_json::from_slice(&self.buffer[start..end]) {
                     Ok(ServerMessage::Error(error)) => return Ok(Some((now, Said::Error(error)))),
+                    Ok(ServerMessage::Reconnect(_)) => return Ok(Some((now, Said::Reconnect))),
                     Ok(_) => return protocol("a second ready".to_owned()),
                     Err(error) => return protocol(error.to_string()),
                 },
@@ -190,6 +210,33 @@ impl Hearer {
                 Err(_) => return Err(SocketError::Closed),
             }
         }
+    }
+
+    /// What keeps frames from being sent while it is locked.
+    pub(super) fn hold(&self) -> Arc<Mutex<()>> {
+        Arc::clone(&self.answers.hold)
+    }
+
+    /// Asks for what the session remembers.
+    ///
+    /// # Errors
+    /// The connection is gone.
+    pub(super) fn seal(&mut self) -> io::Result<()> {
+        self.answers.write(TEXT, &[br#"{"type":"seal"}"#])
+    }
+
+    /// Goes on over another connection, and closes this one.
+    ///
+    /// # Errors
+    /// The system refuses a copy of it.
+    pub(super) fn move_to(&mut self, stream: TcpStream) -> io::Result<()> {
+        let stream = blocking(stream)?;
+        self.answers.close();
+        let mut writer = self.answers.stream.lock().unwrap_or_else(PoisonError::into_inner);
+        *writer = stream.try_clone()?;
+        self.stream = stream;
+        (self.len, self.spent) = (0, 0);
+        Ok(())
     }
 
     /// Ends the connection, whoever may be writing to it.

@@ -9,12 +9,14 @@
 //! | `service` | a running service beside the library's own model |
 //! | `client` | what every client must find, over HTTP and in a session |
 //! | `load` | the load generator against the service |
+//! | `moving` | sessions that go on elsewhere, of the Rust client and the load generator |
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
 
 mod client;
 mod load;
+mod moving;
 mod scene;
 mod service;
 mod shipped;

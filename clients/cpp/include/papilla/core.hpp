@@ -14,7 +14,8 @@ namespace papilla {
 
 class Core {
  public:
-  enum class Event { nothing, ready, refused, broken };
+  /// `reconnect`: the service asks for it, of clients whose hello says that they follow.
+  enum class Event { nothing, ready, refused, broken, reconnect };
 
   /// Called with every outcome, once a frame. `Answer` is reused: copy what has to stay.
   std::function<void(const Answer&)> on_answer;
@@ -119,6 +120,7 @@ class Core {
     json::Value value;
     if (!json::parse(message, value)) return Event::broken;
     if (value["type"].string == "ready") return agree(value);
+    if (value["type"].string == "reconnect") return Event::reconnect;
     const Problem problem{value["code"].string, value["message"].string, value["field"].string};
     if (!value.has("sequence")) return refusal_ = problem, Event::refused;
     const auto sequence = static_cast<std::uint32_t>(value["sequence"].whole());

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -43,7 +44,8 @@ class Session {
 
   Session() : Session(Options()) {}
   explicit Session(Options options)
-      : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(options_.hello) {
+      : options_(std::move(options)), address_(net::Address::of(options_.url)), members_(following(options_.hello)),
+        core_(members_) {
     core_.on_answer = [this](const Answer& answer) { outcome(answer); };
   }
   Session(const Session&) = delete;
@@ -64,14 +66,15 @@ class Session {
       std::lock_guard<std::mutex> lock(mutex_);
       if (closed_) return;
       closed_ = true;
-      socket_.shut();
+      socket_->shut();
     }
     changed_.notify_all();
     if (reader_.joinable()) reader_.join();
     if (writer_.joinable()) writer_.join();
+    if (mover_.joinable()) mover_.join();
     std::lock_guard<std::mutex> lock(mutex_);
     core_.end();
-    socket_.close();
+    socket_->close();
   }
 
   /// Hands over one frame, the whole map (224 x 224, Pa, row by row) or the samples of a window,
@@ -126,13 +129,14 @@ class Session {
   bool renew(const std::string& hello, int timeout_ms = 30000) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (!core_.is_ready()) return problem_ = {"", "there is no session just now", ""}, false;
-    new_hello_ = Core::hello_text(hello);
+    const std::string members = following(hello);
+    new_hello_ = Core::hello_text(members);
     is_answered_ = is_granted_ = false;
     changed_.notify_all();
     const auto wait = std::chrono::milliseconds(timeout_ms);
     const bool good = changed_.wait_for(lock, wait, [this] { return is_answered_ || closed_; }) && is_granted_;
     is_answered_ = true;  // also after a timeout: frames go on under the old terms
-    if (good) core_.set_hello(hello);
+    if (good) core_.set_hello(members_ = members);
     return good;
   }
 
@@ -169,11 +173,12 @@ class Session {
 
   Options options_;
   net::Address address_;
+  std::string members_;               ///< of the hello
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   Core core_;
-  WebSocket socket_;
-  std::thread reader_, writer_;
+  std::unique_ptr<WebSocket> socket_ = std::make_unique<WebSocket>(), next_;
+  std::thread reader_, writer_, mover_;
   std::vector<std::uint8_t> message_;
   bool closed_ = false;
   bool sending_ = false;              ///< the writer has the socket
@@ -185,6 +190,8 @@ class Session {
   std::uint32_t wanted_ = 0;
   std::string new_hello_, pong_;
   bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
+  enum class Moving { no, dialling, seal_due, held, failed };
+  Moving moving_ = Moving::no;
   bool told_refusal_ = false, told_range_ = false;
 
   template <class Send>
@@ -237,9 +244,14 @@ class Session {
     }
   }
 
+  /// The members of a hello of a client that moves when it is asked to.
+  static std::string following(const std::string& members) {
+    return (members.empty() ? "" : members + ", ") + "\"reconnect\": true";
+  }
+
   bool connect() {
     std::string error, answer;
-    if (!socket_.open(address_, "/v1/session", options_.token, error, answer)) {
+    if (!socket_->open(address_, "/v1/session", options_.token, error, answer)) {
       json::Value value;
       json::parse(answer, value);
       const json::Value& said = value["error"];
@@ -248,16 +260,16 @@ class Session {
                                 : Problem{said["code"].string, said["message"].string, said["field"].string};
       return false;
     }
-    socket_.patience(30);
-    if (!socket_.send_text(core_.hello())) return false;
-    const auto kind = socket_.receive(message_);
+    socket_->patience(30);
+    if (!socket_->send_text(core_.hello())) return false;
+    const auto kind = socket_->receive(message_);
     std::lock_guard<std::mutex> lock(mutex_);
     const auto event = kind == WebSocket::Message::text ? core_.text(text()) : Core::Event::broken;
     if (event != Core::Event::ready) {
       problem_ = event == Core::Event::refused ? core_.refusal() : Problem{"", "no ready came", ""};
       return false;
     }
-    socket_.patience(0);
+    socket_->patience(0);
     ++connections_;
     return true;
   }
@@ -273,7 +285,8 @@ class Session {
       std::unique_lock<std::mutex> lock(mutex_);
       core_.lost();
       is_answered_ = true, is_granted_ = false, pong_due_ = false;
-      socket_.shut();
+      moving_ = Moving::no;
+      socket_->shut();
       changed_.notify_all();
       changed_.wait(lock, [this] { return !sending_; });
       const auto pause = std::chrono::milliseconds(options_.retry_ms);
@@ -282,7 +295,7 @@ class Session {
         lock.unlock();
         const bool good = connect();
         lock.lock();
-        if (closed_) socket_.shut();
+        if (closed_) socket_->shut();
         if (good) break;
       } while (!closed_);
       changed_.notify_all();
@@ -292,19 +305,27 @@ class Session {
 
   void read() {
     for (;;) {
-      const auto kind = socket_.receive(message_);
+      const auto kind = socket_->receive(message_);
       if (kind == WebSocket::Message::closed) return;
-      std::lock_guard<std::mutex> lock(mutex_);
+      std::unique_lock<std::mutex> lock(mutex_);
       if (kind == WebSocket::Message::ping) {
-        pong_ = socket_.ping();
+        pong_ = socket_->ping();
         pong_due_ = true;
         changed_.notify_all();
+        continue;
+      }
+      if (kind == WebSocket::Message::binary && is_sealed()) {
+        if (moving_ == Moving::held) move(lock);
         continue;
       }
       const auto event = kind == WebSocket::Message::text
                              ? core_.text(text())
                              : core_.binary(message_.data(), message_.size());
       if (event == Core::Event::broken) return;
+      if (event == Core::Event::reconnect) {
+        if (moving_ == Moving::no) dial(lock);
+        continue;
+      }
       if (core_.waiting()) changed_.notify_all();
       if (event == Core::Event::nothing || is_answered_) continue;
       is_answered_ = true;
@@ -314,29 +335,96 @@ class Session {
     }
   }
 
+  bool is_sealed() const { return message_.size() > 3 && text().substr(0, 3) == "PPS"; }
+
+  /// Opens another connection while this one goes on, until the session has moved to it or ends.
+  void dial(std::unique_lock<std::mutex>& lock) {
+    moving_ = Moving::dialling;
+    lock.unlock();
+    if (mover_.joinable()) mover_.join();
+    mover_ = std::thread([this] {
+      for (;;) {
+        auto next = std::make_unique<WebSocket>();
+        std::string error, answer;
+        const bool good = next->open(address_, "/v1/session", options_.token, error, answer);
+        std::unique_lock<std::mutex> held(mutex_);
+        if (closed_ || moving_ == Moving::no) return;
+        if (good) {
+          next_ = std::move(next);
+          moving_ = Moving::seal_due;
+          changed_.notify_all();
+          const auto over = [this] { return closed_ || moving_ == Moving::no || moving_ == Moving::failed; };
+          changed_.wait_for(held, std::chrono::seconds(5), over);
+          next_.reset();
+          if (closed_ || moving_ == Moving::no) return;
+        }
+        // The old connection goes on for as long as it is there.
+        moving_ = Moving::dialling;
+        changed_.notify_all();
+        const auto ends = [this] { return closed_ || moving_ == Moving::no; };
+        if (changed_.wait_for(held, std::chrono::milliseconds(options_.retry_ms), ends)) return;
+      }
+    });
+  }
+
+  /// Goes on over the other connection with what the service remembers; frames wait meanwhile.
+  void move(std::unique_lock<std::mutex>& lock) {
+    std::unique_ptr<WebSocket> next = std::move(next_);
+    const std::string hello = Core::hello_text(members_ + ", \"resume\": true");
+    lock.unlock();
+    std::vector<std::uint8_t> sealed(WebSocket::headroom + message_.size());
+    std::copy(message_.begin(), message_.end(), sealed.begin() + WebSocket::headroom);
+    bool good = next != nullptr;
+    if (good) {
+      next->patience(5);
+      good = next->send_text(hello) &&
+             next->send(true, sealed.data() + WebSocket::headroom, message_.size()) &&
+             next->receive(message_) == WebSocket::Message::text;
+    }
+    lock.lock();
+    changed_.wait(lock, [this] { return !sending_; });
+    good = good && !closed_ && moving_ == Moving::held && core_.text(text()) == Core::Event::ready;
+    if (good) {
+      next->patience(0);
+      std::swap(socket_, next);
+      next->send_close();
+      ++connections_;
+    }
+    if (moving_ == Moving::held) moving_ = good ? Moving::no : Moving::failed;
+    changed_.notify_all();
+  }
+
   /// Sends what waits, one message at a time; a frame not while new terms are being agreed on.
   void write() {
     std::unique_lock<std::mutex> lock(mutex_);
     for (;;) {
       changed_.wait(lock, [this] {
+        const bool held = moving_ == Moving::held;
         const bool frame = core_.can_take() && is_answered_;
-        return closed_ || (core_.is_ready() && (frame || pong_due_ || !new_hello_.empty()));
+        const bool seal = moving_ == Moving::seal_due && is_answered_;
+        return closed_ ||
+               (core_.is_ready() && (pong_due_ || (!held && (seal || frame || !new_hello_.empty()))));
       });
       if (closed_) return;
       std::string hello, pong;
       const bool answers = std::exchange(pong_due_, false);
       if (answers) pong = pong_;
-      hello.swap(new_hello_);
+      if (!answers && new_hello_.empty() && moving_ == Moving::seal_due && is_answered_) {
+        moving_ = Moving::held;
+        hello = "{\"type\": \"seal\"}";
+      } else if (!answers) {
+        hello.swap(new_hello_);
+      }
       Outgoing* frame = !answers && hello.empty() ? core_.take() : nullptr;
       sending_ = true;
       lock.unlock();
       bool good = true;
-      if (answers) good = socket_.send_pong(pong);
-      if (!hello.empty()) good = socket_.send_text(hello);
-      if (frame) good = socket_.send(true, frame->data(), frame->size);
+      if (answers) good = socket_->send_pong(pong);
+      if (!hello.empty()) good = socket_->send_text(hello);
+      if (frame) good = socket_->send(true, frame->data(), frame->size);
       lock.lock();
       sending_ = false;
-      if (!good) socket_.shut();
+      if (!good) socket_->shut();
       changed_.notify_all();
     }
   }

@@ -3,7 +3,8 @@
 use std::{collections::HashMap, mem::replace, sync::Arc};
 
 use papilla_proto::{
-    FrameHeader, FrameKind, Hello, Problem, Ready, SampleType, ServerMessage, SessionError,
+    FrameHeader, FrameKind, Hello, Problem, Ready, SEALED_MAGIC, SampleType, ServerMessage,
+    SessionError,
 };
 use tokio::sync::oneshot;
 
@@ -35,8 +36,24 @@ pub(super) struct Asked {
     pub(super) reply: oneshot::Sender<Result<Arc<Ready>, PapillaError>>,
 }
 
+/// How far the session is on its way to another connection.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(super) enum Moving {
+    #[default]
+    Stays,
+    /// The service asks for it; frames go on over this one.
+    Asked,
+    /// The other one is there: what the service remembers is to be asked for.
+    SealDue,
+    /// It was asked for, and frames wait.
+    SealSaid,
+    /// It is here.
+    Sealed(Vec<u8>),
+}
+
 /// What the writer is to send.
 pub(super) enum Next {
+    Seal,
     Hello(Box<Hello>),
     Frame(Vec<u8>),
 }
@@ -54,6 +71,7 @@ pub(super) struct State {
     pub(super) hello: Hello,
     pub(super) ready: Arc<Ready>,
     pub(super) asked: Option<Asked>,
+    pub(super) moving: Moving,
     pub(super) superseded_by_client: u64,
     tiers: HashMap<u16, String>,
     sequence: u32,
@@ -71,6 +89,7 @@ impl State {
             hello,
             ready: Arc::new(ready),
             asked: None,
+            moving: Moving::Stays,
             superseded_by_client: 0,
             tiers: HashMap::new(),
             sequence: 0,
@@ -141,12 +160,19 @@ impl State {
 
     /// What to send next; a frame not while terms are being agreed on. It then counts as sent.
     pub(super) fn next(&mut self) -> Option<Next> {
+        if matches!(self.moving, Moving::SealSaid | Moving::Sealed(_)) {
+            return None;
+        }
         if let Some(asked) = &mut self.asked {
             if asked.said {
                 return None;
             }
             asked.said = true;
             return Some(Next::Hello(Box::new(asked.hello.clone())));
+        }
+        if self.moving == Moving::SealDue {
+            self.moving = Moving::SealSaid;
+            return Some(Next::Seal);
         }
         if self.waiting.is_empty() {
             return None;
@@ -160,6 +186,12 @@ impl State {
 
     /// Takes a binary message.
     pub(super) fn on_binary(&mut self, message: &[u8]) -> Result<(), PapillaError> {
+        if message.starts_with(&SEALED_MAGIC) {
+            if self.moving == Moving::SealSaid {
+                self.moving = Moving::Sealed(message.to_vec());
+            }
+            return Ok(());
+        }
         let header = FrameHeader::decode(message)?;
         let Some(pending) = self.forget(header.sequence) else { return Ok(()) };
         let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
@@ -187,6 +219,9 @@ impl State {
                     let _ = reply.send(Ok(ready));
                 }
             }
+            ServerMessage::Reconnect(_) if self.moving == Moving::Stays => {
+                self.moving = Moving::Asked;
+            }
             ServerMessage::Error(SessionError { code, message, field, sequence, .. }) => {
                 let problem = Problem { code, message, field };
                 match sequence.and_then(|sequence| self.forget(sequence)) {
@@ -211,10 +246,19 @@ impl State {
     /// The connection broke: what was sent is lost, what waits goes on waiting.
     pub(super) fn lose(&mut self) {
         self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
+        self.moving = Moving::Stays;
         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
             let reason = "the connection broke".to_owned();
             let _ = asked.reply.send(Err(PapillaError::Protocol(reason)));
         }
+    }
+
+    /// The session goes on over another connection. Every frame that had left was answered, unless
+    /// the service did not say what it remembers.
+    pub(super) fn moved(&mut self, ready: Arc<Ready>) {
+        self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
+        self.moving = Moving::Stays;
+        self.agree(ready);
     }
 
     /// No session will follow.

@@ -98,6 +98,7 @@ impl Solver {
         for (kept, normal) in self.made_for.iter_mut().zip(&self.patch.values.normal) {
             kept[..m].copy_from_slice(&normal[..m]);
         }
+        self.made_with[..m].copy_from_slice(&self.patch.values.object[..m]);
         self.made = m;
     }
 

@@ -9,6 +9,7 @@
 mod approach;
 mod candidates;
 mod iteration;
+mod memory;
 
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
@@ -20,6 +21,7 @@ use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
 use crate::springs;
+pub use memory::Memory;
 use std::sync::Arc;
 
 /// Undeformed vertices nearer than this may come into contact, reference mm.
@@ -94,6 +96,8 @@ pub struct Solver {
     /// Bound of its eigenvalues.
     norm: f32,
     made_for: [Vec<f32>; 3],
+    /// Compliance of the objects that it was made with.
+    made_with: Vec<f32>,
     made: usize,
     rest: Vec<f32>,
     wanted: Vec<bool>,
@@ -128,6 +132,7 @@ impl Solver {
             matrix: vec![0.0; slots * row],
             norm: 0.0,
             made_for: std::array::from_fn(|_| vec![0.0; slots]),
+            made_with: vec![0.0; slots],
             made: 0,
             rest: vec![0.0; slots],
             wanted: vec![false; model.vertices()],

@@ -1,6 +1,7 @@
 //! A flat patch of an elastic half-space, where answers are known in closed form.
 
 mod gaps;
+mod memory;
 mod support;
 
 use papilla_contact::{Arrays, ContactModel, NetForce, Object, Person, Settings, Solver};

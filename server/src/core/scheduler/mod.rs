@@ -11,7 +11,7 @@ mod slot;
 mod work;
 
 use std::{
-    sync::Arc,
+    sync::{Arc, atomic::Ordering},
     thread::{self, JoinHandle},
     time::Duration,
 };
@@ -124,6 +124,12 @@ impl PoolHandle {
     /// # Errors
     /// The job was not taken: the pool is closed or, against the bounds set at the start, full.
     pub(crate) fn submit(&self, slot: &Arc<Slot>, job: Job) -> Result<Option<Job>, NotTaken> {
+        if !job.options.is_contact_alone {
+            self.metrics.tier(job.tier).asked.fetch_add(1, Ordering::Relaxed);
+        }
+        if job.options.solves_contact {
+            self.metrics.contact.asked.fetch_add(1, Ordering::Relaxed);
+        }
         match slot.offer(job) {
             Offer::Scheduled { replaced } => Ok(replaced),
             Offer::Schedule => {

@@ -43,6 +43,9 @@ pub(super) struct Connection {
     is_pinged: bool,
     /// Goes off when a ping or the end may be due.
     alarm: Pin<Box<Sleep>>,
+    /// Goes off when the session is to be asked to move, or has had its time to.
+    due: Pin<Box<Sleep>>,
+    is_due_set: bool,
     limits: Limits,
     /// Goes off when the next turn begins.
     pause: Pin<Box<Sleep>>,
@@ -58,8 +61,25 @@ enum Stream {
 pub(super) enum Event {
     Text(Bytes),
     Binary(Bytes, Instant),
-    /// The server drains: at its beginning, and whenever an accepted frame has been answered.
+    /// The server begins to drain.
     Draining,
+    /// An accepted frame may have been answered.
+    Settled,
+    /// The time that was set has come.
+    Due,
+}
+
+/// What a session waits for beside messages.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wait {
+    /// The beginning of the drain.
+    pub(super) drain: bool,
+    /// Answers to accepted frames.
+    pub(super) settled: bool,
+}
+
+impl Wait {
+    pub(super) const FOR_DRAIN: Self = Self { drain: true, settled: false };
 }
 
 impl Connection {
@@ -79,7 +99,29 @@ impl Connection {
         let heard = TokioInstant::now();
         let alarm = Box::pin(sleep_until(heard + app.timeouts.idle / 3));
         let (limits, pause) = (Limits::new(heard.into_std()), Box::pin(sleep_until(heard)));
-        Self { stream, inbound, reply, app, drain, heard, is_pinged: false, alarm, limits, pause }
+        let due = Box::pin(sleep_until(heard));
+        Self {
+            stream,
+            inbound,
+            reply,
+            app,
+            drain,
+            heard,
+            is_pinged: false,
+            alarm,
+            due,
+            is_due_set: false,
+            limits,
+            pause,
+        }
+    }
+
+    /// Sets the time of the next [`Event::Due`]; none: there is none.
+    pub(super) fn call_after(&mut self, wait: Option<Duration>) {
+        self.is_due_set = wait.is_some();
+        if let Some(wait) = wait {
+            self.due.as_mut().reset(TokioInstant::now() + wait);
+        }
     }
 
     /// The next event. A silent client is pinged after a third of the idle time,
@@ -87,10 +129,10 @@ impl Connection {
     ///
     /// **Invariant:** between two waits, no more than a turn's worth of frames and bytes is worked
     /// off ([`Limits`]), so that one client's flood does not hold a thread up for others.
-    pub(super) async fn next(&mut self, draining: bool) -> Result<Event, End> {
+    pub(super) async fn next(&mut self, wait: Wait) -> Result<Event, End> {
         loop {
             self.flush().await?;
-            if !draining && *self.drain.borrow() {
+            if wait.drain && *self.drain.borrow() {
                 return Ok(Event::Draining);
             }
             let resume_at = self.limits.resume_at(Instant::now());
@@ -120,11 +162,15 @@ impl Connection {
             tokio::select! {
                 biased;
                 () = self.reply.out.call.notified() => {
-                    if draining {
-                        return Ok(Event::Draining);
+                    if wait.settled {
+                        return Ok(Event::Settled);
                     }
                 }
-                () = begun(&mut self.drain), if !draining => return Ok(Event::Draining),
+                () = begun(&mut self.drain), if wait.drain => return Ok(Event::Draining),
+                () = &mut self.due, if self.is_due_set => {
+                    self.is_due_set = false;
+                    return Ok(Event::Due);
+                }
                 () = &mut self.alarm => self.on_idle()?,
                 () = &mut self.pause, if resume_at.is_some() => {}
                 // In a future of its own: room is made only where there will be a read.

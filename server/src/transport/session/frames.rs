@@ -1,6 +1,7 @@
 //! Frames of an open session: each is checked and put into its slot, or refused.
 
 use std::{
+    fmt::Display,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -9,15 +10,18 @@ use bytes::Bytes;
 use papilla_codec::{Input, Output};
 use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
-    ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, ServerMessage, Window,
+    ClientMessage, ErrorCode, FrameHeader, FrameKind, FrameStatus, MessageError, Problem,
+    Reconnect, ReconnectReason, ServerMessage, Window,
 };
+use tokio::{task::spawn_blocking, time::timeout};
 
 use super::{
     End,
-    connection::{Connection, Event},
+    connection::{Connection, Event, Wait},
     drained,
     fresh::Freshness,
     hello,
+    reply::Reply,
     terms::Terms,
 };
 use crate::{
@@ -26,6 +30,7 @@ use crate::{
         scheduler::{Job, JobOptions, Slot},
     },
     problem,
+    transport::app::App,
 };
 
 /// An open session.
@@ -41,25 +46,64 @@ struct Lane {
     slot: Arc<Slot>,
 }
 
+/// How far an open session is from its end.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    Open,
+    /// The server drains, and the client was asked to go on elsewhere.
+    Leaving,
+    /// The server drains: accepted frames are answered, and no more are taken.
+    Draining,
+}
+
 /// Serves until somebody ends it; every accepted frame is answered before a drain ends it.
 pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> End {
-    let mut draining = false;
+    let (mut phase, mut is_seal_due) = (Phase::Open, false);
+    session.set_stay(connection);
     loop {
-        if draining && connection.reply.is_settled() {
-            return drained();
+        let draining = phase == Phase::Draining;
+        if (draining || is_seal_due) && connection.reply.is_settled() {
+            if draining {
+                return drained();
+            }
+            session.seal(Arc::clone(&connection.reply), Arc::clone(&connection.app)).await;
+            is_seal_due = false;
         }
-        match connection.next(draining).await {
+        let wait = Wait { drain: phase == Phase::Open, settled: draining || is_seal_due };
+        match connection.next(wait).await {
             Err(end) => return end,
-            Ok(Event::Draining) => draining = true,
+            Ok(Event::Draining) if session.terms.follows.is_some() => {
+                phase = Phase::Leaving;
+                let grace = connection.app.moves.grace;
+                ask_to_move(connection, ReconnectReason::Drain, Some(grace));
+                connection.call_after(Some(grace));
+            }
+            Ok(Event::Draining) => phase = Phase::Draining,
+            Ok(Event::Due) if phase == Phase::Open => {
+                ask_to_move(connection, ReconnectReason::Age, None);
+                session.set_stay(connection);
+            }
+            Ok(Event::Due) => phase = Phase::Draining,
+            Ok(Event::Settled) => {}
             Ok(Event::Binary(frame, received)) => {
                 session.take(connection, &frame, received, draining);
             }
             Ok(Event::Text(_)) if draining => {
                 connection.reply.send_error(problem::shutting_down(), None);
             }
-            Ok(Event::Text(text)) => session.renew(connection, &text).await,
+            Ok(Event::Text(text)) => match hello::parse(&text).await {
+                Ok(ClientMessage::Seal) if session.terms.follows.is_some() => is_seal_due = true,
+                said => session.renew(connection, said).await,
+            },
         }
     }
+}
+
+/// Asks the client to go on over another connection.
+fn ask_to_move(connection: &Connection, reason: ReconnectReason, within: Option<Duration>) {
+    let within_ms = within.map(|time| u64::try_from(time.as_millis()).unwrap_or(u64::MAX));
+    let ask = Reconnect { reason, within_ms };
+    connection.reply.send_message(&ServerMessage::Reconnect(ask));
 }
 
 impl Session {
@@ -85,14 +129,45 @@ impl Session {
     }
 
     /// Takes a hello for new terms, such as another tier.
-    async fn renew(&mut self, connection: &mut Connection, text: &Bytes) {
-        match hello::renew(&connection.app, text, self.number).await {
+    async fn renew(
+        &mut self,
+        connection: &mut Connection,
+        said: Result<ClientMessage, MessageError>,
+    ) {
+        match hello::renew(&connection.app, said, self.number).await {
             Ok((terms, ready)) => {
                 self.terms = terms;
                 self.open_lanes(connection);
+                if !*connection.app.drain.borrow() {
+                    self.set_stay(connection);
+                }
                 connection.reply.send_message(&ServerMessage::Ready(ready));
             }
             Err(problem) => connection.reply.send_error(problem, None),
+        }
+    }
+
+    /// Sets when a client that follows is asked to go on elsewhere.
+    fn set_stay(&self, connection: &mut Connection) {
+        let stay = self.terms.follows.and_then(|_| connection.app.moves.stay());
+        connection.call_after(stay);
+    }
+
+    /// Sends what the session remembers; every accepted frame is answered.
+    async fn seal(&self, reply: Arc<Reply>, app: Arc<App>) {
+        let Some(shape) = self.terms.follows else { return };
+        let terms = shape.on(&app.catalogue().tiers[self.terms.tier]);
+        let (memory, wait_max) = (self.terms.memory(), app.timeouts.io);
+        // Copying and sealing up to a MiB is not for a thread that moves bytes.
+        let sealing = spawn_blocking(move || memory.seal(&app, &terms));
+        let failed = |error: &dyn Display| {
+            reply.send_error(problem::internal("the state cannot be sealed", error), None);
+        };
+        match timeout(wait_max, sealing).await {
+            Ok(Ok(Ok(sealed))) => reply.send_binary(&sealed),
+            Ok(Ok(Err(error))) => failed(&error),
+            Ok(Err(error)) => failed(&error),
+            Err(error) => failed(&error),
         }
     }
 
@@ -184,6 +259,8 @@ impl Session {
                 time_us: header.client_time_us,
                 effects: self.terms.effects.get(finger).cloned(),
                 finger: hand.and_then(|hand| hand.fingers().get(finger).cloned()),
+                solves_contact: hand.is_some_and(|hand| !hand.form().takes_pressure()),
+                is_contact_alone: !self.terms.shows_sed(),
                 header: Some(header),
             },
         })

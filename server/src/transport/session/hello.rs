@@ -6,11 +6,12 @@ use bytes::Bytes;
 use papilla_proto::{
     ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage, json::JsonError,
 };
+use papilla_session_state::is_sealed;
 use tokio::{task::spawn_blocking, time::timeout};
 
 use super::{
     End, close,
-    connection::{Connection, Event},
+    connection::{Connection, Event, Wait},
     drained,
     terms::{self, Terms, ready},
 };
@@ -47,16 +48,22 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
 
 /// One message; a problem is one the session survives.
 async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), Problem>, End> {
-    let text = match connection.next(false).await? {
+    let text = match connection.next(Wait::FOR_DRAIN).await? {
         Event::Draining => return Err(drained()),
         Event::Text(text) => text,
-        Event::Binary(..) => {
+        Event::Binary(..) | Event::Due | Event::Settled => {
             let message = "the first message is the JSON hello, in text";
             return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
         }
     };
     match parse(&text).await {
-        Ok(ClientMessage::Hello(hello)) => Ok(meet(&connection.app, hello).await),
+        Ok(ClientMessage::Hello(hello)) if hello.resume == Some(true) && hello.version > 1 => {
+            match state(connection).await? {
+                Ok(sealed) => Ok(meet(&connection.app, hello, Some(sealed)).await),
+                Err(problem) => Ok(Err(problem)),
+            }
+        }
+        Ok(ClientMessage::Hello(hello)) => Ok(meet(&connection.app, hello, None).await),
         Ok(_) => Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
         Err(MessageError::Hello(error)) => Ok(Err(error.into())),
         Err(MessageError::Unknown(error)) => {
@@ -67,10 +74,22 @@ async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), P
     }
 }
 
+/// The sealed state that a hello has announced.
+async fn state(connection: &mut Connection) -> Result<Result<Bytes, Problem>, End> {
+    match connection.next(Wait::FOR_DRAIN).await? {
+        Event::Draining => Err(drained()),
+        Event::Binary(sealed, _) if is_sealed(&sealed) => Ok(Ok(sealed)),
+        _ => {
+            let message = "after a hello with 'resume' the sealed state is due, in binary";
+            Ok(Err(Problem::new(ErrorCode::BadJson, message).at("resume")))
+        }
+    }
+}
+
 /// Longest text parsed by a thread that moves bytes, bytes: some 50 us of work.
 const PARSED_INLINE_MAX: usize = 16 * 1024;
 
-async fn parse(text: &Bytes) -> Result<ClientMessage, MessageError> {
+pub(super) async fn parse(text: &Bytes) -> Result<ClientMessage, MessageError> {
     if text.len() <= PARSED_INLINE_MAX {
         return ClientMessage::from_json(text);
     }
@@ -88,11 +107,15 @@ async fn parse(text: &Bytes) -> Result<ClientMessage, MessageError> {
 /// The text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
 pub(super) async fn renew(
     app: &Arc<App>,
-    text: &Bytes,
+    said: Result<ClientMessage, MessageError>,
     number: u64,
 ) -> Result<(Terms, Ready), Problem> {
     const DUE: &str = "binary frames are due once the session is ready, or a hello for new terms";
-    let hello = match parse(text).await {
+    let hello = match said {
+        Ok(ClientMessage::Hello(Hello { resume: Some(true), .. })) => {
+            let message = "a state is for the first hello of a connection";
+            return Err(Problem::new(ErrorCode::BadJson, message).at("resume"));
+        }
         Ok(ClientMessage::Hello(hello)) => hello,
         Ok(_) => return Err(Problem::new(ErrorCode::UnexpectedText, DUE)),
         Err(MessageError::Hello(error)) => return Err(error.into()),
@@ -101,19 +124,25 @@ pub(super) async fn renew(
             return Err(Problem::new(ErrorCode::UnexpectedText, message));
         }
     };
-    let (terms, _) = meet(app, hello).await?;
+    let (terms, _) = meet(app, hello, None).await?;
     let ready = ready(app, number, &terms);
     Ok((terms, ready))
 }
 
 /// Whether and how the hello can be met. Effects may have to place points and take some MiB: that
 /// is not for a thread that moves bytes.
-async fn meet(app: &Arc<App>, hello: Hello) -> Result<(Terms, Hello), Problem> {
+async fn meet(
+    app: &Arc<App>,
+    hello: Hello,
+    sealed: Option<Bytes>,
+) -> Result<(Terms, Hello), Problem> {
     if hello.version == 1 {
-        return terms::meet(app, &hello).map(|terms| (terms, hello));
+        return terms::meet(app, &hello, None).map(|terms| (terms, hello));
     }
     let shared = Arc::clone(app);
-    let meeting = spawn_blocking(move || terms::meet(&shared, &hello).map(|terms| (terms, hello)));
+    let meeting = spawn_blocking(move || {
+        terms::meet(&shared, &hello, sealed.as_deref()).map(|terms| (terms, hello))
+    });
     match timeout(app.timeouts.io, meeting).await {
         Ok(Ok(result)) => result,
         Ok(Err(error)) => Err(problem::internal("the hello cannot be worked out", &error)),

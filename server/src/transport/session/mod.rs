@@ -9,6 +9,7 @@ mod frames;
 mod fresh;
 mod hello;
 mod limits;
+mod moving;
 mod outbox;
 mod reply;
 mod terms;

@@ -87,6 +87,11 @@ impl Reply {
         }
     }
 
+    /// Sends a binary message that is no frame.
+    pub(super) fn send_binary(&self, payload: &[u8]) {
+        self.out.send(&wire::frame(opcode::BINARY, payload));
+    }
+
     /// Tells the client of an error the session survives.
     pub(super) fn send_error(&self, problem: Problem, sequence: Option<u32>) {
         self.app.metrics.error(problem.code);

@@ -7,17 +7,22 @@ use std::sync::{
 
 use papilla_codec::{Output, scale_of};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, RuntimeEffect,
-    SampleType,
+    ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, Resumption,
+    RuntimeEffect, SampleType,
     contact::FINGERS_MAX,
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
 };
 use papilla_session_contact::{Hand, Skin};
 use papilla_session_effects::Effects;
+use papilla_session_state::tier_of;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::{budget::Budget, reply::tier_number};
+use super::{
+    budget::Budget,
+    moving::{Memory, Shape},
+    reply::tier_number,
+};
 use crate::{
     core::{
         buffers::HEADROOM,
@@ -51,6 +56,10 @@ pub(super) struct Terms {
     /// The fingers, in version 3.
     pub(super) hand: Option<Hand>,
     _fingers: Option<OwnedSemaphorePermit>,
+    /// Of clients that follow a request to reconnect: what shapes their state.
+    pub(super) follows: Option<Shape>,
+    /// What became of the state that the hello brought.
+    pub(super) resumption: Option<Resumption>,
     /// What the client is told of them.
     info: ReadyInfo,
     permit: Permit,
@@ -61,6 +70,17 @@ impl Terms {
     pub(super) fn move_to(&mut self, place: usize, tier: &Tier) {
         self.tier = place;
         self.permit = Permit::take(tier);
+    }
+
+    /// Whether the network is asked.
+    pub(super) fn shows_sed(&self) -> bool {
+        self.info.shows_sed
+    }
+
+    /// What answers depend on of the frames before.
+    pub(super) fn memory(&self) -> Memory {
+        let fingers = self.hand.as_ref().map_or(&[][..], Hand::fingers).to_vec();
+        Memory { effects: self.effects.clone(), fingers }
     }
 
     /// Most bytes of an answer, its heads included.
@@ -145,11 +165,27 @@ fn runtime_effect(name: &str) -> Option<RuntimeEffect> {
     name.parse().ok()
 }
 
-/// The terms of a session that sends this hello.
+/// The terms of a session that sends this hello, going on from a sealed state if there is one.
 ///
 /// # Errors
 /// It cannot be met; the problem names the member.
-pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
+pub(super) fn meet(app: &App, hello: &Hello, sealed: Option<&[u8]>) -> Result<Terms, Problem> {
+    let mut terms = agree(app, hello, sealed.and_then(tier_of))?;
+    let Some(sealed) = sealed else { return Ok(terms) };
+    let shape = Shape::of(hello);
+    let for_terms = shape.on(&app.catalogue().tiers[terms.tier]);
+    let resumption = terms.memory().resume(app, &for_terms, sealed);
+    if !matches!(resumption, Resumption::Resumed | Resumption::Nothing) {
+        // Nothing of it stays, not even the tier that it named.
+        drop(terms);
+        terms = agree(app, hello, None)?;
+    }
+    terms.resumption = Some(resumption);
+    Ok(terms)
+}
+
+/// The same without a state, which may have named the tier it came from.
+fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Problem> {
     check_version(hello)?;
     let is_of_tier = |name: &&String| hello.version == 1 || runtime_effect(name).is_none();
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
@@ -157,7 +193,14 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
     let catalogue = app.catalogue();
     let index = match &hello.tier {
         Some(name) => catalogue.tier_named(name)?,
-        None => catalogue.choose(budget_us, &wanted).unwrap_or(catalogue.default),
+        None => before
+            .and_then(|name| catalogue.tier_named(name).ok())
+            .filter(|&index| {
+                let tier = &catalogue.tiers[index];
+                !tier.retired && wanted.iter().all(|effect| tier.effects.contains(effect))
+            })
+            .or_else(|| catalogue.choose(budget_us, &wanted))
+            .unwrap_or(catalogue.default),
     };
     let tier = &catalogue.tiers[index];
     if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
@@ -207,6 +250,8 @@ pub(super) fn meet(app: &App, hello: &Hello) -> Result<Terms, Problem> {
         effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
         hand,
         _fingers: fingers,
+        follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
+        resumption: None,
         info,
         permit: Permit::take(tier),
     })
@@ -267,6 +312,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         answer_sample_type: is_new.then_some(terms.answer_sample_type),
         session_effects: is_new.then(|| terms.info.names.clone()),
         sections: is_new.then(sections),
+        state: terms.resumption,
         vertices: fingers.map(|_| catalogue.atlas.vertex_count() as u32),
         fingers,
         contact_us,

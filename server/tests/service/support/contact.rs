@@ -8,6 +8,7 @@ use papilla_proto::{
     atlas::{Atlas, PatchVertices},
     contact::{Pose, ROW},
 };
+use papilla_server::Config;
 use serde_json::{Value, json};
 
 use super::{Service, hello, model_folder_on, write};
@@ -38,6 +39,11 @@ pub(crate) fn atlas() -> Atlas {
 
 /// A service of this finger, with its contact model.
 pub(crate) async fn service() -> Service {
+    service_with(|_| ()).await
+}
+
+/// The same, with changes to the configuration.
+pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
     let (atlas, folder) = (atlas(), model_folder_on(&atlas()));
     let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
     let vertices = skin.positions_mm.len();
@@ -57,7 +63,11 @@ pub(crate) async fn service() -> Service {
     );
     write(folder.path(), "finger.contact", &arrays.to_bytes(&header).unwrap());
     let file: PathBuf = folder.path().join("finger.contact");
-    Service::on(folder, |config| config.contact = Some(file)).await.unwrap()
+    let configure = |config: &mut Config| {
+        config.contact = Some(file);
+        change(config);
+    };
+    Service::on(folder, configure).await.unwrap()
 }
 
 /// A hello of version 3 for one ball, with more members.

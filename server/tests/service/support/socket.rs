@@ -26,6 +26,8 @@ pub(crate) struct Socket<S = TcpStream> {
 pub(crate) enum Received {
     Json(Value),
     Frame(FrameHeader, Vec<u8>),
+    /// What the session remembers.
+    Sealed(Vec<u8>),
     Closed(Option<u16>),
 }
 
@@ -86,6 +88,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
                 Some(Ok(Message::Text(text))) => {
                     Received::Json(serde_json::from_str(&text).unwrap())
                 }
+                Some(Ok(Message::Binary(bytes))) if bytes.starts_with(b"PPS") => {
+                    Received::Sealed(bytes.to_vec())
+                }
                 Some(Ok(Message::Binary(bytes))) => {
                     let header = FrameHeader::decode(&bytes).unwrap();
                     Received::Frame(header, bytes[HEADER_LEN..].to_vec())
@@ -109,6 +114,25 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
             Received::Frame(header, payload) => (header, payload),
             other => panic!("a frame is due, not {other:?}"),
         }
+    }
+
+    /// Asks for what the session remembers.
+    pub(crate) async fn seal(&mut self) -> Vec<u8> {
+        self.send(r#"{"type": "seal"}"#).await;
+        match self.receive().await {
+            Received::Sealed(sealed) => sealed,
+            other => panic!("a sealed state is due, not {other:?}"),
+        }
+    }
+
+    /// Says a hello that brings a state; returns ready.
+    pub(crate) async fn resume(&mut self, mut hello: Value, sealed: Vec<u8>) -> Value {
+        hello["resume"] = json!(true);
+        self.send(hello.to_string()).await;
+        self.send(sealed).await;
+        let ready = self.hear_json().await;
+        assert_eq!(ready["type"], "ready", "{ready}");
+        ready
     }
 
     /// Asserts that the next message is an error the session survives; returns it.

@@ -26,6 +26,8 @@ pub(crate) struct Run {
     server: String,
     pub(crate) patience: Duration,
     session: Option<Session>,
+    /// Connections at the last move.
+    moved: u64,
     /// For people.
     pub(crate) note: String,
 }
@@ -47,7 +49,7 @@ impl Run {
         let url = env::var("PAPILLA_URL").context("PAPILLA_URL")?;
         let server = url.trim_start_matches("http://").to_owned();
         let patience = Duration::from_secs_f64(timeout_s);
-        Ok(Self { server, patience, session: None, note: String::new() })
+        Ok(Self { server, patience, session: None, moved: 1, note: String::new() })
     }
 
     pub(crate) async fn step(&mut self, step: &Value) -> Result<()> {
@@ -56,6 +58,7 @@ impl Run {
             "frame" => self.frame(step).await,
             "burst" => self.burst(step).await,
             "reconnect" => self.reconnect(step).await,
+            "move" => self.moved(step).await,
             "http" => self.post(step).await,
             "rasterise" => self.rasterise(step).await,
             "contacts" => self.contacts(step).await,
@@ -154,6 +157,16 @@ impl Run {
         time::timeout(within, opened.wait_for(|opened| *opened > before)).await??;
         let seconds = begin.elapsed().as_secs_f64();
         self.note = format!(" (connected {seconds:.2} s after the server was back)");
+        Ok(())
+    }
+
+    async fn moved(&mut self, step: &Value) -> Result<()> {
+        let mut opened = self.session()?.connections();
+        let within = Duration::from_secs_f64(member(step, "within_s")?);
+        // It may have moved between the steps.
+        let before = self.moved;
+        let moved = opened.wait_for(|opened| *opened > before);
+        self.moved = *time::timeout(within, moved).await??;
         Ok(())
     }
 

@@ -1,0 +1,35 @@
+//! The warm start of a finger's solver as bytes.
+
+use papilla_contact::Memory;
+use papilla_session_state::{Reader, StateError, Writer};
+
+/// More vertices than any patch holds: what a damaged count can make the reader take.
+const VERTICES_MAX: usize = 1 << 16;
+
+pub(crate) fn write(memory: &Memory, state: &mut Writer) {
+    let Memory { vertices, near, stride, made, forces_n, made_with, reached } = memory;
+    for count in [vertices.len(), *near, *stride, *made] {
+        state.number(count as u64);
+    }
+    vertices.iter().for_each(|vertex| state.number(u64::from(*vertex)));
+    state.floats(forces_n.as_flattened());
+    state.floats(made_with.as_flattened());
+    let bits = |of: usize| reached.map(|reached| reached[of].to_bits());
+    state.option(bits(0));
+    state.option(bits(1));
+}
+
+pub(crate) fn read(state: &mut Reader<'_>) -> Result<Memory, StateError> {
+    let slots = state.count(VERTICES_MAX, "a number of vertices")?;
+    let near = state.count(slots, "a number of near vertices")?;
+    let stride = state.count(VERTICES_MAX, "a length of rows")?;
+    let made = state.count(slots, "a number of rows")?;
+    let vertex = |_| state.count(u32::MAX as usize, "a vertex").map(|vertex| vertex as u32);
+    let vertices = (0..slots).map(vertex).collect::<Result<_, _>>()?;
+    let (mut forces_n, mut made_with) = (vec![[0.0; 4]; slots], vec![[0.0; 4]; made]);
+    state.floats(forces_n.as_flattened_mut())?;
+    state.floats(made_with.as_flattened_mut())?;
+    let [travel_mm, slope] = [state.option()?, state.option()?];
+    let reached = travel_mm.zip(slope).map(|(a, b)| [a, b].map(f64::from_bits));
+    Ok(Memory { vertices, near, stride, made, forces_n, made_with, reached })
+}
