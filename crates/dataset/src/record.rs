@@ -65,9 +65,11 @@ impl Cells {
 /// One equilibrium on its way into a shard: values at the atlas' vertices, or at nodes of cells.
 ///
 /// MPa = N/mm2 = mJ/mm3, as finite elements have them; a shard stores Pa and J/m3.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sample {
-    /// Where values are known; `None`: at the atlas' vertices. Below, V is their number.
+    /// Where values are known; `None`: at the atlas' vertices. Below, V is their number. Not
+    /// serialised: all samples of an indentation share it.
+    #[serde(skip)]
     pub cells: Option<Arc<Cells>>,
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,
