@@ -172,6 +172,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Ok(slice) => slice,
         Err(error) => return Ok(wrong_usage(&error)),
     };
+    let stop = signals::stop()?;
     let spec = CampaignSpec::read(&args.campaign)?;
     let candidates = spec.candidates();
     let first = candidates.first().context("a campaign has an indenter")?;
@@ -183,7 +184,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         slice,
         threads: args.threads,
         retry_failed: !again,
-        stop: signals::stop()?,
+        stop,
         checkpoint_every: Duration::from_secs(args.checkpoint_s),
         ..RunOptions::default()
     };

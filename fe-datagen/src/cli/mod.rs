@@ -8,6 +8,7 @@ mod cross_check;
 mod dataset;
 mod effects;
 mod explain;
+mod explain_campaign;
 mod export;
 mod fidelity;
 mod generate;

@@ -28,12 +28,8 @@ fn bits(r: &IncrementRecord, pressure_mpa: &[f64]) -> Vec<u64> {
 
 /// Presses from where `from` stood, in a process of its own as it were, until `until` depths
 /// were stored; no path balances to 1e-12, so every way is taken.
-fn press(
-    effects: &str,
-    from: Option<&[u8]>,
-    until: usize,
-) -> (Balanced<Vec<u64>>, Option<Vec<u8>>) {
-    let scene = Scene::parse("scene.toml".as_ref(), format!("{effects}{SCENE}")).unwrap();
+fn press(from: Option<&[u8]>, until: usize) -> (Balanced<Vec<u64>>, Option<Vec<u8>>) {
+    let scene = Scene::parse("scene.toml".as_ref(), SCENE.into()).unwrap();
     let Simulation { body, approach, drive, .. } = Simulation::new(&scene).unwrap();
     let mut solver = body.solver(Options::default()).unwrap();
     let surface = &body.problem.mesh.surfaces[&body.contact];
@@ -59,30 +55,28 @@ fn press(
 /// indentation ends in the same bits.
 #[test]
 fn a_stopped_indentation_goes_on_to_the_same_bits() {
-    for effects in ["", "effects = [\"finite_strain\", \"layers\"]\n"] {
-        let (whole, stored) = press(effects, None, usize::MAX);
-        whole.pressed.unwrap();
-        assert!(stored.is_none() && whole.kept.len() == 2);
-        assert!(whole.attempts.len() >= 3, "{:?}", whole.attempts);
-        for until in 0..2 * whole.attempts.len() {
-            let (stopped, stored) = press(effects, None, until);
-            assert!(matches!(stopped.pressed, Err(SimulationError::Halted)), "{until}");
-            // Once more in between: what was gone on with can be stopped again.
-            let (next, again) = press(effects, stored.as_deref(), 0);
-            let end = match again {
-                Some(again) => press(effects, Some(&again), usize::MAX).0,
-                None => next,
-            };
-            end.pressed.unwrap();
-            assert!(end.kept == whole.kept, "stopped at {until} of {effects}");
-            assert_eq!(end.attempts, whole.attempts);
-        }
+    let (whole, stored) = press(None, usize::MAX);
+    whole.pressed.unwrap();
+    assert!(stored.is_none() && whole.kept.len() == 2);
+    assert!(whole.attempts.len() >= 3, "{:?}", whole.attempts);
+    for until in 0..2 * whole.attempts.len() {
+        let (stopped, stored) = press(None, until);
+        assert!(matches!(stopped.pressed, Err(SimulationError::Halted)), "{until}");
+        // Once more in between: what was gone on with can be stopped again.
+        let (next, again) = press(stored.as_deref(), 0);
+        let end = match again {
+            Some(again) => press(Some(&again), usize::MAX).0,
+            None => next,
+        };
+        end.pressed.unwrap();
+        assert!(end.kept == whole.kept, "stopped at {until}");
+        assert_eq!(end.attempts, whole.attempts);
     }
 }
 
 #[test]
 fn the_state_of_another_mesh_is_refused() {
-    let (_, stored) = press("", None, 0);
+    let (_, stored) = press(None, 0);
     let standing: Standing<Vec<u64>> = postcard::from_bytes(&stored.unwrap()).unwrap();
     let text = SCENE.replace("[4, 4]", "[3, 3]");
     let scene = Scene::parse("scene.toml".as_ref(), text).unwrap();
