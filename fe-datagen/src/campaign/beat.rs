@@ -1,6 +1,6 @@
 //! What a process tells of itself in `DIR/progress`, for `dataset status`. Nothing is decided by it.
 
-use super::Slice;
+use papilla_fingertip::campaign::Slice;
 use papilla_output::{OutputError, atomic};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -8,9 +8,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant, SystemTime};
 
 /// Longest time without a word.
-pub(super) const BEAT: Duration = Duration::from_secs(30);
+pub(super) const BEAT: Duration = Duration::from_secs(60);
 /// Shortest time between two.
-const BEAT_MIN: Duration = Duration::from_secs(2);
+const BEAT_MIN: Duration = Duration::from_secs(10);
 
 /// An indentation that is being solved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Campaigns: many indentations of one finger, solved in parallel into a dataset.
 //!
 //! A campaign is a TOML file ([`CampaignSpec`]). [`solve`] solves the
-//! indentations of one [`Slice`] of it, one per core; any number of slices may share a folder,
+//! indentations of one [`Slice`](papilla_fingertip::campaign::Slice) of it, one per core; any number of slices may share a folder,
 //! and a serial run is the slice of all. [`merge`] writes the dataset that [`papilla_dataset`]
 //! describes. All can be killed at any instant and started again: every indentation is one shard,
 //! written atomically, with a record in `DIR/progress` written after it. The dataset's
@@ -14,7 +14,6 @@ mod error;
 mod merge;
 mod report;
 mod run;
-mod slice;
 mod state;
 mod status;
 #[cfg(test)]
@@ -26,5 +25,4 @@ pub use error::{BoxError, CampaignError};
 pub use merge::merge;
 pub use report::{CampaignReport, Failure, SliceReport};
 pub use run::{IndentationSolver, RunOptions, solve};
-pub use slice::{Slice, SliceError};
 pub use status::{Heard, Status, StatusReader};

@@ -1,9 +1,8 @@
 //! What a slice and a merged campaign say of themselves.
 
-use super::Slice;
 use super::state::{IndentationState, Outcome};
 use papilla_dataset::{DroppedSample, FailedIndentation};
-use papilla_fingertip::campaign::CampaignSpec;
+use papilla_fingertip::campaign::{CampaignSpec, Slice};
 use papilla_progress::clock;
 use serde::Serialize;
 use std::fmt;

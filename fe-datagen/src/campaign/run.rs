@@ -2,11 +2,11 @@
 
 use super::beat::{Beat, Ended, Event, Running};
 use super::state::{Found, IndentationState, Outcome, Workspace};
-use super::{BoxError, CampaignError, Checkpoints, PressError, Slice, SliceReport};
+use super::{BoxError, CampaignError, Checkpoints, PressError, SliceReport};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::{Sample, TriangleOnLattice};
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, indentations};
 use papilla_progress::{Progress, clock};
 use std::any::Any;
 use std::num::NonZero;

@@ -8,7 +8,7 @@ use papilla_atlas::Atlas;
 use papilla_dataset::testing::{atlas, posed_record};
 use papilla_dataset::{Dataset, ImageOptions, Sample, Split, images, stats, verify};
 use papilla_fingertip::campaign::testing::{several, spec};
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, indentations};
 use papilla_fingertip::scene::Pose;
 use papilla_output::map_image::Bits;
 use std::collections::BTreeMap;

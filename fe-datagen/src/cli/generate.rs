@@ -1,9 +1,10 @@
 //! `generate`: a slice of a campaign of indentations, or all of it into a dataset.
 
+use super::part::Part;
 use super::signals::{self, REQUEUE};
 use super::{CHECKS_FAILED, print, wrong_usage};
 use crate::campaign::{
-    self, BoxError, CampaignReport, Checkpoints, IndentationSolver, PressError, RunOptions, Slice,
+    self, BoxError, CampaignReport, Checkpoints, IndentationSolver, PressError, RunOptions,
     SliceReport,
 };
 use anyhow::Context as _;
@@ -45,9 +46,8 @@ pub(super) struct Args {
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
-    /// Solve part I of N [default: the task of a Slurm job array, else all].
-    #[arg(long, value_name = "I/N")]
-    slice: Option<Slice>,
+    #[command(flatten)]
+    part: Part,
     /// Indentations solved at a time [default: one per core].
     #[arg(long)]
     threads: Option<NonZero<usize>>,
@@ -158,17 +158,8 @@ fn pressed(
     }
 }
 
-/// The part that is asked for: by the flag, or by Slurm.
-fn slice(args: &Args) -> anyhow::Result<Slice> {
-    let of_slurm = || Slice::of_slurm(|name| std::env::var(name).ok());
-    Ok(match args.slice {
-        Some(slice) => slice,
-        None => of_slurm()?.unwrap_or(Slice::WHOLE),
-    })
-}
-
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let slice = match slice(args) {
+    let slice = match args.part.slice() {
         Ok(slice) => slice,
         Err(error) => return Ok(wrong_usage(&error)),
     };

@@ -14,6 +14,7 @@ mod fidelity;
 mod generate;
 mod influence;
 mod lines;
+mod part;
 mod schema;
 mod signals;
 mod solve;
@@ -94,8 +95,8 @@ pub fn run() -> ExitCode {
 const CHECKS_FAILED: u8 = 3;
 
 /// Says what is wrong with the command line and gives its exit code.
-fn wrong_usage(error: &anyhow::Error) -> ExitCode {
-    eprintln!("error: {error:#}");
+fn wrong_usage(error: &dyn std::error::Error) -> ExitCode {
+    eprintln!("error: {error}");
     ExitCode::from(2)
 }
 

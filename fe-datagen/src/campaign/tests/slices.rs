@@ -2,6 +2,7 @@
 
 use super::*;
 use std::fs;
+use std::time::{Duration, SystemTime};
 
 fn slice(index: usize, count: usize) -> RunOptions {
     silent(Slice::new(index, count).unwrap(), 1)
@@ -209,4 +210,29 @@ fn the_status_tells_of_failures_and_hours() {
     let status = reader.read().unwrap();
     assert_eq!((status.solved, status.failed.len(), status.unsolved), (7, 0, 0));
     assert!(status.to_string().contains("solved and merged"));
+}
+
+/// A clock that jumps changes what a person is told, and nothing else.
+#[test]
+fn a_clock_that_jumps_only_changes_what_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    part(&spec(), path, &silent(Slice::WHOLE, 1), Trouble::Stop(2)).unwrap();
+    let beat = path.join("progress/slice-00001-of-00001.json");
+    edit(&beat, "\"stopped\"", "null");
+    let day = Duration::from_secs(86_400);
+    let told = |then: SystemTime| {
+        fs::File::options().write(true).open(&beat).unwrap().set_modified(then).unwrap();
+        let status = StatusReader::new(&spec(), path).unwrap().read().unwrap();
+        (status.solved, status.unsolved, status.processes[0].silent)
+    };
+    assert_eq!(told(SystemTime::now() + day), (2, 5, false));
+    assert_eq!(told(SystemTime::now() - day), (2, 5, true));
+    for entry in fs::read_dir(path.join("progress")).unwrap().flatten() {
+        let file = fs::File::options().write(true).open(entry.path()).unwrap();
+        file.set_modified(SystemTime::now() + day).unwrap();
+    }
+    let (slice, _) = go(path, 1, Trouble::None).unwrap();
+    assert_eq!((slice.reused, slice.solved), (2, 5));
+    assert!(files(path) == serial());
 }

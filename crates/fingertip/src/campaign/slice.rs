@@ -96,6 +96,13 @@ impl Slice {
     }
 }
 
+impl Slice {
+    /// Whether the `k`-th of things that grow dearer is its own: every `count`-th is.
+    pub fn takes(self, k: usize) -> bool {
+        k % self.count.get() == self.index - 1
+    }
+}
+
 impl fmt::Display for Slice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.index, self.count)
