@@ -74,7 +74,10 @@ class Cluster:
         self.config.write_text(CONFIG.format(root=root, nodes="\n".join(lines)))
         hosts = ["127.0.0.1 localhost"] + [f"{a} {n}" for n, a in self.addresses.items()]
         (root / "hosts").write_text("\n".join(hosts) + "\n")
-        (root / "ctl").mkdir()
+        # Nothing is held in control groups; slurmd looks for them all the same.
+        (root / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
+        for name in self.addresses:
+            (root / name).mkdir()
         self.environment = os.environ | {"SLURM_CONF": str(self.config)}
 
     def __enter__(self) -> "Cluster":
@@ -84,7 +87,7 @@ class Cluster:
             self.start("ctl")
             for name in self.nodes:
                 self.start(name)
-            until("nodes are idle", lambda: len(self.nodes_in("idle")) == len(self.nodes))
+            until("nodes are idle", self.is_ready)
         except BaseException:
             self.__exit__()
             raise
@@ -95,6 +98,13 @@ class Cluster:
             self.kill(name)
         for name in self.addresses:
             subprocess.run(["ip", "netns", "delete", self.prefix + name], check=False, capture_output=True)
+
+    def is_ready(self) -> bool:
+        for host, process in self.running.items():
+            if process.poll() is not None:
+                log = (self.root / f"{host}.out").read_text(errors="replace")
+                raise RuntimeError(f"{host} ended with {process.returncode}:\n{log}")
+        return len(self.nodes_in("idle")) == len(self.nodes)
 
     def start_network(self) -> None:
         """A bridge in the controller's namespace, and a cable to each node."""
@@ -120,7 +130,7 @@ class Cluster:
         key.chmod(0o600)
         options = ["key-file", "socket", "pid-file", "log-file", "seed-file"]
         paths = [f"--{o}={self.root}/munge.{o.removesuffix('-file')}" for o in options]
-        log = (self.root / "munged.out").open("wb")
+        log = (self.root / "munge.out").open("wb")
         command = ["munged", "--foreground", "--force", *paths]
         self.running["munge"] = subprocess.Popen(command, stdout=log, stderr=log)
         until("munge listens", lambda: (self.root / "munge.socket").exists())
