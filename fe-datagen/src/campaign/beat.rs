@@ -9,8 +9,8 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Longest time without a word.
 pub(super) const BEAT: Duration = Duration::from_secs(60);
-/// Shortest time between two.
-const BEAT_MIN: Duration = Duration::from_secs(10);
+/// Shortest time between two: thousands of processes tell one file system.
+const BEAT_MIN: Duration = Duration::from_secs(30);
 
 /// An indentation that is being solved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -99,8 +99,7 @@ impl Beat {
 
     /// Tells of everything that happens until nothing can any more.
     pub(super) fn follow(&mut self, folder: &Path, events: &Receiver<Event>) {
-        self.write(folder);
-        let (mut last, mut news) = (Instant::now(), false);
+        let (mut last, mut news) = (None::<Instant>, false);
         loop {
             match events.recv_timeout(if news { BEAT_MIN } else { BEAT }) {
                 Ok(event) => {
@@ -110,10 +109,10 @@ impl Beat {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
-            let passed = last.elapsed();
-            if passed >= BEAT || (news && passed >= BEAT_MIN) {
+            let due = if news { BEAT_MIN } else { BEAT };
+            if last.is_none_or(|last| last.elapsed() >= due) {
                 self.write(folder);
-                (last, news) = (Instant::now(), false);
+                (last, news) = (Some(Instant::now()), false);
             }
         }
     }

@@ -12,6 +12,7 @@ mod beat;
 mod checkpoint;
 mod error;
 mod merge;
+mod queue;
 mod report;
 mod run;
 mod state;
