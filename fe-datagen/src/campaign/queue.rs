@@ -15,18 +15,10 @@ use std::sync::mpsc::{Sender, channel};
 use std::time::Instant;
 
 /// What need not be solved any more.
-pub(super) fn settled(
-    workspace: &Workspace,
-    press: &Indentation,
-    retry_failed: bool,
-) -> Option<IndentationState> {
-    match workspace.load(press) {
+pub(super) fn settled(found: Found, retry_failed: bool) -> Option<IndentationState> {
+    match found {
         Found::Vouched(state) => (!(retry_failed && state.is_failed())).then_some(*state),
-        Found::Absent => None,
-        Found::Untrusted(why) => {
-            eprintln!("indentation {} is solved again: {why}", press.id);
-            None
-        }
+        Found::Absent | Found::Untrusted(_) => None,
     }
 }
 
@@ -90,7 +82,7 @@ impl Queue<'_> {
                 return;
             };
             // A slice of another division may have it by now.
-            let elsewhere = settled(self.workspace, press, self.options.retry_failed);
+            let elsewhere = settled(self.workspace.load(press), self.options.retry_failed);
             match elsewhere.map_or_else(
                 || self.press(press, &mut solver, build, events),
                 |state| Ok(Settled::Elsewhere(state)),

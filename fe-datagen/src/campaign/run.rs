@@ -2,7 +2,7 @@
 
 use super::beat::{Beat, Ended};
 use super::queue::{Queue, Settled, settled};
-use super::state::Workspace;
+use super::state::{Found, Workspace};
 use super::{BoxError, CampaignError, Checkpoints, PressError, SliceReport};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
@@ -83,7 +83,11 @@ pub fn solve<S: IndentationSolver>(
     let (mut known, mut todo) = (Vec::new(), Vec::new());
     let planned = indentations(spec);
     for press in &planned[options.slice.range(planned.len())] {
-        match settled(&workspace, press, options.retry_failed) {
+        let found = workspace.load(press);
+        if let Found::Untrusted(why) = &found {
+            eprintln!("indentation {} is solved again: {why}", press.id);
+        }
+        match settled(found, options.retry_failed) {
             Some(state) => known.push(state),
             None => todo.push(press),
         }
