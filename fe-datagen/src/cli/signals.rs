@@ -1,8 +1,5 @@
 //! How a scheduler asks a process to leave: it stores where it stands and goes.
 
-use anyhow::Context as _;
-use signal_hook::consts::SIGTERM;
-use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -11,17 +8,36 @@ use std::sync::atomic::AtomicBool;
 pub(super) const REQUEUE: u8 = 75;
 
 /// A flag that is true once the process has been asked to leave: by USR1, as a scheduler warns
-/// before its time is up, or by TERM. A second TERM ends the process at once.
+/// before its time is up, or by TERM. A second TERM ends the process at once. To be called before
+/// any thread is started.
+///
+/// A thread of its own waits for the signals, which all others block: METIS has handlers of its
+/// own while it orders, which would take a TERM for an error of its own.
+#[cfg(unix)]
 pub(super) fn stop() -> anyhow::Result<Arc<AtomicBool>> {
+    use anyhow::Context as _;
+    use nix::sys::signal::{SigSet, Signal};
+    use std::sync::atomic::Ordering;
+
     let stop = Arc::new(AtomicBool::new(false));
-    let termed = Arc::new(AtomicBool::new(false));
-    let context = "cannot listen for signals";
-    // In this order: the first TERM finds it false.
-    flag::register_conditional_shutdown(SIGTERM, REQUEUE.into(), Arc::clone(&termed))
-        .context(context)?;
-    flag::register(SIGTERM, termed).context(context)?;
-    flag::register(SIGTERM, Arc::clone(&stop)).context(context)?;
-    #[cfg(unix)]
-    flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&stop)).context(context)?;
+    let signals: SigSet = [Signal::SIGTERM, Signal::SIGUSR1].into_iter().collect();
+    signals.thread_block().context("cannot block signals")?;
+    let asked = Arc::clone(&stop);
+    let wait = move || {
+        let mut termed = false;
+        while let Ok(signal) = signals.wait() {
+            if signal == Signal::SIGTERM && std::mem::replace(&mut termed, true) {
+                std::process::exit(REQUEUE.into());
+            }
+            asked.store(true, Ordering::Relaxed);
+        }
+    };
+    std::thread::Builder::new().spawn(wait).context("cannot wait for signals")?;
     Ok(stop)
+}
+
+/// A flag that stays false: there are no such signals.
+#[cfg(not(unix))]
+pub(super) fn stop() -> anyhow::Result<Arc<AtomicBool>> {
+    Ok(Arc::default())
 }
