@@ -2,14 +2,20 @@
 //!
 //! ```
 //! use papilla_dataset::{Sample, testing};
-//! use papilla_fe_datagen::campaign::{BoxError, IndentationSolver, RunOptions, run};
+//! use papilla_fe_datagen::campaign::{
+//!     Checkpoints, IndentationSolver, PressError, RunOptions, merge, solve,
+//! };
 //! use papilla_fingertip::campaign::Indentation;
 //!
 //! /// A formula in place of the finite elements.
 //! struct Formula(usize);
 //!
 //! impl IndentationSolver for Formula {
-//!     fn solve(&mut self, indentation: &Indentation) -> Result<Vec<Sample>, BoxError> {
+//!     fn solve(
+//!         &mut self,
+//!         indentation: &Indentation,
+//!         _: &mut Checkpoints<'_>,
+//!     ) -> Result<Vec<Sample>, PressError> {
 //!         Ok(indentation.depths_mm.iter().map(|d| testing::record(*d, self.0)).collect())
 //!     }
 //! }
@@ -29,7 +35,8 @@
 //! )?;
 //! let (atlas, folder) = (testing::atlas(4), tempfile::tempdir()?);
 //! let solver = || Ok(Formula(atlas.vertex_count()));
-//! let report = run(&spec, (&atlas, None), solver, folder.path(), &RunOptions::default())?;
+//! solve(&spec, (&atlas, None), solver, folder.path(), &RunOptions::default())?;
+//! let report = merge(&spec, folder.path())?;
 //! assert_eq!((report.is_complete(), report.samples), (true, 4));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -107,6 +107,28 @@ def no_validator() -> str | None:
     return "no kubernetes-validate here: pip could not install it"
 
 
+def slurm_missing() -> bool:
+    return not all(shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin") for name in ("slurmctld", "munged"))
+
+
+def install_slurm() -> str:
+    if not slurm_missing():
+        return ":"
+    return f"{AS_ROOT} as_root apt-get install -y -qq --no-install-recommends slurm-wlm munge"
+
+
+def no_slurm() -> str | None:
+    if slurm_missing() and not shutil.which("apt-get"):
+        return "no slurmctld and munged here, and no apt-get to install slurm-wlm and munge"
+    if os.geteuid() != 0 and not shutil.which("sudo"):
+        return "a cluster of namespaces needs root"
+    unshared = ["unshare", "--net", "--uts", "--mount", "--pid", "--fork", "true"]
+    sudo = [] if os.geteuid() == 0 else ["sudo", "-n"]
+    if subprocess.run([*sudo, *unshared], capture_output=True, check=False).returncode != 0:
+        return "no namespaces may be made here"
+    return None
+
+
 def no_nightly() -> str | None:
     command = ["rustup", "run", "nightly", "rustc", "--version"]
     if shutil.which("rustup") and subprocess.run(command, capture_output=True, check=False).returncode == 0:
@@ -377,6 +399,15 @@ def long() -> list[Step]:
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS clients/packages-test crates",
             after=("doc",),
             tests_min=1,
+        ),
+        Step(
+            "slurm",
+            "a campaign on a Slurm cluster in namespaces: preemptions, a lost node, a full disk",
+            f"{install_slurm()}\n{AS_ROOT} as_root env BIN=\"$BIN\" tests/slurm/run",
+            after=("packages", "build"),
+            tests_min=15,
+            installs="apt: slurm-wlm munge" if slurm_missing() else "",
+            missing=no_slurm,
         ),
         Step(
             "deny",

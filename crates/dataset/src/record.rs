@@ -71,10 +71,11 @@ impl Cells {
 /// One equilibrium on its way into a shard: values at the atlas' vertices, or on cells.
 ///
 /// MPa = N/mm2 = mJ/mm3, as finite elements have them; a shard stores Pa and J/m3.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sample {
     /// Where values are known; `None`: at the atlas' V vertices. Below, V is the number of nodes of
-    /// cells where there are any.
+    /// cells where there are any. Not serialised: all samples of an indentation share it.
+    #[serde(skip)]
     pub cells: Option<Arc<Cells>>,
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,

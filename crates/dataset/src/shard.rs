@@ -278,7 +278,7 @@ pub fn raster_npz(
     Ok(npz.finish()?)
 }
 
-/// Writes `atlas.json` and `raster.npz` into a dataset's folder.
+/// Writes `atlas.json` and `raster.npz` into a dataset's folder, if they are not there.
 ///
 /// # Errors
 /// [`DatasetError::Output`] when the folder is not writable.
@@ -291,8 +291,8 @@ pub fn write_atlas(
     let mut text =
         atlas.to_json().map_err(|source| DatasetError::Atlas { path: path.clone(), source })?;
     text.push('\n');
-    atomic::write(&path, text.as_bytes())?;
-    atomic::write(&folder.join("raster.npz"), &raster_npz(atlas, lattice)?)?;
+    atomic::write_changed(&path, text.as_bytes())?;
+    atomic::write_changed(&folder.join("raster.npz"), &raster_npz(atlas, lattice)?)?;
     Ok(())
 }
 

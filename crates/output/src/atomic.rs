@@ -2,9 +2,11 @@
 
 use super::OutputError;
 use serde::Serialize;
+#[cfg(unix)]
 use std::fs::File;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::Path;
+use tempfile::NamedTempFile;
 
 /// Prefix of files that are still being written; a kill can leave them behind.
 pub const PARTIAL_PREFIX: &str = ".partial-";
@@ -18,10 +20,45 @@ pub const PARTIAL_PREFIX: &str = ".partial-";
 /// [`OutputError::Io`] when the folder is not writable or the disk is full; the
 /// old file is then untouched.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let folder = match path.parent() {
+    let failed = || OutputError::io("write", path);
+    partial(path, bytes)?.persist(path).map_err(|e| failed()(e.error))?;
+    sync_folder(path)
+}
+
+/// As [`write`], but a file that is there stays as it is: of many processes that write at once, on
+/// a network file system too, one is first. Whether this was the one.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_first(path: &Path, bytes: &[u8]) -> Result<bool, OutputError> {
+    match partial(path, bytes)?.persist_noclobber(path) {
+        Ok(_) => sync_folder(path).map(|()| true),
+        Err(e) if e.error.kind() == ErrorKind::AlreadyExists => Ok(false),
+        Err(e) => Err(OutputError::io("write", path)(e.error)),
+    }
+}
+
+/// As [`write`], unless the file has these bytes already.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_changed(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    match std::fs::read(path) {
+        Ok(found) if found == bytes => Ok(()),
+        _ => write(path, bytes),
+    }
+}
+
+/// The folder of a file.
+fn folder(path: &Path) -> &Path {
+    match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
+    }
+}
+
+/// The bytes on disk, not yet under their name.
+fn partial(path: &Path, bytes: &[u8]) -> Result<NamedTempFile, OutputError> {
     let failed = || OutputError::io("write", path);
     let mut builder = tempfile::Builder::new();
     builder.prefix(PARTIAL_PREFIX);
@@ -31,12 +68,16 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder).map_err(failed())?;
+    let mut file = builder.tempfile_in(folder(path)).map_err(failed())?;
     file.write_all(bytes).map_err(failed())?;
     file.as_file().sync_all().map_err(failed())?;
-    file.persist(path).map_err(|e| failed()(e.error))?;
+    Ok(file)
+}
+
+#[cfg_attr(not(unix), allow(clippy::unnecessary_wraps))]
+fn sync_folder(path: &Path) -> Result<(), OutputError> {
     #[cfg(unix)]
-    File::open(folder).and_then(|f| f.sync_all()).map_err(failed())?;
+    File::open(folder(path)).and_then(|f| f.sync_all()).map_err(OutputError::io("write", path))?;
     Ok(())
 }
 
@@ -96,6 +137,21 @@ mod tests {
         write(&path, b"long first content").unwrap();
         write(&path, b"second").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"second");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_first_of_many_writers_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("owner.json");
+        let write = |n: u8| write_first(&path, &[n; 1000]).unwrap();
+        let first: Vec<bool> = std::thread::scope(|scope| {
+            let all: Vec<_> = (0..8).map(|n| scope.spawn(move || write(n))).collect();
+            all.into_iter().map(|one| one.join().unwrap()).collect()
+        });
+        let winner = first.iter().position(|f| *f).unwrap();
+        assert_eq!(first.iter().filter(|f| **f).count(), 1);
+        assert_eq!(std::fs::read(&path).unwrap(), [winner as u8; 1000]);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 

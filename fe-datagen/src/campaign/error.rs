@@ -23,11 +23,24 @@ pub enum CampaignError {
         /// What is in it.
         what: &'static str,
     },
-    /// Another process writes there now.
-    #[error("another process is generating into {folder}: wait for it or choose another --out")]
-    Busy {
-        /// The output folder.
+    /// Nothing has been solved there.
+    #[error("{folder} holds no campaign: `fe-datagen generate` begins one")]
+    NotBegun {
+        /// The folder.
         folder: PathBuf,
+    },
+    /// Not every indentation is solved.
+    #[error(
+        "{missing} of {presses} indentations are not solved, the first: {first}. Run \
+         `fe-datagen generate` on their slices, or without a slice, and merge again"
+    )]
+    Holes {
+        /// How many are missing.
+        missing: usize,
+        /// Indentations of the campaign.
+        presses: usize,
+        /// The first few, with what is wrong with each.
+        first: String,
     },
     /// No solver could be built, so no indentation can be solved.
     #[error("cannot set up the solver: {0}")]

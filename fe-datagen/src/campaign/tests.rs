@@ -1,12 +1,14 @@
-//! The runner's mechanics: resume, threads, failures. The solver here is a
+//! The runner's mechanics: slices, resume, threads, failures. The solver here is a
 //! formula of pose and depth; what it returns is of no matter to the runner.
+
+mod slices;
 
 use super::*;
 use papilla_atlas::Atlas;
 use papilla_dataset::testing::{atlas, posed_record};
 use papilla_dataset::{Dataset, ImageOptions, Sample, Split, images, stats, verify};
 use papilla_fingertip::campaign::testing::{several, spec};
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, indentations};
 use papilla_fingertip::scene::Pose;
 use papilla_output::map_image::Bits;
 use std::collections::BTreeMap;
@@ -23,25 +25,42 @@ enum Trouble {
     Fail(usize),
     Panic(usize),
     BadSample(usize),
+    /// The process is asked to stop.
+    Stop(usize),
 }
 
 struct Formula<'a> {
     vertex_count: usize,
     trouble: Trouble,
     calls: &'a AtomicUsize,
+    options: &'a RunOptions,
 }
 
 impl IndentationSolver for Formula<'_> {
-    fn solve(&mut self, press: &Indentation) -> Result<Vec<Sample>, BoxError> {
+    fn solve(
+        &mut self,
+        press: &Indentation,
+        checkpoints: &mut Checkpoints<'_>,
+    ) -> Result<Vec<Sample>, PressError> {
         let Pose { pitch_deg, roll_deg, yaw_deg } = press.pose;
         let pose = papilla_dataset::Pose { pitch_deg, roll_deg, yaw_deg };
         let call = self.calls.fetch_add(1, Ordering::SeqCst);
-        let record = |d: &f64| posed_record(pose, *d, self.vertex_count);
-        let mut records: Vec<_> = press.depths_mm.iter().map(record).collect();
+        let mut records: Vec<Sample> = checkpoints.stored().unwrap_or_default();
+        for depth_mm in press.depths_mm.iter().skip(records.len()) {
+            records.push(posed_record(pose, *depth_mm, self.vertex_count));
+            if self.trouble == Trouble::Stop(call) {
+                self.options.stop.store(true, Ordering::Relaxed);
+            }
+            if checkpoints.at_state(records.len(), || records.clone()).is_break() {
+                return Err(checkpoints.interrupted());
+            }
+        }
         match self.trouble {
             // Not even a destructor runs: what kill -9 does.
             Trouble::Abort(n) if n == call => std::process::abort(),
-            Trouble::Fail(n) if n == call => return Err("no convergence at 0.5 mm".into()),
+            Trouble::Fail(n) if n == call => {
+                return Err(PressError::Failed("no convergence at 0.5 mm".into()));
+            }
             Trouble::Panic(n) if n == call => panic!("index out of bounds"),
             Trouble::BadSample(n) if n == call => records[0].checks.energy_vs_work = 0.02,
             _ => {}
@@ -50,13 +69,41 @@ impl IndentationSolver for Formula<'_> {
     }
 }
 
-fn go(folder: &Path, threads: usize, trouble: Trouble) -> Result<CampaignReport, CampaignError> {
+/// Solves a slice.
+fn part(
+    spec: &CampaignSpec,
+    folder: &Path,
+    options: &RunOptions,
+    trouble: Trouble,
+) -> Result<SliceReport, CampaignError> {
     let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
     let vertex_count = atlas.vertex_count();
-    let options =
-        RunOptions { threads: NonZero::new(threads), progress: false, retry_failed: true };
-    let build = || Ok(Formula { vertex_count, trouble, calls: &calls });
-    run(&spec(), (&atlas, None), build, folder, &options)
+    let build = || Ok(Formula { vertex_count, trouble, calls: &calls, options });
+    solve(spec, (&atlas, None), build, folder, options)
+}
+
+fn silent(slice: Slice, threads: usize) -> RunOptions {
+    let threads = NonZero::new(threads);
+    RunOptions { slice, threads, progress: false, ..RunOptions::default() }
+}
+
+/// A serial run: the slice of all, and the merge.
+fn go_on(
+    spec: &CampaignSpec,
+    folder: &Path,
+    threads: usize,
+    trouble: Trouble,
+) -> Result<(SliceReport, CampaignReport), CampaignError> {
+    let slice = part(spec, folder, &silent(Slice::WHOLE, threads), trouble)?;
+    Ok((slice, merge(spec, folder)?))
+}
+
+fn go(
+    folder: &Path,
+    threads: usize,
+    trouble: Trouble,
+) -> Result<(SliceReport, CampaignReport), CampaignError> {
+    go_on(&spec(), folder, threads, trouble)
 }
 
 /// All files of the dataset; `progress` holds wall times and is not part of it.
@@ -78,9 +125,9 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn threads_do_not_change_a_byte() {
     let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
     for (threads, folder) in [1, 3].into_iter().zip(&folders) {
-        let report = go(folder.path(), threads, Trouble::None).unwrap();
-        assert!(report.is_complete());
-        assert_eq!((report.solved, report.samples), (7, 14));
+        let (slice, report) = go(folder.path(), threads, Trouble::None).unwrap();
+        assert!(slice.is_complete() && report.is_complete());
+        assert_eq!((slice.solved, report.samples), (7, 14));
     }
     let [one, three] = folders.map(|f| files(f.path()));
     assert_eq!(one.len(), 3 + 7, "manifest, atlas, raster and 7 shards: {:?}", one.keys());
@@ -109,12 +156,12 @@ fn a_killed_campaign_goes_on() {
     // What a kill in the midst of a write leaves, and a shard without record.
     std::fs::write(killed.path().join("shards/.partial-x7"), b"half").unwrap();
     std::fs::write(killed.path().join("shards/press-00005.npz"), b"torn").unwrap();
-    let report = go(killed.path(), 2, Trouble::None).unwrap();
-    assert_eq!((report.reused, report.solved), (3, 4), "three indentations were finished");
+    let (slice, _) = go(killed.path(), 2, Trouble::None).unwrap();
+    assert_eq!((slice.reused, slice.solved), (3, 4), "three indentations were finished");
     go(whole.path(), 1, Trouble::None).unwrap();
     assert!(files(killed.path()) == files(whole.path()));
     // A third run finds nothing left to do.
-    let again = go(killed.path(), 1, Trouble::Fail(0)).unwrap();
+    let (again, _) = go(killed.path(), 1, Trouble::Fail(0)).unwrap();
     assert_eq!((again.reused, again.solved), (7, 0));
     assert!(files(killed.path()) == files(whole.path()));
 }
@@ -129,8 +176,10 @@ fn an_altered_shard_is_solved_again() {
     bytes[200] ^= 1;
     std::fs::write(&shard, bytes).unwrap();
     assert!(verify(folder.path()).unwrap_err().to_string().contains("press-00002"));
-    let report = go(folder.path(), 1, Trouble::None).unwrap();
-    assert_eq!((report.reused, report.solved), (6, 1));
+    let error = merge(&spec(), folder.path()).unwrap_err().to_string();
+    assert!(error.contains("press-00002.npz is not what its record"), "{error}");
+    let (slice, _) = go(folder.path(), 1, Trouble::None).unwrap();
+    assert_eq!((slice.reused, slice.solved), (6, 1));
     assert!(files(folder.path()) == before);
 }
 
@@ -140,8 +189,9 @@ fn a_failed_press_is_reported_and_the_rest_is_kept() {
         [(Trouble::Fail(4), "no convergence at 0.5 mm"), (Trouble::Panic(4), "index out of bounds")]
     {
         let folder = tempfile::tempdir().unwrap();
-        let report = go(folder.path(), 1, trouble).unwrap();
-        assert!(!report.is_complete());
+        let (slice, report) = go(folder.path(), 1, trouble).unwrap();
+        assert!(!slice.is_complete() && !report.is_complete());
+        assert_eq!((slice.solved, slice.failed.len(), slice.failed[0].id), (6, 1, 4));
         assert_eq!((report.failed.len(), report.failed[0].id, report.samples), (1, 4, 12));
         assert!(report.failed[0].error.contains(word), "{}", report.failed[0].error);
         assert!(report.to_string().contains(word));
@@ -153,16 +203,16 @@ fn a_failed_press_is_reported_and_the_rest_is_kept() {
         assert!([&manifest.splits.train, &manifest.splits.test].iter().all(|s| !s.contains(&4)));
         verify(folder.path()).unwrap();
         // The next run tries it again.
-        let next = go(folder.path(), 1, Trouble::None).unwrap();
-        assert_eq!((next.reused, next.solved, next.is_complete()), (6, 1, true));
+        let (next, whole) = go(folder.path(), 1, Trouble::None).unwrap();
+        assert_eq!((next.reused, next.solved, whole.is_complete()), (6, 1, true));
     }
 }
 
 #[test]
 fn a_sample_that_fails_its_checks_is_left_out() {
     let folder = tempfile::tempdir().unwrap();
-    let report = go(folder.path(), 1, Trouble::BadSample(2)).unwrap();
-    assert!(!report.is_complete());
+    let (slice, report) = go(folder.path(), 1, Trouble::BadSample(2)).unwrap();
+    assert!(!slice.is_complete() && !report.is_complete());
     assert_eq!((report.samples, report.dropped.len()), (13, 1));
     assert_eq!((report.dropped[0].press, report.dropped[0].depth_mm), (2, Some(0.25)));
     let dataset = Dataset::open(folder.path()).unwrap();
@@ -171,29 +221,11 @@ fn a_sample_that_fails_its_checks_is_left_out() {
 }
 
 #[test]
-fn a_folder_serves_one_campaign() {
-    let folder = tempfile::tempdir().unwrap();
-    go(folder.path(), 1, Trouble::None).unwrap();
-    let options = RunOptions { progress: false, ..RunOptions::default() };
-    let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
-    let vertex_count = atlas.vertex_count();
-    let build = || Ok(Formula { vertex_count, trouble: Trouble::None, calls: &calls });
-    let other = CampaignSpec { seed: 4, ..spec() };
-    let error = run(&other, (&atlas, None), build, folder.path(), &options).unwrap_err();
-    assert!(matches!(error, CampaignError::Occupied { .. }), "{error}");
-    // Nor do two processes write at once.
-    let lock = std::fs::File::open(folder.path().join("progress/lock")).unwrap();
-    lock.lock().unwrap();
-    let error = run(&spec(), (&atlas, None), build, folder.path(), &options).unwrap_err();
-    assert!(matches!(error, CampaignError::Busy { .. }), "{error}");
-}
-
-#[test]
 fn a_solver_that_cannot_be_built_stops_the_campaign() {
     let folder = tempfile::tempdir().unwrap();
     let build = || -> Result<Formula<'static>, BoxError> { Err("mesh has no elements".into()) };
-    let options = RunOptions { progress: false, ..RunOptions::default() };
-    let error = run(&spec(), (&atlas(6), None), build, folder.path(), &options).unwrap_err();
+    let options = silent(Slice::WHOLE, 1);
+    let error = solve(&spec(), (&atlas(6), None), build, folder.path(), &options).unwrap_err();
     assert!(error.to_string().contains("mesh has no elements"), "{error}");
     assert!(!folder.path().join("manifest.json").exists());
 }
@@ -221,12 +253,8 @@ fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
 #[test]
 fn the_manifest_names_the_indenter_of_every_press() {
     let folder = tempfile::tempdir().unwrap();
-    let (calls, atlas) = (AtomicUsize::new(0), atlas(6));
-    let vertex_count = atlas.vertex_count();
-    let options = RunOptions { progress: false, ..RunOptions::default() };
-    let build = || Ok(Formula { vertex_count, trouble: Trouble::Fail(1), calls: &calls });
     let spec = CampaignSpec { presses: 8, ..several() };
-    let report = run(&spec, (&atlas, None), build, folder.path(), &options).unwrap();
+    let (_, report) = go_on(&spec, folder.path(), 1, Trouble::Fail(1)).unwrap();
     // Four indentations of two depths, four of three, one of them failed.
     assert_eq!(spec.samples(), 4 * 2 + 4 * 3);
     assert_eq!((report.samples_due, report.failed.len()), (20, 1));
@@ -246,7 +274,7 @@ fn the_manifest_names_the_indenter_of_every_press() {
 #[test]
 fn stats_images_and_verify_read_what_was_written() {
     let folder = tempfile::tempdir().unwrap();
-    let report = go(folder.path(), 2, Trouble::None).unwrap();
+    let (_, report) = go(folder.path(), 2, Trouble::None).unwrap();
     let verified = verify(folder.path()).unwrap();
     assert_eq!((verified.samples, &verified.dataset_sha256), (14, &report.dataset_sha256));
     let sheet = folder.path().join("sheet.png");

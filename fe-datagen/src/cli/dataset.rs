@@ -1,11 +1,20 @@
 //! `dataset`: look at, check and draw a dataset.
 
-use super::print;
+use super::{CHECKS_FAILED, print};
+use crate::campaign::{self, StatusReader};
 use papilla_dataset as dataset;
 use papilla_dataset::ImageOptions;
+use papilla_fingertip::campaign::CampaignSpec;
 use papilla_output::map_image::Bits;
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::Duration;
+
+/// How often `status --watch` looks.
+const WATCH_EVERY: Duration = Duration::from_secs(5);
+/// Empties a terminal and goes to its first place.
+const CLEAR: &str = "\x1b[2J\x1b[H";
 
 /// Look at, check and draw a dataset.
 #[derive(clap::Args)]
@@ -55,6 +64,35 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Make the dataset of a campaign whose slices are solved.
+    #[command(
+        after_help = "Exit codes: 0 whole; 1 something is missing, and is named; 3 made, but \
+                            indentations or samples failed."
+    )]
+    Merge {
+        /// Campaign file that the slices were solved with.
+        campaign: PathBuf,
+        /// Folder that they share.
+        #[arg(long)]
+        out: PathBuf,
+        /// Print the report as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// What of a campaign is solved, running and failed, and the hours left.
+    Status {
+        /// Campaign file that the slices are solved with.
+        campaign: PathBuf,
+        /// Folder that they share.
+        #[arg(long)]
+        out: PathBuf,
+        /// Draw it again every few seconds until nothing is left.
+        #[arg(long, conflicts_with = "json")]
+        watch: bool,
+        /// Print it as JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Check every hash, shape and value of a dataset.
     Verify {
         /// The dataset's folder.
@@ -81,6 +119,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Command::Replay { folder, out, count, json } => {
             let names = dataset::replay(folder, *count, &out.join("replay.json"))?;
             print(&names, *json, || names.join("\n"))?;
+        }
+        Command::Merge { campaign, out, json } => {
+            let report = campaign::merge(&CampaignSpec::read(campaign)?, out)?;
+            print(&report, *json, || report.to_string())?;
+            if !report.is_complete() {
+                return Ok(ExitCode::from(CHECKS_FAILED));
+            }
+        }
+        Command::Status { campaign, out, watch, json } => {
+            let mut reader = StatusReader::new(&CampaignSpec::read(campaign)?, out)?;
+            loop {
+                let status = reader.read()?;
+                let clear = if *watch && std::io::stdout().is_terminal() { CLEAR } else { "" };
+                print(&status, *json, || format!("{clear}{status}"))?;
+                if !watch || status.is_over() {
+                    break;
+                }
+                std::thread::sleep(WATCH_EVERY);
+            }
         }
         Command::Verify { folder, json } => {
             let report = dataset::verify(folder)?;

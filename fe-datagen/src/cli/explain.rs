@@ -1,6 +1,6 @@
 //! `explain`: what a scene is going to simulate and cost, before it runs.
 
-use super::print;
+use super::{explain_campaign, print};
 use papilla_fingertip::forecast::Forecast;
 use papilla_fingertip::scene::effects::{EFFECTS, Effect};
 use papilla_fingertip::scene::{Output, Plan, Scene};
@@ -13,10 +13,12 @@ use std::time::Instant;
 
 /// Say what a scene is going to simulate, what it leaves out and why, and what it
 /// will cost: unknowns, memory, seconds. Nothing is solved and nothing written.
+///
+/// Of a campaign: what its indentations cost, by indenter.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen explain scenes/flat-press.toml")]
 pub(super) struct Args {
-    /// Scene file (see scenes/ and docs/reference/scenes.md).
+    /// Scene file (see scenes/ and docs/reference/scenes.md), or campaign file.
     scene: PathBuf,
     /// Print as JSON.
     #[arg(long)]
@@ -61,6 +63,10 @@ struct Explanation {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    if explain_campaign::is_campaign(&args.scene) {
+        explain_campaign::run(&args.scene, args.json)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
     let setup = Simulation::new(&scene)?;

@@ -1,6 +1,7 @@
 //! `fidelity`: finite elements as rows of the ladder.
 
-use super::{CHECKS_FAILED, print};
+use super::part::Part;
+use super::{CHECKS_FAILED, print, wrong_usage};
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_progress::Progress;
 use papilla_validation::fidelity::{self, Ladder, Report};
@@ -17,7 +18,8 @@ use std::process::ExitCode;
 /// included. Writes rungs.json and one npz a level; see docs/reports/fe-rungs.md.
 ///
 /// Can be killed at any moment and started again: every indentation at every level is one
-/// file in DIR/parts.
+/// file in DIR/parts. With --slice solves its part only; any number of them may share DIR, and
+/// the same command as a whole (--slice 1/1) solves what is left and writes the files.
 #[derive(clap::Args)]
 #[command(
     after_help = "An indentation of the fine mesh takes minutes and 3 GB; a state that a level cannot solve \
@@ -33,6 +35,8 @@ pub(super) struct Args {
     /// Indentations that the fine mesh with quadratic elements solves too.
     #[arg(long, default_value_t = 1)]
     check: usize,
+    #[command(flatten)]
+    part: Part,
     /// Folder for rungs.json, the archives and what a restart needs.
     #[arg(long)]
     out: PathBuf,
@@ -42,6 +46,10 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let slice = match args.part.slice() {
+        Ok(slice) => slice,
+        Err(error) => return Ok(wrong_usage(&error)),
+    };
     let spec = CampaignSpec::read(&args.campaign)?;
     let progress = Progress::new("solutions", 1, 0, args.json);
     let ladder = Ladder::usual(args.check);
@@ -50,8 +58,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         progress.set_position(done);
         progress.set_message(what);
     };
-    let report = fidelity::run(&spec, &ladder, args.presses, &args.out, tell)?;
+    let found = fidelity::run(&spec, &ladder, (args.presses, slice), &args.out, tell)?;
     drop(progress);
+    let Some(report) = found else { return Ok(ExitCode::SUCCESS) };
     print(&report, args.json, || human(&report))?;
     let clean = report.left_out.is_empty();
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })

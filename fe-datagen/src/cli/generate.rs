@@ -1,7 +1,12 @@
-//! `generate`: a campaign of indentations into a dataset.
+//! `generate`: a slice of a campaign of indentations, or all of it into a dataset.
 
-use super::{CHECKS_FAILED, print};
-use crate::campaign::{self, BoxError, IndentationSolver, RunOptions};
+use super::part::Part;
+use super::signals::{self, REQUEUE};
+use super::{CHECKS_FAILED, print, wrong_usage};
+use crate::campaign::{
+    self, BoxError, CampaignReport, Checkpoints, IndentationSolver, PressError, RunOptions,
+    SliceReport,
+};
 use anyhow::Context as _;
 use papilla_dataset::{BALANCE_RELATIVE_MAX, Cells, Sample, TriangleOnLattice};
 use papilla_fem::solve::{Options, Solver, StepReport};
@@ -10,33 +15,56 @@ use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Leaf, Order, Vertices};
 use papilla_fingertip::scene::Motion;
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::body::Body;
+use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_validation::acceptance;
+use serde::Serialize;
 use std::num::NonZero;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Run a campaign of indentations, one per core, into a dataset.
 ///
 /// Can be killed at any moment and started again: every indentation is one shard,
-/// written whole or not at all, and the bytes depend on the campaign alone.
+/// written whole or not at all, and the bytes depend on the campaign alone. With --slice,
+/// or as a task of a Slurm job array (SLURM_ARRAY_TASK_ID), solves its part only; any
+/// number of them may share the folder, and `dataset merge` makes the dataset.
 #[derive(clap::Args)]
-#[command(after_help = "Example: fe-datagen generate campaigns/s1.toml --out out/s1")]
+#[command(
+    after_help = "USR1 and TERM: store where each indentation stands at its next depth, and leave with exit code\n\
+                  75, which asks to be started again; it goes on from there. A second TERM leaves at once.\n\
+                  Examples: fe-datagen generate campaigns/s1.toml --out out/s1\n          \
+                  fe-datagen generate campaigns/s1.toml --slice 3/100 --out /shared/s1"
+)]
 pub(super) struct Args {
     /// Campaign file (see campaigns/ and docs/reference/dataset.md).
     campaign: PathBuf,
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    part: Part,
     /// Indentations solved at a time [default: one per core].
     #[arg(long)]
     threads: Option<NonZero<usize>>,
+    /// Seconds after which to store where an indentation stands, against a lost node.
+    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
+    checkpoint_s: u64,
     /// Print the report as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// What a run says of itself.
+#[derive(Serialize)]
+struct Report {
+    slice: SliceReport,
+    /// Absent where others solve a part of it.
+    dataset: Option<CampaignReport>,
 }
 
 /// Solves on one mesh, whatever presses.
@@ -47,13 +75,17 @@ struct OneMesh<'a> {
 }
 
 impl IndentationSolver for OneMesh<'_> {
-    fn solve(&mut self, indentation: &Indentation) -> Result<Vec<Sample>, BoxError> {
+    fn solve(
+        &mut self,
+        indentation: &Indentation,
+        checkpoints: &mut Checkpoints<'_>,
+    ) -> Result<Vec<Sample>, PressError> {
         let approach = Approach {
             pose: indentation.pose,
             offset_mm: indentation.offset_mm,
             ..self.approaches[indentation.candidate].clone()
         };
-        pressed(self.body, &mut self.solver, &approach, indentation, None)
+        pressed(self.body, &mut self.solver, &approach, indentation, checkpoints)
     }
 }
 
@@ -64,7 +96,11 @@ struct OwnMesh<'a> {
 }
 
 impl IndentationSolver for OwnMesh<'_> {
-    fn solve(&mut self, indentation: &Indentation) -> Result<Vec<Sample>, BoxError> {
+    fn solve(
+        &mut self,
+        indentation: &Indentation,
+        checkpoints: &mut Checkpoints<'_>,
+    ) -> Result<Vec<Sample>, PressError> {
         let deepest_mm = indentation.depths_mm.last().copied().unwrap_or_default();
         let mut scene = self.spec.scene(&self.candidates[indentation.candidate]);
         scene.motion = Motion {
@@ -72,9 +108,12 @@ impl IndentationSolver for OwnMesh<'_> {
             ..Motion::to_depth(deepest_mm, 1, indentation.pose)
         };
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
-        let vertices = body.read_on_cells().ok_or("a fingertip has a patch")?;
-        let cells = Arc::new(cells(&vertices));
-        pressed(&body, &mut body.solver(Options::default())?, &approach, indentation, Some(&cells))
+        let no_patch = || PressError::Failed("a fingertip has a patch".into());
+        let cells = Arc::new(cells(&body.read_on_cells().ok_or_else(no_patch)?));
+        let mut solver = body.solver(Options::default())?;
+        let found = pressed(&body, &mut solver, &approach, indentation, checkpoints)?;
+        let on_cells = |sample| Sample { cells: Some(Arc::clone(&cells)), ..sample };
+        Ok(found.into_iter().map(on_cells).collect())
     }
 }
 
@@ -94,32 +133,59 @@ fn pressed(
     solver: &mut Solver<'_>,
     approach: &Approach,
     indentation: &Indentation,
-    cells: Option<&Arc<Cells>>,
-) -> Result<Vec<Sample>, BoxError> {
-    let keep = &mut |_, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| Sample {
-        cells: cells.cloned(),
-        ..acceptance::sample(record)
+    checkpoints: &mut Checkpoints<'_>,
+) -> Result<Vec<Sample>, PressError> {
+    let keep = &mut |_, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
+        acceptance::sample(record)
     };
     let drive = Drive::Depths(indentation.depths_mm.clone());
-    let found = body.press_balanced(solver, approach, &drive, BALANCE_RELATIVE_MAX, keep);
-    found.pressed?;
-    Ok(found.kept)
+    let mut from = checkpoints.stored();
+    loop {
+        let at_state =
+            &mut |at: &AtState<'_, Sample>| checkpoints.at_state(at.states(), || at.standing());
+        let stoppable = Stoppable { from: from.take(), at_state };
+        let balance = BALANCE_RELATIVE_MAX;
+        let found = body.press_stoppable(solver, approach, &drive, balance, keep, stoppable);
+        return match found.pressed {
+            Ok(()) => Ok(found.kept),
+            Err(SimulationError::Halted) => Err(checkpoints.interrupted()),
+            Err(SimulationError::Snapshot(error)) => {
+                tracing::warn!(press = indentation.id, %error, "solved from its beginning");
+                continue;
+            }
+            Err(error) => Err(error.into()),
+        };
+    }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let slice = match args.part.slice() {
+        Ok(slice) => slice,
+        Err(error) => return Ok(wrong_usage(&error)),
+    };
+    let stop = signals::stop()?;
     let spec = CampaignSpec::read(&args.campaign)?;
     let candidates = spec.candidates();
     let first = candidates.first().context("a campaign has an indenter")?;
     let Simulation { body, approach, .. } = Simulation::new(&spec.scene(first))?;
     let (atlas, _) = body.atlas().context("a fingertip has an atlas patch")??;
-    let options = RunOptions { threads: args.threads, ..RunOptions::default() };
-    let report = if spec.order == Order::Graded {
+    // A task that its scheduler starts again has tried what failed.
+    let again = std::env::var("SLURM_RESTART_COUNT").is_ok_and(|count| count != "0");
+    let options = RunOptions {
+        slice,
+        threads: args.threads,
+        retry_failed: !again,
+        stop,
+        checkpoint_every: Duration::from_secs(args.checkpoint_s),
+        ..RunOptions::default()
+    };
+    let solved = if spec.order == Order::Graded {
         let vertices = body.patch.as_ref().and_then(|p| p.patch.vertices.as_ref());
         let corners = vertices.map_or(&[][..], |v| &v.corners).iter();
         let on = |&(side, place): &_| TriangleOnLattice { side: side as u32, place };
         let lattice: Vec<TriangleOnLattice> = corners.map(on).collect();
         let solver = || Ok(OwnMesh { spec: &spec, candidates: &candidates });
-        campaign::run(&spec, (&atlas, Some(&lattice)), solver, &args.out, &options)?
+        campaign::solve(&spec, (&atlas, Some(&lattice)), solver, &args.out, &options)?
     } else {
         let mut approaches = Vec::new();
         for candidate in &candidates {
@@ -133,8 +199,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             let solver = body.solver(Options::default())?;
             Ok(OneMesh { body: &body, solver, approaches: &approaches })
         };
-        campaign::run(&spec, (&atlas, None), solver, &args.out, &options)?
+        campaign::solve(&spec, (&atlas, None), solver, &args.out, &options)?
     };
-    print(&report, args.json, || report.to_string())?;
-    Ok(if report.is_complete() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+    let whole = slice.is_whole() && solved.left == 0;
+    let dataset = whole.then(|| campaign::merge(&spec, &args.out)).transpose()?;
+    let report = Report { slice: solved, dataset };
+    let Report { slice, dataset } = &report;
+    let human =
+        || format!("{slice}{}", dataset.as_ref().map_or(String::new(), ToString::to_string));
+    print(&report, args.json, human)?;
+    let complete = slice.is_complete() && dataset.as_ref().is_none_or(CampaignReport::is_complete);
+    Ok(match (slice.left, complete) {
+        (1.., _) => ExitCode::from(REQUEUE),
+        (0, true) => ExitCode::SUCCESS,
+        (0, false) => ExitCode::from(CHECKS_FAILED),
+    })
 }

@@ -8,12 +8,15 @@ mod cross_check;
 mod dataset;
 mod effects;
 mod explain;
+mod explain_campaign;
 mod export;
 mod fidelity;
 mod generate;
 mod influence;
 mod lines;
+mod part;
 mod schema;
+mod signals;
 mod solve;
 mod stability;
 mod verify;
@@ -29,7 +32,8 @@ use std::process::ExitCode;
     name = "fe-datagen",
     version,
     about,
-    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but something did not pass its own checks.\n\
+    after_help = "Exit codes: 0 done; 1 failed; 2 wrong usage; 3 done, but something did not pass its own checks;\n\
+                  75 asked to leave, to be started again.\n\
                   RUST_LOG=papilla=debug tells the story of a solve."
 )]
 struct Cli {
@@ -89,6 +93,12 @@ pub fn run() -> ExitCode {
 
 /// Exit code of a run that finished but did not pass its own checks.
 const CHECKS_FAILED: u8 = 3;
+
+/// Says what is wrong with the command line and gives its exit code.
+fn wrong_usage(error: &dyn std::error::Error) -> ExitCode {
+    eprintln!("error: {error}");
+    ExitCode::from(2)
+}
 
 /// Prints a report as JSON or as people read it.
 fn print<T: serde::Serialize>(

@@ -1,6 +1,7 @@
 //! `stability`: the named suite of hard cases, and random scenes by the thousand.
 
-use super::{CHECKS_FAILED, choices, print};
+use super::part::Part;
+use super::{CHECKS_FAILED, choices, print, wrong_usage};
 use anyhow::Context as _;
 use papilla_fingertip::campaign::CampaignSpec;
 use papilla_output::atomic;
@@ -16,7 +17,8 @@ use std::sync::OnceLock;
 ///
 /// Prints one line a variant: how it ended, how hard it was (iterations, cuts, smallest J,
 /// condition, balances) and the check that came nearest to its tolerance. With --scenes,
-/// solves random scenes of a campaign's distribution instead.
+/// solves random scenes of a campaign's distribution instead; with --slice a part of them, which
+/// the same command without it takes over.
 #[derive(clap::Args)]
 #[command(
     after_help = "Exit code 3 if any case breaks its promise. docs/reports/stability.md is the report.\n\
@@ -49,6 +51,8 @@ pub(super) struct Args {
     /// Press this many random scenes of --campaign, to their deepest state.
     #[arg(long, value_name = "N", requires = "out")]
     scenes: Option<NonZero<usize>>,
+    #[command(flatten)]
+    part: Part,
     /// Seed of the random scenes.
     #[arg(long, default_value_t = 5)]
     seed: u64,
@@ -72,16 +76,22 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     match (args.scenes, &args.out) {
         (Some(count), Some(out)) => {
+            let slice = match args.part.slice() {
+                Ok(slice) => slice,
+                Err(error) => return Ok(wrong_usage(&error)),
+            };
             let spec = CampaignSpec::read(&args.campaign)?;
             let options = ScenesOptions {
                 count,
                 seed: args.seed,
                 density: args.density.into(),
                 threads: args.threads,
+                slice,
             };
             let progress = OnceLock::new();
+            let due = slice.range(count.get()).len();
             let begun = |reused| {
-                progress.get_or_init(|| Progress::new("scenes", count.get(), reused, args.json));
+                progress.get_or_init(|| Progress::new("scenes", due, reused, args.json));
             };
             let solved = || progress.get().into_iter().for_each(Progress::inc);
             let told = Watch { begun: &begun, solved: &solved };
@@ -92,6 +102,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
             print(&report, args.json, || report.to_string())?;
             Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
+        }
+        _ if args.part.is_given() => {
+            eprintln!("error: --slice is a part of --scenes");
+            Ok(ExitCode::from(2))
         }
         _ => suite(args),
     }

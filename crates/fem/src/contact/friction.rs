@@ -11,9 +11,10 @@
 //! then Coulomb's law holds (Simo & Laursen 1992, made symmetric by the lagged bound).
 
 use crate::tensor::norm;
+use serde::{Deserialize, Serialize};
 
 /// Tangential state of every contact point during a step.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FrictionTrial {
     /// Coefficient of friction.
     pub coefficient: f64,
@@ -24,7 +25,7 @@ pub struct FrictionTrial {
 }
 
 /// Tangential state of one contact point.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FrictionPoint {
     /// Traction of the skin on the indenter, MPa per undeformed area.
     pub traction_mpa: [f64; 3],

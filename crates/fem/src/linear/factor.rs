@@ -79,10 +79,30 @@ impl FactorMemory {
         system: &SymbolicSystem,
         matrix: &SymmetricMatrix,
     ) -> Result<NumericFactor, Self> {
-        let b = &mut *self.0;
-        for (s, v) in b.single_matrix.iter_mut().zip(&matrix.values) {
+        for (s, v) in self.0.single_matrix.iter_mut().zip(&matrix.values) {
             *s = *v as f32;
         }
+        self.cholesky_of_held(system)
+    }
+
+    /// Factorizes again what [`NumericFactor::matrix`] gave: the same bits.
+    ///
+    /// # Errors
+    /// Gives the memory back where the matrix is not positive definite or of another length.
+    pub fn cholesky_again(
+        mut self,
+        system: &SymbolicSystem,
+        matrix: &[f32],
+    ) -> Result<NumericFactor, Self> {
+        if matrix.len() != self.0.single_matrix.len() {
+            return Err(self);
+        }
+        self.0.single_matrix.copy_from_slice(matrix);
+        self.cholesky_of_held(system)
+    }
+
+    fn cholesky_of_held(mut self, system: &SymbolicSystem) -> Result<NumericFactor, Self> {
+        let b = &mut *self.0;
         let result = system.symbolic.factorize_numeric_llt(
             &mut b.single,
             system.lower(&b.single_matrix),
@@ -165,6 +185,12 @@ impl NumericFactor {
     #[must_use]
     pub const fn kind(&self) -> FactorKind {
         self.kind
+    }
+
+    /// The entries that a preconditioner is the factor of.
+    #[must_use]
+    pub fn matrix(&self) -> Option<&[f32]> {
+        (self.kind == FactorKind::Preconditioner).then_some(&self.buffers.single_matrix)
     }
 
     /// Gives the factor up for its memory.

@@ -125,15 +125,13 @@ impl FaceKind {
         value
     }
 
-    /// Functions of the points of [`Self::quadrature`] of a quadrilateral at `xi`, in their order:
-    /// linear between neighbouring ones, constant beyond the outermost, positive and of sum 1. `None`
-    /// on other faces.
+    /// Functions of the points of [`Self::quadrature`] of a quadrilateral at `xi`: linear between
+    /// neighbouring ones, constant beyond the outermost, of sum 1. `None` on other faces.
     #[must_use]
     pub fn quadrature_hats(self, xi: [f64; 2]) -> Option<[f64; 9]> {
+        let at = |n: usize, k: usize| gauss_hat_1d(n as i8 - 1, xi[k]);
         let is_quadrilateral = matches!(self, Self::Quad4 | Self::Quad8 | Self::Quad9);
-        let of =
-            |n: usize| gauss_hat_1d(n as i8 % 3 - 1, xi[0]) * gauss_hat_1d(n as i8 / 3 - 1, xi[1]);
-        is_quadrilateral.then(|| std::array::from_fn(of))
+        is_quadrilateral.then(|| std::array::from_fn(|n| at(n % 3, 0) * at(n / 3, 1)))
     }
 
     /// Gauss points of contact within the face, and their weights: they see what

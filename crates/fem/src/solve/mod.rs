@@ -13,6 +13,7 @@ mod prediction;
 mod problem;
 mod results;
 mod rigid_modes;
+mod snapshot;
 mod state;
 mod stepping;
 mod time_step;
@@ -26,6 +27,7 @@ pub use history_layout::HistoryLayout;
 pub use loading::{Loading, MovingIndenter};
 pub use problem::{Problem, ProblemError};
 pub use rigid_modes::{FreeMode, FreePart};
+pub use snapshot::{Snapshot, SnapshotError};
 pub use state::{Mark, StepReport};
 pub use stepping::Solver;
 

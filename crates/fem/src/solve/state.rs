@@ -4,9 +4,10 @@ use super::effort::Effort;
 use super::work::Work;
 use crate::contact::FrictionTrial;
 use crate::element::Dilatation;
+use serde::{Deserialize, Serialize};
 
 /// An equilibrium, or the start of the search for one.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct State {
     pub fraction: f64,
     pub u: Vec<[f64; 3]>,
@@ -20,7 +21,7 @@ pub(super) struct State {
 }
 
 /// A place to go back to, see [`Solver::mark`].
-#[derive(Clone)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mark {
     pub(super) state: State,
     pub(super) before: Option<State>,
@@ -28,7 +29,7 @@ pub struct Mark {
 }
 
 /// One equilibrium.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepReport {
     /// Load fraction.
     pub load_fraction: f64,

@@ -195,7 +195,7 @@ impl<'a> Solver<'a> {
     }
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         let State { fraction, u, independent, multipliers, history, friction } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,

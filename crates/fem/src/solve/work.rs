@@ -1,12 +1,13 @@
 //! Work of a moving indenter, from the equilibria on its path.
 
 use super::loading::MovingIndenter;
+use serde::{Deserialize, Serialize};
 
 /// Exponent of force over way where only one equilibrium is known: a ball's (Hertz).
 const DEFAULT_EXPONENT: f64 = 1.5;
 
 /// Force along the path so far.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Work {
     /// Equilibria of a straight path by rising load fraction, the first at rest.
     straight: Vec<Found>,
@@ -19,7 +20,7 @@ pub(super) struct Work {
 }
 
 /// An equilibrium of a straight path.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Found {
     fraction: f64,
     /// Force along the travel, N.

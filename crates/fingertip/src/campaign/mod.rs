@@ -5,6 +5,7 @@
 
 mod error;
 mod sampling;
+mod slice;
 mod spec;
 pub mod testing;
 #[cfg(test)]
@@ -12,4 +13,5 @@ mod tests;
 
 pub use error::SpecError;
 pub use sampling::{HeldOut, Indentation, held_out, indentations};
+pub use slice::{Slice, SliceError};
 pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};

@@ -16,7 +16,7 @@ use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::mesh::{Mesh, Surface};
 use papilla_fem::solve::{
-    Materials, Options, Problem, ProblemError, SolveError, Solver, StepReport,
+    Materials, Options, Problem, ProblemError, SnapshotError, SolveError, Solver, StepReport,
 };
 use papilla_fem::tensor::{norm, product};
 use papilla_sdf::Placement;
@@ -98,6 +98,12 @@ pub enum SimulationError {
         /// Largest force below it, N.
         reached_n: f64,
     },
+    /// Whoever watches the indentation wants no more of it now.
+    #[error("stopped at a stored state, to be gone on with")]
+    Halted,
+    /// The indentation cannot go on from what was stored of it.
+    #[error(transparent)]
+    Snapshot(#[from] SnapshotError),
     /// The indenter does not meet the body.
     #[error(transparent)]
     Indenter(#[from] IndenterError),

@@ -4,7 +4,7 @@ use super::body::{Body, SimulationError};
 use super::record::IncrementRecord;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
-use papilla_fem::solve::{Effort, Loading, Solver, StepReport};
+use papilla_fem::solve::{Effort, Loading, Snapshot, Solver, StepReport};
 use papilla_sdf::{Plate, RoundedPlate, SignedDistance};
 use std::sync::Arc;
 use std::time::Instant;
@@ -83,6 +83,22 @@ impl DrivePoint {
 /// Called with the solver at each stored equilibrium.
 pub type Visit<'a> = &'a mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport);
 
+/// As [`Visit`]; an error ends the indentation.
+pub(super) type Watch<'a> =
+    &'a mut dyn FnMut(&Solver<'_>, &IncrementRecord, &StepReport) -> Result<(), SimulationError>;
+
+/// How an indentation is taken.
+#[derive(Clone, Copy)]
+pub(super) struct Course<'a> {
+    /// See [`Body::press`].
+    pub refinement: u32,
+    /// At stored depths work is mended ([`Solver::mend_work`]) until it parts from energy by no
+    /// more than this.
+    pub energy_vs_work_max: Option<f64>,
+    /// Stored depths that are behind, and the solver there.
+    pub from: Option<(usize, &'a Snapshot)>,
+}
+
 /// Farthest that a prescribed force is looked for, mm.
 pub(super) const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
 /// How closely a prescribed force is met.
@@ -108,21 +124,23 @@ impl Body {
         refinement: u32,
         visit: Visit<'_>,
     ) -> Result<(), SimulationError> {
-        self.press_to(solver, approach, drive, (refinement, None), visit)
+        let course = Course { refinement, energy_vs_work_max: None, from: None };
+        self.press_to(solver, approach, drive, course, &mut |solver, record, report| {
+            visit(solver, record, report);
+            Ok(())
+        })
     }
 
-    /// As [`Self::press`]; at stored depths work is mended ([`Solver::mend_work`]) until
-    /// it parts from energy by no more than a number that comes with the refinement.
+    /// As [`Self::press`], on a course; only depths can be gone on with.
     pub(super) fn press_to(
         &self,
         solver: &mut Solver<'_>,
         approach: &Approach,
         drive: &Drive,
-        path: (u32, Option<f64>),
-        visit: Visit<'_>,
+        course: Course<'_>,
+        visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         drive.validate()?;
-        let (refinement, _) = path;
         let duration_s = match drive {
             Drive::Path(points) => points.last().map_or(0.0, |p| p.time_s),
             _ => 0.0,
@@ -134,9 +152,9 @@ impl Body {
             ..Loading::default()
         });
         match drive {
-            Drive::Depths(depths) => self.to_depths(solver, depths, path, visit),
+            Drive::Depths(depths) => self.to_depths(solver, depths, course, visit),
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
-            Drive::Path(points) => self.along(solver, points, refinement, visit),
+            Drive::Path(points) => self.along(solver, points, course.refinement, visit),
         }
     }
 
@@ -144,11 +162,18 @@ impl Body {
         &self,
         solver: &mut Solver<'_>,
         depths_mm: &[f64],
-        (refinement, energy_vs_work_max): (u32, Option<f64>),
-        visit: Visit<'_>,
+        Course { refinement, energy_vs_work_max, from }: Course<'_>,
+        visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         let last = depths_mm.last().copied().unwrap_or(1.0);
-        for (i, &depth_mm) in depths_mm.iter().enumerate() {
+        let behind = match from {
+            Some((behind, snapshot)) => {
+                solver.resume(snapshot)?;
+                behind
+            }
+            None => 0,
+        };
+        for (i, &depth_mm) in depths_mm.iter().enumerate().skip(behind) {
             let clock = Instant::now();
             let at = |source| SimulationError::Solve { depth_mm, source };
             let mut effort = Effort::default();
@@ -166,7 +191,7 @@ impl Body {
             report.effort = report.effort.plus(&effort);
             let mut record = self.record(solver, depth_mm, &report)?;
             record.seconds = clock.elapsed().as_secs_f64();
-            visit(solver, &record, &report);
+            visit(solver, &record, &report)?;
         }
         Ok(())
     }
@@ -176,7 +201,7 @@ impl Body {
         solver: &mut Solver<'_>,
         points: &[DrivePoint],
         refinement: u32,
-        visit: Visit<'_>,
+        visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         let end = points.last().map_or(1.0, |p| p.time_s);
         let mut from = DrivePoint::default();
@@ -198,7 +223,7 @@ impl Body {
             let mut record = self.record(solver, p.depth_mm, &report)?;
             record.time_s = p.time_s;
             record.seconds = clock.elapsed().as_secs_f64();
-            visit(solver, &record, &report);
+            visit(solver, &record, &report)?;
         }
         Ok(())
     }
@@ -208,7 +233,7 @@ impl Body {
         &self,
         solver: &mut Solver<'_>,
         forces_n: &[f64],
-        visit: Visit<'_>,
+        visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         // Depth grows about as force^(2/3); the first guess is a small part of it.
         let mut low: (f64, f64) = (0.0, 0.0);
@@ -257,7 +282,7 @@ impl Body {
             report.effort = effort;
             let mut record = self.record(solver, at * FORCE_TRAVEL_MAX_MM, &report)?;
             record.seconds = clock.elapsed().as_secs_f64();
-            visit(solver, &record, &report);
+            visit(solver, &record, &report)?;
         }
         Ok(())
     }

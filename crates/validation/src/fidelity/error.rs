@@ -56,12 +56,6 @@ pub enum FidelityError {
         /// The folder.
         folder: PathBuf,
     },
-    /// Another process writes there now.
-    #[error("another process measures into {folder}: wait for it or choose another --out")]
-    Busy {
-        /// The folder.
-        folder: PathBuf,
-    },
     /// No state was solved by every fidelity level.
     #[error("no state was solved at every fidelity level; the first left out: {first}")]
     NothingSolved {

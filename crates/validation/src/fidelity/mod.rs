@@ -17,7 +17,7 @@ mod tests;
 pub use error::FidelityError;
 pub use report::{DiscretisationError, LeftOut, LevelEntry, Quantiles, Report, StateEntry};
 
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, held_out, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, held_out, indentations};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use serde::{Deserialize, Serialize};
 use solve::{Prepared, Target};
@@ -126,30 +126,35 @@ impl Ladder {
 /// How far a measurement is: what is solved now, and parts done of all.
 pub type Progress<'a> = &'a mut dyn FnMut(&str, usize, usize);
 
-/// Solves `count` held-out indentations of a campaign by every fidelity level, or goes on where an
-/// earlier run was stopped, and writes `rungs.json` and one npz a fidelity level into `folder`.
+/// Solves a slice of `count` held-out indentations of a campaign by every fidelity level, or goes
+/// on where an earlier run was stopped. Any number of slices may share `folder`; the slice of all
+/// writes `rungs.json` and one npz a fidelity level into it.
 ///
 /// # Errors
 /// [`FidelityError`]; single indentations that fail are in the report.
 pub fn run(
     spec: &CampaignSpec,
     ladder: &Ladder,
-    count: usize,
+    (count, slice): (usize, Slice),
     folder: &Path,
     progress: Progress<'_>,
-) -> Result<Report, FidelityError> {
+) -> Result<Option<Report>, FidelityError> {
     spec.validate()?;
     let chosen = choose(spec, count)?;
     let target = Target::new(spec, ladder.atlas)?;
     let store = Store::open(folder, spec, &target.atlas_hash, target.vertices())?;
     let plan = ladder.all(chosen.len());
-    let all = plan.iter().map(|(_, n)| n).sum();
-    let (mut parts, mut done) = (Vec::new(), 0);
+    let planned: usize = plan.iter().map(|(_, n)| n).sum();
+    let all = (0..planned).filter(|&k| slice.takes(k)).count();
+    let (mut parts, mut done, mut places) = (Vec::new(), 0, 0..);
     for (level, presses) in plan {
         let name = level.name();
         let mut prepared = None;
         let mut of_level = Vec::new();
-        for press in &chosen[..presses] {
+        for (press, place) in chosen[..presses].iter().zip(&mut places) {
+            if !slice.takes(place) {
+                continue;
+            }
             progress(&format!("{name}, indentation {}", press.id), done, all);
             let part = match store.load(&name, press) {
                 Some(part) => part,
@@ -169,8 +174,12 @@ pub fn run(
         }
         parts.push((level, of_level));
     }
+    if !slice.is_whole() {
+        return Ok(None);
+    }
     progress("assembling", done, all);
-    assemble::assemble(spec, ladder, &target, &parts, folder)
+    store.remove_partial()?;
+    assemble::assemble(spec, ladder, &target, &parts, folder).map(Some)
 }
 
 /// Held-out indentations, as many different indenters as possible: in the order of their ids,

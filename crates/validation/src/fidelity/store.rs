@@ -9,7 +9,6 @@ use papilla_fingertip::simulation::record::Checks;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
 use papilla_output::{OutputError, atomic};
 use serde::{Deserialize, Serialize};
-use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 /// Program and version.
@@ -79,12 +78,10 @@ impl Default for Record {
     }
 }
 
-/// A folder of parts, held by this process alone.
+/// A folder of parts, which many processes may share: every file is whole or absent.
 pub(super) struct Store {
     folder: PathBuf,
     vertices: usize,
-    // The system drops the lock with the process, even on kill -9.
-    _lock: File,
 }
 
 /// Which measurement a folder belongs to.
@@ -103,26 +100,25 @@ impl Store {
     ) -> Result<Self, FidelityError> {
         let folder = out.join("parts");
         atomic::create_folder(&folder)?;
-        let path = folder.join("lock");
-        let lock = File::create(&path).map_err(OutputError::io("write", &path))?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => {
-                return Err(FidelityError::Busy { folder: out.into() });
-            }
-            Err(TryLockError::Error(e)) => return Err(OutputError::io("lock", &path)(e).into()),
-        }
         let text = serde_json::to_string(&(spec, atlas_hash, SOFTWARE))
             .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
         let owner = Owner { fingerprint: sha256_hex(text.as_bytes()) };
         let path = folder.join("owner.json");
         if !path.exists() {
-            atomic::write_json(&path, &owner)?;
-        } else if atomic::read_json::<Owner>(&path)? != owner {
+            let text = serde_json::to_vec_pretty(&owner)
+                .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
+            // Of two measurements that begin at once, one finds the other's.
+            atomic::write_first(&path, &text)?;
+        }
+        if atomic::read_json::<Owner>(&path)? != owner {
             return Err(FidelityError::Occupied { folder: out.into() });
         }
-        atomic::remove_partial(&folder)?;
-        Ok(Self { folder, vertices, _lock: lock })
+        Ok(Self { folder, vertices })
+    }
+
+    /// Removes what killed processes left half-written, where everything is solved.
+    pub(super) fn remove_partial(&self) -> Result<(), OutputError> {
+        atomic::remove_partial(&self.folder)
     }
 
     fn path(&self, level: &str, id: usize, extension: &str) -> PathBuf {

@@ -56,8 +56,20 @@ fn ladder() -> Ladder {
 #[test]
 fn rungs_are_solved_once_and_compared_with_the_reference() {
     let folder = tempfile::tempdir().unwrap();
-    let run = || super::run(&spec(), &ladder(), 2, folder.path(), &mut |_, _, _| ()).unwrap();
+    let slice = |index, count| {
+        let part = (2, Slice::new(index, count).unwrap());
+        super::run(&spec(), &ladder(), part, folder.path(), &mut |_, _, _| ()).unwrap()
+    };
+    let run = || slice(1, 1).unwrap();
+    // What a slice has solved is not solved again, and a slice makes no report.
+    assert!(slice(2, 3).is_none());
+    let parts = || std::fs::read_dir(folder.path().join("parts")).unwrap().map(|e| e.unwrap());
+    let solved: Vec<_> = parts().map(|e| (e.path(), e.metadata().unwrap().modified())).collect();
     let report = run();
+    assert!(solved.len() > 1 && solved.len() < parts().count());
+    for (path, then) in solved {
+        assert_eq!(path.metadata().unwrap().modified().unwrap(), then.unwrap(), "{path:?}");
+    }
     assert_eq!(report.states.len(), 4);
     assert!(report.left_out.is_empty(), "{:?}", report.left_out);
     let shapes: Vec<_> = report.states.iter().map(|s| s.shape.as_str()).collect();
@@ -95,7 +107,8 @@ fn rungs_are_solved_once_and_compared_with_the_reference() {
     assert_eq!(again.levels[0].sed_relative_l2, report.levels[0].sed_relative_l2);
     // The folder is this campaign's.
     let other = CampaignSpec { seed: 6, ..spec() };
-    let error = super::run(&other, &ladder(), 1, folder.path(), &mut |_, _, _| ()).unwrap_err();
+    let error = super::run(&other, &ladder(), (1, Slice::WHOLE), folder.path(), &mut |_, _, _| ())
+        .unwrap_err();
     assert!(matches!(error, FidelityError::Occupied { .. }), "{error}");
 }
 

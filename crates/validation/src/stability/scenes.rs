@@ -17,7 +17,7 @@ pub use record::{Head, MendedOn};
 pub use report::{Count, ScenesReport};
 pub use table::Row;
 
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, SpecError, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, SpecError, indentations};
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
@@ -42,6 +42,8 @@ pub struct ScenesOptions {
     pub density: Density,
     /// Scenes solved at a time.
     pub threads: NonZero<usize>,
+    /// The part of them; others may solve other parts into the same folder.
+    pub slice: Slice,
 }
 
 /// What a run tells of how far it is.
@@ -141,7 +143,7 @@ fn split(
     (found, todo)
 }
 
-/// Draws and presses scenes, each to its deepest state.
+/// Draws and presses a slice of the scenes, each to its deepest state.
 ///
 /// # Errors
 /// [`ScenesError`]; a scene that does not converge is none.
@@ -153,9 +155,12 @@ pub fn run(
 ) -> Result<ScenesReport, ScenesError> {
     let spec = drawn(spec, options.count, options.seed, options.density);
     spec.validate()?;
-    let (record, Contents { head, lines }) = Record::open(folder, &head(&spec))?;
-    let (mut records, todo) = split(scenes(&spec), lines);
-    let reused = options.count.get() - todo.len();
+    let (record, Contents { head, lines }) = Record::open(folder, &head(&spec), options.slice)?;
+    let own = options.slice.range(options.count.get());
+    let mut all = scenes(&spec);
+    all.retain(|press| own.contains(&press.id));
+    let (mut records, todo) = split(all, lines);
+    let reused = own.len() - todo.len();
     begun(reused);
     let finger = Finger::new(&spec)?;
     let next = AtomicUsize::new(0);

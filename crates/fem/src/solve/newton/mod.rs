@@ -2,6 +2,9 @@
 
 mod direction;
 mod line_search;
+mod preconditioner;
+
+pub(super) use preconditioner::Preconditioner;
 
 use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};

@@ -3,6 +3,7 @@
 
 use super::ScenesError;
 use super::ending::SceneRecord;
+use papilla_fingertip::campaign::Slice;
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_output::OutputError;
 use serde::{Deserialize, Serialize};
@@ -71,11 +72,39 @@ pub(super) struct Contents {
 }
 
 impl Record {
-    /// Opens the record in `folder` and reads what it has; a last line that a kill has torn is
-    /// dropped.
-    pub(super) fn open(folder: &Path, wanted: &Head) -> Result<(Self, Contents), ScenesError> {
+    /// Opens the record of a slice in `folder`, that of all where the slice is all, and reads what
+    /// is known of its scenes; a last line that a kill has torn is dropped. A slice knows the lines
+    /// of the record of all, which takes over those of all slices.
+    pub(super) fn open(
+        folder: &Path,
+        wanted: &Head,
+        slice: Slice,
+    ) -> Result<(Self, Contents), ScenesError> {
+        let (record, mut contents) = Self::open_own(folder, wanted, slice)?;
+        if slice.is_whole() {
+            for path in slices(folder)? {
+                for line in read_of(&path, wanted)?.lines {
+                    if !contents.lines.contains(&line) {
+                        record.add(&line)?;
+                        contents.lines.push(line);
+                    }
+                }
+            }
+        } else if folder.join(WHOLE).exists() {
+            let mut all = read_of(&folder.join(WHOLE), wanted)?;
+            all.lines.append(&mut contents.lines);
+            contents = all;
+        }
+        Ok((record, contents))
+    }
+
+    fn open_own(
+        folder: &Path,
+        wanted: &Head,
+        slice: Slice,
+    ) -> Result<(Self, Contents), ScenesError> {
         std::fs::create_dir_all(folder).map_err(OutputError::io("create", folder))?;
-        let path = folder.join("scenes.jsonl");
+        let path = folder.join(file_name(slice));
         let failed = |what| OutputError::io(what, &path);
         let mut file = OpenOptions::new()
             .read(true)
@@ -92,11 +121,8 @@ impl Record {
         file.read_to_string(&mut text).map_err(failed("read"))?;
         let whole = text.rfind('\n').map_or(0, |i| i + 1);
         let contents = read(&path, &text[..whole])?;
-        if let Some(Contents { head, .. }) = &contents
-            && !head.is_of(wanted)
-        {
-            let (found, wanted) = (head.to_string(), wanted.to_string());
-            return Err(ScenesError::Other { path, found, wanted });
+        if let Some(Contents { head, .. }) = &contents {
+            require(&path, head, wanted)?;
         }
         file.set_len(whole as u64).map_err(failed("write"))?;
         let contents = match contents {
@@ -113,6 +139,48 @@ impl Record {
         let mut file = self.file.lock().unwrap_or_else(|p| p.into_inner());
         Ok(write_line(&mut file, record).map_err(OutputError::io("write", &self.path))?)
     }
+}
+
+/// The record of all scenes.
+const WHOLE: &str = "scenes.jsonl";
+
+fn file_name(slice: Slice) -> String {
+    let (index, count) = (slice.index(), slice.count());
+    if slice.is_whole() { WHOLE.into() } else { format!("scenes-{index:05}-of-{count:05}.jsonl") }
+}
+
+/// The records of slices in a folder.
+fn slices(folder: &Path) -> Result<Vec<PathBuf>, OutputError> {
+    let entries = std::fs::read_dir(folder).map_err(OutputError::io("list", folder))?;
+    let mut paths = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(OutputError::io("list", folder))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with("scenes-") && name.ends_with(".jsonl") {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+fn require(path: &Path, head: &Head, wanted: &Head) -> Result<(), ScenesError> {
+    if head.is_of(wanted) {
+        return Ok(());
+    }
+    let (found, wanted) = (head.to_string(), wanted.to_string());
+    Err(ScenesError::Other { path: path.into(), found, wanted })
+}
+
+/// What a record that another process may be writing says so far.
+fn read_of(path: &Path, wanted: &Head) -> Result<Contents, ScenesError> {
+    let text = std::fs::read_to_string(path).map_err(OutputError::io("read", path))?;
+    let whole = text.rfind('\n').map_or(0, |i| i + 1);
+    let Some(contents) = read(path, &text[..whole])? else {
+        return Ok(Contents { head: wanted.clone(), lines: Vec::new() });
+    };
+    require(path, &contents.head, wanted)?;
+    Ok(contents)
 }
 
 /// Head and lines of a record's text; `None` of an empty one.
@@ -147,30 +215,53 @@ mod tests {
     #[test]
     fn a_record_goes_on_where_it_was_torn() {
         let folder = tempfile::tempdir().unwrap();
-        let (first, found) = Record::open(folder.path(), &head(5)).unwrap();
+        let (first, found) = Record::open(folder.path(), &head(5), Slice::WHOLE).unwrap();
         assert!(found.lines.is_empty());
         let one = record(0, Ending::Balanced);
         first.add(&one).unwrap();
-        assert!(matches!(Record::open(folder.path(), &head(5)), Err(ScenesError::Busy(_))));
+        assert!(matches!(
+            Record::open(folder.path(), &head(5), Slice::WHOLE),
+            Err(ScenesError::Busy(_))
+        ));
         drop(first);
         let path = folder.path().join("scenes.jsonl");
         let torn = std::fs::read_to_string(&path).unwrap() + "{\"press\":{\"id\":1,";
         std::fs::write(&path, torn).unwrap();
-        let (again, found) = Record::open(folder.path(), &head(5)).unwrap();
+        let (again, found) = Record::open(folder.path(), &head(5), Slice::WHOLE).unwrap();
         assert_eq!(found.lines, [one]);
         let two = record(1, Ending::Refused("x".into()));
         again.add(&two).unwrap();
         drop(again);
-        let (_, found) = Record::open(folder.path(), &head(5)).unwrap();
+        let (_, found) = Record::open(folder.path(), &head(5), Slice::WHOLE).unwrap();
         assert_eq!(found.lines.len(), 2);
-        let other = Record::open(folder.path(), &head(6)).map(drop);
+        let other = Record::open(folder.path(), &head(6), Slice::WHOLE).map(drop);
+        assert!(matches!(other, Err(ScenesError::Other { .. })));
+    }
+
+    /// Slices write beside each other; the whole takes over what they have, once.
+    #[test]
+    fn the_record_of_all_takes_over_those_of_slices() {
+        let folder = tempfile::tempdir().unwrap();
+        let open = |index, count| {
+            Record::open(folder.path(), &head(5), Slice::new(index, count).unwrap()).unwrap()
+        };
+        let ((one, _), (two, _)) = (open(1, 2), open(2, 2));
+        two.add(&record(1, Ending::Balanced)).unwrap();
+        one.add(&record(0, Ending::Balanced)).unwrap();
+        for _ in 0..2 {
+            let (_, found) = open(1, 1);
+            assert_eq!(found.lines.iter().map(|l| l.press.id).collect::<Vec<_>>(), [0, 1]);
+        }
+        // A slice of another division knows them too.
+        assert_eq!(open(3, 3).1.lines.len(), 2);
+        let other = Record::open(folder.path(), &head(6), Slice::new(1, 3).unwrap()).map(drop);
         assert!(matches!(other, Err(ScenesError::Other { .. })));
     }
 
     #[test]
     fn a_line_that_cannot_be_read_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
-        let (record_of, _) = Record::open(folder.path(), &head(5)).unwrap();
+        let (record_of, _) = Record::open(folder.path(), &head(5), Slice::WHOLE).unwrap();
         record_of.add(&record(0, Ending::Balanced)).unwrap();
         drop(record_of);
         let path = folder.path().join("scenes.jsonl");
@@ -179,7 +270,7 @@ mod tests {
             let bad = good.replacen(from, to, 1);
             assert_ne!(bad, good);
             std::fs::write(&path, &bad).unwrap();
-            let found = Record::open(folder.path(), &head(5)).map(drop);
+            let found = Record::open(folder.path(), &head(5), Slice::WHOLE).map(drop);
             let Err(error @ ScenesError::Unreadable { line: 2, .. }) = found else {
                 panic!("{from} was read")
             };

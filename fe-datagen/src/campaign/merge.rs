@@ -1,0 +1,52 @@
+//! The dataset, from what slices have left in a folder.
+
+use super::assemble::manifest;
+use super::state::{Found, Workspace};
+use super::{CampaignError, CampaignReport};
+use papilla_fingertip::campaign::{CampaignSpec, indentations};
+use papilla_output::atomic;
+use std::path::Path;
+
+/// Indentations that are named where some are missing.
+const NAMED: usize = 5;
+
+/// Writes the manifest of a campaign whose every indentation is solved, or failed, into its
+/// folder: a dataset of the same bytes whoever solved what.
+///
+/// # Errors
+/// [`CampaignError`] when the folder is of no campaign or of another, an indentation has no
+/// record, a shard is not what its record vouches for, every indentation failed, or the manifest
+/// cannot be written. Nothing has been changed then.
+pub fn merge(spec: &CampaignSpec, folder: &Path) -> Result<CampaignReport, CampaignError> {
+    spec.validate()?;
+    let (workspace, atlas) = Workspace::begun(folder, spec)?;
+    let (mut states, mut missing) = (Vec::new(), Vec::new());
+    for press in indentations(spec) {
+        match workspace.load(&press) {
+            Found::Vouched(state) => states.push(*state),
+            Found::Absent => missing.push(format!("{} (not solved)", press.id)),
+            Found::Untrusted(why) => missing.push(format!("{} ({why})", press.id)),
+        }
+    }
+    if !missing.is_empty() {
+        let first = missing.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+        let (missing, presses) = (missing.len(), spec.presses);
+        return Err(CampaignError::Holes { missing, presses, first });
+    }
+    let manifest = manifest(spec, &atlas, &states)?;
+    atomic::write_json(&workspace.folder().join("manifest.json"), &manifest)?;
+    workspace.remove_partial()?;
+    Ok(CampaignReport {
+        name: spec.name.clone(),
+        folder: folder.to_path_buf(),
+        presses: spec.presses,
+        samples: manifest.presses.iter().map(|p| p.samples).sum(),
+        samples_due: spec.samples(),
+        failed: manifest.failed,
+        dropped: manifest.dropped,
+        pressure_max_pa: manifest.pressure_max_pa,
+        sed_max_j_per_m3: manifest.sed_max_j_per_m3,
+        dataset_sha256: manifest.dataset_sha256,
+        solver_seconds: states.iter().map(|s| s.seconds).sum(),
+    })
+}

@@ -1,0 +1,109 @@
+//! `explain` of a campaign: what a task of a cluster has to ask for.
+
+use super::print;
+use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::forecast::Forecast;
+use papilla_fingertip::mesh::fingertip::Order;
+use papilla_fingertip::scene::Motion;
+use papilla_fingertip::simulation::Simulation;
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+
+/// One of the campaign's indenters, by its deepest indentation.
+#[derive(Serialize)]
+struct IndenterCost {
+    indenter: String,
+    presses: usize,
+    unknowns: usize,
+    /// With the factorization of an indefinite tangent.
+    memory_bytes: usize,
+    /// Of one indentation on one core, its mesh included where each has its own.
+    seconds: f64,
+}
+
+/// What a campaign is going to cost.
+#[derive(Serialize)]
+struct CampaignCost {
+    campaign: String,
+    presses: usize,
+    states: usize,
+    /// Of an indentation, the largest.
+    memory_bytes: usize,
+    /// Of an indentation on one core.
+    seconds_mean: f64,
+    seconds_max: f64,
+    core_hours: f64,
+    indenters: Vec<IndenterCost>,
+}
+
+/// Whether a file is a campaign's rather than a scene's.
+pub(super) fn is_campaign(file: &Path) -> bool {
+    let table = std::fs::read_to_string(file).ok().and_then(|t| t.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.contains_key("presses"))
+}
+
+pub(super) fn run(file: &Path, json: bool) -> anyhow::Result<()> {
+    let spec = CampaignSpec::read(file)?;
+    let planned = indentations(&spec);
+    let mut indenters = Vec::new();
+    for (k, candidate) in spec.candidates().iter().enumerate() {
+        let own: Vec<&Indentation> = planned.iter().filter(|p| p.candidate == k).collect();
+        let depth = |p: &Indentation| p.depths_mm.last().copied().unwrap_or_default();
+        let Some(press) = own.iter().max_by(|a, b| depth(a).total_cmp(&depth(b))) else { continue };
+        let mut scene = spec.scene(candidate);
+        scene.motion = Motion {
+            offset_mm: press.offset_mm,
+            ..Motion::to_depth(depth(press), press.depths_mm.len(), press.pose)
+        };
+        let clock = Instant::now();
+        let setup = Simulation::new(&scene)?;
+        let setup_s = clock.elapsed().as_secs_f64();
+        let forecast = Forecast::new(&scene, &setup);
+        let own_mesh_s = if spec.order == Order::Graded { setup_s } else { 0.0 };
+        indenters.push(IndenterCost {
+            indenter: candidate.name.clone(),
+            presses: own.len(),
+            unknowns: forecast.census.unknowns,
+            memory_bytes: forecast.memory_bytes + forecast.memory_indefinite_bytes,
+            seconds: forecast.seconds.total + own_mesh_s,
+        });
+    }
+    let total_s: f64 = indenters.iter().map(|i| i.presses as f64 * i.seconds).sum();
+    let cost = CampaignCost {
+        campaign: spec.name.clone(),
+        presses: planned.len(),
+        states: spec.samples(),
+        memory_bytes: indenters.iter().map(|i| i.memory_bytes).max().unwrap_or_default(),
+        seconds_mean: total_s / planned.len().max(1) as f64,
+        seconds_max: indenters.iter().map(|i| i.seconds).fold(0.0, f64::max),
+        core_hours: total_s / 3600.0,
+        indenters,
+    };
+    print(&cost, json, || human(&cost))
+}
+
+fn human(c: &CampaignCost) -> String {
+    let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+    let mut text = format!(
+        "campaign {}: {} indentations, {} states\n  {:<24} presses   unknowns   MiB   s each\n",
+        c.campaign, c.presses, c.states, "indenter"
+    );
+    for i in &c.indenters {
+        text += &format!(
+            "  {:<24} {:7} {:10} {:5.0} {:8.1}\n",
+            i.indenter,
+            i.presses,
+            i.unknowns,
+            mib(i.memory_bytes),
+            i.seconds
+        );
+    }
+    text += &format!(
+        "an indentation takes {:.0} MiB at most and about {:.1} s of one core; all {:.1} core hours",
+        mib(c.memory_bytes),
+        c.seconds_mean,
+        c.core_hours
+    );
+    text
+}

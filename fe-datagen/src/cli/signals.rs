@@ -1,0 +1,43 @@
+//! How a scheduler asks a process to leave: it stores where it stands and goes.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// Exit code that asks to be started again, to go on from what is stored; `EX_TEMPFAIL` of
+/// `sysexits.h`.
+pub(super) const REQUEUE: u8 = 75;
+
+/// A flag that is true once the process has been asked to leave: by USR1, as a scheduler warns
+/// before its time is up, or by TERM. A second TERM ends the process at once. To be called before
+/// any thread is started.
+///
+/// A thread of its own waits for the signals, which all others block: METIS has handlers of its
+/// own while it orders, which would take a TERM for an error of its own.
+#[cfg(unix)]
+pub(super) fn stop() -> anyhow::Result<Arc<AtomicBool>> {
+    use anyhow::Context as _;
+    use nix::sys::signal::{SigSet, Signal};
+    use std::sync::atomic::Ordering;
+
+    let stop = Arc::new(AtomicBool::new(false));
+    let signals: SigSet = [Signal::SIGTERM, Signal::SIGUSR1].into_iter().collect();
+    signals.thread_block().context("cannot block signals")?;
+    let asked = Arc::clone(&stop);
+    let wait = move || {
+        let mut termed = false;
+        while let Ok(signal) = signals.wait() {
+            if signal == Signal::SIGTERM && std::mem::replace(&mut termed, true) {
+                std::process::exit(REQUEUE.into());
+            }
+            asked.store(true, Ordering::Relaxed);
+        }
+    };
+    std::thread::Builder::new().spawn(wait).context("cannot wait for signals")?;
+    Ok(stop)
+}
+
+/// A flag that stays false: there are no such signals.
+#[cfg(not(unix))]
+pub(super) fn stop() -> anyhow::Result<Arc<AtomicBool>> {
+    Ok(Arc::default())
+}
