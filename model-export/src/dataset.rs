@@ -85,9 +85,9 @@ pub struct Indentation {
 /// The samples of one indentation.
 #[derive(Clone, Debug)]
 pub struct Shard {
-    /// Cells on which values are known; `None`: they belong to the atlas' vertices.
+    /// Cells whose V nodes the values belong to; `None`: they belong to the atlas' vertices.
     pub cells: Option<Cells>,
-    /// Pressure on the skin, Pa; `[D, V]`, on L cells `[D, 9 L]`.
+    /// Pressure on the skin, Pa; `[D, V]`.
     pub pressure_pa: Array2<f32>,
     /// SED on the dermis side of the interface, J/m3; `[D, V]`.
     pub sed_j_per_m3: Array2<f32>,
@@ -231,9 +231,7 @@ impl Dataset {
             }
             Err(_) => None,
         };
-        let vertices = self.manifest.vertex_count;
-        let points = cells.as_ref().map_or(vertices, Cells::point_count);
-        let nodes = cells.as_ref().map_or(vertices, Cells::node_count);
+        let values = cells.as_ref().map_or(self.manifest.vertex_count, Cells::node_count);
         let shard = Shard {
             cells,
             pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
@@ -241,12 +239,10 @@ impl Dataset {
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
             force_n: read_array(&mut npz, "force_n").ok(),
         };
-        let fields = [
-            ("pressure_pa", &shard.pressure_pa, points),
-            ("sed_dermis_j_per_m3", &shard.sed_j_per_m3, nodes),
-        ];
-        for (name, array, values) in fields {
-            let expected = (indentation.samples, values);
+        let expected = (indentation.samples, values);
+        for (name, array) in
+            [("pressure_pa", &shard.pressure_pa), ("sed_dermis_j_per_m3", &shard.sed_j_per_m3)]
+        {
             if array.dim() != expected {
                 return Err(bad(format!("{name} is {:?}, not {expected:?}", array.dim())));
             }

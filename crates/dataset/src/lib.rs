@@ -11,7 +11,7 @@
 //! use papilla_dataset::{RASTER_ARRAYS, SHARD_ARRAYS, schema};
 //!
 //! let always = SHARD_ARRAYS.iter().filter(|array| !array.optional);
-//! assert!(always.clone().any(|a| a.name == "pressure_pa" && a.shape == ["D", "P"]));
+//! assert!(always.clone().any(|a| a.name == "pressure_pa" && a.shape == ["D", "V"]));
 //! assert_eq!(schema().raster, RASTER_ARRAYS);
 //! ```
 //!

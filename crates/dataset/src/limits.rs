@@ -41,15 +41,14 @@ pub fn fault(record: &Sample, vertex_count: usize) -> Option<String> {
         return Some(format!("a component of force_n is {force}"));
     }
     let values_due = record.cells.as_ref().map_or(vertex_count, |c| c.node_count());
-    let points_due = record.cells.as_ref().map_or(vertex_count, |c| c.point_count());
     let fields = [
-        ("pressure_mpa", &record.pressure_mpa, points_due),
-        ("sed_dermis_mpa", &record.sed_dermis_mpa, values_due),
-        ("sed_epidermis_mpa", &record.sed_epidermis_mpa, values_due),
+        ("pressure_mpa", &record.pressure_mpa),
+        ("sed_dermis_mpa", &record.sed_dermis_mpa),
+        ("sed_epidermis_mpa", &record.sed_epidermis_mpa),
     ];
-    for (name, values, due) in fields {
-        if values.len() != due {
-            return Some(format!("{name} has {} values, not {due}", values.len()));
+    for (name, values) in fields {
+        if values.len() != values_due {
+            return Some(format!("{name} has {} values, not {values_due}", values.len()));
         }
         let bad = values.iter().position(|v| !(v.is_finite() && *v >= 0.0));
         if let Some(vertex) = bad {

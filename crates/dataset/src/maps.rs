@@ -80,36 +80,32 @@ impl Maps {
         cells: Option<&Cells>,
     ) -> Result<MapReader<'_>, DatasetError> {
         let Pixels { raster, place } = self.of_patch(patch);
-        let Some(cells) = cells else { return Ok(MapReader { raster, terms: Vec::new() }) };
+        let Some(cells) = cells else { return Ok(MapReader { raster, nodes: Vec::new() }) };
         let functions = match patch {
-            Patch::Skin => gauss_hats,
+            Patch::Skin => hats,
             Patch::Interface => quadratics,
-        };
-        let entries = |cell: usize| match patch {
-            Patch::Skin => std::array::from_fn(|n| (9 * cell + n) as u32),
-            Patch::Interface => cells.nodes[cell],
         };
         let found = Finder::new(cells);
         let lost = || OutputError::malformed("raster.npz".as_ref(), &"a pixel lies in no cell");
-        let term = |&(side, at): &(u32, [f64; 2])| {
+        let node = |&(side, at): &(u32, [f64; 2])| {
             let (cell, [r, s]) = found.cell(side, at).ok_or_else(lost)?;
             let (r, s) = (functions(r), functions(s));
             let weights = std::array::from_fn(|n| (r[n / 3] * s[n % 3]) as f32);
-            Ok((entries(cell), weights))
+            Ok((cells.nodes[cell], weights))
         };
         if place.len() != raster.pixel_count() {
             return Err(lost().into());
         }
-        let terms = place.iter().map(term).collect::<Result<_, OutputError>>()?;
-        Ok(MapReader { raster, terms })
+        let nodes = place.iter().map(node).collect::<Result<_, OutputError>>()?;
+        Ok(MapReader { raster, nodes })
     }
 }
 
 /// Draws maps of one patch from the values of one shard.
 pub struct MapReader<'a> {
     raster: &'a Raster,
-    /// Values and their weights at each pixel; empty where values are at the atlas' vertices.
-    terms: Vec<([u32; 9], [f32; 9])>,
+    /// Nodes and weights of each pixel; empty where values are at the atlas' vertices.
+    nodes: Vec<([u32; 9], [f32; 9])>,
 }
 
 impl MapReader<'_> {
@@ -119,21 +115,21 @@ impl MapReader<'_> {
         self.raster.mask()
     }
 
-    /// Overwrites a map of 224 x 224; 0 outside the patch. Where the
-    /// polynomial of SED falls below zero, it is 0.
+    /// Overwrites a map of 224 x 224; 0 outside the patch. Where a quadratic overshoots, never
+    /// negative.
     ///
     /// # Errors
     /// [`AtlasError::BufferLength`] if there are not as many values as vertices.
     ///
     /// # Panics
-    /// If there are fewer values than the cells have.
+    /// If there are fewer values than nodes of the cells.
     pub fn draw(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
-        if self.terms.is_empty() {
+        if self.nodes.is_empty() {
             return self.raster.rasterise(values, map);
         }
         map.fill(0.0);
-        for (&at, (entries, weights)) in self.raster.indices().iter().zip(&self.terms) {
-            let sum: f32 = entries.iter().zip(weights).map(|(n, w)| w * values[*n as usize]).sum();
+        for (&at, (nodes, weights)) in self.raster.indices().iter().zip(&self.nodes) {
+            let sum: f32 = nodes.iter().zip(weights).map(|(n, w)| w * values[*n as usize]).sum();
             map[at as usize] = sum.max(0.0);
         }
         Ok(())
@@ -175,17 +171,15 @@ impl Finder {
     }
 }
 
-// As `papilla_fem::element::shape`, which who reads a dataset does not compile.
+// The two families of `papilla_fem::element::shape`, which who reads a dataset does not compile.
 
 /// Quadratic functions of nodes at -1, 0 and 1.
 fn quadratics(x: f64) -> [f64; 3] {
     [0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0)]
 }
 
-/// Functions of three Gauss points, linear between them and constant beyond.
-fn gauss_hats(x: f64) -> [f64; 3] {
-    const OUTER: f64 = 0.774_596_669_241_483_4; // sqrt(3/5)
-    let x = (x / OUTER).clamp(-1.0, 1.0);
+/// Functions that are linear between those nodes.
+fn hats(x: f64) -> [f64; 3] {
     [(-x).max(0.0), 1.0 - x.abs(), x.max(0.0)]
 }
 
@@ -207,19 +201,18 @@ mod tests {
         assert_eq!(found.cell(1, [0.0, 300.0]), None);
     }
 
-    /// A quadratic is read exactly off nodes; off Gauss points what is linear, up to the outermost.
+    /// Of a field that is a quadratic of the place, SED is read exactly; of one that is linear, pressure.
     #[test]
     fn fields_of_the_functions_order_are_read_exactly() {
-        let sum = |w: [f64; 3], at: [f64; 3], f: &dyn Fn(f64) -> f64| -> f64 {
-            w.iter().zip(at).map(|(w, y)| w * f(y)).sum()
-        };
-        let outer = 0.6f64.sqrt();
-        let (curved, straight) = (|y: f64| 1.0 - 0.2 * y + y * y, |y: f64| 2.0 - 3.0 * y);
+        let field = |p: [f64; 2]| 1.0 + 0.3 * p[0] - 0.2 * p[1] + 0.1 * p[0] * p[1] + p[1] * p[1];
         for x in [-1.0, -0.4, 0.0, 0.7, 1.0] {
-            let found = sum(quadratics(x), [-1.0, 0.0, 1.0], &curved);
-            assert!((found - curved(x)).abs() < 1e-14);
-            let (points, due) = ([-outer, 0.0, outer], straight(x.clamp(-outer, outer)));
-            assert!((sum(gauss_hats(x), points, &straight) - due).abs() < 1e-14);
+            let (q, h) = (quadratics(x), hats(x));
+            let nodes = [-1.0, 0.0, 1.0];
+            let sum = |w: [f64; 3], f: &dyn Fn(f64) -> f64| -> f64 {
+                (0..3).map(|n| w[n] * f(nodes[n])).sum()
+            };
+            assert!((sum(q, &|y| field([0.2, y])) - field([0.2, x])).abs() < 1e-14);
+            assert!((sum(h, &|y| 2.0 - 3.0 * y) - (2.0 - 3.0 * x)).abs() < 1e-14);
         }
     }
 }

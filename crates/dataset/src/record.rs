@@ -33,9 +33,9 @@ pub struct Checks {
     pub cg_iterations: u32,
 }
 
-/// Cells of the skin on a fixed lattice ([`crate`]). Within a cell SED is the polynomial through its
-/// nine nodes. Pressure is known at its nine Gauss points, where contact was found: linear between
-/// neighbouring ones, constant beyond the outermost.
+/// Cells of the skin on a fixed lattice ([`crate`]), with nodes at which a field is known:
+/// within a cell SED is the quadratic through its nine nodes, pressure linear between
+/// neighbouring ones.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cells {
     /// Side of the half cube, first row, first column, rows, columns.
@@ -60,29 +60,22 @@ impl Cells {
     pub fn node_count(&self) -> usize {
         self.nodes.iter().flatten().max().map_or(0, |n| *n as usize + 1)
     }
-
-    /// Gauss points: nine a cell.
-    #[must_use]
-    pub fn point_count(&self) -> usize {
-        9 * self.place.len()
-    }
 }
 
-/// One equilibrium on its way into a shard: values at the atlas' vertices, or on cells.
+/// One equilibrium on its way into a shard: values at the atlas' vertices, or at nodes of cells.
 ///
 /// MPa = N/mm2 = mJ/mm3, as finite elements have them; a shard stores Pa and J/m3.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Sample {
-    /// Where values are known; `None`: at the atlas' V vertices. Below, V is the number of nodes of
-    /// cells where there are any. Not serialised: all samples of an indentation share it.
+    /// Where values are known; `None`: at the atlas' vertices. Below, V is their number. Not
+    /// serialised: all samples of an indentation share it.
     #[serde(skip)]
     pub cells: Option<Arc<Cells>>,
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,
     /// Force of the plate on the finger in the finger's frame, N.
     pub force_n: [f64; 3],
-    /// True contact pressure at the skin patch's vertices, MPa; length V. On cells at their Gauss
-    /// points, cell by cell and row by row.
+    /// True contact pressure at the skin patch's vertices, MPa; length V.
     pub pressure_mpa: Vec<f64>,
     /// SED on the dermis side at the interface patch's vertices, MPa; length V.
     pub sed_dermis_mpa: Vec<f64>,

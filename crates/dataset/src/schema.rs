@@ -11,8 +11,8 @@ pub struct ArraySpec {
     pub name: &'static str,
     /// `f32`, `f64` or `u32`, little-endian.
     pub dtype: &'static str,
-    /// Length of each axis: D samples, V vertices (where there are cells: nodes), P vertices (Gauss
-    /// points), L cells, C check columns, N pixels, or a number.
+    /// Length of each axis: D samples, V vertices (or nodes, where there are cells), L cells, C check
+    /// columns, N pixels, or a number.
     pub shape: &'static [&'static str],
     /// Unit, `1` for none.
     pub unit: &'static str,
@@ -31,7 +31,7 @@ const fn array(
 
 /// Arrays of a shard.
 pub const SHARD_ARRAYS: [ArraySpec; 10] = [
-    array("pressure_pa", "f32", &["D", "P"], "Pa"),
+    array("pressure_pa", "f32", &["D", "V"], "Pa"),
     array("sed_dermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
     array("sed_epidermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
     array("depth_mm", "f32", &["D"], "mm"),
@@ -125,30 +125,25 @@ mod tests {
 
     #[test]
     fn archives_hold_the_arrays_that_are_declared() {
-        let (d, v, p) = (2, two_cells().node_count(), two_cells().point_count());
+        let (d, v) = (2, two_cells().node_count());
         let samples: Vec<Sample> = [0.5, 1.0]
             .map(|depth| {
                 let shear_mpa = vec![[0.0, 0.0, 0.1]; v];
                 let cells = Some(Arc::new(two_cells()));
-                let pressure_mpa = record(depth, p).pressure_mpa;
-                let plain = Sample { pressure_mpa, ..record(depth, v) };
-                Sample { cells, shear_mpa, outside_calibration: 0.1, ..plain }
+                Sample { cells, shear_mpa, outside_calibration: 0.1, ..record(depth, v) }
             })
             .into();
         let whole = encode(&samples, v).unwrap().unwrap();
-        let axes = |p: usize| {
-            move |axis: &str| match axis {
-                "D" => Some(d),
-                "P" => Some(p),
-                "V" => Some(v),
-                "C" => Some(CHECK_COLUMNS.len()),
-                number => number.parse().ok(),
-            }
+        let axes = |axis: &str| match axis {
+            "D" => Some(d),
+            "V" => Some(v),
+            "C" => Some(CHECK_COLUMNS.len()),
+            number => number.parse().ok(),
         };
-        assert_declared(&headers(&whole.bytes), &SHARD_ARRAYS, &axes(p));
+        assert_declared(&headers(&whole.bytes), &SHARD_ARRAYS, &axes);
         let least = encode(&[record(0.5, v), record(1.0, v)], v).unwrap().unwrap();
         let always: Vec<_> = SHARD_ARRAYS.into_iter().filter(|a| !a.optional).collect();
-        assert_declared(&headers(&least.bytes), &always, &axes(v));
+        assert_declared(&headers(&least.bytes), &always, &axes);
         let atlas = atlas(4);
         let on = TriangleOnLattice { side: 1, place: [[0.0; 2]; 3] };
         let lattice = vec![on; atlas.triangles().len()];

@@ -42,12 +42,12 @@ fn check_row(c: &Checks) -> [f64; 11] {
     ]
 }
 
-/// The arrays of one shard: D samples on V vertices, or on cells with V nodes.
+/// The arrays of one shard: D samples on V vertices, or nodes of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shard {
-    /// Cells on which values are known; `None`: they belong to the atlas' vertices.
+    /// Cells whose nodes the values belong to; `None`: they belong to the atlas' vertices.
     pub cells: Option<Cells>,
-    /// Pressure on the skin, Pa \[D, V\]; on L cells at their Gauss points \[D, 9 L\].
+    /// Pressure on the skin, Pa \[D, V\].
     pub pressure_pa: Array2<f32>,
     /// SED on the dermis side of the interface, J/m3 \[D, V\].
     pub sed_dermis_j_per_m3: Array2<f32>,
@@ -122,12 +122,11 @@ pub fn encode(
     let dermis = field(|r| &r.sed_dermis_mpa);
     let cells = kept.first().and_then(|r| r.cells.as_deref());
     let (d, v) = (kept.len(), cells.map_or(vertex_count, Cells::node_count));
-    let points = cells.map_or(vertex_count, Cells::point_count);
     let depth: Vec<f32> = kept.iter().map(|r| r.depth_mm as f32).collect();
     let force: Vec<f32> = kept.iter().flat_map(|r| r.force_n).map(|f| f as f32).collect();
     let check_rows: Vec<f64> = kept.iter().flat_map(|r| check_row(&r.checks)).collect();
     let mut npz = NpzBuilder::new();
-    npz.add_slice("pressure_pa", &[d, points], &pressure)?;
+    npz.add_slice("pressure_pa", &[d, v], &pressure)?;
     npz.add_slice("sed_dermis_j_per_m3", &[d, v], &dermis)?;
     npz.add_slice("sed_epidermis_j_per_m3", &[d, v], &field(|r| &r.sed_epidermis_mpa))?;
     npz.add_slice("depth_mm", &[d], &depth)?;
@@ -176,7 +175,6 @@ impl Shard {
         let mut npz = NpzArrays::new(path, bytes)?;
         let (rubs, flagged) = (npz.has("shear_pa")?, npz.has("outside_calibration")?);
         let cells = if npz.has("cell_place")? { Some(read_cells(path, &mut npz)?) } else { None };
-        let points = cells.as_ref().map_or(vertex_count, Cells::point_count);
         let vertex_count = cells.as_ref().map_or(vertex_count, Cells::node_count);
         let shard = Self {
             cells,
@@ -195,7 +193,7 @@ impl Shard {
         let by_sample = |a: &Array1<f32>| (a.len(), 1);
         let by_vertex = |a: &Array3<f32>| (a.dim().0, a.len() / d.max(1));
         let shapes = [
-            ("shape of pressure_pa", shard.pressure_pa.dim(), (d, points)),
+            ("shape of pressure_pa", shard.pressure_pa.dim(), (d, vertex_count)),
             ("shape of sed_dermis_j_per_m3", shard.sed_dermis_j_per_m3.dim(), (d, vertex_count)),
             (
                 "shape of sed_epidermis_j_per_m3",
@@ -331,18 +329,13 @@ mod tests {
     }
 
     #[test]
-    fn cells_come_back_with_their_values() {
+    fn cells_come_back_with_the_values_at_their_nodes() {
         let cells = two_cells();
-        let (n, points) = (cells.node_count(), cells.point_count());
-        let pressure_mpa = record(0.5, points).pressure_mpa;
-        let with = |r: Sample| {
-            let pressure_mpa = pressure_mpa.clone();
-            Sample { cells: Some(Arc::new(cells.clone())), pressure_mpa, ..r }
-        };
+        let n = cells.node_count();
+        let with = |r: Sample| Sample { cells: Some(Arc::new(cells.clone())), ..r };
         let encoded = encode(&[with(record(0.5, n))], 4).unwrap().unwrap();
         let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
-        assert_eq!((shard.cells, shard.pressure_pa.dim()), (Some(cells.clone()), (1, points)));
-        assert_eq!(shard.sed_dermis_j_per_m3.dim(), (1, n));
+        assert_eq!((shard.cells, shard.pressure_pa.dim()), (Some(cells.clone()), (1, n)));
         let short = encode(&[with(record(0.5, n - 1))], 4).unwrap();
         assert!(short.is_err_and(|dropped| dropped[0].1.contains("values")));
     }

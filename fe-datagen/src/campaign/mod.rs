@@ -1,11 +1,13 @@
 //! Campaigns: many indentations of one finger, solved in parallel into a dataset.
 //!
-//! A campaign is a TOML file ([`CampaignSpec`]). [`solve`] solves the
-//! indentations of one [`Slice`](papilla_fingertip::campaign::Slice) of it, one per core; any number of slices may share a folder,
-//! and a serial run is the slice of all. [`merge`] writes the dataset that [`papilla_dataset`]
-//! describes. All can be killed at any instant and started again: every indentation is one shard,
+//! A campaign is a TOML file ([`CampaignSpec`]). [`solve`] solves the indentations of one [`Slice`] of
+//! it, one per core; any number of slices may share a folder, and a serial run is the slice of all.
+//! [`merge`] writes the dataset that [`papilla_dataset`] describes. All can be killed at any instant and started again: every indentation is one shard,
 //! written atomically, with a record in `DIR/progress` written after it. The dataset's
 //! bytes depend on the campaign alone, not on slices, threads, kills or the clock.
+//!
+//! [`CampaignSpec`]: papilla_fingertip::campaign::CampaignSpec
+//! [`Slice`]: papilla_fingertip::campaign::Slice
 
 mod assemble;
 mod beat;
@@ -15,6 +17,7 @@ mod merge;
 mod queue;
 mod report;
 mod run;
+mod solver;
 mod state;
 mod status;
 #[cfg(test)]
@@ -25,5 +28,6 @@ pub use checkpoint::{Checkpoints, PressError};
 pub use error::{BoxError, CampaignError};
 pub use merge::merge;
 pub use report::{CampaignReport, Failure, SliceReport};
-pub use run::{IndentationSolver, RunOptions, solve};
+pub use run::solve;
+pub use solver::{IndentationSolver, RunOptions};
 pub use status::{Heard, Status, StatusReader};

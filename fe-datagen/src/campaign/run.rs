@@ -3,63 +3,17 @@
 use super::beat::{Beat, Ended};
 use super::queue::{Queue, Settled, settled};
 use super::state::{Found, Workspace};
-use super::{BoxError, CampaignError, Checkpoints, PressError, SliceReport};
+use super::{BoxError, CampaignError, IndentationSolver, RunOptions, SliceReport};
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
-use papilla_dataset::{Sample, TriangleOnLattice};
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, Slice, indentations};
+use papilla_dataset::TriangleOnLattice;
+use papilla_fingertip::campaign::{CampaignSpec, indentations};
 use papilla_progress::{Progress, clock};
 use std::num::NonZero;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
-
-/// Solves one indentation after another; each worker thread has its own.
-pub trait IndentationSolver {
-    /// Indentations to each of the depths and returns one equilibrium per depth, with
-    /// values at the vertices of the campaign's atlas. Equal indentations have to give
-    /// equal records (`seconds` apart), whatever was solved before and wherever `checkpoints`
-    /// let it begin.
-    ///
-    /// # Errors
-    /// [`PressError::Failed`]: what did not converge and where; it is recorded in the manifest.
-    fn solve(
-        &mut self,
-        press: &Indentation,
-        checkpoints: &mut Checkpoints<'_>,
-    ) -> Result<Vec<Sample>, PressError>;
-}
-
-/// How to run, as opposed to what.
-#[derive(Clone, Debug)]
-pub struct RunOptions {
-    /// The part of the campaign.
-    pub slice: Slice,
-    /// Indentations solved at a time; `None`: one per core.
-    pub threads: Option<NonZero<usize>>,
-    /// Show on standard error how far it is.
-    pub progress: bool,
-    /// Try indentations again that failed in an earlier run.
-    pub retry_failed: bool,
-    /// Once it is true, every indentation is stored where it stands and the run ends.
-    pub stop: Arc<AtomicBool>,
-    /// How often to store where an indentation stands without being asked.
-    pub checkpoint_every: Duration,
-}
-
-impl Default for RunOptions {
-    fn default() -> Self {
-        Self {
-            slice: Slice::WHOLE,
-            threads: None,
-            progress: true,
-            retry_failed: true,
-            stop: Arc::default(),
-            checkpoint_every: Duration::from_secs(300),
-        }
-    }
-}
+use std::time::Instant;
 
 /// Solves a slice of a campaign into `folder`, which many slices may share, or goes on with it;
 /// [`merge`](super::merge) makes the dataset. `solver` builds one solver per worker thread, with

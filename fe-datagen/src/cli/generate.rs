@@ -109,7 +109,7 @@ impl IndentationSolver for OwnMesh<'_> {
         };
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
         let no_patch = || PressError::Failed("a fingertip has a patch".into());
-        let cells = Arc::new(cells(&body.read_on_cells().ok_or_else(no_patch)?));
+        let cells = Arc::new(cells(&body.read_at_nodes().ok_or_else(no_patch)?));
         let mut solver = body.solver(Options::default())?;
         let found = pressed(&body, &mut solver, &approach, indentation, checkpoints)?;
         let on_cells = |sample| Sample { cells: Some(Arc::clone(&cells)), ..sample };

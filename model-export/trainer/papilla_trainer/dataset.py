@@ -18,12 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from papilla_trainer.errors import DatasetError
-from papilla_trainer.lattice import CELL_NODES, CELL_PLACE, Lattice
+from papilla_trainer.lattice import (
+    CELL_NODES,
+    CELL_PLACE,
+    Functions,
+    Lattice,
+    hats,
+    quadratics,
+)
 from papilla_trainer.raster import MAP_LEN, SIDE_PX, Raster
 from papilla_trainer.sampling import vertex_sampler
 
 FORMATS = (1, 2)
-PRESSURE, SED = "pressure_pa", "sed_dermis_j_per_m3"
 
 F32 = NDArray[np.float32]
 
@@ -99,8 +105,8 @@ class Dataset:
         for i in ids:
             shard = self._read_shard(self.presses[i])
             end = start + self.presses[i].samples
-            pressure[start:end] = _maps(self.skin, shard, PRESSURE)
-            sed[start:end] = _maps(self.interface, shard, SED)
+            pressure[start:end] = _maps(self.skin, hats, shard, "pressure_pa")
+            sed[start:end] = _maps(self.interface, quadratics, shard, "sed_dermis_j_per_m3")
             press_id[start:end] = i
             depth[start:end] = shard["depth_mm"]
             start = end
@@ -110,11 +116,18 @@ class Dataset:
         """Pressure (Pa) and SED (J/m3) at the vertices, ``[N, V]`` each, of all depths."""
         shards = [self._read_shard(self.presses[i]) for i in ids]
         return (
-            np.concatenate([self._at_vertices("skin", s, PRESSURE) for s in shards]),
-            np.concatenate([self._at_vertices("interface", s, SED) for s in shards]),
+            np.concatenate([self._at_vertices("skin", hats, s, "pressure_pa") for s in shards]),
+            np.concatenate(
+                [
+                    self._at_vertices("interface", quadratics, s, "sed_dermis_j_per_m3")
+                    for s in shards
+                ]
+            ),
         )
 
-    def _at_vertices(self, patch: str, shard: dict[str, NDArray[Any]], name: str) -> F32:
+    def _at_vertices(
+        self, patch: str, functions: Functions, shard: dict[str, NDArray[Any]], name: str
+    ) -> F32:
         """What a map says about the vertices, where a shard has values elsewhere."""
         if CELL_PLACE not in shard:
             return shard[name]
@@ -122,7 +135,7 @@ class Dataset:
         if patch not in self._samplers:
             self._samplers[patch] = vertex_sampler(raster, self.vertex_count)
         pixels, weights = self._samplers[patch]
-        maps = _maps(raster, shard, name).reshape(-1, MAP_LEN)
+        maps = _maps(raster, functions, shard, name).reshape(-1, MAP_LEN)
         return (maps[:, pixels] * weights).sum(axis=2).clip(min=0.0).astype(np.float32)
 
     def _check_identity(self) -> None:
@@ -175,16 +188,15 @@ class Dataset:
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
         path = press.directory / press.file
         arrays = _read_npz(path, press.file, sha256=press.sha256)
-        columns = {PRESSURE: self.vertex_count, SED: self.vertex_count}
+        columns = self.vertex_count
         if CELL_PLACE in arrays:
-            nodes = arrays[CELL_NODES]
-            columns = {PRESSURE: nodes.size, SED: int(nodes.max()) + 1}
-        for name, count in columns.items():
+            columns = int(arrays[CELL_NODES].max()) + 1
+        for name in ("pressure_pa", "sed_dermis_j_per_m3"):
             values = arrays.get(name)
-            if values is None or values.shape != (press.samples, count):
+            if values is None or values.shape != (press.samples, columns):
                 shape = None if values is None else values.shape
                 raise DatasetError(
-                    f"{path}: array {name} has shape {shape}, expected {(press.samples, count)}"
+                    f"{path}: array {name} has shape {shape}, expected {(press.samples, columns)}"
                 )
             if values.dtype != np.float32 or not np.isfinite(values).all():
                 raise DatasetError(f"{path}: array {name} is not finite float32")
@@ -249,17 +261,14 @@ def _lattice(arrays: dict[str, Any], patch: str, path: Path, pixels: int) -> Lat
     return Lattice(side, place.astype(np.float64))
 
 
-def _maps(raster: Raster, shard: dict[str, NDArray[Any]], name: str) -> F32:
+def _maps(raster: Raster, functions: Functions, shard: dict[str, NDArray[Any]], name: str) -> F32:
     """``[D, 224, 224]`` of a shard's array, whatever its values belong to."""
     if CELL_PLACE not in shard:
         return raster.rasterise(shard[name])
     if raster.lattice is None:
         raise DatasetError("raster.npz does not say where pixels lie among cells")
-    if name == PRESSURE:
-        entries, weights = raster.lattice.at_gauss_points(shard[CELL_PLACE])
-    else:
-        entries, weights = raster.lattice.at_nodes(shard[CELL_PLACE], shard[CELL_NODES])
-    return raster.scattered((shard[name][:, entries] * weights).sum(axis=2).clip(min=0.0))
+    nodes, weights = raster.lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
+    return raster.scattered((shard[name][:, nodes] * weights).sum(axis=2).clip(min=0.0))
 
 
 def _positive(manifest: dict[str, Any], key: str) -> float:

@@ -89,42 +89,6 @@ impl ContactSurface {
         force_and_area.iter().map(|[f, a]| if *a > 0.0 { f / a } else { 0.0 }).collect()
     }
 
-    /// The same at the points of [`FaceKind::quadrature`] of each face of `surface`, face by face:
-    /// where contact is found at these, what it is there; else what lies between nodes.
-    ///
-    /// [`FaceKind::quadrature`]: crate::mesh::surface::FaceKind::quadrature
-    #[must_use]
-    pub(crate) fn pressure_at_quadrature_mpa(
-        &self,
-        rule: ContactRule,
-        traction_mpa: &[f64],
-        surface: &Surface,
-        x: &[[f64; 3]],
-    ) -> Vec<f64> {
-        let places = surface.kind.quadrature();
-        let nodes = self.nodes();
-        if let Some(deformed) = self.deformed_points(rule, surface, x)
-            && rule == ContactRule::GaussOrder3
-        {
-            let undeformed = &self.points(rule).area_mm2;
-            let mut found =
-                (0..deformed.len()).map(|q| traction_mpa[q] * undeformed[q] / deformed.area_mm2[q]);
-            let touches = |face: &[u32]| face.iter().any(|n| nodes.binary_search(n).is_ok());
-            let of = |face| -> Vec<f64> {
-                let count = places.len();
-                if touches(face) { found.by_ref().take(count).collect() } else { vec![0.0; count] }
-            };
-            return surface.faces().flat_map(of).collect();
-        }
-        let nodal = self.pressure_mpa(rule, traction_mpa, surface, x);
-        let at = |n: u32| nodes.binary_search(&n).map_or(0.0, |k| nodal[k]);
-        let of = |(face, hat): (&[u32], [f64; 9])| -> f64 {
-            face.iter().zip(hat).map(|(&n, v)| v * at(n)).sum()
-        };
-        let hats: Vec<_> = places.iter().map(|&(xi, _)| surface.kind.hats(xi)).collect();
-        surface.faces().flat_map(|face| hats.iter().map(move |hat| (face, *hat))).map(of).collect()
-    }
-
     /// The Gauss points of a rule where `surface` is at the positions `x`; `None` at nodes.
     #[must_use]
     pub(crate) fn deformed_points(

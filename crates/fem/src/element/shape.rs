@@ -1,7 +1,5 @@
 //! Formulas of the shape functions on the lattice `{-1, 0, 1}^d` and the simplex.
 
-use crate::element::reference::GAUSS_3;
-
 /// Edges of a tetrahedron in the order of its mid-edge nodes (VTK).
 pub const TET10_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
@@ -27,13 +25,6 @@ pub fn quadratic_1d(at: i8, x: f64) -> (f64, f64) {
 #[must_use]
 pub fn hat_1d(at: i8, x: f64) -> f64 {
     if at == 0 { 1.0 - x.abs() } else { (f64::from(at) * x).max(0.0) }
-}
-
-/// Function of the Gauss point at `at` (-1, 0 or 1 times sqrt(3/5)) that is linear between
-/// neighbouring ones, and constant beyond the outermost.
-#[must_use]
-pub fn gauss_hat_1d(at: i8, x: f64) -> f64 {
-    hat_1d(at, (x / GAUSS_3[2].0).clamp(-1.0, 1.0))
 }
 
 /// Products of one-dimensional functions along the first `d` axes.

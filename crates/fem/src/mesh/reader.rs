@@ -6,9 +6,8 @@ use crate::tensor::norm;
 /// For each of some points the face of a surface that is nearest, and the shape functions there.
 #[derive(Clone, Debug)]
 pub struct SurfaceReader {
-    /// Nodes and shape functions of each point, the same number for all; or quadrature points of
-    /// its face and their functions.
-    entries: Vec<u32>,
+    /// Nodes and shape functions of each point; the same number for all.
+    nodes: Vec<u32>,
     values: Vec<f64>,
     per_point: usize,
     distance_mm: Vec<f64>,
@@ -21,35 +20,55 @@ impl SurfaceReader {
     /// Finds the points (mm) on a surface of the undeformed mesh.
     #[must_use]
     pub fn new(mesh: &Mesh, surface: &Surface, points: &[[f64; 3]]) -> Self {
-        let n = surface.kind.nodes();
-        let (places, distance_mm) = nearest(mesh, surface, points);
-        let shape = |&(_, xi): &(usize, [f64; 2])| {
+        Self::with(mesh, surface, points, |xi| {
             let mut value = [0.0; 9];
             surface.kind.shape(xi, &mut value, &mut [[0.0; 2]; 9]);
-            value.into_iter().take(n)
-        };
-        let faces: Vec<&[u32]> = surface.faces().collect();
-        Self {
-            entries: places.iter().flat_map(|&(f, _)| faces[f]).copied().collect(),
-            values: places.iter().flat_map(shape).collect(),
-            per_point: n,
-            distance_mm,
-        }
+            value
+        })
     }
 
-    /// The same for what is known at the quadrature points of each of a surface's quadrilaterals:
-    /// [`Self::read`] then asks for the values by point, face by face. `None` if the faces are no
-    /// quadrilaterals.
+    /// The same for fields that are linear between neighbouring nodes, as pressure is.
     #[must_use]
-    pub fn at_quadrature(mesh: &Mesh, surface: &Surface, points: &[[f64; 3]]) -> Option<Self> {
-        let (places, distance_mm) = nearest(mesh, surface, points);
-        let mut entries = Vec::with_capacity(9 * points.len());
-        let mut values = Vec::with_capacity(9 * points.len());
-        for (face, xi) in places {
-            entries.extend((0..9).map(|q| 9 * face as u32 + q));
-            values.extend(surface.kind.quadrature_hats(xi)?);
+    pub fn linear(mesh: &Mesh, surface: &Surface, points: &[[f64; 3]]) -> Self {
+        Self::with(mesh, surface, points, |xi| surface.kind.hats(xi))
+    }
+
+    fn with(
+        mesh: &Mesh,
+        surface: &Surface,
+        points: &[[f64; 3]],
+        functions: impl Fn([f64; 2]) -> [f64; 9],
+    ) -> Self {
+        let n = surface.kind.nodes();
+        let at = |node: u32| mesh.nodes[node as usize];
+        let balls: Vec<([f64; 3], f64)> = surface.faces().map(|f| ball(f, &at)).collect();
+        let mut out = Self {
+            nodes: Vec::with_capacity(n * points.len()),
+            values: Vec::with_capacity(n * points.len()),
+            per_point: n,
+            distance_mm: Vec::with_capacity(points.len()),
+        };
+        let faces: Vec<&[u32]> = surface.faces().collect();
+        for p in points {
+            let away = |f: usize| norm(std::array::from_fn(|i| balls[f].0[i] - p[i]));
+            let mut order: Vec<(f64, usize)> =
+                (0..faces.len()).map(|f| ((away(f) - balls[f].1).max(0.0), f)).collect();
+            order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut best = (f64::INFINITY, 0, [0.0; 2]);
+            for (least, f) in order {
+                if least >= best.0 {
+                    break;
+                }
+                let (distance, xi) = project(surface, faces[f], &at, *p);
+                if distance < best.0 {
+                    best = (distance, f, xi);
+                }
+            }
+            out.nodes.extend(faces[best.1]);
+            out.values.extend(&functions(best.2)[..n]);
+            out.distance_mm.push(best.0);
         }
-        Some(Self { entries, values, per_point: 9, distance_mm })
+        out
     }
 
     /// Distance of each point from the surface, mm.
@@ -61,41 +80,12 @@ impl SurfaceReader {
     /// What a nodal field has at each point.
     #[must_use]
     pub fn read(&self, field: impl Fn(u32) -> f64) -> Vec<f64> {
-        let points = self.entries.chunks_exact(self.per_point);
+        let points = self.nodes.chunks_exact(self.per_point);
         points
             .zip(self.values.chunks_exact(self.per_point))
-            .map(|(entries, values)| entries.iter().zip(values).map(|(&n, v)| v * field(n)).sum())
+            .map(|(nodes, values)| nodes.iter().zip(values).map(|(&n, v)| v * field(n)).sum())
             .collect()
     }
-}
-
-/// The nearest face of each point and where on it, and how far away it is, mm.
-fn nearest(
-    mesh: &Mesh,
-    surface: &Surface,
-    points: &[[f64; 3]],
-) -> (Vec<(usize, [f64; 2])>, Vec<f64>) {
-    let at = |node: u32| mesh.nodes[node as usize];
-    let faces: Vec<&[u32]> = surface.faces().collect();
-    let balls: Vec<([f64; 3], f64)> = faces.iter().map(|f| ball(f, &at)).collect();
-    let of = |p: &[f64; 3]| {
-        let away = |f: usize| norm(std::array::from_fn(|i| balls[f].0[i] - p[i]));
-        let mut order: Vec<(f64, usize)> =
-            (0..faces.len()).map(|f| ((away(f) - balls[f].1).max(0.0), f)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut best = (f64::INFINITY, 0, [0.0; 2]);
-        for (least, f) in order {
-            if least >= best.0 {
-                break;
-            }
-            let (distance, xi) = project(surface, faces[f], &at, *p);
-            if distance < best.0 {
-                best = (distance, f, xi);
-            }
-        }
-        ((best.1, best.2), best.0)
-    };
-    points.iter().map(of).unzip()
 }
 
 /// A ball around a face's nodes, somewhat larger: quadratic faces bulge.

@@ -6,7 +6,7 @@
 
 use crate::element::ElementKind;
 use crate::element::reference::GAUSS_3;
-use crate::element::shape::{gauss_hat_1d, hat_1d, linear_1d, quadratic_1d};
+use crate::element::shape::{hat_1d, linear_1d, quadratic_1d};
 use crate::tensor::norm;
 
 /// Kind of face.
@@ -123,15 +123,6 @@ impl FaceKind {
             _ => self.shape(xi, &mut value, &mut [[0.0; 2]; 9]),
         }
         value
-    }
-
-    /// Functions of the points of [`Self::quadrature`] of a quadrilateral at `xi`: linear between
-    /// neighbouring ones, constant beyond the outermost, of sum 1. `None` on other faces.
-    #[must_use]
-    pub fn quadrature_hats(self, xi: [f64; 2]) -> Option<[f64; 9]> {
-        let at = |n: usize, k: usize| gauss_hat_1d(n as i8 - 1, xi[k]);
-        let is_quadrilateral = matches!(self, Self::Quad4 | Self::Quad8 | Self::Quad9);
-        is_quadrilateral.then(|| std::array::from_fn(|n| at(n % 3, 0) * at(n / 3, 1)))
     }
 
     /// Gauss points of contact within the face, and their weights: they see what

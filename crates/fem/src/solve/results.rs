@@ -129,15 +129,6 @@ impl<'a> Solver<'a> {
         pressure
     }
 
-    /// The same at the quadrature points of each face of the surface that is touched, face by face:
-    /// where contact is found at these it is the pressure that acts, which nodes only share out.
-    #[must_use]
-    pub fn pressure_at_quadrature_mpa(&self, surface: &crate::mesh::Surface) -> Vec<f64> {
-        let Some(contact) = &self.newton.problem.contact else { return Vec::new() };
-        let traction = &self.newton.current.traction_mpa;
-        contact.pressure_at_quadrature_mpa(self.contact_rule(), traction, surface, &self.deformed())
-    }
-
     /// Force that a nodal pressure (MPa) exerts on the deformed surface, N, along the indenter's
     /// normal: at the points of contact, or by Gauss quadrature where these are the nodes.
     #[must_use]

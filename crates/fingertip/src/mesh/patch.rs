@@ -40,12 +40,12 @@ pub struct Vertices {
     pub skin_mm: Vec<[f64; 3]>,
     /// See `skin_mm`.
     pub interface_mm: Vec<[f64; 3]>,
-    /// The cell of each vertex, as an index into `cells`.
-    pub(super) cell: Vec<u32>,
-    /// Shape functions of its nodes.
+    /// Nine of [`Patch::skin`] a vertex, as indices into it.
+    pub(super) nodes: Vec<[u32; 9]>,
+    /// Their shape functions.
     pub(super) quadratic: Vec<[f64; 9]>,
-    /// Functions of its quadrature points.
-    pub(super) quadrature: Vec<[f64; 9]>,
+    /// Functions that are linear between neighbouring nodes.
+    pub(super) linear: Vec<[f64; 9]>,
     /// Where the corners of each of [`Patch::triangles`] lie among the cells: a side of the half cube,
     /// rows and columns.
     pub corners: Vec<(usize, [[f64; 2]; 3])>,
@@ -57,33 +57,31 @@ impl Vertices {
     /// SED at the vertices from its values below [`Patch::skin`].
     #[must_use]
     pub fn sed(&self, nodal: &[f64]) -> Vec<f64> {
-        self.read(&self.quadratic, |cell, n| nodal[self.cells[cell].1[n] as usize])
+        self.scalar(&self.quadratic, nodal)
     }
 
-    /// Pressure at the vertices from its values at the quadrature points of `cells`, nine a cell.
+    /// Pressure, which is linear between nodes, at the vertices from its values at [`Patch::skin`].
     #[must_use]
-    pub fn pressure(&self, at_points: &[f64]) -> Vec<f64> {
-        self.read(&self.quadrature, |cell, n| at_points[9 * cell + n])
+    pub fn pressure(&self, nodal: &[f64]) -> Vec<f64> {
+        self.scalar(&self.linear, nodal)
     }
 
-    /// What functions with these values in a cell are at each vertex, nowhere negative.
-    fn read(&self, functions: &[[f64; 9]], value: impl Fn(usize, usize) -> f64) -> Vec<f64> {
-        let sum = |(&cell, values): (&u32, &[f64; 9])| {
-            let terms = values.iter().enumerate().map(|(n, w)| w * value(cell as usize, n));
-            terms.sum::<f64>().max(0.0)
+    fn scalar(&self, functions: &[[f64; 9]], nodal: &[f64]) -> Vec<f64> {
+        let sum = |(nodes, values): (&[u32; 9], &[f64; 9])| {
+            nodes.iter().zip(values).map(|(&n, w)| w * nodal[n as usize]).sum::<f64>().max(0.0)
         };
-        self.cell.iter().zip(functions).map(sum).collect()
+        self.nodes.iter().zip(functions).map(sum).collect()
     }
 
     /// A vector field at the vertices from its values at [`Patch::skin`], or straight below.
     #[must_use]
     pub fn vector(&self, nodal: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let sum = |(&cell, values): (&u32, &[f64; 9])| {
-            let nodes = self.cells[cell as usize].1.iter().zip(values);
-            let of = |i: usize| nodes.clone().map(|(&n, w)| w * nodal[n as usize][i]).sum();
+        let sum = |(nodes, values): (&[u32; 9], &[f64; 9])| {
+            let of =
+                |i: usize| nodes.iter().zip(values).map(|(&n, w)| w * nodal[n as usize][i]).sum();
             [of(0), of(1), of(2)]
         };
-        self.cell.iter().zip(&self.quadratic).map(sum).collect()
+        self.nodes.iter().zip(&self.quadratic).map(sum).collect()
     }
 }
 

@@ -5,7 +5,7 @@ use super::half_cube::{Grid, GridSize, SIDES};
 use super::leaves::{Leaf, Leaves};
 use super::patch::{PATCH_SIDE_QUARTERS, Patch, Vertices, patch_of};
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
-use papilla_fem::element::shape::{gauss_hat_1d, quadratic_1d};
+use papilla_fem::element::shape::{hat_1d, quadratic_1d};
 use papilla_fem::mesh::{HangingNode, Mesh};
 use std::collections::BTreeMap;
 
@@ -81,25 +81,24 @@ impl Refined {
             (0..SIDES).find_map(on).unwrap_or_default()
         };
         let index = |node: u32| skin.partition_point(|&s| s < node) as u32;
-        let cells: Vec<_> =
-            self.shown_cells().map(|(leaf, nodes)| (leaf, nodes.map(index))).collect();
         let mut out = Vertices {
             skin_mm: vec![],
             interface_mm: vec![],
-            cell: vec![],
+            nodes: vec![],
             quadratic: vec![],
-            quadrature: vec![],
+            linear: vec![],
             corners: triangles.iter().map(corners_of).collect(),
-            cells,
+            cells: self.shown_cells().map(|(leaf, nodes)| (leaf, nodes.map(index))).collect(),
         };
         for &v in &shown {
-            let (cell, at) = self.find(&out.cells, atlas.lattice[v as usize], &body);
+            let (leaf, at) = self.find(atlas.lattice[v as usize], &body);
+            let cell = &self.grid.cells[leaf];
+            out.nodes.push(std::array::from_fn(|n| index(cell[n])));
             let product = |of: &dyn Fn(i8, f64) -> f64| -> [f64; 9] {
                 std::array::from_fn(|n| of(n as i8 / 3 - 1, at[0]) * of(n as i8 % 3 - 1, at[1]))
             };
-            out.cell.push(cell as u32);
             out.quadratic.push(product(&|node, x| quadratic_1d(node, x).0));
-            out.quadrature.push(product(&gauss_hat_1d));
+            out.linear.push(product(&hat_1d));
             let [on_skin, below, ..] = shape.layers(atlas.parameters[v as usize])?;
             out.skin_mm.push(on_skin);
             out.interface_mm.push(below);
@@ -126,20 +125,15 @@ impl Refined {
             .filter(move |(_, nodes): &(Leaf, [u32; 9])| nodes.iter().any(is_shown))
     }
 
-    /// The one of the shown cells that holds a vertex of the atlas, and where in it; `body` are the
-    /// fractions at the rows of the atlas' lattice.
-    fn find(
-        &self,
-        cells: &[(Leaf, [u32; 9])],
-        vertex: [u32; 3],
-        body: &[f64],
-    ) -> (usize, [f64; 2]) {
+    /// The cell that holds a vertex of the atlas, and where in it; `body` are the fractions at the
+    /// rows of the atlas' lattice.
+    fn find(&self, vertex: [u32; 3], body: &[f64]) -> (usize, [f64; 2]) {
         let (side, [row, column]) = ATLAS.place(vertex);
         let place = self.leaves.place(ATLAS, body, side, [row, column].map(f64::from));
-        let found = cells.iter().enumerate().find_map(|(n, (leaf, _))| {
+        let found = self.leaves.leaves.iter().enumerate().find_map(|(n, leaf): (_, &Leaf)| {
             (leaf.side == side).then(|| leaf.reference(place)).flatten().map(|at| (n, at))
         });
-        // They cover what the atlas shows.
+        // Cells cover every side.
         found.unwrap_or((0, [0.0; 2]))
     }
 }

@@ -12,15 +12,14 @@ use crate::tissue::{NoTissue, Tissue};
 use papilla_atlas::Atlas;
 use papilla_atlas::flatten::{AtlasReport, BuildAtlasError, build_atlas};
 use papilla_fem::element::Inverted;
+use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
-use papilla_fem::mesh::{Mesh, Surface};
 use papilla_fem::solve::{
     Materials, Options, Problem, ProblemError, SnapshotError, SolveError, Solver, StepReport,
 };
 use papilla_fem::tensor::{norm, product};
 use papilla_sdf::Placement;
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Why a body could not be set up or pressed.
@@ -172,18 +171,6 @@ pub struct RecordedPatch {
     pub patch: Patch,
     dermis: SedRecovery,
     epidermis: SedRecovery,
-    /// Face of the skin of each of the cells of [`Vertices`], as they lie side by side; none where
-    /// vertices are nodes.
-    faces: Vec<u32>,
-}
-
-impl RecordedPatch {
-    /// Pressure at the quadrature points of the cells, row by row, from that of the faces of the
-    /// skin, whose first direction runs along the rows.
-    fn of_cells(&self, of_faces: &[f64]) -> Vec<f64> {
-        let points = |&face: &u32| (0..9).map(move |n| 9 * face as usize + 3 * (n % 3) + n / 3);
-        self.faces.iter().flat_map(points).map(|q| of_faces[q]).collect()
-    }
 }
 
 impl Body {
@@ -234,9 +221,8 @@ impl Body {
                 .map_err(NoTissue::from)
         };
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
-        let faces = faces_of_cells(&mesh.surfaces["skin"], &patch);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
-        let patch = Some(RecordedPatch { patch, dermis, epidermis, faces });
+        let patch = Some(RecordedPatch { patch, dermis, epidermis });
         Ok(Self { problem, contact: "skin".into(), patch, plane, first_touch: None, graded: false })
     }
 
@@ -274,10 +260,9 @@ impl Body {
         })
     }
 
-    /// From now on records hold SED at the nodes of the patch and pressure at the quadrature points of
-    /// its cells, not both at the atlas' vertices; gives how these were read off them, if they are
-    /// not nodes.
-    pub fn read_on_cells(&mut self) -> Option<Vertices> {
+    /// From now on records hold what is known at the nodes of the patch, not at the atlas' vertices;
+    /// gives how vertices were read off them, if they are not nodes.
+    pub fn read_at_nodes(&mut self) -> Option<Vertices> {
         self.patch.as_mut()?.patch.vertices.take()
     }
 
@@ -357,21 +342,18 @@ impl Body {
         let (mut pressure_mpa, mut sed_dermis_mpa, mut sed_epidermis_mpa, mut shear_mpa) =
             Default::default();
         if let Some(p) = &self.patch {
-            pressure_mpa = if p.faces.is_empty() {
-                p.patch.skin.iter().map(|&n| pressure[n as usize]).collect()
-            } else {
-                p.of_cells(&solver.pressure_at_quadrature_mpa(skin))
-            };
+            let nodal = self.nodal_fields(solver, p, &pressure)?;
             shear_mpa = self.shear_mpa(solver, &p.patch.skin);
-            [sed_dermis_mpa, sed_epidermis_mpa] = self.nodal_sed_mpa(solver, p)?;
-            if let Some(vertices) = &p.patch.vertices {
-                pressure_mpa = vertices.pressure(&pressure_mpa);
-                sed_dermis_mpa = vertices.sed(&sed_dermis_mpa);
-                sed_epidermis_mpa = vertices.sed(&sed_epidermis_mpa);
-                if !shear_mpa.is_empty() {
-                    shear_mpa = vertices.vector(&shear_mpa);
+            [pressure_mpa, sed_dermis_mpa, sed_epidermis_mpa] = match &p.patch.vertices {
+                None => nodal,
+                Some(vertices) => {
+                    if !shear_mpa.is_empty() {
+                        shear_mpa = vertices.vector(&shear_mpa);
+                    }
+                    let [pressure, dermis, epidermis] = nodal;
+                    [vertices.pressure(&pressure), vertices.sed(&dermis), vertices.sed(&epidermis)]
                 }
-            }
+            };
         }
         Ok(IncrementRecord {
             depth_mm,
@@ -401,15 +383,16 @@ impl Body {
         })
     }
 
-    /// SED on the dermis' and on the epidermis' side.
-    fn nodal_sed_mpa(
+    fn nodal_fields(
         &self,
         solver: &Solver<'_>,
         p: &RecordedPatch,
-    ) -> Result<[Vec<f64>; 2], SimulationError> {
+        pressure_mpa: &[f64],
+    ) -> Result<[Vec<f64>; 3], SimulationError> {
         let history = |block, element| solver.history_of(block, element);
         let body = self.deformed(solver, &history);
-        Ok([p.dermis.sed_mpa(&body)?, p.epidermis.sed_mpa(&body)?])
+        let pressure = p.patch.skin.iter().map(|&n| pressure_mpa[n as usize]).collect();
+        Ok([pressure, p.dermis.sed_mpa(&body)?, p.epidermis.sed_mpa(&body)?])
     }
 
     /// A solver for this body.
@@ -420,16 +403,6 @@ impl Body {
         Solver::new(&self.problem, options)
             .map_err(|source| SimulationError::Solve { depth_mm: 0.0, source })
     }
-}
-
-/// The face of the skin of each cell of a patch: they share the node in their middle.
-fn faces_of_cells(skin: &Surface, patch: &Patch) -> Vec<u32> {
-    const MIDDLE: usize = 4;
-    let Some(vertices) = &patch.vertices else { return Vec::new() };
-    let middle = |face: &[u32]| face.last().copied().unwrap_or_default();
-    let face_of: HashMap<u32, u32> = skin.faces().map(middle).zip(0..).collect();
-    let of = |(_, nodes): &(_, [u32; 9])| face_of[&patch.skin[nodes[MIDDLE] as usize]];
-    vertices.cells.iter().map(of).collect()
 }
 
 /// Rotation of an indenter: at rest its pressing side looks along +z into the pad;

@@ -31,8 +31,7 @@ pub struct Checks {
     pub cg_iterations: u32,
 }
 
-/// One stored equilibrium of an indentation: values at the atlas' vertices, or on the cells of a
-/// mesh (`Body::read_on_cells`).
+/// One stored equilibrium of an indentation: values at the atlas' vertices.
 ///
 /// MPa = N/mm2 = mJ/mm3 inside the FE code; the dataset stores Pa and J/m3.
 #[derive(Clone, Debug)]
@@ -43,8 +42,7 @@ pub struct IncrementRecord {
     pub time_s: f64,
     /// Force of the plate on the finger in the finger's frame, N.
     pub force_n: [f64; 3],
-    /// True contact pressure at the skin patch's vertices, MPa; length V. On L cells at the quadrature
-    /// points of each; length 9 L.
+    /// True contact pressure at the skin patch's vertices, MPa; length V.
     pub pressure_mpa: Vec<f64>,
     /// SED on the dermis side at the interface patch's vertices, MPa; length V.
     pub sed_dermis_mpa: Vec<f64>,

@@ -83,16 +83,15 @@ impl Solution {
         let begun_s = processor::thread_s();
         let Simulation { mut body, approach, drive, .. } = Simulation::new(scene)?;
         body.first_touch = Some(target.contact.clone());
-        body.read_on_cells();
+        body.read_at_nodes();
         self.record.setup_s = processor::thread_s() - begun_s;
         self.record.unknowns = body.problem.system.dofs.count;
         self.record.factor_entries = body.problem.system.factor_entries();
         let readers = Readers::new(&body, target);
         let begun_s = processor::thread_s();
         let mut solver = body.solver(Options::default())?;
-        let skin = &body.problem.mesh.surfaces["skin"];
-        let mut keep = |solver: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
-            self.pressure_pa.push(readers.skin(&solver.pressure_at_quadrature_mpa(skin)));
+        let mut keep = |_: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
+            self.pressure_pa.push(readers.skin(&found.pressure_mpa));
             self.sed_j_per_m3.push(readers.interface(&found.sed_dermis_mpa));
             self.record.depth_mm.push(found.depth_mm);
             self.record.force_n.push(norm(found.force_n));
@@ -151,8 +150,7 @@ fn scene(case: &Case, mesh: MeshChoice, states: usize, target: &Target) -> Scene
 /// Where the target's points lie on a body's skin and interface.
 struct Readers<'a> {
     body: &'a Body,
-    /// None where the skin has no quadrilaterals.
-    skin: Option<SurfaceReader>,
+    skin: SurfaceReader,
     interface: SurfaceReader,
 }
 
@@ -162,27 +160,26 @@ impl<'a> Readers<'a> {
         let [skin, interface] = ["skin", "interface"].map(|name| &mesh.surfaces[name]);
         Self {
             body,
-            skin: SurfaceReader::at_quadrature(mesh, skin, &target.skin),
+            skin: SurfaceReader::linear(mesh, skin, &target.skin),
             interface: SurfaceReader::new(mesh, interface, &target.interface),
         }
     }
 
-    /// Pressure from that at the quadrature points of the skin's faces, Pa.
     fn skin(&self, pressure_mpa: &[f64]) -> Vec<f32> {
-        let of = |reader: &SurfaceReader| {
-            let found = reader.read(|q| PA_PER_MPA * pressure_mpa[q as usize]);
-            found.into_iter().map(|v| v as f32).collect()
-        };
-        self.skin.as_ref().map(of).unwrap_or_default()
+        let nodes = self.body.patch.as_ref().map_or(&[][..], |p| &p.patch.skin);
+        self.read(&self.skin, nodes, pressure_mpa)
     }
 
-    /// SED, J/m3; NaN beyond the patch.
     fn interface(&self, sed_mpa: &[f64]) -> Vec<f32> {
         let nodes = self.body.patch.as_ref().map_or(&[][..], |p| &p.patch.interface);
+        self.read(&self.interface, nodes, sed_mpa)
+    }
+
+    fn read(&self, reader: &SurfaceReader, nodes: &[u32], values: &[f64]) -> Vec<f32> {
         let mut nodal = vec![f64::NAN; self.body.problem.mesh.nodes.len()];
-        for (&n, v) in nodes.iter().zip(sed_mpa) {
+        for (&n, v) in nodes.iter().zip(values) {
             nodal[n as usize] = PA_PER_MPA * v;
         }
-        self.interface.read(|n| nodal[n as usize]).into_iter().map(|v| v as f32).collect()
+        reader.read(|n| nodal[n as usize]).into_iter().map(|v| v as f32).collect()
     }
 }
