@@ -2,9 +2,8 @@
 
 mod watch;
 
-use std::sync::{Arc, atomic::Ordering};
+use std::sync::{Arc, PoisonError, RwLock, atomic::Ordering};
 
-use arc_swap::ArcSwap;
 use papilla_metrics::{Metrics, TIERS_MAX};
 use papilla_proto::{ErrorCode, Problem};
 use serde::Serialize;
@@ -28,7 +27,9 @@ use crate::{
 
 /// Holds what there is to render with, and reloads the models of a folder.
 pub(crate) struct Reloader {
-    running: ArcSwap<Catalogue>,
+    /// Held to take or put a pointer, for nothing else. A lock-free pointer would allocate when a
+    /// thread first reads it, which may be in the middle of a session's frames.
+    running: RwLock<Arc<Catalogue>>,
     /// True once the server drains.
     drain: Arc<Sender<bool>>,
     config: Config,
@@ -93,14 +94,14 @@ impl Reloader {
         metrics: Arc<Metrics>,
         drain: Arc<Sender<bool>>,
     ) -> Self {
-        let running = ArcSwap::new(catalogue);
+        let running = RwLock::new(catalogue);
         Self { running, drain, config: config.clone(), exchange, metrics, turn: Arc::default() }
     }
 
     /// What there is to render with now; it may be replaced at any time, so whoever needs it
     /// twice keeps it.
     pub(crate) fn catalogue(&self) -> Arc<Catalogue> {
-        self.running.load_full()
+        Arc::clone(&self.running.read().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The turn, if no reload is under way.
@@ -170,7 +171,7 @@ impl Reloader {
         // submit a job for a new tier at once.
         self.metrics.name_tiers(new.tier_labels());
         self.exchange.hand_over(&new, sessions);
-        self.running.store(new);
+        *self.running.write().unwrap_or_else(PoisonError::into_inner) = new;
         Ok(changes)
     }
 
