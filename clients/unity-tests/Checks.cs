@@ -29,6 +29,27 @@ sealed class Outcome
 /// <content>What is expected, and the patterns.</content>
 sealed partial class Run
 {
+    /// <summary>Does the steps of a case, and prints its line.</summary>
+    internal bool Passes(JToken one)
+    {
+        int at = 0;
+        try
+        {
+            foreach (JObject step in one["steps"])
+            {
+                at++;
+                Do(step);
+            }
+            Console.WriteLine("ok " + one["name"]);
+            return true;
+        }
+        catch (Exception error)
+        {
+            Console.WriteLine("FAIL " + one["name"] + ": step " + at + ": " + (error is Missed ? error.Message : error.ToString().Replace('\n', ' ')));
+            return false;
+        }
+    }
+
     void Check(JObject expect, Outcome got)
     {
         Same("status (" + got.Code + ")", got.Status.ToString().ToLowerInvariant(), (string)expect["status"] ?? "ok");

@@ -25,24 +25,7 @@ static class Native
                 Console.WriteLine("skip " + one["name"] + ": of the wire");
                 continue;
             }
-            int at = 0;
-            using (var run = new Run(arguments[0], arguments[1]))
-            {
-                try
-                {
-                    foreach (JObject step in one["steps"])
-                    {
-                        at++;
-                        run.Do(step);
-                    }
-                    Console.WriteLine("ok " + one["name"]);
-                }
-                catch (Exception error)
-                {
-                    failed++;
-                    Console.WriteLine("FAIL " + one["name"] + ": step " + at + ": " + (error is Missed ? error.Message : error.ToString().Replace('\n', ' ')));
-                }
-            }
+            using (var run = new Run(arguments[0], arguments[1])) failed += run.Passes(one) ? 0 : 1;
         }
         return failed == 0 ? 0 : 1;
     }

@@ -95,9 +95,7 @@ class Level(nn.Module):
 
     def forward(self, blocks: Tensor, above: Tensor) -> Tensor:
         """``[N, 4, n, n]`` and ``[N, C, n, n]`` to ``[N, 4 C, n, n]``."""
-        side = self.place.shape[-1]
-        gain = 1.0 + (self.over_finger @ self.place.flatten(1)).reshape(1, -1, side, side)
-        linear: Tensor = self.near(blocks) * gain + self.above(above)
+        linear: Tensor = self.near(blocks) * _gain(self.over_finger, self.place) + self.above(above)
         return linear
 
 
@@ -125,9 +123,8 @@ class Correction(nn.Module):
     def forward(self, components: Tensor, blocks: Tensor) -> Tensor:
         """``[N, 4 C, n, n]`` and ``[N, 4, n, n]`` to what is added to the components."""
         inputs = torch.cat([components, blocks], dim=1)
-        side = self.place.shape[-1]
-        gain = 1.0 + (self.over_finger @ self.place.flatten(1)).reshape(1, -1, side, side)
-        added: Tensor = self.out(self.value(inputs) * self.gate(inputs).clamp(-1.0, 1.0) * gain)
+        gated = self.value(inputs) * self.gate(inputs).clamp(-1.0, 1.0)
+        added: Tensor = self.out(gated * _gain(self.over_finger, self.place))
         return added
 
 
@@ -201,6 +198,11 @@ def _convolution(channels_in: int, channels_out: int, kernel: int) -> nn.Conv2d:
 
 def _mean(blocks: Tensor) -> Tensor:
     return blocks.mean(dim=1, keepdim=True)
+
+
+def _gain(weights: Tensor, place: Tensor) -> Tensor:
+    """``[1, channels, n, n]`` about 1, from ``[channels, 5]`` and ``[5, n, n]``."""
+    return 1.0 + torch.einsum("ck,kyx->cyx", weights, place)[None]
 
 
 def _place(side: int) -> Tensor:
