@@ -34,6 +34,19 @@ pub enum IndenterError {
         /// Width of the face, mm.
         face_mm: f64,
     },
+    /// It is rounded by less than the smallest cells of a graded mesh can follow.
+    #[error(
+        "the indenter is finer than the mesh can be: nodes would have to be {wanted_mm:.3} mm apart \
+         and are {spacing_mm:.3} mm. Round its edges by {radius_mm:.3} mm at least"
+    )]
+    FinerThanCells {
+        /// Distance of nodes that its curvature asks for, mm.
+        wanted_mm: f64,
+        /// Distance that there is, mm.
+        spacing_mm: f64,
+        /// Radius of curvature that this resolves, mm.
+        radius_mm: f64,
+    },
     /// It is in the body before it moves.
     #[error(
         "the indenter starts {by_mm:.3e} mm inside the body: move it back along its way \

@@ -34,7 +34,7 @@ impl Solver<'_> {
         trial
     }
 
-    fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
+    pub(super) fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
         for &(dof, value) in &self.loading.prescribed_mm {
             u[dof / 3][dof % 3] = fraction * value;
         }

@@ -52,4 +52,6 @@ pub struct StepReport {
     pub effort: Effort,
     /// What of it found equilibria for the indenter's work alone ([`super::Solver::mend_work`]).
     pub mending: Effort,
+    /// What of it was on a coarser mesh ([`super::Solver::advance_from`]).
+    pub guiding: Effort,
 }

@@ -217,7 +217,7 @@ impl<'a> Solver<'a> {
         self.newton.rounding_force_n / self.newton.options.residual_tolerance
     }
 
-    fn report(&self, since: &Effort) -> StepReport {
+    pub(super) fn report(&self, since: &Effort) -> StepReport {
         let e = &self.newton.current;
         // The potential of an elastic body is its stored energy.
         let energy = if self.newton.problem.history_layout.is_some() {
@@ -236,6 +236,7 @@ impl<'a> Solver<'a> {
             condition_at_least: self.newton.condition,
             effort: self.newton.effort.since(since),
             mending: Effort::default(),
+            guiding: Effort::default(),
         }
     }
 
@@ -258,6 +259,12 @@ impl<'a> Solver<'a> {
             mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
         }
         found?;
+        self.accept(next, trial);
+        Ok(())
+    }
+
+    /// Makes an equilibrium the present one.
+    pub(super) fn accept(&mut self, next: f64, mut trial: State) {
         self.set_time_step(next, &trial.u);
         let problem = self.newton.problem;
         let dt_s = self.seconds(next);
@@ -272,6 +279,5 @@ impl<'a> Solver<'a> {
             let Evaluation { contact_force_n, stored_mj, contact_mj, .. } = self.newton.current;
             self.work.add(indenter, next, contact_force_n, stored_mj + contact_mj);
         }
-        Ok(())
     }
 }

@@ -72,6 +72,41 @@ impl Work {
         }
     }
 
+    /// Takes the course of force and energy between the last two equilibria of a straight path from
+    /// another body's, scaled to this one's at the ends.
+    pub(super) fn take_course(&mut self, guide: &Self) {
+        let Some(([.., from], to)) = self.straight.split_last().map(|(to, rest)| (rest, *to))
+        else {
+            return;
+        };
+        let (from, at) = (*from, self.straight.len() - 1);
+        let same =
+            |f: Found| guide.straight.iter().find(|g| g.fraction.total_cmp(&f.fraction).is_eq());
+        let (Some(first), Some(last)) = (same(from), same(to)) else { return };
+        let ratio = |own: f64, other: f64| if other > 0.0 { own / other } else { f64::NAN };
+        let end = [ratio(to.force_n, last.force_n), ratio(to.stored_mj, last.stored_mj)];
+        let start = [ratio(from.force_n, first.force_n), ratio(from.stored_mj, first.stored_mj)];
+        if end.iter().any(|r| r.is_nan()) {
+            return;
+        }
+        let between = guide
+            .straight
+            .iter()
+            .filter(|g| g.fraction > from.fraction && g.fraction < to.fraction)
+            .map(|g| {
+                let part = (g.fraction - from.fraction) / (to.fraction - from.fraction);
+                let [force, stored] = [0, 1].map(|k| {
+                    // At rest there is no ratio.
+                    let near = if start[k].is_nan() { end[k] } else { start[k] };
+                    near + part * (end[k] - near)
+                });
+                let (force_n, stored_mj) = (force * g.force_n, stored * g.stored_mj);
+                Found { fraction: g.fraction, force_n, stored_mj }
+            })
+            .collect::<Vec<_>>();
+        self.straight.splice(at..at, between);
+    }
+
     /// The part beyond the load fraction `from` in which energy and work part the most; none of a
     /// path that is not straight or has not come so far.
     pub(super) fn doubtful(&self, indenter: &MovingIndenter, from: f64) -> Option<Doubtful> {
@@ -194,6 +229,33 @@ mod tests {
         assert!(after.relative < 0.1 * before.relative, "{before:?} {after:?}");
         assert!((work.total_mj(&straight) / energy(1.0) - 1.0).abs() < 1e-3);
         assert!(work.doubtful(&straight, 1.0).is_none());
+    }
+
+    /// What a body's force is over a guide's at two equilibria it is in between, linear in the way.
+    #[test]
+    fn a_guides_course_gives_the_work_between_two_equilibria() {
+        let force = |x: f64| x.powf(1.5) * (1.2 * x).exp();
+        let times = |x: f64| 1.03 - 0.02 * (x - 0.5).max(0.0);
+        let ball = Arc::new(Sphere { radius_mm: 1.0 });
+        let start = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
+        let straight = MovingIndenter::straight(ball, start, [0.0, 0.0, 1.0]);
+        let way = [0.05, 0.12, 0.25, 0.5, 0.62, 0.75, 0.87, 1.0];
+        let along = |scale: &dyn Fn(f64) -> f64| {
+            let mut work = Work::default();
+            for x in way {
+                work.add(&straight, x, [0.0, 0.0, scale(x) * force(x)], scale(x) * x);
+            }
+            work
+        };
+        let (guide, due) = (along(&|_| 1.0), along(&times));
+        let mut own = Work::default();
+        for x in [0.5, 1.0] {
+            own.add(&straight, x, [0.0, 0.0, times(x) * force(x)], times(x) * x);
+            own.take_course(&guide);
+        }
+        let (found, due) = (own.total_mj(&straight), due.total_mj(&straight));
+        assert!((found / due - 1.0).abs() < 1e-12, "{found} {due}");
+        assert_eq!(own.straight.len(), way.len() + 1);
     }
 
     #[test]

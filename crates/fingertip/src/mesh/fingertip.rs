@@ -13,7 +13,9 @@ use super::half_cube::{Grid, GridSize, MEDIUM};
 use super::nail;
 use super::patch::patch_of;
 use super::refined::{self, Refined};
+use super::transfer::Transfer;
 use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
+use crate::indenter::IndenterError;
 use crate::tissue::Tissue;
 use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
@@ -118,6 +120,16 @@ impl Density {
     }
 }
 
+impl FingertipMesh {
+    /// What an indenter wants that the smallest cells do not give; `None` where they do.
+    #[must_use]
+    pub fn unresolved(&self, density: Density) -> Option<IndenterError> {
+        let [wanted_mm, spacing_mm] = self.refined.as_ref()?.unresolved_mm()?;
+        let radius_mm = (spacing_mm / density.closeness().of_radius_mm).powi(2);
+        Some(IndenterError::FinerThanCells { wanted_mm, spacing_mm, radius_mm })
+    }
+}
+
 impl Density {
     /// Two elements through the epidermis and a dermis whose first is .08 mm thick: SED at
     /// the interface of a plane section is then within 1 to 3 % of that of many more layers.
@@ -132,14 +144,20 @@ impl Density {
         Resolution { grid: refined::BASE, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
     }
 
+    /// The skin's cells, split for a contact.
+    fn refined(self, shape: &FingertipShape, contact: Option<&Contact>) -> Refined {
+        let spacing = contact.map(|c| Spacing::new(shape, c, self.closeness()));
+        Refined::new(shape, spacing.as_ref())
+    }
+
     /// How close nodes are under an indenter.
     const fn closeness(self) -> Closeness {
-        let (of_radius_mm, flat_mm, growth) = match self {
-            Self::Coarse => (0.24, 0.8, 0.8),
-            Self::Medium => (0.14, 0.6, 0.6),
-            Self::Fine => (0.075, 0.35, 0.45),
+        let (of_radius_mm, flat_mm, edge_mm, growth) = match self {
+            Self::Coarse => (0.24, 0.8, 0.8, 0.8),
+            Self::Medium => (0.14, 0.6, 0.2, 0.6),
+            Self::Fine => (0.075, 0.35, 0.12, 0.45),
         };
-        Closeness { of_radius_mm, flat_mm, growth }
+        Closeness { of_radius_mm, flat_mm, edge_mm, growth }
     }
 }
 
@@ -160,6 +178,8 @@ pub struct FingertipMesh {
     pub mesh: Mesh,
     /// What the atlas shows.
     pub patch: Patch,
+    /// Its cells, where they are split.
+    pub(super) refined: Option<Refined>,
 }
 
 /// Meshes a fingertip; of [`Order::Graded`] with cells as small as `contact` wants them.
@@ -174,12 +194,43 @@ pub fn build(
     contact: Option<&Contact>,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
-    let resolution = density.resolution(order);
+    let refined = (order == Order::Graded).then(|| density.refined(shape, contact));
+    layered(shape, &density.resolution(order), order, parts, refined)
+}
+
+/// The mesh `fine`, of [`build`] in [`Order::Graded`], with cells as large as those of
+/// [`Density::Coarse`], and what reads its displacement at the nodes of `fine`; `None` where it
+/// would be that mesh, or a solid nail has nodes of its own.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_guide(
+    shape: &FingertipShape,
+    density: Density,
+    parts: Parts,
+    contact: &Contact,
+    fine: &FingertipMesh,
+) -> Result<Option<(FingertipMesh, Transfer)>, FingertipShapeError> {
+    let Some(to) = fine.refined.as_ref().filter(|_| density != Density::Coarse && !parts.nail)
+    else {
+        return Ok(None);
+    };
+    let guide = Density::Coarse.refined(shape, Some(contact));
+    let transfer = Transfer::new(&guide, to);
+    let resolution = density.resolution(Order::Graded);
+    let mesh = layered(shape, &resolution, Order::Graded, parts, Some(guide))?;
+    Ok(Some((mesh, transfer)))
+}
+
+/// Extrudes the skin's grid through the layers.
+fn layered(
+    shape: &FingertipShape,
+    resolution: &Resolution,
+    order: Order,
+    parts: Parts,
+    refined: Option<Refined>,
+) -> Result<FingertipMesh, FingertipShapeError> {
     let step = order.step();
-    let refined = (order == Order::Graded).then(|| {
-        let spacing = contact.map(|c| Spacing::new(shape, c, density.closeness()));
-        Refined::new(shape, spacing.as_ref())
-    });
     let lattice;
     let (grid, size, hanging) = match &refined {
         Some(r) => (&r.grid, r.size, &r.hanging[..]),
@@ -194,7 +245,7 @@ pub fn build(
     let under_nail = (0..n as u32)
         .filter(|&s| shape.under_nail(shape.skin(grid.parameters[s as usize])))
         .collect();
-    let (nodes, tissue) = extrude(shape, grid, &resolution, parts.bone)?;
+    let (nodes, tissue) = extrude(shape, grid, resolution, parts.bone)?;
     let mut mesh = Mesh { nodes, ..Mesh::default() };
     let cells = Cells { cells: &grid.cells, step };
     mesh.blocks.push(cells.hexahedra(&tissue, |layer, s| (layer * n) as u32 + s));
@@ -225,7 +276,7 @@ pub fn build(
         Some(r) => r.patch(shape, interface)?,
         None => patch_of(grid, size, step, interface),
     };
-    Ok(FingertipMesh { mesh, patch })
+    Ok(FingertipMesh { mesh, patch, refined })
 }
 
 /// Node positions layer by layer from the skin, and the tissue of each interval.

@@ -27,6 +27,7 @@ pub(super) const MEDIUM: GridSize = GridSize { across: 22, side: 16, cap: 12, bo
 
 /// A surface grid: nodes with their parameters, cells of `step x step` lattice
 /// intervals listed with `(step + 1)^2` nodes row by row.
+#[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub parameters: Vec<SurfaceParameter>,
     /// Lattice address `[i, j, k]` of each node; `k` counts from the front face.

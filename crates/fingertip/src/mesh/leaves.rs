@@ -36,10 +36,14 @@ type Address = [u32; 3];
 pub(super) type Wanted<'a> = &'a dyn Fn(&[[f64; 3]; 9], [f64; 3]) -> f64;
 
 /// The surface's cells, with their nodes.
+#[derive(Clone, Debug)]
 pub(super) struct Leaves {
     /// The finest lattice.
     pub size: GridSize,
     pub leaves: Vec<Leaf>,
+    /// What a cell that cannot be halved further would have to be, and its nodes' distance, mm; of
+    /// those the one that misses most.
+    pub unresolved_mm: Option<[f64; 2]>,
     /// Fractions of the body's length at its rows.
     body: Vec<f64>,
 }
@@ -48,7 +52,8 @@ impl Leaves {
     /// The cells of `base` (two lattice intervals each way), split as `wanted`.
     pub(super) fn new(base: GridSize, shape: &FingertipShape, wanted: Wanted<'_>) -> Self {
         let size = base.times(TIMES);
-        let mut out = Self { size, leaves: Vec::new(), body: size.body_fractions(shape) };
+        let body = size.body_fractions(shape);
+        let mut out = Self { size, leaves: Vec::new(), unresolved_mm: None, body };
         let cell = 2 * TIMES;
         let mut stack = Vec::new();
         for side in 0..SIDES {
@@ -103,7 +108,12 @@ impl Leaves {
     }
 
     /// Along which of its directions a cell has to be halved.
-    fn split_along(&self, leaf: Leaf, shape: &FingertipShape, wanted: Wanted<'_>) -> Option<usize> {
+    fn split_along(
+        &mut self,
+        leaf: Leaf,
+        shape: &FingertipShape,
+        wanted: Wanted<'_>,
+    ) -> Option<usize> {
         let nodes = leaf.nodes(self.size);
         let at = nodes.map(|a| shape.skin(self.parameter(a)));
         let along = [[at[1], at[7]], [at[3], at[5]]]
@@ -111,12 +121,18 @@ impl Leaves {
         let length = along.map(norm);
         // The longest first, so that cells do not become needles on the way.
         let order = if length[0] >= length[1] { [0, 1] } else { [1, 0] };
-        order.into_iter().find(|&k| {
-            let direction = along[k].map(|v| v / length[k]);
-            leaf.size[k] > 2
-                && (0.5 * length[k] > wanted(&at, direction)
-                    || length[k] > ASPECT_MAX * length[1 - k])
-        })
+        for k in order {
+            let spacing_mm = 0.5 * length[k];
+            let wanted_mm = wanted(&at, along[k].map(|v| v / length[k]));
+            if leaf.size[k] > 2 {
+                if spacing_mm > wanted_mm || length[k] > ASPECT_MAX * length[1 - k] {
+                    return Some(k);
+                }
+            } else if self.unresolved_mm.map_or(1.0, |[w, s]| s / w) < spacing_mm / wanted_mm {
+                self.unresolved_mm = Some([wanted_mm, spacing_mm]);
+            }
+        }
+        None
     }
 
     /// Halves cells until neighbours differ by one halving at most.
@@ -258,6 +274,13 @@ mod tests {
                 assert!(count == 2 || at_base || halved || small, "{a:?} {b:?}");
             }
         }
+    }
+
+    #[test]
+    fn what_no_cell_can_be_is_told() {
+        assert!(leaves([2.0, 1.0, -6.0], 0.08).unresolved_mm.is_none());
+        let [wanted, spacing] = leaves([2.0, 1.0, -6.0], 1e-3).unresolved_mm.unwrap();
+        assert!(wanted < 0.02 && spacing > wanted && spacing < 0.06, "{wanted} {spacing}");
     }
 
     #[test]

@@ -12,3 +12,6 @@ mod patch;
 mod quality;
 mod refined;
 pub mod section;
+mod transfer;
+
+pub use transfer::Transfer;

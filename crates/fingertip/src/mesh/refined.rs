@@ -17,6 +17,7 @@ pub(super) const BASE: GridSize = GridSize { across: 8, side: 4, cap: 4, body: 6
 const ATLAS: GridSize = super::half_cube::MEDIUM;
 
 /// A grid whose cells were split.
+#[derive(Clone, Debug)]
 pub(super) struct Refined {
     /// Its cells of nine nodes.
     pub grid: Grid,
@@ -125,11 +126,32 @@ impl Refined {
             .filter(move |(_, nodes): &(Leaf, [u32; 9])| nodes.iter().any(is_shown))
     }
 
+    /// The nodes of the cell that holds an address of the finest lattice, and where in it.
+    pub(super) fn cell_at(&self, at: [u32; 3]) -> ([u32; 9], [f64; 2]) {
+        let (side, [row, column]) = self.size.place(at);
+        let (cell, at) = self.holding(side, [row, column].map(f64::from));
+        (std::array::from_fn(|n| self.grid.cells[cell][n]), at)
+    }
+
     /// The cell that holds a vertex of the atlas, and where in it; `body` are the fractions at the
     /// rows of the atlas' lattice.
     fn find(&self, vertex: [u32; 3], body: &[f64]) -> (usize, [f64; 2]) {
         let (side, [row, column]) = ATLAS.place(vertex);
-        let place = self.leaves.place(ATLAS, body, side, [row, column].map(f64::from));
+        self.holding(side, self.leaves.place(ATLAS, body, side, [row, column].map(f64::from)))
+    }
+
+    /// See [`Leaves::unresolved_mm`].
+    pub(super) const fn unresolved_mm(&self) -> Option<[f64; 2]> {
+        self.leaves.unresolved_mm
+    }
+
+    /// Its cells, on the finest lattice.
+    pub(super) fn leaves(&self) -> &[Leaf] {
+        &self.leaves.leaves
+    }
+
+    /// The cell that holds a place of a side, and where in it.
+    pub(super) fn holding(&self, side: usize, place: [f64; 2]) -> (usize, [f64; 2]) {
         let found = self.leaves.leaves.iter().enumerate().find_map(|(n, leaf): (_, &Leaf)| {
             (leaf.side == side).then(|| leaf.reference(place)).flatten().map(|at| (n, at))
         });

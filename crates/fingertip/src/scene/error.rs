@@ -160,7 +160,9 @@ pub(crate) fn indenter_field(error: &IndenterError) -> String {
         IndenterError::NeverTouches | IndenterError::StartsInside { .. } => {
             "motion.offset_mm".into()
         }
-        IndenterError::FinerThanMesh { .. } => "indenter".into(),
+        IndenterError::FinerThanMesh { .. } | IndenterError::FinerThanCells { .. } => {
+            "indenter".into()
+        }
     }
 }
 

@@ -1,9 +1,10 @@
 //! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
+use super::guide::Guide;
 use super::record::{Checks, IncrementRecord};
-use crate::geometry::fingertip::{FingertipShape, FingertipShapeError};
+use crate::geometry::fingertip::FingertipShapeError;
 use crate::indenter::IndenterError;
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, Patch, Vertices, build};
+use crate::mesh::fingertip::{Patch, Vertices};
 use crate::mesh::grading::Contact;
 use crate::mesh::section::SectionMeshError;
 use crate::scene::error::{indenter_field, material_field};
@@ -162,6 +163,8 @@ pub struct Body {
     pub first_touch: Option<Contact>,
     /// Whether its cells are split under that contact.
     pub graded: bool,
+    /// On which the way to each state is found first, if there is one.
+    pub(super) guide: Option<Box<Guide>>,
 }
 
 /// What is read off a fingertip at each equilibrium.
@@ -174,40 +177,6 @@ pub struct RecordedPatch {
 }
 
 impl Body {
-    /// Meshes a fingertip and holds what carries it.
-    ///
-    /// Always the axial displacement of the soft tissue's base, which goes on as
-    /// the rest of the finger. A rigid bone is held as a whole. An elastic one is
-    /// clamped where the base plane cuts it, because there the joint carries it; its
-    /// marrow cavity is free: marrow and cancellous bone are softer than the cortex
-    /// by a factor of ten and more, and to hold the cavity's wall would leave but
-    /// 0.75 mm of cortex to deform on a rigid core. The skin under a rigid nail is
-    /// held; an elastic nail is carried by that skin alone.
-    ///
-    /// # Errors
-    /// See [`SimulationError`].
-    pub fn fingertip(
-        shape: &FingertipShape,
-        materials: Materials,
-        density: Density,
-        order: Order,
-        parts: Parts,
-        contact: Option<Contact>,
-    ) -> Result<Self, SimulationError> {
-        let FingertipMesh { mesh, patch } = build(shape, density, order, parts, contact.as_ref())?;
-        let mut fixed = vec![false; 3 * mesh.nodes.len()];
-        for &n in &mesh.node_sets["base"] {
-            fixed[3 * n as usize] = true;
-        }
-        let bone = if parts.bone { "bone_base" } else { "bone" };
-        let nail = (!parts.nail).then_some("nail");
-        for &n in std::iter::once(bone).chain(nail).flat_map(|set| &mesh.node_sets[set]) {
-            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
-        }
-        let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
-        Ok(Self { graded: order == Order::Graded, first_touch: contact, ..body })
-    }
-
     /// A body with layers, of which pressure and SED are read at vertices.
     pub(super) fn with_patch(
         mesh: Mesh,
@@ -223,7 +192,15 @@ impl Body {
         let (dermis, epidermis) = (side(Tissue::Dermis)?, side(Tissue::Epidermis)?);
         let problem = Problem::new(mesh, materials, fixed, Some("skin"))?;
         let patch = Some(RecordedPatch { patch, dermis, epidermis });
-        Ok(Self { problem, contact: "skin".into(), patch, plane, first_touch: None, graded: false })
+        Ok(Self {
+            problem,
+            contact: "skin".into(),
+            patch,
+            plane,
+            first_touch: None,
+            graded: false,
+            guide: None,
+        })
     }
 
     /// Any mesh, held on the surfaces or node sets `held` and touched on the
@@ -257,6 +234,7 @@ impl Body {
             plane,
             first_touch: None,
             graded: false,
+            guide: None,
         })
     }
 

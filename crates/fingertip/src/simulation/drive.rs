@@ -1,10 +1,11 @@
 //! How an indenter is driven into a body, and the states at which it is recorded.
 
 use super::body::{Body, SimulationError};
+use super::guide::Guided;
 use super::record::IncrementRecord;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
-use papilla_fem::solve::{Effort, Loading, Snapshot, Solver, StepReport};
+use papilla_fem::solve::{Effort, Loading, Mark, Snapshot, Solver, StepReport};
 use papilla_sdf::{Plate, RoundedPlate, SignedDistance};
 use std::sync::Arc;
 use std::time::Instant;
@@ -152,7 +153,10 @@ impl Body {
             ..Loading::default()
         });
         match drive {
-            Drive::Depths(depths) => self.to_depths(solver, depths, course, visit),
+            Drive::Depths(depths) => {
+                let guided = self.guided(approach, drive)?;
+                self.to_depths(solver, guided, depths, course, visit)
+            }
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
             Drive::Path(points) => self.along(solver, points, course.refinement, visit),
         }
@@ -161,11 +165,12 @@ impl Body {
     fn to_depths(
         &self,
         solver: &mut Solver<'_>,
+        mut guided: Option<Guided<'_>>,
         depths_mm: &[f64],
         Course { refinement, energy_vs_work_max, from }: Course<'_>,
         visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
-        let last = depths_mm.last().copied().unwrap_or(1.0);
+        let way = Way { depths_mm, refinement, graded: self.graded, energy_vs_work_max };
         let behind = match from {
             Some((behind, snapshot)) => {
                 solver.resume(snapshot)?;
@@ -173,22 +178,16 @@ impl Body {
             }
             None => 0,
         };
+        for i in 0..behind {
+            guided = guided.and_then(|g| way.lead(g, i));
+        }
         for (i, &depth_mm) in depths_mm.iter().enumerate().skip(behind) {
             let clock = Instant::now();
-            let at = |source| SimulationError::Solve { depth_mm, source };
-            let mut effort = Effort::default();
-            let mark = |solver: &Solver<'_>| energy_vs_work_max.map(|_| solver.mark());
-            let mut known: Vec<_> = mark(solver).into_iter().collect();
-            for between in path_mm(depths_mm, i, refinement, self.graded) {
-                effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
-                known.extend(mark(solver));
-            }
-            let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
-            if let Some(limit) = energy_vs_work_max {
-                report.mending = solver.mend_work(known, limit);
-                effort = effort.plus(&report.mending);
-            }
-            report.effort = report.effort.plus(&effort);
+            guided = guided.and_then(|g| way.lead(g, i));
+            let report = match &guided {
+                Some(guided) => way.to_state_after(guided, solver, i)?,
+                None => way.to_state(solver, i)?,
+            };
             let mut record = self.record(solver, depth_mm, &report)?;
             record.seconds = clock.elapsed().as_secs_f64();
             visit(solver, &record, &report)?;
@@ -285,6 +284,79 @@ impl Body {
             visit(solver, &record, &report)?;
         }
         Ok(())
+    }
+}
+
+/// How much more of the work may be missed before it is mended where the force has the course of
+/// a guide: the coarse mesh errs most at first touch, and what it misses there does not grow.
+const GUIDED: f64 = 2.0;
+
+/// A straight way through stored depths.
+struct Way<'a> {
+    depths_mm: &'a [f64],
+    refinement: u32,
+    graded: bool,
+    energy_vs_work_max: Option<f64>,
+}
+
+impl Way<'_> {
+    /// Goes from the stored depth before to that of number `i`.
+    fn to_state(&self, solver: &mut Solver<'_>, i: usize) -> Result<StepReport, SimulationError> {
+        let depth_mm = self.depths_mm[i];
+        let last = self.depths_mm.last().copied().unwrap_or(1.0);
+        let at = |source| SimulationError::Solve { depth_mm, source };
+        let mut effort = Effort::default();
+        let mark = |solver: &Solver<'_>| self.energy_vs_work_max.map(|_| solver.mark());
+        let mut known: Vec<_> = mark(solver).into_iter().collect();
+        for between in path_mm(self.depths_mm, i, self.refinement, self.graded) {
+            effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
+            known.extend(mark(solver));
+        }
+        let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
+        report.effort = report.effort.plus(&effort);
+        self.mend(solver, known, 1.0, &mut report);
+        Ok(report)
+    }
+
+    /// Sends the guide there; none is left where it finds no equilibrium.
+    fn lead<'a>(&self, mut guided: Guided<'a>, i: usize) -> Option<Guided<'a>> {
+        match self.to_state(&mut guided.solver, i) {
+            Ok(report) => {
+                guided.effort = report.effort;
+                Some(guided)
+            }
+            Err(error) => {
+                tracing::info!(%error, "the coarse mesh that leads the way is given up");
+                None
+            }
+        }
+    }
+
+    /// As [`Self::to_state`], straight to a state that a guide is at.
+    fn to_state_after(
+        &self,
+        guided: &Guided<'_>,
+        solver: &mut Solver<'_>,
+        i: usize,
+    ) -> Result<StepReport, SimulationError> {
+        let depth_mm = self.depths_mm[i];
+        let last = self.depths_mm.last().copied().unwrap_or(1.0);
+        let known: Vec<_> = self.energy_vs_work_max.map(|_| solver.mark()).into_iter().collect();
+        let mut report = solver
+            .advance_from(depth_mm / last, guided.guess())
+            .map_err(|source| SimulationError::Solve { depth_mm, source })?;
+        solver.take_course(&guided.solver);
+        self.mend(solver, known, GUIDED, &mut report);
+        report.effort = report.effort.plus(&guided.effort);
+        report.guiding = guided.effort;
+        Ok(report)
+    }
+
+    fn mend(&self, solver: &mut Solver<'_>, known: Vec<Mark>, times: f64, report: &mut StepReport) {
+        if let Some(limit) = self.energy_vs_work_max {
+            report.mending = solver.mend_work(known, times * limit);
+            report.effort = report.effort.plus(&report.mending);
+        }
     }
 }
 

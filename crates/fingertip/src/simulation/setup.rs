@@ -4,10 +4,9 @@ use super::body::{Body, SimulationError};
 use super::drive::{Approach, Drive, DrivePoint, Visit};
 use super::laws::solids;
 use super::section::SectionSpec;
-use crate::geometry::fingertip::FingertipShape;
 use crate::indenter::IndenterError;
-use crate::mesh::fingertip::{Density, Order};
-use crate::scene::{Geometry, Layer, Motion, Plan, Scene, TissueTable};
+use crate::mesh::fingertip::Order;
+use crate::scene::{Geometry, Layer, Motion, Plan, Scene};
 use crate::tissue::Tissue;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::block::{BlockLattice, build as build_block, even};
@@ -98,20 +97,6 @@ fn body(
             let mesh = papilla_fem::mesh::complete::for_contact(mesh, contact);
             Body::from_mesh(mesh, materials, fixed, contact)
         }
-    }
-}
-
-impl Body {
-    /// The default finger with the surface-pressure study's analysis: neo-Hookean layers, rigid
-    /// bone and nail.
-    ///
-    /// # Errors
-    /// [`SimulationError`] if it cannot be set up.
-    pub fn usual(density: Density) -> Result<Self, SimulationError> {
-        let plan = Plan::usual();
-        let materials = solids(&TissueTable::default(), &plan)?;
-        let shape = FingertipShape::default();
-        Self::fingertip(&shape, materials, density, Order::default(), plan.parts, None)
     }
 }
 

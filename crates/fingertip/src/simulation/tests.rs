@@ -279,3 +279,42 @@ fn what_only_meshing_finds_names_its_line_too() {
         assert!(error.starts_with(&at), "{error}\nshould start with {at}");
     }
 }
+
+/// Led by a coarser mesh, a press finds the states of the path on its own mesh, and work that
+/// balances as well.
+#[test]
+#[ignore = "long: ./test --all"]
+fn states_after_a_guide_are_those_of_the_path() {
+    let (shape, plan) = (FingertipShape::default(), Plan::usual());
+    let materials = solids(&TissueTable::default(), &plan).unwrap();
+    let pose = Pose { pitch_deg: 10.0, roll_deg: 5.0, yaw_deg: 20.0 };
+    let ball = approach("shape = \"sphere\"\nradius_mm = 3.0", pose, [0.5, 0.0]);
+    let drive = Drive::Depths(vec![0.3, 0.6]);
+    let contact = ball.contact_with(&shape, &drive);
+    let (density, parts) = (Density::Medium, Parts::default());
+    let mut body =
+        Body::fingertip(&shape, materials, density, Order::Graded, parts, contact).unwrap();
+    let solve = |body: &Body| {
+        let mut found = Vec::new();
+        let mut solver = body.solver(Options::default()).unwrap();
+        let keep = &mut |_: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
+            found.push((record.clone(), report.guiding.steps));
+        };
+        body.press(&mut solver, &ball, &drive, 1, keep).unwrap();
+        found
+    };
+    let guided = solve(&body);
+    assert!(body.guide.take().is_some());
+    for ((led, by), (alone, steps)) in guided.into_iter().zip(solve(&body)) {
+        assert!(by > 0 && steps == 0);
+        let differ = |a: &[f64], b: &[f64]| {
+            let square = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>();
+            let difference = square(&mut a.iter().zip(b).map(|(x, y)| x - y));
+            (difference / square(&mut b.iter().copied())).sqrt()
+        };
+        assert!(differ(&led.force_n, &alone.force_n) < 1e-4);
+        assert!(differ(&led.pressure_mpa, &alone.pressure_mpa) < 1e-3);
+        assert!(differ(&led.sed_dermis_mpa, &alone.sed_dermis_mpa) < 1e-3);
+        assert!(led.checks.energy_vs_work < 1e-2, "{}", led.checks.energy_vs_work);
+    }
+}

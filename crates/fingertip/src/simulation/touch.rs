@@ -25,17 +25,17 @@ impl Approach {
     /// passes it.
     #[must_use]
     pub fn contact_with(&self, finger: &FingertipShape, drive: &Drive) -> Option<Contact> {
-        let depth_mm = match drive {
-            Drive::Depths(depths) => depths.last().copied().unwrap_or(0.0),
-            Drive::Forces(_) => GRADED_DEPTH_MM,
-            Drive::Path(points) => points.iter().map(|p| p.depth_mm).fold(0.0, f64::max),
+        let depths_mm = match drive {
+            Drive::Depths(depths) => depths.clone(),
+            Drive::Forces(_) => vec![GRADED_DEPTH_MM],
+            Drive::Path(points) => vec![points.iter().map(|p| p.depth_mm).fold(0.0, f64::max)],
         };
         let coming = Coming {
             shape: &self.shape,
             rotation: rotation(self.pose),
             top_mm: self.top_mm,
             offset_mm: self.offset_mm,
-            depth_mm,
+            depths_mm,
         };
         Contact::new(finger, &coming)
     }

@@ -5,7 +5,7 @@ use super::{Case, ConvergenceError, MeshChoice};
 use crate::acceptance::fault;
 use crate::processor;
 use ndarray::Ix2;
-use papilla_dataset::sha256_hex;
+use papilla_dataset::{BALANCE_RELATIVE_MAX, sha256_hex};
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fem::tensor::norm;
@@ -90,16 +90,29 @@ impl Solution {
         let readers = Readers::new(&body, target);
         let begun_s = processor::thread_s();
         let mut solver = body.solver(Options::default())?;
-        let mut keep = |_: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
+        let mut keep = |state: usize, _: &Solver<'_>, found: &IncrementRecord, _: &StepReport| {
+            if state == 0 {
+                self.forget_states();
+            }
             self.pressure_pa.push(readers.skin(&found.pressure_mpa));
             self.sed_j_per_m3.push(readers.interface(&found.sed_dermis_mpa));
             self.record.depth_mm.push(found.depth_mm);
             self.record.force_n.push(norm(found.force_n));
             self.record.faults.push(fault(found, found.pressure_mpa.len()));
         };
-        let pressed = body.press(&mut solver, &approach, &drive, 1, &mut keep);
+        let limit = BALANCE_RELATIVE_MAX;
+        let pressed = body.press_balanced(&mut solver, &approach, &drive, limit, &mut keep).pressed;
         self.record.solve_s = processor::thread_s() - begun_s;
         pressed
+    }
+
+    /// An indentation that is taken again tells its states again.
+    fn forget_states(&mut self) {
+        self.pressure_pa.clear();
+        self.sed_j_per_m3.clear();
+        self.record.depth_mm.clear();
+        self.record.force_n.clear();
+        self.record.faults.clear();
     }
 
     fn write(&self, target: &Target, arrays: &Path, record: &Path) -> Result<(), ConvergenceError> {

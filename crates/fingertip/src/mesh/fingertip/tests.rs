@@ -70,7 +70,7 @@ fn every_mesh_is_well_shaped() {
 /// does not hang on the last bit of a platform's `tan`), connectivity, sets,
 /// surfaces and patch.
 fn hash(finger: &FingertipMesh) -> String {
-    let FingertipMesh { mesh, patch } = finger;
+    let FingertipMesh { mesh, patch, .. } = finger;
     let mut bytes = Vec::new();
     for x in mesh.nodes.as_flattened() {
         bytes.extend((*x as f32).to_bits().to_le_bytes());

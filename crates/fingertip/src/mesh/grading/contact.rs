@@ -17,8 +17,8 @@ pub struct Contact {
     pub first: [f64; 3],
     /// Unit vector along which it presses.
     pub direction: [f64; 3],
-    /// How deep it presses at the end, mm.
-    pub depth_mm: f64,
+    /// How deep it presses in the states that are stored, mm, rising.
+    pub depths_mm: Vec<f64>,
 }
 
 /// How an indenter comes to the finger.
@@ -32,8 +32,8 @@ pub struct Coming<'a> {
     /// Where its axis meets the skin, mm along its own x and y from the point that a flat plate
     /// would touch first.
     pub offset_mm: [f64; 2],
-    /// How deep it presses at the end, mm.
-    pub depth_mm: f64,
+    /// How deep it presses in the states that are stored, mm, rising.
+    pub depths_mm: Vec<f64>,
 }
 
 /// Step of the search for the first touch at its start and its end, mm.
@@ -59,13 +59,19 @@ impl Contact {
             start,
             first: plate,
             direction,
-            depth_mm: coming.depth_mm,
+            depths_mm: coming.depths_mm.clone(),
         };
         let limit = 2.0 * finger.length_mm;
         let first = least(finger, direction, |p| far.travel_mm(p, limit))?;
         let travel = far.travel_mm(first, limit);
         let origin_mm = std::array::from_fn(|i| start.origin_mm[i] + travel * direction[i]);
         travel.is_finite().then(|| Self { start: Placement { origin_mm, ..start }, first, ..far })
+    }
+
+    /// How deep it presses in the end, mm.
+    #[must_use]
+    pub fn deepest_mm(&self) -> f64 {
+        self.depths_mm.last().copied().unwrap_or(0.0)
     }
 
     /// Travel until the indenter reaches the undeformed point `p`, mm; infinite if it does not

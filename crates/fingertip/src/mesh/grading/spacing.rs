@@ -16,6 +16,9 @@ pub struct Closeness {
     pub of_radius_mm: f64,
     /// Spacing under what is flat, mm.
     pub flat_mm: f64,
+    /// Spacing across the edge of a contact, mm: about as close as the interface is deep, for SED
+    /// peaks there in a ring.
+    pub edge_mm: f64,
     /// Change of the spacing over the distance from what is touched.
     pub growth: f64,
 }
@@ -34,22 +37,34 @@ struct Touched {
     at: [f64; 3],
     /// Second derivatives of the indenter's signed distance, 1/mm.
     hessian: [[f64; 3]; 3],
+    /// Unit vector along the skin across the contact's edge, if it passes here at a stored depth.
+    across_edge: Option<[f64; 3]>,
 }
+
+/// Where a contact's edge is at some depth: the undeformed skin touches after this part of it.
+/// Under a ball on a thick elastic body it is a half (Hertz: `a^2 = R d`, travel `a^2 / 2R`); the
+/// finger's bone and layers drive it outward.
+const EDGE_TRAVEL: std::ops::Range<f64> = 0.42..0.7;
 
 impl Spacing {
     /// For the skin that an indenter would touch on its way if nothing deformed.
     #[must_use]
     pub fn new(shape: &FingertipShape, contact: &Contact, closeness: Closeness) -> Self {
+        let deepest_mm = contact.deepest_mm();
         let touch = |at| {
-            let travel = contact.travel_mm(at, contact.depth_mm);
-            (travel < contact.depth_mm).then(|| {
+            let travel = contact.travel_mm(at, deepest_mm);
+            (travel < deepest_mm).then(|| {
                 let moved = Placement {
                     origin_mm: std::array::from_fn(|i| {
                         contact.start.origin_mm[i] + travel * contact.direction[i]
                     }),
                     ..contact.start
                 };
-                Touched { at, hessian: moved.distance(contact.shape.as_ref(), at).hessian }
+                let found = moved.distance(contact.shape.as_ref(), at);
+                let is_edge = contact.depths_mm.iter().any(|d| EDGE_TRAVEL.contains(&(travel / d)));
+                let across_edge =
+                    is_edge.then(|| along_skin(found.normal, shape.skin_normal(at))).flatten();
+                Touched { at, hessian: found.hessian, across_edge }
             })
         };
         Self { touched: facing(shape, contact.direction).filter_map(touch).collect(), closeness }
@@ -57,16 +72,27 @@ impl Spacing {
 
     /// Spacing (mm) along a unit vector, anywhere on a cell of which some `points` (mm) are given.
     pub(in crate::mesh) fn wanted_mm(&self, points: &[[f64; 3]; 9], direction: [f64; 3]) -> f64 {
-        let Closeness { of_radius_mm, flat_mm, growth } = self.closeness;
+        let Closeness { of_radius_mm, flat_mm, edge_mm, growth } = self.closeness;
         let spacing = |t: &Touched| {
             let curvature: f64 = (0..3)
                 .map(|i| direction[i] * (0..3).map(|j| t.hessian[i][j] * direction[j]).sum::<f64>())
                 .sum();
-            let own = (of_radius_mm / curvature.abs().sqrt()).min(flat_mm);
+            let across: f64 =
+                t.across_edge.map_or(0.0, |n| (0..3).map(|i| n[i] * direction[i]).sum());
+            let own =
+                (of_radius_mm / curvature.abs().sqrt()).min(edge_mm / across.abs()).min(flat_mm);
             let away = |p: &[f64; 3]| norm(std::array::from_fn(|i| p[i] - t.at[i]));
             let distance = points.iter().map(away).fold(f64::INFINITY, f64::min);
             own + growth * distance
         };
         self.touched.iter().map(spacing).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Unit vector of the part of `v` across the unit vector `normal`; `None` if there is none.
+fn along_skin(v: [f64; 3], normal: [f64; 3]) -> Option<[f64; 3]> {
+    let out: f64 = (0..3).map(|i| v[i] * normal[i]).sum();
+    let along: [f64; 3] = std::array::from_fn(|i| v[i] - out * normal[i]);
+    let size = norm(along);
+    (size > 0.0).then(|| along.map(|a| a / size))
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build};
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_guide};
 use papilla_fem::element::BlockGeometry;
 use papilla_fem::mesh::{HangingNode, Mesh};
 use papilla_fem::tensor::norm;
@@ -15,7 +15,8 @@ fn contact(indenter: &str, angles_deg: [f64; 3], offset_mm: [f64; 2], depth_mm: 
     let [pitch, roll, yaw] = angles_deg;
     let rotation = Placement::turned(pitch, roll, yaw, [0.0; 3]).rotation;
     let top_mm = spec.top_mm();
-    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm, depth_mm };
+    let depths_mm = vec![depth_mm];
+    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm, depths_mm };
     Contact::new(&FingertipShape::default(), &coming).unwrap()
 }
 
@@ -78,6 +79,59 @@ fn nodes_are_close_where_the_indenter_is_narrow() {
     assert!(largest(PLATE, 1.0) > 0.2, "a plate does not pay for what it does not need");
 }
 
+/// Across the edge of a plate's contact nodes are a fifth of a millimetre apart; in its middle and
+/// beyond they are not.
+#[test]
+fn nodes_are_close_where_an_edge_passes() {
+    let contact = contact(PLATE, [10.0, 5.0, 0.0], [0.0; 2], 1.0);
+    let mesh = mesh(Density::Medium, &contact);
+    let at: Vec<[f64; 3]> = mesh.patch.skin.iter().map(|&n| mesh.mesh.nodes[n as usize]).collect();
+    let spacing = |p: &[f64; 3]| {
+        let away = |q: &[f64; 3]| norm(std::array::from_fn(|i| p[i] - q[i]));
+        at.iter().map(away).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    let within = |from: f64, to: f64| -> Vec<f64> {
+        let travels = |p: &&[f64; 3]| (from..to).contains(&contact.travel_mm(**p, 2.0));
+        at.iter().filter(travels).map(spacing).collect()
+    };
+    let largest = |all: Vec<f64>| all.into_iter().fold(0.0, f64::max);
+    let (edge, middle) = (within(0.5, 0.6), within(0.0, 0.15));
+    assert!(edge.len() > 100 && middle.len() > 10, "{} {}", edge.len(), middle.len());
+    assert!(largest(edge) < 0.2 * 2.0_f64.sqrt());
+    assert!(largest(middle) > 0.25);
+}
+
+/// Nodes of a guide, read at the nodes of the mesh that it guides, are those nodes to the order of
+/// the cells; what is linear on the lattice stays what it is in each cell.
+#[test]
+fn a_guide_is_read_where_it_is() {
+    let contact = contact(BALL, [10.0, 5.0, 0.0], [0.0; 2], 1.0);
+    let shape = FingertipShape::default();
+    let (density, parts) = (Density::Medium, Parts::default());
+    let fine = mesh(density, &contact);
+    let (guide, transfer) = build_guide(&shape, density, parts, &contact, &fine).unwrap().unwrap();
+    assert!(guide.mesh.nodes.len() < fine.mesh.nodes.len() / 2);
+    let found = transfer.nodal(&guide.mesh.nodes);
+    assert_eq!(found.len(), fine.mesh.nodes.len());
+    for (p, q) in found.iter().zip(&fine.mesh.nodes) {
+        let miss = norm(std::array::from_fn(|i| p[i] - q[i]));
+        assert!(miss < 0.1, "{p:?} {q:?}");
+    }
+    let rows = |mesh: &FingertipMesh| -> Vec<[f64; 4]> {
+        let cells = &mesh.refined.as_ref().unwrap().leaves().to_vec();
+        let layers = mesh.mesh.blocks[0].len() / cells.len();
+        let of = |layer: usize| {
+            cells.iter().map(move |l| {
+                let (first, half) = (f64::from(l.first[0]), 0.5 * f64::from(l.size[0]));
+                [first + half, half, 0.0, layer as f64]
+            })
+        };
+        (0..layers).flat_map(of).collect()
+    };
+    assert_eq!(transfer.linear(&rows(&guide)), rows(&fine));
+    assert!(build_guide(&shape, Density::Coarse, parts, &contact, &fine).unwrap().is_none());
+}
+
 /// Nodes of the even lattice that are held under the nail are held on any mesh, and all others
 /// that are lie under it too.
 #[test]
@@ -129,7 +183,7 @@ fn elements_meet_along_whole_faces_or_hang() {
 #[test]
 fn vertices_are_read_where_they_are() {
     let contact = contact(BALL, [10.0, 5.0, 0.0], [0.0; 2], 1.0);
-    let FingertipMesh { mesh, patch } = mesh(Density::Coarse, &contact);
+    let FingertipMesh { mesh, patch, .. } = mesh(Density::Coarse, &contact);
     let vertices = patch.vertices.as_ref().unwrap();
     for (nodes, due) in
         [(&patch.skin, &vertices.skin_mm), (&patch.interface, &vertices.interface_mm)]
@@ -155,7 +209,8 @@ fn first_touch_is_that_of_the_smooth_skin() {
     let rotation = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]).rotation;
     let top_mm = spec.top_mm();
     // Along the cylinder's lowest line every point ties: the touch is at z = -h/2 and y = 0.
-    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm: [0.0; 2], depth_mm: 1.0 };
+    let depths_mm = vec![1.0];
+    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm: [0.0; 2], depths_mm };
     let found = Contact::new(&finger, &coming).unwrap();
     assert!(found.first[1].abs() < 1e-4, "{:?}", found.first);
     assert!((found.first[2] + 0.5 * finger.height_mm).abs() < 1e-9, "{:?}", found.first);

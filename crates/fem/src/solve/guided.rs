@@ -1,0 +1,114 @@
+//! Equilibria sought from a displacement that a coarser mesh found.
+//!
+//! What a path of small steps is for, to bring the skin to the indenter and the contact to its
+//! size, a coarse mesh does as well. Newton's method on the fine one then starts beside the
+//! equilibrium. Only where no state depends on the way to it: no viscosity, no friction.
+
+use super::state::{State, StepReport};
+use super::stepping::Solver;
+use super::{SolveError, StepError, mixed};
+use crate::element::Dilatation;
+
+/// Where an equilibrium may be.
+#[derive(Clone, Debug)]
+pub struct Guess {
+    /// Displacement, mm, one a node.
+    pub displacement_mm: Vec<[f64; 3]>,
+    /// Dilatation of each element, in its own basis, if it is known apart from the displacement:
+    /// what is interpolated between nodes changes the volume of nearly incompressible elements,
+    /// and the pressure of that would make the tangent indefinite.
+    pub dilatation: Vec<Dilatation>,
+}
+
+impl Solver<'_> {
+    /// Goes on to `target` in one step from what is close to the equilibrium there; as
+    /// [`Self::advance_to`] where that fails.
+    ///
+    /// # Errors
+    /// As [`Self::advance_to`].
+    pub fn advance_from(&mut self, target: f64, guess: Guess) -> Result<StepReport, SolveError> {
+        let first = self.newton.effort;
+        match self.try_guess(target, guess) {
+            Ok(()) => {
+                self.newton.effort.steps += 1;
+                Ok(self.report(&first))
+            }
+            Err(cause) => {
+                tracing::debug!(target, %cause, "no equilibrium beside the guess");
+                self.newton.effort.cuts += 1;
+                self.settle();
+                self.advance_to(target)?;
+                Ok(self.report(&first))
+            }
+        }
+    }
+
+    fn try_guess(&mut self, target: f64, guess: Guess) -> Result<(), StepError> {
+        let mut trial = State { u: guess.displacement_mm, ..self.state.clone() };
+        // What is held is so on this mesh, whatever the guess has there.
+        for (v, held) in trial.u.as_flattened_mut().iter_mut().zip(&self.newton.problem.fixed) {
+            if *held {
+                *v = 0.0;
+            }
+        }
+        self.prescribe(target, &mut trial.u);
+        if trial.independent.len() == guess.dilatation.len() {
+            trial.independent = guess.dilatation;
+        } else if !trial.independent.is_empty() {
+            trial.independent.clear();
+            mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
+        }
+        self.augmented(target, &mut trial)?;
+        self.accept(target, trial);
+        Ok(())
+    }
+
+    /// The dilatation of each element where it is an unknown of its own; else empty.
+    #[must_use]
+    pub fn independent_dilatation(&self) -> &[Dilatation] {
+        &self.state.independent
+    }
+
+    /// Gives the force between the last two equilibria (the first is at rest) the course that it
+    /// has in `guide`, which found both load fractions too: force and energy of the guide's
+    /// equilibria in between, times what this body's are over the guide's at the ends.
+    pub fn take_course(&mut self, guide: &Solver<'_>) {
+        self.work.take_course(&guide.work);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::element::ElementKind;
+    use crate::solve::{Guess, Options, Solver};
+    use crate::testing::squeezed_block;
+
+    /// From a displacement nearby or from nonsense, the equilibrium is that of the path.
+    #[test]
+    fn a_guess_leads_to_the_equilibrium_of_the_path() {
+        let (problem, loading, _) = squeezed_block(ElementKind::Hex8, 3, 0.48).unwrap();
+        let tight =
+            Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-7, ..Options::default() };
+        let mut guide = Solver::new(&problem, tight).unwrap();
+        guide.start(loading.clone());
+        for step in 1..=4 {
+            guide.advance_to(0.25 * f64::from(step)).unwrap();
+        }
+        let due = guide.displacement_mm().to_vec();
+        let near: Vec<_> = due.iter().map(|u| u.map(|v| 0.97 * v)).collect();
+        let mut folded = due.clone();
+        folded.reverse();
+        for guess in [near, folded] {
+            let mut solver = Solver::new(&problem, tight).unwrap();
+            solver.start(loading.clone());
+            let guess = Guess { displacement_mm: guess, dilatation: Vec::new() };
+            solver.advance_from(1.0, guess).unwrap();
+            let largest = due.as_flattened().iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            for (found, due) in
+                solver.displacement_mm().as_flattened().iter().zip(due.as_flattened())
+            {
+                assert!((found - due).abs() < 1e-5 * largest, "{found} {due}");
+            }
+        }
+    }
+}
