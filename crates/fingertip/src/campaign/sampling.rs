@@ -36,7 +36,7 @@ impl CampaignSpec {
     }
 }
 
-/// All indentations by id: [`indentations_in`] the whole campaign.
+/// All indentations by id.
 pub fn indentations(spec: &CampaignSpec) -> Vec<Indentation> {
     indentations_in(spec, 0..spec.presses)
 }
