@@ -41,6 +41,7 @@ sealed partial class Run : IDisposable
     Session session;
     object reply;
     string twice;
+    int connections = 1;
     ulong clockUs;
 
     internal Run(string url, Atlas atlas, int patienceMs, bool isFramework)
@@ -65,6 +66,7 @@ sealed partial class Run : IDisposable
             case "frame": Frame(step, expect); break;
             case "burst": Burst(step, expect); break;
             case "reconnect": Reconnect((double)step["within_s"]); break;
+            case "move": Moved((double)step["within_s"]); break;
             case "http": Http(step, expect); break;
             case "rasterise": Rasterise(step, expect); break;
             case "contacts": Contacts(step, expect); break;
@@ -223,6 +225,13 @@ sealed partial class Run : IDisposable
         lock (gate) reply = null;
         Steer("restart");
         Until("a new session", () => reply as Ready, (int)(1000 * withinS));
+    }
+
+    void Moved(double withinS)
+    {
+        // It may have moved between the steps.
+        Until("another connection", () => session.Connections > connections ? session : null, (int)(1000 * withinS));
+        connections = session.Connections;
     }
 
     void Http(JObject step, JObject expect)

@@ -47,14 +47,18 @@ namespace Papilla
             return hello;
         }
 
+        /// <param name="follows">the session moves to another connection when it is asked to</param>
+        /// <param name="resumes">what the service remembers is the next message</param>
         /// <param name="isOf3">version 3 whatever its members are</param>
-        internal string ToText(bool isOf3 = false)
+        internal string ToText(bool follows, bool resumes = false, bool isOf3 = false)
         {
             var json = (JObject)Members.DeepClone();
             json["type"] = "hello";
             json["version"] = isOf3 || System.Array.Exists(OfVersion3, name => Members[name] != null) ? 3 : 2;
             json["effects"] = new JArray(Effects);
             json["sample_type"] = SampleType.ToString().ToLowerInvariant();
+            if (follows) json["reconnect"] = true;
+            if (resumes) json["resume"] = true;
             if (Tier != null) json["tier"] = Tier;
             if (BudgetUs != null) json["budget_us"] = BudgetUs;
             if (PressureScalePa > 0) json["pressure_scale_pa"] = PressureScalePa;

@@ -15,23 +15,29 @@ namespace Papilla
             while (true)
             {
                 ITransport open;
+                bool isSeal;
                 lock (gate)
                 {
                     Finger next = null;
-                    while (!isClosed && (ready == null || transport == null || outstanding.Count >= OutstandingMax || (next = NextWaiting()) == null)) Monitor.Wait(gate);
+                    while (!isClosed && (!CanSend() || !IsSealDue() && (next = NextWaiting()) == null)) Monitor.Wait(gate);
                     if (isClosed) return;
-                    var frame = next.Waiting;
-                    next.Waiting = leaving;
-                    leaving = frame;
-                    leaving.StampVersion(ready.Version);
-                    next.IsWaiting = false;
                     open = transport;
-                    outstanding.Add(leaving.Sequence);
-                    Sent++;
+                    if (next == null)
+                    {
+                        move.Stage = Stage.Held;
+                        move.Hello = hello;
+                        move.Asked++;
+                    }
+                    else
+                    {
+                        TakeWaiting(next);
+                    }
+                    isSeal = next == null;
                 }
                 try
                 {
-                    open.Send(leaving.Buffer, Headroom.Bytes, leaving.Bytes, false);
+                    if (isSeal) SendText(open, "{\"type\": \"seal\"}");
+                    else open.Send(leaving.Buffer, Headroom.Bytes, leaving.Bytes, false);
                 }
                 catch (Exception error) when (IsConnection(error))
                 {
@@ -39,6 +45,27 @@ namespace Papilla
                     open.Dispose();
                 }
             }
+        }
+
+        bool CanSend()
+        {
+            return ready != null && transport != null && outstanding.Count < OutstandingMax && (move == null || !move.Holds);
+        }
+
+        bool IsSealDue()
+        {
+            return move != null && move.Stage == Stage.SealDue;
+        }
+
+        void TakeWaiting(Finger of)
+        {
+            var frame = of.Waiting;
+            of.Waiting = leaving;
+            leaving = frame;
+            leaving.StampVersion(ready.Version);
+            of.IsWaiting = false;
+            outstanding.Add(leaving.Sequence);
+            Sent++;
         }
 
         static bool IsConnection(Exception error)
@@ -58,21 +85,25 @@ namespace Papilla
                 try
                 {
                     next.Connect(uri, AttemptMs);
-                    lock (gate) transport = next;
+                    lock (gate)
+                    {
+                        transport = next;
+                        isFirstReady = true;
+                    }
                     Greet(next);
-                    Listen(next);
+                    Attend(next);
                 }
-                catch (Exception error) when (IsConnection(error) || error is FormatException)
+                catch (Exception error) when (IsConnection(error))
                 {
-                    var fault = error is FormatException ? Refused : null;
-                    if (fault != null) fault(new Problem("bad_frame", error.Message));
+                    next.Dispose();
                 }
-                next.Dispose();
                 lock (gate)
                 {
                     transport = null;
                     ready = null;
                     helloBefore = null;
+                    move = null;
+                    Monitor.PulseAll(gate);
                     while (isRefused && !isClosed) Monitor.Wait(gate);
                 }
                 LoseAll();
@@ -80,14 +111,42 @@ namespace Papilla
             }
         }
 
-        void Greet(ITransport open)
+        /// <summary>Listens to a connection, and to the one that the session moves to, until the session has none.</summary>
+        void Attend(ITransport open)
         {
-            var text = Encoding.UTF8.GetBytes(hello.ToText());
+            while (true)
+            {
+                try
+                {
+                    Listen(open);
+                }
+                catch (Exception error) when (IsConnection(error) || error is FormatException)
+                {
+                    var fault = error is FormatException ? Refused : null;
+                    if (fault != null) fault(new Problem("bad_frame", error.Message));
+                }
+                open.Dispose();
+                lock (gate)
+                {
+                    if (isClosed || transport == open) return;
+                    open = transport;
+                }
+            }
+        }
+
+        static void SendText(ITransport open, string words)
+        {
+            var text = Encoding.UTF8.GetBytes(words);
             var buffer = new byte[Headroom.Bytes + text.Length];
             text.CopyTo(buffer, Headroom.Bytes);
+            open.Send(buffer, Headroom.Bytes, text.Length, true);
+        }
+
+        void Greet(ITransport open)
+        {
             try
             {
-                open.Send(buffer, Headroom.Bytes, text.Length, true);
+                SendText(open, hello.ToText(true));
             }
             catch (Exception error) when (IsConnection(error))
             {
@@ -102,7 +161,8 @@ namespace Papilla
                 bool isText;
                 int bytes = open.Receive(message, out isText);
                 if (bytes < 0) return;
-                if (!isText) OnFrame(bytes);
+                if (!isText && Wire.IsSealed(message, bytes)) OnSealed(bytes);
+                else if (!isText) OnFrame(bytes);
                 else if (!OnText(JObject.Parse(Encoding.UTF8.GetString(message, 0, bytes)))) return;
             }
         }
@@ -119,10 +179,17 @@ namespace Papilla
                     readyBefore = null;
                     helloBefore = null;
                     ready = terms;
+                    if (isFirstReady) Connections++;
+                    isFirstReady = false;
                     Monitor.PulseAll(gate);
                 }
                 var welcome = SessionReady;
                 if (welcome != null) welcome(terms);
+                return true;
+            }
+            if ((string)json["type"] == "reconnect")
+            {
+                OnReconnect();
                 return true;
             }
             var problem = new Problem(json);

@@ -27,6 +27,8 @@ namespace Papilla
         public uint DeadlineUs;
         /// <summary>Frames that went out, and those that a newer one superseded before they left.</summary>
         public int Sent, SupersededByClient;
+        /// <summary>Connections that the session had: more than 1 after one was lost, or the service asked it to move.</summary>
+        public int Connections;
         /// <summary>
         /// Called with the first refused hello, the first refused frame and the first one out of range, on a thread of the client's:
         /// by default Unity's console, or standard error.
@@ -44,7 +46,7 @@ namespace Papilla
         readonly Random random = new Random();
         Answer filling = new Answer();
         Frame leaving = new Frame();
-        bool isClosed, isRefused, toldRefusal, toldRange;
+        bool isClosed, isRefused, isFirstReady, toldRefusal, toldRange;
         uint sequence, renewedFrom;
         Hello hello, helloBefore;
         Ready readyBefore, olderReady;
@@ -108,6 +110,7 @@ namespace Papilla
                     helloBefore = hello;
                     readyBefore = ready;
                 }
+                PutOffMove();
                 hello = next;
                 renewedFrom = sequence + 1;
                 ready = null;
@@ -176,11 +179,13 @@ namespace Papilla
                 if (isClosed) return;
                 isClosed = true;
                 if (transport != null) transport.Dispose();
+                if (move != null && move.Next != null) move.Next.Dispose();
                 Monitor.PulseAll(gate);
             }
             if (receiver == null) return;
             if (Thread.CurrentThread != receiver) receiver.Join(2 * AttemptMs);
             if (Thread.CurrentThread != sender) sender.Join(AttemptMs);
+            if (mover != null && Thread.CurrentThread != mover) mover.Join(2 * AttemptMs);
             LoseAll();
             TellWaiting(Status.Lost);
         }

@@ -24,6 +24,12 @@ namespace Papilla
 
         static readonly float[] Halves = HalfTable();
 
+        /// <summary>Whether a message is what a session remembers, sealed: <c>PPS</c> and more.</summary>
+        internal static bool IsSealed(byte[] message, int bytes)
+        {
+            return bytes > 3 && message[0] == 'P' && message[1] == 'P' && message[2] == 'S';
+        }
+
         /// <summary>Bytes of one sample.</summary>
         public static int Bytes(SampleType type)
         {

@@ -8,8 +8,15 @@ use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, Patch};
 use papilla_output::npz::NpzArrays;
 use papilla_output::{OutputError, atomic};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Component, Path, PathBuf};
+
+/// What every format's manifest has.
+#[derive(Deserialize)]
+struct Announced {
+    #[serde(default)]
+    format: serde_json::Value,
+}
 
 /// A dataset on disk; shards are read when asked for.
 #[derive(Debug)]
@@ -28,13 +35,11 @@ impl Dataset {
     pub fn open(folder: &Path) -> Result<Self, DatasetError> {
         let path = folder.join("manifest.json");
         // The format first: another one may have other fields.
-        let raw: serde_json::Value = atomic::read_json(&path)?;
-        let found = raw.get("format").and_then(serde_json::Value::as_u64).unwrap_or(0) as u32;
+        let found = atomic::read_json::<Announced>(&path)?.format.as_u64().unwrap_or(0) as u32;
         if !FORMATS.contains(&found) {
             return Err(DatasetError::Format { path, found, expected: FORMAT });
         }
-        let manifest: Manifest =
-            serde_json::from_value(raw).map_err(|e| OutputError::malformed(&path, &e))?;
+        let manifest: Manifest = atomic::read_json(&path)?;
         if manifest.presses.is_empty() {
             return Err(DatasetError::Empty { path });
         }

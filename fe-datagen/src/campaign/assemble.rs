@@ -72,7 +72,8 @@ pub(super) fn manifest(
     let campaign = serde_json::to_value(spec)
         .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
     let present = |ids: &[usize]| -> Vec<usize> {
-        ids.iter().copied().filter(|id| presses.iter().any(|p| p.id == *id)).collect()
+        let is_there = |id: &usize| presses.binary_search_by_key(id, |p| p.id).is_ok();
+        ids.iter().copied().filter(is_there).collect()
     };
     Ok(Manifest {
         format: dataset::FORMAT,

@@ -20,17 +20,23 @@ const NAMED: usize = 5;
 pub fn merge(spec: &CampaignSpec, folder: &Path) -> Result<CampaignReport, CampaignError> {
     spec.validate()?;
     let (workspace, atlas) = Workspace::begun(folder, spec)?;
-    let (mut states, mut missing) = (Vec::new(), Vec::new());
+    let (mut states, mut missing, mut named) = (Vec::new(), 0, Vec::new());
     for press in indentations(spec) {
-        match workspace.load(&press) {
-            Found::Vouched(state) => states.push(*state),
-            Found::Absent => missing.push(format!("{} (not solved)", press.id)),
-            Found::Untrusted(why) => missing.push(format!("{} ({why})", press.id)),
+        let why = match workspace.load(&press) {
+            Found::Vouched(state) => {
+                states.push(*state);
+                continue;
+            }
+            Found::Absent => "not solved".to_owned(),
+            Found::Untrusted(why) => why,
+        };
+        missing += 1;
+        if named.len() < NAMED {
+            named.push(format!("{} ({why})", press.id));
         }
     }
-    if !missing.is_empty() {
-        let first = missing.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-        let (missing, presses) = (missing.len(), spec.presses);
+    if missing > 0 {
+        let (presses, first) = (spec.presses, named.join(", "));
         return Err(CampaignError::Holes { missing, presses, first });
     }
     let manifest = manifest(spec, &atlas, &states)?;

@@ -7,7 +7,7 @@ use super::{BoxError, CampaignError, IndentationSolver, RunOptions, SliceReport}
 use papilla_atlas::Atlas;
 use papilla_dataset as dataset;
 use papilla_dataset::TriangleOnLattice;
-use papilla_fingertip::campaign::{CampaignSpec, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, indentations_in};
 use papilla_progress::{Progress, clock};
 use std::num::NonZero;
 use std::path::Path;
@@ -35,8 +35,8 @@ pub fn solve<S: IndentationSolver>(
     let workspace = Workspace::open(folder, spec, atlas)?;
     dataset::write_atlas(folder, atlas, lattice)?;
     let (mut known, mut todo) = (Vec::new(), Vec::new());
-    let planned = indentations(spec);
-    for press in &planned[options.slice.range(planned.len())] {
+    let planned = indentations_in(spec, options.slice.range(spec.presses));
+    for press in &planned {
         let found = workspace.load(press);
         if let Found::Untrusted(why) = &found {
             eprintln!("indentation {} is solved again: {why}", press.id);

@@ -23,6 +23,7 @@ mod otlp;
 mod overload;
 mod page;
 mod process;
+mod recorded;
 mod reload;
 mod rendering;
 mod session;

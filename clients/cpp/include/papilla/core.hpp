@@ -29,6 +29,23 @@ class Core {
     return "{\"type\":\"hello\",\"version\":" + std::string(is_of_version_3(members) ? "3" : "2") +
            (members.empty() ? "" : "," + members) + "}";
   }
+  /// Members of a hello of a client that moves when it is asked to.
+  static std::string following(const std::string& members) {
+    return (members.empty() ? "" : members + ", ") + "\"reconnect\": true";
+  }
+  /// To be said to the old connection: asks for what the service remembers.
+  const char* ask_for_seal() {
+    ++seals_due_;
+    return "{\"type\": \"seal\"}";
+  }
+  /// Once for each that came: whether it is the one asked for last. Others are of moves that were given up.
+  bool is_last_seal() { return --seals_due_ == 0; }
+  /// Whether a binary message is that: it begins with PPS.
+  static bool is_sealed(const std::uint8_t* bytes, std::size_t size) {
+    return size > 3 && bytes[0] == 'P' && bytes[1] == 'P' && bytes[2] == 'S';
+  }
+  /// Said to the new connection, before the sealed message.
+  std::string resuming() const { return hello_text(hello_ + ", \"resume\": true"); }
   /// What to say again after a reconnect.
   void set_hello(std::string hello) { hello_ = std::move(hello); }
 
@@ -105,6 +122,7 @@ class Core {
   /// The connection broke: what was sent is lost; what waits goes on waiting.
   void lost() {
     is_ready_ = false;
+    seals_due_ = 0;
     for (const Sent& sent : sent_) outcome(sent.id, Status::lost);
     sent_.clear();
   }
@@ -180,6 +198,7 @@ class Core {
   std::vector<Sent> sent_;
   std::vector<float> recoded_ = std::vector<float>(map_len);
   std::uint64_t superseded_ = 0;
+  int seals_due_ = 0;
   Answer scratch_;
 
   Event agree(const json::Value& message) {

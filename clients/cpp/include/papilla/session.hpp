@@ -44,8 +44,7 @@ class Session {
 
   Session() : Session(Options()) {}
   explicit Session(Options options)
-      : options_(std::move(options)), address_(net::Address::of(options_.url)), members_(following(options_.hello)),
-        core_(members_) {
+      : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(Core::following(options_.hello)) {
     core_.on_answer = [this](const Answer& answer) { outcome(answer); };
   }
   Session(const Session&) = delete;
@@ -129,14 +128,14 @@ class Session {
   bool renew(const std::string& hello, int timeout_ms = 30000) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (!core_.is_ready()) return problem_ = {"", "there is no session just now", ""}, false;
-    const std::string members = following(hello);
+    const std::string members = Core::following(hello);
     new_hello_ = Core::hello_text(members);
     is_answered_ = is_granted_ = false;
     changed_.notify_all();
     const auto wait = std::chrono::milliseconds(timeout_ms);
     const bool good = changed_.wait_for(lock, wait, [this] { return is_answered_ || closed_; }) && is_granted_;
     is_answered_ = true;  // also after a timeout: frames go on under the old terms
-    if (good) core_.set_hello(members_ = members);
+    if (good) core_.set_hello(members);
     return good;
   }
 
@@ -173,7 +172,6 @@ class Session {
 
   Options options_;
   net::Address address_;
-  std::string members_;               ///< of the hello
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   Core core_;
@@ -244,11 +242,6 @@ class Session {
     }
   }
 
-  /// The members of a hello of a client that moves when it is asked to.
-  static std::string following(const std::string& members) {
-    return (members.empty() ? "" : members + ", ") + "\"reconnect\": true";
-  }
-
   bool connect() {
     std::string error, answer;
     if (!socket_->open(address_, "/v1/session", options_.token, error, answer)) {
@@ -314,8 +307,8 @@ class Session {
         changed_.notify_all();
         continue;
       }
-      if (kind == WebSocket::Message::binary && is_sealed()) {
-        if (moving_ == Moving::held) move(lock);
+      if (kind == WebSocket::Message::binary && Core::is_sealed(message_.data(), message_.size())) {
+        if (core_.is_last_seal() && moving_ == Moving::held) move(lock);
         continue;
       }
       const auto event = kind == WebSocket::Message::text
@@ -334,8 +327,6 @@ class Session {
       changed_.notify_all();
     }
   }
-
-  bool is_sealed() const { return message_.size() > 3 && text().substr(0, 3) == "PPS"; }
 
   /// Opens another connection while this one goes on, until the session has moved to it or ends.
   void dial(std::unique_lock<std::mutex>& lock) {
@@ -370,7 +361,7 @@ class Session {
   /// Goes on over the other connection with what the service remembers; frames wait meanwhile.
   void move(std::unique_lock<std::mutex>& lock) {
     std::unique_ptr<WebSocket> next = std::move(next_);
-    const std::string hello = Core::hello_text(members_ + ", \"resume\": true");
+    const std::string hello = core_.resuming();
     lock.unlock();
     std::vector<std::uint8_t> sealed(WebSocket::headroom + message_.size());
     std::copy(message_.begin(), message_.end(), sealed.begin() + WebSocket::headroom);
@@ -411,7 +402,7 @@ class Session {
       if (answers) pong = pong_;
       if (!answers && new_hello_.empty() && moving_ == Moving::seal_due && is_answered_) {
         moving_ = Moving::held;
-        hello = "{\"type\": \"seal\"}";
+        hello = core_.ask_for_seal();
       } else if (!answers) {
         hello.swap(new_hello_);
       }

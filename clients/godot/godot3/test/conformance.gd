@@ -16,6 +16,7 @@ var outcomes = {}
 var order = []
 var tiers = {}
 var reply = null
+var connections = 1
 
 
 func _init():
@@ -33,6 +34,7 @@ func _init():
 		why = ""
 		outcomes = {}
 		order = []
+		connections = 1
 		var at = 0
 		for step in one.steps:
 			at += 1
@@ -262,6 +264,16 @@ func step_reconnect(step, _expect):
 	reply = null
 	steer("restart")
 	wait_for("has_reply", null, int(step.within_s * 1000))
+
+
+# It may have moved between the steps.
+func step_move(step, _expect):
+	if wait_for("has_moved", connections, int(step.within_s * 1000)):
+		connections = session.connections
+
+
+func has_moved(before):
+	return session.connections > before
 
 
 func step_http(step, expect):

@@ -12,6 +12,6 @@ pub mod testing;
 mod tests;
 
 pub use error::SpecError;
-pub use sampling::{HeldOut, Indentation, held_out, indentations};
+pub use sampling::{HeldOut, Indentation, held_out, indentations, indentations_in};
 pub use slice::{Slice, SliceError};
 pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};

@@ -4,6 +4,7 @@ use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
 use crate::scene::Pose;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::ops::Range;
 
 /// One indentation of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,43 +28,62 @@ pub struct Indentation {
 impl CampaignSpec {
     /// Samples in all.
     pub fn samples(&self) -> usize {
-        indentations(self).iter().map(|p| p.depths_mm.len()).sum()
+        let candidates = self.candidates();
+        let states = |c: &Candidate| {
+            c.depths.or(self.depths).map_or(self.depths_mm.len(), |range| range.states)
+        };
+        turns(&candidates).take(self.presses).map(|(place, _)| states(&candidates[place])).sum()
     }
 }
 
 /// All indentations by id.
+pub fn indentations(spec: &CampaignSpec) -> Vec<Indentation> {
+    indentations_in(spec, 0..spec.presses)
+}
+
+/// The indentations of some ids; takes no memory for others.
 ///
 /// Indenters take turns so that after any number of indentations each has had its share, to
 /// less than one indentation. Pose, offset and depth of one indenter's indentations are points
 /// of an Owen-scrambled Sobol sequence of its own (Burley, Practical Hash-based Owen
 /// Scrambling, JCGT 9(4), 2020), scaled to the ranges: they fill the ranges far more
-/// evenly than random ones. The first n presses do not depend on how many follow.
-pub fn indentations(spec: &CampaignSpec) -> Vec<Indentation> {
+/// evenly than random ones. After 65 536 of them the sequence comes again, scrambled otherwise.
+/// The first n presses do not depend on how many follow.
+pub fn indentations_in(spec: &CampaignSpec, ids: Range<usize>) -> Vec<Indentation> {
     let candidates = spec.candidates();
+    let own = turns(&candidates).enumerate().skip(ids.start).take(ids.len());
+    own.map(|(id, (place, index))| press(spec, id, place, &candidates[place], index)).collect()
+}
+
+/// Whose turn it is, without end: the indenter, and how many indentations it has had.
+fn turns(candidates: &[Candidate]) -> impl Iterator<Item = (usize, u32)> + '_ {
     let mut had = vec![0u32; candidates.len()];
     let all: u64 = candidates.iter().map(|c| u64::from(c.share)).sum();
-    (0..spec.presses)
-        .map(|id| {
-            // The one that its presses lag most behind its share.
-            let lag = |k: usize| {
-                let due = u64::from(candidates[k].share) * (id as u64 + 1);
-                due as i64 - (u64::from(had[k]) * all) as i64
-            };
-            let next = (0..candidates.len()).rev().max_by_key(|&k| lag(k)).unwrap_or(0);
-            let press = press(spec, id, next, &candidates[next], had[next]);
-            had[next] += 1;
-            press
-        })
-        .collect()
+    (1u64..).map(move |turn| {
+        // The one that its presses lag most behind its share.
+        let lag = |k: usize| {
+            let due = u64::from(candidates[k].share) * turn;
+            due as i64 - (u64::from(had[k]) * all) as i64
+        };
+        let next = (0..candidates.len()).rev().max_by_key(|&k| lag(k)).unwrap_or(0);
+        had[next] += 1;
+        (next, had[next] - 1)
+    })
 }
+
+/// Points that the Sobol sequence of `sobol_burley` has.
+const POINTS: u32 = 1 << 16;
 
 /// Press `id`, the `index`-th of a candidate.
 fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32) -> Indentation {
     // The sequence takes 32 bits: both halves of the seed count.
     let seed = (spec.seed ^ (spec.seed >> 32)) as u32;
-    let own = seed.wrapping_add((place as u32).wrapping_mul(0x9e37_79b9));
+    let (round, point) = (index / POINTS, index % POINTS);
+    let own = seed
+        .wrapping_add((place as u32).wrapping_mul(0x9e37_79b9))
+        .wrapping_add(round.wrapping_mul(0x85eb_ca6b));
     let within = |dimension: u32, [low, high]: [f64; 2]| {
-        low + (high - low) * f64::from(sobol_burley::sample(index, dimension, own))
+        low + (high - low) * f64::from(sobol_burley::sample(point, dimension, own))
     };
     let PoseRanges { pitch_deg, roll_deg, yaw_deg } = c.pose.unwrap_or(spec.pose);
     let [x, y] = c.offset_mm.unwrap_or(spec.offset_mm);

@@ -127,7 +127,7 @@ mod tests {
 
     #[test]
     fn slices_have_everything_once() {
-        for (all, count) in [(0, 3), (7, 3), (100, 7), (3, 9), (65_536, 4000)] {
+        for (all, count) in [(0, 3), (7, 3), (100, 7), (3, 9), (1 << 20, 34_953)] {
             let own = |i| Slice::new(i, count).unwrap().range(all);
             let joined: Vec<usize> = (1..=count).flat_map(own).collect();
             assert!(joined == (0..all).collect::<Vec<_>>(), "{all} in {count}");

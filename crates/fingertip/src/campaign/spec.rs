@@ -110,8 +110,8 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// Points that the low-discrepancy sequence has.
-const PRESSES_MAX: usize = 1 << 16;
+/// Most indentations. One process reads a manifest of 0.9 kB for each.
+const PRESSES_MAX: usize = 1 << 20;
 /// Most indenters of a campaign.
 const INDENTERS_MAX: usize = 1000;
 /// Most shares of one indenter.

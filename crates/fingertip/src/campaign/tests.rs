@@ -30,6 +30,35 @@ fn poses_fill_their_ranges_and_follow_the_seed() {
     assert!(points.iter().zip(&other).filter(|(a, b)| a == b).count() < 3);
 }
 
+/// The Sobol sequence has 65 536 points; what comes after them fills the ranges as evenly, with other
+/// poses.
+#[test]
+fn a_million_indentations_fill_their_ranges() {
+    let million = CampaignSpec { presses: 1_000_000, ..spec() };
+    million.validate().unwrap();
+    assert_eq!(million.samples(), 1_000_000 * spec().depths_mm.len());
+    assert_eq!(indentations_in(&million, 0..7), indentations(&spec()));
+    let last = indentations_in(&million, 999_990..1_000_000);
+    assert_eq!((last.len(), last[9].id), (10, 999_999));
+    let poses = |round: usize| -> Vec<[f64; 2]> {
+        let ids = round * 65_536..(round + 1) * 65_536;
+        let own = indentations_in(&million, ids);
+        own.iter().map(|p| [p.pose.pitch_deg / 45.0, (p.pose.roll_deg + 30.0) / 60.0]).collect()
+    };
+    let rounds = [0, 1, 14].map(poses);
+    for round in &rounds {
+        // A net: each of 32 x 32 cells has its 64 points.
+        let mut had = vec![0; 32 * 32];
+        for [x, y] in round {
+            had[(x * 32.0) as usize * 32 + (y * 32.0) as usize] += 1;
+        }
+        assert!(had.iter().all(|&n| n == 64), "{had:?}");
+    }
+    let all: BTreeSet<[u64; 2]> =
+        rounds.iter().flatten().map(|pose| pose.map(f64::to_bits)).collect();
+    assert!(all.len() > 3 * 65_536 - 10, "{} poses", all.len());
+}
+
 #[test]
 fn indenters_take_turns_by_their_shares() {
     let all = indentations(&several());
@@ -108,7 +137,7 @@ fn bad_depths() -> Option<DepthRange> {
 #[test]
 fn senseless_campaigns_are_refused_by_field() {
     type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 15] = [
+    let cases: [(Spoil, &str); 16] = [
         (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
         (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
         (|s| s.indenter = None, "indenter"),
@@ -122,6 +151,7 @@ fn senseless_campaigns_are_refused_by_field() {
         (|s| *s = several_with(|c| c.name = "plate".into()), "indenters[1].name"),
         (|s| *s = several_with(|c| c.depths = bad_depths()), "indenters[1].depths.deepest_mm"),
         (|s| s.presses = 0, "presses"),
+        (|s| s.presses = (1 << 20) + 1, "presses"),
         (|s| s.depths_mm = vec![1.0, 0.5], "depths_mm"),
         (|s| s.depths_mm = vec![f64::NAN], "depths_mm"),
         (|s| s.test_fraction = 1.0, "test_fraction"),

@@ -212,6 +212,21 @@ fn the_status_tells_of_failures_and_hours() {
     assert!(status.to_string().contains("solved and merged"));
 }
 
+/// What is sized by the number of indentations, at its greatest.
+#[test]
+fn a_slice_of_a_million_is_a_slice() {
+    let folder = tempfile::tempdir().unwrap();
+    let million = CampaignSpec { presses: 1 << 20, ..spec() };
+    let report = part(&million, folder.path(), &slice(34_953, 34_953), Trouble::None).unwrap();
+    assert_eq!((report.presses, report.solved), (30, 30));
+    let status = StatusReader::new(&million, folder.path()).unwrap().read().unwrap();
+    assert_eq!((status.presses, status.solved, status.unsolved), (1 << 20, 30, (1 << 20) - 30));
+    assert!(status.untrusted.is_empty() && status.processes.is_empty());
+    assert!(folder.path().join("shards/press-1048575.npz").exists());
+    let error = merge(&million, folder.path()).unwrap_err().to_string();
+    assert!(error.contains("1048546 of 1048576"), "{error}");
+}
+
 /// A clock that jumps changes what a person is told, and nothing else.
 #[test]
 fn a_clock_that_jumps_only_changes_what_is_told() {

@@ -102,6 +102,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
         }
     }
 
+    /// The next message as it came.
+    pub(crate) async fn hear(&mut self) -> Message {
+        timeout(PATIENCE, self.stream.next()).await.expect("no answer").unwrap().unwrap()
+    }
+
     pub(crate) async fn hear_json(&mut self) -> Value {
         match self.receive().await {
             Received::Json(value) => value,

@@ -3,12 +3,13 @@
 #
 # Put the node into the scene, connect `map_received` or `touched`, call `send`, `send_window` or `send_poses`. The newest
 # frame of a finger wins here too: with `in_flight_max` of its frames without an answer a frame waits, and a newer one
-# takes its place. A lost connection is made anew by itself.
+# takes its place. A lost connection is made anew by itself, and the session moves to another when the service asks it to.
 extends Node
 
 const Compat = preload("compat.gd")
 const Frame = preload("frame.gd")
 const Link = preload("link.gd")
+const Move = preload("move.gd")
 const Samples = preload("samples.gd")
 const Touch = preload("touch.gd")
 
@@ -50,8 +51,13 @@ var client_time_us = 0
 # Frames that went out, and frames that a newer one replaced before they left.
 var sent = 0
 var superseded_by_client = 0
+# Connections that the session had: more than 1 after one was lost, or the service asked it to move.
+var connections = 0
 
 var _link = null
+# Null: the service does not ask for it.
+var _move = null
+var _is_first_ready = false
 var _open = false
 var _is_refused = false
 var _next_try_ms = 0
@@ -101,6 +107,9 @@ func renew(next):
 	_end_waiting("superseded")
 	if server_ready != null:
 		_before = {"asked": _asked, "server_ready": server_ready}
+	if _move != null and _move.holds():
+		# What is sealed is of the old terms.
+		_move.put_off(Time.get_ticks_msec())
 	_asked = next.duplicate(true)
 	_renewed_from = _sequence + 1
 	server_ready = null
@@ -194,6 +203,8 @@ func poll():
 	if _link.poll():
 		_greet()
 	_receive()
+	if _link != null and _move != null:
+		_follow(now)
 	if _link == null:
 		return
 	if _link.has_ended or (server_ready == null and now > _gives_up_ms):
@@ -213,28 +224,56 @@ func _receive():
 			_binary(message)
 
 
+# Goes on over another connection once that is ready; nothing is on its way then.
+func _follow(now):
+	var agreed = _move.poll(now)
+	if _move.is_seal_due() and server_ready != null:
+		_link.send_text(Move.SEAL)
+		_move.hold(now)
+	if agreed == null:
+		return
+	_link.close()
+	_link = _move.link
+	_move = null
+	connections += 1
+	_begin(agreed)
+
+
 func _connect():
 	_drop()
 	_link = Link.new()
+	_is_first_ready = true
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.uri_encode()
-	if not _link.open(address):
+	if not _link.open(_address()):
 		_lost()
 
 
-func _greet():
+func _address():
+	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
+	if token != "":
+		address += "?access_token=" + token.uri_encode()
+	return address
+
+
+func _words():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
 	message["version"] = 3 if Touch.is_asked(_asked) else 2
-	_link.send_text(Compat.json_text(message))
+	message["reconnect"] = true
+	return message
+
+
+func _greet():
+	_link.send_text(Compat.json_text(_words()))
 	_gives_up_ms = Time.get_ticks_msec() + ATTEMPT_MS
 
 
 func _drop():
 	server_ready = null
 	_before = null
+	if _move != null:
+		_move.close()
+		_move = null
 	if _link == null:
 		return
 	var old = _link
@@ -269,6 +308,8 @@ func _end_one(finger, status):
 
 
 func _flush():
+	if _move != null and _move.holds():
+		return
 	for finger in _waiting.keys():
 		if server_ready == null or not _waiting.has(finger) or _outstanding.values().count(finger) >= in_flight_max:
 			continue
@@ -282,13 +323,22 @@ func _flush():
 			return
 
 
+func _begin(agreed):
+	server_ready = agreed
+	session_ready.emit(server_ready)
+	_flush()
+
+
 func _text(message):
 	if message.type == "ready":
 		_older_ready = _before.server_ready if _before != null else null
 		_before = null
-		server_ready = message
-		session_ready.emit(server_ready)
-		_flush()
+		connections += int(_is_first_ready)
+		_is_first_ready = false
+		_begin(message)
+	elif message.type == "reconnect":
+		if _move == null:
+			_move = Move.new(_address())
 	elif message.get("sequence") != null:
 		var sequence = int(message.sequence)
 		if _outstanding.has(sequence):
@@ -318,6 +368,10 @@ func _on_refusal(problem):
 
 
 func _binary(packet):
+	if Move.is_sealed(packet):
+		if _move != null:
+			_move.resume(packet, _words(), Time.get_ticks_msec())
+		return
 	if packet.size() < Frame.HEADER_BYTES:
 		push_error("an answer of %d bytes has no header" % packet.size())
 		return

@@ -10,6 +10,7 @@
 namespace
 {
 constexpr double RetrySeconds = 0.15;
+constexpr double MovePatienceSeconds = 5.0;
 
 FString ToFString(const std::string& Text)
 {
@@ -52,7 +53,7 @@ void UPapillaSessionComponent::BeginPlay()
 {
     Super::BeginPlay();
     Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
-    Core = MakeUnique<papilla::Core>(ToUtf8(Hello));
+    Core = MakeUnique<papilla::Core>(papilla::Core::following(ToUtf8(Hello)));
     Core->on_answer = [this](const papilla::Answer& Outcome)
     {
         if (Outcome.status == papilla::Status::error && !bHasWarned)
@@ -67,63 +68,141 @@ void UPapillaSessionComponent::BeginPlay()
         if (Outcome.has_touch) OnTouched.Broadcast(Outcome.finger, ToTouch(Outcome.touch));
     };
     FetchAtlas();
-    Connect();
+    Dial(Socket);
 }
 
 void UPapillaSessionComponent::EndPlay(const EEndPlayReason::Type Reason)
 {
     if (Core) Core->on_answer = nullptr;
-    if (Socket)
-    {
-        Socket->OnConnected().Clear();
-        Socket->OnConnectionError().Clear();
-        Socket->OnClosed().Clear();
-        Socket->OnMessage().Clear();
-        Socket->OnBinaryMessage().Clear();
-        Socket->Close();
-        Socket.Reset();
-    }
+    HangUp(Socket);
+    HangUp(Next);
     Super::EndPlay(Reason);
 }
 
-void UPapillaSessionComponent::Connect()
+void UPapillaSessionComponent::HangUp(TSharedPtr<IWebSocket>& Old)
 {
-    FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
-    Socket = Module.CreateWebSocket(TEXT("ws://") + Server + TEXT("/v1/session"), FString());
-    TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
-    Socket->OnConnected().AddLambda([Weak]()
-    {
-        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Socket->Send(ToFString(Self->Core->hello()));
-    });
-    Socket->OnConnectionError().AddLambda([Weak](const FString& Error)
-    {
-        if (UPapillaSessionComponent* Self = Weak.Get())
-        {
-            Self->OnRefused.Broadcast(FString(), Error);
-            Self->Broke();
-        }
-    });
-    Socket->OnClosed().AddLambda([Weak](int32, const FString&, bool)
-    {
-        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Broke();
-    });
-    Socket->OnMessage().AddLambda([Weak](const FString& Message)
-    {
-        if (UPapillaSessionComponent* Self = Weak.Get()) Self->HandleText(Message);
-    });
-    Socket->OnBinaryMessage().AddLambda([Weak](const void* Data, SIZE_T Size, bool bIsLast)
-    {
-        if (UPapillaSessionComponent* Self = Weak.Get()) Self->HandlePiece(Data, Size, bIsLast);
-    });
-    Socket->Connect();
+    if (!Old) return;
+    Old->OnConnected().Clear();
+    Old->OnConnectionError().Clear();
+    Old->OnClosed().Clear();
+    Old->OnMessage().Clear();
+    Old->OnBinaryMessage().Clear();
+    Old->Close();
+    Old.Reset();
 }
 
-void UPapillaSessionComponent::Broke()
+void UPapillaSessionComponent::Dial(TSharedPtr<IWebSocket>& Dialled)
 {
+    HangUp(Dialled);
+    FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
+    Dialled = Module.CreateWebSocket(TEXT("ws://") + Server + TEXT("/v1/session"), FString());
+    // Told apart by address alone: which of the two it is changes when the session moves.
+    IWebSocket* const Of = Dialled.Get();
+    TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
+    Dialled->OnConnected().AddLambda([Weak, Of]()
+    {
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Opened(Of);
+    });
+    Dialled->OnConnectionError().AddLambda([Weak, Of](const FString& Error)
+    {
+        UPapillaSessionComponent* const Self = Weak.Get();
+        if (!Self) return;
+        if (Of == Self->Socket.Get()) Self->OnRefused.Broadcast(FString(), Error);
+        Self->Broke(Of);
+    });
+    Dialled->OnClosed().AddLambda([Weak, Of](int32, const FString&, bool)
+    {
+        if (UPapillaSessionComponent* Self = Weak.Get()) Self->Broke(Of);
+    });
+    Dialled->OnMessage().AddLambda([Weak, Of](const FString& Message)
+    {
+        UPapillaSessionComponent* const Self = Weak.Get();
+        if (!Self) return;
+        if (Of == Self->Next.Get()) Self->Adopt(Message);
+        else if (Of == Self->Socket.Get()) Self->HandleText(Message);
+    });
+    Dialled->OnBinaryMessage().AddLambda([Weak, Of](const void* Data, SIZE_T Size, bool bIsLast)
+    {
+        UPapillaSessionComponent* const Self = Weak.Get();
+        if (Self && Of == Self->Socket.Get()) Self->HandlePiece(Data, Size, bIsLast);
+    });
+    Dialled->Connect();
+}
+
+void UPapillaSessionComponent::Opened(const IWebSocket* Of)
+{
+    if (Of == Socket.Get()) Socket->Send(ToFString(Core->hello()));
+    if (Of != Next.Get() || Move != EMove::Dialling) return;
+    // Nothing leaves from now on: the answers to what has left come before the sealed state.
+    Socket->Send(ToFString(Core->ask_for_seal()));
+    Enter(EMove::Held);
+}
+
+void UPapillaSessionComponent::Broke(const IWebSocket* Of)
+{
+    if (Of == Next.Get()) PutOffMove();
+    if (Of != Socket.Get()) return;
     Core->lost();
     Pieces.reset();
-    // A new socket at the next tick after that: not from within the old one's call.
+    Move = EMove::No;
+    // New sockets at the next tick after that: not from within the old one's call.
     RetryAt = FPlatformTime::Seconds() + RetrySeconds;
+}
+
+void UPapillaSessionComponent::Enter(EMove To)
+{
+    Move = To;
+    MoveUntil = FPlatformTime::Seconds() + MovePatienceSeconds;
+}
+
+void UPapillaSessionComponent::PutOffMove()
+{
+    // The old connection goes on for as long as it is there.
+    if (Move == EMove::No) return;
+    Move = EMove::Paused;
+    MoveUntil = FPlatformTime::Seconds() + RetrySeconds;
+}
+
+void UPapillaSessionComponent::Resume()
+{
+    if (!Core->is_last_seal() || Move != EMove::Held) return;
+    Next->Send(ToFString(Core->resuming()));
+    Next->Send(Pieces.message().data(), Pieces.message().size(), true);
+    Enter(EMove::Resuming);
+}
+
+void UPapillaSessionComponent::Adopt(const FString& Message)
+{
+    if (Move != EMove::Resuming) return;
+    if (Core->text(ToUtf8(Message)) != papilla::Core::Event::ready)
+    {
+        PutOffMove();
+        return;
+    }
+    Swap(Socket, Next);
+    HangUp(Next);
+    Pieces.reset();
+    Move = EMove::No;
+    OnReady.Broadcast();
+    Pump();
+}
+
+void UPapillaSessionComponent::TickMove(double Now)
+{
+    if (Move == EMove::No)
+    {
+        HangUp(Next);
+        return;
+    }
+    if (Now < MoveUntil) return;
+    if (Move == EMove::Paused)
+    {
+        Enter(EMove::Dialling);
+        Dial(Next);
+        return;
+    }
+    HangUp(Next);
+    PutOffMove();
 }
 
 void UPapillaSessionComponent::HandleText(const FString& Message)
@@ -140,6 +219,10 @@ void UPapillaSessionComponent::HandleText(const FString& Message)
     case papilla::Core::Event::broken:
         Socket->Close();
         break;
+    case papilla::Core::Event::reconnect:
+        // Dials at the next tick.
+        if (Move == EMove::No) Move = EMove::Paused, MoveUntil = 0.0;
+        break;
     case papilla::Core::Event::nothing:
         Pump();
         break;
@@ -150,6 +233,11 @@ void UPapillaSessionComponent::HandlePiece(const void* Data, SIZE_T Size, bool b
 {
     // Unreal hands over 64 KiB at a time: a frame of f32 comes in four pieces.
     if (!Pieces.add(Data, Size, bIsLast)) return;
+    if (papilla::Core::is_sealed(Pieces.message().data(), Pieces.message().size()))
+    {
+        Resume();
+        return;
+    }
     if (Core->binary(Pieces.message().data(), Pieces.message().size()) == papilla::Core::Event::broken)
     {
         Socket->Close();
@@ -162,7 +250,8 @@ void UPapillaSessionComponent::Pump()
 {
     // The service has a place for each finger.
     const size_t Most = static_cast<size_t>(InFlightMax) * Core->fingers();
-    while (Socket && Core->in_flight() < Most)
+    const bool bIsHeld = Move == EMove::Held || Move == EMove::Resuming;
+    while (Socket && !bIsHeld && Core->in_flight() < Most)
     {
         papilla::Outgoing* const Frame = Core->take();
         if (!Frame) return;
@@ -174,11 +263,13 @@ void UPapillaSessionComponent::TickComponent(float DeltaTime, ELevelTick Tick, F
 {
     Super::TickComponent(DeltaTime, Tick, Function);
     if (!Core) return;
-    if (RetryAt > 0.0 && FPlatformTime::Seconds() >= RetryAt)
+    const double Now = FPlatformTime::Seconds();
+    TickMove(Now);
+    if (RetryAt > 0.0 && Now >= RetryAt)
     {
         RetryAt = 0.0;
         if (!bHasAtlas) FetchAtlas();
-        Connect();
+        Dial(Socket);
     }
     Pump();
 }

@@ -62,7 +62,8 @@ DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaTouched, int32, Finger, con
 /**
  * Sends pressure maps (Pa) or poses of objects and gives the newest strain energy density map (J/m3), 224 x 224 each,
  * and what pushes back.
- * The latest frame wins: sending never blocks or queues. Reconnects by itself. Game thread only.
+ * The latest frame wins: sending never blocks or queues. Reconnects by itself, and moves to another connection when the service
+ * asks for it. Game thread only.
  */
 UCLASS(ClassGroup = (Haptics), meta = (BlueprintSpawnableComponent))
 class PAPILLA_API UPapillaSessionComponent : public UActorComponent
@@ -134,15 +135,25 @@ public:
     virtual void TickComponent(float DeltaTime, ELevelTick Tick, FActorComponentTickFunction* Function) override;
 
 private:
-    void Connect();
-    void Broke();
+    /** A move to another connection: frames wait while it is Held or Resuming. Paused: it is to be tried again. */
+    enum class EMove : uint8 { No, Paused, Dialling, Held, Resuming };
+
+    void Dial(TSharedPtr<IWebSocket>& Dialled);
+    void HangUp(TSharedPtr<IWebSocket>& Old);
+    void Opened(const IWebSocket* Of);
+    void Broke(const IWebSocket* Of);
+    void Enter(EMove To);
+    void PutOffMove();
+    void Resume();
+    void Adopt(const FString& Message);
+    void TickMove(double Now);
     void HandleText(const FString& Message);
     void HandlePiece(const void* Data, SIZE_T Size, bool bIsLast);
     void Pump();
     void FetchAtlas();
 
     TUniquePtr<papilla::Core> Core;
-    TSharedPtr<IWebSocket> Socket;
+    TSharedPtr<IWebSocket> Socket, Next;
     papilla::Pieces Pieces;
     papilla::Answer Answer;
     papilla::Atlas Atlas;
@@ -152,5 +163,6 @@ private:
     bool bHasAtlas = false;
     bool bHasAnswer = false;
     bool bHasWarned = false;
-    double RetryAt = 0.0;
+    EMove Move = EMove::No;
+    double RetryAt = 0.0, MoveUntil = 0.0;
 };
