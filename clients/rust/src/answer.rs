@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
-    Window, contact::Touch, effects::SectionName, flags,
+    Window, contact::Touch, effects::SectionName, flags, spikes::Fired,
 };
 
 use crate::PapillaError;
@@ -74,6 +74,8 @@ pub struct Answer {
     pub points: Vec<f32>,
     /// The effect `actuators`.
     pub actuators: Vec<f32>,
+    /// The effect `spikes`.
+    pub fired: Option<Fired>,
 }
 
 impl Answer {
@@ -113,6 +115,7 @@ impl Answer {
             summary: None,
             points: Vec::new(),
             actuators: Vec::new(),
+            fired: None,
         }
     }
 
@@ -183,6 +186,10 @@ impl Answer {
                 SectionName::Summary => self.summary = Summary::decode(part),
                 SectionName::Points => self.points = floats(part)?,
                 SectionName::Actuators => self.actuators = floats(part)?,
+                SectionName::Spikes => {
+                    let fired = Fired::decode(part, header.client_time_us);
+                    self.fired = Some(fired.ok_or_else(short)?);
+                }
                 SectionName::Map => {
                     self.map = vec![0.0; MAP_LEN];
                     self.window

@@ -43,6 +43,8 @@ pub struct Fingertip {
     /// Drive of each unit by the rate of stress in this frame.
     drive: Vec<f64>,
     pub(crate) pacinian: Pacinian,
+    /// Place of each Pacinian unit among them.
+    pacinian_of: Vec<Option<u16>>,
     /// Units that are not at rest in this frame.
     awake: Vec<u16>,
     pub(crate) last_us: Option<u64>,
@@ -63,6 +65,9 @@ impl Fingertip {
     ) -> Self {
         let of_pc = |unit: &&Unit| unit.class == Class::Pc;
         let places: Vec<_> = units.iter().filter(of_pc).map(|unit| place_mm(unit.pixel)).collect();
+        let mut numbers = 0..;
+        let number = |unit: &Unit| (unit.class == Class::Pc).then(|| numbers.next()).flatten();
+        let pacinian_of = units.iter().map(number).collect();
         let neuron = |unit: &Unit| {
             let model = usize::from(unit.model) % Neuron::models(unit.class);
             Neuron::new(unit.class, model)
@@ -73,6 +78,7 @@ impl Fingertip {
             stress_mpa: [0, 1].map(|_| vec![0.0; units.len()]),
             drive: vec![0.0; units.len()],
             pacinian: Pacinian::new(&places, cells),
+            pacinian_of,
             awake: Vec::with_capacity(units.len()),
             last_us: None,
             fired: 0,
@@ -153,15 +159,14 @@ impl Fingertip {
     /// Steps the membranes over all samples after `from_us`, up to `time_us`.
     fn integrate(&mut self, from_us: u64, time_us: u64) {
         let [before, now] = &self.stress_mpa;
-        let first_pc = self.units.len() - self.pacinian.len();
         for sample in from_us / SAMPLE_US + 1..=time_us / SAMPLE_US {
             let at_us = SAMPLE_US * sample;
             let share = (at_us - from_us) as f64 / (time_us - from_us) as f64;
             self.pacinian.advance();
             for &number in &self.awake {
                 let unit = usize::from(number);
-                let (stress_mpa, drive) = match unit.checked_sub(first_pc) {
-                    Some(pc) => (0.0, self.pacinian.drive(pc)),
+                let (stress_mpa, drive) = match self.pacinian_of[unit] {
+                    Some(number) => (0.0, self.pacinian.drive(number.into())),
                     None => {
                         let rise = now[unit] - before[unit];
                         (before[unit] + share * rise, self.drive[unit])

@@ -31,6 +31,7 @@ pub mod pins;
 mod placement;
 mod random;
 mod state;
+pub mod touchsim;
 
 pub use class::Class;
 pub use fingertip::{FRAME_MAX_US, Fingertip, Settings, Spike};

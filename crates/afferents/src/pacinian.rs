@@ -81,10 +81,6 @@ impl Pacinian {
         }
     }
 
-    pub(crate) fn len(&self) -> usize {
-        self.units.len()
-    }
-
     /// Nothing is under way.
     pub(crate) fn rest(&mut self) {
         self.units.iter_mut().for_each(|unit| unit.arriving = [0.0; DELAYS]);

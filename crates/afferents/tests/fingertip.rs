@@ -1,5 +1,8 @@
 //! A whole finger: what drives it is what drives pins, and when frames come changes nothing.
 
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
 use papilla_afferents::{
     Cell, Class, Densities, FRAME_MAX_US, Fingertip, Neuron, SAMPLES_PER_S, Settings, Spike, Unit,
     pins::{Pin, inputs, spikes_s},

@@ -26,6 +26,7 @@ mod process;
 mod reload;
 mod rendering;
 mod session;
+mod spikes;
 mod start;
 mod support;
 mod tls;
