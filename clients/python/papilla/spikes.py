@@ -82,10 +82,11 @@ class SpikeTrains:
 
     def of(self, unit: int) -> NDArray[np.int64]:
         """The times of one unit, us."""
-        return self.time_us[self.unit == unit]
+        times_us: NDArray[np.int64] = self.time_us[self.unit == unit]
+        return times_us
 
     def save_npz(self, path: str | PathLike[str]) -> None:
-        """Writes `unit` and `time_us` of every spike, and `unit_class`, `unit_model`, `unit_px`, `lost`, `atlas_hash`."""
+        """Writes `unit`, `time_us` of every spike; `unit_class`, `unit_model`, `unit_px`; `lost`, `atlas_hash`."""
         np.savez(
             path,
             unit=self.unit,
@@ -100,12 +101,12 @@ class SpikeTrains:
     def save_nwb(self, path: str | PathLike[str], start: datetime | None = None) -> None:
         """Writes the units table of a Neurodata Without Borders file, times in s from the first spike on.
 
-        Needs `pip install pynwb`; raises PapillaError without. `start`: when the session began (now).
+        Needs `pip install 'papilla[nwb]'`; raises PapillaError without. `start`: when the session began (now).
         """
         try:
             from pynwb import NWBHDF5IO, NWBFile
         except ImportError as error:
-            raise PapillaError("NWB files need pynwb: pip install pynwb; save_npz needs nothing more") from error
+            raise PapillaError("NWB files need pynwb (pip install pynwb); save_npz needs nothing more") from error
         file = NWBFile(
             session_description=f"simulated touch units of a fingertip, {self.lost} spikes lost",
             identifier=f"papilla-{self.atlas_hash}",
