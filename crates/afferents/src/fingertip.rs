@@ -50,6 +50,7 @@ pub struct Fingertip {
     pub(crate) last_us: Option<u64>,
     pub(crate) fired: u32,
     spikes: Vec<Spike>,
+    spikes_max: usize,
 }
 
 impl Fingertip {
@@ -83,6 +84,7 @@ impl Fingertip {
             last_us: None,
             fired: 0,
             spikes: Vec::with_capacity(spikes_max),
+            spikes_max,
             units,
         }
     }
@@ -108,13 +110,15 @@ impl Fingertip {
     /// Goes on to the next frame: its time, the SED of every pixel, J/m3, and the force on every
     /// cell, N.
     ///
-    /// The first frame, and one whose time goes back, begins with membranes at rest.
+    /// The first frame, and one whose time goes back, begins with membranes at rest. Of more than
+    /// [`FRAME_MAX_US`] between two frames the end is simulated.
     pub fn step(&mut self, time_us: u64, sed_j_per_m3: &[f32], force_n: &[f32]) {
         self.spikes.clear();
         let [before, now] = &mut self.stress_mpa;
         std::mem::swap(before, now);
         for (unit, stress_mpa) in self.units.iter().zip(now.iter_mut()) {
-            let sed = sed_j_per_m3.get(unit.pixel as usize).copied().unwrap_or_default();
+            // What is no number would stay in a membrane for good.
+            let sed = sed_j_per_m3.get(unit.pixel as usize).map_or(0.0, |sed| sed.max(0.0));
             // kPa x Pa are 1e-9 MPa^2.
             *stress_mpa = (2e-9 * f64::from(self.settings.e_ref_kpa) * f64::from(sed)).sqrt();
         }
@@ -175,7 +179,7 @@ impl Fingertip {
                 let noise = self.settings.noise.map_or(0.0, |seed| normal(seed, unit, sample));
                 if self.neurons[unit].step(stress_mpa, drive, noise) {
                     self.fired = self.fired.wrapping_add(1);
-                    if self.spikes.len() < self.spikes.capacity() {
+                    if self.spikes.len() < self.spikes_max {
                         self.spikes.push(Spike { unit: number, time_us: at_us });
                     }
                 }

@@ -24,7 +24,6 @@ pub(crate) mod relaxation;
 mod report;
 mod ring;
 mod solid_parts;
-mod spikes;
 mod tangent;
 mod uniaxial;
 
@@ -168,13 +167,6 @@ pub const CASES: &[Case] = &[
                 supports, energy against work.",
         quick: true,
         run: balances::run,
-    },
-    Case {
-        name: "spikes",
-        shows: "Integrate-and-fire neurons of touch units: TouchSim's own test values under pins, \
-                and the same pin given as strain energy density.",
-        quick: true,
-        run: spikes::run,
     },
     Case {
         name: "density",
