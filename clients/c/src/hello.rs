@@ -58,7 +58,7 @@ fn check_model(hello: &Hello, model: &Model) -> Result<(), Problem> {
         return Err(Problem::new(ErrorCode::UnknownTier, message).at("tier"));
     }
     // An answer of the library is lists of f32, which spikes are not.
-    let is_own = |e: &String| e.parse().is_ok_and(|effect| effect != RuntimeEffect::Spikes);
+    let is_own = |e: &String| e.parse::<RuntimeEffect>().is_ok_and(|e| e != RuntimeEffect::Spikes);
     let is_foreign = |e: &&String| !is_own(e) && !info.effects.contains(e);
     if let Some(effect) = hello.effects.iter().find(is_foreign) {
         let (effect, rendered) = (shortened(effect), info.effects.join(", "));

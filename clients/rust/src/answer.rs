@@ -209,3 +209,33 @@ fn floats(bytes: &[u8]) -> Result<Vec<f32>, PapillaError> {
         .map_err(|error| PapillaError::Protocol(error.to_string()))?;
     Ok(values)
 }
+
+#[cfg(test)]
+mod tests {
+    use papilla_proto::{HEADER_LEN_V2, spikes::Spike};
+    use serde_json::{from_value, json};
+
+    use super::*;
+
+    #[test]
+    fn spikes_are_read_by_the_clock_of_the_frame() {
+        let ready: Ready = from_value(json!({
+            "version": 2, "session": 1, "tier": "nano", "effects": [], "atlas_hash": "",
+            "predicted_latency_us": 1, "width": 224, "height": 224, "sample_type": "f32",
+            "pressure_max_pa": 1e4, "sed_scale_j_per_m3": 1.0,
+            "sections": [{"name": "spikes", "offset": HEADER_LEN_V2, "bytes": 24}],
+        }))
+        .unwrap();
+        let time_us = 7_000_000;
+        let header = FrameHeader::pressure(1, time_us, 0, SampleType::F32, 1.0);
+        let header = header.windowed(Window::EMPTY);
+        let spikes = vec![Spike { unit: 4, time_us: 6_999_200 }, Spike { unit: 2, time_us }];
+        let mut message = header.encode().to_vec();
+        message.extend([9_u32.to_le_bytes(), 2_u32.to_le_bytes()].as_flattened());
+        spikes.iter().for_each(|spike| message.extend(spike.encode(time_us)));
+        let read = |message: &[u8]| Answer::read(&header, message, &ready, String::new());
+        assert!(read(&message).is_err(), "the section has 24 bytes");
+        message.extend([0; 8]);
+        assert_eq!(read(&message).unwrap().fired, Some(Fired { total: 9, spikes }));
+    }
+}
