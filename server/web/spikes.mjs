@@ -65,7 +65,8 @@ export class SpikeView {
     const style = getComputedStyle(this.canvas);
     const colours = CLASSES.map((name) => style.getPropertyValue(`--${name}`));
     const rowHeight = height / Math.max(1, this.rows.length);
-    const mark = Math.max(1, Math.round(rowHeight));
+    // Rows are thinner than what an eye finds.
+    const mark = Math.max(1.5 * (window.devicePixelRatio || 1), rowHeight);
     for (let n = 0; n < section.count; n++) {
       const unit = section.unit(n);
       const kind = this.classes[unit];

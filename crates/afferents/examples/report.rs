@@ -34,6 +34,10 @@ const SED: &str = "
 The same ramp of 1 mm by a pin of 1 mm radius, its stress at 0.3 mm given as SED in 1000 frames: what
 the finger of Papilla makes of a stress, without its mechanics. PC units take force, not SED.
 
+At the default 80 kPa a stress below some 8 kPa, 400 J/m3, leaves SA1 silent. A plate at 0.9 N, whose
+SED is 340 J/m3 at most (`large`, on the page), fires but a few of 470: `e_ref_kpa` is not fitted to
+the rates of people.
+
 | neuron | spikes under the pin | spikes of SED | first under the pin, ms | first of SED, ms |
 |---|---|---|---|---|
 ";
