@@ -22,15 +22,18 @@ pub enum RuntimeEffect {
     Actuators,
     /// Map and points carry the firing rate of SA1 afferents, Hz, in place of SED.
     Afferents,
+    /// The answer carries the [spikes](crate::spikes) of touch units.
+    Spikes,
     /// The tissue creeps under the pressure.
     Relaxation,
 }
 
 impl RuntimeEffect {
     /// All of them, in the order in which they act.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Relaxation,
         Self::Afferents,
+        Self::Spikes,
         Self::ContactWindow,
         Self::Summary,
         Self::Points,
@@ -46,6 +49,7 @@ impl RuntimeEffect {
             Self::Points => "points",
             Self::Actuators => "actuators",
             Self::Afferents => "afferents",
+            Self::Spikes => "spikes",
             Self::Relaxation => "relaxation",
         }
     }
@@ -59,6 +63,7 @@ impl RuntimeEffect {
             Self::Points => "adds values at listed points of the finger",
             Self::Actuators => "adds the intensity of every actuator of a display",
             Self::Afferents => "turns SED into the firing rate of SA1 afferents in map and points",
+            Self::Spikes => "adds when SA1, RA and Pacinian units of the finger fire",
             Self::Relaxation => "lets the tissue creep: a Prony filter on pressure before the map",
         }
     }
@@ -286,6 +291,8 @@ pub enum SectionName {
     Points,
     /// One f32 an actuator.
     Actuators,
+    /// [`Fired`](crate::spikes::Fired): who fired, and when.
+    Spikes,
     /// The samples of the map; always last.
     Map,
     /// What the map shows at the vertices of the atlas, in place of it. Version 3.

@@ -46,6 +46,7 @@ pub mod input_statistics;
 pub mod map;
 pub mod message;
 pub mod sample;
+pub mod spikes;
 pub mod summary;
 pub mod window;
 

@@ -12,6 +12,7 @@ use crate::{
     contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout},
     effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
     json::{self, JsonError},
+    spikes::{PlacedUnit, Spikes},
 };
 
 /// Longest text of a client that is read, bytes: five times a display of the most actuators that
@@ -141,6 +142,9 @@ pub struct Hello {
     /// Parameters of the effect `afferents`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub afferents: Option<Afferents>,
+    /// Parameters of the effect `spikes`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spikes: Option<Spikes>,
     /// Parameters of the effect `relaxation`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relaxation: Option<Relaxation>,
@@ -193,6 +197,7 @@ impl Hello {
             (self.points.is_some(), "points"),
             (self.actuators.is_some(), "actuators"),
             (self.afferents.is_some(), "afferents"),
+            (self.spikes.is_some(), "spikes"),
             (self.relaxation.is_some(), "relaxation"),
             (self.reconnect.is_some(), "reconnect"),
             (self.resume.is_some(), "resume"),
@@ -240,6 +245,7 @@ impl Default for Hello {
             points: None,
             actuators: None,
             afferents: None,
+            spikes: None,
             relaxation: None,
             reconnect: None,
             resume: None,
@@ -317,6 +323,9 @@ pub struct Ready {
     /// What the payload of an answer with status ok holds, and where.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sections: Option<Vec<Section>>,
+    /// The units of the effect `spikes`, by number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Vec<PlacedUnit>>,
     /// What became of the state that the hello brought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<Resumption>,

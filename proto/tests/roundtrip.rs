@@ -7,6 +7,7 @@ use papilla_proto::contact::{
     AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout,
 };
 use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
+use papilla_proto::spikes::{PlacedUnit, UnitClass};
 use papilla_proto::{
     ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
     Summary,
@@ -159,7 +160,7 @@ proptest! {
         names in prop::collection::vec(".{0,12}", 3),
         numbers in any::<(u64, u64, Option<u32>, Option<bool>, Option<u16>)>(),
         scales in (number(), number()),
-        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=6)),
+        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=7)),
         offset in any::<u32>(),
     ) {
         let section = Section { name: SectionName::Points, offset, bytes: 8 };
@@ -182,6 +183,10 @@ proptest! {
             answer_sample_type: Some(SampleType::F16),
             session_effects: effects,
             sections: Some(vec![section]),
+            units: numbers.4.map(|model| {
+                let model = model as u8;
+                vec![PlacedUnit { class: UnitClass::Ra, model, px: [scales.0, 0.5] }]
+            }),
             state: numbers.2.map(|_| Resumption::OtherTerms),
             vertices: Some(offset),
             fingers: numbers.2,

@@ -11,6 +11,7 @@ import { Meters } from './meters.mjs';
 import { Press } from './press.mjs';
 import { MAP_LEN, Session } from './protocol.mjs';
 import { Replay, fetchJson } from './replay.mjs';
+import { SpikeView } from './spikes.mjs';
 
 const byId = (id) => document.getElementById(id);
 /** A complaint stays at least this long, then until frames are answered again. */
@@ -35,6 +36,7 @@ class Page {
     this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
     this.meters = new Meters(fastest(listing.tiers));
     this.replay = new Replay(atlas);
+    this.spikes = new SpikeView();
     this.#makeViews();
     this.control = new PressControl(atlas, this.press, this.views.pressure);
     if (this.finger) this.control.attachFinger(this.finger);
@@ -92,7 +94,7 @@ class Page {
   #hello(nowMs) {
     const announced = this.solves ? this.contact.hello(nowMs) : {};
     const budgetUs = Number(byId('budget').value);
-    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash, ...announced });
+    this.session.open({ tier: byId('tier').value || null, budget_us: budgetUs, atlas_hash: this.atlas.hash, effects: this.spikes.isOn ? ['spikes'] : [], ...announced });
   }
 
   /** Whether the server finds the pressure of this press. */
@@ -107,6 +109,7 @@ class Page {
 
   #ready(ready) {
     this.ladder.setReady(ready);
+    this.spikes.setUnits(ready.units);
     this.control.changed = true;
     this.unsent = true;
     this.replay.forget();
@@ -125,6 +128,7 @@ class Page {
     this.#followTier(answer.tierNumber);
     showFlags(answer, this.session.ready?.pressure_max_pa);
     if (answer.touch) this.#showTouch(answer, nowMs);
+    if (answer.spikes) this.spikes.show(answer.spikes, answer.timeMs);
     this.answered.sequence = answer.sequence;
     this.answered.tier = this.session.ready?.tier;
     this.answered.pressurePa.set(answer.pressurePa ?? this.sent.pressurePa);
@@ -236,6 +240,10 @@ class Page {
     byId('controls').addEventListener('submit', (event) => event.preventDefault());
     byId('tier').addEventListener('change', () => this.#open());
     byId('budget').addEventListener('change', () => this.#open());
+    byId('spikes-on').addEventListener('change', () => {
+      this.spikes.toggle(byId('spikes-on').checked);
+      this.#open();
+    });
     byId('log').addEventListener('change', () => {
       this.log = byId('log').checked;
       for (const name of ['sed', 'truth']) this.views[name].setLogarithmic(this.log, performance.now());

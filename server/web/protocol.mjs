@@ -1,6 +1,8 @@
 // Papilla's session protocol, versions 2 and 3, client side: one WebSocket, a JSON hello, a JSON ready, then binary frames
 // of a 48-byte little-endian header and a payload (here always f32): a row-major 224 x 224 map, or an object's pose.
 
+import { SpikeSection } from './spikes.mjs';
+
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
 export const HEADER_BYTES = 48;
@@ -72,7 +74,8 @@ export function readAnswer(data, into, at = BARE_MAP) {
   into.cutOff = (view.getUint8(46) & FLAG.cutOff) !== 0;
   into.unfamiliar = (view.getUint8(46) & FLAG.unfamiliar) !== 0;
   into.unsettled = (view.getUint8(46) & FLAG.unsettled) !== 0;
-  into.sedJPerM3 = into.pressurePa = into.touch = null;
+  into.timeMs = (view.getUint32(16, true) + view.getUint32(20, true) * TWO_POW_32) / 1000;
+  into.sedJPerM3 = into.pressurePa = into.touch = into.spikes = null;
   if (into.status === 'ok') {
     const sampleType = view.getUint8(6);
     if (sampleType !== SAMPLE_F32 || data.byteLength !== at.map + 4 * MAP_LEN) {
@@ -80,6 +83,7 @@ export function readAnswer(data, into, at = BARE_MAP) {
     }
     into.sedJPerM3 = new Float32Array(data, at.map, MAP_LEN);
     if (at.pressure) into.pressurePa = new Float32Array(data, at.pressure, MAP_LEN);
+    if (at.spikes) into.spikes = new SpikeSection(data, at.spikes, at.map - at.spikes);
     if (at.touch) into.touch = new Float32Array(data, at.touch, TOUCH_LEN);
   }
   return into;
@@ -99,8 +103,8 @@ export class Session {
     this.mapFrame = RequestFrame.map();
     this.poseFrame = RequestFrame.pose();
     this.answer = {
-      status: 'error', sequence: 0, serverUs: 0, tierNumber: 0, sedJPerM3: null, pressurePa: null, touch: null,
-      outOfRange: false, unfamiliar: false, unsettled: false, cutOff: false,
+      status: 'error', sequence: 0, serverUs: 0, timeMs: 0, tierNumber: 0, sedJPerM3: null, pressurePa: null, touch: null,
+      spikes: null, outOfRange: false, unfamiliar: false, unsettled: false, cutOff: false,
     };
     this.sections = BARE_MAP;
     this.sequence = 0;

@@ -202,6 +202,39 @@ test('the indenter shapes press differently', async () => {
   assert.ok(areas.sphere > 0 && areas.sphere < areas.edge && areas.edge < areas.plate, JSON.stringify(areas));
 });
 
+test('spikes of the touch units are drawn while they are asked for', async () => {
+  assert.equal(await page.locator('#spikes').isVisible(), false);
+  // A late answer carries no spikes: whether a busy machine is in time is not asked here.
+  await page.selectOption('#budget', '500000');
+  await until(() => globalThis.papilla?.session.ready?.session_effects.length === 0);
+  await page.check('#spikes-on');
+  await until(() => globalThis.papilla.session.ready?.units);
+  await page.fill('#depth', '0.2');
+  await settled();
+  await page.fill('#depth', '1.5');
+  const units = await page.evaluate(() => globalThis.papilla.session.ready.units.length);
+  const shown = await Promise.all(['sa1', 'ra', 'pc'].map((name) => text(`spikes-${name}-units`)));
+  assert.equal(shown.reduce((sum, count) => sum + Number(count), 0), units);
+  for (const width of [390, 1280]) {
+    await page.setViewportSize({ width, height: 900 });
+    await page.fill('#depth', width === 390 ? '0.5' : '1.5');
+    await settled();
+    const { drawn, wide } = await page.evaluate(() => {
+      const canvas = document.getElementById('spike-plot');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const drawn = data.filter((value, at) => at % 4 === 3 && value > 0).length;
+      return { drawn, wide: document.documentElement.scrollWidth - window.innerWidth };
+    });
+    assert.ok(drawn > 0 && wide <= 0, `${drawn} pixels drawn at ${width} px, page ${wide} px too wide`);
+    await keep(`spikes-${width}`);
+  }
+  await page.setViewportSize({ width: 1440, height: 900 });
+  await page.uncheck('#spikes-on');
+  await page.selectOption('#budget', '50000');
+  await until(() => globalThis.papilla.session.ready && !globalThis.papilla.session.ready.units);
+  assert.equal(await page.locator('#spikes').isVisible(), false);
+});
+
 test('replay shows the error against the FE truth', async () => {
   // By budget the tier might change between the two figures.
   await page.selectOption('#tier', 'nano');

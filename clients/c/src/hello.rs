@@ -57,7 +57,9 @@ fn check_model(hello: &Hello, model: &Model) -> Result<(), Problem> {
         let message = format!("no tier '{}'; '{name}' was loaded", shortened(tier));
         return Err(Problem::new(ErrorCode::UnknownTier, message).at("tier"));
     }
-    let is_foreign = |e: &&String| e.parse::<RuntimeEffect>().is_err() && !info.effects.contains(e);
+    // An answer of the library is lists of f32, which spikes are not.
+    let is_own = |e: &String| e.parse::<RuntimeEffect>().is_ok_and(|e| e != RuntimeEffect::Spikes);
+    let is_foreign = |e: &&String| !is_own(e) && !info.effects.contains(e);
     if let Some(effect) = hello.effects.iter().find(is_foreign) {
         let (effect, rendered) = (shortened(effect), info.effects.join(", "));
         let message = format!("tier {name} renders {rendered}, but not '{effect}'");

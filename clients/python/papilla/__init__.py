@@ -5,6 +5,7 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 
 - `sed(pressure_pa)`: one map over HTTP
 - `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
+- `SpikeTrains`: when the touch units of a finger fire, as files
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
 """
 
@@ -13,6 +14,7 @@ from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
 from .errors import Closed, NotRendered, PapillaError, Refused, Unreachable
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
+from .spikes import Spikes, SpikeTrains
 from .sync import Session
 from .wire import SIDE_PX
 
@@ -30,6 +32,8 @@ __all__ = [
     "Problem",
     "Refused",
     "Session",
+    "SpikeTrains",
+    "Spikes",
     "Summary",
     "Touch",
     "Unreachable",

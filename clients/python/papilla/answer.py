@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import wire
+from . import spikes, wire
 from .errors import NotRendered
 from .wire import Map, Window
 
@@ -109,6 +109,8 @@ class Answer:
     summary: Summary | None = None
     points: Map | None = None
     actuators: Map | None = None
+    spikes: spikes.Spikes | None = None
+    """The effect `spikes`."""
 
     @property
     def map(self) -> Map:
@@ -167,6 +169,8 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
             answer.points = wire.floats(message, offset, size)
         elif name == "actuators":
             answer.actuators = wire.floats(message, offset, size)
+        elif name == "spikes":
+            answer.spikes = spikes.read(message, offset, header.client_time_us)
         elif name == "map":
             answer.values = wire.samples(message, offset, header)
     return answer

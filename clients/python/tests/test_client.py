@@ -89,6 +89,45 @@ def test_a_frame_that_waits_can_be_closed_on(url):
     assert {outcome.result(5).status for outcome in sent} <= {"ok", "superseded", "lost"}
 
 
+def test_spikes_are_collected_and_written(url, tmp_path, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    trains = runpy.run_path(str(EXAMPLES / "spikes.py"))["trains"]
+    written = np.load(tmp_path / "spikes.npz")
+    assert written["lost"] == 0 and str(written["atlas_hash"]) == trains.atlas_hash
+    assert set(written["unit_class"][written["unit"]]) == {"sa1", "ra", "pc"}
+    assert np.all(np.diff(written["time_us"]) >= 0) and written["time_us"].max() <= 999_000
+    # Taps that come ten times a second are answered ten times a second.
+    per_ms = np.bincount(written["time_us"] // 1000, minlength=1000)
+    per_tap = per_ms[:1000].reshape(10, 100).sum(1)
+    assert per_tap.min() > 100 and per_tap[2:].std() < 0.05 * per_tap.mean()
+    assert trains.of(int(trains.unit[0]))[0] == written["time_us"][0]
+
+
+def test_spikes_that_did_not_fit_are_counted(url):
+    with papilla.Session(url, tier="half-space", effects=["spikes"], spikes={"spikes_max": 5}) as session:
+        trains = papilla.SpikeTrains(session.ready)
+        for ms in range(0, 60, 10):
+            trains.add(session.render(bump(1e3 * ms), client_time_us=1000 * ms))
+        session.renew(effects=[])
+        with pytest.raises(papilla.PapillaError, match="spikes"):
+            papilla.SpikeTrains(session.ready)
+    assert 0 < len(trains.unit) <= 30 and trains.lost > 0
+
+
+def test_nwb_files_hold_the_units(url, tmp_path):
+    pynwb = pytest.importorskip("pynwb")
+    with papilla.Session(url, tier="half-space", effects=["spikes"]) as session:
+        trains = papilla.SpikeTrains(session.ready)
+        for ms in range(60):
+            trains.add(session.render(bump(500.0 * ms), client_time_us=1000 * ms))
+    trains.save_nwb(tmp_path / "spikes.nwb")
+    with pynwb.NWBHDF5IO(str(tmp_path / "spikes.nwb"), "r") as file:
+        units = file.read().units
+        assert len(units) == len(trains.classes)
+        assert sum(len(units["spike_times"][n]) for n in range(len(units))) == len(trains.unit)
+
+
 def test_figure_4_is_drawn(url, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)

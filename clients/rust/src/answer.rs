@@ -2,7 +2,7 @@
 
 use papilla_proto::{
     Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
-    Window, contact::Touch, effects::SectionName, flags,
+    Window, contact::Touch, effects::SectionName, flags, spikes::Fired,
 };
 
 use crate::PapillaError;
@@ -74,6 +74,8 @@ pub struct Answer {
     pub points: Vec<f32>,
     /// The effect `actuators`.
     pub actuators: Vec<f32>,
+    /// The effect `spikes`.
+    pub fired: Option<Fired>,
 }
 
 impl Answer {
@@ -113,6 +115,7 @@ impl Answer {
             summary: None,
             points: Vec::new(),
             actuators: Vec::new(),
+            fired: None,
         }
     }
 
@@ -183,6 +186,10 @@ impl Answer {
                 SectionName::Summary => self.summary = Summary::decode(part),
                 SectionName::Points => self.points = floats(part)?,
                 SectionName::Actuators => self.actuators = floats(part)?,
+                SectionName::Spikes => {
+                    let fired = Fired::decode(part, header.client_time_us);
+                    self.fired = Some(fired.ok_or_else(short)?);
+                }
                 SectionName::Map => {
                     self.map = vec![0.0; MAP_LEN];
                     self.window
@@ -201,4 +208,34 @@ fn floats(bytes: &[u8]) -> Result<Vec<f32>, PapillaError> {
         .decode(bytes, 1.0, &mut values)
         .map_err(|error| PapillaError::Protocol(error.to_string()))?;
     Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use papilla_proto::{HEADER_LEN_V2, spikes::Spike};
+    use serde_json::{from_value, json};
+
+    use super::*;
+
+    #[test]
+    fn spikes_are_read_by_the_clock_of_the_frame() {
+        let ready: Ready = from_value(json!({
+            "version": 2, "session": 1, "tier": "nano", "effects": [], "atlas_hash": "",
+            "predicted_latency_us": 1, "width": 224, "height": 224, "sample_type": "f32",
+            "pressure_max_pa": 1e4, "sed_scale_j_per_m3": 1.0,
+            "sections": [{"name": "spikes", "offset": HEADER_LEN_V2, "bytes": 24}],
+        }))
+        .unwrap();
+        let time_us = 7_000_000;
+        let header = FrameHeader::pressure(1, time_us, 0, SampleType::F32, 1.0);
+        let header = header.windowed(Window::EMPTY);
+        let spikes = vec![Spike { unit: 4, time_us: 6_999_200 }, Spike { unit: 2, time_us }];
+        let mut message = header.encode().to_vec();
+        message.extend([9_u32.to_le_bytes(), 2_u32.to_le_bytes()].as_flattened());
+        spikes.iter().for_each(|spike| message.extend(spike.encode(time_us)));
+        let read = |message: &[u8]| Answer::read(&header, message, &ready, String::new());
+        assert!(read(&message).is_err(), "the section has 24 bytes");
+        message.extend([0; 8]);
+        assert_eq!(read(&message).unwrap().fired, Some(Fired { total: 9, spikes }));
+    }
 }

@@ -70,15 +70,20 @@ fn us(mut effects: Effects, contact_pa: &[f32]) -> f64 {
     let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut bytes = BytesMut::with_capacity(effects.size_hint());
     let mut least = Duration::MAX;
+    // A contact that moves: at rest, units that spike cost next to nothing.
+    let lighter_pa: Vec<f32> = contact_pa.iter().map(|pa| 0.9 * pa).collect();
     for run in 0..RUNS {
-        pressure_pa.copy_from_slice(contact_pa);
+        let map = if run % 2 == 0 { contact_pa } else { &lighter_pa };
+        pressure_pa.copy_from_slice(map);
         bytes.clear();
         bytes.resize(HEADER_LEN_V2, 0);
         let start = Instant::now();
         let time_us = run * 11_111;
         effects.before(&mut pressure_pa, time_us);
         // The pressure stands in for its SED: the times do not depend on the values.
-        if effects.write(&pressure_pa, contact_pa, time_us, &mut bytes).is_ok() {
+        let written = effects.write(&pressure_pa, map, time_us, &mut bytes).is_ok();
+        // The first frame begins, which is less than to go on.
+        if written && run > 0 {
             least = least.min(start.elapsed());
         }
     }

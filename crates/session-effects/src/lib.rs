@@ -1,7 +1,7 @@
 //! What a session asks for beside the SED map; one file an effect.
 //!
-//! A frame meets them in this order: `relaxation` before the network, `afferents` after it, and
-//! then whatever reads their results. **Invariant:** what the hello did not name is neither
+//! A frame meets them in this order: `relaxation` before the network, `afferents` and `spikes` after
+//! it, and then whatever reads their results. **Invariant:** what the hello did not name is neither
 //! computed nor allocated; what it named allocates at the hello and never in a frame.
 //!
 //! ```
@@ -45,6 +45,7 @@ mod finger;
 mod geometry;
 mod points;
 mod relaxation;
+mod spikes;
 mod summary;
 mod vertices;
 mod window;
@@ -60,6 +61,7 @@ use papilla_proto::{
     SampleError, SampleType, Window,
     contact::SampleLayout,
     effects::{ActuatorInput, Section, SectionName},
+    spikes::PlacedUnit,
 };
 
 use papilla_session_state::{Reader, StateError, Writer};
@@ -69,7 +71,7 @@ pub use finger::{Cost, Finger, Shared};
 
 use self::{
     actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,
-    relaxation::Relaxation, summary::Contact, vertices::Vertices,
+    relaxation::Relaxation, spikes::Spikes, summary::Contact, vertices::Vertices,
 };
 
 /// The effects of one session and their state.
@@ -85,6 +87,7 @@ pub struct Effects {
     vertices: Option<Vertices>,
     relaxation: Option<Relaxation>,
     afferents: Option<Afferents>,
+    spikes: Option<(Arc<Geometry>, Spikes)>,
     margin_px: Option<u16>,
     summary: Option<Arc<Geometry>>,
     points: Option<Points>,
@@ -134,6 +137,12 @@ impl Effects {
         let afferents = has(RuntimeEffect::Afferents)
             .then(|| Afferents::new(hello.afferents.unwrap_or_default()))
             .transpose()?;
+        let spikes = has(RuntimeEffect::Spikes)
+            .then(|| {
+                let (of, geometry) = (hello.spikes.clone().unwrap_or_default(), geometry());
+                Spikes::new(&of, finger, &geometry).map(|spikes| (geometry, spikes))
+            })
+            .transpose()?;
         let points = match &hello.points {
             Some(places) => Some(Points::new(places, &geometry())?),
             None => None,
@@ -161,6 +170,7 @@ impl Effects {
             vertices: (map && by_vertices).then(|| Vertices::new(finger)),
             relaxation,
             afferents,
+            spikes,
             margin_px,
             summary,
             points,
@@ -180,6 +190,7 @@ impl Effects {
                 SectionName::Actuators,
                 self.actuators.as_ref().map(|(_, actuators)| floats(actuators.len())),
             ),
+            (SectionName::Spikes, self.spikes.as_ref().map(|(_, spikes)| spikes.len())),
             (SectionName::Map, self.map.then(|| MAP_LEN * self.sample_type.bytes())),
             (
                 SectionName::Vertices,
@@ -214,6 +225,12 @@ impl Effects {
         &self.sections
     }
 
+    /// The units of the effect `spikes`, by number; none without it.
+    #[must_use]
+    pub fn units(&self) -> Option<&[PlacedUnit]> {
+        self.spikes.as_ref().map(|(_, spikes)| spikes.placed())
+    }
+
     /// What the map of an answer shows.
     fn kind(&self) -> FrameKind {
         if self.afferents.is_some() { FrameKind::Sa1Rate } else { FrameKind::Sed }
@@ -236,7 +253,7 @@ impl Effects {
     /// Whether an answer depends on the frames before it.
     #[must_use]
     pub fn has_state(&self) -> bool {
-        self.relaxation.is_some() || self.afferents.is_some()
+        self.relaxation.is_some() || self.afferents.is_some() || self.spikes.is_some()
     }
 
     /// Writes what answers depend on of the frames before.
@@ -246,6 +263,9 @@ impl Effects {
         }
         if let Some(afferents) = &self.afferents {
             afferents.save(state);
+        }
+        if let Some((_, spikes)) = &self.spikes {
+            spikes.save(state);
         }
     }
 
@@ -259,6 +279,9 @@ impl Effects {
         }
         if let Some(afferents) = &mut self.afferents {
             afferents.restore(state)?;
+        }
+        if let Some((_, spikes)) = &mut self.spikes {
+            spikes.restore(state)?;
         }
         Ok(())
     }
@@ -305,6 +328,11 @@ impl Effects {
             };
             actuators.write(input, bytes);
         }
+        if let Some((geometry, spikes)) = &mut self.spikes {
+            pad(bytes);
+            spikes.step(geometry, sent_pa, sed_j_per_m3, time_us);
+            spikes.write(time_us, bytes);
+        }
         let kind = self.kind();
         if let Some(vertices) = &mut self.vertices {
             pad(bytes);
@@ -339,6 +367,7 @@ fn named(hello: &Hello) -> Result<Vec<RuntimeEffect>, Problem> {
         (RuntimeEffect::Points, hello.points.is_some(), true),
         (RuntimeEffect::Actuators, hello.actuators.is_some(), true),
         (RuntimeEffect::Afferents, hello.afferents.is_some(), false),
+        (RuntimeEffect::Spikes, hello.spikes.is_some(), false),
         (RuntimeEffect::Relaxation, hello.relaxation.is_some(), false),
     ] {
         let named = names.contains(&effect);

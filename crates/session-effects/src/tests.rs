@@ -27,7 +27,7 @@ pub(super) fn plane() -> Geometry {
 }
 
 /// A finger of its own.
-struct Owned {
+pub(super) struct Owned {
     atlas: Atlas,
     skin: Raster,
     interface: Raster,
@@ -35,13 +35,13 @@ struct Owned {
 }
 
 impl Owned {
-    fn plane() -> Self {
+    pub(super) fn plane() -> Self {
         let atlas = plane_atlas();
         let [skin, interface] = Patch::ALL.map(|patch| Raster::new(&atlas, patch));
         Self { atlas, skin, interface, shared: Shared::default() }
     }
 
-    fn finger(&self) -> Finger<'_> {
+    pub(super) fn finger(&self) -> Finger<'_> {
         let Self { atlas, skin, interface, shared } = self;
         Finger { atlas, skin, interface, shared }
     }

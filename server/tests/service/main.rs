@@ -27,6 +27,7 @@ mod recorded;
 mod reload;
 mod rendering;
 mod session;
+mod spikes;
 mod start;
 mod support;
 mod tls;

@@ -172,7 +172,7 @@ fn messages() -> Vec<(&'static str, String)> {
     let wide = vec![json!({"at": {"px": [110.5, 110.5]}}); 32];
     let display = json!({"actuators": wide, "radius_mm": 1000.0, "gain": 1.0});
     let all = hello(&json!({"version": 2, "actuators": display,
-        "effects": ["actuators", "relaxation", "afferents", "summary"],
+        "effects": ["actuators", "relaxation", "afferents", "spikes", "summary"],
         "relaxation": {"prony": (1..=6).map(|n| json!({"g": 0.1, "tau_s": n})).collect::<Vec<_>>()}}));
     vec![
         ("effects", fill(&with(r#""effects":["#), r#""""#, "]}")),

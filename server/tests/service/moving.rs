@@ -30,7 +30,9 @@ impl Shared {
 
 /// A hello whose answers depend on every frame before.
 fn creeping() -> Value {
-    hello_2(&json!({"effects": ["relaxation", "afferents", "summary"], "reconnect": true}))
+    hello_2(
+        &json!({"effects": ["relaxation", "afferents", "spikes", "summary"], "reconnect": true}),
+    )
 }
 
 /// A patch that moves and breathes, Pa.

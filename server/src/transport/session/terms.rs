@@ -12,6 +12,7 @@ use papilla_proto::{
     contact::FINGERS_MAX,
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
+    spikes::PlacedUnit,
 };
 use papilla_session_contact::{Hand, Skin};
 use papilla_session_effects::Effects;
@@ -115,6 +116,8 @@ impl Drop for Permit {
 /// What `ready` says of the effects of a session.
 struct ReadyInfo {
     names: Vec<RuntimeEffect>,
+    /// Units of the effect `spikes`.
+    units: Option<Vec<PlacedUnit>>,
     sections: Vec<Section>,
     /// Greatest value that the map shows.
     value_max: Option<f32>,
@@ -144,7 +147,13 @@ fn check_version(hello: &Hello) -> Result<(), Problem> {
 impl Default for ReadyInfo {
     /// The bare map.
     fn default() -> Self {
-        Self { names: Vec::new(), sections: Vec::new(), value_max: None, shows_sed: true }
+        Self {
+            names: Vec::new(),
+            units: None,
+            sections: Vec::new(),
+            value_max: None,
+            shows_sed: true,
+        }
     }
 }
 
@@ -227,6 +236,7 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
     }
     let info = effects.first().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
         names: effects.names().to_vec(),
+        units: effects.units().map(<[_]>::to_vec),
         sections: effects.sections().to_vec(),
         value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
         shows_sed: hand.is_none() || effects.shows_sed(),
@@ -312,6 +322,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         answer_sample_type: is_new.then_some(terms.answer_sample_type),
         session_effects: is_new.then(|| terms.info.names.clone()),
         sections: is_new.then(sections),
+        units: terms.info.units.clone(),
         state: terms.resumption,
         vertices: fingers.map(|_| catalogue.atlas.vertex_count() as u32),
         fingers,

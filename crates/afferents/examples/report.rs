@@ -1,0 +1,179 @@
+//! Writes `docs/reports/spikes.md`: TouchSim's values, pins against SED, the time of a frame.
+
+use std::{fs, time::Instant};
+
+use papilla_afferents::{
+    Cell, Class, Densities, Fingertip, Neuron, PlacementError, SAMPLES_PER_S, Settings, Unit,
+    pins::{Pin, inputs, spikes_s},
+    place,
+    touchsim::{FIRST_TOLERANCE_MS, Motion, PUBLISHED, SPIKES_TOLERANCE},
+};
+
+const HEAD: &str = "\
+# Spikes of touch units
+
+Written by
+
+```sh
+cargo run --release -p papilla-afferents --example report > docs/reports/spikes.md
+```
+
+## Against TouchSim
+
+Values that TouchSim's own tests hold to one spike and 0.25 ms (`tests/test_timing.py` of
+github.com/hsaal/touchsim; Saal, Delhaye, Rayhaun & Bensmaia 2017): the first neuron of each class
+under a pin that moves for a second.
+
+| class | pin | radius, mm | off by, mm | spikes | TouchSim | first, ms | TouchSim | |
+|---|---|---|---|---|---|---|---|---|
+";
+
+const SED: &str = "
+## Pins against strain energy density
+
+The same ramp of 1 mm by a pin of 1 mm radius, its stress at 0.3 mm given as SED in 1000 frames: what
+the finger of Papilla makes of a stress, without its mechanics. PC units take force, not SED.
+
+At the default 80 kPa a stress below some 8 kPa, 400 J/m3, leaves SA1 silent. A plate at 0.9 N, whose
+SED is 340 J/m3 at most (`large`, on the page), fires but a few of 470: `e_ref_kpa` is not fitted to
+the rates of people.
+
+| neuron | spikes under the pin | spikes of SED | first under the pin, ms | first of SED, ms |
+|---|---|---|---|---|
+";
+
+const COST: &str = "
+## Time of a frame
+
+A plane interface of 6.7 cm2 at the densities of a fingertip, SED and force going up and down seven
+times a second; medians of 400 frames, membranes, places of SED and waves together.
+
+| SED on | noise | frames a second | units | spikes a second | time of a frame, us |
+|---|---|---|---|---|---|
+";
+
+const SIDE: u32 = 224;
+const PIXEL_MM: f32 = 0.1156;
+
+fn main() -> Result<(), PlacementError> {
+    print!("{HEAD}");
+    for value in PUBLISHED {
+        let found_s = value.found_s();
+        let (count, first_ms) =
+            (found_s.len() as f64, found_s.first().map_or(f64::NAN, |s| 1e3 * s));
+        let is_met = (count - value.spikes).abs() <= SPIKES_TOLERANCE
+            && (first_ms - value.first_ms).abs() <= FIRST_TOLERANCE_MS;
+        let pin = match value.motion {
+            Motion::Ramp { depth_mm } => format!("ramp of {depth_mm} mm"),
+            Motion::Sine { frequency_hz, amplitude_mm } => {
+                format!("{frequency_hz} Hz, {amplitude_mm} mm")
+            }
+        };
+        println!(
+            "| {} | {pin} | {} | {} | {count} | {} | {first_ms:.1} | {:.1} | {} |",
+            value.class,
+            value.radius_mm,
+            value.distance_mm,
+            value.spikes,
+            value.first_ms,
+            if is_met { "ok" } else { "MISSED" }
+        );
+    }
+    print!("{SED}");
+    for class in [Class::Sa1, Class::Ra] {
+        (0..Neuron::models(class)).for_each(|model| from_sed(class, model));
+    }
+    print!("{COST}");
+    for (what, radius_mm) in [("77 mm2", 4.95), ("all", f32::INFINITY)] {
+        for (noise, name) in [(None, "no"), (Some(1), "yes")] {
+            for period_us in [1000, 11_111] {
+                cost(what, radius_mm, (noise, name), period_us)?;
+            }
+        }
+    }
+    println!("\nMeasured on {}, which others used too.", machine());
+    Ok(())
+}
+
+/// A pin's stress at the depth of SA1 receptors as SED, 1000 frames a second.
+fn from_sed(class: Class, model: usize) {
+    let trace_mm = Motion::Ramp { depth_mm: 1.0 }.trace_mm();
+    let pin = [Pin::indenting([0.0; 2], 1.0, &trace_mm)];
+    let due_s = Neuron::new(class, model)
+        .map_or_else(Vec::new, |neuron| spikes_s(neuron, &inputs(&pin, class, [0.0; 2])));
+    let settings = Settings { e_ref_kpa: 80.0, noise: None };
+    let unit = Unit { class, model: model as u8, pixel: 0 };
+    let mut finger = Fingertip::new(vec![unit], &[], |_| [0.0; 3], settings, 1000);
+    let stress_mpa = inputs(&pin, Class::Sa1, [0.0; 2]).stress_mpa;
+    let mut first_us = None;
+    for (ms, stress_mpa) in stress_mpa.iter().step_by(SAMPLES_PER_S as usize / 1000).enumerate() {
+        // sigma^2 / 2 E, MPa as J/m3.
+        let sed = (1e9 * stress_mpa * stress_mpa / (2.0 * 80.0)) as f32;
+        finger.step(1000 * ms as u64, &[sed], &[]);
+        first_us = first_us.or(finger.spikes().first().map(|spike| spike.time_us));
+    }
+    let ms = |time_s: Option<f64>| time_s.map_or("–".to_owned(), |s| format!("{:.1}", 1e3 * s));
+    println!(
+        "| {class} {model} | {} | {} | {} | {} |",
+        due_s.len(),
+        finger.fired(),
+        ms(due_s.first().copied()),
+        ms(first_us.map(|us| 1e-6 * us as f64))
+    );
+}
+
+fn cost(
+    what: &str,
+    radius_mm: f32,
+    (noise, name): (Option<u32>, &str),
+    period_us: u64,
+) -> Result<(), PlacementError> {
+    const FRAMES: u64 = 400;
+    let at_mm = |pixel: u32| {
+        let [x, y] = [pixel % SIDE, pixel / SIDE].map(|n| PIXEL_MM * (n as f32 - 111.5));
+        [x, y, 0.0]
+    };
+    let within = |at_mm: [f32; 3]| {
+        let [x, y, _] = at_mm;
+        (1.0 - (x * x + y * y) / (radius_mm * radius_mm)).max(0.0)
+    };
+    let pixels: Vec<_> = (0..SIDE * SIDE).map(|pixel| (pixel, PIXEL_MM * PIXEL_MM)).collect();
+    // Middles of squares of 16 pixels.
+    let cell = |n: u32| Cell {
+        at_mm: at_mm(16 * (n / 14) * SIDE + 8 * SIDE + 16 * (n % 14) + 8),
+        area_mm2: (16.0 * PIXEL_MM).powi(2),
+    };
+    let cells: Vec<_> = (0..196).map(cell).collect();
+    let units = place(&pixels, Densities::default(), 1)?;
+    let count = units.len();
+    let settings = Settings { e_ref_kpa: 80.0, noise };
+    let mut finger = Fingertip::new(units, &cells, at_mm, settings, 1024);
+    let mut times_us = Vec::new();
+    for frame in 0..FRAMES {
+        let time_us = frame * period_us;
+        let wave = (1e-6 * time_us as f32 * std::f32::consts::TAU * 7.0).sin().abs();
+        // 2 kJ/m3 are 18 kPa.
+        let sed: Vec<f32> =
+            pixels.iter().map(|&(pixel, _)| 2000.0 * wave * wave * within(at_mm(pixel))).collect();
+        let force_n: Vec<f32> = cells.iter().map(|cell| 0.05 * wave * within(cell.at_mm)).collect();
+        let start = Instant::now();
+        finger.step(time_us, &sed, &force_n);
+        times_us.push(1e6 * start.elapsed().as_secs_f64());
+    }
+    times_us.sort_by(f64::total_cmp);
+    let seconds = 1e-6 * (FRAMES * period_us) as f64;
+    println!(
+        "| {what} | {name} | {} | {count} | {:.0} | {:.0} |",
+        1_000_000 / period_us,
+        f64::from(finger.fired()) / seconds,
+        times_us[times_us.len() / 2]
+    );
+    Ok(())
+}
+
+/// The processor, as Linux names it.
+fn machine() -> String {
+    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = info.lines().find_map(|line| line.strip_prefix("model name"));
+    name.map_or("an unnamed processor", |name| name.trim_start_matches([' ', '\t', ':'])).to_owned()
+}
