@@ -1,5 +1,6 @@
 //! Where the search for the next equilibrium starts.
 
+use super::fluid;
 use super::state::State;
 use super::stepping::Solver;
 
@@ -24,6 +25,7 @@ impl Solver<'_> {
             }
         }
         self.prescribe(next, &mut trial.u);
+        fluid::begin(self.before.as_ref(), next, &mut trial);
         trial
     }
 
@@ -31,12 +33,14 @@ impl Solver<'_> {
     pub(super) fn unmoved(&self, next: f64) -> State {
         let mut trial = self.state.clone();
         self.prescribe(next, &mut trial.u);
+        fluid::begin(self.before.as_ref(), next, &mut trial);
         trial
     }
 
     fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
+        let share = self.loading.share(fraction);
         for &(dof, value) in &self.loading.prescribed_mm {
-            u[dof / 3][dof % 3] = fraction * value;
+            u[dof / 3][dof % 3] = share * value;
         }
         self.newton.problem.mesh.follow(u);
     }

@@ -1,6 +1,7 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
 use super::history_layout::HistoryLayout;
+use crate::biphasic::{FluidError, FluidPhase, FluidSpec, Solid};
 use crate::contact::{ContactRule, ContactSurface, Support};
 use crate::element::{BlockGeometry, Materials, ShapeError};
 use crate::linear::{SymbolicError, SymbolicSystem, SymmetricMatrix};
@@ -22,6 +23,8 @@ pub struct Problem {
     pub system: SymbolicSystem,
     /// Where contact may happen.
     pub contact: Option<ContactSurface>,
+    /// What flows in it; `None` of a body without fluid.
+    pub fluid: Option<FluidPhase>,
 }
 
 /// Why a problem could not be set up.
@@ -48,6 +51,9 @@ pub enum ProblemError {
         /// Surface.
         name: String,
     },
+    /// The body cannot be full of fluid.
+    #[error(transparent)]
+    Fluid(#[from] FluidError),
     /// A surface or node set is missing.
     #[error("the mesh has no {kind} named '{name}'; it has: {known}")]
     Missing {
@@ -98,7 +104,36 @@ impl Problem {
             }
         };
         let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
-        Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
+        let fluid = None;
+        Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact, fluid })
+    }
+
+    /// The same body full of fluid, see [`crate::biphasic`].
+    ///
+    /// # Errors
+    /// [`ProblemError::Fluid`].
+    pub fn with_fluid(self, spec: FluidSpec) -> Result<Self, ProblemError> {
+        let fluid = Some(FluidPhase::new(&self.mesh, &self.system, spec)?);
+        Ok(Self { fluid, ..self })
+    }
+
+    /// Side of a cube (square) as large as the mean element, mm.
+    pub(super) fn element_width_mm(&self) -> f64 {
+        let volume: f64 = self
+            .mesh
+            .blocks
+            .iter()
+            .zip(&self.geometry)
+            .flat_map(|(b, g)| (0..b.len()).map(move |e| g.element(e)))
+            .map(|g| g.weights.iter().sum::<f64>())
+            .sum();
+        let mean = volume / self.mesh.element_count() as f64;
+        if self.mesh.is_planar() { mean.sqrt() } else { mean.cbrt() }
+    }
+
+    /// The solid, for what flows in it.
+    pub(super) fn solid(&self) -> Solid<'_> {
+        Solid { mesh: &self.mesh, geometry: &self.geometry, materials: &self.materials }
     }
 
     /// Adds `N_a N_b stiffness` (N/mm) between the unknowns that carry a point of the surface.

@@ -1,0 +1,119 @@
+//! Cryer's ball: suddenly pressed all round on its drained surface. In its middle pressure rises
+//! above what presses it (Cryer 1963): the Mandel-Cryer effect in space.
+
+use crate::bodies::{Body, march, place, sudden, times};
+use papilla_fem::element::ElementKind;
+use papilla_fem::mesh::block::even;
+use papilla_fem::mesh::lattice::{REGION, lattice};
+use papilla_fem::mesh::{Block, FaceKind, Mesh, Surface};
+use papilla_fem::solve::Loading;
+use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_4;
+
+const RADIUS_MM: f64 = 1.5;
+const PRESSURE_MPA: f64 = 0.01;
+/// Half the side of the cube in the ball's middle, over the radius.
+const CORE: f64 = 0.25;
+
+/// Poisson's ratio; `p / P` in the middle at T = .01, .05, .1, .5; its peak and when.
+const TABLE: [(f64, [f64; 4], f64, f64); 3] = [
+    (0.0, [1.245_450, 1.557_325, 1.475_505, 0.272_313], 1.575_42, 0.063),
+    (0.2, [1.175_762, 1.363_718, 1.194_103, 0.111_119], 1.364_27, 0.052),
+    (0.4, [1.072_546, 1.115_835, 0.876_360, 0.032_166], 1.126_46, 0.039),
+];
+const STOPS: [f64; 4] = [0.01, 0.05, 0.1, 0.5];
+
+/// An eighth of the ball: a cube, and between each of its far sides and the sphere a shell, `cells`
+/// wide and `layers` deep, thinner outwards.
+fn eighth(cells: usize, layers: usize) -> Mesh {
+    let kind = ElementKind::Hex27;
+    let side = even(1.0, 2 * cells);
+    let core = lattice(kind, [side.clone(), side.clone(), side.clone()], |p| p.map(|v| CORE * v));
+    let through = even(1.0, 2 * layers);
+    let mut pieces = vec![core];
+    for axis in 0..3 {
+        // Of a shell the third coordinate goes outwards along `axis`, keeping the hand.
+        pieces.push(lattice(kind, [side.clone(), side.clone(), through.clone()], |[a, b, s]| {
+            let way = |v: f64| (FRAC_PI_4 * v).tan();
+            let mut out = [0.0; 3];
+            out[axis] = 1.0;
+            out[(axis + 1) % 3] = way(a);
+            out[(axis + 2) % 3] = way(b);
+            let norm = out.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let mut inner = [0.0; 3];
+            (inner[axis], inner[(axis + 1) % 3], inner[(axis + 2) % 3]) = (CORE, CORE * a, CORE * b);
+            let s = s * (1.2 - 0.2 * s);
+            std::array::from_fn(|i| (1.0 - s) * inner[i] + s * out[i] / norm)
+        }));
+    }
+    join(&pieces)
+}
+
+fn join(pieces: &[Mesh]) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut number: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+    let mut block = Block { kind: ElementKind::Hex27, connectivity: Vec::new(), region: Vec::new() };
+    let mut outside = Surface { kind: FaceKind::of(block.kind), connectivity: Vec::new() };
+    for (i, piece) in pieces.iter().enumerate() {
+        let new: Vec<u32> = piece
+            .nodes
+            .iter()
+            .map(|p| {
+                let key = p.map(|v| (v * 1e8).round() as i64);
+                *number.entry(key).or_insert_with(|| {
+                    mesh.nodes.push(p.map(|v| RADIUS_MM * v));
+                    mesh.nodes.len() as u32 - 1
+                })
+            })
+            .collect();
+        let from = &piece.blocks[0];
+        block.connectivity.extend(from.connectivity.iter().map(|&n| new[n as usize]));
+        block.region.extend(from.region.iter().map(|_| REGION));
+        if i > 0 {
+            let faces = &piece.surfaces["z_max"].connectivity;
+            outside.connectivity.extend(faces.iter().map(|&n| new[n as usize]));
+        }
+    }
+    for (i, name) in ["x_min", "y_min", "z_min"].into_iter().enumerate() {
+        let on = |n: &u32| mesh.nodes[*n as usize][i].abs() < 1e-9;
+        mesh.node_sets.insert(name.into(), (0..mesh.nodes.len() as u32).filter(on).collect());
+    }
+    mesh.blocks.push(block);
+    mesh.surfaces.insert("sphere".into(), outside);
+    mesh
+}
+
+#[test]
+fn cryer_is_met_with_its_overshoot() {
+    for (nu, table, peak, peak_at) in TABLE {
+        let [x, y, z] = [0, 1, 2].map(|i| std::array::from_fn(|j| i == j));
+        let held = [("x_min", x), ("y_min", y), ("z_min", z)];
+        let body = Body::new(eighth(2, 7), nu, &held, "sphere");
+        let t = times(&STOPS, 14);
+        let scale_s = RADIUS_MM * RADIUS_MM / body.c();
+        let seconds: Vec<f64> = t.iter().map(|t| t * scale_s).collect();
+        let loading = Loading {
+            dead_n: body.pressed("sphere", PRESSURE_MPA),
+            course: sudden(&seconds),
+            ..Loading::default()
+        };
+        let middle = body.node([0.0; 3]);
+        let mut found = Vec::new();
+        march(&body.problem, loading, &seconds, |_, solver| {
+            found.push(solver.fluid_pressure_mpa()[middle] / PRESSURE_MPA);
+        });
+        for (at, due) in STOPS.into_iter().zip(table) {
+            let p = found[place(&t, at)];
+            println!("nu {nu} T {at}: {p:.6} {due} {:.3} %", 100.0 * (p / due - 1.0));
+        }
+        let (highest, when) =
+            found.iter().zip(&t).fold((0.0, 0.0), |m, (&f, &t)| if f > m.0 { (f, t) } else { m });
+        println!("nu {nu}: peak {highest} at {when}; {peak} at {peak_at}");
+        for (at, due) in STOPS.into_iter().zip(table) {
+            let p = found[place(&t, at)];
+            assert!((p / due - 1.0).abs() < 5e-3, "nu {nu}, T {at}: {p}, {due}");
+        }
+        assert!((highest / peak - 1.0).abs() < 5e-3, "nu {nu}: {highest}");
+        assert!((when / peak_at - 1.0).abs() < 0.15, "nu {nu}: {when}");
+    }
+}
