@@ -17,7 +17,7 @@ pub(super) struct Interpolation {
     at_points: Vec<[f64; CORNERS_MAX]>,
     /// At the element's nodes: pressure functions are sums of displacement functions with these
     /// factors, and so are their gradients.
-    at_nodes: Vec<[f64; CORNERS_MAX]>,
+    pub at_nodes: Vec<[f64; CORNERS_MAX]>,
 }
 
 impl Interpolation {
@@ -158,9 +158,7 @@ impl Flowing<'_> {
         }
         let c = &at.cof;
         std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                k / at.j() * (0..3).map(|m| c[m][i] * c[m][j]).sum::<f64>()
-            })
+            std::array::from_fn(|j| k / at.j() * (0..3).map(|m| c[m][i] * c[m][j]).sum::<f64>())
         })
     }
 }

@@ -37,6 +37,8 @@
 mod element;
 mod permeability;
 mod phase;
+#[cfg(test)]
+mod tests;
 
 pub use permeability::{HolmesMow, Permeability, PermeabilityError};
 pub use phase::{Flow, FluidError, FluidPhase, FluidSpec, Older};

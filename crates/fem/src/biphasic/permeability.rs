@@ -25,13 +25,17 @@ pub struct HolmesMow {
 #[derive(Clone, Copy, Debug, thiserror::Error, PartialEq)]
 pub enum PermeabilityError {
     /// Negative, or not a number.
-    #[error("permeability {0} mm4/(N s) must be finite and not negative: fluid flows down the pressure")]
+    #[error(
+        "permeability {0} mm4/(N s) must not be negative or infinite: fluid flows down the pressure"
+    )]
     Value(f64),
     /// A share outside [0, 1).
     #[error("a solid's share of {0} must be at least 0 and below 1")]
     SolidShare(f64),
     /// A negative power or exponent.
-    #[error("a power or exponent of {0} must be finite and not negative: pores close as tissue shrinks")]
+    #[error(
+        "a power or exponent of {0} must be finite and not negative: pores close as tissue shrinks"
+    )]
     Exponent(f64),
 }
 

@@ -50,6 +50,12 @@ pub enum FluidError {
     /// Cells of different size side by side.
     #[error("pressure is not continuous where cells are halved: take a mesh without hanging nodes")]
     Hanging,
+    /// A drained surface on tissue without fluid.
+    #[error(
+        "no element at the drained surface '{0}' has a permeability: nothing can leave there; give the tissue \
+         below it one or seal the surface"
+    )]
+    DryDrain(String),
     /// No region has a permeability.
     #[error("no element has a permeability: there is no fluid")]
     NoFluid,
@@ -115,16 +121,15 @@ impl FluidPhase {
         let mut elements = Vec::new();
         for (b, block) in mesh.blocks.iter().enumerate() {
             let wet: Vec<_> = (0..block.len()).filter(|&e| of(block.region[e]).is_some()).collect();
-            let by_kind = || {
-                Interpolation::new(block.kind).ok_or(FluidError::Linear { kind: block.kind })
-            };
+            let by_kind =
+                || Interpolation::new(block.kind).ok_or(FluidError::Linear { kind: block.kind });
             interpolation.push(if wet.is_empty() { None } else { Some(by_kind()?) });
             elements.extend(wet.iter().map(|&e| [b as u32, e as u32]));
         }
         if elements.is_empty() {
             return Err(FluidError::NoFluid);
         }
-        let outlet = outlet(mesh, drained)?;
+        let outlet = outlet(mesh, drained.as_deref())?;
         let (mut unknown, mut count) = (vec![DofMap::FIXED; mesh.nodes.len()], 0);
         let mut has_pressure = vec![false; mesh.nodes.len()];
         for &[b, e] in &elements {
@@ -138,6 +143,11 @@ impl FluidPhase {
                 }
                 has_pressure[n as usize] = true;
             }
+        }
+        if let (Some(name), false) =
+            (drained, (0..outlet.len()).any(|n| outlet[n] && has_pressure[n]))
+        {
+            return Err(FluidError::DryDrain(name));
         }
         for n in (0..unknown.len()).filter(|&n| has_pressure[n] && !outlet[n]) {
             unknown[n] = count;
@@ -164,12 +174,35 @@ impl FluidPhase {
         self.count
     }
 
-    /// What pressure unknowns make of every node, MPa: 0 where there is no fluid or it leaves, and
-    /// between corners, whose pressures say what it is there.
+    /// Pressure at every node of `mesh`, MPa, by the pressure unknowns; 0 where there is no fluid or
+    /// it leaves.
     #[must_use]
-    pub fn at_nodes_mpa(&self, pressure_mpa: &[f64]) -> Vec<f64> {
-        let of = |&e: &u32| pressure_mpa.get(e as usize).copied().unwrap_or(0.0);
-        self.unknown.iter().map(of).collect()
+    pub fn at_nodes_mpa(&self, mesh: &Mesh, pressure_mpa: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; mesh.nodes.len()];
+        for &[b, e] in &self.elements {
+            let nodes = mesh.blocks[b as usize].element(e as usize);
+            let Some(interpolation) = &self.interpolation[b as usize] else { continue };
+            let corners = self.corners(interpolation, nodes, pressure_mpa);
+            for (&n, factors) in nodes.iter().zip(&interpolation.at_nodes) {
+                out[n as usize] = factors.iter().zip(&corners).map(|(f, p)| f * p).sum();
+            }
+        }
+        out
+    }
+
+    /// Pressure of an element's corners, MPa.
+    fn corners(
+        &self,
+        interpolation: &Interpolation,
+        nodes: &[u32],
+        pressure_mpa: &[f64],
+    ) -> [f64; CORNERS_MAX] {
+        let mut pressure = [0.0; CORNERS_MAX];
+        for (p, &n) in pressure.iter_mut().zip(&nodes[..interpolation.corners]) {
+            let unknown = self.unknown[n as usize] as usize;
+            *p = pressure_mpa.get(unknown).copied().unwrap_or(0.0);
+        }
+        pressure
     }
 
     /// Visits the elements with fluid: their number, nodes and flow.
@@ -195,11 +228,7 @@ impl FluidPhase {
                 (end[a], start[a]) = (u[n as usize], flow.start_mm[n as usize]);
                 older[a] = flow.older.map_or([0.0; 3], |o| o.start_mm[n as usize]);
             }
-            let mut pressure = [0.0; CORNERS_MAX];
-            for (p, &n) in pressure.iter_mut().zip(&nodes[..interpolation.corners]) {
-                let unknown = self.unknown[n as usize] as usize;
-                *p = flow.pressure_mpa.get(unknown).copied().unwrap_or(0.0);
-            }
+            let pressure = self.corners(interpolation, nodes, flow.pressure_mpa);
             let flowing = Flowing {
                 geometry: body.geometry[b].element(e),
                 interpolation,
@@ -323,10 +352,11 @@ pub(crate) struct FluidForces<'a> {
 }
 
 /// Nodes at which fluid leaves.
-fn outlet(mesh: &Mesh, drained: Option<String>) -> Result<Vec<bool>, FluidError> {
+fn outlet(mesh: &Mesh, drained: Option<&str>) -> Result<Vec<bool>, FluidError> {
     let mut outlet = vec![false; mesh.nodes.len()];
     let Some(name) = drained else { return Ok(outlet) };
-    let Some(surface) = mesh.surfaces.get(&name) else { return Err(FluidError::Missing(name)) };
+    let missing = || FluidError::Missing(name.into());
+    let surface = mesh.surfaces.get(name).ok_or_else(missing)?;
     surface.nodes().iter().for_each(|&n| outlet[n as usize] = true);
     Ok(outlet)
 }

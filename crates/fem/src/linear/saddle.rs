@@ -86,10 +86,8 @@ impl SaddleSystem {
             CholeskySymbolicParams::default(),
         )
         .map_err(|e| SymbolicError::Symbolic(format!("{e:?}")))?;
-        let scatter = couplings
-            .iter()
-            .map(|c| scatter(c, displacements, &column_start, &row))
-            .collect();
+        let scatter =
+            couplings.iter().map(|c| scatter(c, displacements, &column_start, &row)).collect();
         Ok(Self { displacements, pressures, column_start, row, scatter, symbolic })
     }
 
@@ -115,6 +113,13 @@ impl SaddleSystem {
     #[must_use]
     pub fn factor_entries(&self) -> usize {
         self.symbolic.len_val()
+    }
+
+    /// Memory of pattern, places and symbolic factorization, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let places: usize = self.scatter.iter().map(Vec::len).sum();
+        8 * (self.row.len() + self.column_start.len() + 2 * self.len()) + 4 * places
     }
 
     /// Multiplications and additions of one factorization.
@@ -164,7 +169,7 @@ impl SaddleSystem {
     }
 
     /// `y = b - A x`.
-    fn residual(&self, matrix: &SymmetricMatrix, b: &[f64], x: &[f64], y: &mut [f64]) {
+    pub(crate) fn residual(&self, matrix: &SymmetricMatrix, b: &[f64], x: &[f64], y: &mut [f64]) {
         y.copy_from_slice(b);
         for c in 0..self.len() {
             let range = self.column_start[c]..self.column_start[c + 1];

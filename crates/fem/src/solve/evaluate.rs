@@ -100,7 +100,8 @@ pub fn evaluate_body(
     }
     problem.mesh.condense(&mut out.residual_n);
     out.mixed_norm = lag.norm_n(problem, &out.residual_n);
-    let mut norm = surplus_n2(problem, &out.surplus_mm3);
+    let surplus = out.surplus_mm3.iter().map(|s| (problem.surplus_n_per_mm3 * s).powi(2));
+    let mut norm: f64 = surplus.sum();
     for (r, &e) in out.residual_n.iter().zip(&problem.system.dofs.of_dof) {
         if e == crate::linear::DofMap::FIXED {
             reference += r * r;
@@ -192,16 +193,6 @@ fn fluid(
     phase
         .add(problem.solid(), trial.u, flow, trial.variables.dt_s, forces)
         .map_err(|(block, element, i)| StepError::Inverted { block, element, j: i.j })
-}
-
-/// Square of the force that would press the surplus away, N2: a volume over an element's width
-/// times the solid's modulus.
-fn surplus_n2(problem: &Problem, surplus_mm3: &[f64]) -> f64 {
-    if surplus_mm3.is_empty() {
-        return 0.0;
-    }
-    let scale = problem.reference_modulus_mpa() / problem.element_width_mm();
-    surplus_mm3.iter().map(|s| (scale * s).powi(2)).sum()
 }
 
 /// Adds contact; returns the square of its force norm.

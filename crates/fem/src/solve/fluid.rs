@@ -1,7 +1,6 @@
 //! The fluid of a body over a step: where it starts, where it has come to, what it has lost.
 
 use super::problem::Problem;
-use super::state::State;
 use crate::biphasic::{Flow, Older};
 use serde::{Deserialize, Serialize};
 
@@ -35,23 +34,23 @@ pub(super) fn at_rest(problem: &Problem) -> Option<FluidState> {
     })
 }
 
-/// A step begins from a copy of the last equilibrium; `before` is that before it, if the load has
-/// not turned since.
-pub(super) fn begin(before: Option<&State>, next: f64, trial: &mut State) {
-    let State { fraction, fluid, .. } = trial;
-    if let (Some(fluid), Some(before)) = (fluid, before) {
-        let ratio = (next - *fraction) / (*fraction - before.fraction);
-        fluid.older = Some((before.u.clone(), ratio));
+/// A step begins from a copy of the last equilibrium: the displacement at the one before it, if the
+/// load has not turned since, and the step over the last.
+pub(super) fn begin(trial: &mut Option<FluidState>, before: Option<(&[[f64; 3]], f64)>) {
+    if let (Some(fluid), Some((u, ratio))) = (trial, before) {
+        fluid.older = Some((u.to_vec(), ratio));
     }
 }
 
-/// The step from `last` to `found` is done.
-pub(super) fn advance(problem: &Problem, last: &State, found: &mut State) {
-    let (Some(phase), Some(before), Some(fluid)) = (&problem.fluid, &last.fluid, &mut found.fluid)
-    else {
-        return;
-    };
-    fluid.lost_mj += phase.lost_mj(problem.solid(), &found.u, fluid.flow(), &before.pressure_mpa);
-    fluid.start_mm.copy_from_slice(&found.u);
+/// The step from the fluid `last` to the displacement `u` is done.
+pub(super) fn advance(
+    problem: &Problem,
+    last: Option<&FluidState>,
+    u: &[[f64; 3]],
+    found: &mut Option<FluidState>,
+) {
+    let (Some(phase), Some(last), Some(fluid)) = (&problem.fluid, last, found) else { return };
+    fluid.lost_mj += phase.lost_mj(problem.solid(), u, fluid.flow(), &last.pressure_mpa);
+    fluid.start_mm.copy_from_slice(u);
     fluid.older = None;
 }

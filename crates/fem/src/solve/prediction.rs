@@ -25,7 +25,7 @@ impl Solver<'_> {
             }
         }
         self.prescribe(next, &mut trial.u);
-        fluid::begin(self.before.as_ref(), next, &mut trial);
+        fluid::begin(&mut trial.fluid, self.last_step(next));
         trial
     }
 
@@ -33,8 +33,16 @@ impl Solver<'_> {
     pub(super) fn unmoved(&self, next: f64) -> State {
         let mut trial = self.state.clone();
         self.prescribe(next, &mut trial.u);
-        fluid::begin(self.before.as_ref(), next, &mut trial);
+        fluid::begin(&mut trial.fluid, self.last_step(next));
         trial
+    }
+
+    /// Displacement before the last step, and the length of the next over its; none since the load
+    /// has turned.
+    fn last_step(&self, next: f64) -> Option<(&[[f64; 3]], f64)> {
+        let before = self.before.as_ref()?;
+        let ratio = (next - self.state.fraction) / (self.state.fraction - before.fraction);
+        Some((&before.u, ratio))
     }
 
     fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {

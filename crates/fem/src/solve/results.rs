@@ -26,12 +26,14 @@ impl<'a> Solver<'a> {
         self.loading.contact()
     }
 
-    /// Pressure of the fluid at the nodes, MPa: at corners of elements with fluid, 0 elsewhere and
-    /// where it leaves; empty of a body without.
+    /// Pressure of the fluid at the nodes, MPa: 0 where there is none or it leaves; empty of a body
+    /// without.
     #[must_use]
     pub fn fluid_pressure_mpa(&self) -> Vec<f64> {
         match (&self.newton.problem.fluid, &self.state.fluid) {
-            (Some(phase), Some(fluid)) => phase.at_nodes_mpa(&fluid.pressure_mpa),
+            (Some(phase), Some(fluid)) => {
+                phase.at_nodes_mpa(&self.newton.problem.mesh, &fluid.pressure_mpa)
+            }
             _ => Vec::new(),
         }
     }

@@ -274,7 +274,7 @@ impl<'a> Solver<'a> {
         }
         friction::update(&mut trial.friction, &self.newton.current);
         friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
-        fluid::advance(problem, &self.state, &mut trial);
+        fluid::advance(problem, self.state.fluid.as_ref(), &trial.u, &mut trial.fluid);
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
             let Evaluation { contact_force_n, stored_mj, contact_mj, .. } = self.newton.current;

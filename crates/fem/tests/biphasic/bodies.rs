@@ -91,12 +91,12 @@ pub(crate) fn sudden(times_s: &[f64]) -> Vec<(f64, f64)> {
     vec![(times_s[0] / times_s.last().unwrap(), 1.0), (1.0, 1.0)]
 }
 
-/// Times through all of `stops`: so many steps to each, growing as the square of their number from
-/// the first, even between the others.
-pub(crate) fn times(stops: &[f64], steps: usize) -> Vec<f64> {
+/// Times through all of `stops`, so many steps to each: as the square of their number to the first,
+/// even between the others.
+pub(crate) fn times(stops: &[f64], steps: &[usize]) -> Vec<f64> {
     let mut out = Vec::new();
     let mut from = 0.0;
-    for &to in stops {
+    for (&to, &steps) in stops.iter().zip(steps) {
         for i in 1..=steps {
             let part = i as f64 / steps as f64;
             let part = if from == 0.0 { part * part } else { part };

@@ -44,7 +44,7 @@ fn consolidate(cells: usize, t: &[f64]) -> Vec<[f64; 2]> {
 
 #[test]
 fn terzaghi_is_met() {
-    let t = times(&TABLE.map(|row| row.0), 40);
+    let t = times(&TABLE.map(|row| row.0), &[40; 5]);
     let found = consolidate(32, &t);
     for (at, pressure, degree) in TABLE {
         let [p, u] = found[place(&t, at)];

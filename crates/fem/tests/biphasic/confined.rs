@@ -76,7 +76,7 @@ fn one_dimensional(law: Option<HolmesMow>) -> [f64; 2] {
 
 /// The same by elements: pressure at the base.
 fn by_elements(law: Option<HolmesMow>) -> [f64; 2] {
-    let cells = 10;
+    let cells = 16;
     let mesh = rectangle([HEIGHT_MM / cells as f64, HEIGHT_MM], [1, cells]);
     let (x, y) = ([true, false, false], [false, true, false]);
     let fixed = hold(&mesh, &[("x_min", x), ("x_max", x), ("y_min", y), ("y_max", y)]);
@@ -84,8 +84,7 @@ fn by_elements(law: Option<HolmesMow>) -> [f64; 2] {
     let [mu_mpa, bulk_mpa] = moduli(YOUNG_MPA, NU);
     let materials = Materials::new(vec![Elastic::shared(NeoHookean { mu_mpa }, bulk_mpa)]);
     let permeability = Permeability { at_rest_mm4_per_n_s: K0, strain: law };
-    let fluid =
-        FluidSpec { permeability: vec![Some(permeability)], drained: Some("y_max".into()) };
+    let fluid = FluidSpec { permeability: vec![Some(permeability)], drained: Some("y_max".into()) };
     let problem = Problem::new(mesh, materials, fixed, None).unwrap().with_fluid(fluid).unwrap();
     let steps = 100;
     let part = |i: usize| i as f64 / steps as f64;

@@ -12,8 +12,10 @@ use std::f64::consts::FRAC_PI_4;
 
 const RADIUS_MM: f64 = 1.5;
 const PRESSURE_MPA: f64 = 0.01;
-/// Half the side of the cube in the ball's middle, over the radius.
-const CORE: f64 = 0.25;
+/// Half the side of the cube in the ball's middle before its far sides bulge, over the radius.
+const CORE: f64 = 0.1;
+/// How far they bulge: 0 is a cube, 1 a ball.
+const BULGE: f64 = 0.65;
 
 /// Poisson's ratio; `p / P` in the middle at T = .01, .05, .1, .5; its peak and when.
 const TABLE: [(f64, [f64; 4], f64, f64); 3] = [
@@ -23,27 +25,39 @@ const TABLE: [(f64, [f64; 4], f64, f64); 3] = [
 ];
 const STOPS: [f64; 4] = [0.01, 0.05, 0.1, 0.5];
 
-/// An eighth of the ball: a cube, and between each of its far sides and the sphere a shell, `cells`
-/// wide and `layers` deep, thinner outwards.
+/// A point of the unit cube in the bulged one.
+fn bulged(p: [f64; 3]) -> [f64; 3] {
+    let (norm, largest) = (norm(p), p.into_iter().fold(0.0, f64::max));
+    let round = if norm > 0.0 { 1.3 * largest / norm } else { 1.0 };
+    p.map(|v| CORE * v * (1.0 - BULGE + BULGE * round))
+}
+
+fn norm(p: [f64; 3]) -> f64 {
+    p.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// An eighth of the ball: a bulged cube, and between each of its far sides and the sphere a shell,
+/// `cells` wide and `layers` deep, thinner outwards.
 fn eighth(cells: usize, layers: usize) -> Mesh {
     let kind = ElementKind::Hex27;
     let side = even(1.0, 2 * cells);
-    let core = lattice(kind, [side.clone(), side.clone(), side.clone()], |p| p.map(|v| CORE * v));
+    let core = lattice(kind, [side.clone(), side.clone(), side.clone()], bulged);
     let through = even(1.0, 2 * layers);
     let mut pieces = vec![core];
     for axis in 0..3 {
         // Of a shell the third coordinate goes outwards along `axis`, keeping the hand.
         pieces.push(lattice(kind, [side.clone(), side.clone(), through.clone()], |[a, b, s]| {
-            let way = |v: f64| (FRAC_PI_4 * v).tan();
-            let mut out = [0.0; 3];
-            out[axis] = 1.0;
-            out[(axis + 1) % 3] = way(a);
-            out[(axis + 2) % 3] = way(b);
-            let norm = out.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let mut inner = [0.0; 3];
-            (inner[axis], inner[(axis + 1) % 3], inner[(axis + 2) % 3]) = (CORE, CORE * a, CORE * b);
-            let s = s * (1.2 - 0.2 * s);
-            std::array::from_fn(|i| (1.0 - s) * inner[i] + s * out[i] / norm)
+            let turned = |a: f64, b: f64| {
+                let mut p = [1.0; 3];
+                (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (a, b);
+                p
+            };
+            let (inner, out) = (bulged(turned(a, b)), {
+                let way = |v: f64| (FRAC_PI_4 * v).tan();
+                turned(way(a), way(b))
+            });
+            let s = s * (1.15 - 0.15 * s);
+            std::array::from_fn(|i| (1.0 - s) * inner[i] + s * out[i] / norm(out))
         }));
     }
     join(&pieces)
@@ -52,7 +66,8 @@ fn eighth(cells: usize, layers: usize) -> Mesh {
 fn join(pieces: &[Mesh]) -> Mesh {
     let mut mesh = Mesh::default();
     let mut number: BTreeMap<[i64; 3], u32> = BTreeMap::new();
-    let mut block = Block { kind: ElementKind::Hex27, connectivity: Vec::new(), region: Vec::new() };
+    let mut block =
+        Block { kind: ElementKind::Hex27, connectivity: Vec::new(), region: Vec::new() };
     let mut outside = Surface { kind: FaceKind::of(block.kind), connectivity: Vec::new() };
     for (i, piece) in pieces.iter().enumerate() {
         let new: Vec<u32> = piece
@@ -88,8 +103,8 @@ fn cryer_is_met_with_its_overshoot() {
     for (nu, table, peak, peak_at) in TABLE {
         let [x, y, z] = [0, 1, 2].map(|i| std::array::from_fn(|j| i == j));
         let held = [("x_min", x), ("y_min", y), ("z_min", z)];
-        let body = Body::new(eighth(2, 7), nu, &held, "sphere");
-        let t = times(&STOPS, 14);
+        let body = Body::new(eighth(1, 12), nu, &held, "sphere");
+        let t = times(&STOPS, &[14, 10, 10, 40 + (100.0 * nu) as usize]);
         let scale_s = RADIUS_MM * RADIUS_MM / body.c();
         let seconds: Vec<f64> = t.iter().map(|t| t * scale_s).collect();
         let loading = Loading {

@@ -29,6 +29,7 @@ pub mod body;
 pub mod drive;
 pub mod fields;
 mod fit;
+mod fluid;
 pub mod laws;
 pub mod record;
 pub mod section;

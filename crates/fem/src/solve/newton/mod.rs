@@ -9,10 +9,10 @@ pub(super) use preconditioner::Preconditioner;
 
 use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};
+use super::fluid::FluidState;
 use super::loading::Loading;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
-use super::fluid::FluidState;
 use crate::biphasic::Flow;
 use crate::contact::{ContactRule, FrictionTrial};
 use crate::element::{Dilatation, HistoryVariables};
