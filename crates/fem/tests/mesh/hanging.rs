@@ -75,8 +75,7 @@ fn a_joint_is_no_worse_than_the_large_side() {
     }
     let kind = ElementKind::Hex27;
     let fine = lattice(kind, [even(1.5, 12), even(1.0, 8), even(1.0, 4)], |p| p);
-    let large =
-        lattice(kind, [vec![0.0, 0.5, 1.0, 1.25, 1.5], even(1.0, 2), even(1.0, 2)], |p| p);
+    let large = lattice(kind, [vec![0.0, 0.5, 1.0, 1.25, 1.5], even(1.0, 2), even(1.0, 2)], |p| p);
     let (fine_at, large_at) = (fine.nodes.clone(), large.nodes.clone());
     let due = solve(fine, field);
     // At the nodes of the large cubes, which all meshes have.
@@ -99,17 +98,15 @@ fn a_joint_is_no_worse_than_the_large_side() {
 #[test]
 fn the_patch_test_is_passed_to_rounding() {
     let h = [[0.08, 0.03, -0.02], [0.01, -0.05, 0.04], [0.02, 0.01, 0.06]];
-    let field = |p: [f64; 3]| -> [f64; 3] {
-        std::array::from_fn(|i| (0..3).map(|j| h[i][j] * p[j]).sum())
-    };
+    let field =
+        |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| (0..3).map(|j| h[i][j] * p[j]).sum()) };
     let mesh = joined();
     let nodes = mesh.nodes.clone();
     let law = NeoHookean { mu_mpa: 0.3 };
     let materials = Materials::new([0; 5].map(|_| Elastic::shared(law, 4.0)).into());
     let mut fixed = vec![false; 3 * nodes.len()];
     let mut loading = Loading::default();
-    let outside =
-        |p: &[f64; 3]| (0..3).any(|i| p[i] < 1e-9 || p[i] > [1.5, 1.0, 1.0][i] - 1e-9);
+    let outside = |p: &[f64; 3]| (0..3).any(|i| p[i] < 1e-9 || p[i] > [1.5, 1.0, 1.0][i] - 1e-9);
     for (n, &p) in nodes.iter().enumerate() {
         if mesh.hanging_node(n as u32).is_none() && outside(&p) {
             for i in 0..3 {

@@ -1,12 +1,12 @@
 //! Strain energy density on either side of an interface.
 
-use papilla_fem::mesh::recovery::SedRecovery;
-use papilla_fem::mesh::sample::Deformed;
-use papilla_fem::mesh::{Mesh, Region, Surface};
 use papilla_fem::element::{BlockGeometry, ConstitutiveModel, Elastic, ElementKind, Materials};
 use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::FaceKind;
 use papilla_fem::mesh::block::{BlockLattice, build, even};
+use papilla_fem::mesh::recovery::SedRecovery;
+use papilla_fem::mesh::sample::Deformed;
+use papilla_fem::mesh::{Mesh, Region, Surface};
 use papilla_fem::tensor::Kinematics;
 use std::sync::Arc;
 
@@ -31,11 +31,10 @@ fn layered(kind: ElementKind, elements: usize) -> Mesh {
     let layers =
         (0..elements).map(|l| if 2 * l < elements { Region(1) } else { Region(0) }).collect();
     let up = kind.dimension() - 1;
-    let mut mesh =
-        build(&BlockLattice { axes: [axis(), axis(), third], layers, kind }, |mut p| {
-            p[up] *= 1.0 + 0.1 * (2.0 * p[0]).sin();
-            p
-        });
+    let mut mesh = build(&BlockLattice { axes: [axis(), axis(), third], layers, kind }, |mut p| {
+        p[up] *= 1.0 + 0.1 * (2.0 * p[0]).sin();
+        p
+    });
     // The upper sides of the lower layer's top elements.
     let b = &mesh.blocks[0];
     let top = if kind.is_planar() { 2 } else { 5 };

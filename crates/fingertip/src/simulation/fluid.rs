@@ -108,4 +108,69 @@ mod tests {
         assert_sound(&p);
         assert!(p.lost > 0.0 && p.lost <= 0.05, "{}", p.lost);
     }
+
+    /// TEMPORARY
+    #[test]
+    #[ignore]
+    fn rates() {
+        use crate::scene::EffectName;
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        let name = std::env::var("WATER_SCENE").unwrap_or("water-section.toml".into());
+        let path = root.join(&name);
+        let base = Scene::parse(&path, std::fs::read_to_string(&path).unwrap()).unwrap();
+        let seconds = std::env::var("WATER_SECONDS").unwrap_or("0.1,1,10,1000,100000".into());
+        for seconds in seconds.split(',').map(|s| s.parse::<f64>().unwrap()) {
+            let mut sed_base: Vec<f64> = Vec::new();
+            for off in ["none", "biphasic", "viscoelastic"] {
+                let mut scene = base.clone();
+                let end = scene.motion.path.as_ref().unwrap().last().unwrap().time_s;
+                for p in scene.motion.path.as_mut().unwrap() {
+                    p.time_s *= seconds / end;
+                }
+                scene.effects.retain(|e: &EffectName| e.as_str() != off);
+                let clock = std::time::Instant::now();
+                let setup = match Simulation::new(&scene) {
+                    Ok(s) => s,
+                    Err(e) => {
+                        println!("{seconds} {off}: {e}");
+                        continue;
+                    }
+                };
+                let problem = &setup.body.problem;
+                let at_rest = problem.volume_mm3(&vec![[0.0; 3]; problem.mesh.nodes.len()]);
+                let mut line = String::new();
+                let mut sed = Vec::new();
+                let mut effort = papilla_fem::solve::Effort::default();
+                let run = setup.run(&mut |solver, record, report| {
+                    effort = effort.plus(&report.effort);
+                    let volume = problem.volume_mm3(solver.displacement_mm());
+                    let p = solver.fluid_pressure_mpa().into_iter().fold(0.0, f64::max);
+                    sed = record.sed_dermis_mpa.clone();
+                    line = format!(
+                        "F {:.5} p {:.1} sed {:.2} fluid {:.1} Pa lost {:.5} energy {:.4}",
+                        papilla_fem::tensor::norm(record.force_n),
+                        1e6 * record.pressure_mpa.iter().copied().fold(0.0, f64::max),
+                        1e6 * sed.iter().copied().fold(0.0, f64::max),
+                        1e6 * p,
+                        1.0 - volume / at_rest,
+                        record.checks.energy_vs_work
+                    );
+                });
+                if off == "none" {
+                    sed_base = sed.clone();
+                }
+                let l2 = crate::simulation::record::relative_l2(&sed, &sed_base);
+                println!(
+                    "{seconds} s, off {off}: {line} L2 {l2:.4} unknowns {} newton {} fact {} steps {} cuts {} s {:.1} {:?}",
+                    problem.system.dofs.count,
+                    effort.newton_iterations,
+                    effort.factorizations,
+                    effort.steps,
+                    effort.cuts,
+                    clock.elapsed().as_secs_f64(),
+                    run.err().map(|e| e.to_string())
+                );
+            }
+        }
+    }
 }
