@@ -44,9 +44,7 @@ fn an_effect_that_is_not_named_assembles_and_stores_nothing() {
 /// What the census counts is what the solver holds.
 #[test]
 fn the_solver_holds_what_the_census_counts() {
-    for names in
-        [&[][..], &["viscoelastic"], &["friction"], &["elastic_bone", "nail"], &["biphasic"]]
-    {
+    for names in [&[][..], &["viscoelastic"], &["friction"], &["elastic_bone", "nail"]] {
         let scene = finger(names);
         let setup = Simulation::new(&scene).unwrap();
         let census = census(&scene, &setup);
@@ -64,11 +62,7 @@ fn the_solver_holds_what_the_census_counts() {
             assert_eq!(solver.shear_traction_mpa().len(), census.friction_states, "{names:?}");
             assert_eq!(solver.traction_mpa().len(), census.contact_nodes, "{names:?}");
             let free = body.problem.fixed.iter().filter(|fixed| !**fixed).count();
-            // Corners under pressure: none is at rest under a plate that goes on.
-            let pressed = solver.fluid_pressure_mpa();
-            assert_eq!(pressed.is_empty(), census.pressure_unknowns == 0, "{names:?}");
-            assert!(pressed.iter().filter(|p| **p != 0.0).count() >= census.pressure_unknowns);
-            assert_eq!(free + census.pressure_unknowns, census.unknowns, "{names:?}");
+            assert_eq!(free, census.unknowns, "{names:?}");
         };
         body.press(&mut solver, &setup.approach, &setup.drive, 1, &mut visit).unwrap();
         assert_eq!(seen, 1);
