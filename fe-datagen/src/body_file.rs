@@ -8,7 +8,7 @@ use papilla_output::vtu::{self, Field, Values, VtuMesh};
 use std::path::Path;
 
 /// Writes the body at the solver's equilibrium as `.vtu`: points with
-/// displacement (mm) and contact pressure (Pa), cells with SED (J/m3 of
+/// displacement (mm), contact pressure and, of biphasic tissue, the fluid's (Pa), cells with SED (J/m3 of
 /// undeformed volume, element mean), volume ratio and layer id (0 epidermis,
 /// 1 dermis, 2 subcutaneous, 3 nail, 4 bone).
 ///
@@ -37,10 +37,15 @@ pub(crate) fn write_vtu(path: &Path, body: &Body, solver: &Solver<'_>) -> Result
         offsets: &offsets,
         types: &types,
     };
-    let points = [
+    let mut points = vec![
         Field { name: "displacement_mm", components: 3, values: Values::F64(u.as_flattened()) },
         Field { name: "pressure_pa", components: 1, values: Values::F64As32(&pressure) },
     ];
+    let fluid: Vec<f64> = solver.fluid_pressure_mpa().iter().map(|p| p * PA_PER_MPA).collect();
+    if !fluid.is_empty() {
+        let values = Values::F64As32(&fluid);
+        points.push(Field { name: "fluid_pressure_pa", components: 1, values });
+    }
     let cells = [
         Field {
             name: "sed_j_per_m3",

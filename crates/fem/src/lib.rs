@@ -51,6 +51,7 @@
 // Determinism is tested: the same bits, not nearly the same.
 #![cfg_attr(test, allow(clippy::float_cmp))]
 
+pub mod biphasic;
 pub mod contact;
 pub mod element;
 pub mod linear;

@@ -1,5 +1,9 @@
 //! Materials as scenes write them, and what they become.
 
+mod biphasic;
+
+pub use biphasic::{BiphasicError, BiphasicSpec, HolmesMowSpec};
+
 use papilla_fem::material::{Ogden, OgdenTerm, Prony, PronyTerm, moduli};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -221,13 +225,16 @@ pub struct MaterialSpec {
     /// Relaxation of the effect `viscoelastic`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prony: Option<PronySpec>,
+    /// Fluid of the effect `biphasic`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub biphasic: Option<BiphasicSpec>,
 }
 
 impl MaterialSpec {
     /// Elastic constants alone.
     #[must_use]
     pub fn elastic(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Self {
-        Self { youngs_modulus_mpa, poissons_ratio, ogden: None, prony: None }
+        Self { youngs_modulus_mpa, poissons_ratio, ogden: None, prony: None, biphasic: None }
     }
 
     /// The constants at rest.
@@ -298,6 +305,9 @@ pub enum MaterialError {
     /// A relaxation time that is not positive.
     #[error("prony.time_s = {0} s must be positive and finite")]
     PronyTime(f64),
+    /// The fluid is out of range.
+    #[error("biphasic: {0}")]
+    Biphasic(#[from] BiphasicError),
     /// Shares add up to 1 or more.
     #[error("prony.share adds up to {0}; shares must not be negative and add up to less than 1")]
     PronyShare(f64),

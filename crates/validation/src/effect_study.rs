@@ -4,8 +4,9 @@
 use crate::processor;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fem::tensor::norm;
+use papilla_fingertip::forecast::census;
 use papilla_fingertip::scene::effects::EFFECTS;
-use papilla_fingertip::scene::{EffectName, Scene};
+use papilla_fingertip::scene::{EffectName, Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
@@ -86,20 +87,42 @@ pub struct Study {
     pub effects: Vec<EffectName>,
     /// The scene as it stands.
     pub base: Solved,
-    /// One entry an effect, in the order of the table of effects.
+    /// One entry an effect that was asked for, in the order of the table of effects.
     pub switched: Vec<Switched>,
 }
 
-/// Solves `scene` and every variant of it; `visit` is told of each before.
+/// A scene whose path over time is taken in another time, as fast or slow all along.
+///
+/// # Errors
+/// [`SceneError`] for one without a path.
+pub fn taken_in(scene: &Scene, seconds: f64) -> Result<Scene, SceneError> {
+    let mut scene = scene.clone();
+    let Some(path) = &mut scene.motion.path else {
+        let rule = "to be taken in other times needs motion.path";
+        return Err(SceneError::Fields { field: "motion", rule });
+    };
+    let end_s = path.last().map_or(1.0, |p| p.time_s);
+    path.iter_mut().for_each(|p| p.time_s *= seconds / end_s);
+    scene.validate()?;
+    Ok(scene)
+}
+
+/// Solves `scene` and its variants, those of the effects `only` or of all if that is empty; `visit`
+/// is told of each before.
 ///
 /// # Errors
 /// [`SimulationError`] if the scene itself cannot be solved; variants report theirs in
 /// [`Outcome`].
-pub fn run(scene: &Scene, visit: &mut dyn FnMut(&str)) -> Result<Study, SimulationError> {
+pub fn run(
+    scene: &Scene,
+    only: &[EffectName],
+    visit: &mut dyn FnMut(&str),
+) -> Result<Study, SimulationError> {
     visit("as it stands");
     let base = solve(scene)?;
     let mut switched = Vec::new();
-    for effect in EFFECTS {
+    let wanted = |name: &str| only.is_empty() || only.iter().any(|o| o.as_str() == name);
+    for effect in EFFECTS.into_iter().filter(|e| wanted(e.name)) {
         let named = scene.has(effect.name);
         visit(effect.name);
         let (variant, along) = switch(scene, effect.name, named);
@@ -161,7 +184,7 @@ fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
     let solve_s = processor::thread_s() - ready_s;
     let last = last.ok_or(SimulationError::Empty)?;
     Ok(Solved {
-        unknowns: setup.body.problem.system.dofs.count,
+        unknowns: census(scene, &setup).unknowns,
         setup_s: ready_s - begun_s,
         solve_s,
         effort,
@@ -219,8 +242,24 @@ mod tests {
     }
 
     #[test]
+    fn a_path_is_taken_in_another_time_and_a_depth_is_not() {
+        let mut still = scene("[]");
+        assert!(matches!(taken_in(&still, 5.0), Err(SceneError::Fields { field: "motion", .. })));
+        still.motion.depth_mm = None;
+        let point = |time_s| papilla_fingertip::scene::PathPoint {
+            time_s,
+            depth_mm: 0.2,
+            shift_mm: [0.0; 2],
+        };
+        still.motion.path = Some(vec![point(1.0), point(4.0)]);
+        let path = taken_in(&still, 8.0).unwrap().motion.path.unwrap();
+        assert_eq!([path[0].time_s, path[1].time_s], [2.0, 8.0]);
+        assert!(taken_in(&still, -1.0).is_err());
+    }
+
+    #[test]
     fn every_effect_gets_a_row_and_friction_changes_the_force() {
-        let study = run(&scene("[\"finite_strain\", \"layers\"]"), &mut |_| {}).unwrap();
+        let study = run(&scene("[\"finite_strain\", \"layers\"]"), &[], &mut |_| {}).unwrap();
         assert_eq!(study.switched.len(), EFFECTS.len());
         let of = |name: &str| &study.switched.iter().find(|s| s.effect == name).unwrap().outcome;
         let Outcome::Solved { change: Some(change), .. } = of("friction") else {

@@ -1,6 +1,7 @@
 //! `effects`: what each effect of a scene changes and costs.
 
 use super::print;
+use papilla_fingertip::scene::effects::EFFECTS;
 use papilla_fingertip::scene::{EffectName, Scene};
 use papilla_output::atomic;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
@@ -25,23 +26,27 @@ pub(super) struct Args {
     /// Folder for table and plot.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Print the study as JSON.
+    /// Only these effects, separated by commas.
+    #[arg(long, value_delimiter = ',', value_parser = effect)]
+    only: Vec<EffectName>,
+    /// Take the scene's path in each of these times, s: one study a time.
+    #[arg(long, value_delimiter = ',')]
+    seconds: Vec<f64>,
+    /// Print the study as JSON; with --seconds a list of studies.
     #[arg(long)]
     json: bool,
 }
 
+fn effect(name: &str) -> Result<EffectName, String> {
+    name.to_owned().try_into()
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = Scene::read(&args.scene)?;
-    let all = papilla_fingertip::scene::effects::EFFECTS.len() + 1;
-    let progress = Progress::new("variants", all, 0, args.json);
-    let mut begun = false;
-    let study = effect_study::run(&scene, &mut |what| {
-        progress.set_message(what);
-        if std::mem::replace(&mut begun, true) {
-            progress.inc();
-        }
-    })?;
-    drop(progress);
+    if !args.seconds.is_empty() {
+        return at_rates(&scene, args);
+    }
+    let study = study(&scene, args)?;
     let table = markdown(&study);
     if let Some(out) = &args.out {
         atomic::create_folder(out)?;
@@ -51,6 +56,35 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     print(&study, args.json, || table)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A study for each time that the path is taken in.
+fn at_rates(scene: &Scene, args: &Args) -> anyhow::Result<ExitCode> {
+    let (mut studies, mut text) = (Vec::new(), String::new());
+    for &seconds in &args.seconds {
+        let found = study(&effect_study::taken_in(scene, seconds)?, args)?;
+        let _ = write!(text, "## In {seconds} s\n\n{}\n", markdown(&found));
+        studies.push(found);
+    }
+    if let Some(out) = &args.out {
+        atomic::create_folder(out)?;
+        atomic::write_json(&out.join("effects.json"), &studies)?;
+        atomic::write(&out.join("effects.md"), text.as_bytes())?;
+    }
+    print(&studies, args.json, || text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn study(scene: &Scene, args: &Args) -> anyhow::Result<Study> {
+    let all = if args.only.is_empty() { EFFECTS.len() } else { args.only.len() };
+    let progress = Progress::new("variants", all + 1, 0, args.json);
+    let mut begun = false;
+    Ok(effect_study::run(scene, &args.only, &mut |what| {
+        progress.set_message(what);
+        if std::mem::replace(&mut begun, true) {
+            progress.inc();
+        }
+    })?)
 }
 
 fn markdown(study: &Study) -> String {

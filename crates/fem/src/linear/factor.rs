@@ -17,6 +17,9 @@ pub enum FactorError {
     /// A pivot is not positive: the matrix is not positive definite.
     #[error("the tangent is not positive definite")]
     NotPositiveDefinite,
+    /// A pivot vanishes.
+    #[error("the system of displacement and fluid pressure is singular")]
+    Singular,
     /// Out of memory.
     #[error("out of memory: the factor needs {0} entries")]
     Memory(usize),

@@ -13,6 +13,7 @@ mod eigen;
 mod factor;
 mod ordering;
 mod pattern;
+mod saddle;
 mod symbolic;
 
 pub use cg::{CgOutcome, CgWorkspace, conjugate_gradient};
@@ -23,4 +24,5 @@ pub(crate) use dot::dot;
 pub(crate) use eigen::eigen;
 pub use factor::{FactorError, FactorKind, FactorMemory, NumericFactor};
 pub use ordering::{Elimination, OrderingError};
+pub use saddle::{Coupling, SaddleSolver, SaddleSystem};
 pub use symbolic::{SymbolicError, SymbolicSystem, SymmetricMatrix};

@@ -110,23 +110,10 @@ impl SymbolicSystem {
         self.symbolic.len_val()
     }
 
-    /// Multiplications and additions of one numeric factorization: `r^2` for a
-    /// column of the factor with `r` entries, its diagonal included.
+    /// Multiplications and additions of one numeric factorization.
     #[must_use]
     pub fn factor_flops(&self) -> f64 {
-        let column = |rows: usize| (rows as f64).powi(2);
-        match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(s) => {
-                s.col_ptr().windows(2).map(|w| column(w[1] - w[0])).sum()
-            }
-            SymbolicCholeskyRaw::Supernodal(s) => (0..s.n_supernodes())
-                .map(|k| {
-                    let width = s.supernode_end()[k] - s.supernode_begin()[k];
-                    let below = s.supernode(k).pattern().len();
-                    (1..=width).map(|c| column(below + c)).sum::<f64>()
-                })
-                .sum(),
-        }
+        factor_flops(&self.symbolic)
     }
 
     /// Visits the place of every diagonal entry among the factor's values.
@@ -263,5 +250,23 @@ impl SymbolicSystem {
             }
         }
         super::dot(&y, &y).sqrt()
+    }
+}
+
+/// Multiplications and additions of a numeric factorization: `r^2` for a column of the factor with
+/// `r` entries, its diagonal included.
+pub(super) fn factor_flops(symbolic: &SymbolicCholesky<usize>) -> f64 {
+    let column = |rows: usize| (rows as f64).powi(2);
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(s) => {
+            s.col_ptr().windows(2).map(|w| column(w[1] - w[0])).sum()
+        }
+        SymbolicCholeskyRaw::Supernodal(s) => (0..s.n_supernodes())
+            .map(|k| {
+                let width = s.supernode_end()[k] - s.supernode_begin()[k];
+                let below = s.supernode(k).pattern().len();
+                (1..=width).map(|c| column(below + c)).sum::<f64>()
+            })
+            .sum(),
     }
 }

@@ -31,21 +31,23 @@ impl Solver<'_> {
             false => 1e-3f64.max(options.residual_tolerance),
         };
         for update in 0..=updates {
-            let (multipliers, u, independent) =
-                (&trial.multipliers, &mut trial.u, &mut trial.independent);
+            let (multipliers, u, independent, fluid) =
+                (&trial.multipliers, &mut trial.u, &mut trial.independent, &mut trial.fluid);
             let fixed = Fixed {
                 loading: &self.loading,
                 load_fraction: fraction,
                 multipliers,
                 variables: HistoryVariables { history: &trial.history, dt_s },
                 friction: rubs.then_some(&trial.friction),
+                fluid: None,
             };
-            self.newton.equilibrate(tolerance, fixed, u, independent)?;
+            self.newton.equilibrate(tolerance, fixed, u, independent, fluid.as_mut())?;
             let e = &self.newton.current;
             let exact = e.residual_norm <= options.residual_tolerance * e.reference_norm;
             let closes = |gap_mm: f64| by_penalty || gap_mm <= options.gap_tolerance_mm;
             if closes(e.gap_error_mm) && !exact {
-                self.newton.equilibrate(options.residual_tolerance, fixed, u, independent)?;
+                let tolerance = options.residual_tolerance;
+                self.newton.equilibrate(tolerance, fixed, u, independent, fluid.as_mut())?;
             }
             let closed = closes(self.newton.current.gap_error_mm);
             let change = friction::change(&trial.friction, &self.newton.current);

@@ -4,6 +4,7 @@ use super::StepError;
 use super::loading::Loading;
 use super::mixed::Lag;
 use super::problem::Problem;
+use crate::biphasic::{Flow, FluidForces};
 use crate::contact::{FrictionTrial, PointContact, PointFriction, Support};
 use crate::element::{Dilatation, HistoryVariables, IndependentDilatation};
 use crate::linear::SymmetricMatrix;
@@ -19,7 +20,9 @@ pub struct Evaluation {
     pub potential_mj: f64,
     /// Internal + contact - external force at every degree of freedom, N.
     pub residual_n: Vec<f64>,
-    /// Its norm over the unknowns.
+    /// Volume, mm3, by which each unknown of the fluid's pressure is off; empty without fluid.
+    pub surplus_mm3: Vec<f64>,
+    /// Norm of both over the unknowns, N.
     pub residual_norm: f64,
     /// How far displacement and independent dilatations are from equilibrium, N; 0 without.
     pub mixed_norm: f64,
@@ -61,6 +64,8 @@ pub struct Trial<'a> {
     pub variables: HistoryVariables<'a>,
     /// Tangential contact; `None` without friction.
     pub friction: Option<&'a FrictionTrial>,
+    /// The fluid's pressure; `None` without fluid.
+    pub fluid: Option<Flow<'a>>,
 }
 
 /// Evaluates the body; fills `tangent` if given.
@@ -81,11 +86,13 @@ pub fn evaluate_body(
     let mut lag = Lag::new(problem, trial.independent);
     elements(problem, trial, tangent.as_deref_mut(), out, &mut lag)?;
     lag.condense(problem);
+    fluid(problem, trial, tangent.as_deref_mut(), out)?;
     out.potential_mj = out.stored_mj;
     let mut reference = contact(problem, loading, trial, tangent, out);
+    let share = loading.share(trial.load_fraction);
     for (node, f) in loading.dead_n.iter().enumerate() {
         for i in 0..3 {
-            let force = trial.load_fraction * f[i];
+            let force = share * f[i];
             out.residual_n[3 * node + i] -= force;
             out.potential_mj -= force * trial.u[node][i];
             reference += force * force;
@@ -93,7 +100,8 @@ pub fn evaluate_body(
     }
     problem.mesh.condense(&mut out.residual_n);
     out.mixed_norm = lag.norm_n(problem, &out.residual_n);
-    let mut norm = 0.0;
+    let surplus = out.surplus_mm3.iter().map(|s| (problem.surplus_n_per_mm3 * s).powi(2));
+    let mut norm: f64 = surplus.sum();
     for (r, &e) in out.residual_n.iter().zip(&problem.system.dofs.of_dof) {
         if e == crate::linear::DofMap::FIXED {
             reference += r * r;
@@ -167,6 +175,24 @@ fn elements(
         }
     }
     Ok(())
+}
+
+/// Adds the fluid's pressure.
+fn fluid(
+    problem: &Problem,
+    trial: &Trial<'_>,
+    tangent: Option<&mut SymmetricMatrix>,
+    out: &mut Evaluation,
+) -> Result<(), StepError> {
+    let (Some(phase), Some(flow)) = (&problem.fluid, trial.fluid) else { return Ok(()) };
+    let forces = FluidForces {
+        force_n: &mut out.residual_n,
+        surplus_mm3: &mut out.surplus_mm3,
+        tangent: tangent.map(|t| (&problem.system, t)),
+    };
+    phase
+        .add(problem.solid(), trial.u, flow, trial.variables.dt_s, forces)
+        .map_err(|(block, element, i)| StepError::Inverted { block, element, j: i.j })
 }
 
 /// Adds contact; returns the square of its force norm.

@@ -75,8 +75,7 @@ impl MovingIndenter {
     }
 }
 
-/// Loads; dead forces and prescribed displacements are proportional to the
-/// load fraction in `[0, 1]`.
+/// Loads over the load fraction in `[0, 1]`.
 #[derive(Clone, Default)]
 pub struct Loading {
     /// Dead nodal forces at fraction 1, N; empty if there are none.
@@ -84,9 +83,12 @@ pub struct Loading {
     /// Prescribed displacements at fraction 1: `(degree of freedom, mm)`; the
     /// other prescribed degrees of freedom stay 0.
     pub prescribed_mm: Vec<(usize, f64)>,
+    /// Share of dead forces and prescribed displacements at rising load fractions, linear in between
+    /// and from 0 at 0; the load fraction itself if empty.
+    pub course: Vec<(f64, f64)>,
     /// Indenter.
     pub indenter: Option<MovingIndenter>,
-    /// Time that the whole load takes, s. Only viscoelastic materials see it.
+    /// Time that the whole load takes, s. Only viscoelastic materials and fluid see it.
     pub duration_s: f64,
     /// Coulomb coefficient between skin and indenter; 0 is no friction.
     pub friction: f64,
@@ -97,5 +99,14 @@ impl Loading {
     #[must_use]
     pub fn contact(&self) -> ContactRule {
         self.indenter.as_ref().map_or(ContactRule::Nodal, |m| m.contact)
+    }
+
+    /// Share of dead forces and prescribed displacements that acts at a load fraction.
+    pub(super) fn share(&self, fraction: f64) -> f64 {
+        let Some(&last) = self.course.last() else { return fraction };
+        let next = self.course.partition_point(|&(at, _)| at < fraction);
+        let Some(&(to, after)) = self.course.get(next) else { return last.1 };
+        let (from, before) = next.checked_sub(1).map_or((0.0, 0.0), |i| self.course[i]);
+        before + (fraction - from) / (to - from) * (after - before)
     }
 }

@@ -30,8 +30,11 @@ pub(super) const OLD_FACTOR_CG_MAX: u32 = 30;
 const LINEAR_MIN: f64 = 1e-10;
 
 /// The dilatations that a body keeps, at rest; none unless some of it is of finite strain
-/// and so nearly incompressible that it pays.
+/// and so nearly incompressible that it pays; none with fluid, whose pressure is an unknown too.
 pub(super) fn at_rest(problem: &Problem) -> Vec<Dilatation> {
+    if problem.fluid.is_some() {
+        return Vec::new();
+    }
     let blocks = &problem.mesh.blocks;
     let ratio =
         |kind: ElementKind| if kind.order() == 2 { STIFF_RATIO_QUADRATIC } else { STIFF_RATIO };

@@ -3,6 +3,7 @@
 mod augmented;
 mod effort;
 pub mod evaluate;
+mod fluid;
 mod friction;
 mod guided;
 mod history;
@@ -64,7 +65,8 @@ pub struct Options {
     /// below which friction has settled.
     pub friction_tolerance: f64,
     /// How far linear extrapolation over a time step may miss, over the largest
-    /// displacement; viscoelastic bodies only.
+    /// displacement; viscoelastic and biphasic bodies only. Infinite: biphasic bodies take the
+    /// steps that are asked for.
     pub time_error: f64,
 }
 
@@ -137,6 +139,9 @@ pub enum StepError {
         /// Last change of traction or bound over the largest bound.
         change: f64,
     },
+    /// Displacement and fluid pressure do not follow from each other.
+    #[error("the system of displacement and fluid pressure is singular")]
+    Singular,
     /// Energy or force is not a finite number.
     #[error("energy or force is not finite")]
     NotFinite,

@@ -1,5 +1,6 @@
 //! Where the search for the next equilibrium starts.
 
+use super::fluid;
 use super::state::State;
 use super::stepping::Solver;
 
@@ -24,6 +25,7 @@ impl Solver<'_> {
             }
         }
         self.prescribe(next, &mut trial.u);
+        fluid::begin(&mut trial.fluid, self.last_step(next));
         trial
     }
 
@@ -31,12 +33,22 @@ impl Solver<'_> {
     pub(super) fn unmoved(&self, next: f64) -> State {
         let mut trial = self.state.clone();
         self.prescribe(next, &mut trial.u);
+        fluid::begin(&mut trial.fluid, self.last_step(next));
         trial
     }
 
+    /// Displacement before the last step, and the length of the next over its; none since the load
+    /// has turned.
+    fn last_step(&self, next: f64) -> Option<(&[[f64; 3]], f64)> {
+        let before = self.before.as_ref()?;
+        let ratio = (next - self.state.fraction) / (self.state.fraction - before.fraction);
+        Some((&before.u, ratio))
+    }
+
     pub(super) fn prescribe(&self, fraction: f64, u: &mut [[f64; 3]]) {
+        let share = self.loading.share(fraction);
         for &(dof, value) in &self.loading.prescribed_mm {
-            u[dof / 3][dof % 3] = fraction * value;
+            u[dof / 3][dof % 3] = share * value;
         }
         self.newton.problem.mesh.follow(u);
     }

@@ -1,10 +1,13 @@
 //! What is solved: mesh, materials, constraints, contact surface, loads.
 
 use super::history_layout::HistoryLayout;
+use crate::biphasic::{FluidError, FluidPhase, FluidSpec, Solid};
 use crate::contact::{ContactRule, ContactSurface, Support};
+use crate::element::geometry::displacement_gradient;
 use crate::element::{BlockGeometry, Materials, ShapeError};
 use crate::linear::{SymbolicError, SymbolicSystem, SymmetricMatrix};
-use crate::mesh::Mesh;
+use crate::mesh::{Block, Mesh};
+use crate::tensor::Kinematics;
 
 /// A body ready to be loaded. Shared by every indentation of a campaign.
 pub struct Problem {
@@ -22,6 +25,10 @@ pub struct Problem {
     pub system: SymbolicSystem,
     /// Where contact may happen.
     pub contact: Option<ContactSurface>,
+    /// What flows in it; `None` of a body without fluid.
+    pub fluid: Option<FluidPhase>,
+    /// Force that a volume of fluid too much amounts to, N/mm3; 0 without fluid.
+    pub(super) surplus_n_per_mm3: f64,
 }
 
 /// Why a problem could not be set up.
@@ -48,6 +55,9 @@ pub enum ProblemError {
         /// Surface.
         name: String,
     },
+    /// The body cannot be full of fluid.
+    #[error(transparent)]
+    Fluid(#[from] FluidError),
     /// A surface or node set is missing.
     #[error("the mesh has no {kind} named '{name}'; it has: {known}")]
     Missing {
@@ -98,7 +108,66 @@ impl Problem {
             }
         };
         let history_layout = HistoryLayout::new(&mesh, &geometry, &materials);
-        Ok(Self { mesh, geometry, materials, history_layout, fixed, system, contact })
+        Ok(Self {
+            mesh,
+            geometry,
+            materials,
+            history_layout,
+            fixed,
+            system,
+            contact,
+            fluid: None,
+            surplus_n_per_mm3: 0.0,
+        })
+    }
+
+    /// The same body full of fluid, see [`crate::biphasic`].
+    ///
+    /// # Errors
+    /// [`ProblemError::Fluid`].
+    pub fn with_fluid(self, spec: FluidSpec) -> Result<Self, ProblemError> {
+        let fluid = Some(FluidPhase::new(&self.mesh, &self.system, spec)?);
+        Ok(Self { fluid, surplus_n_per_mm3: self.surplus_scale_n_per_mm3(), ..self })
+    }
+
+    /// Volume of the body, mm3 (of planar elements area times 1 mm), with its nodes displaced by
+    /// `u`, mm.
+    #[must_use]
+    pub fn volume_mm3(&self, u: &[[f64; 3]]) -> f64 {
+        let mut volume = 0.0;
+        for (block, geometry) in self.mesh.blocks.iter().zip(&self.geometry) {
+            let n = block.kind.nodes();
+            for e in 0..block.len() {
+                let local: Vec<_> = block.element(e).iter().map(|&a| u[a as usize]).collect();
+                let g = geometry.element(e);
+                for (gradients, weight) in g.gradients.chunks_exact(n).zip(g.weights) {
+                    volume +=
+                        weight * Kinematics::new(displacement_gradient(&local, gradients)).j();
+                }
+            }
+        }
+        volume
+    }
+
+    /// Side of a cube (square) as large as the mean element, mm.
+    fn element_width_mm(&self) -> f64 {
+        let weights = |(b, g): (&Block, &BlockGeometry)| -> f64 {
+            (0..b.len()).flat_map(|e| g.element(e).weights).sum()
+        };
+        let volume: f64 = self.mesh.blocks.iter().zip(&self.geometry).map(weights).sum();
+        let mean = volume / self.mesh.element_count() as f64;
+        if self.mesh.is_planar() { mean.sqrt() } else { mean.cbrt() }
+    }
+
+    /// Force that a volume of fluid too much amounts to, N/mm3: over an element's width, with the
+    /// solid's modulus.
+    fn surplus_scale_n_per_mm3(&self) -> f64 {
+        self.reference_modulus_mpa() / self.element_width_mm()
+    }
+
+    /// The solid, for what flows in it.
+    pub(super) fn solid(&self) -> Solid<'_> {
+        Solid { mesh: &self.mesh, geometry: &self.geometry, materials: &self.materials }
     }
 
     /// Adds `N_a N_b stiffness` (N/mm) between the unknowns that carry a point of the surface.

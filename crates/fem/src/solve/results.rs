@@ -26,6 +26,18 @@ impl<'a> Solver<'a> {
         self.loading.contact()
     }
 
+    /// Pressure of the fluid at the nodes, MPa: 0 where there is none or it leaves; empty of a body
+    /// without.
+    #[must_use]
+    pub fn fluid_pressure_mpa(&self) -> Vec<f64> {
+        match (&self.newton.problem.fluid, &self.state.fluid) {
+            (Some(phase), Some(fluid)) => {
+                phase.at_nodes_mpa(&self.newton.problem.mesh, &fluid.pressure_mpa)
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// Nominal traction of each contact node, MPa per undeformed area.
     #[must_use]
     pub fn traction_mpa(&self) -> Vec<f64> {

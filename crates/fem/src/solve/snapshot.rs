@@ -42,6 +42,8 @@ impl Solver<'_> {
                 && s.multipliers.len() == self.state.multipliers.len()
                 && s.history.len() == self.state.history.len()
                 && s.friction.points.len() == self.state.friction.points.len()
+                && s.fluid.as_ref().map(|f| f.pressure_mpa.len())
+                    == self.state.fluid.as_ref().map(|f| f.pressure_mpa.len())
         };
         let Snapshot { mark, time_step, preconditioner } = snapshot;
         if !fits(&mark.state)

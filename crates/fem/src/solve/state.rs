@@ -1,6 +1,7 @@
 //! Equilibria: what makes one and how one is told of.
 
 use super::effort::Effort;
+use super::fluid::FluidState;
 use super::work::Work;
 use crate::contact::FrictionTrial;
 use crate::element::Dilatation;
@@ -18,6 +19,8 @@ pub(super) struct State {
     pub history: Vec<f64>,
     /// Tangential contact; no points without friction.
     pub friction: FrictionTrial,
+    /// The fluid's pressure; `None` without fluid.
+    pub fluid: Option<FluidState>,
 }
 
 /// A place to go back to, see [`Solver::mark`].

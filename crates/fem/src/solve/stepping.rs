@@ -8,7 +8,7 @@ use super::newton::{Fixed, Newton};
 use super::problem::Problem;
 use super::state::{Mark, State, StepReport};
 use super::work::Work;
-use super::{Options, SolveError, StepError, friction, mixed};
+use super::{Options, SolveError, StepError, fluid, friction, mixed};
 use crate::contact::{FrictionPoint, FrictionTrial};
 use crate::element::HistoryVariables;
 
@@ -57,6 +57,7 @@ impl<'a> Solver<'a> {
             multipliers: vec![0.0; contact_points],
             history: vec![0.0; problem.history_layout.as_ref().map_or(0, |m| m.len)],
             friction: FrictionTrial::default(),
+            fluid: fluid::at_rest(problem),
         };
         if self.loading.friction > 0.0 {
             self.state.friction = FrictionTrial {
@@ -132,7 +133,10 @@ impl<'a> Solver<'a> {
     pub fn mend_work(&mut self, known: Vec<Mark>, relative: f64) -> Effort {
         const PROBES_MAX: usize = 12;
         let first = self.newton.effort;
-        let is_lost = self.loading.friction > 0.0 || self.newton.problem.history_layout.is_some();
+        let problem = self.newton.problem;
+        let is_lost = self.loading.friction > 0.0
+            || problem.history_layout.is_some()
+            || problem.fluid.is_some();
         let (Some(indenter), Some(start), false) = (&self.loading.indenter, known.first(), is_lost)
         else {
             return Effort::default();
@@ -196,13 +200,14 @@ impl<'a> Solver<'a> {
 
     /// After a step that failed: forces and tractions are again those of the last equilibrium.
     pub(super) fn settle(&mut self) {
-        let State { fraction, u, independent, multipliers, history, friction } = &self.state;
+        let State { fraction, u, independent, multipliers, history, friction, fluid } = &self.state;
         let fixed = Fixed {
             loading: &self.loading,
             load_fraction: *fraction,
             multipliers,
             variables: HistoryVariables { history, dt_s: 0.0 },
             friction: (!friction.points.is_empty()).then_some(friction),
+            fluid: fluid.as_ref().map(|f| f.flow()),
         };
         // It was in equilibrium: nothing in it is inverted.
         if let Err(error) = self.newton.evaluate(fixed, u, independent) {
@@ -230,7 +235,9 @@ impl<'a> Solver<'a> {
             residual_relative: e.residual_norm / e.reference_norm.max(self.least_force_n()),
             gap_error_mm: e.gap_error_mm,
             stored_mj: energy.stored_mj + e.contact_mj,
-            dissipated_mj: energy.dissipated_mj + self.state.friction.heat_mj,
+            dissipated_mj: energy.dissipated_mj
+                + self.state.friction.heat_mj
+                + self.state.fluid.as_ref().map_or(0.0, |f| f.lost_mj),
             j_min: e.j_min,
             j_min_at: e.j_min_at,
             condition_at_least: self.newton.condition,
@@ -274,6 +281,7 @@ impl<'a> Solver<'a> {
         }
         friction::update(&mut trial.friction, &self.newton.current);
         friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
+        fluid::advance(problem, self.state.fluid.as_ref(), &trial.u, &mut trial.fluid);
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
             let Evaluation { contact_force_n, stored_mj, contact_mj, .. } = self.newton.current;

@@ -1,18 +1,24 @@
-//! How far a time step goes in viscoelastic bodies.
+//! How far a time step goes in viscoelastic and biphasic bodies.
 
 use super::stepping::Solver;
 
+/// Load fraction of the first time step of fluid that flows.
+const FLOW_FIRST: f64 = 0.01;
 /// Least load fraction of a time step: what relaxes within it has relaxed at its end, and
 /// its history is exact for what changes linearly.
 const TIME_STEP_MIN: f64 = 1e-9;
 
 impl Solver<'_> {
-    /// Half the shortest relaxation time, as a load fraction.
+    /// Half the shortest relaxation time, as a load fraction; of fluid a hundredth.
     pub(super) fn first_time_step(&self) -> Option<f64> {
         let problem = self.newton.problem;
-        problem.history_layout.as_ref()?;
-        let shortest = problem.materials.models().filter_map(|m| m.shortest_time_s());
-        Some(0.5 * shortest.fold(f64::INFINITY, f64::min) / self.loading.duration_s)
+        let flows = problem.fluid.is_some() && self.newton.options.time_error.is_finite();
+        let relaxes = problem.history_layout.as_ref().map(|_| {
+            let shortest = problem.materials.models().filter_map(|m| m.shortest_time_s());
+            0.5 * shortest.fold(f64::INFINITY, f64::min) / self.loading.duration_s
+        });
+        let flow = flows.then_some(FLOW_FIRST);
+        relaxes.into_iter().chain(flow).reduce(f64::min)
     }
 
     /// `step`, no longer than time integration allows.

@@ -4,7 +4,9 @@ use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
-use crate::scene::{EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable};
+use crate::scene::{
+    Biphasic, EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable,
+};
 use papilla_sdf::IndenterSpec;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -162,6 +164,7 @@ impl CampaignSpec {
             indenter: candidate.indenter.clone(),
             motion: Motion::to_depth(1.0, 1, Pose::default()),
             friction: self.friction,
+            biphasic: Biphasic::default(),
             contact: None,
             effects: self.effects.clone(),
             outputs: None,

@@ -10,9 +10,14 @@ use crate::tissue::Tissue;
 pub fn census(scene: &Scene, setup: &Simulation) -> Census {
     let problem = &setup.body.problem;
     let contact_nodes = problem.contact.as_ref().map_or(0, |c| c.nodes().len());
+    let pressure_unknowns = problem.fluid.as_ref().map_or(0, |f| f.unknowns());
     let mut census = Census {
-        unknowns: problem.system.dofs.count,
-        tangent_entries: problem.system.row.len(),
+        unknowns: problem.system.dofs.count + pressure_unknowns,
+        pressure_unknowns,
+        tangent_entries: problem
+            .fluid
+            .as_ref()
+            .map_or(problem.system.row.len(), |f| f.system.entries()),
         contact_nodes,
         history_numbers: problem.history_layout.as_ref().map_or(0, |m| m.len),
         friction_states: if setup.approach.friction > 0.0 { contact_nodes } else { 0 },

@@ -19,7 +19,7 @@ pub use work::Work;
 use crate::scene::{Census, Scene};
 use crate::simulation::Simulation;
 use assembly::Pass;
-use papilla_fem::linear::FactorMemory;
+use papilla_fem::linear::{FactorMemory, SaddleSolver};
 use papilla_fem::solve::Problem;
 use serde::Serialize;
 
@@ -77,16 +77,29 @@ impl Forecast {
         // measured to run three times slower for a while.
         let pass = Pass::probe(problem);
         let (machine, work) = (Machine::probe(), Work::new(setup));
-        let (entries, flops) = (system.factor_entries(), system.factor_flops());
-        // Forward and backward through the f32 factor, once through tangent and pattern.
-        let cg_bytes = (8 * entries + 16 * system.row.len()) as f64;
+        let fluid = problem.fluid.as_ref().map(|f| &f.system);
+        // Forward and backward through the f32 factor, once through tangent and pattern; with fluid
+        // twice through that of f64, one pass of refinement.
+        let (entries, flops, cg_bytes) = match fluid {
+            None => {
+                let entries = system.factor_entries();
+                (entries, system.factor_flops(), 8 * entries + 16 * system.row.len())
+            }
+            Some(s) => {
+                let entries = s.factor_entries();
+                (entries, s.factor_flops(), 32 * entries + 32 * s.entries())
+            }
+        };
+        // A number of f64 takes twice the time and the room of one of f32.
+        let width = if fluid.is_some() { 2.0 } else { 1.0 };
         let mut seconds = Seconds {
             assembly: work.newton_iterations * pass.tangent_s
                 + work.force_evaluations * pass.forces_s,
             factorization: work.factorizations
+                * width
                 * (flops / (FACTOR_EFFICIENCY * machine.dense_flops_per_s)
                     + FACTOR_BYTES_PER_ENTRY * entries as f64 / machine.stream_bytes_per_s),
-            linear_solves: work.cg_iterations * cg_bytes
+            linear_solves: work.cg_iterations * cg_bytes as f64
                 / (SOLVE_EFFICIENCY * machine.stream_bytes_per_s),
             total: 0.0,
         };
@@ -96,7 +109,7 @@ impl Forecast {
             factor_entries: entries,
             factor_flops: flops,
             memory_bytes: memory_bytes(problem),
-            memory_indefinite_bytes: 8 * entries,
+            memory_indefinite_bytes: if fluid.is_some() { 0 } else { 8 * entries },
             work,
             machine,
             seconds,
@@ -129,7 +142,10 @@ fn memory_bytes(problem: &Problem) -> usize {
         + history
         + system.bytes()
         + 8 * system.row.len()
-        + FactorMemory::bytes(system)
+        + problem.fluid.as_ref().map_or_else(
+            || FactorMemory::bytes(system),
+            |f| SaddleSolver::bytes(&f.system) + f.system.bytes() + 8 * f.system.entries(),
+        )
 }
 
 #[cfg(test)]

@@ -9,9 +9,16 @@ const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n\
     [friction]\ncoefficient = 0.3\n[motion]\n\
     path = [{ time_s = 0.1, depth_mm = 0.05 }]\n";
 
+/// Fluid below the epidermis.
+const WATER: &str = "[materials.subcutaneous]\nyoungs_modulus_mpa = 0.034\npoissons_ratio = 0.48\n\
+    biphasic = { permeability_mm4_per_n_s = 1e-3, drained_poissons_ratio = 0.2 }\n";
+
 fn finger(effects: &[&str]) -> Scene {
     let named: Vec<_> = effects.iter().map(|e| format!("\"{e}\"")).collect();
-    let text = format!("effects = [{}]\n{FINGER}", named.join(", "));
+    let mut text = format!("effects = [{}]\n{FINGER}", named.join(", "));
+    if effects.contains(&"biphasic") {
+        text = text.replace("\"coarse\"", "\"coarse\"\norder = \"quadratic\"") + WATER;
+    }
     Scene::parse(Path::new("finger.toml"), text).unwrap()
 }
 

@@ -50,7 +50,11 @@ const EXTRA_DEPTHS: [usize; 2] = [5, 1];
 impl Work {
     pub(super) fn new(setup: &Simulation) -> Self {
         let equilibria = equilibria(setup);
-        let rate = if setup.approach.friction > 0.0 {
+        let flows = setup.body.problem.fluid.is_some();
+        let rate = if flows {
+            // Each Newton iteration factorizes and solves; counted on the coarse section.
+            Rate { newton: 2.1, factorizations: 2.1, cg: 1.0 }
+        } else if setup.approach.friction > 0.0 {
             Rate { newton: 14.0, factorizations: 1.5, cg: 4.9 }
         } else if setup.plan.law == Law::Linear {
             Rate { newton: 2.8, factorizations: 0.2, cg: 4.4 }
@@ -82,8 +86,11 @@ fn equilibria(setup: &Simulation) -> f64 {
         Drive::Path(points) => points,
     };
     let problem = &setup.body.problem;
-    if problem.history_layout.is_none() {
+    if problem.history_layout.is_none() && problem.fluid.is_none() {
         return points.len() as f64;
+    }
+    if problem.fluid.is_some() {
+        return flow_steps(points);
     }
     // From a stored time steps start at half the shortest relaxation time. While the
     // indenter holds still each may be twice as long as the last; while it
@@ -96,6 +103,21 @@ fn equilibria(setup: &Simulation) -> f64 {
         let parts = (p.time_s - from.time_s) / first_s;
         let holds = DrivePoint { time_s: from.time_s, ..*p } == from;
         if holds { (parts + 1.0).log2().ceil() } else { parts.ceil() }
+    });
+    steps.sum()
+}
+
+/// Steps of fluid that flows: some 70 in a path that moves all the time (counted on the coarse
+/// section); while the indenter holds still each is half as long again as the last, from a
+/// hundredth of the whole path.
+fn flow_steps(points: &[DrivePoint]) -> f64 {
+    let end_s = points.last().map_or(1.0, |p| p.time_s);
+    let mut last = DrivePoint::default();
+    let steps = points.iter().map(|p| {
+        let from = std::mem::replace(&mut last, *p);
+        let share = (p.time_s - from.time_s) / end_s;
+        let holds = DrivePoint { time_s: from.time_s, ..*p } == from;
+        if holds { ((1.0 + 50.0 * share).ln() / 1.5f64.ln()).ceil() } else { (70.0 * share).ceil() }
     });
     steps.sum()
 }

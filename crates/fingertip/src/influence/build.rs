@@ -116,6 +116,7 @@ pub(super) fn tangent_at_rest(problem: &Problem) -> Result<SymmetricMatrix, Infl
         load_fraction: 0.0,
         variables: Default::default(),
         friction: None,
+        fluid: None,
     };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, Some(&mut tangent), &mut out)?;

@@ -200,6 +200,7 @@ impl<'a> Curvature<'a> {
                 load_fraction: 0.0,
                 variables: Default::default(),
                 friction: None,
+                fluid: None,
             };
             evaluate_body(problem, &Loading::default(), &trial, None, &mut self.out)?;
             let forces = sum.iter_mut().zip(&self.out.residual_n);

@@ -23,6 +23,8 @@ pub struct Census {
     pub layered_elements: usize,
     /// Numbers that materials with memory keep from step to step.
     pub history_numbers: usize,
+    /// Unknowns of fluid pressure.
+    pub pressure_unknowns: usize,
     /// Contact nodes with a tangential multiplier, bound, plane and anchor.
     pub friction_states: usize,
     /// Elements of bone.

@@ -148,6 +148,9 @@ pub(crate) fn material_field(error: &TissueError) -> String {
         MaterialError::Calibrated(..) => ".ogden.calibrated_stretch",
         MaterialError::PronyTerms { .. } | MaterialError::PronyShare(_) => ".prony.share",
         MaterialError::PronyTime(_) => ".prony.time_s",
+        MaterialError::Biphasic(e) => {
+            return format!("materials.{}.biphasic.{}", error.tissue, e.field());
+        }
     };
     format!("materials.{}{field}", error.tissue)
 }

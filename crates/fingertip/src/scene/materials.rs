@@ -105,5 +105,8 @@ fn check(spec: &MaterialSpec, tissue: Tissue) -> Result<(), MaterialError> {
             return Err(MaterialError::OgdenUnits(mu0));
         }
     }
+    if let Some(fluid) = &spec.biphasic {
+        fluid.validate()?;
+    }
     spec.prony.as_ref().map_or(Ok(()), |p| p.series().map(drop))
 }

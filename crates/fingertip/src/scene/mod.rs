@@ -3,6 +3,7 @@
 //! A scene names a geometry, materials, an indenter, a motion and the effects
 //! it wants. What it does not name is not simulated.
 
+pub(crate) mod biphasic;
 mod census;
 pub mod effects;
 pub(crate) mod error;
@@ -14,6 +15,7 @@ mod outputs;
 #[cfg(test)]
 mod tests;
 
+pub use biphasic::{Biphasic, SkinFlow};
 pub use census::Census;
 pub use effects::{EffectName, Plan};
 pub use error::SceneError;
@@ -50,6 +52,9 @@ pub struct Scene {
     /// Friction, for the effect of that name.
     #[serde(default)]
     pub friction: Friction,
+    /// Where fluid leaves, for the effect `biphasic`.
+    #[serde(default, skip_serializing_if = "Biphasic::is_default")]
+    pub biphasic: Biphasic,
     /// Where on the skin contact is found; by the indenter's width and the mesh if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
@@ -100,6 +105,7 @@ impl Scene {
             indenter: IndenterSpec::default(),
             motion: Motion::to_depth(1.0, 1, Pose::default()),
             friction: Friction::default(),
+            biphasic: Biphasic::default(),
             contact: None,
             effects: effects::usual(),
             outputs: None,
@@ -174,6 +180,9 @@ impl Scene {
             });
         }
         self.materials.validate()?;
+        if self.has("biphasic") {
+            self.biphasic.validate(&self.materials)?;
+        }
         self.validate_outputs()?;
         self.plan().map(drop)
     }

@@ -140,3 +140,36 @@ fn what_is_no_scene_names_line_and_cure() {
     let error = parse("[motion]\ndepth_mm = 1.0\n").unwrap_err().to_string();
     assert!(error.starts_with("bad.toml: missing field `geometry`: add it"), "{error}");
 }
+
+#[test]
+fn fluid_that_cannot_flow_names_line_field_and_cure() {
+    let scene = |spec: &str, skin: &str, order: &str, motion: &str| {
+        format!(
+            "effects = [\"finite_strain\", \"layers\", \"biphasic\"]\n[geometry]\nkind = \"fingertip\"\n\
+             density = \"coarse\"\norder = \"{order}\"\n[biphasic]\nskin = \"{skin}\"\n\
+             [materials.dermis]\nyoungs_modulus_mpa = 0.08\npoissons_ratio = 0.48\n{spec}\n\
+             [motion]\n{motion}\n"
+        )
+    };
+    let path = "path = [{ time_s = 1.0, depth_mm = 1.0 }]";
+    let fluid = |k: &str, nu: &str| {
+        format!("biphasic = {{ permeability_mm4_per_n_s = {k}, drained_poissons_ratio = {nu} }}")
+    };
+    let with = |spec: &str| scene(spec, "sealed", "quadratic", path);
+    let wet = fluid("1e-3", "0.2");
+    assert_eq!(parse(&with(&wet)).unwrap().plan().unwrap().fluid, Some(SkinFlow::Sealed));
+    let k = "materials.dermis.biphasic.permeability_mm4_per_n_s";
+    let shut = fluid("0.0", "0.2");
+    assert!(parse(&with(&shut)).is_ok(), "undrained");
+    assert_refused(&[
+        (scene(&shut, "drained", "quadratic", path), 11, &[k, "above 0", "seal the skin"]),
+        (with(&fluid("-1e-3", "0.2")), 11, &["dermis", "permeability -0.001", "not be negative"]),
+        (with(&fluid("1e-15", "0.2")), 11, &["m4/(N s)", "1e-3 here"]),
+        (with(&fluid("1e-3", "0.5")), 11, &["drained Poisson's ratio of 0.5"]),
+        (scene(&wet, "wet", "quadratic", path), 7, &["sealed", "drained"]),
+        (scene(&wet, "sealed", "linear", path), 1, &["'biphasic'", "geometry.order"]),
+        (scene(&wet, "sealed", "graded", path), 1, &["'biphasic'", "geometry.order"]),
+        (scene(&wet, "sealed", "quadratic", "depth_mm = 1.0"), 1, &["'biphasic'", "motion.path"]),
+        (with(""), 1, &["'biphasic'", "no tissue has a table"]),
+    ]);
+}

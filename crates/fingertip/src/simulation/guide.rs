@@ -23,7 +23,9 @@ impl Body {
         approach: &Approach,
         drive: &Drive,
     ) -> Result<Option<Guided<'a>>, SimulationError> {
-        let depends = approach.friction > 0.0 || self.problem.history_layout.is_some();
+        let depends = approach.friction > 0.0
+            || self.problem.history_layout.is_some()
+            || self.problem.fluid.is_some();
         let Some(guide) = self.guide.as_ref().filter(|_| !depends) else { return Ok(None) };
         let mut solver = guide.body.solver(Options::default())?;
         let indenter = Some(guide.body.indenter(approach, drive)?);

@@ -5,7 +5,7 @@ use crate::scene::effects::{Law, Plan};
 use crate::scene::{TissueError, TissueTable};
 use crate::tissue::Tissue;
 use papilla_fem::element::{ConstitutiveModel, Elastic, ModelOf, Viscoelastic};
-use papilla_fem::material::{LinearElastic, NeoHookean, Prony};
+use papilla_fem::material::{Isochoric as _, LinearElastic, NeoHookean, Prony};
 use papilla_fem::solve::Materials;
 use std::sync::Arc;
 
@@ -33,14 +33,22 @@ fn solid(spec: &MaterialSpec, plan: &Plan) -> Result<Arc<dyn ConstitutiveModel>,
         let mut ogden = ogden.clone();
         ogden.mu_mpa.iter_mut().for_each(|mu| *mu *= scale);
         let (law, bulk) = ogden.law()?;
-        return Ok(shared(law, bulk / scale, series));
+        let bulk = drained(spec, plan, law.shear_modulus_mpa() / scale)?.unwrap_or(bulk / scale);
+        return Ok(shared(law, bulk, series));
     }
     let [mu, bulk] = spec.constants().moduli_mpa()?;
+    let bulk = drained(spec, plan, mu)?.unwrap_or(bulk);
     let mu_mpa = scale * mu;
     Ok(match plan.law {
         Law::Linear => shared(LinearElastic { mu_mpa }, bulk, series),
         Law::NeoHookean | Law::Ogden => shared(NeoHookean { mu_mpa }, bulk, series),
     })
+}
+
+/// Bulk modulus of the solid of a tissue full of fluid, MPa; `None` of any other.
+fn drained(spec: &MaterialSpec, plan: &Plan, shear_mpa: f64) -> Result<Option<f64>, MaterialError> {
+    let fluid = spec.biphasic.as_ref().filter(|_| plan.fluid.is_some());
+    Ok(fluid.map(|f| f.bulk_mpa(shear_mpa)).transpose()?)
 }
 
 fn shared<L: ModelOf>(

@@ -30,6 +30,7 @@ pub mod drive;
 pub mod fields;
 mod finger;
 mod fit;
+mod fluid;
 mod guide;
 pub mod laws;
 pub mod record;

@@ -55,7 +55,7 @@ impl Simulation {
             contact: scene.contact,
         };
         let drive = drive(&scene.motion);
-        let body = body(scene, &plan, &approach, &drive)?;
+        let body = body(scene, &plan, &approach, &drive)?.filled(&scene.materials, &plan)?;
         // An indenter that never touches is found now, not after files are written.
         body.indenter(&approach, &drive)?;
         Ok(Self { plan, body, approach, drive })

@@ -91,6 +91,7 @@ pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f6
         load_fraction: 0.0,
         variables: HistoryVariables::default(),
         friction: None,
+        fluid: None,
     };
     let mut out = Evaluation::default();
     evaluate_body(problem, &Loading::default(), &trial, None, &mut out)?;

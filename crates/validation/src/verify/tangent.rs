@@ -91,6 +91,7 @@ fn error(kind: ElementKind, cells: usize, rule: ContactRule) -> Result<(f64, usi
             load_fraction: 1.0,
             variables: HistoryVariables::default(),
             friction: None,
+            fluid: None,
         };
         let mut out = Evaluation::default();
         evaluate_body(&problem, &loading, &trial, with_tangent.then_some(&mut tangent), &mut out)?;

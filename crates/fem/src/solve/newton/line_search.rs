@@ -27,6 +27,15 @@ impl Newton<'_> {
         }
     }
 
+    /// Evaluates the trial.
+    pub(super) fn try_trial(&mut self, fixed: Fixed<'_>) -> Result<(), StepError> {
+        let clock = Instant::now();
+        let trial = fixed.trial(&self.trial_u, &self.trial_independent, self.penalty);
+        let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
+        self.effort.assemble_s += clock.elapsed().as_secs_f64();
+        found
+    }
+
     /// Backtracks along `step` until potential or residual falls; with independent dilatations,
     /// which go the same way, until the potential or the residual of both fields does.
     pub(super) fn line_search(
@@ -51,11 +60,7 @@ impl Newton<'_> {
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
             self.go(u, independent, length);
-            let clock = Instant::now();
-            let trial = fixed.trial(&self.trial_u, &self.trial_independent, self.penalty);
-            let found = evaluate_body(self.problem, fixed.loading, &trial, None, &mut self.trial);
-            self.effort.assemble_s += clock.elapsed().as_secs_f64();
-            if found.is_ok() {
+            if self.try_trial(fixed).is_ok() {
                 let falls = self.trial.potential_mj <= energy + 1e-4 * length * slope;
                 let smaller = if independent.is_empty() {
                     self.trial.residual_norm < 0.5 * norm

@@ -1,5 +1,6 @@
 //! Newton's method at one load fraction.
 
+mod biphasic;
 mod direction;
 mod line_search;
 mod preconditioner;
@@ -8,9 +9,11 @@ pub(super) use preconditioner::Preconditioner;
 
 use super::effort::Effort;
 use super::evaluate::{Evaluation, Trial, evaluate_body};
+use super::fluid::FluidState;
 use super::loading::Loading;
 use super::problem::Problem;
 use super::{Options, SolveError, StepError};
+use crate::biphasic::Flow;
 use crate::contact::{ContactRule, FrictionTrial};
 use crate::element::{Dilatation, HistoryVariables};
 use crate::linear::{CgWorkspace, DofMap, FactorMemory, NumericFactor, SymmetricMatrix};
@@ -24,6 +27,7 @@ pub(super) struct Fixed<'a> {
     pub multipliers: &'a [f64],
     pub variables: HistoryVariables<'a>,
     pub friction: Option<&'a FrictionTrial>,
+    pub fluid: Option<Flow<'a>>,
 }
 
 impl<'a> Fixed<'a> {
@@ -36,6 +40,7 @@ impl<'a> Fixed<'a> {
             load_fraction: self.load_fraction,
             variables: self.variables,
             friction: self.friction,
+            fluid: self.fluid,
         }
     }
 }
@@ -75,6 +80,8 @@ pub(super) struct Newton<'a> {
     /// See [`NumericFactor::condition_at_least`]; of the last Cholesky factor.
     pub condition: f64,
     cg: CgWorkspace,
+    /// The system of displacement and fluid pressure.
+    saddle: Option<biphasic::Saddle>,
     right: Vec<f64>,
     step: Vec<f64>,
     trial_u: Vec<[f64; 3]>,
@@ -88,17 +95,24 @@ pub(super) struct Newton<'a> {
 impl<'a> Newton<'a> {
     pub(super) fn new(problem: &'a Problem, options: Options) -> Result<Self, SolveError> {
         let n = problem.system.dofs.count;
+        let saddle = problem.fluid.as_ref().map(biphasic::Saddle::new).transpose()?;
+        // With fluid its system is factorized, not the displacements' own.
+        let memory = match saddle {
+            Some(_) => FactorMemory::default(),
+            None => FactorMemory::new(&problem.system)?,
+        };
         Ok(Self {
             problem,
             options,
             penalty: 0.0,
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
-            held: Held::Memory(FactorMemory::new(&problem.system)?),
+            held: Held::Memory(memory),
             tangent: problem.system.zeros(),
             stale: true,
             condition: f64::NAN,
             cg: CgWorkspace::default(),
+            saddle,
             right: vec![0.0; n],
             step: vec![0.0; n],
             trial_u: Vec::new(),
@@ -119,7 +133,7 @@ impl<'a> Newton<'a> {
         self.effort = Effort::default();
     }
 
-    /// Brings `u`, and the dilatations that elements keep as unknowns of their own, if any, to
+    /// Brings `u`, the dilatations that elements keep as unknowns of their own and the fluid, if any, to
     /// equilibrium with everything else `fixed`, to a residual of `tolerance` times the reference
     /// force.
     pub(super) fn equilibrate(
@@ -128,7 +142,11 @@ impl<'a> Newton<'a> {
         fixed: Fixed<'_>,
         u: &mut [[f64; 3]],
         independent: &mut [Dilatation],
+        fluid: Option<&mut FluidState>,
     ) -> Result<(), StepError> {
+        if let Some(fluid) = fluid {
+            return self.equilibrate_with_fluid(tolerance, fixed, u, fluid);
+        }
         self.evaluate(fixed, u, independent)?;
         let floor = self.rounding_force_n;
         let mut previous = f64::INFINITY;

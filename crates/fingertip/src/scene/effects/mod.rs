@@ -5,6 +5,7 @@
 //! says what it adds, what it needs and how it changes the [`Plan`]; [`EFFECTS`] is
 //! the table. What no effect has put into the plan is not assembled.
 
+mod biphasic;
 mod elastic_bone;
 mod finite_strain;
 mod friction;
@@ -14,6 +15,7 @@ mod nail;
 mod plane_strain;
 mod viscoelastic;
 
+use super::biphasic::SkinFlow;
 use super::{Scene, SceneError};
 use crate::mesh::fingertip::Parts;
 use crate::scene::Census;
@@ -43,11 +45,12 @@ pub struct Effect {
 }
 
 /// Every effect, in the order in which they change a plan.
-pub const EFFECTS: [&Effect; 8] = [
+pub const EFFECTS: [&Effect; 9] = [
     &finite_strain::EFFECT,
     &layers::EFFECT,
     &hyperelastic::EFFECT,
     &viscoelastic::EFFECT,
+    &biphasic::EFFECT,
     &friction::EFFECT,
     &elastic_bone::EFFECT,
     &nail::EFFECT,
@@ -75,6 +78,9 @@ pub struct Plan {
     pub tissues: [Tissue; Tissue::ALL.len()],
     /// Whether tissues with a Prony series relax.
     pub relaxes: bool,
+    /// What the skin does to the fluid of tissues that have some; `None` is no fluid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fluid: Option<SkinFlow>,
     /// Solid parts that are meshed and deform.
     pub parts: Parts,
     /// Coulomb coefficient; 0 is no friction.
@@ -92,6 +98,7 @@ impl Plan {
             law: Law::Linear,
             tissues: [Subcutaneous, Subcutaneous, Subcutaneous, Nail, Bone],
             relaxes: false,
+            fluid: None,
             parts: Parts::default(),
             friction: 0.0,
             plane_strain: false,
