@@ -101,6 +101,9 @@ pub struct FluidPhase {
     pub system: SaddleSystem,
 }
 
+/// Called with an element's number, its nodes and what flows in it.
+type Visit<'a> = &'a mut dyn FnMut(usize, &[u32], &Flowing<'_>) -> Result<(), Inverted>;
+
 impl FluidPhase {
     /// The fluid of a body whose displacements have `system`.
     ///
@@ -212,7 +215,7 @@ impl FluidPhase {
         u: &[[f64; 3]],
         flow: Flow<'_>,
         dt_s: f64,
-        visit: &mut dyn FnMut(usize, &[u32], &Flowing<'_>) -> Result<(), Inverted>,
+        visit: Visit<'_>,
     ) -> Result<(), (usize, usize, Inverted)> {
         let [mut end, mut start, mut older] = [[[0.0; 3]; NODES_MAX]; 3];
         for (at, &[b, e]) in self.elements.iter().enumerate() {

@@ -1,9 +1,9 @@
 //! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
-use super::guide::Guide;
 use super::record::{Checks, IncrementRecord};
 use crate::geometry::fingertip::FingertipShapeError;
 use crate::indenter::IndenterError;
+use crate::mesh::Transfer;
 use crate::mesh::fingertip::{Patch, Vertices};
 use crate::mesh::grading::Contact;
 use crate::mesh::section::SectionMeshError;
@@ -165,6 +165,12 @@ pub struct Body {
     pub graded: bool,
     /// On which the way to each state is found first, if there is one.
     pub(super) guide: Option<Box<Guide>>,
+}
+
+/// A coarser mesh of a body, and its fields on that body's own.
+pub(super) struct Guide {
+    pub body: Body,
+    pub transfer: Transfer,
 }
 
 /// What is read off a fingertip at each equilibrium.

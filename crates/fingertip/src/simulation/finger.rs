@@ -1,7 +1,6 @@
 //! The solid fingertip as a body.
 
-use super::body::{Body, SimulationError};
-use super::guide::Guide;
+use super::body::{Body, Guide, SimulationError};
 use super::laws::solids;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_guide};
@@ -29,13 +28,13 @@ impl Body {
         density: Density,
         order: Order,
         parts: Parts,
-        contact: Option<Contact>,
+        contact: Option<&Contact>,
     ) -> Result<Self, SimulationError> {
-        let fine = build(shape, density, order, parts, contact.as_ref())?;
+        let fine = build(shape, density, order, parts, contact)?;
         if let Some(error) = fine.unresolved(density) {
             return Err(error.into());
         }
-        let guide = match &contact {
+        let guide = match contact {
             Some(contact) => build_guide(shape, density, parts, contact, &fine)?,
             None => None,
         };
@@ -43,7 +42,7 @@ impl Body {
             let FingertipMesh { mesh, patch, .. } = mesh;
             let fixed = Self::held(&mesh, parts);
             let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
-            let (graded, first_touch) = (order == Order::Graded, contact.clone());
+            let (graded, first_touch) = (order == Order::Graded, contact.cloned());
             Ok::<_, SimulationError>(Self { graded, first_touch, guide, ..body })
         };
         let guide = match guide {

@@ -4,35 +4,9 @@
 //! states, Newton iterations in which the contact grows. The guide has the layers of the fine mesh
 //! and larger cells along the skin; it goes that way at a tenth of the price.
 
-use super::body::{Body, SimulationError};
-use super::drive::{Approach, Drive};
+use super::body::{Guide, SimulationError};
 use crate::mesh::Transfer;
-use papilla_fem::solve::{Effort, Guess, Loading, Options, Solver};
-
-/// A coarser mesh of a body.
-pub(super) struct Guide {
-    pub body: Body,
-    pub transfer: Transfer,
-}
-
-impl Body {
-    /// The guide of this body, about to press; `None` if there is none or states depend on the
-    /// way to them.
-    pub(super) fn guided<'a>(
-        &'a self,
-        approach: &Approach,
-        drive: &Drive,
-    ) -> Result<Option<Guided<'a>>, SimulationError> {
-        let depends = approach.friction > 0.0
-            || self.problem.history_layout.is_some()
-            || self.problem.fluid.is_some();
-        let Some(guide) = self.guide.as_ref().filter(|_| !depends) else { return Ok(None) };
-        let mut solver = guide.body.solver(Options::default())?;
-        let indenter = Some(guide.body.indenter(approach, drive)?);
-        solver.start(Loading { indenter, ..Loading::default() });
-        Ok(Some(Guided { solver, transfer: &guide.transfer, effort: Effort::default() }))
-    }
-}
+use papilla_fem::solve::{Effort, Guess, Loading, MovingIndenter, Options, Solver};
 
 /// A guide on its way.
 pub(super) struct Guided<'a> {
@@ -42,7 +16,14 @@ pub(super) struct Guided<'a> {
     pub effort: Effort,
 }
 
-impl Guided<'_> {
+impl<'a> Guided<'a> {
+    /// About to press.
+    pub(super) fn new(guide: &'a Guide, indenter: MovingIndenter) -> Result<Self, SimulationError> {
+        let mut solver = guide.body.solver(Options::default())?;
+        solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
+        Ok(Self { solver, transfer: &guide.transfer, effort: Effort::default() })
+    }
+
     /// Where the body's own mesh goes, by the guide's equilibrium.
     pub(super) fn guess(&self) -> Guess {
         Guess {

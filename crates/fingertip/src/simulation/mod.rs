@@ -38,6 +38,7 @@ pub mod section;
 mod setup;
 mod skin;
 mod touch;
+mod way;
 
 pub use setup::Simulation;
 

@@ -72,7 +72,14 @@ fn body(
     match &scene.geometry {
         Geometry::Fingertip { density, order, shape } => {
             let contact = (*order == Order::Graded).then(|| approach.contact_with(shape, drive));
-            Body::fingertip(shape, materials, *density, *order, plan.parts, contact.flatten())
+            Body::fingertip(
+                shape,
+                materials,
+                *density,
+                *order,
+                plan.parts,
+                contact.flatten().as_ref(),
+            )
         }
         Geometry::Block { size_mm, elements, layers, order } => {
             let lattice = block_lattice(*size_mm, *elements, layers, *order);

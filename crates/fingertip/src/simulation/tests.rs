@@ -293,7 +293,8 @@ fn states_after_a_guide_are_those_of_the_path() {
     let contact = ball.contact_with(&shape, &drive);
     let (density, parts) = (Density::Medium, Parts::default());
     let mut body =
-        Body::fingertip(&shape, materials, density, Order::Graded, parts, contact).unwrap();
+        Body::fingertip(&shape, materials, density, Order::Graded, parts, contact.as_ref())
+            .unwrap();
     let solve = |body: &Body| {
         let mut found = Vec::new();
         let mut solver = body.solver(Options::default()).unwrap();

@@ -1,0 +1,34 @@
+//! Equilibria sought from a guess.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+
+use papilla_fem::element::ElementKind;
+use papilla_fem::solve::{Guess, Options, Solver};
+use papilla_fem::testing::squeezed_block;
+
+/// From a displacement nearby or from nonsense, the equilibrium is that of the path.
+#[test]
+fn a_guess_leads_to_the_equilibrium_of_the_path() {
+    let (problem, loading, _) = squeezed_block(ElementKind::Hex8, 3, 0.48).unwrap();
+    let tight = Options { residual_tolerance: 1e-9, gap_tolerance_mm: 1e-7, ..Options::default() };
+    let mut guide = Solver::new(&problem, tight).unwrap();
+    guide.start(loading.clone());
+    for step in 1..=4 {
+        guide.advance_to(0.25 * f64::from(step)).unwrap();
+    }
+    let due = guide.displacement_mm().to_vec();
+    let near: Vec<_> = due.iter().map(|u| u.map(|v| 0.97 * v)).collect();
+    let mut folded = due.clone();
+    folded.reverse();
+    for guess in [near, folded] {
+        let mut solver = Solver::new(&problem, tight).unwrap();
+        solver.start(loading.clone());
+        let guess = Guess { displacement_mm: guess, dilatation: Vec::new() };
+        solver.advance_from(1.0, guess).unwrap();
+        let largest = due.as_flattened().iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        for (found, due) in solver.displacement_mm().as_flattened().iter().zip(due.as_flattened()) {
+            assert!((found - due).abs() < 1e-5 * largest, "{found} {due}");
+        }
+    }
+}

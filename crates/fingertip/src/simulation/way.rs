@@ -1,0 +1,105 @@
+//! A straight way from one stored depth to the next.
+
+use super::body::SimulationError;
+use super::guide::Guided;
+use papilla_fem::solve::{Effort, Mark, Solver, StepReport};
+
+/// How much more of the work may be missed before it is mended where the force has the course of
+/// a guide: the coarse mesh errs most at first touch, and what it misses there does not grow.
+const GUIDED: f64 = 2.0;
+
+/// A straight way through stored depths.
+pub(super) struct Way<'a> {
+    pub depths_mm: &'a [f64],
+    pub refinement: u32,
+    pub graded: bool,
+    pub energy_vs_work_max: Option<f64>,
+}
+
+impl Way<'_> {
+    /// Goes from the stored depth before to that of number `i`.
+    pub(super) fn to_state(
+        &self,
+        solver: &mut Solver<'_>,
+        i: usize,
+    ) -> Result<StepReport, SimulationError> {
+        let depth_mm = self.depths_mm[i];
+        let last = self.depths_mm.last().copied().unwrap_or(1.0);
+        let at = |source| SimulationError::Solve { depth_mm, source };
+        let mut effort = Effort::default();
+        let mark = |solver: &Solver<'_>| self.energy_vs_work_max.map(|_| solver.mark());
+        let mut known: Vec<_> = mark(solver).into_iter().collect();
+        for between in path_mm(self.depths_mm, i, self.refinement, self.graded) {
+            effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
+            known.extend(mark(solver));
+        }
+        let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
+        report.effort = report.effort.plus(&effort);
+        self.mend(solver, known, 1.0, &mut report);
+        Ok(report)
+    }
+
+    /// Sends the guide there; none is left where it finds no equilibrium.
+    pub(super) fn lead<'a>(&self, mut guided: Guided<'a>, i: usize) -> Option<Guided<'a>> {
+        match self.to_state(&mut guided.solver, i) {
+            Ok(report) => {
+                guided.effort = report.effort;
+                Some(guided)
+            }
+            Err(error) => {
+                tracing::info!(%error, "the coarse mesh that leads the way is given up");
+                None
+            }
+        }
+    }
+
+    /// As [`Self::to_state`], straight to a state that a guide is at.
+    pub(super) fn to_state_after(
+        &self,
+        guided: &Guided<'_>,
+        solver: &mut Solver<'_>,
+        i: usize,
+    ) -> Result<StepReport, SimulationError> {
+        let depth_mm = self.depths_mm[i];
+        let last = self.depths_mm.last().copied().unwrap_or(1.0);
+        let known: Vec<_> = self.energy_vs_work_max.map(|_| solver.mark()).into_iter().collect();
+        let mut report = solver
+            .advance_from(depth_mm / last, guided.guess())
+            .map_err(|source| SimulationError::Solve { depth_mm, source })?;
+        solver.take_course(&guided.solver);
+        self.mend(solver, known, GUIDED, &mut report);
+        report.effort = report.effort.plus(&guided.effort);
+        report.guiding = guided.effort;
+        Ok(report)
+    }
+
+    fn mend(&self, solver: &mut Solver<'_>, known: Vec<Mark>, times: f64, report: &mut StepReport) {
+        if let Some(limit) = self.energy_vs_work_max {
+            report.mending = solver.mend_work(known, times * limit);
+            report.effort = report.effort.plus(&report.mending);
+        }
+    }
+}
+
+/// Depths between stored depth `i` and the one before it at which to find
+/// equilibrium too, mm. Force turns fast after first touch, and with it the
+/// work integral.
+fn path_mm(depths_mm: &[f64], i: usize, refinement: u32, graded: bool) -> Vec<f64> {
+    let to = depths_mm[i];
+    let from = if i == 0 { 0.0 } else { depths_mm[i - 1] };
+    let coarse: &[f64] = match i {
+        0 if graded => &[0.0, 0.12, 0.35, 0.65, 1.0],
+        0 => &[0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
+        1 if !graded => &[0.0, 0.5, 1.0],
+        _ => &[0.0, 1.0],
+    };
+    let at = |part: f64| from + part * (to - from);
+    let mut path = Vec::new();
+    for pair in coarse.windows(2) {
+        for k in 1..=refinement {
+            path.push(at(pair[0] + (pair[1] - pair[0]) * f64::from(k) / f64::from(refinement)));
+        }
+    }
+    path.pop();
+    path
+}
