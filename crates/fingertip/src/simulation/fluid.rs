@@ -100,14 +100,13 @@ mod tests {
         assert!(slow.force_n < fast.force_n);
     }
 
-    /// Srinivasan, Gulati & Dandekar 1992 found at most 5 %. In 1 s hardly any fluid moves:
-    /// the volume changes by some 2e-5.
+    /// Srinivasan, Gulati & Dandekar 1992 found at most 5 %.
     #[test]
     #[ignore = "long: ./test --all"]
     fn a_drained_finger_loses_at_most_a_twentieth_of_its_volume() {
         let p = press(FINGER, "drained", 1.0);
         println!("lost {} {} N {:?}", p.lost, p.force_n, p.checks);
         assert_sound(&p);
-        assert!(p.lost.abs() <= 0.05, "{}", p.lost);
+        assert!(p.lost > 0.0 && p.lost <= 0.05, "{}", p.lost);
     }
 }
