@@ -1,4 +1,4 @@
-//! A problem that tests of this crate and of others share.
+//! A problem and kinds of elements that tests of this crate and of others share.
 
 use crate::element::{Elastic, ElementKind, Materials};
 use crate::material::{NeoHookean, moduli};
@@ -8,6 +8,16 @@ use crate::mesh::supports::hold;
 use crate::solve::{Loading, MovingIndenter, Problem, ProblemError};
 use papilla_sdf::{Placement, RoundedPlate};
 use std::sync::Arc;
+
+/// Elements that a lattice is made of.
+pub const LATTICE_KINDS: [ElementKind; 6] = [
+    ElementKind::Hex8,
+    ElementKind::Hex20,
+    ElementKind::Hex27,
+    ElementKind::Quad4,
+    ElementKind::Quad8,
+    ElementKind::Quad9,
+];
 
 /// A quarter of a 10 x 10 x 5 mm block (E 0.1 MPa), bonded below and squeezed by 0.75 mm with a
 /// smooth plate; of planar elements half of a 10 x 5 mm section, 1 mm long. The number is the axis

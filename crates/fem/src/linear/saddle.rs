@@ -10,7 +10,7 @@
 use super::FactorError;
 use super::symbolic::{SymbolicError, SymbolicSystem, SymmetricMatrix};
 use super::{DofMap, dot};
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
@@ -242,21 +242,23 @@ const REFINEMENTS_MAX: usize = 4;
 /// Relative residual of a linear system that is good enough.
 const RESIDUAL_ENOUGH: f64 = 1e-12;
 
+fn scratch(system: &SaddleSystem) -> StackReq {
+    let s = &system.symbolic;
+    s.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default())
+        .or(s.solve_in_place_scratch::<f64>(1, Par::Seq))
+}
+
 impl SaddleSolver {
     /// Memory for `system`.
     ///
     /// # Errors
     /// [`FactorError::Memory`].
     pub fn new(system: &SaddleSystem) -> Result<Self, FactorError> {
-        let s = &system.symbolic;
-        let scratch = s
-            .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default())
-            .or(s.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let memory = MemBuffer::try_new(scratch)
+        let memory = MemBuffer::try_new(scratch(system))
             .map_err(|_| FactorError::Memory(system.factor_entries()))?;
         let vector = || vec![0.0; system.len()];
         Ok(Self {
-            factor: vec![0.0; s.len_val()],
+            factor: vec![0.0; system.factor_entries()],
             memory,
             residual: vector(),
             correction: vector(),
@@ -266,11 +268,8 @@ impl SaddleSolver {
     /// What it takes on `system`, bytes.
     #[must_use]
     pub fn bytes(system: &SaddleSystem) -> usize {
-        let s = &system.symbolic;
-        let scratch = s
-            .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Spec::default())
-            .or(s.solve_in_place_scratch::<f64>(1, Par::Seq));
-        scratch.unaligned_bytes_required() + 8 * (s.len_val() + 2 * system.len())
+        scratch(system).unaligned_bytes_required()
+            + 8 * (system.factor_entries() + 2 * system.len())
     }
 
     /// Factorizes `matrix`.

@@ -118,15 +118,7 @@ fn side_axis(kind: ElementKind, side: usize) -> (usize, bool) {
 mod tests {
     use super::*;
     use crate::element::BlockGeometry;
-
-    const KINDS: [ElementKind; 6] = [
-        ElementKind::Hex8,
-        ElementKind::Hex20,
-        ElementKind::Hex27,
-        ElementKind::Quad4,
-        ElementKind::Quad8,
-        ElementKind::Quad9,
-    ];
+    use crate::testing::LATTICE_KINDS;
 
     /// 1 x 2 x 3 mm in 2 x 2 x 4 node intervals; in the plane 1 x 2 mm.
     fn mesh(kind: ElementKind) -> Mesh {
@@ -138,7 +130,7 @@ mod tests {
 
     #[test]
     fn sides_look_outward_and_have_the_right_area() {
-        for kind in KINDS {
+        for kind in LATTICE_KINDS {
             let mesh = mesh(kind);
             assert_eq!(mesh.surfaces.len(), 2 * kind.dimension());
             for (name, s) in &mesh.surfaces {
@@ -162,7 +154,7 @@ mod tests {
 
     #[test]
     fn elements_fill_the_block_and_use_every_node() {
-        for kind in KINDS {
+        for kind in LATTICE_KINDS {
             let mesh = mesh(kind);
             let block = &mesh.blocks[0];
             let geometry = BlockGeometry::new(kind, &mesh.nodes, &block.connectivity).unwrap();

@@ -5,16 +5,8 @@ use papilla_fem::mesh::block::{BlockLattice, build, even};
 use papilla_fem::mesh::probe::{Probe, ProbeError, line};
 use papilla_fem::mesh::sample::Sample;
 use papilla_fem::mesh::{Mesh, Region};
+use papilla_fem::testing::LATTICE_KINDS;
 use proptest::prelude::*;
-
-const KINDS: [ElementKind; 6] = [
-    ElementKind::Hex8,
-    ElementKind::Hex20,
-    ElementKind::Hex27,
-    ElementKind::Quad4,
-    ElementKind::Quad8,
-    ElementKind::Quad9,
-];
 
 fn bent(kind: ElementKind) -> Mesh {
     let axis = || even(1.0, 4 * kind.order());
@@ -31,7 +23,7 @@ proptest! {
     fn points_are_found_where_they_are(
         element in 0usize..16, xi in prop::array::uniform3(-0.99f64..0.99),
     ) {
-        for kind in KINDS {
+        for kind in LATTICE_KINDS {
             let mesh = bent(kind);
             let mut xi = xi;
             if kind.is_planar() {
@@ -63,7 +55,7 @@ proptest! {
 
 #[test]
 fn a_point_on_an_interface_has_both_sides() {
-    for kind in KINDS {
+    for kind in LATTICE_KINDS {
         let mesh = bent(kind);
         let up = kind.dimension() - 1;
         // In the middle of a side between dermis and epidermis, then inside.

@@ -8,16 +8,8 @@ use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::mesh::{Mesh, Region, Surface};
 use papilla_fem::tensor::Kinematics;
+use papilla_fem::testing::LATTICE_KINDS;
 use std::sync::Arc;
-
-const KINDS: [ElementKind; 6] = [
-    ElementKind::Hex8,
-    ElementKind::Hex20,
-    ElementKind::Hex27,
-    ElementKind::Quad4,
-    ElementKind::Quad8,
-    ElementKind::Quad9,
-];
 
 /// Poisson's ratio 0.45.
 fn material(e_mpa: f64) -> Arc<dyn ConstitutiveModel> {
@@ -80,7 +72,7 @@ fn sed_of_an_even_strain_is_exact_on_both_sides() {
         let k = Kinematics::new(h);
         material(e).stored_mpa(&k, k.j_minus_1, &[])
     };
-    for kind in KINDS {
+    for kind in LATTICE_KINDS {
         let mesh = layered(kind, 4);
         let u: Vec<[f64; 3]> = mesh
             .nodes
@@ -104,7 +96,7 @@ fn sed_converges_at_the_interface() {
         let s = -0.1 * (1.3 * x[0] + x[1]).sin();
         [[0.0, 0.17 * (1.7 * x[1]).cos(), 0.0], [1.3 * s, s, 0.0], [0.0; 3]]
     };
-    for kind in KINDS {
+    for kind in LATTICE_KINDS {
         let error = |elements: usize| {
             let mesh = layered(kind, elements);
             let u: Vec<_> = mesh.nodes.iter().map(|&x| field(x)).collect();

@@ -144,12 +144,6 @@ impl Density {
         Resolution { grid: refined::BASE, epidermis: &[0.0, 0.25, 0.5, 0.75, 1.0], dermis, fat }
     }
 
-    /// The skin's cells, split for a contact.
-    fn refined(self, shape: &FingertipShape, contact: Option<&Contact>) -> Refined {
-        let spacing = contact.map(|c| Spacing::new(shape, c, self.closeness()));
-        Refined::new(shape, spacing.as_ref())
-    }
-
     /// How close nodes are under an indenter.
     const fn closeness(self) -> Closeness {
         let (of_radius_mm, flat_mm, edge_mm, growth) = match self {
@@ -194,13 +188,16 @@ pub fn build(
     contact: Option<&Contact>,
 ) -> Result<FingertipMesh, FingertipShapeError> {
     shape.validate()?;
-    let refined = (order == Order::Graded).then(|| density.refined(shape, contact));
+    let refined = (order == Order::Graded).then(|| {
+        let spacing = contact.map(|c| Spacing::new(shape, c, density.closeness()));
+        Refined::new(shape, spacing)
+    });
     layered(shape, &density.resolution(order), order, parts, refined)
 }
 
 /// The mesh `fine`, of [`build`] in [`Order::Graded`], with cells as large as those of
 /// [`Density::Coarse`], and what reads its displacement at the nodes of `fine`; `None` where it
-/// would be that mesh, or a solid nail has nodes of its own.
+/// would be that mesh, no contact splits cells, or a solid nail has nodes of its own.
 ///
 /// # Errors
 /// As [`build`].
@@ -208,14 +205,12 @@ pub fn build_guide(
     shape: &FingertipShape,
     density: Density,
     parts: Parts,
-    contact: &Contact,
     fine: &FingertipMesh,
 ) -> Result<Option<(FingertipMesh, Transfer)>, FingertipShapeError> {
-    let Some(to) = fine.refined.as_ref().filter(|_| density != Density::Coarse && !parts.nail)
-    else {
-        return Ok(None);
-    };
-    let guide = Density::Coarse.refined(shape, Some(contact));
+    let leads = density != Density::Coarse && !parts.nail;
+    let Some(to) = fine.refined.as_ref().filter(|_| leads) else { return Ok(None) };
+    let Some(spacing) = &to.spacing else { return Ok(None) };
+    let guide = Refined::new(shape, Some(spacing.with(Density::Coarse.closeness())));
     let transfer = Transfer::new(&guide, to);
     let resolution = density.resolution(Order::Graded);
     let mesh = layered(shape, &resolution, Order::Graded, parts, Some(guide))?;

@@ -25,13 +25,15 @@ pub(super) struct Refined {
     pub size: GridSize,
     /// Nodes that hang, and what they follow, as numbers of the grid.
     pub hanging: Vec<HangingNode>,
+    /// What the cells were split for.
+    pub spacing: Option<Spacing>,
     leaves: Leaves,
 }
 
 impl Refined {
     /// Splits the cells of [`BASE`] as far as `spacing` asks, but those under the nail.
-    pub(super) fn new(shape: &FingertipShape, spacing: Option<&Spacing>) -> Self {
-        let wanted = |at: &[[f64; 3]; 9], direction| match spacing {
+    pub(super) fn new(shape: &FingertipShape, spacing: Option<Spacing>) -> Self {
+        let wanted = |at: &[[f64; 3]; 9], direction| match &spacing {
             Some(s) if !at.iter().any(|&p| shape.under_nail(p)) => s.wanted_mm(at, direction),
             _ => f64::INFINITY,
         };
@@ -55,7 +57,7 @@ impl Refined {
             lattice[id as usize] = at;
         }
         let parameters = lattice.iter().map(|&at| leaves.parameter(at)).collect();
-        Self { grid: Grid { parameters, lattice, cells }, size, hanging, leaves }
+        Self { grid: Grid { parameters, lattice, cells }, size, hanging, spacing, leaves }
     }
 
     /// What the atlas shows: `interface` is the number of the first node of that layer.

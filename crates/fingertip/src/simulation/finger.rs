@@ -34,10 +34,7 @@ impl Body {
         if let Some(error) = fine.unresolved(density) {
             return Err(error.into());
         }
-        let guide = match contact {
-            Some(contact) => build_guide(shape, density, parts, contact, &fine)?,
-            None => None,
-        };
+        let guide = build_guide(shape, density, parts, &fine)?;
         let body = |mesh: FingertipMesh, materials, guide| {
             let FingertipMesh { mesh, patch, .. } = mesh;
             let fixed = Self::held(&mesh, parts);

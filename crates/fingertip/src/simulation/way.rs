@@ -24,16 +24,15 @@ impl Way<'_> {
         i: usize,
     ) -> Result<StepReport, SimulationError> {
         let depth_mm = self.depths_mm[i];
-        let last = self.depths_mm.last().copied().unwrap_or(1.0);
         let at = |source| SimulationError::Solve { depth_mm, source };
         let mut effort = Effort::default();
         let mark = |solver: &Solver<'_>| self.energy_vs_work_max.map(|_| solver.mark());
         let mut known: Vec<_> = mark(solver).into_iter().collect();
         for between in path_mm(self.depths_mm, i, self.refinement, self.graded) {
-            effort = effort.plus(&solver.advance_to(between / last).map_err(at)?.effort);
+            effort = effort.plus(&solver.advance_to(self.fraction(between)).map_err(at)?.effort);
             known.extend(mark(solver));
         }
-        let mut report = solver.advance_to(depth_mm / last).map_err(at)?;
+        let mut report = solver.advance_to(self.fraction(depth_mm)).map_err(at)?;
         report.effort = report.effort.plus(&effort);
         self.mend(solver, known, 1.0, &mut report);
         Ok(report)
@@ -61,16 +60,20 @@ impl Way<'_> {
         i: usize,
     ) -> Result<StepReport, SimulationError> {
         let depth_mm = self.depths_mm[i];
-        let last = self.depths_mm.last().copied().unwrap_or(1.0);
         let known: Vec<_> = self.energy_vs_work_max.map(|_| solver.mark()).into_iter().collect();
         let mut report = solver
-            .advance_from(depth_mm / last, guided.guess())
+            .advance_from(self.fraction(depth_mm), guided.guess())
             .map_err(|source| SimulationError::Solve { depth_mm, source })?;
         solver.take_course(&guided.solver);
         self.mend(solver, known, GUIDED, &mut report);
         report.effort = report.effort.plus(&guided.effort);
         report.guiding = guided.effort;
         Ok(report)
+    }
+
+    /// Load fraction at a depth.
+    fn fraction(&self, depth_mm: f64) -> f64 {
+        depth_mm / self.depths_mm.last().copied().unwrap_or(1.0)
     }
 
     fn mend(&self, solver: &mut Solver<'_>, known: Vec<Mark>, times: f64, report: &mut StepReport) {

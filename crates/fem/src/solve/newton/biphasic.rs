@@ -4,9 +4,10 @@
 //! asks the norm of both residuals to fall below the largest of the last few (Grippo, Lampariello
 //! & Lucidi 1986), since contact that opens and closes makes it rise now and then.
 
+use super::line_search::move_along;
 use super::{Fixed, Newton};
 use crate::biphasic::{Flow, FluidPhase};
-use crate::linear::{DofMap, FactorError, SaddleSolver, SymmetricMatrix};
+use crate::linear::{FactorError, SaddleSolver, SymmetricMatrix};
 use crate::solve::StepError;
 use crate::solve::fluid::FluidState;
 use std::time::Instant;
@@ -128,14 +129,7 @@ impl Newton<'_> {
         let Saddle { step, trial_mpa, .. } = saddle;
         let mut length = 1.0;
         for _ in 0..self.options.line_search_max {
-            self.trial_u.clear();
-            self.trial_u.extend_from_slice(u);
-            let components = self.trial_u.as_flattened_mut();
-            for (v, &e) in components.iter_mut().zip(&self.problem.system.dofs.of_dof) {
-                if e != DofMap::FIXED {
-                    *v += length * step[e as usize];
-                }
-            }
+            move_along(self.problem, u, step, length, &mut self.trial_u);
             let pressure_step = &step[self.problem.system.dofs.count..];
             for ((t, p), s) in trial_mpa.iter_mut().zip(&fluid.pressure_mpa).zip(pressure_step) {
                 *t = p + length * s;

@@ -4,23 +4,31 @@ use super::{Fixed, Newton};
 use crate::element::Dilatation;
 use crate::linear::DofMap;
 use crate::solve::evaluate::evaluate_body;
-use crate::solve::{StepError, mixed};
+use crate::solve::{Problem, StepError, mixed};
 use std::time::Instant;
+
+/// Sets `trial_u` to `length` of a step (mm, one an unknown) from `u`.
+pub(super) fn move_along(
+    problem: &Problem,
+    u: &[[f64; 3]],
+    step: &[f64],
+    length: f64,
+    trial_u: &mut Vec<[f64; 3]>,
+) {
+    trial_u.clear();
+    trial_u.extend_from_slice(u);
+    for (v, &e) in trial_u.as_flattened_mut().iter_mut().zip(&problem.system.dofs.of_dof) {
+        if e != DofMap::FIXED {
+            *v += length * step[e as usize];
+        }
+    }
+    problem.mesh.follow(trial_u);
+}
 
 impl Newton<'_> {
     /// Sets the trial to `length` of the step from `u` and the independent dilatations.
     fn go(&mut self, u: &[[f64; 3]], independent: &[Dilatation], length: f64) {
-        self.trial_u.clear();
-        self.trial_u.extend_from_slice(u);
-        for (node, v) in self.trial_u.iter_mut().enumerate() {
-            for i in 0..3 {
-                let e = self.problem.system.dofs.of_dof[3 * node + i];
-                if e != DofMap::FIXED {
-                    v[i] += length * self.step[e as usize];
-                }
-            }
-        }
-        self.problem.mesh.follow(&mut self.trial_u);
+        move_along(self.problem, u, &self.step, length, &mut self.trial_u);
         self.trial_independent.clear();
         for (c, n) in independent.iter().zip(&self.next) {
             self.trial_independent.push(std::array::from_fn(|r| c[r] + length * (n[r] - c[r])));

@@ -70,6 +70,11 @@ impl Spacing {
         Self { touched: facing(shape, contact.direction).filter_map(touch).collect(), closeness }
     }
 
+    /// The same contact meshed more or less closely: where it touches is not looked for again.
+    pub(in crate::mesh) fn with(&self, closeness: Closeness) -> Self {
+        Self { touched: self.touched.clone(), closeness }
+    }
+
     /// Spacing (mm) along a unit vector, anywhere on a cell of which some `points` (mm) are given.
     pub(in crate::mesh) fn wanted_mm(&self, points: &[[f64; 3]; 9], direction: [f64; 3]) -> f64 {
         let Closeness { of_radius_mm, flat_mm, edge_mm, growth } = self.closeness;

@@ -109,7 +109,7 @@ fn a_guide_is_read_where_it_is() {
     let shape = FingertipShape::default();
     let (density, parts) = (Density::Medium, Parts::default());
     let fine = mesh(density, &contact);
-    let (guide, transfer) = build_guide(&shape, density, parts, &contact, &fine).unwrap().unwrap();
+    let (guide, transfer) = build_guide(&shape, density, parts, &fine).unwrap().unwrap();
     assert!(guide.mesh.nodes.len() < fine.mesh.nodes.len() / 2);
     let found = transfer.nodal(&guide.mesh.nodes);
     assert_eq!(found.len(), fine.mesh.nodes.len());
@@ -129,7 +129,7 @@ fn a_guide_is_read_where_it_is() {
         (0..layers).flat_map(of).collect()
     };
     assert_eq!(transfer.linear(&rows(&guide)), rows(&fine));
-    assert!(build_guide(&shape, Density::Coarse, parts, &contact, &fine).unwrap().is_none());
+    assert!(build_guide(&shape, Density::Coarse, parts, &fine).unwrap().is_none());
 }
 
 /// Nodes of the even lattice that are held under the nail are held on any mesh, and all others
