@@ -40,6 +40,10 @@ struct Manifest {
 struct Campaign {
     #[serde(default)]
     name: String,
+    #[serde(default)]
+    density: String,
+    /// Absent: linear.
+    order: Option<String>,
     indenter: Option<IndenterSpec>,
     #[serde(default)]
     indenters: Vec<NamedIndenter>,
@@ -153,6 +157,13 @@ impl Dataset {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.manifest.campaign.name
+    }
+
+    /// Mesh that it was solved on, such as `medium-graded`.
+    #[must_use]
+    pub fn mesh(&self) -> String {
+        let Campaign { density, order, .. } = &self.manifest.campaign;
+        format!("{density}-{}", order.as_deref().unwrap_or("linear"))
     }
 
     /// What pressed in an indentation; none if the manifest does not say.

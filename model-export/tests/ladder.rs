@@ -5,55 +5,38 @@
 
 mod bench;
 
-use bench::{Bench, DEPTHS};
-use ndarray::Array2;
-use ndarray_npy::{NpzReader, NpzWriter};
+use bench::Bench;
 use papilla_engine::Ladder;
 use papilla_engine::ladder::{Kind, Rung};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::fs;
-use std::io::Cursor;
 
-const COMMAND: [&str; 7] = ["ladder", "--data", "sets", "--fe", "fe", "--out", "out/ladder"];
+const COMMAND: [&str; 8] =
+    ["ladder", "--data", "sets", "--fe", "fe/final", "fe/medium", "--out", "out/ladder"];
 
-/// The bench with its dataset as `sets/s1` and `sets/deep`, an index, and FE rungs: the reference
-/// has the held-out indentations' truth, `fe-medium-linear-finite` a tenth more.
+/// The bench with its dataset as `sets/s1`, `sets/deep` and the reference, `sets/final`; in `fe`
+/// the reference and a coarser mesh, whose SED is a tenth more, with what each took.
 fn bench() -> Bench {
     let bench = Bench::new();
-    fs::create_dir_all(bench.path("sets/deep/shards")).unwrap();
-    for file in ["manifest.json", "atlas.json", "shards/0.npz", "shards/1.npz"] {
-        fs::copy(bench.path("data").join(file), bench.path("sets/deep").join(file)).unwrap();
+    for name in ["sets/deep", "sets/final"] {
+        bench.copy("data", name);
     }
     fs::rename(bench.path("data"), bench.path("sets/s1")).unwrap();
     let index = json!({"default": "tiny", "models": ["tiny"]}).to_string();
     fs::write(bench.path("models/index.json"), index).unwrap();
-    fs::create_dir_all(bench.path("fe")).unwrap();
-    let shard = fs::read(bench.path("sets/s1/shards/1.npz")).unwrap();
-    let mut npz = NpzReader::new(Cursor::new(shard)).unwrap();
-    let pressure: Array2<f32> = npz.by_name("pressure_pa.npy").unwrap();
-    let sed: Array2<f32> = npz.by_name("sed_dermis_j_per_m3.npy").unwrap();
-    let mut rungs = Vec::new();
-    for (name, scale, seconds, reference) in
-        [("fe-medium-linear-finite", 1.1f32, 2.0, false), ("fe-fine", 1.0, 10.0, true)]
+    for (name, mesh, [scale, seconds]) in
+        [("final", ["fine", "graded"], [1.0, 30.0]), ("medium", ["medium", "graded"], [1.1, 6.0])]
     {
-        let mut npz = NpzWriter::new(Cursor::new(Vec::new()));
-        npz.add_array("pressure_pa", &pressure).unwrap();
-        npz.add_array("sed_dermis_j_per_m3", &(scale * &sed)).unwrap();
-        let bytes = npz.finish().unwrap().into_inner();
-        fs::write(bench.path(&format!("fe/{name}.npz")), bytes).unwrap();
-        let mut rung = json!({"name": name, "density": "fine", "order": "linear",
-            "kinematics": "finite", "unknowns": 99, "reference": reference,
-            "seconds": vec![seconds; DEPTHS.len()], "file": format!("{name}.npz")});
-        if reference {
-            rung["discretisation_error"] = json!({"sed_relative_l2": 0.01, "how": "by hand"});
+        let folder = format!("fe/{name}");
+        bench.copy("sets/final", &folder);
+        bench.resolve(&folder, mesh, scale);
+        fs::create_dir_all(bench.path(&folder).join("progress")).unwrap();
+        for id in 0..2 {
+            let record = json!({"seconds": 99.0, "processor_s": seconds}).to_string();
+            let file = format!("progress/press-{id:05}.json");
+            fs::write(bench.path(&folder).join(file), record).unwrap();
         }
-        rungs.push(rung);
     }
-    let manifest = fs::read_to_string(bench.path("sets/s1/manifest.json")).unwrap();
-    let manifest: Value = serde_json::from_str(&manifest).unwrap();
-    let listing = json!({"format": 1, "atlas_hash": manifest["atlas_hash"], "campaign": "test",
-        "states": vec![json!({}); DEPTHS.len()], "rungs": rungs});
-    fs::write(bench.path("fe/rungs.json"), listing.to_string()).unwrap();
     bench
 }
 
@@ -76,9 +59,9 @@ fn every_rung_has_the_known_errors() {
     let samples: Vec<(&str, usize)> =
         ladder.sets.iter().map(|set| (set.name.as_str(), set.samples)).collect();
     let due =
-        [("heldout-presses", 0), ("heldout-shapes", 0), ("reference", 3), ("s1", 3), ("deep", 0)];
+        [("heldout-presses", 0), ("heldout-shapes", 0), ("reference", 6), ("s1", 3), ("deep", 0)];
     assert_eq!(samples, due);
-    assert!(ladder.sets[0].about.contains("no dataset 'broad'"), "{:?}", ladder.sets[0]);
+    assert!(ladder.sets[0].about.contains("no dataset 'broad-graded'"), "{:?}", ladder.sets[0]);
     assert!(ladder.sets[4].about.contains("no such state"), "none is deeper than 2 mm");
 
     let tiny = rung(&ladder, "tiny");
@@ -99,11 +82,15 @@ fn every_rung_has_the_known_errors() {
     }
     assert_eq!(tiny.refused, 0);
 
-    near(rung(&ladder, "fe-medium-linear-finite").relative_l2("reference"), 0.1);
-    let reference = rung(&ladder, "fe-fine");
+    let medium = rung(&ladder, "fe-medium-graded");
+    near(medium.relative_l2("reference"), 0.1);
+    near(medium.seconds.map(|s| s.p50), 2.0);
+    let reference = rung(&ladder, "fe-fine-graded");
     assert!(reference.reference && reference.kind == Kind::Fe && reference.bytes.is_none());
     near(reference.relative_l2("reference"), 0.0);
     near(reference.seconds.map(|s| s.p50), 10.0);
+    let error = ladder.discretisation_error.as_ref().unwrap();
+    near(Some(error.sed_relative_l2), 0.1 / (25.0 / 9.0 - 1.0));
     assert_eq!(ladder.pareto_set.as_deref(), Some("reference"));
     assert!(ladder.rungs.iter().all(|rung| rung.pareto), "each is the faster or the better one");
 }
@@ -116,12 +103,12 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
     let page = read("out/ladder.md");
     for word in [
         "Not measured",
-        "there is no dataset 'broad'",
+        "there is no dataset 'broad-graded'",
         "](ladder.svg)",
         "](ladder-zone.svg)",
         "| tiny | network |",
         "the truth",
-        "good to 1.00 %",
+        "good to 5.63 %",
     ] {
         assert!(page.replace("**tiny**", "tiny").contains(word), "{word}: {page}");
     }
@@ -131,7 +118,7 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
         assert!(table.lines().all(|line| Some(columns(line)) == first), "{table}");
     }
     let plot = read("out/ladder.svg");
-    for word in ["tiny", "fe-fine", "fe-medium-linear-finite", "discretisation", "Pareto"] {
+    for word in ["tiny", "fe-fine-graded", "fe-medium-graded", "discretisation", "Pareto"] {
         assert!(plot.contains(word), "{word}");
     }
     for svg in [plot, read("out/ladder-zone.svg")] {
@@ -155,28 +142,21 @@ fn quick_leaves_the_shipped_ladder_alone() {
 }
 
 #[test]
+fn a_mesh_that_did_not_reach_a_state_is_said_to_have_refused_it() {
+    let bench = bench();
+    bench.drop_last_depth("fe/medium");
+    let ladder = Ladder::from_json(&bench.done(&[&COMMAND[..], &["--json"]].concat())).unwrap();
+    let medium = rung(&ladder, "fe-medium-graded");
+    assert_eq!((medium.refused, medium.errors["reference"].samples), (2, 4));
+    near(medium.seconds.map(|s| s.p50), 3.0);
+}
+
+#[test]
 fn fe_folders_that_break_their_contract_are_refused() {
     let bench = bench();
-    let path = bench.path("fe/rungs.json");
-    let good = fs::read_to_string(&path).unwrap();
-    for (old, new, word) in [
-        ("\"format\":1", "\"format\":2", "format 2"),
-        ("\"reference\":true", "\"reference\":false", "marked as the reference"),
-        ("fe-fine.npz", "../fe-fine.npz", "no path inside"),
-        ("[10.0,10.0,10.0]", "[10.0]", "1 times for 3 states"),
-    ] {
-        assert!(good.contains(old), "{old}: {good}");
-        fs::write(&path, good.replace(old, new)).unwrap();
-        let stderr = bench.refused(1, &COMMAND);
-        assert!(stderr.contains(word), "{word}: {stderr}");
-    }
-    let mut listing: Value = serde_json::from_str(&good).unwrap();
-    listing["atlas_hash"] = json!("f".repeat(64));
-    fs::write(&path, listing.to_string()).unwrap();
-    assert!(bench.refused(1, &COMMAND).contains("of atlas ffff"));
-    fs::write(&path, good.replace("[{},{},{}]", "[{}]")).unwrap();
-    let stderr = bench.refused(1, &COMMAND);
-    assert!(stderr.contains("3 times for 1 states"), "{stderr}");
-    fs::remove_file(&path).unwrap();
-    bench.refused(3, &COMMAND);
+    bench.refused(3, &["ladder", "--data", "sets", "--fe", "fe/none"]);
+    fs::write(bench.path("fe/medium/progress/press-00001.json"), "{").unwrap();
+    assert!(bench.refused(1, &COMMAND).contains("not the record of an indentation"));
+    fs::write(bench.path("fe/medium/shards/1.npz"), "no").unwrap();
+    assert!(bench.refused(1, &COMMAND).contains("shards/1.npz"));
 }

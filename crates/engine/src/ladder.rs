@@ -119,9 +119,6 @@ pub struct Rung {
     /// Processor seconds of one FE state.
     #[serde(default)]
     pub seconds: Option<Percentiles>,
-    /// Unknowns of the FE mesh.
-    #[serde(default)]
-    pub unknowns: Option<u64>,
     /// Whether its SED is the truth of the set `reference`.
     #[serde(default)]
     pub reference: bool,

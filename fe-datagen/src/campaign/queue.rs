@@ -7,6 +7,7 @@ use papilla_dataset as dataset;
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::Indentation;
 use papilla_progress::Progress;
+use papilla_validation::processor::thread_s;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
@@ -117,7 +118,7 @@ impl Queue<'_> {
             Some(ready) => ready,
             None => build().map_err(CampaignError::Simulation)?,
         };
-        let start = Instant::now();
+        let (start, processor_start_s) = (Instant::now(), thread_s());
         let id = press.id;
         let states_due = press.depths_mm.len();
         let reached = |states| {
@@ -126,6 +127,7 @@ impl Queue<'_> {
         reached(0);
         let store = |bytes: &[u8]| self.workspace.store_standing(id, bytes);
         let stored = self.workspace.standing(id);
+        let whole = stored.is_none();
         let when = (&*self.options.stop, self.options.checkpoint_every);
         let mut checkpoints = Checkpoints::new(states_due, stored, &store, &reached, when);
         // One bad indentation must not cost the others; a solver that panicked may be
@@ -148,6 +150,7 @@ impl Queue<'_> {
             Err(PressError::Output(error)) => return Err(error.into()),
         };
         let seconds = start.elapsed().as_secs_f64();
+        let processor_s = whole.then(|| thread_s() - processor_start_s);
         let (outcome, shard) = match solved {
             Ok(records) => self.encode(&records)?,
             Err(error) => (Outcome::Failed { error }, None),
@@ -162,7 +165,8 @@ impl Queue<'_> {
             }
         }
         let fingerprint = None;
-        let mut state = IndentationState { press: press.clone(), seconds, outcome, fingerprint };
+        let press = press.clone();
+        let mut state = IndentationState { press, seconds, processor_s, outcome, fingerprint };
         self.workspace.store(&mut state, shard.as_deref())?;
         Ok(Settled::Now(state))
     }

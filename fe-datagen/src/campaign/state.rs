@@ -27,6 +27,9 @@ pub(super) struct IndentationState {
     pub press: Indentation,
     /// Wall time, s. Not part of the dataset: it is never the same twice.
     pub seconds: f64,
+    /// Processor time, s; absent if it went on from where another process stood.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub processor_s: Option<f64>,
     pub outcome: Outcome,
     /// Campaign that it is of; earlier versions left that to the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -20,6 +20,7 @@ use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_validation::acceptance;
+use papilla_validation::convergence::MESHES;
 use serde::Serialize;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -38,7 +39,8 @@ use std::time::Duration;
     after_help = "USR1 and TERM: store where each indentation stands at its next depth, and leave with exit code\n\
                   75, which asks to be started again; it goes on from there. A second TERM leaves at once.\n\
                   Examples: fe-datagen generate campaigns/s1.toml --out out/s1\n          \
-                  fe-datagen generate campaigns/s1.toml --slice 3/100 --out /shared/s1"
+                  fe-datagen generate campaigns/s1.toml --slice 3/100 --out /shared/s1\n          \
+                  fe-datagen generate campaigns/final.toml --mesh medium-graded --out data/rungs/medium-graded"
 )]
 pub(super) struct Args {
     /// Campaign file (see campaigns/ and docs/reference/dataset.md).
@@ -46,6 +48,9 @@ pub(super) struct Args {
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
+    /// Press on this mesh instead of the campaign's, one of `convergence`: what a mesh costs and errs.
+    #[arg(long, value_name = "NAME")]
+    mesh: Option<String>,
     #[command(flatten)]
     part: Part,
     /// Indentations solved at a time [default: one per core].
@@ -164,7 +169,12 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Err(error) => return Ok(wrong_usage(&error)),
     };
     let stop = signals::stop()?;
-    let spec = CampaignSpec::read(&args.campaign)?;
+    let names = MESHES.map(|mesh| mesh.name);
+    super::refuse_unknown(args.mesh.as_slice(), &names)?;
+    let mut spec = CampaignSpec::read(&args.campaign)?;
+    if let Some(mesh) = MESHES.iter().find(|mesh| args.mesh.as_deref() == Some(mesh.name)) {
+        (spec.density, spec.order) = (mesh.density, mesh.order);
+    }
     let candidates = spec.candidates();
     let first = candidates.first().context("a campaign has an indenter")?;
     let Simulation { body, approach, .. } = Simulation::new(&spec.scene(first))?;

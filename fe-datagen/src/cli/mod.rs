@@ -118,7 +118,7 @@ fn print<T: serde::Serialize>(
 fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
     match only.iter().find(|n| !known.contains(&n.as_str())) {
         Some(unknown) => {
-            anyhow::bail!("no case named '{unknown}'; there are: {}", known.join(", "))
+            anyhow::bail!("there is no '{unknown}'; there are: {}", known.join(", "))
         }
         None => Ok(()),
     }

@@ -10,15 +10,15 @@ use std::time::Instant;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Folder of the datasets `broad`, `heldout`, `deep` and `s1`; those that are not there
-    /// are reported as not measured.
+    /// Folder of the datasets `broad-graded`, `heldout-graded`, `final`, `s1` and `deep`; those
+    /// that are not there are reported as not measured.
     #[arg(long, default_value = "data", value_name = "FOLDER")]
     data: PathBuf,
     /// Folder of the models, with index.json and atlas.json.
     #[arg(long, default_value = "models", value_name = "FOLDER")]
     models: PathBuf,
-    /// Folders that `fe-datagen fidelity` wrote: the reference and the solver's own rungs
-    /// [default: the folders in DATA/rungs].
+    /// Datasets of the campaign `final` on other meshes, the solver's own rungs
+    /// [default: DATA/final and the folders in DATA/rungs].
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
     fe: Vec<PathBuf>,
     /// Writes STEM.md, STEM.svg, STEM-zone.svg and STEM.json.
@@ -60,12 +60,13 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The folders in `data/rungs`, in order; none where there is no such folder.
+/// The reference and the folders in `data/rungs` that hold datasets, in order.
 fn fe_folders(data: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(data.join("rungs")).into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
-    folders.retain(|folder| folder.is_dir());
     folders.sort();
+    folders.insert(0, data.join("final"));
+    folders.retain(|folder| folder.join("manifest.json").is_file());
     folders
 }
 

@@ -1,11 +1,11 @@
 //! The ladder: every way of getting a SED map, measured on the same held-out sets.
 //!
 //! Servable rungs are the models of `models/index.json`, run in the serving engine on one
-//! thread; FE rungs come from folders that `fe-datagen fidelity` wrote. What is not there is
+//! thread; FE rungs are the reference's presses, solved on other meshes. What is not there is
 //! reported as not measured. The outcome is a [`Ladder`], from which [`report`] makes the
 //! table and [`plot`] the pictures.
 
-pub mod fe;
+mod fe;
 pub mod here;
 mod model;
 pub mod plot;
@@ -30,11 +30,11 @@ pub const QUICK_SAMPLES: usize = 16;
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Folder that holds the datasets `broad`, `heldout`, `deep` and `s1`.
+    /// Folder that holds the datasets `broad-graded`, `heldout-graded`, `final`, `s1`, `deep`.
     pub data: PathBuf,
     /// Folder of the models, their index and atlas.
     pub models: PathBuf,
-    /// Folders that `fe-datagen fidelity` wrote.
+    /// Datasets of the reference's campaign on other meshes.
     pub fe: Vec<PathBuf>,
     /// Whether to take a part of each set and shorter timings.
     pub quick: bool,
@@ -116,9 +116,7 @@ pub fn measure(
     footprint: &dyn Fn(&Path) -> Option<Footprint>,
 ) -> Result<Ladder, ExportError> {
     let canvas = Canvas::read(&task.models)?;
-    let fe = fe::Folders::read(&task.fe, &canvas)?;
     let mut sets = sets::load(&task.data, &canvas)?;
-    sets.push(fe.reference_set(&canvas));
     sets.sort_by_key(|set| SET_NAMES.iter().position(|name| *name == set.name));
     if task.quick {
         for set in &mut sets {
@@ -151,10 +149,16 @@ pub fn measure(
         quick: task.quick,
         sets: sets.iter().map(SampleSet::described).collect(),
         pareto_set: None,
-        discretisation_error: fe.discretisation_error(),
+        discretisation_error: None,
         rungs: models,
     };
-    ladder.rungs.extend(fe.rungs(&canvas)?);
+    let reference = sets.iter().find(|set| set.name == "reference" && !set.states.is_empty());
+    if let Some(reference) = reference {
+        for folder in &task.fe {
+            ladder.rungs.push(fe::rung(folder, reference, &canvas)?);
+        }
+        ladder.discretisation_error = fe::reference_error(&ladder.rungs, reference.name);
+    }
     // FE can only be held against the reference, so the reference comes first here.
     let order = ["reference", "heldout-presses", "heldout-shapes", "s1", "deep"];
     let measured =

@@ -1,6 +1,6 @@
 //! A servable rung: errors, refusals, times and footprint of one model.
 
-use super::{Canvas, Progress, SampleSet, State, Timing};
+use super::{Canvas, Progress, SampleSet, Timing};
 use crate::evaluate::require_same_atlas;
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::{ExportError, read, read_text};
@@ -62,7 +62,6 @@ pub(super) fn measure(
         memory_mib: footprint.and_then(|f| f.memory_mib),
         latency_ms: Some(LatencyByEngine { tract, ort: time_ort(&onnx, path, &maps, timing)? }),
         seconds: None,
-        unknowns: None,
         reference: false,
         errors,
         refused,
@@ -108,7 +107,8 @@ impl Judge<'_> {
         let mut samples = Vec::with_capacity(set.states.len());
         let [mut pressure, mut truth, mut answer] = std::array::from_fn(|_| vec![0.0; MAP_LEN]);
         for (index, state) in set.states.iter().enumerate() {
-            draw(self.canvas, state, &mut pressure, Some(&mut truth));
+            draw(&self.canvas.skin, &state.pressure_pa, &mut pressure);
+            draw(&self.canvas.interface, &state.sed_j_per_m3, &mut truth);
             if self.infer(&pressure, &mut answer)? {
                 let metrics = SampleMetrics::measure(&answer, &truth, &self.canvas.ground);
                 samples.push(metrics.ok_or_else(|| ExportError::Truth {
@@ -162,17 +162,11 @@ fn hostile_maps(most_pa: f32) -> Vec<Vec<f32>> {
     ]
 }
 
-/// Draws a state: overwrites both maps, 0 outside the patches.
-fn draw(canvas: &Canvas, state: &State, pressure: &mut [f32], truth: Option<&mut Vec<f32>>) {
-    let scatter = |raster: &Raster, values: &[f32], map: &mut [f32]| {
-        map.fill(0.0);
-        for (&pixel, value) in raster.indices().iter().zip(values) {
-            map[pixel as usize] = *value;
-        }
-    };
-    scatter(&canvas.skin, &state.pressure_pa, pressure);
-    if let Some(truth) = truth {
-        scatter(&canvas.interface, &state.sed_j_per_m3, truth);
+/// Draws a patch's values: overwrites the map, 0 outside the patch.
+pub(super) fn draw(raster: &Raster, values: &[f32], map: &mut [f32]) {
+    map.fill(0.0);
+    for (&pixel, value) in raster.indices().iter().zip(values) {
+        map[pixel as usize] = *value;
     }
 }
 
@@ -186,7 +180,7 @@ fn timed_maps(canvas: &Canvas, sets: &[SampleSet], info: &ModelInfo) -> Vec<Vec<
     states
         .map(|state| {
             let mut map = vec![0.0; MAP_LEN];
-            draw(canvas, state, &mut map, None);
+            draw(&canvas.skin, &state.pressure_pa, &mut map);
             map
         })
         .collect()

@@ -70,10 +70,9 @@ fn costs(text: &mut String, ladder: &Ladder) {
         );
     }
     if ladder.rungs.iter().any(|rung| rung.kind == Kind::Fe) {
-        text.push_str("\n| FE rung | unknowns | s a state, median | p99 |\n|---|---|---|---|\n");
+        text.push_str("\n| FE rung | s a state, median | p99 |\n|---|---|---|\n");
         for rung in by_time(ladder).filter(|rung| rung.kind == Kind::Fe) {
-            let unknowns = rung.unknowns.unwrap_or_default();
-            let _ = writeln!(text, "| {} | {unknowns} | {} |", name(rung), times(rung.seconds));
+            let _ = writeln!(text, "| {} | {} |", name(rung), times(rung.seconds));
         }
     }
     text.push('\n');

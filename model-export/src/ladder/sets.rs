@@ -16,10 +16,22 @@ pub const DEEP_MM: f32 = 2.0;
 pub struct State {
     /// Where it is from, for messages.
     pub origin: String,
+    /// Number of the indentation within its campaign.
+    pub indentation: usize,
+    /// Depth, mm.
+    pub depth_mm: f32,
     /// Pressure on the skin, Pa.
     pub pressure_pa: Vec<f32>,
     /// True SED on the dermis side of the interface, J/m3.
     pub sed_j_per_m3: Vec<f32>,
+}
+
+impl State {
+    /// Whether it is this one, perhaps on another mesh.
+    pub(super) fn is_of(&self, other: &Self) -> bool {
+        self.indentation == other.indentation
+            && (self.depth_mm - other.depth_mm).abs() <= 1e-5 * other.depth_mm
+    }
 }
 
 /// States that no training saw.
@@ -36,6 +48,17 @@ pub struct SampleSet {
 }
 
 impl SampleSet {
+    /// All states of a dataset.
+    pub(super) fn of(
+        folder: &Path,
+        dataset: &Dataset,
+        canvas: &Canvas,
+    ) -> Result<Self, ExportError> {
+        let what = folder.display().to_string();
+        require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
+        REFERENCE.taken_of(dataset)
+    }
+
     /// Keeps at most `count` states, evenly spread.
     pub fn thin(&mut self, count: usize) {
         let have = self.states.len();
@@ -65,34 +88,44 @@ struct Source {
     deeper_than_mm: Option<f32>,
 }
 
-const SOURCES: [Source; 4] = [
+const REFERENCE: Source = Source {
+    name: "reference",
+    folder: "final",
+    about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
+    test_only: false,
+    deeper_than_mm: None,
+};
+
+const SOURCES: [Source; 5] = [
     Source {
         name: "heldout-presses",
-        folder: "broad",
+        folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
         test_only: true,
         deeper_than_mm: None,
     },
     Source {
         name: "heldout-shapes",
-        folder: "heldout",
+        folder: "heldout-graded",
         about: "shapes that no training saw",
         test_only: false,
+        deeper_than_mm: None,
+    },
+    REFERENCE,
+    Source {
+        name: "s1",
+        folder: "s1",
+        about: "held-out presses of the published campaign, a plate alone, on the even lattice: \
+                its SED is 20 to 40 % off the reference's",
+        test_only: true,
         deeper_than_mm: None,
     },
     Source {
         name: "deep",
         folder: "deep",
-        about: "deeper than any training (more than 2.0 mm)",
+        about: "deeper than any training (more than 2.0 mm), on the even lattice",
         test_only: false,
         deeper_than_mm: Some(DEEP_MM),
-    },
-    Source {
-        name: "s1",
-        folder: "s1",
-        about: "held-out presses of the published campaign, a plate alone",
-        test_only: true,
-        deeper_than_mm: None,
     },
 ];
 
@@ -104,27 +137,34 @@ pub(super) fn load(data: &Path, canvas: &Canvas) -> Result<Vec<SampleSet>, Expor
 impl Source {
     fn load(&self, data: &Path, canvas: &Canvas) -> Result<SampleSet, ExportError> {
         let folder = data.join(self.folder);
-        let mut set = SampleSet {
-            name: self.name,
-            about: self.about.to_owned(),
-            dataset_sha256: None,
-            states: Vec::new(),
-        };
         if !folder.join("manifest.json").is_file() {
-            set.about = format!("not measured: there is no dataset '{}'", self.folder);
-            return Ok(set);
+            return Ok(SampleSet {
+                name: self.name,
+                about: format!("not measured: there is no dataset '{}'", self.folder),
+                dataset_sha256: None,
+                states: Vec::new(),
+            });
         }
         let dataset = Dataset::open(&folder)?;
         let what = folder.display().to_string();
         require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
-        set.dataset_sha256 = Some(dataset.sha256().to_owned());
+        self.taken_of(&dataset)
+    }
+
+    fn taken_of(&self, dataset: &Dataset) -> Result<SampleSet, ExportError> {
+        let mut set = SampleSet {
+            name: self.name,
+            about: self.about.to_owned(),
+            dataset_sha256: Some(dataset.sha256().to_owned()),
+            states: Vec::new(),
+        };
         let indentations = if self.test_only {
             dataset.indentations("test")?
         } else {
             dataset.every_indentation()
         };
         for indentation in indentations {
-            self.take(&dataset, indentation, &mut set.states)?;
+            self.take(dataset, indentation, &mut set.states)?;
         }
         if set.states.is_empty() {
             set.about = format!("not measured: '{}' has no such state", self.folder);
@@ -152,6 +192,8 @@ impl Source {
             dataset.draw_sed(indentation, &shard, index, &mut below)?;
             states.push(State {
                 origin: format!("{}, sample {index}", dataset.shard_path(indentation).display()),
+                indentation: indentation.id,
+                depth_mm: *depth_mm,
                 pressure_pa: shown(Patch::Skin, &on_skin),
                 sed_j_per_m3: shown(Patch::Interface, &below),
             });
@@ -168,6 +210,8 @@ mod tests {
     fn a_thinned_set_is_spread_over_the_whole() {
         let state = |i: usize| State {
             origin: i.to_string(),
+            indentation: i,
+            depth_mm: 1.0,
             pressure_pa: Vec::new(),
             sed_j_per_m3: Vec::new(),
         };

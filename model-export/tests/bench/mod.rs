@@ -5,8 +5,8 @@
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "each test program uses a part")]
 
-use ndarray::{Array1, Array2, Array3, Axis};
-use ndarray_npy::NpzWriter;
+use ndarray::{Array1, Array2, Array3, Axis, s};
+use ndarray_npy::{NpzReader, NpzWriter};
 use papilla_engine::{Card, MAP_LEN, MAP_SIDE_PX, load};
 use papilla_proto::atlas::{Atlas, PatchVertices};
 use serde_json::{Value, json};
@@ -71,6 +71,54 @@ impl Bench {
         npz.add_array("pressure_pa", &maps[0]).unwrap();
         npz.add_array("sed_j_per_m3", &maps[1]).unwrap();
         fs::write(self.path("reference.npz"), npz.finish().unwrap().into_inner()).unwrap();
+    }
+
+    /// Copies a dataset.
+    pub(crate) fn copy(&self, from: &str, to: &str) {
+        fs::create_dir_all(self.path(to).join("shards")).unwrap();
+        for file in ["manifest.json", "atlas.json", "shards/0.npz", "shards/1.npz"] {
+            fs::copy(self.path(from).join(file), self.path(to).join(file)).unwrap();
+        }
+    }
+
+    /// As if this density and order had been solved and found this many times the SED.
+    pub(crate) fn resolve(&self, folder: &str, [density, order]: [&str; 2], scale: f32) {
+        self.rewrite(folder, DEPTHS.len(), scale);
+        let path = self.path(folder).join("manifest.json");
+        let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        manifest["campaign"] = json!({"name": "final", "density": density, "order": order});
+        fs::write(path, manifest.to_string()).unwrap();
+    }
+
+    /// As if no press had reached its deepest state.
+    pub(crate) fn drop_last_depth(&self, folder: &str) {
+        self.rewrite(folder, DEPTHS.len() - 1, 1.0);
+    }
+
+    /// The first `depths` of each indentation, SED times `scale`, and the hashes that follow.
+    fn rewrite(&self, folder: &str, depths: usize, scale: f32) {
+        let path = self.path(folder).join("manifest.json");
+        let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        let mut hashes = String::new();
+        for id in 0..2 {
+            let file = self.path(folder).join(format!("shards/{id}.npz"));
+            let mut npz = NpzReader::new(Cursor::new(fs::read(&file).unwrap())).unwrap();
+            let pressure: Array2<f32> = npz.by_name("pressure_pa.npy").unwrap();
+            let sed: Array2<f32> = npz.by_name("sed_dermis_j_per_m3.npy").unwrap();
+            let first = s![..depths, ..];
+            let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
+            npz.add_array("pressure_pa", &pressure.slice(first)).unwrap();
+            npz.add_array("sed_dermis_j_per_m3", &(scale * &sed.slice(first))).unwrap();
+            npz.add_array("depth_mm", &Array1::from(DEPTHS[..depths].to_vec())).unwrap();
+            let bytes = npz.finish().unwrap().into_inner();
+            let hash = sha256_hex(&bytes);
+            fs::write(file, bytes).unwrap();
+            manifest["presses"][id]["sha256"] = json!(hash);
+            manifest["presses"][id]["samples"] = json!(depths);
+            hashes += &hash;
+        }
+        manifest["dataset_sha256"] = json!(sha256_hex(hashes.as_bytes()));
+        fs::write(path, manifest.to_string()).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

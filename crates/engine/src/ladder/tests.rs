@@ -23,7 +23,6 @@ fn rung(name: &str, time_ms: f64, error: f64) -> Rung {
         memory_mib: None,
         latency_ms: Some(LatencyByEngine { tract, ort: None }),
         seconds: None,
-        unknowns: None,
         reference: false,
         errors: [("s1".to_owned(), errors)].into(),
         refused: 0,
