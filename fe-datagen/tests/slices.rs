@@ -91,6 +91,20 @@ fn a_campaign_that_is_asked_to_leave_ends_in_the_same_bytes() {
     assert!(manifest(folder) == manifest(whole.path()));
 }
 
+/// What another mesh makes of a campaign says that it is another mesh's; a folder holds one.
+#[test]
+fn presses_on_another_mesh_are_a_dataset_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let generate = "generate c.toml --out out --slice 1/3";
+    assert_eq!(code(folder.path(), &format!("{generate} --mesh fines")), 1);
+    assert!(!folder.path().join("out").exists(), "refused before anything is solved");
+    // The first of three parts of two indentations is empty: nothing is solved here.
+    assert_eq!(code(folder.path(), &format!("{generate} --mesh coarse-graded")), 0);
+    assert_eq!(code(folder.path(), generate), 1, "the folder is of another mesh");
+    assert_eq!(code(folder.path(), "dataset status c.toml --mesh coarse-graded --out out"), 0);
+    assert_eq!(code(folder.path(), "dataset status c.toml --out out"), 1);
+}
+
 #[test]
 fn wrong_slices_are_wrong_usage() {
     let folder = tempfile::tempdir().unwrap();

@@ -39,11 +39,11 @@ export function errorFigures(network, truth, pixels, out) {
   return out;
 }
 
-/** The shipped presses, one at a time; rasterises pressure and truth. */
+/** The shipped presses, one at a time, with the maps of pressure and truth. */
 export class Replay {
   constructor(atlas) {
     this.atlas = atlas;
-    /** Each with name, pose, depth_mm, pressure_pa and sed_j_per_m3 at the atlas's vertices. */
+    /** Each with name, pose, depth_mm, and its maps of pressurePa and sedJPerM3. */
     this.presses = [];
     /** Relative L2 of each press as last answered; NaN before. */
     this.errors = [];
@@ -69,7 +69,11 @@ export class Replay {
   async load() {
     const { presses } = await fetchJson('v1/presses');
     const loaded = [];
-    for (let n = 0; n < presses.length; n++) loaded.push(await fetchJson(`v1/presses/${n}`));
+    for (const press of presses) {
+      const at = `v1/presses/${press.id}`;
+      const [pressurePa, sedJPerM3] = [await fetchMap(`${at}/pressure`), await fetchMap(`${at}/sed`)];
+      loaded.push({ ...press, pressurePa, sedJPerM3 });
+    }
     this.presses = loaded;
     this.forget();
     this.choose(0);
@@ -100,7 +104,7 @@ export class Replay {
 
   /** Pressure map of the chosen press, Pa. */
   pressureInto(map) {
-    this.atlas.skin.raster.rasterise(this.presses[this.chosen].pressure_pa, map);
+    map.set(this.presses[this.chosen].pressurePa);
   }
 
   /** Remembers the truth of the press that is being sent. */
@@ -108,7 +112,7 @@ export class Replay {
     if (this.sent === this.chosen) return;
     this.sent = this.chosen;
     this.judged = false;
-    this.atlas.interface.raster.rasterise(this.presses[this.sent].sed_j_per_m3, this.truth);
+    this.truth.set(this.presses[this.sent].sedJPerM3);
   }
 
   /** Holds an answer against the truth; also fills the map of differences. */
@@ -124,10 +128,17 @@ export class Replay {
 
 /** JSON of a resource; an Error with the server's own message where it is refused. */
 export async function fetchJson(path) {
-  const response = await fetch(path);
-  if (!response.ok) {
-    const said = await response.json().catch(() => null);
-    throw new Error(`${path}: ${said?.error?.message ?? `HTTP ${response.status}`}`);
-  }
-  return response.json();
+  return (await answered(path, 'application/json')).json();
+}
+
+/** A map of 32-bit floats. */
+async function fetchMap(path) {
+  return new Float32Array(await (await answered(path, 'application/octet-stream')).arrayBuffer());
+}
+
+async function answered(path, accept) {
+  const response = await fetch(path, { headers: { accept } });
+  if (response.ok) return response;
+  const said = await response.json().catch(() => null);
+  throw new Error(`${path}: ${said?.error?.message ?? `HTTP ${response.status}`}`);
 }

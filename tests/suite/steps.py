@@ -30,7 +30,7 @@ def lints() -> dict[str, str]:
 # Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
 # Tests that solve for seconds: verification, hard cases, presses of whole fingers.
-SOLVES = ["every_quick_row", "every_hard_case", "simulation::tests", "rungs_are_solved_once"]
+SOLVES = ["every_quick_row", "every_hard_case", "simulation::tests"]
 # Debian's packages, by the program or file that shows that they are there.
 PACKAGES = {
     "ccx": "calculix-ccx",

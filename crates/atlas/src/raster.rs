@@ -133,6 +133,23 @@ impl Raster {
         Ok(())
     }
 
+    /// Draws values that are known pixel by pixel, 0 outside the patch.
+    ///
+    /// `pixel_values` has one value per pixel of the patch, in the order of
+    /// [`Raster::indices`]; all of `pixels` is overwritten. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`AtlasError::BufferLength`] if either buffer has another length.
+    pub fn scatter(&self, pixel_values: &[f32], pixels: &mut [f32]) -> Result<(), AtlasError> {
+        check_length("the list of pixel values", pixel_values.len(), self.indices.len())?;
+        check_length("the map", pixels.len(), MAP_LEN)?;
+        pixels.fill(0.0);
+        for (&index, value) in self.indices.iter().zip(pixel_values) {
+            pixels[index as usize] = *value;
+        }
+        Ok(())
+    }
+
     /// Position on the undeformed finger (mm) that the pixel at `row`, `column` shows;
     /// `None` outside the patch. `atlas` must be the one this raster was made from.
     #[must_use]

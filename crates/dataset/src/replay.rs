@@ -1,7 +1,8 @@
 //! A few held-out indentations for the service's page, next to their FE truth.
 
-use super::{Dataset, DatasetError, IndentationEntry, Split};
+use super::{Dataset, DatasetError, IndentationEntry, MapReader, Maps, Split};
 use crate::record::Pose;
+use papilla_atlas::{AtlasError, MAP_LEN, Patch, Raster};
 use papilla_output::atomic;
 use serde::Serialize;
 use std::path::Path;
@@ -12,7 +13,9 @@ struct ReplayPress {
     name: String,
     pose: Pose,
     depth_mm: f32,
+    /// At the pixels of the skin, in the raster's order.
     pressure_pa: Vec<f32>,
+    /// At those of the interface.
     sed_j_per_m3: Vec<f32>,
 }
 
@@ -34,6 +37,7 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
     let held_out: Vec<&IndentationEntry> =
         dataset.manifest().presses.iter().filter(|p| p.split == Split::Test).collect();
     let count = count.min(held_out.len());
+    let maps = Maps::read(folder, dataset.atlas())?;
     let mut presses = Vec::with_capacity(count);
     for k in 0..count {
         let press = held_out[k * held_out.len() / count];
@@ -41,15 +45,20 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
         // Deepest first, then shallower ones.
         let sample = shard.len() - 1 - (2 * k) % shard.len();
         let depth_mm = shard.depth_mm[sample];
+        let drawn = |patch, values: &ndarray::Array2<f32>| {
+            let reader = maps.reader(patch, shard.cells.as_ref())?;
+            shown(&reader, maps.raster(patch), &values.row(sample).to_vec())
+                .map_err(|source| DatasetError::Atlas { path: folder.join(&press.file), source })
+        };
         presses.push(ReplayPress {
             name: format!(
-                "press {}: pitch {:.0}°, roll {:.0}°, {depth_mm} mm",
-                press.id, press.pose.pitch_deg, press.pose.roll_deg
+                "{}: {depth_mm:.2} mm, pitch {:.0}°, roll {:.0}°",
+                press.indenter, press.pose.pitch_deg, press.pose.roll_deg
             ),
             pose: press.pose,
             depth_mm,
-            pressure_pa: shard.pressure_pa.row(sample).to_vec(),
-            sed_j_per_m3: shard.sed_dermis_j_per_m3.row(sample).to_vec(),
+            pressure_pa: drawn(Patch::Skin, &shard.pressure_pa)?,
+            sed_j_per_m3: drawn(Patch::Interface, &shard.sed_dermis_j_per_m3)?,
         });
     }
     let names = presses.iter().map(|p| p.name.clone()).collect();
@@ -60,4 +69,18 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
     };
     atomic::write_json(path, &replay)?;
     Ok(names)
+}
+
+/// Values at the pixels of a patch, to the four digits that a map of 16 bits has.
+fn shown(reader: &MapReader<'_>, raster: &Raster, values: &[f32]) -> Result<Vec<f32>, AtlasError> {
+    let mut map = vec![0.0; MAP_LEN];
+    reader.draw(values, &mut map)?;
+    let short = |&pixel: &u32| match map[pixel as usize] {
+        0.0 => 0.0,
+        value => {
+            let digits = 10f32.powi(3 - value.abs().log10().floor() as i32);
+            (value * digits).round() / digits
+        }
+    };
+    Ok(raster.indices().iter().map(short).collect())
 }

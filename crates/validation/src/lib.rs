@@ -3,8 +3,8 @@
 //! [`verify`]: closed forms, benchmarks, balances. [`stability`]: hard cases, each of which
 //! converges to a right answer or is refused. [`calculix`]: the same problems in another program.
 //! [`convergence`]: SED at the interface on ever finer meshes.
-//! [`wedge`]: the figures of Chen, Shuai & Zhu. [`fidelity`]: coarser and finer elements beside
-//! each other. [`effect_study`]: what each effect of a scene changes and costs.
+//! [`wedge`]: the figures of Chen, Shuai & Zhu. [`effect_study`]: what each effect of a scene
+//! changes and costs.
 //!
 //! ```
 //! use papilla_validation::verify;
@@ -20,7 +20,6 @@ pub mod acceptance;
 pub mod calculix;
 pub mod convergence;
 pub mod effect_study;
-pub mod fidelity;
 pub mod processor;
 pub mod stability;
 pub mod verify;

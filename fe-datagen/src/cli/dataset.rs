@@ -1,10 +1,10 @@
 //! `dataset`: look at, check and draw a dataset.
 
+use super::campaign_file::CampaignFile;
 use super::{CHECKS_FAILED, print};
 use crate::campaign::{self, StatusReader};
 use papilla_dataset as dataset;
 use papilla_dataset::ImageOptions;
-use papilla_fingertip::campaign::CampaignSpec;
 use papilla_output::map_image::Bits;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
@@ -70,8 +70,8 @@ enum Command {
                             indentations or samples failed."
     )]
     Merge {
-        /// Campaign file that the slices were solved with.
-        campaign: PathBuf,
+        #[command(flatten)]
+        campaign: CampaignFile,
         /// Folder that they share.
         #[arg(long)]
         out: PathBuf,
@@ -81,8 +81,8 @@ enum Command {
     },
     /// What of a campaign is solved, running and failed, and the hours left.
     Status {
-        /// Campaign file that the slices are solved with.
-        campaign: PathBuf,
+        #[command(flatten)]
+        campaign: CampaignFile,
         /// Folder that they share.
         #[arg(long)]
         out: PathBuf,
@@ -121,14 +121,14 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
             print(&names, *json, || names.join("\n"))?;
         }
         Command::Merge { campaign, out, json } => {
-            let report = campaign::merge(&CampaignSpec::read(campaign)?, out)?;
+            let report = campaign::merge(&campaign.read()?, out)?;
             print(&report, *json, || report.to_string())?;
             if !report.is_complete() {
                 return Ok(ExitCode::from(CHECKS_FAILED));
             }
         }
         Command::Status { campaign, out, watch, json } => {
-            let mut reader = StatusReader::new(&CampaignSpec::read(campaign)?, out)?;
+            let mut reader = StatusReader::new(&campaign.read()?, out)?;
             loop {
                 let status = reader.read()?;
                 let clear = if *watch && std::io::stdout().is_terminal() { CLEAR } else { "" };

@@ -1,5 +1,6 @@
 //! `generate`: a slice of a campaign of indentations, or all of it into a dataset.
 
+use super::campaign_file::CampaignFile;
 use super::part::Part;
 use super::signals::{self, REQUEUE};
 use super::{CHECKS_FAILED, print, wrong_usage};
@@ -20,7 +21,6 @@ use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_validation::acceptance;
-use papilla_validation::convergence::MESHES;
 use serde::Serialize;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -43,14 +43,11 @@ use std::time::Duration;
                   fe-datagen generate campaigns/final.toml --mesh medium-graded --out data/rungs/medium-graded"
 )]
 pub(super) struct Args {
-    /// Campaign file (see campaigns/ and docs/reference/dataset.md).
-    campaign: PathBuf,
+    #[command(flatten)]
+    campaign: CampaignFile,
     /// Folder of the dataset.
     #[arg(long)]
     out: PathBuf,
-    /// Press on this mesh instead of the campaign's, one of `convergence`: what a mesh costs and errs.
-    #[arg(long, value_name = "NAME")]
-    mesh: Option<String>,
     #[command(flatten)]
     part: Part,
     /// Indentations solved at a time [default: one per core].
@@ -169,12 +166,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Err(error) => return Ok(wrong_usage(&error)),
     };
     let stop = signals::stop()?;
-    let names = MESHES.map(|mesh| mesh.name);
-    super::refuse_unknown(args.mesh.as_slice(), &names)?;
-    let mut spec = CampaignSpec::read(&args.campaign)?;
-    if let Some(mesh) = MESHES.iter().find(|mesh| args.mesh.as_deref() == Some(mesh.name)) {
-        (spec.density, spec.order) = (mesh.density, mesh.order);
-    }
+    let spec = args.campaign.read()?;
     let candidates = spec.candidates();
     let first = candidates.first().context("a campaign has an indenter")?;
     let Simulation { body, approach, .. } = Simulation::new(&spec.scene(first))?;

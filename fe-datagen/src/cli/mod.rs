@@ -1,6 +1,7 @@
 //! The command line: one file a command.
 
 mod atlas;
+mod campaign_file;
 mod choices;
 mod contact;
 mod convergence;
@@ -10,7 +11,6 @@ mod effects;
 mod explain;
 mod explain_campaign;
 mod export;
-mod fidelity;
 mod generate;
 mod influence;
 mod lines;
@@ -49,7 +49,6 @@ enum Command {
     Generate(generate::Args),
     Operator(influence::Args),
     Contact(contact::Args),
-    Fidelity(fidelity::Args),
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Convergence(convergence::Args),
@@ -79,7 +78,6 @@ pub fn run() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => influence::run(&args),
         Command::Contact(args) => contact::run(&args),
-        Command::Fidelity(args) => fidelity::run(&args),
         Command::Wedge(args) => wedge::run(&args),
     };
     match result {

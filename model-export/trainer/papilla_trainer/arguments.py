@@ -206,12 +206,6 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         help="part of a face network's correction that each step leaves out (0)",
     )
     add(
-        "--start",
-        metavar="RUN_DIR",
-        help="begin with the weights of this run of the same network on maps: learn from many "
-        "cheap indentations, then from few good ones",
-    )
-    add(
         "--train-presses",
         type=int,
         metavar="N",

@@ -41,15 +41,12 @@ class TrainConfig:
     train_presses: int | None = None
     base_rate: float = 0.05
     dropout: float = 0.0
-    start: str | None = None
 
     def __post_init__(self) -> None:
         if (self.operator is not None) != isinstance(self.spec, FaceSpec):
             raise UsageError(
                 "--operator FILE.npz is what face networks, and they alone, start from"
             )
-        if self.start is not None and not isinstance(self.spec, MapSpec):
-            raise UsageError("--start RUN_DIR is for networks on maps: others have another start")
         if not 0.0 <= self.base_rate <= 1.0:
             raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
         if not 0.0 <= self.dropout < 1.0:

@@ -11,10 +11,8 @@ import torch
 from torch import Tensor, nn
 
 from papilla_trainer.atlas import Atlas
-from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import F32, Dataset, Maps
-from papilla_trainer.errors import RunError, UsageError
 from papilla_trainer.face_init import start_from_operator
 from papilla_trainer.face_layout import FaceLayout
 from papilla_trainer.face_network import FaceNet, FaceSpec
@@ -54,8 +52,6 @@ class Task:
     fit: Samples
     validation: Samples | None
     loss: Loss
-    # What the weights were before, where that is not noise.
-    start: str | None
 
 
 def make_task(
@@ -68,21 +64,16 @@ def make_task(
     """Load the indentations named, and no others, and build the network."""
     spec = config.spec
     load = _loader(spec)
-    fit, start = load(dataset, fit_ids, device), None
+    fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
     if isinstance(spec, FaceSpec):
         network = fresh_face_network(dataset, config, fit.inputs.cpu())
         weights = torch.from_numpy(pixels_of_vertices(dataset))
-        start = "linear operator of the finger"
     else:
         network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)
-        if config.start is not None:
-            earlier = _earlier(Path(config.start), config.network, dataset.atlas_hash)
-            network.load_state_dict(earlier.best_model)
-            start = "weights of " + ", ".join(d[:12] for d in earlier.served.datasets)
         weights = torch.from_numpy(dataset.interface.mask())
     loss = make_loss(config.loss_name, weights.to(device), config.far_weight)
-    return Task(network.to(device), fit, validation, loss, start)
+    return Task(network.to(device), fit, validation, loss)
 
 
 def fresh_face_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tensor) -> FaceNet:
@@ -109,16 +100,6 @@ def fresh_network(spec: NetworkSpec | MapSpec, seed: int) -> nn.Module:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return MapNet(spec)
-
-
-def _earlier(run_dir: Path, network: str, atlas_hash: str) -> Checkpoint:
-    """A run whose weights fit this network and this atlas."""
-    earlier = Checkpoint.load(run_dir)
-    if earlier.config["network"] != network:
-        raise UsageError(f"--start {run_dir}: a run of {earlier.config['network']}, not {network}")
-    if earlier.served.atlas_hash != atlas_hash:
-        raise RunError(f"--start {run_dir}: its dataset has another atlas")
-    return earlier
 
 
 def trained_network(

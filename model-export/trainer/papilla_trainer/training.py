@@ -75,7 +75,7 @@ class Trainer:
             best_epoch=0,
             best_loss=BEST_LOSS_AT_START,
             best_model=copy_weights(self.network.state_dict()),
-            environment=_environment(self.device, threads, task.start),
+            environment=_environment(self.device, threads),
         )
         if exists:
             self._resume()
@@ -206,9 +206,9 @@ def _rates(network: nn.Module, base_rate: float) -> list[tuple[float, list[nn.Pa
     return [(rate, parameters) for rate, parameters in groups if rate > 0.0 and parameters]
 
 
-def _environment(device: torch.device, threads: int, start: str | None) -> dict[str, Any]:
+def _environment(device: torch.device, threads: int) -> dict[str, Any]:
     name = torch.cuda.get_device_name(device) if device.type == "cuda" else platform.machine()
-    return ({} if start is None else {"start": start}) | {
+    return {
         "torch": str(torch.__version__),
         "python": platform.python_version(),
         "device": f"{device.type} ({name})",

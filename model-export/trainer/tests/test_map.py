@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,19 +123,6 @@ def test_it_learns_and_resumes(
         trainer.fit(stop_after_two)
     again = Trainer(tiny, config, tmp_path / "twice", resume=True).fit()
     assert all(torch.equal(again.model[name], value) for name, value in straight.model.items())
-
-
-def test_it_starts_from_the_weights_of_another_run(
-    tiny: Dataset, config: TrainConfig, run: tuple[Path, Checkpoint], tmp_path: Path
-) -> None:
-    settings = replace(config, start=str(run[0]), epochs=1, learning_rate=1e-9)
-    from_there = Trainer(tiny, settings, tmp_path / "on").fit()
-    for name, value in run[1].best_model.items():
-        torch.testing.assert_close(from_there.model[name], value, rtol=1e-4, atol=1e-6)
-    assert from_there.environment["start"].startswith("weights of ")
-    other = replace(settings, network="map-c2-k3-r4")
-    with pytest.raises(UsageError, match="a run of map-c2-k3-r4-h4, not map-c2-k3-r4"):
-        Trainer(tiny, other, tmp_path / "other")
 
 
 def test_the_exported_graph_is_the_trained_network(

@@ -3,10 +3,7 @@
 use std::path::Path;
 
 use papilla_model_export::dataset::Dataset;
-use papilla_proto::{
-    MAP_LEN, SampleType,
-    atlas::{Atlas, Patch, Raster},
-};
+use papilla_proto::{MAP_LEN, SampleType, atlas::Atlas};
 use serde::{Deserialize, de::DeserializeOwned};
 
 use super::LoadError;
@@ -32,11 +29,6 @@ struct StateList {
 #[derive(Deserialize)]
 struct StateEntry {
     id: usize,
-}
-
-#[derive(Deserialize)]
-struct State {
-    pressure_pa: Vec<f32>,
 }
 
 impl Content {
@@ -65,12 +57,10 @@ impl Content {
     /// [`LoadError`]: the service does not answer, or ships none.
     pub async fn from_server(server: &str, count: usize) -> Result<Self, LoadError> {
         let atlas: Atlas = get(server, "/v1/atlas").await?;
-        let skin = Raster::new(&atlas, Patch::Skin);
         let list: StateList = get(server, "/v1/presses").await?;
         let mut maps_pa = Vec::new();
         for entry in list.states.iter().take(count) {
-            let state: State = get(server, &format!("/v1/presses/{}", entry.id)).await?;
-            maps_pa.push(draw(&skin, &state.pressure_pa)?);
+            maps_pa.push(get_map(server, &format!("/v1/presses/{}/pressure", entry.id)).await?);
         }
         let source = format!("the presses of {server}");
         if maps_pa.is_empty() {
@@ -80,19 +70,30 @@ impl Content {
     }
 }
 
-fn draw(raster: &Raster, vertex_values: &[f32]) -> Result<Vec<f32>, LoadError> {
-    let mut map = vec![0.0; MAP_LEN];
-    raster.rasterise(vertex_values, &mut map)?;
-    Ok(map)
+async fn get_map(server: &str, path: &str) -> Result<Vec<f32>, LoadError> {
+    let body = get_bytes(server, path).await?;
+    if body.len() != 4 * MAP_LEN {
+        let reason = format!("{} bytes, a map has {}", body.len(), 4 * MAP_LEN);
+        return Err(LoadError::Service { path: path.to_owned(), reason });
+    }
+    Ok(body.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect())
 }
 
 pub(super) async fn get<T: DeserializeOwned>(server: &str, path: &str) -> Result<T, LoadError> {
-    let bad = |reason: String| LoadError::Service { path: path.to_owned(), reason };
+    let bad = |error: serde_json::Error| LoadError::Service {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    };
+    serde_json::from_slice(&get_bytes(server, path).await?).map_err(bad)
+}
+
+async fn get_bytes(server: &str, path: &str) -> Result<Vec<u8>, LoadError> {
     let answer = Request::get(path).send(server).await?;
     if answer.status != 200 {
-        return Err(bad(format!("status {}: {}", answer.status, answer.text())));
+        let reason = format!("status {}: {}", answer.status, answer.text());
+        return Err(LoadError::Service { path: path.to_owned(), reason });
     }
-    serde_json::from_slice(&answer.body).map_err(|error| bad(error.to_string()))
+    Ok(answer.body)
 }
 
 /// The maps as they go over the wire.

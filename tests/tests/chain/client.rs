@@ -271,13 +271,12 @@ pub(crate) async fn sessions_survive_mistakes(service: &Service, sample: &Sample
 
 /// Renders the samples in a session of the default tier; the median relative L2 error
 /// against the FE truth over the pixels of the interface.
-pub(crate) async fn median_error(service: &Service, samples: &[Sample]) -> f64 {
+pub(crate) async fn median_error(service: &Service, maps: &[[Vec<f32>; 2]]) -> f64 {
     let name = &service.models[0].info().name;
     let mut session = Session::open(service, name, SampleType::F32, 0.0).await;
     let mut errors = Vec::new();
-    for (sequence, sample) in (0..).zip(samples) {
-        let (_, found) = session.render(sequence, &service.pressure_map(sample)).await;
-        let truth = service.truth_map(sample);
+    for (sequence, [pressure_pa, truth]) in (0..).zip(maps) {
+        let (_, found) = session.render(sequence, pressure_pa).await;
         let (mut difference, mut size) = (0.0, 0.0);
         for &pixel in service.interface.indices() {
             let (p, t) = (f64::from(found[pixel as usize]), f64::from(truth[pixel as usize]));

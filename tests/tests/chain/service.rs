@@ -83,11 +83,6 @@ impl Service {
     pub(crate) fn pressure_map(&self, sample: &Sample) -> Vec<f32> {
         drawn(&self.skin, &sample.pressure_pa)
     }
-
-    /// The SED map that the FE solver found, J/m3.
-    pub(crate) fn truth_map(&self, sample: &Sample) -> Vec<f32> {
-        drawn(&self.interface, &sample.sed_j_per_m3)
-    }
 }
 
 /// The defaults, with a calibration of two runs a tier.

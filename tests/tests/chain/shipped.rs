@@ -6,7 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use papilla_dataset::{Dataset, IndentationEntry, Shard, Split};
+use ndarray::Array2;
+use papilla_dataset::{Dataset, IndentationEntry, Maps, Shard, Split};
 use papilla_engine::Card;
 use papilla_fingertip::scene::Scene;
 use papilla_proto::{
@@ -42,11 +43,12 @@ fn dataset() -> Dataset {
     Dataset::open(&folder("data/s1")).unwrap()
 }
 
-/// The shipped dataset that a card was measured on.
-fn judged_on(card: &Card) -> Dataset {
+/// The shipped dataset that a card was measured on, and its folder.
+fn judged_on(card: &Card) -> (PathBuf, Dataset) {
     let due = card.metrics.dataset_sha256.as_ref().unwrap_or(&card.dataset_sha256);
-    let shipped = ["data/s1", "data/broad"].map(|name| Dataset::open(&folder(name)).unwrap());
-    let found = shipped.into_iter().find(|d| d.manifest().dataset_sha256 == *due);
+    let shipped = ["data/s1", "data/broad", "data/broad-graded"].map(folder);
+    let opened = shipped.map(|path| (path.clone(), Dataset::open(&path).unwrap()));
+    let found = opened.into_iter().find(|(_, d)| d.manifest().dataset_sha256 == *due);
     found.unwrap_or_else(|| panic!("{}: its dataset {due} does not ship", card.name))
 }
 
@@ -70,7 +72,7 @@ async fn the_shipped_models_answer_every_client() {
     let dataset = dataset();
     assert_eq!(service.atlas.hash(), dataset.atlas().hash());
     for card in &service.cards {
-        assert_eq!(judged_on(card).atlas().hash(), dataset.atlas().hash(), "{}", card.name);
+        assert_eq!(judged_on(card).1.atlas().hash(), dataset.atlas().hash(), "{}", card.name);
     }
     let states = samples(&dataset.shard(held_out(&dataset)[0]).unwrap());
     let deepest = states.last().unwrap();
@@ -85,10 +87,22 @@ async fn the_shipped_models_answer_every_client() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_card_tells_the_truth() {
     let service = Service::shipped().await;
-    let dataset = judged_on(&service.cards[0]);
-    let shards =
-        held_out(&dataset).into_iter().map(|indentation| dataset.shard(indentation).unwrap());
-    let all: Vec<Sample> = shards.flat_map(|shard| samples(&shard)).collect();
+    let (path, dataset) = judged_on(&service.cards[0]);
+    let maps = Maps::read(&path, dataset.atlas()).unwrap();
+    let mut all = Vec::new();
+    for indentation in held_out(&dataset) {
+        let shard = dataset.shard(indentation).unwrap();
+        for i in 0..shard.len() {
+            let drawn = |patch, values: &Array2<f32>| {
+                let mut map = vec![0.0; MAP_LEN];
+                let reader = maps.reader(patch, shard.cells.as_ref()).unwrap();
+                reader.draw(&values.row(i).to_vec(), &mut map).unwrap();
+                map
+            };
+            let pressure_pa = drawn(Patch::Skin, &shard.pressure_pa);
+            all.push([pressure_pa, drawn(Patch::Interface, &shard.sed_dermis_j_per_m3)]);
+        }
+    }
     let card = &service.cards[0].metrics;
     assert_eq!((card.split.as_str(), card.samples), ("test", all.len()));
     let found = client::median_error(&service, &all).await;

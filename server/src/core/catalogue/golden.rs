@@ -73,7 +73,7 @@ pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>
     let mut worst: Option<Golden> = None;
     for state in states {
         let fill = |raster: &Raster, values: &[f32], map: &mut [f32]| {
-            raster.rasterise(values, map).map_err(|error| GoldenError::State {
+            raster.scatter(values, map).map_err(|error| GoldenError::State {
                 state: state.name.clone(),
                 reason: error.to_string(),
             })

@@ -173,10 +173,10 @@ impl Catalogue {
         let default = tiers.iter().position(|t| t.name == wanted).ok_or_else(|| {
             StartError::UnknownDefault { name: wanted.to_owned(), known: index.models.join(", ") }
         })?;
+        let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
+        let pixels = [skin.pixel_count(), interface.pixel_count()];
         let replay = match assets.get("replay.json") {
-            Some(json) => {
-                Replay::parse(json, atlas.vertex_count()).map_err(|e| bad("replay.json", &e))?
-            }
+            Some(json) => Replay::parse(json, pixels).map_err(|e| bad("replay.json", &e))?,
             None => Replay::default(),
         };
         let ladder = match assets.get("ladder.json") {
@@ -187,8 +187,6 @@ impl Catalogue {
         };
         let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
-        let (skin, interface) =
-            (Raster::new(&atlas, Patch::Skin), Raster::new(&atlas, Patch::Interface));
         let overhead = Overhead::default();
         Ok(Self {
             tiers,

@@ -1,22 +1,22 @@
 //! A few states of FE simulations shipped with the models, so that a visitor sees the error.
 
 use papilla_proto::json;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::Value;
 
-/// One state: where the plate was, and what the FE solver found.
-#[derive(Debug, Serialize, Deserialize)]
+/// One state: how something pressed, and what the FE solver found.
+#[derive(Debug, Deserialize)]
 pub(crate) struct State {
     /// Name to show.
     pub(crate) name: String,
-    /// Angles of the plate, as the dataset's manifest has them.
+    /// Angles of what pressed, as the dataset's manifest has them.
     #[serde(default)]
     pub(crate) pose: Value,
     /// Depth, mm.
     pub(crate) depth_mm: f32,
-    /// Pressure on the skin at each atlas vertex, Pa.
+    /// Pressure at each pixel of the skin, in the order of the raster's indices, Pa.
     pub(crate) pressure_pa: Vec<f32>,
-    /// FE strain energy density at each atlas vertex, J/m3.
+    /// FE strain energy density at each pixel of the interface likewise, J/m3.
     pub(crate) sed_j_per_m3: Vec<f32>,
 }
 
@@ -28,20 +28,21 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    /// Reads and checks the file.
+    /// Reads and checks the file; `pixels`: of skin and interface.
     ///
     /// # Errors
     /// It is not the JSON that is due, or a state does not fit the atlas.
-    pub(crate) fn parse(text: &[u8], vertex_count: usize) -> Result<Self, String> {
+    pub(crate) fn parse(text: &[u8], pixels: [usize; 2]) -> Result<Self, String> {
         let replay: Self = json::read(text).map_err(|e| e.to_string())?;
         for (index, state) in replay.states.iter().enumerate() {
-            for (what, values) in
-                [("pressure_pa", &state.pressure_pa), ("sed_j_per_m3", &state.sed_j_per_m3)]
-            {
+            for (what, values, due) in [
+                ("pressure_pa", &state.pressure_pa, pixels[0]),
+                ("sed_j_per_m3", &state.sed_j_per_m3, pixels[1]),
+            ] {
                 let found = values.len();
-                if found != vertex_count {
+                if found != due {
                     return Err(format!(
-                        "press {index} has {found} values of {what}, the atlas {vertex_count} vertices"
+                        "press {index} has {found} values of {what}, the atlas {due} pixels"
                     ));
                 }
                 if !values.iter().all(|v| v.is_finite() && *v >= 0.0) {
@@ -64,7 +65,7 @@ mod tests {
             r#"{{"presses": [{{"name": "flat", "pose": {{"pitch_deg": 0}}, "depth_mm": 1,
                 "pressure_pa": {pressure}, "sed_j_per_m3": {sed}}}]}}"#
         );
-        Replay::parse(json.as_bytes(), 2)
+        Replay::parse(json.as_bytes(), [2, 2])
     }
 
     #[test]
@@ -74,6 +75,6 @@ mod tests {
         assert!(parse("[1, 2]", "[0, 3, 4]").unwrap_err().contains("sed_j_per_m3"));
         assert!(parse("[1, -2]", "[0, 3]").unwrap_err().contains("negative"));
         assert!(parse("[1, 1e39]", "[0, 3]").is_err());
-        assert!(Replay::parse(b"{", 2).is_err());
+        assert!(Replay::parse(b"{", [2, 2]).is_err());
     }
 }

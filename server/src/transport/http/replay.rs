@@ -3,18 +3,22 @@
 use std::sync::Arc;
 
 use axum::{
-    extract::State,
+    extract,
     http::{HeaderMap, Uri},
 };
 use bytes::BytesMut;
 use papilla_codec::{Map, Output, Quantity, encode};
-use papilla_proto::{ErrorCode, MAP_LEN, Problem, error::shortened};
+use papilla_proto::{
+    ErrorCode, MAP_LEN, Problem,
+    atlas::{AtlasError, Raster, VertexSampler},
+    error::shortened,
+};
 use serde_json::{Value, json};
 
 use crate::{
     core::{
         cache::Content,
-        catalogue::{Catalogue, Document},
+        catalogue::{Catalogue, Document, replay::State},
     },
     problem,
     transport::{
@@ -23,7 +27,7 @@ use crate::{
     },
 };
 
-pub(crate) async fn list(State(app): Shared, headers: HeaderMap) -> Answer {
+pub(crate) async fn list(extract::State(app): Shared, headers: HeaderMap) -> Answer {
     let catalogue = app.catalogue();
     let of = Arc::clone(&catalogue);
     let make = move || {
@@ -53,17 +57,28 @@ fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
     })
 }
 
-/// Vertex values, as the atlas orders them.
-pub(crate) async fn one(State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
+/// Values read from the maps at the atlas' vertices, in its order.
+pub(crate) async fn one(extract::State(app): Shared, uri: Uri, headers: HeaderMap) -> Answer {
     let catalogue = app.catalogue();
     let state = match find(&catalogue, &uri) {
         Ok(state) => state,
         Err(problem) => return refuse(&app, problem),
     };
     let of = Arc::clone(&catalogue);
-    let make = move || match serde_json::to_vec(&of.replay.states[state]) {
-        Ok(bytes) => Ok(Content::new("application/json", bytes)),
-        Err(error) => Err(problem::internal("the press cannot be encoded", &error)),
+    let make = move || {
+        let at_vertices = |quantity| {
+            let (raster, map) = drawn(&of, state, quantity)?;
+            let sampler = VertexSampler::new(&of.atlas, raster);
+            let mut values = vec![0.0; sampler.vertex_count()];
+            sampler.sample(&map, &mut values).map_err(|error| unfit(&error))?;
+            Ok::<_, Problem>(values)
+        };
+        let (pressure_pa, sed_j_per_m3) =
+            (at_vertices(Quantity::Pressure)?, at_vertices(Quantity::Sed)?);
+        let State { name, pose, depth_mm, .. } = &of.replay.states[state];
+        let text = json!({"name": name, "pose": pose, "depth_mm": depth_mm,
+            "pressure_pa": pressure_pa, "sed_j_per_m3": sed_j_per_m3});
+        Ok(Content::new("application/json", text.to_string()))
     };
     let made = cached(&catalogue.cache, &headers, Document::State(state), make).await;
     made.or_else(|problem| refuse(&app, problem))
@@ -79,7 +94,12 @@ pub(crate) async fn sed(app: Shared, uri: Uri, headers: HeaderMap) -> Answer {
     map(app, &uri, &headers, Quantity::Sed).await
 }
 
-async fn map(State(app): Shared, uri: &Uri, headers: &HeaderMap, quantity: Quantity) -> Answer {
+async fn map(
+    extract::State(app): Shared,
+    uri: &Uri,
+    headers: &HeaderMap,
+    quantity: Quantity,
+) -> Answer {
     let catalogue = app.catalogue();
     let asked = find(&catalogue, uri).and_then(|state| Ok((state, negotiate::output(headers)?)));
     let (state, output) = match asked {
@@ -87,27 +107,42 @@ async fn map(State(app): Shared, uri: &Uri, headers: &HeaderMap, quantity: Quant
         Err(problem) => return refuse(&app, problem),
     };
     let of = Arc::clone(&catalogue);
-    let make = move || rasterised(&of, state, quantity, output);
+    let make = move || encoded(&of, state, quantity, output);
     let document = Document::StateMap(state, quantity, output);
     let made = cached(&catalogue.cache, headers, document, make).await;
     made.or_else(|problem| refuse(&app, problem))
 }
 
-fn rasterised(
+fn drawn(
+    catalogue: &Catalogue,
+    state: usize,
+    quantity: Quantity,
+) -> Result<(&Raster, Vec<f32>), Problem> {
+    let state = &catalogue.replay.states[state];
+    let (raster, values) = match quantity {
+        Quantity::Pressure => (&*catalogue.skin, &state.pressure_pa),
+        Quantity::Sed => (&catalogue.interface, &state.sed_j_per_m3),
+    };
+    let mut map = vec![0.0; MAP_LEN];
+    raster.scatter(values, &mut map).map_err(|error| unfit(&error))?;
+    Ok((raster, map))
+}
+
+fn unfit(error: &AtlasError) -> Problem {
+    problem::internal("the press does not fit the atlas", error)
+}
+
+fn encoded(
     catalogue: &Catalogue,
     state: usize,
     quantity: Quantity,
     output: Output,
 ) -> Result<Content, Problem> {
-    let state = &catalogue.replay.states[state];
-    let (raster, vertex_values, white) = match quantity {
-        Quantity::Pressure => (&*catalogue.skin, &state.pressure_pa, "x-pressure-max-pa"),
-        Quantity::Sed => (&catalogue.interface, &state.sed_j_per_m3, "x-sed-max-j-per-m3"),
+    let (_, values) = drawn(catalogue, state, quantity)?;
+    let white = match quantity {
+        Quantity::Pressure => "x-pressure-max-pa",
+        Quantity::Sed => "x-sed-max-j-per-m3",
     };
-    let mut values = vec![0.0; MAP_LEN];
-    raster
-        .rasterise(vertex_values, &mut values)
-        .map_err(|error| problem::internal("the press does not fit the atlas", &error))?;
     let mut bytes = BytesMut::with_capacity(output.size_hint());
     let map = Map { quantity, values: &values, source: "fe" };
     let scale = encode(output, map, &mut bytes)

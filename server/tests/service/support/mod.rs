@@ -12,7 +12,7 @@ use std::{fs, net::SocketAddr, path::Path};
 
 use papilla_proto::{
     MAP_LEN,
-    atlas::{Atlas, PatchVertices},
+    atlas::{Atlas, Patch, PatchVertices, Raster},
 };
 use papilla_server::{Config, Server, StartError};
 use serde_json::{Value, json};
@@ -115,8 +115,12 @@ pub(crate) fn model_folder_on(atlas: &Atlas) -> TempDir {
     let values: Vec<f32> = (0..atlas.vertex_count()).map(|i| 100.0 * i as f32).collect();
     // What the test models make of it: their golden answer.
     let sed: Vec<f32> = values.iter().map(|value| GAIN * value).collect();
+    let drawn = |patch, values: &[f32]| -> Vec<f32> {
+        let raster = Raster::new(atlas, patch);
+        raster.pixels().iter().map(|pixel| pixel.value(values)).collect()
+    };
     let state = json!({"name": "flat", "pose": {"pitch_deg": 30.0}, "depth_mm": 1.5,
-        "pressure_pa": values, "sed_j_per_m3": sed});
+        "pressure_pa": drawn(Patch::Skin, &values), "sed_j_per_m3": drawn(Patch::Interface, &sed)});
     write(folder.path(), "replay.json", json!({"presses": [state]}).to_string().as_bytes());
     folder
 }
