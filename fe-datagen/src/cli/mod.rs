@@ -12,6 +12,7 @@ mod explain_campaign;
 mod export;
 mod fidelity;
 mod generate;
+mod human;
 mod influence;
 mod lines;
 mod part;
@@ -53,6 +54,7 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Convergence(convergence::Args),
+    Human(human::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
@@ -71,6 +73,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Convergence(args) => convergence::run(&args),
+        Command::Human(args) => human::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),
