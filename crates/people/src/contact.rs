@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// What is read of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ContactRead {
+pub(crate) struct ContactRead {
     /// Area of the deformed skin that touches, mm2.
     pub area_mm2: f64,
     /// Peak over mean of the pressure; see [`peak_over_mean`].
@@ -102,6 +102,35 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use papilla_fem::solve::Options;
+    use papilla_fem::tensor::UNIT;
+    use papilla_fingertip::scene::Scene;
+    use papilla_fingertip::simulation::Simulation;
+
+    /// A block that a larger plate squeezes touches it with its whole face, which has grown as its
+    /// volume stayed.
+    #[test]
+    fn the_face_of_a_squeezed_block_touches() {
+        let text = "
+            [geometry]
+            kind = \"block\"
+            size_mm = [6.0, 4.0]
+            elements = [6, 4]
+            order = \"quadratic\"
+            layers = [{ tissue = \"dermis\", thickness_mm = 5.0, elements = 3 }]
+            [motion]
+            depth_mm = 0.5
+            increments = 2";
+        let scene = Scene::parse("scene.toml".as_ref(), text.into()).unwrap();
+        let Simulation { body, approach, drive, .. } = Simulation::new(&scene).unwrap();
+        let mut solver = body.solver(Options::default()).unwrap();
+        body.press(&mut solver, &approach, &drive, 1, &mut |_, _, _| ()).unwrap();
+        let found = read(&body, &solver, UNIT).unwrap();
+        // A tenth shorter is a tenth wider in area; the far end, which is held, takes some of it.
+        assert!(found.area_mm2 > 24.0 * 1.05 && found.area_mm2 < 24.0 * 1.15, "{found:?}");
+        // Nearly even, but for the edges, where a block without shear on its face has no peak.
+        assert!((found.peak_over_mean - 1.0).abs() < 0.15, "{found:?}");
+    }
 
     /// Pressures of known shape over an ellipse that lies askew.
     #[test]

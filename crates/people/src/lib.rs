@@ -25,6 +25,7 @@ mod contact;
 mod error;
 pub mod force_path;
 pub mod measured;
+pub mod mesh_error;
 mod pad;
 mod press;
 pub mod rates;

@@ -79,11 +79,11 @@ fn straightness(x: &[f64], y: &[f64]) -> f64 {
 mod tests {
     use super::*;
     use crate::contact::ContactRead;
-    use crate::force_path::{ForcePath, steps_mm};
+    use crate::force_path::steps_mm;
 
     /// A sphere of 10 mm and 0.1 MPa as Hertz has it: area `pi R d`, pressure an ellipsoid.
     fn hertz() -> Solution {
-        let mut found = Solution { path: ForcePath::default(), ..Solution::default() };
+        let mut found = Solution::default();
         for d in steps_mm(0.05, 3.0) {
             let force_n = 4.0 / 3.0 * 0.1 / 0.75 * 10f64.sqrt() * d.powf(1.5);
             found.path.push(d, force_n);

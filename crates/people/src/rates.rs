@@ -34,7 +34,8 @@ impl Law {
             let high = set[above - 1].0;
             let low = points.get(above).map_or(0.0, |p| p.0).max(0.0);
             let free = line(set).map(|l| l.threshold).filter(|t| (low..=high).contains(t));
-            for threshold in [free, Some(low), Some(high)].into_iter().flatten() {
+            let thresholds = [free, Some(low), Some(high)].into_iter().flatten();
+            for threshold in thresholds.filter(|t| *t >= 0.0) {
                 let Some(law) = through(set, threshold) else { continue };
                 let missed = points.iter().map(|p| (p.1 - law.rate_per_s(p.0)).powi(2)).sum();
                 if best.is_none_or(|(least, _)| missed < least) {
@@ -44,6 +45,13 @@ impl Law {
         }
         best.map(|(_, law)| law)
     }
+}
+
+/// As [`Law::fitted`], with a threshold of either sign: one below 0 is a rate at rest. `None` where
+/// the line of least squares does not rise.
+#[must_use]
+pub fn line_of(felt: &[f64], rate_per_s: &[f64]) -> Option<Law> {
+    line(&felt.iter().copied().zip(rate_per_s.iter().copied()).collect::<Vec<_>>())
 }
 
 /// Line of least squares; `None` if it does not rise.

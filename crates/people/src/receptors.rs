@@ -11,7 +11,6 @@ use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_fingertip::tissue::Tissue;
 use serde::{Deserialize, Serialize};
 
 /// Distances from the middle of the indenter at which receptors are read, mm.

@@ -2,22 +2,25 @@
 
 mod charts;
 mod page;
+mod rates;
 mod words;
 
 use crate::PeopleError;
 use crate::afferents::Afferents;
 use crate::force_path::ForcePath;
 use crate::measured::{Figure, Measured};
+use crate::mesh_error::MeshError;
 use crate::press::Materials;
 use crate::receptors::Stimulus;
 use crate::solution::Solution;
-use crate::study::Options;
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_output::{OutputError, atomic};
 use papilla_validation::processor::today_here;
 use serde::Serialize;
 use std::path::Path;
 
+/// Folder of the plots, beside the page.
+const PICTURES: &str = "pictures/human";
 /// R2 that is asked of rates under spheres at forces that were not fitted.
 const R2_RATES: f64 = 0.9;
 /// R2 that is asked of profiles.
@@ -156,18 +159,21 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// Rates of SA1 afferents.
     pub afferents: Option<Afferents>,
+    /// How far what receptors feel moves on a finer mesh.
+    pub mesh_errors: Vec<MeshError>,
     /// Presses with a plate.
     pub plates: Vec<Plate>,
 }
 
 impl Report {
-    pub(crate) fn new(options: &Options) -> Self {
+    pub(crate) fn new(materials: Materials, density: Density) -> Self {
         Self {
             made: today_here(),
-            materials: options.materials,
-            density: options.density,
+            materials,
+            density,
             rows: Vec::new(),
             afferents: None,
+            mesh_errors: Vec::new(),
             plates: Vec::new(),
         }
     }
@@ -215,7 +221,7 @@ impl Report {
     /// [`OutputError`] if a file cannot be written.
     pub fn write_page(&self, page: &Path) -> Result<(), OutputError> {
         atomic::write(page, self.markdown().as_bytes())?;
-        let folder = page.parent().unwrap_or_else(|| Path::new("")).join(page::PICTURES);
+        let folder = page.parent().unwrap_or_else(|| Path::new("")).join(PICTURES);
         atomic::create_folder(&folder)?;
         self.write_charts(&folder)
     }

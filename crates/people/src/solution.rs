@@ -10,6 +10,7 @@ use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::mesh::fingertip::Order;
+use papilla_fingertip::mesh::grading::Contact;
 use papilla_fingertip::scene::Scene;
 use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
 use papilla_fingertip::simulation::body::{Body, SimulationError};
@@ -126,18 +127,7 @@ impl Solution {
         let begun_s = processor::thread_s();
         let finger = FingertipShape::default();
         let touch = press.first_touch(&course.depths_mm)?;
-        let plan = scene.plan().map_err(|e| failed(e.into()))?;
-        let tissues = solids(&scene.materials, &plan).map_err(|e| failed(e.into()))?;
-        // Cells are split for the very depths that are stored.
-        let mut body = Body::fingertip(
-            &finger,
-            tissues,
-            course.density,
-            Order::Graded,
-            plan.parts,
-            Some(&touch),
-        )
-        .map_err(failed)?;
+        let mut body = body(scene, &finger, course.density, &touch).map_err(failed)?;
         body.read_at_nodes();
         self.unknowns = body.problem.system.dofs.count;
         let receptors = match course.reads {
@@ -180,6 +170,9 @@ impl Solution {
         let pressed =
             body.press_stoppable(&mut solver, &approach, &drive, limit, &mut keep, stoppable);
         self.states = pressed.kept;
+        if self.states.is_empty() {
+            self.path = ForcePath::default();
+        }
         self.ended = match pressed.pressed {
             Ok(()) | Err(SimulationError::Halted) => broken,
             Err(e) => Some(e.to_string()),
@@ -189,10 +182,21 @@ impl Solution {
     }
 
     /// Largest |stored energy - work| over work.
-    #[must_use]
     pub(crate) fn energy_vs_work_max(&self) -> f64 {
         self.states.iter().map(|s| s.energy_vs_work).fold(0.0, f64::max)
     }
+}
+
+/// The finger, its cells split for the very depths that are stored.
+fn body(
+    scene: &Scene,
+    finger: &FingertipShape,
+    density: Density,
+    touch: &Contact,
+) -> Result<Body, SimulationError> {
+    let plan = scene.plan()?;
+    let tissues = solids(&scene.materials, &plan)?;
+    Body::fingertip(finger, tissues, density, Order::Graded, plan.parts, Some(touch))
 }
 
 /// Deepest that a force is looked for, mm.

@@ -3,9 +3,10 @@
 use crate::PeopleError;
 use crate::afferents::Afferents;
 use crate::measured::{Figure, Measured, Quantity};
+use crate::mesh_error::mesh_errors;
 use crate::pad;
 pub use crate::press::Materials;
-use crate::report::{Plate, Report, Row, Verdict};
+use crate::report::{Plate, Report, Row};
 use crate::solution::Solution;
 use crate::tap;
 use papilla_fingertip::mesh::fingertip::Density;
@@ -13,7 +14,7 @@ use papilla_output::atomic;
 use std::path::Path;
 
 /// Parts of the comparison, as the command line names them.
-pub const PARTS: [&str; 4] = ["sa1", "plates", "tap", "relaxation"];
+pub const PARTS: [&str; 5] = ["sa1", "mesh", "plates", "tap", "relaxation"];
 
 /// What is compared, and on what.
 #[derive(Clone, Debug)]
@@ -45,7 +46,7 @@ pub fn run(
     let spheres = if wanted("sa1") { measured.sa1.curvature_per_m.len() } else { 0 };
     let all = plates.len() + spheres;
     let mut done = 0;
-    let mut report = Report::new(options);
+    let mut report = Report::new(options.materials, options.density);
     if wanted("sa1") {
         let found = Afferents::new(
             &measured.sa1,
@@ -58,6 +59,13 @@ pub fn run(
             },
         )?;
         report.take_afferents(found, measured);
+    }
+    if wanted("mesh")
+        && let Some(finer) = finer(options.density)
+    {
+        let pair = [options.density, finer];
+        let told = &mut |press: &str| told(press, done, all);
+        report.mesh_errors = mesh_errors(&measured.sa1, options.materials, pair, folder, told)?;
     }
     let mut pressed = Vec::new();
     for &(pitch_deg, until_n) in &plates {
@@ -75,6 +83,15 @@ pub fn run(
     report.write(folder)?;
     told("done", done, all);
     Ok(report)
+}
+
+/// The next finer mesh.
+const fn finer(density: Density) -> Option<Density> {
+    match density {
+        Density::Coarse => Some(Density::Medium),
+        Density::Medium => Some(Density::Fine),
+        Density::Fine => None,
+    }
 }
 
 /// Which part of the comparison a quantity belongs to.

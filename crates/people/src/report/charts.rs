@@ -11,11 +11,8 @@ impl Report {
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), OutputError> {
         if let Some(found) = &self.afferents {
             let best = &found.fits[found.best];
-            let title = format!(
-                "SA1 rates: measured, from SED at the interface, from {} at {}",
-                best.stimulus.name(),
-                crate::receptors::depth_name(best.depth)
-            );
+            let title =
+                format!("SA1 rates: measured, from SED at the interface, from {}", best.name());
             let of = |profile: bool| {
                 let pick = move |p: &Predicted| (p.distance_mm.last() > Some(&0.0)) == profile;
                 (

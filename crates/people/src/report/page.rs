@@ -1,13 +1,8 @@
 //! The report as Markdown and as plain text.
 
-use super::{Report, Row, Verdict};
-use crate::afferents::{Afferents, Fit};
-use crate::receptors::depth_name;
+use super::{PICTURES, Report, Row, Verdict, rates};
 use papilla_fingertip::mesh::fingertip::Density;
 use std::fmt::Write as _;
-
-/// Folder of the plots, beside the page.
-pub(super) const PICTURES: &str = "pictures/human";
 
 /// What stands before the tables.
 const HEAD: &str = include_str!("head.md");
@@ -69,7 +64,10 @@ impl Report {
             );
         }
         if let Some(found) = &self.afferents {
-            afferents(&mut text, found);
+            rates::afferents(&mut text, found);
+        }
+        if !self.mesh_errors.is_empty() {
+            rates::mesh_errors(&mut text, &self.mesh_errors);
         }
         if !self.plates.is_empty() {
             self.plates(&mut text);
@@ -115,84 +113,10 @@ impl Report {
             let _ = writeln!(text, "{:78} {here:>8}  {people:<18} {verdict}", r.quantity);
         }
         if let Some(found) = &self.afferents {
-            let _ = writeln!(
-                text,
-                "\n{:60} {:>8} {:>8} {:>8}",
-                "SA1 rates from", "R2 fit", "others", "profiles"
-            );
-            for f in &found.fits {
-                let name = format!("{} at {}", f.stimulus.name(), depth_name(f.depth));
-                let _ = writeln!(
-                    text,
-                    "{name:60} {:8.3} {:8.3} {:8.3}",
-                    f.r2_fitted, f.r2_others, f.r2_profiles
-                );
-            }
+            rates::human(&mut text, found);
         }
         text
     }
-}
-
-fn afferents(text: &mut String, found: &Afferents) {
-    let _ = write!(
-        text,
-        "\n## SA1 rates\n\n`rate = gain (felt - threshold)`, not below 0; both numbers from the rates at \
-         the smallest force alone. States lie within {:.1} % of their force, and what is felt is taken to \
-         it along a line; energy and work part by {:.2} % at most; {:.0} s of processor time.\n\n\
-         | felt | depth | gain, impulses/s | threshold | R2 of the fit | **R2 of the others** | R2 of the \
-         profiles | peaks, mm (people's) |\n|---|---|---|---|---|---|---|---|\n",
-        100.0 * found.force_missed_max,
-        100.0 * found.energy_vs_work_max,
-        found.solve_s
-    );
-    for f in &found.fits {
-        let (gain, threshold) =
-            f.law.map_or_else(Default::default, |l| (per(l.gain), per(l.threshold)));
-        let _ = writeln!(
-            text,
-            "| {}, {} | {} | {gain} | {threshold} | {:.3} | {:.3} | {:.3} | {} |",
-            f.stimulus.name(),
-            f.stimulus.unit(),
-            depth_name(f.depth),
-            f.r2_fitted,
-            f.r2_others,
-            f.r2_profiles,
-            peaks(f)
-        );
-    }
-    let best = &found.fits[found.best];
-    let _ = write!(
-        text,
-        "\n![Rates]({PICTURES}/rates.svg)\n\n![Profiles]({PICTURES}/profiles.svg)\n\nRates at the middle, \
-         impulses/s; 'best' is {} at {}.\n\n| force, N | curvature, 1/m | distance, mm | measured | SED at \
-         the interface | best |\n|---|---|---|---|---|---|\n",
-        best.stimulus.name(),
-        depth_name(best.depth)
-    );
-    for (sed, best) in found.of_sed.iter().zip(&found.of_best) {
-        for k in 0..sed.measured_per_s.len() {
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {:.1} | {:.1} | {:.1} |",
-                sed.force_n,
-                sed.curvature_per_m[k],
-                sed.distance_mm[k],
-                sed.measured_per_s[k],
-                sed.here_per_s[k],
-                best.here_per_s[k]
-            );
-        }
-    }
-}
-
-fn peaks(fit: &Fit) -> String {
-    let peak = |p: &crate::afferents::Peak| format!("{:.1} ({})", p.here_mm, p.people_mm);
-    fit.peaks.iter().map(peak).collect::<Vec<_>>().join(", ")
-}
-
-/// Three digits.
-fn per(v: f64) -> String {
-    if v != 0.0 && !(1e-2..1e4).contains(&v.abs()) { format!("{v:.2e}") } else { format!("{v:.3}") }
 }
 
 const fn density(density: Density) -> &'static str {

@@ -4,7 +4,7 @@ use crate::measured::Quantity;
 
 /// What would bring rates nearer.
 pub(super) const RATES_MEND: &str =
-    "a stimulus at the receptor's depth (table below); the monkey's smaller pad";
+    "another stimulus, deeper and over a disc (table below); a monkey's finger, which is smaller";
 
 /// A quantity with its unit.
 pub(super) fn quantity(quantity: &Quantity) -> String {
