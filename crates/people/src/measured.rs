@@ -187,13 +187,13 @@ impl Figure {
     fn validate(&self, at: &str) -> Result<(), PeopleError> {
         let given = [self.value.is_some(), self.range.is_some(), self.at_most.is_some()];
         let count = given.iter().filter(|g| **g).count();
-        require(count == 1, at, "has to have exactly one of value, range and at_most", count)?;
+        require(count == 1, at, "has to have exactly one of value, range and at_most", &count)?;
         let numbers = self.value.into_iter().chain(self.range.into_iter().flatten());
         let numbers: Vec<f64> = numbers.chain(self.at_most).collect();
         let positive = numbers.iter().all(|v| v.is_finite() && *v > 0.0);
-        require(positive, at, "has to have positive finite numbers", format!("{numbers:?}"))?;
+        require(positive, at, "has to have positive finite numbers", &format!("{numbers:?}"))?;
         let rises = self.range.is_none_or(|[low, high]| low < high);
-        require(rises, &format!("{at}.range"), "has to rise", format!("{numbers:?}"))?;
+        require(rises, &format!("{at}.range"), "has to rise", &format!("{numbers:?}"))?;
         self.quantity.validate(&format!("{at}.quantity"))
     }
 }
@@ -218,22 +218,22 @@ impl Quantity {
         if let Some((pitch_deg, force_n)) = self.plate() {
             force(force_n, at)?;
             let name = format!("{at}.pitch_deg");
-            require((0.0..=60.0).contains(&pitch_deg), &name, "has to be 0 to 60", pitch_deg)?;
+            require((0.0..=60.0).contains(&pitch_deg), &name, "has to be 0 to 60", &pitch_deg)?;
         }
         match *self {
             Self::Stiffening { from_n, to_n, .. } | Self::AreaRatio { from_n, to_n, .. } => {
                 let name = format!("{at}.from_n");
-                require(from_n > 0.0 && from_n < to_n, &name, "has to be 0 to to_n", from_n)
+                require(from_n > 0.0 && from_n < to_n, &name, "has to be 0 to to_n", &from_n)
             }
             Self::RelaxationTime { rank } => {
-                require(rank >= 1, &format!("{at}.rank"), "has to be 1 or more", rank)
+                require(rank >= 1, &format!("{at}.rank"), "has to be 1 or more", &rank)
             }
             Self::EnergyLost { depth_mm, time_s } => {
                 let name = format!("{at}.depth_mm");
                 let deep = (0.1..=4.0).contains(&depth_mm);
-                require(deep, &name, "has to be 0.1 to 4 mm", depth_mm)?;
+                require(deep, &name, "has to be 0.1 to 4 mm", &depth_mm)?;
                 let name = format!("{at}.time_s");
-                require((1e-4..=1e3).contains(&time_s), &name, "has to be 1e-4 to 1e3 s", time_s)
+                require((1e-4..=1e3).contains(&time_s), &name, "has to be 1e-4 to 1e3 s", &time_s)
             }
             _ => Ok(()),
         }
@@ -246,21 +246,21 @@ impl Sa1 {
             self.curvature_per_m.len() >= 3,
             "sa1.curvature_per_m",
             "has to have 3 or more: two numbers are fitted",
-            self.curvature_per_m.len(),
+            &self.curvature_per_m.len(),
         )?;
         for (i, &c) in self.curvature_per_m.iter().enumerate() {
             let name = format!("sa1.curvature_per_m[{i}]");
             let sane = (0.0..=CURVATURE_MAX_PER_M).contains(&c);
-            require(sane, &name, "has to be 0 (flat) to 2000 1/m", c)?;
+            require(sane, &name, "has to be 0 (flat) to 2000 1/m", &c)?;
         }
-        require(!self.force_n.is_empty(), "sa1.force_n", "has to have one or more", 0)?;
+        require(!self.force_n.is_empty(), "sa1.force_n", "has to have one or more", &0)?;
         for (i, &f) in self.force_n.iter().enumerate() {
             force(f, &format!("sa1.force_n[{i}]"))?;
         }
         rising(&self.force_n, "sa1.force_n")?;
         let rows = self.rate_per_s.len();
         let rule = "has to have one row a force";
-        require(rows == self.force_n.len(), "sa1.rate_per_s", rule, rows)?;
+        require(rows == self.force_n.len(), "sa1.rate_per_s", rule, &rows)?;
         for (i, row) in self.rate_per_s.iter().enumerate() {
             rates(row, self.curvature_per_m.len(), &format!("sa1.rate_per_s[{i}]"))?;
         }
@@ -268,13 +268,13 @@ impl Sa1 {
             let at = |name: &str| format!("sa1.profile[{i}].{name}");
             let known = self.curvature_per_m.contains(&p.curvature_per_m);
             let rule = "has to be one of sa1.curvature_per_m";
-            require(known, &at("curvature_per_m"), rule, p.curvature_per_m)?;
+            require(known, &at("curvature_per_m"), rule, &p.curvature_per_m)?;
             let known = self.force_n.contains(&p.force_n);
-            require(known, &at("force_n"), "has to be one of sa1.force_n", p.force_n)?;
+            require(known, &at("force_n"), "has to be one of sa1.force_n", &p.force_n)?;
             rising(&p.distance_mm, &at("distance_mm"))?;
             let inside = p.distance_mm.iter().all(|d| (0.0..=DISTANCE_MAX_MM).contains(d));
             let found = format!("{:?}", p.distance_mm);
-            require(inside, &at("distance_mm"), "has to be 0 to 6 mm", found)?;
+            require(inside, &at("distance_mm"), "has to be 0 to 6 mm", &found)?;
             rates(&p.rate_per_s, p.distance_mm.len(), &at("rate_per_s"))?;
         }
         Ok(())
@@ -283,25 +283,25 @@ impl Sa1 {
 
 fn force(force_n: f64, at: &str) -> Result<(), PeopleError> {
     let sane = force_n > 0.0 && force_n <= FORCE_MAX_N;
-    require(sane, at, "has to have a force above 0 and at most 50 N", force_n)
+    require(sane, at, "has to have a force above 0 and at most 50 N", &force_n)
 }
 
 fn rising(values: &[f64], at: &str) -> Result<(), PeopleError> {
     let rises = values.windows(2).all(|w| w[0] < w[1]);
-    require(rises, at, "has to rise", format!("{values:?}"))
+    require(rises, at, "has to rise", &format!("{values:?}"))
 }
 
 fn rates(values: &[f64], count: usize, at: &str) -> Result<(), PeopleError> {
-    require(values.len() == count, at, "has to have as many rates as places", values.len())?;
+    require(values.len() == count, at, "has to have as many rates as places", &values.len())?;
     let sane = values.iter().all(|r| r.is_finite() && *r >= 0.0);
-    require(sane, at, "has to have finite rates that are not negative", format!("{values:?}"))
+    require(sane, at, "has to have finite rates that are not negative", &format!("{values:?}"))
 }
 
 fn require(
     ok: bool,
     field: &str,
     rule: &'static str,
-    found: impl ToString,
+    found: &impl ToString,
 ) -> Result<(), PeopleError> {
     if ok {
         return Ok(());

@@ -14,19 +14,18 @@ impl Report {
             let title =
                 format!("SA1 rates: measured, from SED at the interface, from {}", best.name());
             let of = |profile: bool| {
-                let pick = move |p: &Predicted| (p.distance_mm.last() > Some(&0.0)) == profile;
-                (
-                    found.of_sed.iter().filter(move |p| pick(p)).collect(),
-                    found.of_best.iter().filter(move |p| pick(p)).collect(),
-                )
+                let pick = move |p: &&Predicted| (p.distance_mm.last() > Some(&0.0)) == profile;
+                [&found.of_sed, &found.of_best]
+                    .map(|all| all.iter().filter(pick).collect::<Vec<_>>())
             };
-            let (sed, top) = of(false);
-            let rates = rates_chart(title.clone(), "curvature, 1/m", sed, top, |p| {
+            let [sed, top] = of(false);
+            let rates = rates_chart(title.clone(), "curvature, 1/m", [&sed, &top], |p| {
                 (format!("{} N", p.force_n), &p.curvature_per_m)
             });
             write_svg(&folder.join("rates.svg"), &rates)?;
-            let (sed, top) = of(true);
-            let profiles = rates_chart(title, "distance from the middle, mm", sed, top, |p| {
+            let [sed, top] = of(true);
+            let distance = "distance from the middle, mm";
+            let profiles = rates_chart(title, distance, [&sed, &top], |p| {
                 let curvature = p.curvature_per_m.first().copied().unwrap_or(0.0);
                 (format!("{curvature} 1/m"), &p.distance_mm)
             });
@@ -54,8 +53,7 @@ impl Report {
 fn rates_chart<'a>(
     title: String,
     x: &str,
-    sed: Vec<&'a Predicted>,
-    best: Vec<&'a Predicted>,
+    [sed, best]: [&[&'a Predicted]; 2],
     along: impl Fn(&'a Predicted) -> (String, &'a Vec<f64>),
 ) -> Chart {
     let line = |p: &'a Predicted, rates: &[f64], what: &str| {
