@@ -4,7 +4,7 @@ use super::{PICTURES, Report, Row, Verdict, rates};
 use papilla_fingertip::mesh::fingertip::Density;
 use std::fmt::Write as _;
 
-/// What stands before the tables.
+/// What stands before the tables; DENSITY is that of the mesh.
 const HEAD: &str = include_str!("head.md");
 
 impl Verdict {
@@ -43,9 +43,10 @@ impl Report {
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{HEAD}\n{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
+            "{}\n{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
              `coarse`.\n\n## Rows\n\n| quantity | finger here | people | spread | source | | what would \
              mend it |\n|---|---|---|---|---|---|---|\n",
+            HEAD.replace("DENSITY", density(self.density)),
             self.made,
             self.materials.name(),
             density(self.density)

@@ -54,7 +54,7 @@ pub(super) const fn mends(quantity: &Quantity) -> &'static str {
         Quantity::RelaxationTime { .. } | Quantity::EnergyLost { .. } => {
             "Prony terms of 4 and 70 ms, of which no amplitudes are published"
         }
-        Quantity::PeakOverMean { .. } => "stiffening tissue; layers that end at the bone",
+        Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed; a finer mesh",
         Quantity::VolumeLost { .. } => "a Poisson's ratio nearer to 1/2",
     }
 }
