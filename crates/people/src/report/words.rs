@@ -52,7 +52,7 @@ pub(super) const fn mends(quantity: &Quantity) -> &'static str {
         }
         Quantity::Exponential { .. } => "the same",
         Quantity::RelaxationTime { .. } | Quantity::EnergyLost { .. } => {
-            "Prony terms of 4 and 70 ms, of which no amplitudes are published"
+            "Prony terms of 4 and 70 ms, of whose amplitudes the abstract says nothing"
         }
         Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed; a finer mesh",
         Quantity::VolumeLost { .. } => "a Poisson's ratio nearer to 1/2",
