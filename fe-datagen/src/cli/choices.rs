@@ -1,6 +1,7 @@
 //! What options name, and what they stand for in the libraries.
 
 use papilla_fingertip::mesh::fingertip;
+use papilla_people::study;
 use papilla_validation::{calculix, wedge};
 
 /// Makes a choice of the command line that stands for an enumeration of the same variants.
@@ -31,6 +32,16 @@ choice! {
         Medium,
         /// About 185 thousand unknowns: the reference.
         Fine,
+    }
+}
+
+choice! {
+    /// Laws and constants of the tissues.
+    Materials for study::Materials {
+        /// Neo-Hookean with the moduli of Maeno 1998 and Chen, Shuai & Zhu.
+        NeoHookean,
+        /// Ogden's law of Chen, Shuai & Zhu for dermis and fat.
+        Ogden,
     }
 }
 

@@ -12,6 +12,7 @@ mod explain;
 mod explain_campaign;
 mod export;
 mod generate;
+mod human;
 mod influence;
 mod lines;
 mod part;
@@ -52,6 +53,7 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Convergence(convergence::Args),
+    Human(human::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
@@ -70,6 +72,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Convergence(args) => convergence::run(&args),
+        Command::Human(args) => human::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),

@@ -1,0 +1,129 @@
+//! The report as Markdown and as plain text.
+
+use super::{PICTURES, Report, Row, Verdict, rates};
+use papilla_fingertip::mesh::fingertip::Density;
+use std::fmt::Write as _;
+
+/// What stands before the tables; DENSITY is that of the mesh.
+const HEAD: &str = include_str!("head.md");
+
+impl Verdict {
+    fn text(&self) -> String {
+        match self {
+            Self::Ok => "ok".into(),
+            Self::Failed => "**failed**".into(),
+            Self::TimesPeople(factor) => format!("{factor:.2} times people's"),
+            Self::NotReached(why) => format!("**not reached**: {why}"),
+        }
+    }
+}
+
+impl Row {
+    fn here_text(&self) -> String {
+        match self.here {
+            None => String::new(),
+            Some(v) if v.abs() < 0.1 => format!("{v:.4}"),
+            Some(v) if v.abs() < 10.0 => format!("{v:.3}"),
+            Some(v) => format!("{v:.1}"),
+        }
+    }
+
+    /// What would mend a row that does not hold, or is a tenth off.
+    fn mends_text(&self) -> &'static str {
+        match self.verdict {
+            Verdict::Ok => "",
+            Verdict::TimesPeople(factor) if (factor - 1.0).abs() <= 0.1 => "",
+            _ => self.mends,
+        }
+    }
+}
+
+impl Report {
+    /// The report as a page of docs/reports.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = format!(
+            "{}\n{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
+             `coarse`.\n\n## Rows\n\n| quantity | finger here | people | spread | source | | what would \
+             mend it |\n|---|---|---|---|---|---|---|\n",
+            HEAD.replace("DENSITY", density(self.density)),
+            self.made,
+            self.materials.name(),
+            density(self.density)
+        );
+        for r in &self.rows {
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {} | {} | {} |",
+                r.quantity,
+                r.here_text(),
+                r.people,
+                r.spread,
+                r.source,
+                r.verdict.text(),
+                r.mends_text()
+            );
+        }
+        if let Some(found) = &self.afferents {
+            rates::afferents(&mut text, found);
+        }
+        if !self.mesh_errors.is_empty() {
+            rates::mesh_errors(&mut text, &self.mesh_errors);
+        }
+        if !self.plates.is_empty() {
+            self.plates(&mut text);
+        }
+        text
+    }
+
+    fn plates(&self, text: &mut String) {
+        let _ = write!(text, "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\n");
+        text.push_str("| plate | depth, mm | force, N | stiffness, N/mm | contact area, mm2 |\n");
+        text.push_str("|---|---|---|---|---|\n");
+        for p in &self.plates {
+            let stiffness = p.path.stiffness_n_per_mm();
+            for (k, s) in stiffness.iter().enumerate() {
+                let _ = writeln!(
+                    text,
+                    "| {} degrees | {:.2} | {:.3} | {s:.2} | {:.1} |",
+                    p.pitch_deg, p.path.depth_mm[k], p.path.force_n[k], p.area_mm2[k]
+                );
+            }
+        }
+        for p in &self.plates {
+            let _ = writeln!(
+                text,
+                "\nPlate at {} degrees: {} unknowns, {:.0} s of processor time, energy and work part \
+                 by {:.2} % at most{}.",
+                p.pitch_deg,
+                p.unknowns,
+                p.solve_s,
+                100.0 * p.energy_vs_work_max,
+                p.ended.as_deref().map(|w| format!("; it ended: {w}")).unwrap_or_default()
+            );
+        }
+    }
+
+    /// A table for people.
+    #[must_use]
+    pub fn human(&self) -> String {
+        let mut text = format!("{:78} {:>8}  {:<18} verdict\n", "quantity", "here", "people");
+        for r in &self.rows {
+            let verdict = r.verdict.text().replace("**", "");
+            let (here, people) = (r.here_text(), &r.people);
+            let _ = writeln!(text, "{:78} {here:>8}  {people:<18} {verdict}", r.quantity);
+        }
+        if let Some(found) = &self.afferents {
+            rates::human(&mut text, found);
+        }
+        text
+    }
+}
+
+const fn density(density: Density) -> &'static str {
+    match density {
+        Density::Coarse => "coarse",
+        Density::Medium => "medium",
+        Density::Fine => "fine",
+    }
+}
