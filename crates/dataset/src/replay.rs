@@ -3,7 +3,7 @@
 use super::{Dataset, DatasetError, IndentationEntry, MapReader, Maps, Split};
 use crate::record::Pose;
 use papilla_atlas::{AtlasError, MAP_LEN, Patch, Raster};
-use papilla_output::atomic;
+use papilla_output::{OutputError, atomic};
 use serde::Serialize;
 use std::path::Path;
 
@@ -67,7 +67,10 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
         dataset_sha256: dataset.manifest().dataset_sha256.clone(),
         presses,
     };
-    atomic::write_json(path, &replay)?;
+    // On one line: there are half a million numbers.
+    let text = serde_json::to_vec(&replay)
+        .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
+    atomic::write(path, &text)?;
     Ok(names)
 }
 

@@ -36,6 +36,8 @@ OPERATORS = frozenset(
         # Networks on faces.
         *("Add", "Cast", "Gather", "MatMul", "ReduceSum", "Reshape", "Slice", "Sub"),
         *("Squeeze", "Tanh", "Unsqueeze"),
+        # Networks on maps.
+        *("DepthToSpace", "Einsum", "Flatten", "ReduceMean", "Transpose"),
     }
 )
 METADATA = (
