@@ -166,9 +166,19 @@ fn draw_on(area: &Area<'_>, chart: &Chart, x: Scale, y: Scale) -> Drawn {
     if chart.series.iter().all(|s| s.mark == Mark::Dots) {
         return Ok(());
     }
+    // The legend stands on the side of the upper half that fewer points pass.
+    let points = chart.series.iter().flat_map(|s| &s.points);
+    let places = points.map(|p| context.backend_coord(p));
+    let upper = places.filter(|place| place.1 < (ys.start + ys.end) / 2);
+    let (right, left): (Vec<_>, Vec<_>) = upper.partition(|at| at.0 > (xs.start + xs.end) / 2);
+    let corner = if right.len() > left.len() {
+        SeriesLabelPosition::UpperLeft
+    } else {
+        SeriesLabelPosition::UpperRight
+    };
     context
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(corner)
         .background_style(WHITE.mix(0.85))
         .border_style(RGBColor(200, 200, 200))
         .label_font(("sans-serif", 14))

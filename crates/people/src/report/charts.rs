@@ -11,8 +11,7 @@ impl Report {
     pub(super) fn write_charts(&self, folder: &Path) -> Result<(), OutputError> {
         if let Some(found) = &self.afferents {
             let best = &found.fits[found.best];
-            let title =
-                format!("SA1 rates: measured, from SED at the interface, from {}", best.name());
+            let title = format!("SA1 rates; best: {}", best.name());
             let of = |profile: bool| {
                 let pick = move |p: &&Predicted| (p.distance_mm.last() > Some(&0.0)) == profile;
                 [&found.of_sed, &found.of_best]
@@ -63,7 +62,10 @@ fn rates_chart<'a>(
     };
     let mut series: Vec<Series> =
         sed.iter().map(|p| line(p, &p.measured_per_s, "measured")).collect();
-    series.extend(sed.iter().map(|p| line(p, &p.here_per_s, "SED")));
-    series.extend(best.iter().map(|p| line(p, &p.here_per_s, "best")));
+    // The first and the last of each: more lines would not be told apart.
+    for (all, what) in [(sed, "SED"), (best, "best")] {
+        let ends = all.first().into_iter().chain(all.last().filter(|_| all.len() > 1));
+        series.extend(ends.map(|p| line(p, &p.here_per_s, what)));
+    }
     Chart { title, x: Axis::linear(x), y: Axis::linear("impulses/s"), series }
 }
