@@ -119,8 +119,12 @@ pub(crate) fn model_folder(atlas: &Atlas, sample: &Sample, onnx: &[u8]) -> TempD
     write("index.json", br#"{"default": "tiny", "models": ["tiny"]}"#);
     write("tiny.onnx", onnx);
     write("tiny.json", card_of(onnx).to_json().unwrap().as_bytes());
+    let at_pixels = |patch, values: &[f32]| -> Vec<f32> {
+        Raster::new(atlas, patch).pixels().iter().map(|pixel| pixel.value(values)).collect()
+    };
     let state = json!({"name": "coarse", "depth_mm": sample.depth_mm,
-        "pressure_pa": sample.pressure_pa, "sed_j_per_m3": sample.sed_j_per_m3});
+        "pressure_pa": at_pixels(Patch::Skin, &sample.pressure_pa),
+        "sed_j_per_m3": at_pixels(Patch::Interface, &sample.sed_j_per_m3)});
     write("replay.json", json!({"presses": [state]}).to_string().as_bytes());
     models
 }
