@@ -27,6 +27,7 @@
 mod backend;
 pub mod card;
 mod choice;
+mod convolution;
 mod error;
 mod guard;
 mod info;

@@ -1,7 +1,7 @@
 //! Where the time of a model goes in tract: its operators, each with what it reads and computes.
 
 use crate::tract_backend::{SHAPE, TractModel};
-use crate::{EngineError, checked, guard::guarded, products, sparse, trial_map};
+use crate::{EngineError, checked, convolution, guard::guarded, products, sparse, trial_map};
 use std::time::{Duration, Instant};
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::ops::Cost;
@@ -88,7 +88,8 @@ fn operator(model: &TypedModel, node: &TypedNode, median: Duration) -> TractResu
             _ => {}
         }
     }
-    if let Some((table_bytes, terms)) = sparse::table(node).or_else(|| products::table(node)) {
+    let of_ours = sparse::table(node).or_else(|| products::table(node));
+    if let Some((table_bytes, terms)) = of_ours.or_else(|| convolution::table(node)) {
         constant_bytes += table_bytes;
         operations += 2 * terms;
     }

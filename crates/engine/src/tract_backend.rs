@@ -2,7 +2,7 @@
 
 use crate::{
     Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
-    check_output, guard::guarded, products, sparse, widen::widen,
+    check_output, convolution, guard::guarded, products, sparse, widen::widen,
 };
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
@@ -27,11 +27,14 @@ impl TractModel {
         info.backend = LABEL.to_owned();
         widen(&mut proto);
         let typed = guarded("read the model", || {
-            products::keep_joined(tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()?)
+            let typed = tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()?;
+            convolution::run_direct(products::keep_joined(typed)?)
         })?;
         check_sizes(&typed)?;
         let plan = guarded("optimise the model", || {
-            let fused = sparse::fuse(typed.into_decluttered()?)?;
+            // Again: only now is a bias that was given a shape known to be constant.
+            let direct = convolution::run_direct(typed.into_decluttered()?)?;
+            let fused = sparse::fuse(direct)?;
             products::stack(fused)?.into_optimized()?.into_runnable()
         })?;
         Ok(Self { info, plan })

@@ -1,0 +1,81 @@
+//! Convolutions of maps, run as they stand.
+//!
+//! tract lays every patch of a map out as a column, packs the columns and multiplies them with the
+//! kernels. Between few channels that writes and reads nine times the map for a small product: four
+//! times the [bound](crate::profile). Here sums of four channels and two vectors of pixels stay in
+//! registers while rows of the map pass by.
+
+mod direct;
+#[cfg(test)]
+mod tests;
+
+use direct::{Direct, Shape};
+use tract_onnx::tract_core::internal::*;
+use tract_onnx::tract_core::ops::cnn::{Conv, KernelFormat};
+use tract_onnx::tract_core::ops::nn::DataFormat;
+
+/// Most weights of a convolution that is run as it stands (1 MiB): they are read again for every row
+/// and have to stay in the cache.
+const WEIGHTS_MAX: usize = 1 << 18;
+
+/// Replaces convolutions of one map by constant kernels. Those of one pixel are products once the
+/// graph is decluttered.
+pub(crate) fn run_direct(mut model: TypedModel) -> TractResult<TypedModel> {
+    for node in model.eval_order()? {
+        let Some(convolution) = direct(&model, node)? else { continue };
+        let mut patch = TypedModelPatch::new("direct convolution");
+        let source = patch.tap_model(&model, model.nodes[node].inputs[0])?;
+        let name = format!("{}.direct", model.nodes[node].name);
+        let made = patch.wire_node(name, convolution, &[source])?;
+        patch.shunt_outside(&model, node.into(), made[0])?;
+        patch.apply(&mut model)?;
+    }
+    model.compact()?;
+    Ok(model)
+}
+
+/// Bytes of the weights and products of a map of a node that is such a convolution.
+pub(crate) fn table(node: &TypedNode) -> Option<(u64, u64)> {
+    node.op_as::<Direct>().map(Direct::size)
+}
+
+/// The convolution at a node, if it is one of step 1, between constant kernels and one map.
+fn direct(model: &TypedModel, node: usize) -> TractResult<Option<Direct>> {
+    let node = &model.nodes[node];
+    let Some(op) = node.op_as::<Conv>() else { return Ok(None) };
+    let facts = model.node_input_facts(node.id)?;
+    let &[map, kernels, bias] = &facts[..] else { return Ok(None) };
+    let pool = &op.pool_spec;
+    let is_plain = op.group == 1
+        && op.q_params.is_none()
+        && op.kernel_fmt == KernelFormat::OIHW
+        && pool.data_format == DataFormat::NCHW
+        && pool.strides().iter().chain(&*pool.dilations()).all(|&step| step == 1);
+    let (Some(shape), Some(kernels), Some(bias)) =
+        (map.shape.as_concrete(), &kernels.konst, &bias.konst)
+    else {
+        return Ok(None);
+    };
+    let is_f32 = |tensor: &Tensor| tensor.datum_type() == f32::datum_type() && tensor.is_plain();
+    let (&[1, channels, rows, columns], &[made, _, kernel_rows, kernel_columns]) =
+        (shape, kernels.shape())
+    else {
+        return Ok(None);
+    };
+    if !is_plain
+        || map.datum_type != f32::datum_type()
+        || !is_f32(kernels)
+        || !is_f32(bias)
+        || kernels.len() > WEIGHTS_MAX
+    {
+        return Ok(None);
+    }
+    let padding = pool.computed_padding(&[rows, columns]);
+    let shape = Shape {
+        map: [channels, rows, columns],
+        before: [padding[0].pad_before, padding[1].pad_before],
+        kernel: [kernel_rows, kernel_columns],
+        made: [made, padding[0].convoluted, padding[1].convoluted],
+    };
+    Direct::new(shape, kernels, bias).map(Some)
+}
