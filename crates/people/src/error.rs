@@ -3,6 +3,7 @@
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
+use papilla_validation::part::PartError;
 use std::path::PathBuf;
 
 /// Why a comparison stopped.
@@ -68,14 +69,9 @@ pub enum PeopleError {
         /// Which, and where.
         why: String,
     },
-    /// A file of an earlier run cannot be read.
-    #[error("{}: {why}; delete it, and it is solved again", path.display())]
-    Part {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        why: String,
-    },
+    /// What an earlier run stored is of no use.
+    #[error(transparent)]
+    Part(#[from] PartError),
     /// A file cannot be read or written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -9,7 +9,6 @@ use papilla_fingertip::scene::{EffectName, Geometry, Motion, Pose, Scene};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_sdf::{IndenterSpec, Plate, Sphere};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
 
 /// Laws and constants of the tissues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,15 +83,9 @@ impl Press {
 
     /// The indenter in its pose.
     pub(crate) fn approach(&self) -> Result<Approach, PeopleError> {
-        let failed = |source| PeopleError::Indenter { press: self.name.clone(), source };
-        Ok(Approach {
-            shape: self.indenter.build(Path::new("")).map_err(|e| failed(e.into()))?,
-            top_mm: self.indenter.top_mm(),
-            pose: Pose { pitch_deg: self.pitch_deg, ..Pose::default() },
-            offset_mm: [0.0; 2],
-            friction: 0.0,
-            contact: None,
-        })
+        let pose = Pose { pitch_deg: self.pitch_deg, ..Pose::default() };
+        Approach::straight(&self.indenter, pose)
+            .map_err(|source| PeopleError::Indenter { press: self.name.clone(), source })
     }
 
     /// Where it first touches the undeformed finger, on its way to some depths.

@@ -168,11 +168,8 @@ impl<'a> Receptors<'a> {
     /// SED of the interface's dermis side, J/m3, as maps have it.
     fn interface_sed(&self, record: &IncrementRecord) -> Vec<f64> {
         let nodes = self.body.patch.as_ref().map_or(&[][..], |p| &p.patch.interface);
-        let mut nodal = vec![0.0; self.body.problem.mesh.nodes.len()];
-        for (&n, v) in nodes.iter().zip(&record.sed_dermis_mpa) {
-            nodal[n as usize] = PA_PER_MPA * v;
-        }
-        self.interface.read(|n| nodal[n as usize])
+        let nodal = self.body.at_nodes(nodes, &record.sed_dermis_mpa);
+        self.interface.read(|n| PA_PER_MPA * nodal[n as usize])
     }
 }
 

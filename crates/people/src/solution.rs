@@ -5,11 +5,10 @@ use crate::contact::{self, ContactRead};
 use crate::force_path::{ForcePath, steps_mm};
 use crate::press::Press;
 use crate::receptors::{Felt, Receptors};
-use papilla_dataset::{BALANCE_RELATIVE_MAX, sha256_hex};
+use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
-use papilla_fingertip::mesh::fingertip::Density;
-use papilla_fingertip::mesh::fingertip::Order;
+use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::mesh::grading::Contact;
 use papilla_fingertip::scene::Scene;
 use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
@@ -17,8 +16,7 @@ use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::Drive;
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_output::OutputError;
-use papilla_validation::processor;
+use papilla_validation::{part, processor};
 use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -97,28 +95,16 @@ impl Solution {
         folder: &Path,
     ) -> Result<Self, PeopleError> {
         let scene = press.scene(course.density, course.depths_mm.last().copied().unwrap_or(1.0));
-        let text = serde_json::to_string(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))
-            .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
-        let fingerprint = sha256_hex(text.as_bytes());
+        let fingerprint = part::fingerprint(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("{}-{}.json", press.name, &fingerprint[..8]));
-        if let Some(found) = Self::read(&path)?.filter(|f| f.fingerprint == fingerprint) {
+        let found: Option<Self> = part::read_json(&path)?;
+        if let Some(found) = found.filter(|f| f.fingerprint == fingerprint) {
             return Ok(found);
         }
         let mut solution = Self { fingerprint, ..Self::default() };
         solution.solve(press, course, &scene)?;
         papilla_output::atomic::write_json(&path, &solution)?;
         Ok(solution)
-    }
-
-    fn read(path: &Path) -> Result<Option<Self>, PeopleError> {
-        let text = match std::fs::read(path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            found => found.map_err(OutputError::io("read", path))?,
-        };
-        let reader = &mut serde_json::Deserializer::from_slice(&text);
-        serde_path_to_error::deserialize(reader)
-            .map(Some)
-            .map_err(|e| PeopleError::Part { path: path.into(), why: e.to_string() })
     }
 
     fn solve(&mut self, press: &Press, course: &Course, scene: &Scene) -> Result<(), PeopleError> {

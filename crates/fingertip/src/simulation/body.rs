@@ -250,6 +250,16 @@ impl Body {
         self.patch.as_mut()?.patch.vertices.take()
     }
 
+    /// Values of `nodes` as a field of all nodes of the mesh, NaN where none is given.
+    #[must_use]
+    pub fn at_nodes(&self, nodes: &[u32], values: &[f64]) -> Vec<f64> {
+        let mut field = vec![f64::NAN; self.problem.mesh.nodes.len()];
+        for (&node, value) in nodes.iter().zip(values) {
+            field[node as usize] = *value;
+        }
+        field
+    }
+
     /// The atlas of the body's patch; `None` for a body without one and for a section.
     ///
     /// # Errors

@@ -4,10 +4,12 @@ use super::body::{Body, SimulationError};
 use super::guide::Guided;
 use super::record::IncrementRecord;
 use super::way::Way;
+use crate::indenter::IndenterError;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Loading, Snapshot, Solver, StepReport};
-use papilla_sdf::{Plate, RoundedPlate, SignedDistance};
+use papilla_sdf::{IndenterSpec, Plate, RoundedPlate, SignedDistance};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -43,6 +45,21 @@ impl Approach {
             friction: 0.0,
             contact: None,
         }
+    }
+
+    /// A described indenter in a pose, straight over the first touch, without friction.
+    ///
+    /// # Errors
+    /// [`IndenterError`] if the description is of no shape, or names a file that cannot be read.
+    pub fn straight(indenter: &IndenterSpec, pose: Pose) -> Result<Self, IndenterError> {
+        Ok(Self {
+            shape: indenter.build(Path::new(""))?,
+            top_mm: indenter.top_mm(),
+            pose,
+            offset_mm: [0.0; 2],
+            friction: 0.0,
+            contact: None,
+        })
     }
 }
 

@@ -1,9 +1,9 @@
 //! What keeps a study from being made.
 
+use crate::part::PartError;
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_output::OutputError;
-use std::path::PathBuf;
 
 /// Why a convergence study stopped.
 #[derive(Debug, thiserror::Error)]
@@ -32,14 +32,9 @@ pub enum ConvergenceError {
         /// Why.
         why: String,
     },
-    /// A file of an earlier run cannot be read.
-    #[error("{}: {why}; delete it, and it is solved again", path.display())]
-    Part {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        why: String,
-    },
+    /// What an earlier run stored is of no use.
+    #[error(transparent)]
+    Part(#[from] PartError),
     /// A file cannot be read or written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -3,9 +3,9 @@
 use super::target::Target;
 use super::{Case, ConvergenceError, MeshChoice};
 use crate::acceptance::fault;
-use crate::processor;
+use crate::{part, processor};
 use ndarray::Ix2;
-use papilla_dataset::{BALANCE_RELATIVE_MAX, sha256_hex};
+use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fem::tensor::norm;
@@ -59,16 +59,12 @@ impl Solution {
         folder: &Path,
     ) -> Result<Self, ConvergenceError> {
         let scene = scene(case, mesh, states, target);
-        let text = serde_json::to_string(&(&scene, env!("CARGO_PKG_VERSION")))
-            .map_err(|e| OutputError::Encode { what: "JSON", message: e.to_string() })?;
-        let fingerprint = sha256_hex(text.as_bytes());
+        let fingerprint = part::fingerprint(&(&scene, env!("CARGO_PKG_VERSION")))?;
         let stem = folder.join(format!("{}-{}", case.name, mesh.name));
         let (arrays, record) = (stem.with_extension("npz"), stem.with_extension("json"));
-        if record.exists() {
-            let found = Self::read(&arrays, &record)?;
-            if found.record.fingerprint == fingerprint {
-                return Ok(found);
-            }
+        let found: Option<Record> = part::read_json(&record)?;
+        if let Some(found) = found.filter(|found| found.fingerprint == fingerprint) {
+            return Self::read(&arrays, found);
         }
         let mut solution = Self::default();
         solution.record.fingerprint = fingerprint;
@@ -128,22 +124,14 @@ impl Solution {
         Ok(papilla_output::atomic::write_json(record, &self.record)?)
     }
 
-    fn read(arrays: &Path, record: &Path) -> Result<Self, ConvergenceError> {
-        let bad = |path: &Path, why: String| ConvergenceError::Part { path: path.into(), why };
-        let text = std::fs::read(record).map_err(OutputError::io("read", record))?;
-        let found: Record =
-            serde_json::from_slice(&text).map_err(|e| bad(record, e.to_string()))?;
+    fn read(arrays: &Path, record: Record) -> Result<Self, ConvergenceError> {
         let bytes = std::fs::read(arrays).map_err(OutputError::io("read", arrays))?;
         let mut npz = NpzArrays::new(arrays, &bytes)?;
         let mut rows = |name: &str| -> Result<Vec<Vec<f32>>, ConvergenceError> {
             let all = npz.get::<f32, Ix2>(name)?;
             Ok(all.outer_iter().map(|row| row.to_vec()).collect())
         };
-        Ok(Self {
-            pressure_pa: rows("pressure_pa")?,
-            sed_j_per_m3: rows("sed_j_per_m3")?,
-            record: found,
-        })
+        Ok(Self { pressure_pa: rows("pressure_pa")?, sed_j_per_m3: rows("sed_j_per_m3")?, record })
     }
 }
 
@@ -189,10 +177,7 @@ impl<'a> Readers<'a> {
     }
 
     fn read(&self, reader: &SurfaceReader, nodes: &[u32], values: &[f64]) -> Vec<f32> {
-        let mut nodal = vec![f64::NAN; self.body.problem.mesh.nodes.len()];
-        for (&n, v) in nodes.iter().zip(values) {
-            nodal[n as usize] = PA_PER_MPA * v;
-        }
-        reader.read(|n| nodal[n as usize]).into_iter().map(|v| v as f32).collect()
+        let nodal = self.body.at_nodes(nodes, values);
+        reader.read(|n| PA_PER_MPA * nodal[n as usize]).into_iter().map(|v| v as f32).collect()
     }
 }

@@ -3,11 +3,9 @@
 use super::{Case, ConvergenceError};
 use papilla_fem::tensor::norm;
 use papilla_fingertip::geometry::fingertip::FingertipShape;
-use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::grading::Contact;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_sdf::IndenterSpec;
-use std::path::Path;
 
 /// Half of the side of the square around the first touch that is read, mm.
 const HALF_MM: f64 = 7.0;
@@ -33,17 +31,8 @@ impl Target {
         let describe = |why: String| ConvergenceError::Description { case: case.name, why };
         let indenter = case.indenter().map_err(|e| describe(e.to_string()))?;
         let motion = case.motion(1);
-        let approach = Approach {
-            shape: indenter.build(Path::new("")).map_err(|e| ConvergenceError::Indenter {
-                case: case.name,
-                source: IndenterError::from(e),
-            })?,
-            top_mm: indenter.top_mm(),
-            pose: motion.pose(),
-            offset_mm: [0.0; 2],
-            friction: 0.0,
-            contact: None,
-        };
+        let approach = Approach::straight(&indenter, motion.pose())
+            .map_err(|source| ConvergenceError::Indenter { case: case.name, source })?;
         let depths = Drive::Depths(motion.depth_mm.into_iter().collect());
         let contact = approach
             .contact_with(&finger, &depths)
