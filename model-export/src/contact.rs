@@ -1,13 +1,15 @@
 //! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
 //! takes.
 
+mod placed;
+
+use self::placed::placed;
 use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::{SampleMetrics, quantile};
 use crate::{ExportError, read};
 use papilla_contact::{Contact, ContactModel, Gaps, Method, Object, Scene, Settings, Solver};
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::Patch;
-use papilla_proto::sdf::{Placement, first_touch_travel};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -57,7 +59,7 @@ pub struct Row {
     pub rung: &'static str,
     /// Campaign.
     pub set: String,
-    /// Relative L2 of pressure at the vertices.
+    /// Relative L2 of the pressure map.
     pub pressure: [f64; 2],
     /// Relative error of the size of the force.
     pub force: [f64; 2],
@@ -115,44 +117,6 @@ fn thread_s() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Where an indenter is at a depth, in the finger's frame: as the dataset's simulations place it, at
-/// the first touch of a vertex.
-fn placed(
-    dataset: &Dataset,
-    indentation: &Indentation,
-    depth_mm: f64,
-) -> Result<Option<Object>, ExportError> {
-    let path = dataset.shard_path(indentation);
-    let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
-    let Some(spec) = dataset.indenter(indentation) else {
-        return Err(bad("the manifest does not say what pressed".into()));
-    };
-    let shape = spec.build(Path::new("")).map_err(|error| bad(error.to_string()))?;
-    let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm: [a, b], .. } = *indentation;
-    let mut placement = Placement::turned(pitch_deg, roll_deg, yaw_deg, [0.0; 3]);
-    let axis = |k: usize| [0, 1, 2].map(|i| placement.rotation[i][k]);
-    let (x, y, normal) = (axis(0), axis(1), axis(2));
-    let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
-    let points: Vec<[f64; 3]> = skin.iter().map(|p| p.map(f64::from)).collect();
-    let along = |p: &[f64; 3]| (0..3).map(|i| p[i] * normal[i]).sum::<f64>();
-    let least = points.iter().map(along).fold(f64::INFINITY, f64::min);
-    let touching: Vec<_> = points.iter().filter(|p| along(p) <= least + 1e-5).collect();
-    let top_mm = spec.top_mm();
-    let from: [f64; 3] = std::array::from_fn(|i| {
-        let first = touching.iter().map(|p| p[i]).sum::<f64>() / touching.len() as f64;
-        first - top_mm * normal[i] + a * x[i] + b * y[i]
-    });
-    placement.origin_mm = from;
-    let touch = match first_touch_travel(shape.as_ref(), &placement, normal, &points) {
-        Ok(travel) => travel,
-        // Inside by the rounding of positions to f32: there already.
-        Err(papilla_proto::sdf::TouchError::StartsInside { by_mm }) if by_mm < 1e-4 => 0.0,
-        Err(_) => return Ok(None),
-    };
-    placement.origin_mm = std::array::from_fn(|i| from[i] + (touch + depth_mm) * normal[i]);
-    Ok(Some(Object::rigid(shape, placement)))
-}
-
 /// Measures a rung on the held-out indentations of a dataset, every `every`th state.
 ///
 /// # Errors
@@ -179,7 +143,7 @@ pub fn measure(
                 continue;
             }
             let depth_mm = f64::from(shard.depth_mm[state]);
-            let Some(object) = placed(dataset, indentation, depth_mm)? else { continue };
+            let Some(object) = placed(dataset, indentation, &shard, depth_mm)? else { continue };
             solver.reset();
             let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);
             figures.cold_us.push(cold);
@@ -251,8 +215,14 @@ impl Figures {
         out: &Contact,
         network: &mut Option<&mut (dyn Session + '_)>,
     ) -> Result<(), ExportError> {
+        let [mut pressure_pa, mut sed, mut truth] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
+        let path = dataset.shard_path(indentation);
+        let refused = |source| ExportError::Atlas { path: path.clone(), source };
+        let skin = dataset.maps.raster(Patch::Skin);
+        skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?;
+        dataset.draw_pressure(indentation, shard, state, &mut truth)?;
         let (mut miss, mut size) = (0.0, 0.0);
-        for (found, due) in out.pressure_pa.iter().zip(shard.pressure_pa.row(state)) {
+        for (found, due) in pressure_pa.iter().zip(&truth) {
             miss += f64::from(found - due).powi(2);
             size += f64::from(*due).powi(2);
         }
@@ -266,14 +236,6 @@ impl Figures {
         self.told[1] += usize::from(out.quality.out_of_range);
         self.told[2] += 1;
         let Some(network) = network else { return Ok(()) };
-        let [mut pressure_pa, mut sed, mut truth] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
-        let path = dataset.shard_path(indentation);
-        let refused = |source| ExportError::Atlas { path: path.clone(), source };
-        dataset
-            .maps
-            .raster(Patch::Skin)
-            .rasterise(&out.pressure_pa, &mut pressure_pa)
-            .map_err(refused)?;
         let failed = |source| ExportError::Engine { path: path.clone(), source };
         network.infer(&pressure_pa, &mut sed).map_err(failed)?;
         dataset.draw_sed(indentation, shard, state, &mut truth)?;

@@ -1,0 +1,72 @@
+//! Where an indenter of a dataset stands, in the finger's frame.
+
+use crate::ExportError;
+use crate::dataset::{Dataset, Indentation, Shard};
+use papilla_contact::Object;
+use papilla_fingertip::geometry::fingertip::FingertipShape;
+use papilla_fingertip::scene::Pose;
+use papilla_fingertip::simulation::drive::{Approach, Drive};
+use papilla_proto::atlas::Patch;
+use papilla_proto::sdf::{IndenterSpec, Placement, TouchError, first_touch_travel};
+use std::sync::Arc;
+
+/// An indenter at a depth from first touch, as the dataset's simulations place it: on graded meshes
+/// from the skin itself, on the even lattice from its nodes. `None` if it passes the finger.
+pub(super) fn placed(
+    dataset: &Dataset,
+    indentation: &Indentation,
+    shard: &Shard,
+    depth_mm: f64,
+) -> Result<Option<Object>, ExportError> {
+    let path = dataset.shard_path(indentation);
+    let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+    let Some(spec) = dataset.indenter(indentation) else {
+        return Err(bad("the manifest does not say what pressed".into()));
+    };
+    let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm, .. } = *indentation;
+    let pose = Pose { pitch_deg, roll_deg, yaw_deg };
+    let mut approach = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
+    approach.offset_mm = offset_mm;
+    let shape = Arc::clone(&approach.shape);
+    let touch = if shard.cells.is_some() {
+        let contact = approach.contact_with(&FingertipShape::default(), &Drive::Depths(vec![]));
+        contact.map(|contact| (contact.start, contact.direction))
+    } else {
+        on_vertices(dataset, spec, &approach)
+    };
+    Ok(touch.map(|(mut placement, direction)| {
+        placement.origin_mm =
+            std::array::from_fn(|i| placement.origin_mm[i] + depth_mm * direction[i]);
+        Object::rigid(shape, placement)
+    }))
+}
+
+/// Where it first touches one of the atlas' vertices, and its way.
+fn on_vertices(
+    dataset: &Dataset,
+    spec: &IndenterSpec,
+    approach: &Approach,
+) -> Option<(Placement, [f64; 3])> {
+    let Approach { shape, pose, offset_mm: [a, b], .. } = approach;
+    let mut placement = Placement::turned(pose.pitch_deg, pose.roll_deg, pose.yaw_deg, [0.0; 3]);
+    let axis = |k: usize| [0, 1, 2].map(|i| placement.rotation[i][k]);
+    let (x, y, normal) = (axis(0), axis(1), axis(2));
+    let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
+    let points: Vec<[f64; 3]> = skin.iter().map(|p| p.map(f64::from)).collect();
+    let along = |p: &[f64; 3]| (0..3).map(|i| p[i] * normal[i]).sum::<f64>();
+    let least = points.iter().map(along).fold(f64::INFINITY, f64::min);
+    let touching: Vec<_> = points.iter().filter(|p| along(p) <= least + 1e-5).collect();
+    let top_mm = spec.top_mm();
+    placement.origin_mm = std::array::from_fn(|i| {
+        let first = touching.iter().map(|p| p[i]).sum::<f64>() / touching.len() as f64;
+        first - top_mm * normal[i] + a * x[i] + b * y[i]
+    });
+    let travel_mm = match first_touch_travel(shape.as_ref(), &placement, normal, &points) {
+        Ok(travel_mm) => travel_mm,
+        // Inside by the rounding of positions to f32: there already.
+        Err(TouchError::StartsInside { by_mm }) if by_mm < 1e-4 => 0.0,
+        Err(_) => return None,
+    };
+    placement.origin_mm = std::array::from_fn(|i| placement.origin_mm[i] + travel_mm * normal[i]);
+    Some((placement, normal))
+}
