@@ -32,9 +32,9 @@ will serve it, on indentations that no training saw, and writes its card.";
 
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
-  model-export check    models/s1-base8.onnx --atlas models/atlas.json
-  model-export evaluate models/s1-base8.onnx data/s1 --out out/models/s1-base8.json --pictures docs/reports/pictures/s1-base8
-  model-export index    models --default s1-base8
+  model-export check    models/small.onnx --atlas models/atlas.json
+  model-export evaluate models/small.onnx data/broad-graded --out out/models/small.json --pictures docs/reports/pictures/small
+  model-export index    models --default small
   model-export patterns models --dataset data/s1
   model-export table    models/*.json
 All models and the solver itself, error against time:

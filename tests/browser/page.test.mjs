@@ -358,7 +358,7 @@ test('a server that says nothing is given up and found again', async () => {
 test('a press beyond what the network learnt says so', async () => {
   await chooseRadio('mode', 'press');
   // The one whose maps end where a press on the page can still go.
-  await page.selectOption('#tier', 'fe-operator');
+  await page.selectOption('#tier', 'half-space');
   await page.evaluate(() => globalThis.papilla.press.moveToPixel(112, 112));
   await chooseRadio('shape', 'sphere');
   await page.fill('#radius', '1.5');

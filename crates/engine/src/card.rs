@@ -13,7 +13,7 @@ use serde_json::Value;
 pub struct Card {
     /// Version of this layout.
     pub format: u32,
-    /// Name of the model, such as `s1-base8`.
+    /// Name of the model, such as `small`.
     pub name: String,
     /// SHA-256 of the `.onnx` file, 64 lower-case hexadecimal digits.
     pub onnx_sha256: String,

@@ -11,7 +11,7 @@ use tract_onnx::pb::{ModelProto, tensor_proto::DataType};
 /// What a model is, from the `metadata_props` of its file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModelInfo {
-    /// Name, such as `s1-base8`.
+    /// Name, such as `small`.
     pub name: String,
     /// SHA-256 of the file, 64 lower-case hexadecimal digits.
     pub onnx_sha256: String,

@@ -238,9 +238,9 @@ fn raw_data(onnx: &[u8]) -> Vec<Range<usize>> {
     tensors.iter().filter(|t| t.raw_data.len() > 64).filter_map(place).collect()
 }
 
-/// The smallest of the shipped networks of either kind.
+/// A shipped network on vertices and one on pixels.
 fn shipped() -> [(&'static str, Vec<u8>); 2] {
-    ["nano", "s1-base4"].map(|name| {
+    ["nano", "small"].map(|name| {
         let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
         (name, fs::read(path).unwrap())
     })

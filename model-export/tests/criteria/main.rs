@@ -49,7 +49,7 @@ fn best(ladder: &Ladder) -> &Rung {
 
 /// The published U-Net at 16 channels, on the data that our networks were trained on.
 fn baseline(ladder: &Ladder) -> &Rung {
-    ladder.rungs.iter().find(|row| row.name == "s1-base16-broad").unwrap()
+    ladder.rungs.iter().find(|row| row.name == "s1-base16-relative").unwrap()
 }
 
 #[test]

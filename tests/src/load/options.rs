@@ -18,7 +18,7 @@ superseded, refused, lost, or ok but too slow.
 
 Examples:
   papilla-load                                  one session, 90 Hz, 10 s
-  papilla-load --sessions 8 --rate-hz 30 --tier s1-base4
+  papilla-load --sessions 8 --rate-hz 30 --tier small
   papilla-load --budget-us 0 --deadline-us 11111
                                                 drop nothing, count what a 90 Hz frame misses
   papilla-load --dataset data/s1 --sample-type u16 --verify

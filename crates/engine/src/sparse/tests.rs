@@ -150,7 +150,7 @@ fn a_pick_beyond_the_end_stays_for_tract_to_refuse() {
 
 #[test]
 fn shipped_models_answer_as_before() {
-    for name in ["nano", "small", "fe-operator"] {
+    for name in ["nano", "small", "half-space"] {
         let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
         let mut proto = crate::onnx::decode(&std::fs::read(path).unwrap()).unwrap();
         crate::widen::widen(&mut proto);
