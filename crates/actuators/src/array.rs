@@ -12,7 +12,7 @@ const REACH_MM: [f32; 2] = [0.25, 2.5];
 /// Most different reaches: each takes some ten milliseconds to prepare.
 const REACHES_MAX: usize = 8;
 /// How far beyond a pin's reach it is felt, mm: SED has fallen below a hundredth there.
-const BEYOND_MM: f32 = 3.0;
+const BEYOND_MM: f32 = 1.5;
 /// SED is fitted at one pixel of so many either way: .27 mm on the shipped atlas, as deep as the
 /// interface lies.
 const STRIDE: usize = 2;

@@ -1,6 +1,7 @@
 //! The drive whose SED comes closest to a wanted map.
 
-use crate::{Array, nnls};
+use crate::Array;
+use crate::nnls::{self, Coupled};
 
 /// How often a step that made the fit worse is halved.
 const HALVINGS: usize = 4;
@@ -18,6 +19,8 @@ pub struct Inverse {
     array: Array,
     /// `sum_x |s_i(x)| |s_k(x)|`: of the linear problem.
     magnitudes: Vec<f64>,
+    /// Pins that share a sample: the same in every problem.
+    coupled: Coupled,
     gram: Vec<f64>,
     slope: Vec<f64>,
     drive: Vec<f64>,
@@ -31,7 +34,7 @@ pub struct Inverse {
 
 impl Inverse {
     /// Gauss-Newton steps after which the drive has settled (`docs/reports/actuators.md`).
-    pub const STEPS: usize = 4;
+    pub const STEPS: usize = 3;
 
     /// Takes all memory that frames need.
     #[must_use]
@@ -50,10 +53,11 @@ impl Inverse {
             }
             begin = end as usize;
         }
+        let coupled = Coupled::of(&magnitudes, n);
         damp(&mut magnitudes, n);
         let factor = vec![1.0; array.samples.len()];
         let drive_pa = vec![0.0; n];
-        Self { array, magnitudes, gram, slope, drive, trial, factor, derivative, drive_pa }
+        Self { array, magnitudes, coupled, gram, slope, drive, trial, factor, derivative, drive_pa }
     }
 
     /// The array.
@@ -87,7 +91,8 @@ impl Inverse {
             begin = end as usize;
         }
         self.drive.fill(0.0);
-        nnls::solve(&self.magnitudes, &mut self.slope, &self.array.max_pa, &mut self.drive);
+        let Self { magnitudes, coupled, slope, drive, .. } = self;
+        nnls::solve(magnitudes, coupled, slope, &self.array.max_pa, drive);
         self.refine(wanted_j_per_m3, steps)
     }
 
@@ -124,7 +129,8 @@ impl Inverse {
         for _ in 0..steps {
             self.linearise(wanted_j_per_m3);
             self.trial.copy_from_slice(&self.drive);
-            nnls::solve(&self.gram, &mut self.slope, &self.array.max_pa, &mut self.trial);
+            let Self { gram, coupled, slope, trial, .. } = self;
+            nnls::solve(gram, coupled, slope, &self.array.max_pa, trial);
             let before = cost;
             for _ in 0..=HALVINGS {
                 let found = self.cost(&self.trial, wanted_j_per_m3);

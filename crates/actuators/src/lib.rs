@@ -29,7 +29,7 @@
 //! let mut inverse = Inverse::new(array);
 //! let drive_pa = inverse.fit(&wanted_j_per_m3, Inverse::STEPS);
 //! assert!((drive_pa[0] / 4e3 - 1.0).abs() < 1e-2 && (drive_pa[1] / 9e3 - 1.0).abs() < 1e-2);
-//! # Ok::<(), papilla_actuators::ArrayError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod array;

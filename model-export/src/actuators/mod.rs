@@ -69,9 +69,11 @@ pub struct Row {
     pub way: Way,
     /// Relative L2 of SED.
     pub relative_l2: [f64; 2],
+    /// The same of its means over the pins.
+    pub means: [f64; 2],
     /// Relative error of the greatest SED.
     pub peak: [f64; 2],
-    /// Time of a frame without the network, us; none where it is another row's.
+    /// Processor time of a frame without the network, us; none where it is another row's.
     pub us: Option<[f64; 2]>,
 }
 
@@ -88,7 +90,7 @@ pub struct Table {
     pub pins: usize,
     /// Relative L2 of what the judge makes of the press itself.
     pub judge: [f64; 2],
-    /// Time of the network that corrects, us.
+    /// Processor time of the network that corrects, us.
     pub network_us: [f64; 2],
     /// Its ways.
     pub rows: Vec<Row>,
@@ -134,7 +136,7 @@ struct State {
     truth: Vec<f32>,
     means: Vec<f32>,
     best_gain: f32,
-    errors: Vec<Option<[f64; 2]>>,
+    errors: Vec<Option<[f64; 3]>>,
     corrected_pa: Vec<f32>,
 }
 
@@ -209,11 +211,15 @@ fn pair(values: &[f64]) -> [f64; 2] {
 
 fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table {
     let row = |(place, way): (usize, Way)| {
-        let found = || states.iter().filter_map(|state| state.errors[place]);
+        let found = |part: usize| {
+            let all = states.iter().filter_map(|state| state.errors[place]);
+            pair(&all.map(|error| error[part]).collect::<Vec<_>>())
+        };
         Row {
             way,
-            relative_l2: pair(&found().map(|[l2, _]| l2).collect::<Vec<_>>()),
-            peak: pair(&found().map(|[_, peak]| peak).collect::<Vec<_>>()),
+            relative_l2: found(0),
+            means: found(2),
+            peak: found(1),
             us: (!work.times_us[place].is_empty()).then(|| pair(&work.times_us[place])),
         }
     };
@@ -231,7 +237,7 @@ fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table
 /// The state whose corrected drive has the median error: the press, what the drives give, the pins.
 fn drawn(work: &mut Work<'_>, states: &[State], gain: f32) -> Result<RgbImage, ExportError> {
     const CORRECTED: usize = 4;
-    let l2 = |state: &&State, way: usize| state.errors[way].map_or(f64::NAN, |[l2, _]| l2);
+    let l2 = |state: &&State, way: usize| state.errors[way].map_or(f64::NAN, |[l2, ..]| l2);
     let mut order: Vec<&State> = states.iter().collect();
     order.sort_by(|a, b| l2(a, CORRECTED).total_cmp(&l2(b, CORRECTED)));
     let Some(state) = order.get(order.len() / 2) else {

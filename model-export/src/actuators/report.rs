@@ -17,7 +17,7 @@ pub fn markdown(tables: &[(Table, String)]) -> String {
         let _ = writeln!(
             text,
             "\n## {}: {} pins, {} mm apart\n\n{} states; judge {}; `small` {} us.\n\n\
-             | drive | SED, relative L2 | peak of SED | us a frame |\n|---|---|---|---|",
+             | drive | SED, relative L2 | means over the pins | peak of SED | us a frame |\n|---|---|---|---|---|",
             table.set,
             table.pins,
             table.pitch_mm,
@@ -28,9 +28,10 @@ pub fn markdown(tables: &[(Table, String)]) -> String {
         for row in &table.rows {
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} |",
+                "| {} | {} | {} | {} | {} |",
                 row.way.name(),
                 percent(row.relative_l2),
+                percent(row.means),
                 percent(row.peak),
                 row.us.map_or_else(String::new, us),
             );

@@ -9,12 +9,17 @@ use papilla_engine::Session;
 use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Layout, Place};
 use papilla_proto::{HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, Problem};
 use papilla_session_effects::{Effects, Finger};
-use std::time::Instant;
 
 /// Steps towards the best gain: SED is nearly its square, so few are enough.
 const GAIN_STEPS: usize = 4;
 /// Corrections of the last row.
 const CORRECTIONS: usize = 10;
+
+/// Processor time of this thread, us: what else the machine does does not count.
+fn thread_us() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    1e6 * time.tv_sec as f64 + 1e-3 * time.tv_nsec as f64
+}
 
 /// The session's effect by its formula, with a gain of 1: the means of SED over the pins.
 pub(super) struct Formula {
@@ -61,9 +66,9 @@ impl Formula {
     fn means(&mut self, sed: &[f32]) -> Option<(Vec<f32>, f64)> {
         self.bytes.clear();
         self.bytes.resize(HEADER_LEN_V2, 0);
-        let start = Instant::now();
+        let start_us = thread_us();
         self.effects.write(&self.pressure_pa, sed, 0, &mut self.bytes).ok()?;
-        let us = 1e6 * start.elapsed().as_secs_f64();
+        let us = thread_us() - start_us;
         let numbers = self.bytes[HEADER_LEN_V2..].as_chunks::<4>().0;
         Some((numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(), us))
     }
@@ -104,9 +109,9 @@ impl Work<'_> {
         self.judge.infer(&self.press_pa, &mut self.answered).map_err(failed)?;
         let on_press = SampleMetrics::measure(&self.answered, &truth, &self.dataset.ground);
         self.judged.extend(on_press.map(|metrics| metrics.relative_l2));
-        let start = Instant::now();
+        let start_us = thread_us();
         self.served.infer(&self.press_pa, &mut self.wanted).map_err(failed)?;
-        self.network_us.push(1e6 * start.elapsed().as_secs_f64());
+        self.network_us.push(thread_us() - start_us);
 
         let (means, us) = self.formula.means(&self.wanted).unwrap_or_default();
         self.times_us[0].push(us);
@@ -114,23 +119,23 @@ impl Work<'_> {
         let best_pa = self.formula_pa(&means, best_gain);
         let mut errors = vec![None, self.error(&best_pa, &truth)?];
         let wanted = std::mem::take(&mut self.wanted);
-        let start = Instant::now();
+        let start_us = thread_us();
         let drive_pa = self.inverse.fit(&wanted, 0).to_vec();
-        self.times_us[2].push(1e6 * start.elapsed().as_secs_f64());
+        self.times_us[2].push(thread_us() - start_us);
         errors.push(self.error(&drive_pa, &truth)?);
-        let start = Instant::now();
+        let start_us = thread_us();
         let mut drive_pa = self.inverse.fit(&wanted, Inverse::STEPS).to_vec();
-        let fit_us = 1e6 * start.elapsed().as_secs_f64();
+        let fit_us = thread_us() - start_us;
         self.times_us[3].push(fit_us);
         errors.push(self.error(&drive_pa, &truth)?);
         let mut corrected_pa = Vec::new();
         for correction in 0..CORRECTIONS {
             self.inverse.array().pressure(&drive_pa, &mut self.pins_pa);
             self.served.infer(&self.pins_pa, &mut self.answered).map_err(failed)?;
-            let start = Instant::now();
+            let start_us = thread_us();
             drive_pa = self.inverse.correct(&wanted, &self.answered, Inverse::STEPS).to_vec();
             if correction == 0 {
-                self.times_us[4].push(fit_us + 1e6 * start.elapsed().as_secs_f64());
+                self.times_us[4].push(fit_us + thread_us() - start_us);
                 errors.push(self.error(&drive_pa, &truth)?);
                 corrected_pa.clone_from(&drive_pa);
             }
@@ -160,15 +165,22 @@ impl Work<'_> {
         self.judge.infer(&self.pins_pa, &mut self.answered).map_err(failed)
     }
 
-    /// Relative L2 and error of the peak of a drive's SED.
+    /// Of a drive's SED: relative L2, error of the peak, and relative L2 of its means over the pins.
     pub(super) fn error(
         &mut self,
         drive_pa: &[f32],
         truth: &[f32],
-    ) -> Result<Option<[f64; 2]>, ExportError> {
+    ) -> Result<Option<[f64; 3]>, ExportError> {
         self.judge(drive_pa)?;
         let metrics = SampleMetrics::measure(&self.answered, truth, &self.dataset.ground);
-        Ok(metrics.map(|metrics| [metrics.relative_l2, metrics.peak_error]))
+        let [found, due] = [&self.answered[..], truth].map(|sed| self.formula.means(sed));
+        let (Some((found, _)), Some((due, _)), Some(metrics)) = (found, due, metrics) else {
+            return Ok(None);
+        };
+        let square = |a: &f32| f64::from(*a).powi(2);
+        let off: f64 = found.iter().zip(&due).map(|(a, b)| square(&(a - b))).sum();
+        let means = (off / due.iter().map(square).sum::<f64>()).sqrt();
+        Ok(Some([metrics.relative_l2, metrics.peak_error, means]))
     }
 
     /// The gain whose drive comes closest to the truth, in hindsight: of SED that grows with its
