@@ -33,7 +33,7 @@ pub struct Inverse {
 }
 
 impl Inverse {
-    /// Gauss-Newton steps after which the drive has settled (`docs/reports/actuators.md`).
+    /// Gauss-Newton steps of a frame.
     pub const STEPS: usize = 3;
 
     /// Takes all memory that frames need.

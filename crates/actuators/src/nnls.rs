@@ -96,7 +96,7 @@ mod tests {
             let product = |i: usize, k: usize| (0..8).map(|r| a[3 * r + i] * a[3 * r + k]).sum();
             let gram: Vec<f64> = (0..9).map(|at| product(at / 3, at % 3)).collect();
             let right: Vec<f64> = (0..3).map(|i| (0..8).map(|r| a[3 * r + i] * y[r]).sum()).collect();
-            let (mut x, mut slope) = ([0.0; 3], right.clone());
+            let (mut x, mut slope) = ([0.0; 3], right);
             solve(&gram, &Coupled::of(&gram, 3), &mut slope, &max, &mut x);
             prop_assert!(x.iter().all(|x| (0.0..=1.5).contains(x)), "{x:?}");
             let found = cost(&a, &y, &x);

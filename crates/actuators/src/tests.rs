@@ -52,9 +52,9 @@ fn pressure_is_that_of_a_smooth_round_contact() {
 
 #[test]
 fn the_drive_that_made_a_map_is_found_again() {
-    // Gauss-Newton converges quadratically where the residual vanishes, so what is left after so
-    // many steps is rounding: maps are f32, 6e-8 of SED or 3e-8 of a drive, times the condition of
-    // touching pins, some hundreds.
+    // Gauss-Newton converges where the residual vanishes, down to what the least squares leave:
+    // they stop where a sweep moves no drive by more than 1e-5 of the greatest, and a sweep of
+    // touching pins takes away some percent of what is left, so 1e-3 of the greatest remain.
     let array = square(5);
     let mut random = fastrand::Rng::with_seed(7);
     for _ in 0..8 {

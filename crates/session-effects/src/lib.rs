@@ -99,7 +99,7 @@ pub struct Effects {
 #[derive(Debug)]
 enum Display {
     Formula(ActuatorInput, Actuators),
-    Pins(Pins),
+    Pins(Box<Pins>),
 }
 
 impl Display {
@@ -112,7 +112,7 @@ impl Display {
         if layout.drive == Drive::Formula {
             return Ok(Self::Formula(layout.input, Actuators::new(layout, &geometry)?));
         }
-        Ok(Self::Pins(Pins::new(layout, finger, &geometry)?))
+        Ok(Self::Pins(Box::new(Pins::new(layout, finger, &geometry)?)))
     }
 
     fn len(&self) -> usize {

@@ -37,7 +37,7 @@ impl Pins {
         if !(max.is_finite() && max > 0.0) {
             return Err(bad(format!("'max' is {max}; it has to be above 0")));
         }
-        let (mut pins, mut gains) = (Vec::new(), Vec::new());
+        let (mut pins, mut gain) = (Vec::new(), Vec::new());
         for (number, actuator) in layout.actuators.iter().enumerate() {
             if actuator.threshold.unwrap_or(layout.threshold) > 0.0 {
                 let message = format!("'threshold' of actuator {number}: a fitted drive has none");
@@ -50,11 +50,11 @@ impl Pins {
                 })
             };
             let reach_mm = due("radius_mm", actuator.radius_mm.or(layout.radius_mm))?;
-            let gain = due("gain", actuator.gain.or(layout.gain))?;
+            let own_gain = due("gain", actuator.gain.or(layout.gain))?;
             let name = format_args!("actuator {number}").to_string();
             let (pixel, _) = geometry.locate(actuator.at, "actuators", &name)?;
-            pins.push(Pin { pixel, reach_mm, max_pa: max / gain });
-            gains.push(gain);
+            pins.push(Pin { pixel, reach_mm, max_pa: max / own_gain });
+            gain.push(own_gain);
         }
         let rasters = [finger.skin, finger.interface];
         let array = Array::new(finger.atlas, rasters, &pins, HalfSpace::SHIPPED)
@@ -62,8 +62,8 @@ impl Pins {
         let asks = layout.drive == Drive::Corrected;
         Ok(Self {
             inverse: Inverse::new(array),
-            drive_pa: vec![0.0; gains.len()],
-            gain: gains,
+            drive_pa: vec![0.0; gain.len()],
+            gain,
             max,
             asked: asks.then(|| [(); 2].map(|()| vec![0.0; MAP_LEN])),
         })
@@ -187,9 +187,9 @@ mod tests {
         assert!(refused(&Layout { max: f32::NAN, ..good.clone() }).contains("'max'"));
         assert!(refused(&Layout { radius_mm: None, ..good.clone() }).contains("'radius_mm'"));
         assert!(refused(&Layout { radius_mm: Some(0.1), ..good.clone() }).contains("'radius_mm'"));
-        assert!(refused(&Layout { actuators: Vec::new(), ..good.clone() }).contains("0 pins"));
-        let mut off = good;
+        let mut off = good.clone();
         off.actuators[1].at = Place::Px([1.0, 1.0]);
         assert!(refused(&off).contains("actuator 1"));
+        assert!(refused(&Layout { actuators: Vec::new(), ..good }).contains("0 pins"));
     }
 }
