@@ -165,7 +165,7 @@ pub struct Layout {
     #[serde(default)]
     pub input: ActuatorInput,
     /// How intensities are found.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_formula")]
     pub drive: Drive,
     /// Radius of a receptive field, or of a pin, mm. Due unless every actuator has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -179,6 +179,11 @@ pub struct Layout {
     /// Greatest intensity.
     #[serde(default = "one")]
     pub max: f32,
+}
+
+/// Services that know no other have no such member.
+fn is_formula(drive: &Drive) -> bool {
+    *drive == Drive::Formula
 }
 
 fn one() -> f32 {

@@ -177,6 +177,7 @@ impl Worker {
                 tier.latency.learn(times.infer);
             }
         }
+        let start = Instant::now();
         if let Some(effects) = effects.as_mut().filter(|_| shows_sed) {
             let session = &mut self.sessions[job.tier];
             let infer = |pressure_pa: &[f32], sed: &mut [f32]| session.infer(pressure_pa, sed);
@@ -185,8 +186,6 @@ impl Worker {
                 problem::internal("the drive of the actuators cannot be corrected", &error)
             })?;
         }
-
-        let start = Instant::now();
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
         if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
             self.maps.to_person(finger);
