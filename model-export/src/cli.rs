@@ -1,5 +1,6 @@
 //! The command line.
 
+mod actuators;
 mod check;
 mod contact;
 mod evaluate;
@@ -115,6 +116,12 @@ enum Command {
     /// each against the FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
+    /// Measure drives of arrays of pins: the formula of sessions, and its inversion.
+    ///
+    /// For each held-out indentation both find the drive whose SED comes closest to it; a second
+    /// network tells what the drive gives.
+    #[command(after_long_help = EXIT_CODES)]
+    Actuators(actuators::Options),
     /// Load one model and say what that took, as JSON; the ladder runs it in a fresh process.
     #[command(hide = true)]
     Footprint {
@@ -136,6 +143,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Here(options) => here::run(options, json),
         Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
+        Command::Actuators(options) => actuators::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }
 }

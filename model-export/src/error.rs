@@ -43,6 +43,14 @@ pub enum ExportError {
         /// What is wrong with it.
         source: papilla_contact::ModelError,
     },
+    /// An array cannot be.
+    #[error("pins {pitch_mm} mm apart: {reason}")]
+    Pins {
+        /// Distance of the pins, mm.
+        pitch_mm: f32,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A file of the dataset is not what its contract says.
     #[error("{path}: {reason}")]
     Dataset {

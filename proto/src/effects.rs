@@ -136,9 +136,24 @@ pub enum ActuatorInput {
     Sa1Rate,
 }
 
+/// How intensities are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Drive {
+    /// By the formula of the [`Layout`], each actuator for itself.
+    #[default]
+    Formula,
+    /// Together: pins that press with `intensity / gain` Pa, so that SED on a half-space comes
+    /// closest to the frame's.
+    Fitted,
+    /// The same, corrected once by the SED that the network gives for those pins: it is asked twice
+    /// a frame.
+    Corrected,
+}
+
 /// A display: parameters of [`RuntimeEffect::Actuators`].
 ///
-/// `intensity = min(max, gain (m - threshold)+)`, where `m` is the input's mean over the pixels
+/// By [`Drive::Formula`], `intensity = min(max, gain (m - threshold)+)`, where `m` is the input's mean over the pixels
 /// within `radius_mm` of the actuator (chord on the undeformed interface) with the weight
 /// `A_i (1 - d_i^2 / radius^2)`; the nearest pixel alone if none is that near.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -149,7 +164,10 @@ pub struct Layout {
     /// What drives them.
     #[serde(default)]
     pub input: ActuatorInput,
-    /// Radius of a receptive field, mm. Due unless every actuator has its own.
+    /// How intensities are found.
+    #[serde(default, skip_serializing_if = "is_formula")]
+    pub drive: Drive,
+    /// Radius of a receptive field, or of a pin, mm. Due unless every actuator has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f32>,
     /// Intensity per unit of input above the threshold. Due unless every actuator has its own.
@@ -161,6 +179,11 @@ pub struct Layout {
     /// Greatest intensity.
     #[serde(default = "one")]
     pub max: f32,
+}
+
+/// Services that know no other have no such member.
+fn is_formula(drive: &Drive) -> bool {
+    *drive == Drive::Formula
 }
 
 fn one() -> f32 {

@@ -12,8 +12,8 @@ use papilla_proto::{
     ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
     Summary,
     effects::{
-        Actuator, ActuatorInput, Afferents, ContactWindow, Layout, Moduli, OutOfRange, Place,
-        PronyTerm, Relaxation, Section, SectionName, Tissue,
+        Actuator, ActuatorInput, Afferents, ContactWindow, Drive, Layout, Moduli, OutOfRange,
+        Place, PronyTerm, Relaxation, Section, SectionName, Tissue,
     },
 };
 use proptest::prelude::*;
@@ -34,16 +34,17 @@ fn layout() -> impl Strategy<Value = Layout> {
     let actuator = (place(), own(), own(), own())
         .prop_map(|(at, radius_mm, gain, threshold)| Actuator { at, radius_mm, gain, threshold });
     let input = prop::sample::select(vec![ActuatorInput::Sed, ActuatorInput::Sa1Rate]);
-    (prop::collection::vec(actuator, 0..4), input, own(), own(), number(), number()).prop_map(
-        |(actuators, input, radius_mm, gain, threshold, max)| Layout {
+    let drive = prop::sample::select(vec![Drive::Formula, Drive::Fitted, Drive::Corrected]);
+    (prop::collection::vec(actuator, 0..4), input, drive, own(), own(), number(), number())
+        .prop_map(|(actuators, input, drive, radius_mm, gain, threshold, max)| Layout {
             actuators,
             input,
+            drive,
             radius_mm,
             gain,
             threshold,
             max,
-        },
-    )
+        })
 }
 
 fn relaxation() -> impl Strategy<Value = Relaxation> {

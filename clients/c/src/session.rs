@@ -212,7 +212,7 @@ impl Session {
         let place = usize::from(finger);
         self.last.kind = None;
         self.last.values = 0;
-        let Self { model, hand, effects, maps, range, .. } = self;
+        let Self { model, hand, effects, maps, range, network, .. } = self;
         let mut finger = lock(&hand.fingers()[place]);
         let mut effects = effects.get_mut(place);
         let shows_sed = effects.as_ref().is_none_or(|effects| effects.shows_sed());
@@ -234,7 +234,12 @@ impl Session {
             let judged = maps.judge(summary, *range, &model.pixels, trained_max);
             found |= judged.flags;
             if !judged.is_zero {
-                maps.infer(self.network.as_mut()).map_err(|error| of_engine(&error))?;
+                maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
+            }
+            if let Some(effects) = &mut effects {
+                let infer = |pressure_pa: &[f32], sed: &mut [f32]| network.infer(pressure_pa, sed);
+                effects.fit(&maps.sed_j_per_m3, infer).map_err(|error| of_engine(&error))?;
+                finger.to_person(effects.pin_pa_mut());
             }
             maps.to_person(&finger);
         }

@@ -19,6 +19,7 @@ export interface Afferents {
 
 export interface Actuators {
   input: 'sed' | 'sa1_rate';
+  drive?: 'formula' | 'fitted' | 'corrected';
   radius_mm?: number;
   gain?: number;
   threshold?: number;

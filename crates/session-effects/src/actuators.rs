@@ -11,7 +11,7 @@ const ACTUATORS_MAX: usize = 1024;
 /// Most pixels in all receptive fields together: 8 MiB of weights.
 const TAPS_MAX: usize = 1 << 20;
 
-/// A display: the weights of all receptive fields behind one another.
+/// A display by its formula: the weights of all receptive fields behind one another.
 #[derive(Debug)]
 pub(super) struct Actuators {
     each: Vec<Each>,
@@ -110,7 +110,7 @@ impl Actuators {
 
 #[cfg(test)]
 mod tests {
-    use papilla_proto::effects::{Actuator, ActuatorInput, Place};
+    use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Place};
 
     use super::{super::tests::plane, *};
 
@@ -118,6 +118,7 @@ mod tests {
         Layout {
             actuators: actuators.to_vec(),
             input: ActuatorInput::Sed,
+            drive: Drive::Formula,
             radius_mm: Some(1.0),
             gain: Some(0.5),
             threshold: 2.0,

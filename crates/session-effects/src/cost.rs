@@ -6,7 +6,7 @@ use bytes::BytesMut;
 use papilla_proto::{
     HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
     atlas::Raster,
-    effects::{Actuator, ActuatorInput, Layout, Place},
+    effects::{Actuator, ActuatorInput, Drive, Layout, Place},
 };
 
 use super::{Cost, Effects, Finger};
@@ -54,6 +54,7 @@ fn hello(effect: RuntimeEffect, interface: &Raster) -> Hello {
             hello.actuators = Some(Layout {
                 actuators: places().map(actuator).collect(),
                 input: ActuatorInput::Sed,
+                drive: Drive::Formula,
                 radius_mm: Some(1.0),
                 gain: Some(1.0),
                 threshold: 0.0,

@@ -43,6 +43,7 @@ mod afferents;
 mod cost;
 mod finger;
 mod geometry;
+mod pins;
 mod points;
 mod relaxation;
 mod spikes;
@@ -60,7 +61,7 @@ use papilla_proto::{
     ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
     SampleError, SampleType, Window,
     contact::SampleLayout,
-    effects::{ActuatorInput, Section, SectionName},
+    effects::{ActuatorInput, Drive, Layout, Section, SectionName},
     spikes::PlacedUnit,
 };
 
@@ -70,7 +71,7 @@ pub use cost::measure;
 pub use finger::{Cost, Finger, Shared};
 
 use self::{
-    actuators::Actuators, afferents::Afferents, geometry::Geometry, points::Points,
+    actuators::Actuators, afferents::Afferents, geometry::Geometry, pins::Pins, points::Points,
     relaxation::Relaxation, spikes::Spikes, summary::Contact, vertices::Vertices,
 };
 
@@ -91,7 +92,35 @@ pub struct Effects {
     margin_px: Option<u16>,
     summary: Option<Arc<Geometry>>,
     points: Option<Points>,
-    actuators: Option<(ActuatorInput, Actuators)>,
+    actuators: Option<Display>,
+}
+
+/// A display, by how its intensities are found.
+#[derive(Debug)]
+enum Display {
+    Formula(ActuatorInput, Actuators),
+    Pins(Box<Pins>),
+}
+
+impl Display {
+    fn new(layout: &Layout, finger: Finger<'_>, has_rates: bool) -> Result<Self, Problem> {
+        if layout.input == ActuatorInput::Sa1Rate && !has_rates {
+            let message = "input 'sa1_rate' needs the effect 'afferents'";
+            return Err(unusable("actuators", message));
+        }
+        let geometry = finger.geometry();
+        if layout.drive == Drive::Formula {
+            return Ok(Self::Formula(layout.input, Actuators::new(layout, &geometry)?));
+        }
+        Ok(Self::Pins(Box::new(Pins::new(layout, finger, &geometry)?)))
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Formula(_, actuators) => actuators.len(),
+            Self::Pins(pins) => pins.len(),
+        }
+    }
 }
 
 /// What [`Effects::write`] put into an answer.
@@ -147,16 +176,8 @@ impl Effects {
             Some(places) => Some(Points::new(places, &geometry())?),
             None => None,
         };
-        let actuators = match &hello.actuators {
-            Some(layout) => {
-                if layout.input == ActuatorInput::Sa1Rate && afferents.is_none() {
-                    let message = "input 'sa1_rate' needs the effect 'afferents'";
-                    return Err(unusable("actuators", message));
-                }
-                Some((layout.input, Actuators::new(layout, &geometry())?))
-            }
-            None => None,
-        };
+        let place = |layout| Display::new(layout, finger, afferents.is_some());
+        let actuators = hello.actuators.as_ref().map(place).transpose()?;
         let summary = has(RuntimeEffect::Summary).then(geometry);
         let margin_px = has(RuntimeEffect::ContactWindow)
             .then(|| hello.contact_window.unwrap_or_default().margin_px);
@@ -186,10 +207,7 @@ impl Effects {
         let parts = [
             (SectionName::Summary, self.summary.as_ref().map(|_| SUMMARY_LEN)),
             (SectionName::Points, self.points.as_ref().map(|points| floats(points.len()))),
-            (
-                SectionName::Actuators,
-                self.actuators.as_ref().map(|(_, actuators)| floats(actuators.len())),
-            ),
+            (SectionName::Actuators, self.actuators.as_ref().map(|display| floats(display.len()))),
             (SectionName::Spikes, self.spikes.as_ref().map(|(_, spikes)| spikes.len())),
             (SectionName::Map, self.map.then(|| MAP_LEN * self.sample_type.bytes())),
             (
@@ -292,6 +310,31 @@ impl Effects {
         self.relaxation.as_mut().map(|relaxation| relaxation.step(pressure_pa, time_us))
     }
 
+    /// Fits the drive of pins to the frame's SED, both of the finger that the network knows;
+    /// `infer` asks the network about their pressure. Nothing to do, and nothing asked, if the
+    /// display has another [drive](Drive).
+    ///
+    /// # Errors
+    /// Those of `infer`.
+    pub fn fit<E>(
+        &mut self,
+        sed_j_per_m3: &[f32],
+        infer: impl FnOnce(&[f32], &mut [f32]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match &mut self.actuators {
+            Some(Display::Pins(pins)) => pins.fit(sed_j_per_m3, infer),
+            _ => Ok(()),
+        }
+    }
+
+    /// The pressures that [`fit`](Self::fit) found, Pa, one a pin: to be turned into this person's.
+    pub fn pin_pa_mut(&mut self) -> &mut [f32] {
+        match &mut self.actuators {
+            Some(Display::Pins(pins)) => pins.drive_pa_mut(),
+            _ => &mut [],
+        }
+    }
+
     /// What acts after the network: appends every section to `bytes`, which holds the header.
     ///
     /// `pressure_pa` is what [`before`](Self::before) left.
@@ -320,13 +363,13 @@ impl Effects {
             pad(bytes);
             points.write(shown, bytes);
         }
-        if let Some((input, actuators)) = &self.actuators {
+        if let Some(display) = &self.actuators {
             pad(bytes);
-            let input = match input {
-                ActuatorInput::Sed => sed_j_per_m3,
-                ActuatorInput::Sa1Rate => shown,
-            };
-            actuators.write(input, bytes);
+            match display {
+                Display::Formula(ActuatorInput::Sed, by) => by.write(sed_j_per_m3, bytes),
+                Display::Formula(ActuatorInput::Sa1Rate, by) => by.write(shown, bytes),
+                Display::Pins(pins) => pins.write(bytes),
+            }
         }
         if let Some((geometry, spikes)) = &mut self.spikes {
             pad(bytes);

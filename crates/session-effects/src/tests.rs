@@ -57,6 +57,7 @@ fn display() -> Layout {
     Layout {
         actuators: vec![Actuator { at, radius_mm: None, gain: None, threshold: None }; 3],
         input: ActuatorInput::Sed,
+        drive: Drive::Formula,
         radius_mm: Some(0.0),
         gain: Some(1.0),
         threshold: 0.0,

@@ -71,9 +71,35 @@ pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> R
             Scale::Signed,
         ),
     ];
+    laid_out(&describe(heading, sample), &panels)
+}
+
+/// A map of values from 0 up.
+pub(crate) struct Picture<'a> {
+    pub(crate) title: String,
+    pub(crate) values: Vec<f32>,
+    pub(crate) mask: &'a [bool],
+    pub(crate) max: f32,
+    pub(crate) unit: &'static str,
+}
+
+/// Draws maps side by side.
+pub(crate) fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> RgbImage {
+    let panels = pictures.map(|Picture { title, values, mask, max, unit }| Panel {
+        title,
+        values,
+        mask,
+        ends: [0.0, max],
+        unit,
+        scale: Scale::Rising,
+    });
+    laid_out(heading, &panels)
+}
+
+fn laid_out(heading: &str, panels: &[Panel<'_>]) -> RgbImage {
     let width = panels.len() * PANEL + (panels.len() + 1) * GAP;
     let mut canvas = Canvas::new(width, HEAD + PANEL + FOOT);
-    canvas.text(GAP, 8, &describe(heading, sample));
+    canvas.text(GAP, 8, heading);
     for (i, panel) in panels.iter().enumerate() {
         draw_panel(&mut canvas, GAP + i * (PANEL + GAP), panel);
     }

@@ -218,7 +218,8 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
     let service = runtime.block_on(Service::start());
     one_frame_at_a_time(&service, engines_own);
     frames_that_wait(&service, engines_own);
-    every_effect(&service, engines_own);
+    every_effect(&service, engines_own, ("formula", 1));
+    every_effect(&service, engines_own, ("corrected", 2));
     runtime.block_on(service.server.drain()).unwrap();
     let service = runtime.block_on(contact::service());
     fingers(&service);
@@ -277,12 +278,15 @@ fn fingers(service: &Service) {
 }
 
 /// Every effect at once, windows both ways.
-fn every_effect(service: &Service, engines_own: u64) {
+///
+/// Pins whose drive is corrected ask the network twice.
+fn every_effect(service: &Service, engines_own: u64, (drive, asked): (&str, u64)) {
     let effects = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
     let hello = json!({
         "type": "hello", "version": 2, "effects": effects, "tier": "quick",
         "points": [{"px": [110.0, 65.0]}],
-        "actuators": {"radius_mm": 1.0, "gain": 1.0, "actuators": [{"at": {"px": [110.0, 65.0]}}]}
+        "actuators": {"drive": drive, "radius_mm": 1.0, "gain": 1.0,
+                      "actuators": [{"at": {"px": [110.0, 65.0]}}]}
     });
     let mut client = Client::connect(service, &hello);
     let window = Window { x: 60, y: 50, width: 100, height: 80 };
@@ -290,5 +294,5 @@ fn every_effect(service: &Service, engines_own: u64) {
         (1..=(WARM_UP + FRAMES) as u32).map(|n| windowed(n, window, &ramp())).collect();
     client.exchange(&frames[..WARM_UP], 1);
     let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
-    assert_eq!(all, FRAMES as u64 * engines_own, "with every effect");
+    assert_eq!(all, FRAMES as u64 * asked * engines_own, "with every effect, {drive}");
 }

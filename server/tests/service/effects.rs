@@ -290,6 +290,32 @@ async fn a_session_can_ask_for_less_than_a_map() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn drives_of_pins_are_fitted_to_the_sed_of_the_frame() {
+    let service = Service::start().await;
+    let mut nearest = Vec::new();
+    for drive in ["fitted", "corrected"] {
+        let mut socket = service.socket().await;
+        let pins = json!([{"at": {"px": [110.5, 65.5]}}, {"at": {"px": [60, 90]}}]);
+        let wish = json!({
+            "effects": ["layers", "actuators"], "map": false,
+            "actuators": {"drive": drive, "radius_mm": 0.5, "gain": 1e-6, "actuators": pins}
+        });
+        socket.open(hello_2(&wish)).await;
+        let window = Window { x: 100, y: 60, width: 20, height: 10 };
+        socket.send(windowed(1, 0, window, &patch())).await;
+        let message = socket.hear_2().await.2;
+        let [near, far] = floats_of(&message[48..56])[..] else { panic!("two pins") };
+        assert!(near > 0.0 && near < 1.0 && far.abs() < 1e-3 * near, "{drive}: {near} {far}");
+        socket.send(windowed(2, 0, Window::EMPTY, &[])).await;
+        let message = socket.hear_2().await.2;
+        assert_eq!(floats_of(&message[48..56]), [0.0, 0.0], "nothing touches");
+        nearest.push(near);
+    }
+    // The test network's SED is not a half-space's.
+    assert!((nearest[0] / nearest[1] - 1.0).abs() > 0.01, "{nearest:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn time_dependent_effects_follow_the_clients_clock() {
     let service = Service::start().await;
     let mut socket = service.socket().await;

@@ -177,11 +177,21 @@ impl Worker {
                 tier.latency.learn(times.infer);
             }
         }
-
         let start = Instant::now();
+        if let Some(effects) = effects.as_mut().filter(|_| shows_sed) {
+            let session = &mut self.sessions[job.tier];
+            let infer = |pressure_pa: &[f32], sed: &mut [f32]| session.infer(pressure_pa, sed);
+            effects.fit(&self.maps.sed_j_per_m3, infer).map_err(|error| {
+                let error = format_args!("{}.onnx: {error}", tier.name);
+                problem::internal("the drive of the actuators cannot be corrected", &error)
+            })?;
+        }
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
         if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
             self.maps.to_person(finger);
+            if let Some(effects) = &mut effects {
+                finger.to_person(effects.pin_pa_mut());
+            }
         }
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
