@@ -13,7 +13,7 @@ use std::{
 fn main() -> Result<(), Box<dyn Error>> {
     let root = PathBuf::from(env::var("CARGO_MANIFEST_DIR")?);
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    embed(files(&root.join("../models"), &["onnx", "json"])?, &out.join("models.rs"))?;
+    embed(files(&root.join("../models"), &["onnx", "json", "contact"])?, &out.join("models.rs"))?;
     let endings = ["html", "css", "mjs", "js", "svg", "png", "json", "ico", "woff2", "webp"];
     let mut page = files(&root.join("web"), &endings)?;
     // The web client's: the page paints the same pixels.

@@ -2,6 +2,7 @@
 
 use std::{fmt, net::TcpListener, time::Instant};
 
+use papilla_session_contact::ContactAssets;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -101,11 +102,17 @@ pub fn check(config: &Config) -> Report {
             Err(error) => report.bad("state_keys", 2, &error),
         }
     }
-    let assets = Assets::of(config);
-    match assets.and_then(|a| Catalogue::load(&a, Loading::of(config), None)) {
-        Ok(catalogue) => {
+    let loaded = Assets::of(config).and_then(|assets| {
+        let catalogue = Catalogue::load(&assets, Loading::of(config), None)?;
+        Ok((assets, catalogue))
+    });
+    let mut solves_contact = false;
+    match loaded {
+        Ok((assets, catalogue)) => {
             look_at_models(&mut report, config, &catalogue);
-            look_at_contact(&mut report, config, &catalogue);
+            let contact = load_contact(config, &assets, &catalogue);
+            solves_contact = matches!(contact, Ok(Some(_)));
+            look_at_contact(&mut report, contact);
         }
         Err(error) => report.bad("models", error.exit_code(), &error),
     }
@@ -116,7 +123,7 @@ pub fn check(config: &Config) -> Report {
             report.bad("port", 4, &StartError::Bind { address, source });
         }
     }
-    let bytes = memory_bound(config);
+    let bytes = memory_bound(config, solves_contact);
     let detail = format!("clients can make it hold {} MiB at most, beside the models", bytes >> 20);
     report.good("memory", detail, json!({"clients_bytes_max": bytes}));
     report
@@ -176,22 +183,24 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     }
 }
 
-fn look_at_contact(report: &mut Report, config: &Config, catalogue: &Catalogue) {
-    let Some(file) = &config.contact else { return };
-    match load_contact(file, catalogue) {
-        Ok(contact) => {
+fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, StartError>) {
+    match contact {
+        Ok(Some(contact)) => {
             let detail = format!("of this finger, {} us a frame", contact.frame_us);
             report.good("contact", detail, json!({"frame_us": contact.frame_us}));
+        }
+        Ok(None) => {
+            report.good("contact", "no model; sessions send pressure".to_owned(), Value::Null);
         }
         Err(error) => report.bad("contact", error.exit_code(), &error),
     }
 }
 
 /// Bytes that clients can make the service hold, by construction.
-fn memory_bound(config: &Config) -> usize {
+fn memory_bound(config: &Config, solves_contact: bool) -> usize {
     let requests =
         config.max_requests.get() * (3 * config.max_body_bytes + PER_REQUEST_BEYOND_BODY);
-    let contact = config.contact.as_ref().map_or(0, |_| PER_FINGER);
+    let contact = if solves_contact { PER_FINGER } else { 0 };
     config.max_connections.get() * (PER_CONNECTION + config.max_body_bytes)
         + config.max_sessions.get() * (PER_SESSION + PER_EFFECTS)
         + config.max_fingers.get() * (PER_EFFECTS + contact)

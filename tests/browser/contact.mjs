@@ -1,4 +1,4 @@
-// The page against a server with a contact model (--contact): a press is a solve there, and what pushes back is shown.
+// The page against a server as it ships, with a contact model: a press is a solve there, and what pushes back is shown.
 
 import assert from 'node:assert/strict';
 import { after, before, test } from 'node:test';

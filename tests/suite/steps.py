@@ -295,10 +295,8 @@ def full() -> list[Step]:
         Step(
             "page",
             "the page in headless Chromium",
-            "clients/conformance/run --only-serve page npm --prefix tests/browser test --silent\n"
-            'export CONTACT_MODEL="$TARGET/tmp/page.contact"\n'
-            'mkdir -p "$TARGET/tmp" && "$BIN/conformance-record" --contact-model "$CONTACT_MODEL"\n'
-            "clients/conformance/run --only-serve --contact page npm --prefix tests/browser run contact --silent",
+            "clients/conformance/run --only-serve --no-contact page npm --prefix tests/browser test --silent\n"
+            "clients/conformance/run --only-serve page npm --prefix tests/browser run contact --silent",
             after=("build", "node", "packages"),
             tests_min=38,
         ),

@@ -1,4 +1,4 @@
-"""A ball that goes down on a finger, and what pushes back. Needs `papilla-server --contact FILE`.
+"""A ball that goes down on a finger, and what pushes back.
 
 python examples/touch.py [URL]
 """

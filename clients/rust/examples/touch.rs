@@ -1,8 +1,8 @@
 //! Balls that go down on fingers, and what pushes back: objects in, forces out.
 //!
-//! `cargo run --release -p papilla-client --example touch -- [HOST:PORT [FRAMES [HZ [FINGERS [TIER]]]]]`;
-//! the service needs `--contact FILE`. With a tier, answers carry SED at the vertices. Says at the
-//! end how long the way there and back took.
+//! `cargo run --release -p papilla-client --example touch -- [HOST:PORT [FRAMES [HZ [FINGERS [TIER]]]]]`.
+//! With a tier, answers carry SED at the vertices. Says at the end how long the way there and back
+//! took.
 
 use std::{
     env,

@@ -1,4 +1,4 @@
-// A ball that goes down on a finger, and what pushes back. Needs `papilla-server --contact FILE`, and a browser or Node 22:
+// A ball that goes down on a finger, and what pushes back. Needs a browser or Node 22:
 //
 //     node clients/web/examples/touch.js [http://127.0.0.1:7224]
 

@@ -1,4 +1,4 @@
-// The WebXR scene on a server with a contact model: several fingers touch. PAPILLA_URL: a server with --xr-dir dist and --contact.
+// The WebXR scene on a server with a contact model: several fingers touch. PAPILLA_URL: a server with --xr-dir dist.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';

@@ -10,7 +10,10 @@ pub enum ModelError {
     #[error("the contact model's header: {0}; make the model again with `fe-datagen contact`")]
     Header(#[from] serde_json::Error),
     /// Another version of the format.
-    #[error("a contact model of format {found}, this program reads {expected}")]
+    #[error(
+        "a contact model of format {found}, this program reads {expected}; make it again with \
+         `fe-datagen contact`"
+    )]
     Version {
         /// Found.
         found: u32,
@@ -26,6 +29,14 @@ pub enum ModelError {
         found: usize,
         /// Expected.
         expected: usize,
+    },
+    /// An array that cannot be unpacked.
+    #[error("`{array}` of the contact model is damaged or cut off: {source}")]
+    Damaged {
+        /// Array.
+        array: &'static str,
+        /// Why.
+        source: std::io::Error,
     },
     /// A number that cannot be.
     #[error("`{array}[{index}]` of the contact model is {value}, {rule}")]

@@ -39,6 +39,7 @@ mod ladder;
 mod model;
 mod nearest;
 mod objects;
+mod packed;
 mod patch;
 mod second_order;
 mod slopes;

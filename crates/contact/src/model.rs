@@ -7,7 +7,7 @@ use crate::slopes::{Slopes, slopes};
 use serde::{Deserialize, Serialize};
 
 /// Version of the file.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Most vertices of a skin.
 const VERTICES_MAX: usize = 8192;
 
@@ -39,9 +39,9 @@ pub struct Header {
     /// Deepest training indentation, mm; beyond it an answer is out of range. 0: not known.
     #[serde(default)]
     pub depth_max_mm: f32,
-    /// mm/N for a unit of the file's compliance; set when it is written.
+    /// Step to which the file rounds compliance, mm/N; 0: of the writer's choice.
     #[serde(default)]
-    pub compliance_unit_mm_per_n: f32,
+    pub compliance_step_mm_per_n: f32,
 }
 
 /// Arrays of a file, in its order.
@@ -93,22 +93,14 @@ impl ContactModel {
     /// # Errors
     /// [`ModelError`] names the array that does not fit.
     pub fn new(header: Header, arrays: Arrays) -> Result<Self, ModelError> {
-        let (v, t, r, k) = (header.vertices, header.triangles, header.modes, header.outputs);
+        let (v, r, k) = (header.vertices, header.modes, header.outputs);
         header.require_format()?;
-        let lengths = lengths(&header)?;
-        for ((array, values), (_, expected)) in arrays.floats().into_iter().zip(&lengths) {
-            if values.len() != *expected {
-                let found = values.len();
-                return Err(ModelError::Length { array, found, expected: *expected });
-            }
+        arrays.require_lengths(&header)?;
+        for (array, values) in arrays.floats() {
             if let Some(index) = values.iter().position(|v| !v.is_finite()) {
                 let value = f64::from(values[index]);
                 return Err(ModelError::Value { array, index, value, rule: "not finite" });
             }
-        }
-        if arrays.triangles.len() != 3 * t {
-            let found = arrays.triangles.len();
-            return Err(ModelError::Length { array: "triangles", found, expected: 3 * t });
         }
         if let Some(index) = arrays.triangles.iter().position(|i| *i as usize >= v) {
             let value = f64::from(arrays.triangles[index]);
@@ -193,6 +185,17 @@ impl Header {
         Self { format: FORMAT, ..Self::default() }
     }
 
+    /// Reads a header whose version is this one; of another one the rest may differ.
+    pub(crate) fn of_json(json: &[u8]) -> Result<Self, ModelError> {
+        #[derive(Deserialize)]
+        struct Version {
+            format: u32,
+        }
+        let Version { format } = serde_json::from_slice(json)?;
+        Self { format, ..Self::default() }.require_format()?;
+        Ok(serde_json::from_slice(json)?)
+    }
+
     pub(crate) fn require_format(&self) -> Result<(), ModelError> {
         let (found, expected) = (self.format, FORMAT);
         if found == expected { Ok(()) } else { Err(ModelError::Version { found, expected }) }
@@ -200,6 +203,19 @@ impl Header {
 }
 
 impl Arrays {
+    /// Refuses arrays that are not as long as the header says.
+    pub(crate) fn require_lengths(&self, header: &Header) -> Result<(), ModelError> {
+        let floats = self.floats().map(|(_, values)| values.len());
+        let due = lengths(header)?.into_iter().zip(floats);
+        let triangles = ("triangles", 3 * header.triangles);
+        for ((array, expected), found) in due.chain([(triangles, self.triangles.len())]) {
+            if found != expected {
+                return Err(ModelError::Length { array, found, expected });
+            }
+        }
+        Ok(())
+    }
+
     pub(crate) fn floats(&self) -> [(&'static str, &[f32]); 7] {
         [
             ("positions_mm", &self.positions_mm),

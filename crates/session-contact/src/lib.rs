@@ -87,8 +87,9 @@ impl Hand {
         let model = match (input, skin.model) {
             (Input::Pressure, _) => None,
             (_, None) => {
-                let message = "this service has no contact model; start it with --contact FILE, or \
-                               send pressure";
+                let message = "this service has no contact model, since its folder of models has no \
+                               finger.contact; put one there, start it with --contact FILE, or send \
+                               pressure";
                 return Err(unusable("input", message));
             }
             (_, Some(model)) => Some(model),

@@ -85,12 +85,12 @@ pub struct Config {
     pub allow_anyone: bool,
 
     /// Folder of models to serve instead of the ones in the binary (index.json, atlas.json,
-    /// NAME.onnx and NAME.json).
+    /// NAME.onnx and NAME.json, and finger.contact for contact).
     #[arg(long, env = "PAPILLA_MODELS", value_name = "DIR")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub models: Option<PathBuf>,
 
-    /// Contact model of `fe-datagen contact`: sessions may then send objects and gaps.
+    /// Contact model of `fe-datagen contact` instead of the one among the models.
     #[arg(long, env = "PAPILLA_CONTACT", value_name = "FILE")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<PathBuf>,

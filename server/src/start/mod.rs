@@ -4,7 +4,7 @@
 mod load;
 mod remeasure;
 
-use std::{path::Path, sync::Arc, thread};
+use std::{borrow::Cow, sync::Arc, thread};
 
 use papilla_engine::{Backend, Choice};
 use papilla_metrics::Metrics;
@@ -16,7 +16,11 @@ use crate::{
     SettingError, StartError,
     config::Config,
     core::{
-        catalogue::{Catalogue, Loading, Step, assets::Assets, calibrate, golden},
+        catalogue::{
+            Catalogue, Loading, Step,
+            assets::{Assets, CONTACT},
+            calibrate, golden,
+        },
         reload,
         scheduler::Pool,
     },
@@ -117,8 +121,8 @@ fn load(
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() * FINGERS_MAX + config.max_requests.get();
     let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
-    let contact = config.contact.as_deref().map(|file| load_contact(file, &catalogue));
-    Ok((catalogue, pool, contact.transpose()?))
+    let contact = load_contact(config, &assets, &catalogue)?;
+    Ok((catalogue, pool, contact))
 }
 
 /// Holds all tiers to their golden answers: the library of ONNX Runtime is not the one that the models
@@ -134,21 +138,32 @@ fn require_golden_answers(catalogue: &Catalogue) -> Result<(), StartError> {
     Ok(())
 }
 
-/// Reads the contact model, which has to be of the models' finger.
+/// Reads the contact model that `config` names, or else the one among the models, if there is one.
+/// It has to be of the models' finger.
 pub(crate) fn load_contact(
-    file: &Path,
+    config: &Config,
+    assets: &Assets,
     catalogue: &Catalogue,
-) -> Result<ContactAssets, StartError> {
-    let bad = |reason: String| StartError::Unusable {
-        file: file.display().to_string(),
-        origin: "--contact".to_owned(),
-        reason,
+) -> Result<Option<ContactAssets>, StartError> {
+    let (file, origin) = match &config.contact {
+        Some(file) => (file.display().to_string(), "--contact"),
+        None => (CONTACT.to_owned(), assets.origin.as_str()),
     };
-    let bytes = std::fs::read(file).map_err(|error| bad(error.to_string()))?;
-    let assets = ContactAssets::read(&bytes).map_err(|error| bad(error.to_string()))?;
-    let fits = assets.model.require_atlas(catalogue.atlas.hash());
+    let bad = |reason: String| {
+        let (file, origin) = (file.clone(), origin.to_owned());
+        StartError::Unusable { file, origin, reason }
+    };
+    let bytes = match &config.contact {
+        Some(file) => Cow::Owned(std::fs::read(file).map_err(|error| bad(error.to_string()))?),
+        None => match assets.get(CONTACT) {
+            Some(bytes) => Cow::Borrowed(bytes),
+            None => return Ok(None),
+        },
+    };
+    let contact = ContactAssets::read(&bytes).map_err(|error| bad(error.to_string()))?;
+    let fits = contact.model.require_atlas(catalogue.atlas.hash());
     fits.map_err(|error| bad(error.to_string()))?;
-    Ok(assets)
+    Ok(Some(contact))
 }
 
 /// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not

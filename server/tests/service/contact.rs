@@ -9,8 +9,8 @@ use serde_json::{Value, json};
 
 use crate::support::{
     GAIN, Service, Socket,
-    contact::{deep, hello_3, hertz_n, rows, service},
-    floats_of, frame, hello,
+    contact::{atlas, deep, hello_3, hertz_n, model, rows, service},
+    floats_of, frame, hello, model_folder, model_folder_on, write,
 };
 
 const VERTICES: usize = 361;
@@ -128,7 +128,7 @@ async fn pressure_and_gaps_may_be_told_at_the_vertices() {
     );
     let members = json!({"version": 3, "input": "gaps", "input_layout": "vertices", "map": false});
     socket.open(hello(&members)).await;
-    let depths: Vec<f32> = crate::support::contact::atlas()
+    let depths: Vec<f32> = atlas()
         .patch(papilla_proto::atlas::Patch::Skin)
         .positions_mm
         .iter()
@@ -247,4 +247,21 @@ async fn without_a_contact_model_objects_are_refused() {
     socket.send(hello_3(&json!({})).to_string()).await;
     let error = socket.hear_refusal("bad_contact").await;
     assert!(error["message"].as_str().unwrap().contains("--contact"), "{error}");
+}
+
+/// The models' own is served unasked, another one by name; either has to be of their finger.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_contact_model_lies_among_the_models_or_is_named() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    write(elsewhere.path(), "mine.contact", &model());
+    let file = elsewhere.path().join("mine.contact");
+    let named = |config: &mut papilla_server::Config| config.contact = Some(file.clone());
+    let service = Service::on(model_folder_on(&atlas()), named).await.unwrap();
+    assert!(service.json("/v1/tiers").await["contact_us"].is_u64());
+    let other = model_folder();
+    write(other.path(), "finger.contact", &model());
+    let error = Service::on(other, |_| ()).await.err().unwrap().to_string();
+    assert!(error.contains("finger.contact") && error.contains("atlas"), "{error}");
+    let error = Service::on(model_folder(), named).await.err().unwrap().to_string();
+    assert!(error.contains("mine.contact") && error.contains("--contact"), "{error}");
 }

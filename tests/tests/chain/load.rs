@@ -3,10 +3,7 @@
 use std::{path::Path, process::Command};
 
 use clap::Parser;
-use papilla_tests::{
-    conformance::ContactRecorder,
-    load::{self, LoadError, Options, Report},
-};
+use papilla_tests::load::{self, LoadError, Options, Report};
 use tempfile::TempDir;
 
 use crate::{
@@ -62,11 +59,7 @@ async fn every_frame_is_accounted_for_and_every_map_is_the_engines() {
 /// Two fingers send poses: each frame has its outcome, and the parts of its time add up.
 #[tokio::test(flavor = "multi_thread")]
 async fn fingers_are_loaded_with_poses_beside_an_echo_of_their_bytes() {
-    let room = tempfile::tempdir().unwrap();
-    let file = room.path().join("half-space.contact");
-    let model = ContactRecorder::new(&folder("models")).unwrap().file().unwrap();
-    std::fs::write(&file, model).unwrap();
-    let service = Service::with_contact(&file).await;
+    let service = Service::shipped().await;
     for (what, asks) in [("touch", false), ("summary", true), ("vertices", true)] {
         let arguments = ["--contact", what, "--fingers", "2", "--tier", "nano", "--budget-us", "0"];
         let report = run(&service, &arguments).await.unwrap();

@@ -9,6 +9,7 @@
 //! | `service` | a running service beside the library's own model |
 //! | `client` | what every client must find, over HTTP and in a session |
 //! | `load` | the load generator against the service |
+//! | `persons` | fingers of other widths and stiffness, in sessions and in finite elements |
 //! | `moving` | sessions that go on elsewhere, of the Rust client and the load generator |
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
@@ -17,6 +18,7 @@
 mod client;
 mod load;
 mod moving;
+mod persons;
 mod scene;
 mod service;
 mod shipped;

@@ -20,7 +20,7 @@ use crate::{
     service::{Sample, Service, tiny_models},
 };
 
-const SCENE: &str = r#"
+pub(crate) const SCENE: &str = r#"
 [geometry]
 kind = "fingertip"
 density = "coarse"

@@ -43,12 +43,6 @@ impl Service {
         Self::start(&quickly(), &folder("models")).await
     }
 
-    /// The service as it ships, with this contact model.
-    pub(crate) async fn with_contact(file: &Path) -> Self {
-        Self::start(&Config { contact: Some(file.to_owned()), ..quickly() }, &folder("models"))
-            .await
-    }
-
     /// A service on the models in `models`.
     pub(crate) async fn on(models: &Path) -> Self {
         Self::start(&Config { models: Some(models.to_owned()), ..quickly() }, models).await

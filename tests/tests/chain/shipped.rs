@@ -66,6 +66,21 @@ fn samples(shard: &Shard) -> Vec<Sample> {
     (0..shard.len()).map(sample).collect()
 }
 
+/// The contact model is of the networks' finger, and its load modes are of the shipped datasets.
+#[test]
+fn the_shipped_contact_model_says_where_it_is_from() {
+    let bytes = fs::read(folder("models").join("finger.contact")).unwrap();
+    let model = papilla_contact::ContactModel::read(&bytes).unwrap();
+    let atlas = Atlas::from_json(&text(&folder("models").join("atlas.json"))).unwrap();
+    model.require_atlas(atlas.hash()).unwrap();
+    assert_eq!(model.vertices(), atlas.vertex_count());
+    let hash = |name| Dataset::open(&folder(name)).unwrap().manifest().dataset_sha256.clone();
+    let header = model.header();
+    assert_eq!(header.datasets, ["data/s1", "data/broad"].map(hash));
+    assert_eq!(header.effects, ["finite_strain", "layers"]);
+    assert!(header.modes > 0 && header.depth_max_mm > 1.0, "{header:?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_shipped_models_answer_every_client() {
     let service = Service::shipped().await;

@@ -19,18 +19,24 @@ pub(crate) struct Finger {
 
 impl Finger {
     pub(crate) fn new() -> Self {
-        let (header, arrays) = match std::env::var(FILE) {
-            Ok(file) => {
-                Arrays::read(&std::fs::read(file).expect("it can be read")).expect("a model")
-            }
-            Err(_) => ellipsoid(),
-        };
+        Self::of(arrays())
+    }
+
+    pub(crate) fn of((header, arrays): (Header, Arrays)) -> Self {
         let triples = |x: &[f32]| {
             x.as_chunks::<3>().0.iter().map(|p| p.map(f64::from)).collect::<Vec<[f64; 3]>>()
         };
         let (places_mm, normals) = (triples(&arrays.positions_mm), triples(&arrays.normals));
         let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
         Self { model, places_mm, normals }
+    }
+}
+
+/// The real finger's arrays if there is a file, else the ellipsoid's.
+pub(crate) fn arrays() -> (Header, Arrays) {
+    match std::env::var(FILE) {
+        Ok(file) => Arrays::read(&std::fs::read(file).expect("it can be read")).expect("a model"),
+        Err(_) => ellipsoid(),
     }
 }
 

@@ -7,7 +7,10 @@ use std::borrow::Cow;
 
 use crate::{StartError, config::Config};
 
-/// The shipped models, cards, atlas and replay, as they were when the binary was built.
+/// The contact model's file among the others.
+pub(crate) const CONTACT: &str = "finger.contact";
+
+/// The shipped models, cards, atlas, replay and contact model, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
 /// Files by name.

@@ -1,7 +1,5 @@
 //! A finger that is a plane of an elastic half-space, and frames of version 3 for it.
 
-use std::path::PathBuf;
-
 use papilla_contact::{Arrays, Header};
 use papilla_proto::{
     FrameHeader, FrameKind, SampleType,
@@ -44,7 +42,14 @@ pub(crate) async fn service() -> Service {
 
 /// The same, with changes to the configuration.
 pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
-    let (atlas, folder) = (atlas(), model_folder_on(&atlas()));
+    let folder = model_folder_on(&atlas());
+    write(folder.path(), "finger.contact", &model());
+    Service::on(folder, change).await.unwrap()
+}
+
+/// The contact model's file.
+pub(crate) fn model() -> Vec<u8> {
+    let atlas = atlas();
     let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
     let vertices = skin.positions_mm.len();
     let header = Header {
@@ -61,13 +66,7 @@ pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
         atlas.triangles().as_flattened().to_vec(),
         MODULUS_MPA.into(),
     );
-    write(folder.path(), "finger.contact", &arrays.to_bytes(&header).unwrap());
-    let file: PathBuf = folder.path().join("finger.contact");
-    let configure = |config: &mut Config| {
-        config.contact = Some(file);
-        change(config);
-    };
-    Service::on(folder, configure).await.unwrap()
+    arrays.to_bytes(&header).unwrap()
 }
 
 /// A hello of version 3 for one ball, with more members.

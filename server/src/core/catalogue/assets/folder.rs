@@ -13,7 +13,7 @@ use std::{
 use papilla_engine::card::Index;
 
 use super::{
-    Files,
+    CONTACT, Files,
     detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
@@ -26,7 +26,7 @@ const FOLDER_BYTES_MAX: u64 = 1 << 30;
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
-const BASE: [&str; 4] = ["index.json", "atlas.json", "replay.json", "ladder.json"];
+const BASE: [&str; 5] = ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT];
 
 /// The files of `folder` that a service is made of: [`BASE`] and those of the models that its index
 /// names. Strangers that cannot be read are named in the log. None: it was to stop.
@@ -149,12 +149,13 @@ fn unusable(folder: &Path, file: String, reason: String) -> StartError {
     StartError::Unusable { file, origin: folder.display().to_string(), reason }
 }
 
-/// The names of the `.onnx` and `.json` files of `folder`.
+/// The names of the `.onnx`, `.json` and `.contact` files of `folder`.
 fn names(folder: &Path) -> io::Result<HashSet<String>> {
     let mut names = HashSet::new();
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name();
-        let wanted = Path::new(&name).extension().is_some_and(|e| e == "onnx" || e == "json");
+        let ending = Path::new(&name).extension().and_then(|e| e.to_str());
+        let wanted = matches!(ending, Some("onnx" | "json" | "contact"));
         match (wanted, name.into_string()) {
             (true, Ok(name)) => {
                 names.insert(name);
