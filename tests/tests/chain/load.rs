@@ -9,7 +9,6 @@ use tempfile::TempDir;
 use crate::{
     scene::PRESSED,
     service::{Service, model_folder, replaced, tiny_models},
-    shipped::folder,
 };
 
 fn models() -> TempDir {
