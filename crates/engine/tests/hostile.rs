@@ -227,10 +227,12 @@ fn names_that_are_made_twice_or_too_late() {
     }
 }
 
-/// Where the file holds the raw data of its initialisers.
+/// Where the file holds the raw data of its initialisers and of constants.
 fn raw_data(onnx: &[u8]) -> Vec<Range<usize>> {
-    let model = ModelProto::decode(onnx).unwrap();
-    let tensors = model.graph.unwrap().initializer;
+    let graph = ModelProto::decode(onnx).unwrap().graph.unwrap();
+    let attributes = graph.node.into_iter().flat_map(|node| node.attribute);
+    let constants = attributes.filter_map(|attribute| attribute.t);
+    let tensors: Vec<_> = graph.initializer.into_iter().chain(constants).collect();
     let place = |t: &TensorProto| {
         let start = onnx.windows(t.raw_data.len()).position(|w| w == t.raw_data)?;
         Some(start..start + t.raw_data.len())
@@ -238,7 +240,7 @@ fn raw_data(onnx: &[u8]) -> Vec<Range<usize>> {
     tensors.iter().filter(|t| t.raw_data.len() > 64).filter_map(place).collect()
 }
 
-/// A shipped network on vertices and one on pixels.
+/// Shipped networks of two widths.
 fn shipped() -> [(&'static str, Vec<u8>); 2] {
     ["nano", "small"].map(|name| {
         let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
