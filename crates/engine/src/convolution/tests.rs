@@ -96,7 +96,7 @@ fn other_convolutions_stay() {
     for case in [
         Case { stride: 2, ..plain.clone() },
         Case { dilation: 2, ..plain.clone() },
-        Case { group: 2, ..plain.clone() },
+        Case { group: 2, ..plain },
     ] {
         let model = case.model();
         let fast = run_direct(model.clone()).unwrap();
