@@ -200,10 +200,11 @@ sealed partial class Run : IDisposable
         int count = (int)step["count"], gapMs = (int?)step["gap_ms"] ?? 0, before = session.SupersededByClient;
         bool isPaused = (bool?)step["paused"] ?? false;
         var sequences = new uint[count];
+        var maps = Enumerable.Range(1, count).Select(k => Pattern((JObject)step["pressure"], (double)k / count)).ToArray();
         if (isPaused) Steer("pause");
-        for (int k = 1; k <= count; k++)
+        for (int k = 0; k < count; k++)
         {
-            sequences[k - 1] = session.Send(Pattern((JObject)step["pressure"], (double)k / count));
+            sequences[k] = session.Send(maps[k]);
             Thread.Sleep(gapMs);
         }
         if (isPaused) Steer("resume");

@@ -188,11 +188,12 @@ class Runner {
   async burst({ count, gap_ms: gapMs = 0, pressure, paused, expect }) {
     const session = /** @type {Session} */ (this.session);
     const before = session.supersededByClient;
+    const maps = Array.from({ length: count }, (_, k) => pressureMap(pressure, (k + 1) / count));
     if (paused) await this.steer('pause');
     /** @type {number[]} */
     const sequences = [];
-    for (let k = 1; k <= count; k++) {
-      sequences.push(session.send(pressureMap(pressure, k / count)));
+    for (const map of maps) {
+      sequences.push(session.send(map));
       if (gapMs) await wait(gapMs);
     }
     if (paused) await this.steer('resume');

@@ -231,10 +231,14 @@ func step_burst(step, expect):
 	var before = session.superseded_by_client
 	var paused = step.get("paused", false)
 	var sequences = []
+	# Drawing a map takes longer here than a fast tier needs to render it.
+	var maps = []
+	for k in int(step.count):
+		maps.append(Patterns.pattern(step.pressure, (k + 1) / float(step.count)))
 	if paused:
 		steer("pause")
-	for k in int(step.count):
-		sequences.append(session.send(Patterns.pattern(step.pressure, (k + 1) / float(step.count))))
+	for map in maps:
+		sequences.append(session.send(map))
 		session.poll()
 		OS.delay_msec(int(step.get("gap_ms", 0)))
 	if paused:
