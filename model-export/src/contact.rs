@@ -3,9 +3,10 @@
 
 mod placed;
 
-use self::placed::placed;
+use self::placed::Placed;
 use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::{SampleMetrics, quantile};
+use crate::processor::thread_s;
 use crate::{ExportError, read};
 use papilla_contact::{Contact, ContactModel, Gaps, Method, Object, Scene, Settings, Solver};
 use papilla_engine::{MAP_LEN, Session};
@@ -111,12 +112,6 @@ impl Models {
     }
 }
 
-/// Processor time of this thread, s: what else the machine does does not count.
-fn thread_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
 /// Measures a rung on the held-out indentations of a dataset, every `every`th state.
 ///
 /// # Errors
@@ -137,13 +132,14 @@ pub fn measure(
     let mut count = 0;
     for indentation in dataset.indentations("test")? {
         let shard = dataset.load(indentation)?;
+        let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
         for state in 0..indentation.samples {
             count += 1;
             if (count - 1) % every.max(1) != 0 {
                 continue;
             }
-            let depth_mm = f64::from(shard.depth_mm[state]);
-            let Some(object) = placed(dataset, indentation, &shard, depth_mm)? else { continue };
+            let Some(placed) = &placed else { continue };
+            let object = placed.at(f64::from(shard.depth_mm[state]));
             solver.reset();
             let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);
             figures.cold_us.push(cold);

@@ -32,6 +32,7 @@ pub mod ladder;
 pub mod metrics;
 pub mod operators;
 pub mod picture;
+mod processor;
 pub mod reference;
 pub mod table;
 

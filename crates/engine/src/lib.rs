@@ -38,6 +38,7 @@ mod operators;
 mod ort_backend;
 mod products;
 mod profile;
+mod rewrite;
 mod sparse;
 mod tract_backend;
 mod widen;

@@ -67,7 +67,6 @@ impl Press {
 
     /// The scene that presses the default finger, up to a depth.
     pub(crate) fn scene(&self, density: Density, depth_mm: f64) -> Scene {
-        let pose = Pose { pitch_deg: self.pitch_deg, ..Pose::default() };
         Scene {
             geometry: Geometry::Fingertip {
                 density,
@@ -75,16 +74,19 @@ impl Press {
                 shape: FingertipShape::default(),
             },
             indenter: self.indenter.clone(),
-            motion: Motion::to_depth(depth_mm, 1, pose),
+            motion: Motion::to_depth(depth_mm, 1, self.pose()),
             effects: self.materials.effects(),
             ..Scene::usual()
         }
     }
 
+    fn pose(&self) -> Pose {
+        Pose { pitch_deg: self.pitch_deg, ..Pose::default() }
+    }
+
     /// The indenter in its pose.
     pub(crate) fn approach(&self) -> Result<Approach, PeopleError> {
-        let pose = Pose { pitch_deg: self.pitch_deg, ..Pose::default() };
-        Approach::straight(&self.indenter, pose)
+        Approach::straight(&self.indenter, self.pose())
             .map_err(|source| PeopleError::Indenter { press: self.name.clone(), source })
     }
 

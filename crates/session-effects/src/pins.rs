@@ -51,7 +51,7 @@ impl Pins {
             };
             let reach_mm = due("radius_mm", actuator.radius_mm.or(layout.radius_mm))?;
             let own_gain = due("gain", actuator.gain.or(layout.gain))?;
-            let name = format_args!("actuator {number}").to_string();
+            let name = format!("actuator {number}");
             let (pixel, _) = geometry.locate(actuator.at, "actuators", &name)?;
             pins.push(Pin { pixel, reach_mm, max_pa: max / own_gain });
             gain.push(own_gain);

@@ -136,7 +136,8 @@ struct State {
     truth: Vec<f32>,
     means: Vec<f32>,
     best_gain: f32,
-    errors: Vec<Option<[f64; 3]>>,
+    /// Of SED, of its peak and of its means over the pins, by way; none where SED is zero.
+    errors: [Option<[f64; 3]>; Way::ALL.len()],
     corrected_pa: Vec<f32>,
 }
 
@@ -194,7 +195,7 @@ pub fn measure(
     let gain = quantile(&gains, 0.5).unwrap_or(0.0) as f32;
     for state in &mut states {
         let drive_pa = work.formula_pa(&state.means, gain);
-        state.errors[0] = work.error(&drive_pa, &state.truth)?;
+        state.errors[Way::Formula as usize] = work.error(&drive_pa, &state.truth)?;
     }
     let picture = drawn(&mut work, &states, gain)?;
     Ok((table(&work, &states, pitch_mm, pins.len()), picture))
@@ -210,9 +211,9 @@ fn pair(values: &[f64]) -> [f64; 2] {
 }
 
 fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table {
-    let row = |(place, way): (usize, Way)| {
+    let row = |way: Way| {
         let found = |part: usize| {
-            let all = states.iter().filter_map(|state| state.errors[place]);
+            let all = states.iter().filter_map(|state| state.errors[way as usize]);
             pair(&all.map(|error| error[part]).collect::<Vec<_>>())
         };
         Row {
@@ -220,7 +221,8 @@ fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table
             relative_l2: found(0),
             means: found(2),
             peak: found(1),
-            us: (!work.times_us[place].is_empty()).then(|| pair(&work.times_us[place])),
+            us: (!work.times_us[way as usize].is_empty())
+                .then(|| pair(&work.times_us[way as usize])),
         }
     };
     Table {
@@ -230,16 +232,15 @@ fn table(work: &Work<'_>, states: &[State], pitch_mm: f32, pins: usize) -> Table
         pins,
         judge: pair(&work.judged),
         network_us: pair(&work.network_us),
-        rows: Way::ALL.into_iter().enumerate().map(row).collect(),
+        rows: Way::ALL.map(row).into(),
     }
 }
 
 /// The state whose corrected drive has the median error: the press, what the drives give, the pins.
 fn drawn(work: &mut Work<'_>, states: &[State], gain: f32) -> Result<RgbImage, ExportError> {
-    const CORRECTED: usize = 4;
-    let l2 = |state: &&State, way: usize| state.errors[way].map_or(f64::NAN, |[l2, ..]| l2);
+    let l2 = |state: &&State, way: Way| state.errors[way as usize].map_or(f64::NAN, |[l2, ..]| l2);
     let mut order: Vec<&State> = states.iter().collect();
-    order.sort_by(|a, b| l2(a, CORRECTED).total_cmp(&l2(b, CORRECTED)));
+    order.sort_by(|a, b| l2(a, Way::Corrected).total_cmp(&l2(b, Way::Corrected)));
     let Some(state) = order.get(order.len() / 2) else {
         return Ok(RgbImage::new(1, 1));
     };
@@ -262,8 +263,8 @@ fn drawn(work: &mut Work<'_>, states: &[State], gain: f32) -> Result<RgbImage, E
     };
     let panels = [
         sed("SED of the press, finite elements".to_owned(), &state.truth),
-        sed(format!("by formula, {}", percent(0)), &formula_sed),
-        sed(format!("corrected, {}", percent(CORRECTED)), &work.answered),
+        sed(format!("by formula, {}", percent(Way::Formula)), &formula_sed),
+        sed(format!("corrected, {}", percent(Way::Corrected)), &work.answered),
         Picture {
             title: "pins, corrected".to_owned(),
             max: max(&pins_kpa),

@@ -1,9 +1,10 @@
 //! One state: each way's drive, and the error of its SED.
 
-use super::State;
+use super::{State, Way};
 use crate::ExportError;
 use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::SampleMetrics;
+use crate::processor::thread_s;
 use papilla_actuators::{Inverse, Pin};
 use papilla_engine::Session;
 use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Layout, Place};
@@ -14,12 +15,6 @@ use papilla_session_effects::{Effects, Finger};
 const GAIN_STEPS: usize = 4;
 /// Corrections of the last row.
 const CORRECTIONS: usize = 10;
-
-/// Processor time of this thread, us: what else the machine does does not count.
-fn thread_us() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    1e6 * time.tv_sec as f64 + 1e-3 * time.tv_nsec as f64
-}
 
 /// The session's effect by its formula, with a gain of 1: the means of SED over the pins.
 pub(super) struct Formula {
@@ -66,9 +61,9 @@ impl Formula {
     fn means(&mut self, sed: &[f32]) -> Option<(Vec<f32>, f64)> {
         self.bytes.clear();
         self.bytes.resize(HEADER_LEN_V2, 0);
-        let start_us = thread_us();
+        let start_s = thread_s();
         self.effects.write(&self.pressure_pa, sed, 0, &mut self.bytes).ok()?;
-        let us = thread_us() - start_us;
+        let us = 1e6 * (thread_s() - start_s);
         let numbers = self.bytes[HEADER_LEN_V2..].as_chunks::<4>().0;
         Some((numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(), us))
     }
@@ -89,7 +84,7 @@ pub(super) struct Work<'a> {
     pub(super) pins_pa: Vec<f32>,
     pub(super) answered: Vec<f32>,
     /// By way; empty where a row has no time of its own.
-    pub(super) times_us: [Vec<f64>; 6],
+    pub(super) times_us: [Vec<f64>; Way::ALL.len()],
     pub(super) network_us: Vec<f64>,
     pub(super) judged: Vec<f64>,
 }
@@ -109,38 +104,39 @@ impl Work<'_> {
         self.judge.infer(&self.press_pa, &mut self.answered).map_err(failed)?;
         let on_press = SampleMetrics::measure(&self.answered, &truth, &self.dataset.ground);
         self.judged.extend(on_press.map(|metrics| metrics.relative_l2));
-        let start_us = thread_us();
+        let start_s = thread_s();
         self.served.infer(&self.press_pa, &mut self.wanted).map_err(failed)?;
-        self.network_us.push(thread_us() - start_us);
+        self.network_us.push(1e6 * (thread_s() - start_s));
 
         let (means, us) = self.formula.means(&self.wanted).unwrap_or_default();
-        self.times_us[0].push(us);
+        self.times_us[Way::Formula as usize].push(us);
         let best_gain = self.best_gain(&means, &truth)?;
         let best_pa = self.formula_pa(&means, best_gain);
-        let mut errors = vec![None, self.error(&best_pa, &truth)?];
+        let mut errors = [None; Way::ALL.len()];
+        errors[Way::FormulaBest as usize] = self.error(&best_pa, &truth)?;
         let wanted = std::mem::take(&mut self.wanted);
-        let start_us = thread_us();
+        let start_s = thread_s();
         let drive_pa = self.inverse.fit(&wanted, 0).to_vec();
-        self.times_us[2].push(thread_us() - start_us);
-        errors.push(self.error(&drive_pa, &truth)?);
-        let start_us = thread_us();
+        self.times_us[Way::Magnitudes as usize].push(1e6 * (thread_s() - start_s));
+        errors[Way::Magnitudes as usize] = self.error(&drive_pa, &truth)?;
+        let start_s = thread_s();
         let mut drive_pa = self.inverse.fit(&wanted, Inverse::STEPS).to_vec();
-        let fit_us = thread_us() - start_us;
-        self.times_us[3].push(fit_us);
-        errors.push(self.error(&drive_pa, &truth)?);
+        let fit_us = 1e6 * (thread_s() - start_s);
+        self.times_us[Way::Fitted as usize].push(fit_us);
+        errors[Way::Fitted as usize] = self.error(&drive_pa, &truth)?;
         let mut corrected_pa = Vec::new();
         for correction in 0..CORRECTIONS {
             self.inverse.array().pressure(&drive_pa, &mut self.pins_pa);
             self.served.infer(&self.pins_pa, &mut self.answered).map_err(failed)?;
-            let start_us = thread_us();
+            let start_s = thread_s();
             drive_pa = self.inverse.correct(&wanted, &self.answered, Inverse::STEPS).to_vec();
             if correction == 0 {
-                self.times_us[4].push(fit_us + thread_us() - start_us);
-                errors.push(self.error(&drive_pa, &truth)?);
+                self.times_us[Way::Corrected as usize].push(fit_us + 1e6 * (thread_s() - start_s));
+                errors[Way::Corrected as usize] = self.error(&drive_pa, &truth)?;
                 corrected_pa.clone_from(&drive_pa);
             }
         }
-        errors.push(self.error(&drive_pa, &truth)?);
+        errors[Way::Settled as usize] = self.error(&drive_pa, &truth)?;
         self.wanted = wanted;
         let heading = format!(
             "{}, press {} ({}), {:.2} mm deep; SED of pins by {}",

@@ -7,38 +7,51 @@ use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_proto::atlas::Patch;
-use papilla_proto::sdf::{IndenterSpec, Placement, TouchError, first_touch_travel};
+use papilla_proto::sdf::{IndenterSpec, Placement, SignedDistance, TouchError, first_touch_travel};
 use std::sync::Arc;
 
-/// An indenter at a depth from first touch, as the dataset's simulations place it: on graded meshes
-/// from the skin itself, on the even lattice from its nodes. `None` if it passes the finger.
-pub(super) fn placed(
-    dataset: &Dataset,
-    indentation: &Indentation,
-    shard: &Shard,
-    depth_mm: f64,
-) -> Result<Option<Object>, ExportError> {
-    let path = dataset.shard_path(indentation);
-    let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
-    let Some(spec) = dataset.indenter(indentation) else {
-        return Err(bad("the manifest does not say what pressed".into()));
-    };
-    let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm, .. } = *indentation;
-    let pose = Pose { pitch_deg, roll_deg, yaw_deg };
-    let mut approach = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
-    approach.offset_mm = offset_mm;
-    let shape = Arc::clone(&approach.shape);
-    let touch = if shard.cells.is_some() {
-        let contact = approach.contact_with(&FingertipShape::default(), &Drive::Depths(vec![]));
-        contact.map(|contact| (contact.start, contact.direction))
-    } else {
-        on_vertices(dataset, spec, &approach)
-    };
-    Ok(touch.map(|(mut placement, direction)| {
-        placement.origin_mm =
-            std::array::from_fn(|i| placement.origin_mm[i] + depth_mm * direction[i]);
-        Object::rigid(shape, placement)
-    }))
+/// An indenter on its way into the finger.
+pub(super) struct Placed {
+    shape: Arc<dyn SignedDistance>,
+    first_touch: Placement,
+    direction: [f64; 3],
+}
+
+impl Placed {
+    /// As the dataset's simulations place it: on graded meshes by the skin itself, on the even
+    /// lattice by its nodes. `None` if it passes the finger.
+    pub(super) fn at_first_touch(
+        dataset: &Dataset,
+        indentation: &Indentation,
+        shard: &Shard,
+    ) -> Result<Option<Self>, ExportError> {
+        let path = dataset.shard_path(indentation);
+        let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+        let Some(spec) = dataset.indenter(indentation) else {
+            return Err(bad("the manifest does not say what pressed".into()));
+        };
+        let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm, .. } = *indentation;
+        let pose = Pose { pitch_deg, roll_deg, yaw_deg };
+        let straight = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
+        let approach = Approach { offset_mm, ..straight };
+        let touch = if shard.cells.is_some() {
+            let contact = approach.contact_with(&FingertipShape::default(), &Drive::Depths(vec![]));
+            contact.map(|contact| (contact.start, contact.direction))
+        } else {
+            on_vertices(dataset, spec, &approach)
+        };
+        let shape = approach.shape;
+        Ok(touch.map(|(first_touch, direction)| Self { shape, first_touch, direction }))
+    }
+
+    /// It at a depth from there.
+    pub(super) fn at(&self, depth_mm: f64) -> Object {
+        let mut placement = self.first_touch;
+        for (at, along) in placement.origin_mm.iter_mut().zip(self.direction) {
+            *at += depth_mm * along;
+        }
+        Object::rigid(Arc::clone(&self.shape), placement)
+    }
 }
 
 /// Where it first touches one of the atlas' vertices, and its way.

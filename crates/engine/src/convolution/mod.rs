@@ -9,6 +9,7 @@ mod direct;
 #[cfg(test)]
 mod tests;
 
+use crate::rewrite::replace;
 use direct::{Direct, Shape};
 use tract_onnx::tract_core::internal::*;
 use tract_onnx::tract_core::ops::cnn::{Conv, KernelFormat};
@@ -22,13 +23,10 @@ const WEIGHTS_MAX: usize = 1 << 18;
 /// graph is decluttered.
 pub(crate) fn run_direct(mut model: TypedModel) -> TractResult<TypedModel> {
     for node in model.eval_order()? {
-        let Some(convolution) = direct(&model, node)? else { continue };
-        let mut patch = TypedModelPatch::new("direct convolution");
-        let source = patch.tap_model(&model, model.nodes[node].inputs[0])?;
-        let name = format!("{}.direct", model.nodes[node].name);
-        let made = patch.wire_node(name, convolution, &[source])?;
-        patch.shunt_outside(&model, node.into(), made[0])?;
-        patch.apply(&mut model)?;
+        if let Some(convolution) = direct(&model, node)? {
+            let source = model.nodes[node].inputs[0];
+            replace(&mut model, source, node, "direct", convolution)?;
+        }
     }
     model.compact()?;
     Ok(model)

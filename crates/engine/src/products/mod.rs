@@ -10,6 +10,7 @@ mod stacked;
 #[cfg(test)]
 mod tests;
 
+use crate::rewrite::replace;
 use joined::Joined;
 use stacked::Stacked;
 use tract_onnx::tract_core::internal::*;
@@ -36,13 +37,10 @@ fn f32_fact(model: &TypedModel, node: usize) -> TractResult<TypedFact> {
 /// Replaces products with stacks of constant matrices: in a graph that is decluttered.
 pub(crate) fn stack(mut model: TypedModel) -> TractResult<TypedModel> {
     for node in model.eval_order()? {
-        let Some(product) = stacked(&model, node)? else { continue };
-        let mut patch = TypedModelPatch::new("stacked product");
-        let source = patch.tap_model(&model, model.nodes[node].inputs[0])?;
-        let name = format!("{}.stacked", model.nodes[node].name);
-        let made = patch.wire_node(name, product, &[source])?;
-        patch.shunt_outside(&model, node.into(), made[0])?;
-        patch.apply(&mut model)?;
+        if let Some(product) = stacked(&model, node)? {
+            let source = model.nodes[node].inputs[0];
+            replace(&mut model, source, node, "stacked", product)?;
+        }
     }
     model.compact()?;
     Ok(model)

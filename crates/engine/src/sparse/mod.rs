@@ -11,6 +11,7 @@ mod terms;
 #[cfg(test)]
 mod tests;
 
+use crate::rewrite::replace;
 use map::SparseMap;
 use terms::Terms;
 use tract_onnx::tract_core::internal::*;
@@ -26,13 +27,9 @@ use tract_onnx::tract_core::ops::{
 pub(crate) fn fuse(mut model: TypedModel) -> TractResult<TypedModel> {
     // From the outputs on, so that a chain is found from its end.
     for end in model.eval_order()?.into_iter().rev() {
-        let Some((start, map)) = chain(&model, end)? else { continue };
-        let mut patch = TypedModelPatch::new("sparse map");
-        let source = patch.tap_model(&model, start)?;
-        let name = format!("{}.sparse", model.nodes[end].name);
-        let fused = patch.wire_node(name, map, &[source])?;
-        patch.shunt_outside(&model, end.into(), fused[0])?;
-        patch.apply(&mut model)?;
+        if let Some((start, map)) = chain(&model, end)? {
+            replace(&mut model, start, end, "sparse", map)?;
+        }
     }
     model.compact()?;
     Ok(model)

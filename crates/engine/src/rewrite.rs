@@ -1,0 +1,20 @@
+//! How operators of our own get into a graph.
+
+use tract_onnx::tract_core::internal::*;
+
+/// Puts `op` in the place of all that lies between `source` and the output of the node `end`, under
+/// that node's name and `.suffix`.
+pub(crate) fn replace(
+    model: &mut TypedModel,
+    source: OutletId,
+    end: usize,
+    suffix: &str,
+    op: impl Into<Box<dyn TypedOp>>,
+) -> TractResult<()> {
+    let mut patch = TypedModelPatch::new(suffix.to_owned());
+    let source = patch.tap_model(model, source)?;
+    let name = format!("{}.{suffix}", model.nodes[end].name);
+    let made = patch.wire_node(name, op, &[source])?;
+    patch.shunt_outside(model, end.into(), made[0])?;
+    patch.apply(model)
+}
