@@ -32,6 +32,7 @@ mod error;
 mod guard;
 mod info;
 pub mod ladder;
+mod moves;
 mod onnx;
 mod operators;
 #[cfg(feature = "ort")]

@@ -2,7 +2,7 @@
 
 use crate::{
     Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
-    check_output, convolution, guard::guarded, products, sparse, widen::widen,
+    check_output, convolution, guard::guarded, moves, products, sparse, widen::widen,
 };
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
@@ -35,7 +35,8 @@ impl TractModel {
             // Again: only now is a bias that was given a shape known to be constant.
             let direct = convolution::run_direct(typed.into_decluttered()?)?;
             let fused = sparse::fuse(direct)?;
-            products::stack(fused)?.into_optimized()?.into_runnable()
+            let stacked = products::stack(fused)?;
+            moves::run_by_rows(stacked)?.into_optimized()?.into_runnable()
         })?;
         Ok(Self { info, plan })
     }

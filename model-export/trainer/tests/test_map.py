@@ -9,6 +9,7 @@ import onnx
 import onnxruntime
 import pytest
 import torch
+from torch.nn import functional
 
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
@@ -19,7 +20,7 @@ from papilla_trainer.export import export_run
 from papilla_trainer.map_network import MapNet, MapSpec, mirrored, parse_map_network
 from papilla_trainer.training import Trainer
 
-NAMES = ("map-c2-k3-r4", "map-c3-k5-r2-h4")
+NAMES = ("map-c2-k3-r4", "map-c3-k5-r2-h4", "map-c3-k3-r2-h4-p2")
 
 
 def build(name: str) -> MapNet:
@@ -42,7 +43,11 @@ def test_names_are_read() -> None:
     for name in NAMES:
         assert parse_map_network(name).name == name
     assert parse_map_network("map-c6-k5-r32-h16") == MapSpec(6, 5, 32, 16)
-    for wrong in ("map", "map-c6", "map-c6-k4-r2", "map-c0-k3-r2", "map-c6-k3-r2-h0", "map-k3-c6"):
+    assert parse_map_network("map-c3-k3-r32-h4-p2") == MapSpec(3, 3, 32, 4, pixel=2)
+    assert parse_map_network("map-c3-k3-r32").sides == [112, 56, 28]
+    assert parse_map_network("map-c3-k3-r32-p2").sides == [56, 28]
+    wrong_names = ("map", "map-c6", "map-c6-k4-r2", "map-c0-k3-r2", "map-c6-k3-r2-h0", "map-k3-c6")
+    for wrong in (*wrong_names, "map-c6-k3-r2-p3", "map-c6-k3-r2-p1"):
         with pytest.raises(UsageError, match=r"--network|unknown network"):
             parse_map_network(wrong)
 
@@ -84,6 +89,16 @@ def test_a_pixel_is_felt_in_blocks_around_it_and_through_the_global_map_elsewher
     assert everywhere[0, 0, 20, 20] > 0.0
     assert near[0, 0, 112, 112] > 0.0
     assert near[0, 0, 20, 20] == 0.0
+
+
+@torch.no_grad()
+def test_between_coarse_pixels_values_are_linear() -> None:
+    between = build("map-c2-k3-r4-p2").between
+    y, x = torch.meshgrid(torch.arange(24.0), torch.arange(24.0), indexing="ij")
+    plane = 3.0 * y - 2.0 * x + 100.0
+    coarse = functional.avg_pool2d(plane[None, None], 2)
+    drawn = functional.pixel_shuffle(functional.conv2d(coarse, between, padding=1), 2)[0, 0]
+    assert torch.allclose(drawn[2:-2, 2:-2], plane[2:-2, 2:-2])
 
 
 def test_what_varies_over_the_finger_is_even_in_the_mirror() -> None:
