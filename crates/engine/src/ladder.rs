@@ -75,6 +75,8 @@ pub enum Kind {
     PublishedUNet,
     /// The finite-element solver itself.
     Fe,
+    /// One map for every pressure: what whoever knows nothing of the pressure errs.
+    Floor,
 }
 
 impl Kind {
@@ -103,7 +105,7 @@ pub struct Rung {
     pub name: String,
     /// What it is.
     pub kind: Kind,
-    /// Name of the model that serves it; none for FE.
+    /// Name of the model that serves it; none for FE and floors.
     pub model: Option<String>,
     /// SHA-256 of the model measured.
     #[serde(default)]
@@ -135,6 +137,27 @@ pub struct Rung {
 }
 
 impl Rung {
+    /// A rung that no model serves, and of which nothing is measured yet.
+    #[must_use]
+    pub const fn unserved(name: String, kind: Kind) -> Self {
+        Self {
+            name,
+            kind,
+            model: None,
+            onnx_sha256: None,
+            bytes: None,
+            load_ms: None,
+            memory_mib: None,
+            latency_ms: None,
+            seconds: None,
+            reference: false,
+            errors: BTreeMap::new(),
+            refused: 0,
+            zero_answer: None,
+            pareto: false,
+        }
+    }
+
     /// Time of one map, ms: an inference in tract, or one FE state.
     #[must_use]
     pub fn time_ms(&self) -> Option<f64> {

@@ -64,30 +64,17 @@ pub(super) fn rung(
         draw(&canvas.interface, &state.sed_j_per_m3, &mut own);
         draw(&canvas.interface, &due.sed_j_per_m3, &mut truth);
         let metrics = SampleMetrics::measure(&own, &truth, &canvas.ground);
-        samples.push(metrics.ok_or_else(|| ExportError::Truth {
-            path: due.origin.clone().into(),
-            sample: index,
-            reason: "it is zero",
-        })?);
+        samples.push(metrics.ok_or_else(|| due.without_sed(index))?);
     }
     let seconds = seconds(folder, &dataset)?;
     let at = |q| quantile(&seconds, q);
     let errors = summarise(reference.name, &samples);
     Ok(Rung {
-        name: format!("fe-{}", dataset.mesh()),
-        kind: Kind::Fe,
-        model: None,
-        onnx_sha256: None,
-        bytes: None,
-        load_ms: None,
-        memory_mib: None,
-        latency_ms: None,
         seconds: at(0.5).zip(at(0.99)).map(|(p50, p99)| Percentiles { p50, p99 }),
         reference: is_reference,
         errors: errors.into_iter().map(|e| (reference.name.to_owned(), e.into())).collect(),
         refused,
-        zero_answer: None,
-        pareto: false,
+        ..Rung::unserved(format!("fe-{}", dataset.mesh()), Kind::Fe)
     })
 }
 

@@ -5,7 +5,7 @@
 
 use super::{Progress, Timing, machine, model};
 use crate::{ExportError, read, read_text};
-use papilla_engine::ladder::{Kind, Ladder, LatencyByEngine, Percentiles, Rung};
+use papilla_engine::ladder::{Ladder, LatencyByEngine, Percentiles, Rung};
 use papilla_engine::{EngineError, MAP_LEN, MAP_SIDE_PX};
 use std::fmt::Write;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub fn measure(models: &Path, progress: &dyn Progress) -> Result<Ladder, ExportE
     let path = models.join("ladder.json");
     let mut ladder = Ladder::from_json(&read_text(&path)?).map_err(ExportError::engine(&path))?;
     // The solver's rows were timed elsewhere.
-    ladder.rungs.retain(|rung| rung.kind != Kind::Fe);
+    ladder.rungs.retain(|rung| rung.model.is_some());
     progress.total(ladder.rungs.len() as u64);
     for rung in &mut ladder.rungs {
         progress.stage(&rung.name);

@@ -6,6 +6,7 @@
 //! table and [`plot`] the pictures.
 
 mod fe;
+mod floor;
 pub mod here;
 mod model;
 pub mod plot;
@@ -141,6 +142,7 @@ pub fn measure(
             footprint,
         )?);
     }
+    models.extend(floor::rungs(&task.data, &sets, &canvas)?);
     progress.stage("finite elements");
     let mut ladder = Ladder {
         format: MODEL_FORMAT,

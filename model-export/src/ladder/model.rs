@@ -111,11 +111,7 @@ impl Judge<'_> {
             draw(&self.canvas.interface, &state.sed_j_per_m3, &mut truth);
             if self.infer(&pressure, &mut answer)? {
                 let metrics = SampleMetrics::measure(&answer, &truth, &self.canvas.ground);
-                samples.push(metrics.ok_or_else(|| ExportError::Truth {
-                    path: (&state.origin).into(),
-                    sample: index,
-                    reason: "it is zero",
-                })?);
+                samples.push(metrics.ok_or_else(|| state.without_sed(index))?);
             }
             progress.step();
         }

@@ -55,7 +55,7 @@ fn costs(text: &mut String, ladder: &Ladder) {
         ".\n\n| rung | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
-    for rung in by_time(ladder).filter(|rung| rung.kind != Kind::Fe) {
+    for rung in by_time(ladder).filter(|rung| ![Kind::Fe, Kind::Floor].contains(&rung.kind)) {
         let latency = rung.latency_ms.as_ref();
         let _ = writeln!(
             text,
@@ -144,6 +144,7 @@ pub(super) fn kind(kind: Kind) -> &'static str {
         Kind::Network => "network",
         Kind::PublishedUNet => "published U-Net",
         Kind::Fe => "finite elements",
+        Kind::Floor => "floor",
     }
 }
 

@@ -32,6 +32,11 @@ impl State {
         self.indentation == other.indentation
             && (self.depth_mm - other.depth_mm).abs() <= 1e-5 * other.depth_mm
     }
+
+    /// What is wrong with a truth that is zero everywhere.
+    pub(super) fn without_sed(&self, sample: usize) -> ExportError {
+        ExportError::Truth { path: (&self.origin).into(), sample, reason: "it is zero" }
+    }
 }
 
 /// States that no training saw.
@@ -80,11 +85,11 @@ impl SampleSet {
 }
 
 /// What a set takes of a dataset.
-struct Source {
+pub(super) struct Source {
     name: &'static str,
     folder: &'static str,
     about: &'static str,
-    test_only: bool,
+    split: Option<&'static str>,
     deeper_than_mm: Option<f32>,
 }
 
@@ -92,7 +97,7 @@ const REFERENCE: Source = Source {
     name: "reference",
     folder: "final",
     about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
-    test_only: false,
+    split: None,
     deeper_than_mm: None,
 };
 
@@ -101,14 +106,14 @@ const SOURCES: [Source; 5] = [
         name: "heldout-presses",
         folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
-        test_only: true,
+        split: Some("test"),
         deeper_than_mm: None,
     },
     Source {
         name: "heldout-shapes",
         folder: "heldout-graded",
         about: "shapes that no training saw",
-        test_only: false,
+        split: None,
         deeper_than_mm: None,
     },
     REFERENCE,
@@ -117,17 +122,29 @@ const SOURCES: [Source; 5] = [
         folder: "s1",
         about: "held-out presses of the published campaign, a plate alone, on the even lattice: \
                 its SED is 20 to 40 % off the reference's",
-        test_only: true,
+        split: Some("test"),
         deeper_than_mm: None,
     },
     Source {
         name: "deep",
         folder: "deep",
         about: "deeper than any training (more than 2.0 mm), on the even lattice",
-        test_only: false,
+        split: None,
         deeper_than_mm: Some(DEEP_MM),
     },
 ];
+
+/// What the networks on maps learnt from.
+pub(super) const TRAINING: [Source; 2] =
+    [Source { folder: "more-graded", ..LEARNT }, Source { folder: "broad-graded", ..LEARNT }];
+
+const LEARNT: Source = Source {
+    name: "training",
+    folder: "",
+    about: "what networks learnt from",
+    split: Some("train"),
+    deeper_than_mm: None,
+};
 
 /// Reads the sets whose datasets are in `data`; the others come out empty and say why.
 pub(super) fn load(data: &Path, canvas: &Canvas) -> Result<Vec<SampleSet>, ExportError> {
@@ -135,7 +152,7 @@ pub(super) fn load(data: &Path, canvas: &Canvas) -> Result<Vec<SampleSet>, Expor
 }
 
 impl Source {
-    fn load(&self, data: &Path, canvas: &Canvas) -> Result<SampleSet, ExportError> {
+    pub(super) fn load(&self, data: &Path, canvas: &Canvas) -> Result<SampleSet, ExportError> {
         let folder = data.join(self.folder);
         if !folder.join("manifest.json").is_file() {
             return Ok(SampleSet {
@@ -158,10 +175,9 @@ impl Source {
             dataset_sha256: Some(dataset.sha256().to_owned()),
             states: Vec::new(),
         };
-        let indentations = if self.test_only {
-            dataset.indentations("test")?
-        } else {
-            dataset.every_indentation()
+        let indentations = match self.split {
+            Some(split) => dataset.indentations(split)?,
+            None => dataset.every_indentation(),
         };
         for indentation in indentations {
             self.take(dataset, indentation, &mut set.states)?;

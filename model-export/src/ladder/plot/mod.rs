@@ -30,7 +30,8 @@ fn colour(kind: Kind) -> RGBColor {
         Kind::Operator => RGBColor(0, 158, 115),
         Kind::Network => RGBColor(0, 114, 178),
         Kind::PublishedUNet => RGBColor(213, 94, 0),
-        Kind::Fe => RGBColor(60, 60, 60),
+        // Floors have no time and are not drawn.
+        Kind::Fe | Kind::Floor => RGBColor(60, 60, 60),
     }
 }
 
