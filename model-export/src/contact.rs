@@ -8,8 +8,13 @@ use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::{SampleMetrics, quantile};
 use crate::processor::thread_s;
 use crate::{ExportError, read};
-use papilla_contact::{Contact, ContactModel, Gaps, Method, Object, Scene, Settings, Solver};
+use papilla_contact::{
+    Contact, ContactModel, Gaps, Layer, Method, Object, PixelContact, PixelSkin, Scene, Settings,
+    Solver,
+};
 use papilla_engine::{MAP_LEN, Session};
+use papilla_fingertip::scene::TissueTable;
+use papilla_fingertip::tissue::Tissue;
 use papilla_proto::atlas::Patch;
 use serde::Serialize;
 use std::path::Path;
@@ -33,12 +38,20 @@ pub enum Rung {
     Gaps,
     /// The same, told the object.
     SecondOrder,
+    /// The same, then on pixels.
+    Pixels,
 }
 
 impl Rung {
     /// All of them, from fast and rough to slow and exact.
-    pub const ALL: [Self; 5] =
-        [Self::Springs, Self::HalfSpace, Self::SmallStrain, Self::Gaps, Self::SecondOrder];
+    pub const ALL: [Self; 6] = [
+        Self::Springs,
+        Self::HalfSpace,
+        Self::SmallStrain,
+        Self::Gaps,
+        Self::SecondOrder,
+        Self::Pixels,
+    ];
 
     /// Name in tables.
     #[must_use]
@@ -49,6 +62,7 @@ impl Rung {
             Self::SmallStrain => "small strain",
             Self::Gaps => "second order, gaps",
             Self::SecondOrder => "second order",
+            Self::Pixels => "second order, pixels",
         }
     }
 }
@@ -106,7 +120,7 @@ impl Models {
             Rung::Springs => (&self.finger, Method::Springs),
             Rung::HalfSpace => (&self.half_space, Method::SmallStrain),
             Rung::SmallStrain => (&self.finger, Method::SmallStrain),
-            Rung::Gaps | Rung::SecondOrder => (&self.finger, Method::SecondOrder),
+            Rung::Gaps | Rung::SecondOrder | Rung::Pixels => (&self.finger, Method::SecondOrder),
         };
         Solver::new(Arc::clone(model), Settings { method, ..Settings::default() }).ok()
     }
@@ -128,6 +142,11 @@ pub fn measure(
     let Some(mut solver) = models.solver(rung) else {
         return Ok(figures.row(rung, dataset.name()));
     };
+    if rung == Rung::Pixels {
+        let raster = std::sync::Arc::new(dataset.maps.raster(Patch::Skin).clone());
+        let skin = PixelSkin::new(&dataset.atlas, raster, &layers());
+        figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger));
+    }
     let mut out = Contact::new(models.finger.vertices());
     let mut count = 0;
     for indentation in dataset.indentations("test")? {
@@ -169,6 +188,18 @@ struct Figures {
     warm_us: Vec<f64>,
     told: [usize; 3],
     depth_mm: Vec<f32>,
+    pixels: Option<PixelContact>,
+}
+
+/// The default finger's skin, from the surface to the bone below the middle of the pad.
+fn layers() -> [Layer; 3] {
+    let tissues = TissueTable::default();
+    [(Tissue::Epidermis, 0.2), (Tissue::Dermis, 1.0), (Tissue::Subcutaneous, 3.0)].map(
+        |(tissue, thickness_mm)| {
+            let spec = tissues.of(tissue);
+            Layer { young_mpa: spec.youngs_modulus_mpa, poisson: spec.poissons_ratio, thickness_mm }
+        },
+    )
 }
 
 impl Figures {
@@ -195,7 +226,10 @@ impl Figures {
             Scene::Objects(objects)
         };
         let clock = thread_s();
-        let solved = solver.solve(scene, out);
+        let solved = match &mut self.pixels {
+            Some(pixels) => solver.solve_on_pixels(scene, pixels, out),
+            None => solver.solve(scene, out),
+        };
         let us = (thread_s() - clock) * 1e6;
         self.told[0] += usize::from(solved.is_err());
         us
@@ -215,7 +249,10 @@ impl Figures {
         let path = dataset.shard_path(indentation);
         let refused = |source| ExportError::Atlas { path: path.clone(), source };
         let skin = dataset.maps.raster(Patch::Skin);
-        skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?;
+        match &self.pixels {
+            Some(pixels) => pressure_pa.copy_from_slice(pixels.map_pa()),
+            None => skin.rasterise(&out.pressure_pa, &mut pressure_pa).map_err(refused)?,
+        }
         dataset.draw_pressure(indentation, shard, state, &mut truth)?;
         let (mut miss, mut size) = (0.0, 0.0);
         for (found, due) in pressure_pa.iter().zip(&truth) {

@@ -30,6 +30,24 @@ pub(crate) struct Symmetric<'a> {
     pub norm: f32,
 }
 
+/// A symmetric positive definite operator.
+pub(crate) trait Operator {
+    /// No less than its largest eigenvalue.
+    fn norm(&self) -> f32;
+    /// Fills `y` with its product with `x`.
+    fn times(&mut self, x: &[f32], y: &mut [f32]);
+}
+
+impl Operator for Symmetric<'_> {
+    fn norm(&self) -> f32 {
+        self.norm
+    }
+
+    fn times(&mut self, x: &[f32], y: &mut [f32]) {
+        multiply(self.values, self.stride, x, y);
+    }
+}
+
 impl<'a> Symmetric<'a> {
     /// The first `n` rows and columns.
     pub(crate) fn new(values: &'a [f32], stride: usize, n: usize) -> Self {
@@ -64,7 +82,7 @@ impl BoundedSolver {
     /// violates its condition by more than `tolerance_mm`, or `products_max` are done.
     pub(crate) fn solve(
         &mut self,
-        m: Symmetric<'_>,
+        mut m: impl Operator,
         g: &[f32],
         f: &mut [f32],
         tolerance_mm: f32,
@@ -77,16 +95,15 @@ impl BoundedSolver {
         for f in f.iter_mut() {
             *f = if *f > 0.0 { *f } else { 0.0 };
         }
-        let times = |x: &[f32], y: &mut [f32]| multiply(m.values, m.stride, x, y);
-        let refresh = |f: &[f32], gradient: &mut [f32]| {
-            times(f, gradient);
+        let refresh = |m: &mut dyn Operator, f: &[f32], gradient: &mut [f32]| {
+            m.times(f, gradient);
             for (w, g) in gradient.iter_mut().zip(g) {
                 *w += g;
             }
         };
-        refresh(f, gradient);
+        refresh(&mut m, f, gradient);
         let mut effort = Effort { products: 1, violation_mm: 0.0 };
-        let step = 1.0 / m.norm.max(f32::MIN_POSITIVE);
+        let step = 1.0 / m.norm().max(f32::MIN_POSITIVE);
         let mut restart = true;
         loop {
             let (mut out_of_balance, mut penetrating) = (0.0f32, 0.0f32);
@@ -110,7 +127,7 @@ impl BoundedSolver {
                 return effort;
             }
             if penetrating > PROPORTION * usable.max(0.0) {
-                times(chopped, product);
+                m.times(chopped, product);
                 effort.products += 1;
                 let bends = dot(chopped, product);
                 let length = penetrating / bends.max(f32::MIN_POSITIVE);
@@ -123,7 +140,7 @@ impl BoundedSolver {
                 direction.copy_from_slice(free);
                 restart = false;
             }
-            times(direction, product);
+            m.times(direction, product);
             effort.products += 1;
             let bends = dot(direction, product).max(f32::MIN_POSITIVE);
             let length = dot(gradient, direction) / bends;
@@ -156,7 +173,7 @@ impl BoundedSolver {
                         f[i] = (f[i] - step * gradient[i]).max(0.0);
                     }
                 }
-                refresh(f, gradient);
+                refresh(&mut m, f, gradient);
                 effort.products += 1;
                 restart = true;
             }

@@ -125,6 +125,14 @@ impl View<'_> {
         }
     }
 
+    /// The nearest object of a place, reference mm; none of a scene that is told by gaps.
+    pub(crate) fn nearest_at(&self, at_mm: [f64; 3]) -> Option<Nearest> {
+        match self.things {
+            Things::Objects(objects) => Some(self.nearest_object(objects, self.seen(at_mm))),
+            Things::Field(_) => None,
+        }
+    }
+
     fn nearest_object(&self, objects: &[Object], p: [f64; 3]) -> Nearest {
         let mut nearest = Nearest {
             gap_mm: f64::INFINITY,

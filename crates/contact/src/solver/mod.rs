@@ -159,6 +159,22 @@ impl Solver {
         &self.model
     }
 
+    /// Forces on the skin's vertices after the last frame, N.
+    pub(crate) fn forces(&self, force_n: &mut [Vec<f32>; 3]) {
+        let Slots { found, size, .. } = &self.patch.values;
+        for (force, found) in force_n.iter_mut().zip(found) {
+            force.fill(0.0);
+            for slot in (0..self.patch.near()).filter(|slot| size[*slot] > 0.0) {
+                force[self.patch.vertices()[slot] as usize] = found[slot];
+            }
+        }
+    }
+
+    /// Whose finger it is.
+    pub(crate) fn person(&self) -> Person {
+        self.settings.person
+    }
+
     /// Finds what presses on the finger in a scene: objects in the finger's frame, in mm of this
     /// person, or gaps.
     ///

@@ -2,6 +2,7 @@
 
 mod gaps;
 mod memory;
+mod pixels;
 mod support;
 
 use papilla_contact::{Arrays, ContactModel, NetForce, Object, Person, Settings, Solver};

@@ -1,0 +1,180 @@
+//! Products with a compliance that is the same everywhere, on a window of pixels.
+
+use super::layers::SurfaceCompliance;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+use std::f64::consts::TAU;
+use std::fmt;
+use std::sync::Arc;
+
+type C32 = Complex<f32>;
+
+/// Lengths of windows: a transform of each is fast.
+const LENGTHS: [usize; 10] = [32, 48, 64, 80, 96, 128, 160, 192, 224, 288];
+
+/// Transforms along a window of one length.
+struct Plan {
+    length: usize,
+    forward: Arc<dyn RealToComplex<f32>>,
+    back: Arc<dyn ComplexToReal<f32>>,
+    across: [Arc<dyn Fft<f32>>; 2],
+}
+
+/// Memory for a window of any of the lengths, either way.
+pub(super) struct Convolution {
+    plans: Vec<Plan>,
+    rows: usize,
+    columns: usize,
+    /// `[rows][columns]`.
+    grid: Vec<f32>,
+    /// `[rows][columns / 2 + 1]`, and the same the other way round.
+    spectrum: Vec<C32>,
+    turned: Vec<C32>,
+    scratch: Vec<C32>,
+    /// `[columns / 2 + 1][rows]`: compliance over the number of pixels, mm/MPa.
+    compliance: Vec<f32>,
+}
+
+impl fmt::Debug for Convolution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { rows, columns, .. } = self;
+        f.debug_struct("Convolution").field("rows", rows).field("columns", columns).finish()
+    }
+}
+
+impl Convolution {
+    pub(super) fn new() -> Self {
+        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
+        let plan = |length| Plan {
+            length,
+            forward: real.plan_fft_forward(length),
+            back: real.plan_fft_inverse(length),
+            across: [complex.plan_fft_forward(length), complex.plan_fft_inverse(length)],
+        };
+        let plans: Vec<Plan> = LENGTHS.map(plan).into();
+        let scratch = |p: &Plan| {
+            let lines = p.across.iter().map(|fft| fft.get_inplace_scratch_len()).max();
+            let along = p.forward.get_scratch_len().max(p.back.get_scratch_len());
+            along.max(lines.unwrap_or(0))
+        };
+        let scratch = plans.iter().map(scratch).max().unwrap_or(0);
+        let longest = LENGTHS[LENGTHS.len() - 1];
+        let half = longest * (longest / 2 + 1);
+        let zero = C32::new(0.0, 0.0);
+        Self {
+            plans,
+            rows: 0,
+            columns: 0,
+            grid: vec![0.0; longest * longest],
+            spectrum: vec![zero; half],
+            turned: vec![zero; half],
+            scratch: vec![zero; scratch],
+            compliance: vec![0.0; half],
+        }
+    }
+
+    /// Takes a window of at least so many rows and columns, as far as there is one, of pixels
+    /// `pitch_mm` apart along rows and columns.
+    pub(super) fn open(
+        &mut self,
+        [rows, columns]: [usize; 2],
+        [across_mm, along_mm]: [f64; 2],
+        surface: &SurfaceCompliance,
+    ) {
+        let longest = LENGTHS[LENGTHS.len() - 1];
+        let fitting = |least| LENGTHS.into_iter().find(|l| *l >= least).unwrap_or(longest);
+        (self.rows, self.columns) = (fitting(rows), fitting(columns));
+        let wave = |index: usize, length: usize, pitch_mm: f64| {
+            TAU * index.min(length - index) as f64 / (length as f64 * pitch_mm)
+        };
+        let pixels = (self.rows * self.columns) as f64;
+        for column in 0..=self.columns / 2 {
+            let x = wave(column, self.columns, along_mm);
+            for row in 0..self.rows {
+                let k = x.hypot(wave(row, self.rows, across_mm));
+                self.compliance[column * self.rows + row] = (surface.at(k) / pixels) as f32;
+            }
+        }
+    }
+
+    /// Pixels of a row.
+    pub(super) fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Rows.
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The window, to be filled with pressure (MPa) before, and read displacement (mm) after
+    /// [`Self::apply`].
+    pub(super) fn grid(&mut self) -> &mut [f32] {
+        &mut self.grid[..self.rows * self.columns]
+    }
+
+    /// Pressure to displacement. The window is periodic.
+    pub(super) fn apply(&mut self) {
+        let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance } = self;
+        let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
+        let of = |length: usize| plans.iter().find(|p| p.length == length);
+        let (Some(along), Some(across)) = (of(columns), of(rows)) else { return };
+        let grid = &mut grid[..rows * columns];
+        let [spectrum, turned] = [spectrum, turned].map(|v| &mut v[..rows * half]);
+        // Lengths are those of the plans, so nothing here can be refused.
+        for (row, waves) in grid.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
+            let _ = along.forward.process_with_scratch(row, waves, scratch);
+        }
+        turn(spectrum, half, turned);
+        across.across[0].process_with_scratch(turned, scratch);
+        for (wave, compliance) in turned.iter_mut().zip(&*compliance) {
+            *wave *= *compliance;
+        }
+        across.across[1].process_with_scratch(turned, scratch);
+        turn(turned, rows, spectrum);
+        for (row, waves) in grid.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
+            // Rounding leaves a trace of what is real.
+            waves[0].im = 0.0;
+            waves[half - 1].im = 0.0;
+            let _ = along.back.process_with_scratch(waves, row, scratch);
+        }
+    }
+}
+
+/// Transposes lines of `length`.
+fn turn(from: &[C32], length: usize, to: &mut [C32]) {
+    let lines = from.len() / length;
+    for (line, values) in from.chunks_exact(length).enumerate() {
+        for (column, value) in values.iter().enumerate() {
+            to[column * lines + line] = *value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::layers::Layer;
+    use super::*;
+
+    /// A wave moves as the table says; all else stays still.
+    #[test]
+    fn a_wave_of_pressure_moves_by_its_compliance() {
+        let layers = [Layer { young_mpa: 0.1, poisson: 0.4, thickness_mm: 3.0 }];
+        let surface = SurfaceCompliance::new(&layers);
+        let mut convolution = Convolution::new();
+        let [across_mm, along_mm] = [0.15, 0.12];
+        convolution.open([40, 60], [across_mm, along_mm], &surface);
+        assert_eq!([convolution.rows(), convolution.columns()], [48, 64]);
+        let phase = |i: usize| TAU * (3.0 * (i / 64) as f64 / 48.0 + 5.0 * (i % 64) as f64 / 64.0);
+        for (i, p) in convolution.grid().iter_mut().enumerate() {
+            *p = phase(i).cos() as f32;
+        }
+        convolution.apply();
+        let k = (TAU * 3.0 / (48.0 * across_mm)).hypot(TAU * 5.0 / (64.0 * along_mm));
+        for (i, u) in convolution.grid().iter().enumerate() {
+            let due = surface.at(k) * phase(i).cos();
+            assert!((f64::from(*u) - due).abs() < 1e-5 * surface.at(k), "{i}: {u} {due}");
+        }
+    }
+}

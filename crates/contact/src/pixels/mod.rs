@@ -1,0 +1,244 @@
+//! Contact on pixels: what vertices are too far apart to see.
+//!
+//! A finger's compliance at vertices is right over long distances and too coarse under an edge or
+//! a dot. Nearby, skin is a stack of plane layers, whose compliance `K` is known for every
+//! wave length. The displacement of a pixel is
+//!
+//! ```text
+//! u(x) = S [u_v - K p_v] + K p
+//! ```
+//!
+//! with the vertices' displacement `u_v` under their forces, the pressure `p_v` that is linear
+//! between vertices, interpolation `S` of second degree, and the pressure `p` on pixels. So a vertex'
+//! own dent makes way for the true one; what is far away cancels. `p >= 0`, `gap >= 0`,
+//! `p gap = 0` on pixels; the vertices' forces are the pressure's sums over their hats, and both go
+//! in turn until forces settle.
+
+mod convolution;
+mod layers;
+mod smooth;
+mod window;
+
+use crate::answer::{Contact, Effort, Person};
+use crate::bounded::{BoundedSolver, Operator};
+use crate::error::ContactError;
+use crate::model::ContactModel;
+use crate::objects::{Scene, View};
+use crate::second_order::Amplitudes;
+use crate::solver::Solver;
+use convolution::Convolution;
+use layers::SurfaceCompliance;
+use papilla_atlas::{Atlas, MAP_LEN, Raster};
+use smooth::{Stencil, stencils};
+use std::sync::Arc;
+use window::Window;
+
+pub use layers::Layer;
+
+/// Rounds of vertices and pixels at most.
+const ROUNDS_MAX: usize = 6;
+/// Change of the vertices' forces, of their sum, that ends them.
+const SETTLED: f32 = 0.01;
+/// Violation of a complementarity condition that is accepted, reference mm.
+const VIOLATION_MM: f32 = 1e-4;
+/// Most products with the compliance in a round.
+const PRODUCTS_MAX: u32 = 80;
+const PA_PER_MPA: f32 = 1e6;
+
+/// What pixels have to know of a skin; made once, for any number of fingers.
+#[derive(Debug)]
+pub struct PixelSkin {
+    raster: Arc<Raster>,
+    uv_px: Vec<[f32; 2]>,
+    stencils: Vec<Stencil>,
+    surface: SurfaceCompliance,
+}
+
+impl PixelSkin {
+    /// The skin of an atlas, its layers from the surface down to the bone.
+    #[must_use]
+    pub fn new(atlas: &Atlas, raster: Arc<Raster>, layers: &[Layer]) -> Self {
+        let uv_px = atlas.patch(raster.patch()).uv_px.clone();
+        let stencils = stencils(atlas, &raster);
+        Self { raster, uv_px, stencils, surface: SurfaceCompliance::new(layers) }
+    }
+}
+
+/// Contact on the pixels of one finger. All memory is taken at construction.
+#[derive(Debug)]
+pub struct PixelContact {
+    skin: Arc<PixelSkin>,
+    window: Window,
+    bounded: BoundedSolver,
+    convolution: Convolution,
+    amplitudes: Option<Amplitudes>,
+    /// By pixel of the window: gap without the pressure on pixels, mm, and pressure, MPa.
+    rest: Vec<f32>,
+    pressure: Vec<f32>,
+    map_pa: Vec<f32>,
+}
+
+/// Compliance between the pixels of a window.
+struct Nearby<'a> {
+    convolution: &'a mut Convolution,
+    cells: &'a [u32],
+    norm: f32,
+}
+
+impl Operator for Nearby<'_> {
+    fn norm(&self) -> f32 {
+        self.norm
+    }
+
+    fn times(&mut self, x: &[f32], y: &mut [f32]) {
+        let grid = self.convolution.grid();
+        grid.fill(0.0);
+        for (cell, x) in self.cells.iter().zip(x) {
+            grid[*cell as usize] = *x;
+        }
+        self.convolution.apply();
+        let grid = self.convolution.grid();
+        for (cell, y) in self.cells.iter().zip(y) {
+            *y = grid[*cell as usize];
+        }
+    }
+}
+
+impl Solver {
+    /// Finds what presses on the finger, first at vertices, then on pixels; pressure at vertices is
+    /// the pixels' mean under their hats.
+    ///
+    /// # Errors
+    /// As [`Self::solve`]; [`ContactError::Diverged`] for a scene of gaps, which pixels cannot ask.
+    pub fn solve_on_pixels<'a>(
+        &mut self,
+        scene: impl Into<Scene<'a>>,
+        pixels: &mut PixelContact,
+        out: &mut Contact,
+    ) -> Result<(), ContactError> {
+        self.within(scene.into(), 0.0, |solver, view| {
+            solver.frame(view, out)?;
+            pixels.refine(solver, view, out)
+        })
+    }
+}
+
+impl PixelContact {
+    /// A finger that nothing touches.
+    #[must_use]
+    pub fn new(skin: Arc<PixelSkin>, model: &ContactModel) -> Self {
+        let pixels = skin.raster.pixel_count();
+        Self {
+            window: Window::new(pixels, model.vertices()),
+            bounded: BoundedSolver::new(pixels),
+            convolution: Convolution::new(),
+            amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
+            rest: vec![0.0; pixels],
+            pressure: vec![0.0; pixels],
+            map_pa: vec![0.0; MAP_LEN],
+            skin,
+        }
+    }
+
+    /// Pressure of the last frame, Pa; 224 x 224, row by row.
+    #[must_use]
+    pub fn map_pa(&self) -> &[f32] {
+        &self.map_pa
+    }
+
+    fn refine(
+        &mut self,
+        solver: &Solver,
+        view: View<'_>,
+        out: &mut Contact,
+    ) -> Result<(), ContactError> {
+        self.map_pa.fill(0.0);
+        let Self { skin, window, .. } = self;
+        let model = &*solver.model;
+        if !window.open(skin, model, view) {
+            return Ok(());
+        }
+        solver.forces(&mut window.force_n);
+        let mut settled = false;
+        for round in 0..ROUNDS_MAX {
+            let change = self.round(model, view, round == 0, &mut out.effort)?;
+            if !change.is_finite() {
+                return Err(ContactError::Diverged);
+            }
+            settled = change <= SETTLED;
+            if settled {
+                break;
+            }
+        }
+        self.answer(model, solver.person(), settled, out);
+        Ok(())
+    }
+
+    /// Vertices, then pixels; returns the change of the vertices' forces over their sum.
+    fn round(
+        &mut self,
+        model: &ContactModel,
+        view: View<'_>,
+        first: bool,
+        effort: &mut Effort,
+    ) -> Result<f32, ContactError> {
+        let Self { skin, window, convolution, bounded, amplitudes, rest, pressure, .. } = self;
+        window.displace(model, amplitudes.as_mut());
+        window.place(skin, model);
+        window.measure(view)?;
+        if first {
+            window.press_hats(skin, pressure);
+            let pitch_mm = window.pitch_mm(pressure);
+            convolution.open(window.size(), pitch_mm, &skin.surface);
+            window.number_cells(convolution.rows(), convolution.columns());
+        } else {
+            window.press_hats(skin, rest);
+        }
+        let n = window.len();
+        let hats: &[f32] = if first { &pressure[..n] } else { &rest[..n] };
+        let grid = convolution.grid();
+        grid.fill(0.0);
+        for (cell, p) in window.cells.iter().zip(hats) {
+            grid[*cell as usize] = *p;
+        }
+        convolution.apply();
+        let (rows, columns) = (convolution.rows(), convolution.columns());
+        window.own_dents(skin, convolution.grid(), [rows, columns]);
+        window.rest(skin, &mut rest[..n]);
+        let norm = skin.surface.largest() as f32;
+        let nearby = Nearby { convolution, cells: &window.cells, norm };
+        effort.products += bounded
+            .solve(nearby, &rest[..n], &mut pressure[..n], VIOLATION_MM, PRODUCTS_MAX)
+            .products;
+        effort.distances += n as u32;
+        effort.iterations += 1;
+        Ok(window.take_forces(skin, &pressure[..n]))
+    }
+
+    fn answer(&mut self, model: &ContactModel, person: Person, settled: bool, out: &mut Contact) {
+        let Self { window, pressure, map_pa, skin, .. } = self;
+        let (quality, effort) = (out.quality, out.effort);
+        out.clear();
+        (out.quality, out.effort) = (quality, effort);
+        out.quality.settled &= settled;
+        let mut size_n = 0.0;
+        for (i, p) in pressure[..window.len()].iter().enumerate() {
+            if !(*p > 0.0) {
+                continue;
+            }
+            let size = f64::from(p * window.area_mm2[i]);
+            let force = window.normal[i].map(|n| f64::from(n) * size);
+            out.add(window.at_mm[i].map(f64::from), force, size, f64::from(window.area_mm2[i]));
+            size_n += size;
+            let index = skin.raster.indices()[window.entries[i] as usize];
+            map_pa[index as usize] = p * PA_PER_MPA * person.stiffness as f32;
+        }
+        for vertex in 0..model.vertices() {
+            let p = window.vertex_pressure(vertex);
+            if p > 0.0 {
+                out.press(vertex as u32, p * PA_PER_MPA * person.stiffness as f32);
+            }
+        }
+        out.finish(person, size_n);
+    }
+}

@@ -1,0 +1,111 @@
+//! Values between vertices, smoother than the triangles' planes.
+
+use papilla_atlas::{Atlas, Patch, Raster};
+
+/// Vertices that a pixel's value is of.
+pub(super) const NEIGHBOURS: usize = 16;
+/// Terms of a polynomial of second degree in two coordinates.
+const TERMS: usize = 6;
+/// Largest sum of the weights' sizes: beyond, where a pixel lies at the edge, the triangle's plane
+/// is taken.
+const WEIGHTS_MAX: f64 = 2.5;
+
+/// What a pixel's value is made of: vertices and weights, whose sum is 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stencil {
+    pub vertices: [u16; NEIGHBOURS],
+    pub weights: [f32; NEIGHBOURS],
+}
+
+impl Stencil {
+    /// Value of a field at the pixel.
+    pub(super) fn value(&self, field: impl Fn(usize) -> f32) -> f32 {
+        let terms = self.vertices.iter().zip(self.weights);
+        terms.map(|(vertex, weight)| weight * field(usize::from(*vertex))).sum()
+    }
+}
+
+/// A stencil for each pixel of the skin: the value at the pixel of the polynomial of second degree
+/// that is closest to the values at its neighbours, nearer ones counting more (moving least squares).
+pub(super) fn stencils(atlas: &Atlas, raster: &Raster) -> Vec<Stencil> {
+    let uv_px = &atlas.patch(Patch::Skin).uv_px;
+    let side = papilla_atlas::MAP_SIDE_PX;
+    let places = raster.indices().iter().map(|i| (*i as usize % side, *i as usize / side));
+    let mut order: Vec<(f32, u16)> = Vec::with_capacity(uv_px.len());
+    let stencil = |((column, row), pixel): ((usize, usize), &papilla_atlas::Pixel)| {
+        let at = [column as f32 + 0.5, row as f32 + 0.5];
+        order.clear();
+        order.extend(uv_px.iter().enumerate().map(|(vertex, uv)| {
+            ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), vertex as u16)
+        }));
+        least_squares(at, uv_px, &mut order).unwrap_or_else(|| plane(pixel))
+    };
+    places.zip(raster.pixels()).map(stencil).collect()
+}
+
+/// The triangle's plane.
+fn plane(pixel: &papilla_atlas::Pixel) -> Stencil {
+    let mut stencil = Stencil { vertices: [0; NEIGHBOURS], weights: [0.0; NEIGHBOURS] };
+    stencil.vertices.fill(pixel.vertices[0] as u16);
+    for i in 0..3 {
+        (stencil.vertices[i], stencil.weights[i]) = (pixel.vertices[i] as u16, pixel.weights[i]);
+    }
+    stencil
+}
+
+/// None if there are too few neighbours, or they lie to one side.
+fn least_squares(at: [f32; 2], uv_px: &[[f32; 2]], order: &mut [(f32, u16)]) -> Option<Stencil> {
+    if order.len() <= NEIGHBOURS {
+        return None;
+    }
+    let by_place = |a: &(f32, u16), b: &(f32, u16)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    let (near, next, _) = order.select_nth_unstable_by(NEIGHBOURS, by_place);
+    near.sort_unstable_by(by_place);
+    let reach = f64::from(next.0);
+    let mut rows = [[0.0f64; TERMS]; NEIGHBOURS];
+    let mut counts = [0.0f64; NEIGHBOURS];
+    for (i, (square, vertex)) in near.iter().enumerate() {
+        let uv = uv_px[usize::from(*vertex)];
+        let [x, y] = [0, 1].map(|a| f64::from(uv[a] - at[a]) / reach.sqrt());
+        rows[i] = [1.0, x, y, x * x, x * y, y * y];
+        // Nothing at the first vertex that does not count, so that the value has no steps.
+        counts[i] = (1.0 - f64::from(*square) / reach).powi(2);
+    }
+    let mut normal = [[0.0f64; TERMS]; TERMS];
+    for (row, count) in rows.iter().zip(counts) {
+        for a in 0..TERMS {
+            for b in 0..TERMS {
+                normal[a][b] += count * row[a] * row[b];
+            }
+        }
+    }
+    let first = solve(normal, std::array::from_fn(|i| f64::from(i == 0)))?;
+    let weight = |i: usize| counts[i] * (0..TERMS).map(|a| rows[i][a] * first[a]).sum::<f64>();
+    let weights: [f64; NEIGHBOURS] = std::array::from_fn(weight);
+    let size: f64 = weights.iter().map(|w| w.abs()).sum();
+    (size <= WEIGHTS_MAX).then(|| Stencil {
+        vertices: std::array::from_fn(|i| near[i].1),
+        weights: weights.map(|w| w as f32),
+    })
+}
+
+/// Gauss' elimination of a positive definite matrix; none if it is not.
+fn solve(mut m: [[f64; TERMS]; TERMS], mut b: [f64; TERMS]) -> Option<[f64; TERMS]> {
+    for pivot in 0..TERMS {
+        if !(m[pivot][pivot] > 1e-9) {
+            return None;
+        }
+        for row in pivot + 1..TERMS {
+            let factor = m[row][pivot] / m[pivot][pivot];
+            for column in pivot..TERMS {
+                m[row][column] -= factor * m[pivot][column];
+            }
+            b[row] -= factor * b[pivot];
+        }
+    }
+    for row in (0..TERMS).rev() {
+        let known: f64 = (row + 1..TERMS).map(|column| m[row][column] * b[column]).sum();
+        b[row] = (b[row] - known) / m[row][row];
+    }
+    Some(b)
+}

@@ -1,0 +1,313 @@
+//! The part of the skin that things are near: its pixels, and the vertices that move them.
+
+use super::PixelSkin;
+use crate::error::ContactError;
+use crate::model::ContactModel;
+use crate::objects::View;
+use crate::second_order::Amplitudes;
+use papilla_atlas::MAP_SIDE_PX;
+
+/// Pixels round vertices nearer than this are looked at, reference mm.
+const NEAR_MM: f64 = 0.6;
+/// Gap of a displaced pixel beyond which nothing presses, reference mm.
+const FREE_MM: f32 = 0.3;
+/// Pixels between the window and itself, where it repeats.
+const BETWEEN: usize = 24;
+const NONE: u32 = u32::MAX;
+
+/// Pixels that things are near, and the vertices that move them.
+#[derive(Debug)]
+pub(super) struct Window {
+    /// Entries of the raster, and their cells in the grid.
+    pub entries: Vec<u32>,
+    pub cells: Vec<u32>,
+    pub at_mm: Vec<[f32; 3]>,
+    pub normal: Vec<[f32; 3]>,
+    pub area_mm2: Vec<f32>,
+    gap_mm: Vec<f32>,
+    /// Slot of each pixel of the map.
+    slot: Vec<u32>,
+    first: [usize; 2],
+    size: [usize; 2],
+    /// Vertices of the pixels' stencils, and where each stands among them.
+    ids: Vec<u32>,
+    place: Vec<u32>,
+    near: Vec<bool>,
+    linear: [Vec<f32>; 3],
+    moved: [Vec<f32>; 3],
+    /// By vertex of the skin: displacement by its own hats, mm; force, N; hat's area, mm2; pressure,
+    /// MPa.
+    dent_mm: Vec<f32>,
+    pub force_n: [Vec<f32>; 3],
+    hat_mm2: Vec<f32>,
+    hat_n: Vec<f32>,
+    touched: Vec<u32>,
+    packed: [Vec<f32>; 3],
+}
+
+impl Window {
+    pub(super) fn new(pixels: usize, vertices: usize) -> Self {
+        let zeros = || vec![0.0f32; vertices];
+        let vector = || std::array::from_fn(|_| zeros());
+        Self {
+            entries: Vec::with_capacity(pixels),
+            cells: Vec::with_capacity(pixels),
+            at_mm: vec![[0.0; 3]; pixels],
+            normal: vec![[0.0; 3]; pixels],
+            area_mm2: vec![0.0; pixels],
+            gap_mm: vec![0.0; pixels],
+            slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
+            first: [0; 2],
+            size: [0; 2],
+            ids: Vec::with_capacity(vertices),
+            place: vec![NONE; vertices],
+            near: vec![false; vertices],
+            linear: vector(),
+            moved: vector(),
+            dent_mm: zeros(),
+            force_n: vector(),
+            hat_mm2: zeros(),
+            hat_n: zeros(),
+            touched: Vec::with_capacity(vertices),
+            packed: vector(),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    pub(super) fn size(&self) -> [usize; 2] {
+        self.size.map(|s| s + BETWEEN)
+    }
+
+    /// Takes the pixels that things are near; false if there are none.
+    pub(super) fn open(&mut self, skin: &PixelSkin, model: &ContactModel, view: View<'_>) -> bool {
+        self.near.fill(false);
+        self.slot.fill(NONE);
+        self.place.fill(NONE);
+        self.entries.clear();
+        self.ids.clear();
+        let near = &mut self.near;
+        view.near(model, NEAR_MM, |vertex, free| near[vertex as usize] |= free < NEAR_MM);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for (entry, (pixel, index)) in
+            skin.raster.pixels().iter().zip(skin.raster.indices()).enumerate()
+        {
+            if !pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+                continue;
+            }
+            self.slot[*index as usize] = self.entries.len() as u32;
+            self.entries.push(entry as u32);
+            let at = [*index as usize / MAP_SIDE_PX, *index as usize % MAP_SIDE_PX];
+            for i in 0..2 {
+                (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
+            }
+            let corners = pixel.vertices.map(|v| v as u16);
+            for vertex in skin.stencils[entry].vertices.iter().chain(&corners) {
+                if self.place[usize::from(*vertex)] == NONE {
+                    self.place[usize::from(*vertex)] = self.ids.len() as u32;
+                    self.ids.push(u32::from(*vertex));
+                }
+            }
+        }
+        if self.entries.is_empty() {
+            return false;
+        }
+        self.first = low;
+        self.size = [high[0] - low[0], high[1] - low[1]];
+        true
+    }
+
+    pub(super) fn number_cells(&mut self, rows: usize, columns: usize) {
+        self.cells.clear();
+        self.cells.resize(self.entries.len(), 0);
+        for (index, slot) in self.slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
+            let row = (index / MAP_SIDE_PX - self.first[0]) % rows;
+            let column = (index % MAP_SIDE_PX - self.first[1]) % columns;
+            self.cells[*slot as usize] = (row * columns + column) as u32;
+        }
+    }
+
+    /// Moves the stencils' vertices under the vertices' forces.
+    pub(super) fn displace(&mut self, model: &ContactModel, amplitudes: Option<&mut Amplitudes>) {
+        let v = model.vertices();
+        self.touched.clear();
+        for vertex in 0..v {
+            if (0..3).any(|i| self.force_n[i][vertex] != 0.0) {
+                let at = self.touched.len();
+                self.touched.push(vertex as u32);
+                for i in 0..3 {
+                    self.packed[i][at] = self.force_n[i][vertex];
+                }
+            }
+        }
+        for (slot, id) in self.ids.iter().enumerate() {
+            let rows = &model.compliance[9 * *id as usize * v..][..9 * v];
+            for (a, linear) in self.linear.iter_mut().enumerate() {
+                let mut sum = 0.0;
+                for (b, packed) in self.packed.iter().enumerate() {
+                    let row = &rows[(3 * a + b) * v..][..v];
+                    for (k, other) in self.touched.iter().enumerate() {
+                        sum += row[model.rank[*other as usize] as usize] * packed[k];
+                    }
+                }
+                linear[slot] = sum;
+            }
+        }
+        if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
+            let m = self.touched.len();
+            let [x, y, z] = &self.packed;
+            s.evaluate(&self.touched, [&x[..m], &y[..m], &z[..m]], a);
+            s.displace(a, &self.ids, &self.linear, &mut self.moved);
+        } else {
+            for (moved, linear) in self.moved.iter_mut().zip(&self.linear) {
+                moved.copy_from_slice(linear);
+            }
+        }
+    }
+
+    /// Places the pixels, and finds their deformed areas.
+    pub(super) fn place(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let stencil = &skin.stencils[*entry as usize];
+            self.at_mm[slot] = std::array::from_fn(|i| {
+                stencil.value(|vertex| {
+                    let moved = self.moved[i][self.place[vertex] as usize];
+                    model.positions_mm[vertex][i] as f32 + moved
+                })
+            });
+        }
+        for slot in 0..self.entries.len() {
+            let index = skin.raster.indices()[self.entries[slot] as usize] as usize;
+            let [a, b] = [MAP_SIDE_PX, 1].map(|step| self.across(index, slot, step));
+            let n =
+                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+            self.area_mm2[slot] = n.iter().map(|v| v * v).sum::<f32>().sqrt();
+        }
+    }
+
+    /// From one pixel to the next, mm, along rows or columns.
+    fn across(&self, index: usize, slot: usize, step: usize) -> [f32; 3] {
+        let side = |to: Option<usize>| {
+            to.and_then(|i| self.slot.get(i)).filter(|s| **s != NONE).map(|s| *s as usize)
+        };
+        let (before, after) = (side(index.checked_sub(step)), side(index.checked_add(step)));
+        let apart = f32::from(u8::from(before.is_some()) + u8::from(after.is_some()));
+        let [from, to] = [before, after].map(|s| self.at_mm[s.unwrap_or(slot)]);
+        std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
+    }
+
+    pub(super) fn measure(&mut self, view: View<'_>) -> Result<(), ContactError> {
+        for slot in 0..self.entries.len() {
+            let nearest = view.nearest_at(self.at_mm[slot].map(f64::from));
+            let nearest = nearest.ok_or(ContactError::Diverged)?;
+            self.gap_mm[slot] = nearest.gap_mm.min(1e3) as f32;
+            self.normal[slot] = nearest.normal.map(|n| n as f32);
+        }
+        Ok(())
+    }
+
+    /// Pressure of the vertices' forces, linear between them, MPa.
+    pub(super) fn press_hats(&mut self, skin: &PixelSkin, pressure: &mut [f32]) {
+        self.hat_mm2.fill(0.0);
+        for (entry, area) in self.entries.iter().zip(&self.area_mm2) {
+            let pixel = &skin.raster.pixels()[*entry as usize];
+            for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
+                self.hat_mm2[*vertex as usize] += weight * area;
+            }
+        }
+        let hat = |vertex: usize| {
+            let force: f32 = self.force_n.iter().map(|f| f[vertex].powi(2)).sum();
+            force.sqrt() / self.hat_mm2[vertex].max(1e-3)
+        };
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let pixel = &skin.raster.pixels()[*entry as usize];
+            let corners = pixel.vertices.iter().zip(pixel.weights);
+            pressure[slot] = corners.map(|(v, w)| w * hat(*v as usize)).sum();
+        }
+    }
+
+    /// Mean distance of neighbouring pixels under pressure, down and along rows, mm.
+    pub(super) fn pitch_mm(&self, pressure: &[f32]) -> [f64; 2] {
+        let pressed = pressure[..self.len()].iter().any(|p| *p > 0.0);
+        let (mut sums, mut count) = ([0.0f64; 2], 0.0);
+        for (index, slot) in self.slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
+            let slot = *slot as usize;
+            if pressed && !(pressure[slot] > 0.0) {
+                continue;
+            }
+            for (sum, step) in sums.iter_mut().zip([MAP_SIDE_PX, 1]) {
+                let by = self.across(index, slot, step);
+                *sum += f64::from(by.iter().map(|v| v * v).sum::<f32>().sqrt());
+            }
+            count += 1.0;
+        }
+        sums.map(|sum| (sum / count).max(1e-3))
+    }
+
+    /// Displacement of the stencils' vertices in a grid of displacements.
+    pub(super) fn own_dents(
+        &mut self,
+        skin: &PixelSkin,
+        grid: &[f32],
+        [rows, columns]: [usize; 2],
+    ) {
+        for id in &self.ids {
+            let [u, v] = skin.uv_px[*id as usize];
+            let [x, y] = [u - 0.5 - self.first[1] as f32, v - 0.5 - self.first[0] as f32];
+            let (left, top) = (x.floor(), y.floor());
+            let at = |down: i32, right: i32| {
+                let row = (top as i32 + down).rem_euclid(rows as i32) as usize;
+                let column = (left as i32 + right).rem_euclid(columns as i32) as usize;
+                grid[row * columns + column]
+            };
+            let (a, b) = (x - left, y - top);
+            self.dent_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
+                + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
+        }
+    }
+
+    /// Gaps of pixels without their own pressure, mm.
+    pub(super) fn rest(&self, skin: &PixelSkin, rest: &mut [f32]) {
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let stencil = &skin.stencils[*entry as usize];
+            let gap = self.gap_mm[slot];
+            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
+            rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent };
+        }
+    }
+
+    /// Sums the pixels' pressure to the vertices' forces; returns the change over their sum.
+    pub(super) fn take_forces(&mut self, skin: &PixelSkin, pressure: &[f32]) -> f32 {
+        let (mut change, mut size) = (0.0f32, 0.0f32);
+        for (i, packed) in self.packed.iter_mut().enumerate() {
+            packed.fill(0.0);
+            for (slot, entry) in self.entries.iter().enumerate() {
+                let force = pressure[slot] * self.area_mm2[slot] * self.normal[slot][i];
+                let pixel = &skin.raster.pixels()[*entry as usize];
+                for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
+                    packed[*vertex as usize] += weight * force;
+                }
+            }
+            for (now, force) in packed.iter().zip(&mut self.force_n[i]) {
+                change += (now - *force).abs();
+                size += now.abs();
+                *force = *now;
+            }
+        }
+        self.hat_n.fill(0.0);
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let pixel = &skin.raster.pixels()[*entry as usize];
+            for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
+                self.hat_n[*vertex as usize] += weight * pressure[slot] * self.area_mm2[slot];
+            }
+        }
+        if size > 0.0 { change / size } else { 0.0 }
+    }
+
+    /// Mean pressure under a vertex' hat, MPa.
+    pub(super) fn vertex_pressure(&self, vertex: usize) -> f32 {
+        if self.hat_mm2[vertex] > 0.0 { self.hat_n[vertex] / self.hat_mm2[vertex] } else { 0.0 }
+    }
+}
