@@ -160,6 +160,7 @@ pub fn measure(
             let Some(placed) = &placed else { continue };
             let object = placed.at(f64::from(shard.depth_mm[state]));
             solver.reset();
+            figures.pixels.iter_mut().for_each(PixelContact::reset);
             let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);
             figures.cold_us.push(cold);
             figures.compare(dataset, indentation, &shard, state, &out, &mut network)?;

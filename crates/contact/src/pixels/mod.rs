@@ -17,6 +17,7 @@
 mod convolution;
 mod layers;
 mod smooth;
+mod turns;
 mod window;
 
 use crate::answer::{Contact, Effort, Person};
@@ -31,14 +32,19 @@ use layers::SurfaceCompliance;
 use papilla_atlas::{Atlas, MAP_LEN, Raster};
 use smooth::{Stencil, stencils};
 use std::sync::Arc;
+use turns::Turns;
 use window::Window;
 
 pub use layers::Layer;
 
 /// Rounds of vertices and pixels at most.
-const ROUNDS_MAX: usize = 6;
+const ROUNDS_MAX: usize = 8;
 /// Change of the vertices' forces, of their sum, that ends them.
 const SETTLED: f32 = 0.01;
+/// The same, above which an answer is not settled.
+const UNSETTLED: f32 = 0.03;
+/// Change of the forces without pixels, of their sum, up to which the last frame is a start.
+const JUMP: f32 = 0.5;
 /// Violation of a complementarity condition that is accepted, reference mm.
 const VIOLATION_MM: f32 = 1e-4;
 /// Most products with the compliance in a round.
@@ -72,6 +78,7 @@ pub struct PixelContact {
     bounded: BoundedSolver,
     convolution: Convolution,
     amplitudes: Option<Amplitudes>,
+    turns: Turns,
     /// By pixel of the window: gap without the pressure on pixels, mm, and pressure, MPa.
     rest: Vec<f32>,
     pressure: Vec<f32>,
@@ -82,6 +89,8 @@ pub struct PixelContact {
 struct Nearby<'a> {
     convolution: &'a mut Convolution,
     cells: &'a [u32],
+    /// How far the object gives way at each pixel, mm/MPa.
+    give: &'a [f32],
     norm: f32,
 }
 
@@ -98,8 +107,8 @@ impl Operator for Nearby<'_> {
         }
         self.convolution.apply();
         let grid = self.convolution.grid();
-        for (cell, y) in self.cells.iter().zip(y) {
-            *y = grid[*cell as usize];
+        for (((cell, give), x), y) in self.cells.iter().zip(self.give).zip(x).zip(y) {
+            *y = grid[*cell as usize] + give * x;
         }
     }
 }
@@ -133,6 +142,7 @@ impl PixelContact {
             bounded: BoundedSolver::new(pixels),
             convolution: Convolution::new(),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
+            turns: Turns::new(model.vertices()),
             rest: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
             map_pa: vec![0.0; MAP_LEN],
@@ -146,81 +156,104 @@ impl PixelContact {
         &self.map_pa
     }
 
+    /// Forgets the last frame.
+    pub fn reset(&mut self) {
+        self.map_pa.fill(0.0);
+        self.turns.forget();
+    }
+
     fn refine(
         &mut self,
         solver: &Solver,
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        self.map_pa.fill(0.0);
-        let Self { skin, window, .. } = self;
-        let model = &*solver.model;
+        let Self { skin, window, pressure, map_pa, turns, .. } = self;
+        let (model, person) = (&*solver.model, solver.person());
         if !window.open(skin, model, view) {
+            self.reset();
             return Ok(());
         }
-        solver.forces(&mut window.force_n);
-        let mut settled = false;
+        let unit_pa = PA_PER_MPA * person.stiffness as f32;
+        solver.forces(turns.without_pixels());
+        let warm = turns.begin(&mut window.force_n);
+        if warm {
+            for (p, entry) in pressure.iter_mut().zip(&window.entries) {
+                *p = map_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
+            }
+        }
+        map_pa.fill(0.0);
+        let mut change = f32::INFINITY;
         for round in 0..ROUNDS_MAX {
-            let change = self.round(model, view, round == 0, &mut out.effort)?;
+            let start = (round == 0).then_some(warm);
+            change = self.round(model, person, view, start, &mut out.effort)?;
             if !change.is_finite() {
+                self.reset();
                 return Err(ContactError::Diverged);
             }
-            settled = change <= SETTLED;
-            if settled {
+            if change <= SETTLED {
                 break;
             }
         }
-        self.answer(model, solver.person(), settled, out);
+        if change > UNSETTLED {
+            out.quality.settled = false;
+            self.turns.forget();
+        }
+        self.answer(model, person, out);
         Ok(())
     }
 
-    /// Vertices, then pixels; returns the change of the vertices' forces over their sum.
+    /// Vertices, then pixels; returns the change of the vertices' forces over their sum. The first
+    /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
     fn round(
         &mut self,
         model: &ContactModel,
+        person: Person,
         view: View<'_>,
-        first: bool,
+        start: Option<bool>,
         effort: &mut Effort,
     ) -> Result<f32, ContactError> {
-        let Self { skin, window, convolution, bounded, amplitudes, rest, pressure, .. } = self;
+        let Self { skin, window, convolution, bounded, amplitudes, turns, rest, pressure, .. } =
+            self;
+        let n = window.len();
         window.displace(model, amplitudes.as_mut());
         window.place(skin, model);
-        window.measure(view)?;
-        if first {
-            window.press_hats(skin, pressure);
+        window.measure(view, person)?;
+        window.press_hats(skin, rest);
+        if let Some(warm) = start {
+            if !warm {
+                pressure[..n].copy_from_slice(&rest[..n]);
+            }
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());
-        } else {
-            window.press_hats(skin, rest);
         }
-        let n = window.len();
-        let hats: &[f32] = if first { &pressure[..n] } else { &rest[..n] };
         let grid = convolution.grid();
         grid.fill(0.0);
-        for (cell, p) in window.cells.iter().zip(hats) {
+        for (cell, p) in window.cells.iter().zip(&rest[..n]) {
             grid[*cell as usize] = *p;
         }
         convolution.apply();
         let (rows, columns) = (convolution.rows(), convolution.columns());
         window.own_dents(skin, convolution.grid(), [rows, columns]);
         window.rest(skin, &mut rest[..n]);
-        let norm = skin.surface.largest() as f32;
-        let nearby = Nearby { convolution, cells: &window.cells, norm };
+        let give = &window.give[..n];
+        let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
+        let nearby = Nearby { convolution, cells: &window.cells, give, norm };
         effort.products += bounded
             .solve(nearby, &rest[..n], &mut pressure[..n], VIOLATION_MM, PRODUCTS_MAX)
             .products;
         effort.distances += n as u32;
         effort.iterations += 1;
-        Ok(window.take_forces(skin, &pressure[..n]))
+        window.sum_forces(skin, &pressure[..n], turns.found());
+        Ok(turns.take(&mut window.force_n))
     }
 
-    fn answer(&mut self, model: &ContactModel, person: Person, settled: bool, out: &mut Contact) {
+    fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
         let Self { window, pressure, map_pa, skin, .. } = self;
         let (quality, effort) = (out.quality, out.effort);
         out.clear();
         (out.quality, out.effort) = (quality, effort);
-        out.quality.settled &= settled;
         let mut size_n = 0.0;
         for (i, p) in pressure[..window.len()].iter().enumerate() {
             if !(*p > 0.0) {

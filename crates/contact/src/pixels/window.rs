@@ -1,6 +1,7 @@
 //! The part of the skin that things are near: its pixels, and the vertices that move them.
 
 use super::PixelSkin;
+use crate::answer::Person;
 use crate::error::ContactError;
 use crate::model::ContactModel;
 use crate::objects::View;
@@ -25,6 +26,8 @@ pub(super) struct Window {
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
     gap_mm: Vec<f32>,
+    /// How far the object gives way, mm/MPa.
+    pub give: Vec<f32>,
     /// Slot of each pixel of the map.
     slot: Vec<u32>,
     first: [usize; 2],
@@ -56,6 +59,7 @@ impl Window {
             normal: vec![[0.0; 3]; pixels],
             area_mm2: vec![0.0; pixels],
             gap_mm: vec![0.0; pixels],
+            give: vec![0.0; pixels],
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
             size: [0; 2],
@@ -198,11 +202,14 @@ impl Window {
         std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
     }
 
-    pub(super) fn measure(&mut self, view: View<'_>) -> Result<(), ContactError> {
+    pub(super) fn measure(&mut self, view: View<'_>, person: Person) -> Result<(), ContactError> {
         for slot in 0..self.entries.len() {
             let nearest = view.nearest_at(self.at_mm[slot].map(f64::from));
             let nearest = nearest.ok_or(ContactError::Diverged)?;
             self.gap_mm[slot] = nearest.gap_mm.min(1e3) as f32;
+            // In the units of the reference finger: pressure over stiffness, length over width.
+            self.give[slot] =
+                (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
             self.normal[slot] = nearest.normal.map(|n| n as f32);
         }
         Ok(())
@@ -278,32 +285,27 @@ impl Window {
         }
     }
 
-    /// Sums the pixels' pressure to the vertices' forces; returns the change over their sum.
-    pub(super) fn take_forces(&mut self, skin: &PixelSkin, pressure: &[f32]) -> f32 {
-        let (mut change, mut size) = (0.0f32, 0.0f32);
-        for (i, packed) in self.packed.iter_mut().enumerate() {
-            packed.fill(0.0);
-            for (slot, entry) in self.entries.iter().enumerate() {
-                let force = pressure[slot] * self.area_mm2[slot] * self.normal[slot][i];
-                let pixel = &skin.raster.pixels()[*entry as usize];
-                for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
-                    packed[*vertex as usize] += weight * force;
-                }
-            }
-            for (now, force) in packed.iter().zip(&mut self.force_n[i]) {
-                change += (now - *force).abs();
-                size += now.abs();
-                *force = *now;
-            }
+    /// Sums the pixels' pressure to forces of the vertices.
+    pub(super) fn sum_forces(
+        &mut self,
+        skin: &PixelSkin,
+        pressure: &[f32],
+        force_n: &mut [Vec<f32>; 3],
+    ) {
+        for force in force_n.iter_mut() {
+            force.fill(0.0);
         }
         self.hat_n.fill(0.0);
-        for (slot, entry) in self.entries.iter().enumerate() {
+        for (slot, entry) in self.entries.iter().enumerate().filter(|(i, _)| pressure[*i] > 0.0) {
+            let size = pressure[slot] * self.area_mm2[slot];
             let pixel = &skin.raster.pixels()[*entry as usize];
             for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
-                self.hat_n[*vertex as usize] += weight * pressure[slot] * self.area_mm2[slot];
+                self.hat_n[*vertex as usize] += weight * size;
+                for (force, normal) in force_n.iter_mut().zip(self.normal[slot]) {
+                    force[*vertex as usize] += weight * size * normal;
+                }
             }
         }
-        if size > 0.0 { change / size } else { 0.0 }
     }
 
     /// Mean pressure under a vertex' hat, MPa.

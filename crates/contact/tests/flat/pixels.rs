@@ -47,7 +47,8 @@ fn plane() -> Plane {
         }
     }
     let patch = PatchVertices { positions_mm: positions_mm.clone(), uv_px };
-    let atlas = Atlas::new(PITCH_MM as f32, triangles.clone(), patch.clone(), patch).unwrap();
+    let atlas =
+        Atlas::new(PITCH_MM as f32, triangles.clone(), patch.clone(), patch).expect("an atlas");
     let area = (SPACING_PX * PITCH_MM).powi(2) as f32;
     let vertices = positions_mm.len();
     let arrays = Arrays::half_space(
@@ -59,7 +60,7 @@ fn plane() -> Plane {
     );
     let triangles = triangles.len();
     let header = Header { vertices, triangles, share_max: 1.0, ..Header::current() };
-    let model = Arc::new(ContactModel::new(header, arrays).unwrap());
+    let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
     let young_mpa = MODULUS_MPA * (1.0 - POISSON * POISSON);
     let layers = [Layer { young_mpa, poisson: POISSON, thickness_mm: 100.0 }];
     let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
@@ -68,7 +69,7 @@ fn plane() -> Plane {
     Plane {
         pixels: PixelContact::new(skin, &model),
         out: Contact::new(model.vertices()),
-        solver: Solver::new(model, settings).unwrap(),
+        solver: Solver::new(model, settings).expect("a solver"),
         raster,
     }
 }
@@ -130,11 +131,49 @@ fn air_presses_nothing_and_gaps_are_refused() {
     let Plane { solver, pixels, out, .. } = &mut plane;
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], 0.3)], pixels, out).unwrap();
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], -0.1)], pixels, out).unwrap();
-    assert!(pixels.map_pa().iter().all(|p| *p == 0.0) && out.force_n == [0.0; 3]);
+    assert!(pixels.map_pa().iter().all(|p| *p == 0.0) && force_n(out) == 0.0);
     let depth_mm = vec![0.1; solver.model().vertices()];
     let gaps = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
     assert!(solver.solve_on_pixels(gaps, pixels, out).is_err());
     let none: [Object; 0] = [];
     solver.solve_on_pixels(&none, pixels, out).unwrap();
-    assert!(out.force_n == [0.0; 3]);
+    assert!(force_n(out) == 0.0);
+}
+
+fn force_n(out: &Contact) -> f64 {
+    out.force_n.map(f64::abs).iter().sum()
+}
+
+/// A frame that moved a little takes less than one from nothing, and finds the same.
+#[test]
+fn a_warm_frame_finds_what_a_cold_one_does_with_less() {
+    let mut plane = plane();
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], 0.29)], pixels, out).unwrap();
+    let scene = [ball(3.0, [0.02, 0.0], 0.3)];
+    solver.solve_on_pixels(&scene, pixels, out).unwrap();
+    let (warm, warm_n) = (out.effort, force_n(out));
+    solver.reset();
+    pixels.reset();
+    solver.solve_on_pixels(&scene, pixels, out).unwrap();
+    assert!((warm_n / force_n(out) - 1.0).abs() < 0.01, "{warm_n} {}", force_n(out));
+    assert!(2 * warm.products < out.effort.products, "{warm:?} {:?}", out.effort);
+}
+
+#[test]
+fn what_gives_way_presses_less() {
+    let mut plane = plane();
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    let mut force = |stiffness_mpa_per_mm: f64| {
+        let object = Object { stiffness_mpa_per_mm, ..ball(3.0, [0.0, 0.0], 0.3) };
+        solver.reset();
+        pixels.reset();
+        solver.solve_on_pixels(&[object], pixels, out).unwrap();
+        force_n(out)
+    };
+    let [soft, hard, rigid] = [0.1, 1e4, f64::INFINITY].map(&mut force);
+    assert!((hard / rigid - 1.0).abs() < 2e-3, "{hard} {rigid}");
+    // A bed of springs alone under a ball: F = s pi R d^2. In series, less than either.
+    let bed = 0.1 * std::f64::consts::PI * 3.0 * 0.3f64.powi(2);
+    assert!(soft < bed && soft < rigid && soft > 0.3 * bed, "{soft} {bed} {rigid}");
 }

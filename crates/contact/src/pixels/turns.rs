@@ -1,0 +1,90 @@
+//! Forces of the vertices, from round to round and from frame to frame.
+
+use super::JUMP;
+
+type Vectors = [Vec<f32>; 3];
+
+/// Forces that vertices and pixels hand to each other, N.
+///
+/// A round answers forces `f` with `F(f)`. The next one starts from the secant's estimate of where
+/// `F(f) = f` (Anderson's method of depth one, J. ACM 12, 1965).
+#[derive(Debug)]
+pub(super) struct Turns {
+    /// What vertices find by themselves, in this frame and in the last one.
+    without: Vectors,
+    last: Vectors,
+    /// `F(f)`, and of the round before it and `F(f) - f`.
+    found: Vectors,
+    before: Vectors,
+    residual: Vectors,
+    rounds: usize,
+    warm: bool,
+}
+
+impl Turns {
+    pub(super) fn new(vertices: usize) -> Self {
+        let zeros = || std::array::from_fn(|_| vec![0.0; vertices]);
+        let [without, last, found, before, residual] = std::array::from_fn(|_| zeros());
+        Self { without, last, found, before, residual, rounds: 0, warm: false }
+    }
+
+    /// To be filled with the forces that vertices find by themselves.
+    pub(super) fn without_pixels(&mut self) -> &mut Vectors {
+        std::mem::swap(&mut self.without, &mut self.last);
+        &mut self.without
+    }
+
+    /// To be filled with a round's forces.
+    pub(super) fn found(&mut self) -> &mut Vectors {
+        &mut self.found
+    }
+
+    /// The next frame starts from nothing.
+    pub(super) fn forget(&mut self) {
+        self.warm = false;
+    }
+
+    /// Sets the forces that a frame starts from: those of the last frame, moved on as the vertices
+    /// move by themselves; after a jump, theirs. Returns whether the last frame is a start.
+    pub(super) fn begin(&mut self, force_n: &mut Vectors) -> bool {
+        let (mut change, mut size) = (0.0, 0.0);
+        for (now, last) in self.without.iter().flatten().zip(self.last.iter().flatten()) {
+            change += (now - last).abs();
+            size += now.abs();
+        }
+        let warm = self.warm && change <= JUMP * size;
+        let now = self.without.iter().flatten().zip(self.last.iter().flatten());
+        for (force, (now, last)) in force_n.iter_mut().flatten().zip(now) {
+            *force = if warm { *force + now - last } else { *now };
+        }
+        (self.rounds, self.warm) = (0, true);
+        warm
+    }
+
+    /// Moves `force_n` on; returns the change over the sum of forces.
+    pub(super) fn take(&mut self, force_n: &mut Vectors) -> f32 {
+        let (mut change, mut size, mut along, mut square) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
+        let forces = force_n.iter().flatten().zip(self.found.iter().flatten());
+        for ((force, found), residual) in forces.zip(self.residual.iter_mut().flatten()) {
+            let now = found - force;
+            let by = now - *residual;
+            change += now.abs();
+            size += found.abs();
+            along += now * by;
+            square += by * by;
+            *residual = now;
+        }
+        let share = if self.rounds > 0 && square > 0.0 { along / square } else { 0.0 };
+        let share = share.clamp(-SHARE_MAX, SHARE_MAX);
+        let both = self.found.iter().flatten().zip(self.before.iter_mut().flatten());
+        for (force, (found, before)) in force_n.iter_mut().flatten().zip(both) {
+            *force = found + share * (*before - found);
+            *before = *found;
+        }
+        self.rounds += 1;
+        if size > 0.0 { change / size } else { 0.0 }
+    }
+}
+
+/// Farthest that a round goes beyond, or stays behind, what it found.
+const SHARE_MAX: f32 = 0.7;
