@@ -228,7 +228,7 @@ impl Figures {
         };
         let clock = thread_s();
         let solved = match &mut self.pixels {
-            Some(pixels) => solver.solve_on_pixels(scene, pixels, out),
+            Some(pixels) => solver.solve_on_pixels(objects, pixels, out),
             None => solver.solve(scene, out),
         };
         let us = (thread_s() - clock) * 1e6;

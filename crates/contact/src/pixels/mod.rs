@@ -24,7 +24,7 @@ use crate::answer::{Contact, Effort, Person};
 use crate::bounded::{BoundedSolver, Operator};
 use crate::error::ContactError;
 use crate::model::ContactModel;
-use crate::objects::{Scene, View};
+use crate::objects::{Object, View};
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
 use convolution::Convolution;
@@ -115,17 +115,18 @@ impl Operator for Nearby<'_> {
 
 impl Solver {
     /// Finds what presses on the finger, first at vertices, then on pixels; pressure at vertices is
-    /// the pixels' mean under their hats.
+    /// the pixels' mean under their hats. Gaps at vertices say nothing of what lies between them,
+    /// so it is objects that are needed.
     ///
     /// # Errors
-    /// As [`Self::solve`]; [`ContactError::Diverged`] for a scene of gaps, which pixels cannot ask.
-    pub fn solve_on_pixels<'a>(
+    /// As [`Self::solve`].
+    pub fn solve_on_pixels(
         &mut self,
-        scene: impl Into<Scene<'a>>,
+        objects: &[Object],
         pixels: &mut PixelContact,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        self.within(scene.into(), 0.0, |solver, view| {
+        self.within(objects.into(), 0.0, |solver, view| {
             solver.frame(view, out)?;
             pixels.refine(solver, view, out)
         })

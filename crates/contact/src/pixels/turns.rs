@@ -2,6 +2,9 @@
 
 use super::JUMP;
 
+/// Farthest that a round goes beyond, or stays behind, what it found.
+const SHARE_MAX: f32 = 0.7;
+
 type Vectors = [Vec<f32>; 3];
 
 /// Forces that vertices and pixels hand to each other, N.
@@ -85,6 +88,3 @@ impl Turns {
         if size > 0.0 { change / size } else { 0.0 }
     }
 }
-
-/// Farthest that a round goes beyond, or stays behind, what it found.
-const SHARE_MAX: f32 = 0.7;

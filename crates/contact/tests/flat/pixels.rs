@@ -3,7 +3,7 @@
 use crate::support::ball;
 use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, PatchVertices, Raster};
 use papilla_contact::{
-    Arrays, Contact, ContactModel, Gaps, Header, Layer, Method, Object, PixelContact, PixelSkin,
+    Arrays, Contact, ContactModel, Header, Layer, Method, Object, PixelContact, PixelSkin,
     Settings, Solver,
 };
 use std::sync::Arc;
@@ -126,15 +126,12 @@ fn a_dot_between_vertices_is_felt() {
 }
 
 #[test]
-fn air_presses_nothing_and_gaps_are_refused() {
+fn air_and_no_object_press_nothing() {
     let mut plane = plane();
     let Plane { solver, pixels, out, .. } = &mut plane;
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], 0.3)], pixels, out).unwrap();
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], -0.1)], pixels, out).unwrap();
     assert!(pixels.map_pa().iter().all(|p| *p == 0.0) && force_n(out) == 0.0);
-    let depth_mm = vec![0.1; solver.model().vertices()];
-    let gaps = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
-    assert!(solver.solve_on_pixels(gaps, pixels, out).is_err());
     let none: [Object; 0] = [];
     solver.solve_on_pixels(&none, pixels, out).unwrap();
     assert!(force_n(out) == 0.0);
