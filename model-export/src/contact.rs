@@ -143,7 +143,7 @@ pub fn measure(
         return Ok(figures.row(rung, dataset.name()));
     };
     if rung == Rung::Pixels {
-        let raster = std::sync::Arc::new(dataset.maps.raster(Patch::Skin).clone());
+        let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
         let skin = PixelSkin::new(&dataset.atlas, raster, &layers());
         figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger));
     }

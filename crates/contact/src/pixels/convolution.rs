@@ -110,12 +110,23 @@ impl Convolution {
 
     /// The window, to be filled with pressure (MPa) before, and read displacement (mm) after
     /// [`Self::apply`].
-    pub(super) fn grid(&mut self) -> &mut [f32] {
+    fn grid(&mut self) -> &mut [f32] {
         &mut self.grid[..self.rows * self.columns]
     }
 
+    /// Displacement of the window (mm) under pressure (MPa) on some of its cells, none elsewhere.
+    pub(super) fn press(&mut self, cells: &[u32], pressure: &[f32]) -> &[f32] {
+        let grid = self.grid();
+        grid.fill(0.0);
+        for (cell, p) in cells.iter().zip(pressure) {
+            grid[*cell as usize] = *p;
+        }
+        self.apply();
+        self.grid()
+    }
+
     /// Pressure to displacement. The window is periodic.
-    pub(super) fn apply(&mut self) {
+    fn apply(&mut self) {
         let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance } = self;
         let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
         let of = |length: usize| plans.iter().find(|p| p.length == length);

@@ -51,6 +51,11 @@ const VIOLATION_MM: f32 = 1e-4;
 const PRODUCTS_MAX: u32 = 80;
 const PA_PER_MPA: f32 = 1e6;
 
+/// Pressure of a person for 1 MPa on the reference finger, Pa.
+fn unit_pa(person: Person) -> f32 {
+    PA_PER_MPA * person.stiffness as f32
+}
+
 /// What pixels have to know of a skin; made once, for any number of fingers.
 #[derive(Debug)]
 pub struct PixelSkin {
@@ -100,13 +105,7 @@ impl Operator for Nearby<'_> {
     }
 
     fn times(&mut self, x: &[f32], y: &mut [f32]) {
-        let grid = self.convolution.grid();
-        grid.fill(0.0);
-        for (cell, x) in self.cells.iter().zip(x) {
-            grid[*cell as usize] = *x;
-        }
-        self.convolution.apply();
-        let grid = self.convolution.grid();
+        let grid = self.convolution.press(self.cells, x);
         for (((cell, give), x), y) in self.cells.iter().zip(self.give).zip(x).zip(y) {
             *y = grid[*cell as usize] + give * x;
         }
@@ -175,7 +174,7 @@ impl PixelContact {
             self.reset();
             return Ok(());
         }
-        let unit_pa = PA_PER_MPA * person.stiffness as f32;
+        let unit_pa = unit_pa(person);
         solver.forces(turns.without_pixels());
         let warm = turns.begin(&mut window.force_n);
         if warm {
@@ -229,14 +228,9 @@ impl PixelContact {
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());
         }
-        let grid = convolution.grid();
-        grid.fill(0.0);
-        for (cell, p) in window.cells.iter().zip(&rest[..n]) {
-            grid[*cell as usize] = *p;
-        }
-        convolution.apply();
-        let (rows, columns) = (convolution.rows(), convolution.columns());
-        window.own_dents(skin, convolution.grid(), [rows, columns]);
+        let size = [convolution.rows(), convolution.columns()];
+        let grid = convolution.press(&window.cells, &rest[..n]);
+        window.own_dents(skin, grid, size);
         window.rest(skin, &mut rest[..n]);
         let give = &window.give[..n];
         let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
@@ -252,6 +246,7 @@ impl PixelContact {
 
     fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
         let Self { window, pressure, map_pa, skin, .. } = self;
+        let unit_pa = unit_pa(person);
         let (quality, effort) = (out.quality, out.effort);
         out.clear();
         (out.quality, out.effort) = (quality, effort);
@@ -265,12 +260,12 @@ impl PixelContact {
             out.add(window.at_mm[i].map(f64::from), force, size, f64::from(window.area_mm2[i]));
             size_n += size;
             let index = skin.raster.indices()[window.entries[i] as usize];
-            map_pa[index as usize] = p * PA_PER_MPA * person.stiffness as f32;
+            map_pa[index as usize] = p * unit_pa;
         }
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);
             if p > 0.0 {
-                out.press(vertex as u32, p * PA_PER_MPA * person.stiffness as f32);
+                out.press(vertex as u32, p * unit_pa);
             }
         }
         out.finish(person, size_n);
