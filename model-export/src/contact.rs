@@ -9,12 +9,9 @@ use crate::metrics::{SampleMetrics, quantile};
 use crate::processor::thread_s;
 use crate::{ExportError, read};
 use papilla_contact::{
-    Contact, ContactModel, Gaps, Layer, Method, Object, PixelContact, PixelSkin, Scene, Settings,
-    Solver,
+    Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, Scene, Settings, Solver,
 };
 use papilla_engine::{MAP_LEN, Session};
-use papilla_fingertip::scene::TissueTable;
-use papilla_fingertip::tissue::Tissue;
 use papilla_proto::atlas::Patch;
 use serde::Serialize;
 use std::path::Path;
@@ -144,7 +141,9 @@ pub fn measure(
     };
     if rung == Rung::Pixels {
         let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
-        let skin = PixelSkin::new(&dataset.atlas, raster, &layers());
+        let Some(skin) = PixelSkin::new(&models.finger, &dataset.atlas, raster) else {
+            return Ok(figures.row(rung, dataset.name()));
+        };
         figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger));
     }
     let mut out = Contact::new(models.finger.vertices());
@@ -190,17 +189,6 @@ struct Figures {
     told: [usize; 3],
     depth_mm: Vec<f32>,
     pixels: Option<PixelContact>,
-}
-
-/// The default finger's skin, from the surface to the bone below the middle of the pad.
-fn layers() -> [Layer; 3] {
-    let tissues = TissueTable::default();
-    [(Tissue::Epidermis, 0.2), (Tissue::Dermis, 1.0), (Tissue::Subcutaneous, 3.0)].map(
-        |(tissue, thickness_mm)| {
-            let spec = tissues.of(tissue);
-            Layer { young_mpa: spec.youngs_modulus_mpa, poisson: spec.poissons_ratio, thickness_mm }
-        },
-    )
 }
 
 impl Figures {

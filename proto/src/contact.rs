@@ -61,6 +61,8 @@ pub enum ContactMethod {
     /// The same with the second order of finite strain.
     #[default]
     SecondOrder,
+    /// The same, then on pixels of the map: what lies between vertices is felt. Of objects alone.
+    Pixels,
 }
 
 /// An object that a hello announces.

@@ -124,8 +124,12 @@ fn contact() -> impl Strategy<Value = Hello> {
     let finger = (0.5..2.0f64, 0.5..2.0f64)
         .prop_map(|(width, stiffness)| AnnouncedFinger { width, stiffness });
     let inputs = vec![Input::Pressure, Input::Gaps, Input::Objects];
-    let methods =
-        vec![ContactMethod::Springs, ContactMethod::SmallStrain, ContactMethod::SecondOrder];
+    let methods = vec![
+        ContactMethod::Springs,
+        ContactMethod::SmallStrain,
+        ContactMethod::SecondOrder,
+        ContactMethod::Pixels,
+    ];
     (
         prop::option::of(prop::sample::select(inputs)),
         (layout(), layout(), layout()),

@@ -19,8 +19,8 @@ use crate::{
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_EFFECTS: usize = 20 << 20;
-/// A finger's solver, during a renewal twice, and the shapes of its session.
-const PER_FINGER: usize = 34 << 20;
+/// A finger's solver and its pixels, during a renewal twice, and the shapes of its session.
+const PER_FINGER: usize = 42 << 20;
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
 /// What was found, in the order it was looked at.
@@ -186,8 +186,13 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
 fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, StartError>) {
     match contact {
         Ok(Some(contact)) => {
-            let detail = format!("of this finger, {} us a frame", contact.frame_us);
-            report.good("contact", detail, json!({"frame_us": contact.frame_us}));
+            let (us, on_pixels) = (contact.frame_us, contact.pixel_frame_us);
+            let pixels = match on_pixels {
+                Some(us) => format!("{us} us on pixels"),
+                None => "no pixels, since its model names no layers".to_owned(),
+            };
+            let detail = format!("of this finger, {us} us a frame, {pixels}");
+            report.good("contact", detail, json!({"frame_us": us, "pixel_frame_us": on_pixels}));
         }
         Ok(None) => {
             report.good("contact", "no model; sessions send pressure".to_owned(), Value::Null);

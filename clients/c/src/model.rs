@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use papilla_contact::ContactModel;
+use papilla_contact::{ContactModel, PixelSkin};
 use papilla_engine::{Card, EngineError, card::Index};
 use papilla_proto::atlas::{Atlas, AtlasError, Patch, Raster};
 use papilla_render::SkinPixels;
@@ -87,6 +87,7 @@ pub struct Model {
     pub(crate) network: Arc<dyn papilla_engine::Model>,
     pub(crate) card: Card,
     pub(crate) contact: Option<Arc<ContactModel>>,
+    pub(crate) pixel_skin: Option<Arc<PixelSkin>>,
 }
 
 impl std::fmt::Debug for Model {
@@ -144,7 +145,9 @@ impl Model {
         let pixels = SkinPixels::from(&skin);
         let shared = effects::Shared::default();
         let skin = Arc::new(skin);
-        Ok(Self { atlas, skin, interface, pixels, shared, network, card, contact })
+        let pixel_skin = contact.as_ref().and_then(|m| PixelSkin::new(m, &atlas, skin.clone()));
+        let pixel_skin = pixel_skin.map(Arc::new);
+        Ok(Self { atlas, skin, interface, pixels, shared, network, card, contact, pixel_skin })
     }
 
     /// Draws values at the vertices of the skin as a map.

@@ -67,8 +67,9 @@ impl Session {
     /// A member is unusable or missing; the problem names it.
     pub fn open(model: &Arc<Model>, hello: &str) -> Result<Self, Problem> {
         let hello = hello::read(hello, model)?;
-        let Model { atlas, skin, interface, shared, contact, .. } = &**model;
-        let hand = Hand::of(&hello, Skin { atlas, raster: skin, model: contact.as_ref() })?;
+        let Model { atlas, skin, interface, shared, contact, pixel_skin, .. } = &**model;
+        let (contact, pixels) = (contact.as_ref(), pixel_skin.as_ref());
+        let hand = Hand::of(&hello, Skin { atlas, raster: skin, model: contact, pixels })?;
         let finger = effects::Finger { atlas, skin, interface, shared };
         let mut effects = Vec::with_capacity(hand.fingers().len());
         for _ in hand.fingers() {

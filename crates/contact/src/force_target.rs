@@ -11,10 +11,7 @@ const TRAVEL_MAX_MM: f64 = 30.0;
 const STEP_MM: f64 = 0.1;
 /// Longest step where only one side of the travel is known, mm.
 const STEP_MAX_MM: f64 = 1.0;
-/// How closely the force is met.
-const TOLERANCE: f64 = 2e-3;
-/// Most frames tried, and linearisations in all of them.
-const TRIES_MAX: u32 = 40;
+/// Most linearisations in all frames tried.
 const ITERATIONS_MAX: u32 = 400;
 /// A travel this near an end of its bracket, as part of it, goes to the middle.
 const MARGIN: f64 = 0.02;
@@ -28,8 +25,21 @@ pub struct NetForce {
     pub force_n: f64,
 }
 
+/// How the travel is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    /// How closely the force is met.
+    pub(crate) tolerance: f64,
+    /// Most frames tried.
+    pub(crate) tries_max: u32,
+}
+
+impl Search {
+    pub(crate) const AT_VERTICES: Self = Self { tolerance: 2e-3, tries_max: 40 };
+}
+
 impl NetForce {
-    fn validate(&self) -> Result<(), ContactError> {
+    pub(crate) fn validate(&self) -> Result<(), ContactError> {
         let size = self.direction.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !((size - 1.0).abs() < 1e-3) {
             let (member, rule) = ("direction", "has to be a unit vector; this is its length");
@@ -62,14 +72,19 @@ impl Solver {
     ) -> Result<f64, ContactError> {
         net.validate()?;
         let everywhere = f32::INFINITY;
-        self.within(scene.into(), everywhere, |solver, view| solver.travel_until(view, net, out))
+        self.within(scene.into(), everywhere, |solver, view| {
+            solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame)
+        })
     }
 
-    fn travel_until(
+    /// Looks for the travel with `frame`, which finds what presses in a view.
+    pub(crate) fn travel_until(
         &mut self,
         view: View<'_>,
         NetForce { direction, force_n }: NetForce,
+        Search { tolerance, tries_max }: Search,
         out: &mut Contact,
+        mut frame: impl FnMut(&mut Self, View<'_>, &mut Contact) -> Result<(), ContactError>,
     ) -> Result<f64, ContactError> {
         let mut effort = Effort::default();
         let [mut low, mut high]: [Option<(f64, f64)>; 2] = [None, None];
@@ -77,10 +92,10 @@ impl Solver {
         let start = self.reached.take();
         let mut slope = start.map(|s| s.slope_n_per_mm);
         let (mut travel, mut reached) = (start.map_or(0.0, |s| s.travel_mm), 0.0f64);
-        for _ in 0..TRIES_MAX {
+        for _ in 0..tries_max {
             let shift_mm = direction.map(|d| d * travel / view.length);
             let view = View { shift_mm, ..view };
-            self.frame(view, out)?;
+            frame(self, view, out)?;
             effort = effort.plus(out.effort);
             out.effort = effort;
             let force = (0..3).map(|i| direction[i] * out.force_n[i]).sum::<f64>();
@@ -89,7 +104,7 @@ impl Solver {
                 let found = (force - then) / (travel - at);
                 slope = Some(found).filter(|s| *s > 0.0 && s.is_finite()).or(slope);
             }
-            if (force - force_n).abs() <= TOLERANCE * force_n {
+            if (force - force_n).abs() <= tolerance * force_n {
                 let slope_n_per_mm = slope.unwrap_or(0.0);
                 self.reached = Some(Reached { travel_mm: travel, slope_n_per_mm });
                 return Ok(travel);

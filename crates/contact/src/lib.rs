@@ -54,5 +54,5 @@ pub use gaps::Gaps;
 pub use ladder::Method;
 pub use model::{Arrays, ContactModel, Header};
 pub use objects::{Object, Scene};
-pub use pixels::{Layer, PixelContact, PixelSkin};
+pub use pixels::{Layer, PixelContact, PixelMemory, PixelSkin};
 pub use solver::{Memory, Settings, Solver};

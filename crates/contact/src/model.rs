@@ -2,14 +2,17 @@
 
 use crate::clusters::Clusters;
 use crate::error::ModelError;
+use crate::pixels::Layer;
 use crate::second_order::SecondOrder;
 use crate::slopes::{Slopes, slopes};
 use serde::{Deserialize, Serialize};
 
 /// Version of the file.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 /// Most vertices of a skin.
 const VERTICES_MAX: usize = 8192;
+/// Most layers of a skin.
+const LAYERS_MAX: usize = 16;
 
 /// Header of a file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -39,6 +42,10 @@ pub struct Header {
     /// Deepest training indentation, mm; beyond it an answer is out of range. 0: not known.
     #[serde(default)]
     pub depth_max_mm: f32,
+    /// Layers below the middle of the pad, from the surface down to the bone; none: pixels cannot be
+    /// solved.
+    #[serde(default)]
+    pub layers: Vec<Layer>,
     /// Step to which the file rounds compliance, mm/N; 0: of the writer's choice.
     #[serde(default)]
     pub compliance_step_mm_per_n: f32,
@@ -95,6 +102,7 @@ impl ContactModel {
     pub fn new(header: Header, arrays: Arrays) -> Result<Self, ModelError> {
         let (v, r, k) = (header.vertices, header.modes, header.outputs);
         header.require_format()?;
+        header.require_layers()?;
         arrays.require_lengths(&header)?;
         for (array, values) in arrays.floats() {
             if let Some(index) = values.iter().position(|v| !v.is_finite()) {
@@ -194,6 +202,26 @@ impl Header {
         let Version { format } = serde_json::from_slice(json)?;
         Self { format, ..Self::default() }.require_format()?;
         Ok(serde_json::from_slice(json)?)
+    }
+
+    /// Refuses layers that no tissue has.
+    fn require_layers(&self) -> Result<(), ModelError> {
+        if self.layers.len() > LAYERS_MAX {
+            return Err(ModelError::Format("its header names more layers than a skin has"));
+        }
+        let values = self.layers.iter().enumerate().flat_map(|(index, layer)| {
+            let Layer { young_mpa, poisson, thickness_mm } = *layer;
+            let positive = |value: f64| value > 0.0 && value.is_finite();
+            [
+                ("layers.young_mpa", index, young_mpa, positive(young_mpa)),
+                ("layers.thickness_mm", index, thickness_mm, positive(thickness_mm)),
+                ("layers.poisson", index, poisson, (0.0..0.5).contains(&poisson)),
+            ]
+        });
+        let mut wrong = values.filter(|(.., is_good)| !is_good);
+        wrong.next().map_or(Ok(()), |(array, index, value, _)| {
+            Err(ModelError::Value { array, index, value, rule: "no tissue's" })
+        })
     }
 
     pub(crate) fn require_format(&self) -> Result<(), ModelError> {

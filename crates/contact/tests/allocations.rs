@@ -1,7 +1,9 @@
 //! A warm frame takes no memory.
 
+use papilla_atlas::{Atlas, Patch, PatchVertices, Raster};
 use papilla_contact::{
-    Arrays, Contact, ContactModel, Gaps, Header, Method, NetForce, Object, Settings, Solver,
+    Arrays, Contact, ContactModel, Gaps, Header, Layer, Method, NetForce, Object, PixelContact,
+    PixelSkin, Settings, Solver,
 };
 use papilla_sdf::{Placement, Sphere};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -30,10 +32,12 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-fn model() -> Arc<ContactModel> {
+fn model() -> (Arc<ContactModel>, PixelContact) {
     let side = 17u32;
     let place = |i: u32| [f64::from(i % side), f64::from(i / side)].map(|v| 0.1 * v - 0.8);
     let vertices: Vec<u32> = (0..side * side).collect();
+    let uv = |[x, y]: [f64; 2]| [100.0 * y + 112.0, 100.0 * x + 112.0].map(|v| v as f32);
+    let uv_px = vertices.iter().map(|i| uv(place(*i))).collect();
     let positions = vertices.iter().flat_map(|i| [place(*i)[0] as f32, place(*i)[1] as f32, 0.0]);
     let triangles: Vec<u32> = vertices
         .iter()
@@ -44,12 +48,21 @@ fn model() -> Arc<ContactModel> {
         vertices: vertices.len(),
         triangles: triangles.len() / 3,
         share_max: 1.0,
+        layers: vec![Layer { young_mpa: 0.15, poisson: 0.48, thickness_mm: 50.0 }],
         ..Header::current()
     };
     let normals = vertices.iter().flat_map(|_| [0.0, 0.0, -1.0]).collect();
     let areas = vec![0.01; vertices.len()];
     let arrays = Arrays::half_space(positions.collect(), normals, areas, triangles, 0.2);
-    Arc::new(ContactModel::new(header, arrays).expect("a model"))
+    let positions_mm = arrays.positions_mm.as_chunks::<3>().0.to_vec();
+    let corners = arrays.triangles.as_chunks::<3>().0.to_vec();
+    let patch = PatchVertices { positions_mm, uv_px };
+    let atlas = Atlas::new(0.01, corners, patch.clone(), patch).expect("an atlas");
+    let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
+    let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
+    let skin = PixelSkin::new(&model, &atlas, raster).expect("layers");
+    let pixels = PixelContact::new(Arc::new(skin), &model);
+    (model, pixels)
 }
 
 fn ball(step: u32) -> Object {
@@ -60,11 +73,11 @@ fn ball(step: u32) -> Object {
 
 #[test]
 fn a_warm_frame_takes_no_memory() {
-    let model = model();
+    let (model, mut pixels) = model();
     let settings = Settings { method: Method::SmallStrain, stiffness: true, ..Settings::default() };
     let mut solver = Solver::new(model.clone(), settings).expect("a solver");
     let mut out = Contact::new(model.vertices());
-    let objects: Vec<_> = (0..200).map(ball).collect();
+    let objects: Vec<_> = (0..20).map(ball).collect();
     let depth_mm: Vec<f32> = (0..model.vertices()).map(|i| 0.02 - 1e-4 * i as f32).collect();
     let net = NetForce { direction: [0.0, 0.0, 1.0], force_n: 0.005 };
     let mut frame = |object: &Object| {
@@ -73,6 +86,10 @@ fn a_warm_frame_takes_no_memory() {
         let gaps = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
         solver.solve(gaps, &mut out).expect("an answer");
         solver.solve_for_force(std::slice::from_ref(object), net, &mut out).expect("a travel");
+        let objects = std::slice::from_ref(object);
+        solver.solve_on_pixels(objects, &mut pixels, &mut out).expect("an answer");
+        assert!(out.force_n[2] > 0.0);
+        solver.solve_for_force_on_pixels(objects, net, &mut pixels, &mut out).expect("a travel");
         solver.solve(&[] as &[Object; 0], &mut out).expect("an answer");
     };
     objects.iter().take(3).for_each(&mut frame);

@@ -20,8 +20,8 @@ pub struct ContactMetrics {
     unsettled: Counter,
     in_air: Counter,
     iterations: Counter,
-    /// Solves that were asked for, done or not.
-    pub asked: AtomicU64,
+    /// Time that all solves that were asked for are expected to take, done or not, us.
+    pub asked_us: AtomicU64,
 }
 
 impl ContactMetrics {
@@ -33,7 +33,7 @@ impl ContactMetrics {
             settled: count("settled"),
             unsettled: count("unsettled"),
             in_air: count("in_air"),
-            asked: AtomicU64::new(0),
+            asked_us: AtomicU64::new(0),
             iterations: registered(
                 registry,
                 "contact_iterations",

@@ -3,7 +3,7 @@
 use papilla_contact::{Object, Person};
 use papilla_proto::{
     Hello, Problem, SampleType,
-    contact::{AnnouncedFinger, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
+    contact::{AnnouncedFinger, ContactMethod, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
     sdf::Placement,
 };
 
@@ -29,6 +29,10 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
     }
     if input == Input::Objects && hello.input_layout.is_some() {
         return Err(unusable("input_layout", "objects have no layout: each has one pose"));
+    }
+    if input == Input::Gaps && hello.method == Some(ContactMethod::Pixels) {
+        let message = "'pixels' is of input 'objects': gaps say nothing of what is between them";
+        return Err(unusable("method", message));
     }
     let exact = match input {
         Input::Pressure => true,

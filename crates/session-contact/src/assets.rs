@@ -2,8 +2,15 @@
 
 use std::{sync::Arc, time::Instant};
 
-use papilla_contact::{Contact, ContactModel, ModelError, Object, Settings, Solver};
-use papilla_proto::sdf::{Placement, RoundedPlate};
+use papilla_contact::{
+    Contact, ContactModel, ModelError, Object, PixelContact, PixelSkin, Settings, Solver,
+};
+use papilla_proto::{
+    atlas::{Atlas, Raster},
+    sdf::{Placement, RoundedPlate},
+};
+
+use super::Hand;
 
 /// Frames that are timed, of which the median counts.
 const FRAMES: u32 = 15;
@@ -12,24 +19,42 @@ const FRAMES: u32 = 15;
 pub struct ContactAssets {
     /// The model.
     pub model: Arc<ContactModel>,
+    /// What pixels have to know; none if the model names no layers.
+    pub pixels: Option<Arc<PixelSkin>>,
     /// Time of a warm frame under a plate that moves by 10 um, us.
     pub frame_us: u64,
+    /// The same on pixels.
+    pub pixel_frame_us: Option<u64>,
 }
 
 impl ContactAssets {
-    /// Reads a file's bytes, and times the solver.
+    /// Reads a file's bytes, which have to be of this atlas' finger, and times the solver.
     ///
     /// # Errors
-    /// [`ModelError`] for what is no model, or one that is damaged.
-    pub fn read(bytes: &[u8]) -> Result<Self, ModelError> {
+    /// [`ModelError`] for what is no model, one that is damaged, or one of another finger.
+    pub fn read(bytes: &[u8], atlas: &Atlas, raster: &Arc<Raster>) -> Result<Self, ModelError> {
         let model = Arc::new(ContactModel::read(bytes)?);
-        let frame_us = frame_us(&model).unwrap_or(0);
-        Ok(Self { model, frame_us })
+        model.require_atlas(atlas.hash())?;
+        let pixels = PixelSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
+        let frame_us = frame_us(&model, None).unwrap_or(0);
+        let pixel_frame_us = pixels.as_ref().and_then(|skin| frame_us_on(skin, &model));
+        Ok(Self { model, pixels, frame_us, pixel_frame_us })
+    }
+
+    /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
+    #[must_use]
+    pub fn us_of(&self, hand: &Hand) -> Option<u64> {
+        let us = if hand.is_on_pixels { self.pixel_frame_us? } else { self.frame_us };
+        (!hand.form().takes_pressure()).then_some(us)
     }
 }
 
+fn frame_us_on(skin: &Arc<PixelSkin>, model: &Arc<ContactModel>) -> Option<u64> {
+    frame_us(model, Some(PixelContact::new(Arc::clone(skin), model)))
+}
+
 /// A plate against the pad, half a millimetre and a bit deep.
-fn frame_us(model: &Arc<ContactModel>) -> Option<u64> {
+fn frame_us(model: &Arc<ContactModel>, mut pixels: Option<PixelContact>) -> Option<u64> {
     let lowest = model.lowest_mm();
     let plate = Arc::new(RoundedPlate { half_mm: [10.0, 10.0, 3.0], edge_radius_mm: 1.0 });
     let mut solver = Solver::new(Arc::clone(model), Settings::default()).ok()?;
@@ -40,7 +65,10 @@ fn frame_us(model: &Arc<ContactModel>) -> Option<u64> {
         let origin_mm = [lowest[0], lowest[1], lowest[2] + depth - plate.half_mm[2]];
         let object = Object::rigid(plate.clone(), Placement::turned(0.0, 0.0, 0.0, origin_mm));
         let start = Instant::now();
-        solver.solve(&[object], &mut out).ok()?;
+        match &mut pixels {
+            Some(pixels) => solver.solve_on_pixels(&[object], pixels, &mut out).ok()?,
+            None => solver.solve(&[object], &mut out).ok()?,
+        }
         times.push(start.elapsed().as_micros() as u64);
     }
     times.sort_unstable();

@@ -4,25 +4,24 @@ use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
 use papilla_contact::{
-    Contact, ContactError, ContactModel, Gaps, Method, NetForce, Object, Person, Scene, Settings,
-    Solver,
+    Contact, ContactError, ContactModel, Gaps, NetForce, Object, Person, PixelContact, Scene,
 };
 use papilla_proto::{
     ErrorCode, Hello, MAP_LEN, Problem, SampleType,
     atlas::{Raster, VertexSampler},
-    contact::{ContactMethod, Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
+    contact::{Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     flags,
 };
 
 use papilla_session_state::{Reader, StateError, Writer};
 
-use super::{FrameForm, Skin, unusable, warm_start};
+use super::{FrameForm, Skin, solver::FingerSolver, unusable};
 
 /// A finger.
 pub struct Finger {
     form: FrameForm,
     person: Person,
-    solver: Option<Solver>,
+    solver: Option<FingerSolver>,
     out: Contact,
     objects: Vec<Object>,
     /// Samples of a frame, and of what follows them.
@@ -63,16 +62,8 @@ impl Finger {
         person: Person,
     ) -> Result<Self, Problem> {
         let vertices = skin.atlas.vertex_count();
-        let settings = Settings {
-            method: match hello.method.unwrap_or_default() {
-                ContactMethod::Springs => Method::Springs,
-                ContactMethod::SmallStrain => Method::SmallStrain,
-                ContactMethod::SecondOrder => Method::SecondOrder,
-            },
-            person,
-            stiffness: hello.stiffness == Some(true),
-        };
-        let solver = model.map(|model| Solver::new(Arc::clone(model), settings)).transpose();
+        let solver =
+            model.map(|model| FingerSolver::new(hello, skin, model, person)).transpose()?;
         let of_map = form.layout == SampleLayout::Map;
         let is_gaps = form.input == Input::Gaps;
         let samples = match form.input {
@@ -84,7 +75,7 @@ impl Finger {
         Ok(Self {
             form,
             person,
-            solver: solver.map_err(|error| of_contact(&error))?,
+            solver,
             out: Contact::new(if form.is_window() { 0 } else { vertices }),
             objects,
             samples: vec![0.0; samples],
@@ -171,12 +162,12 @@ impl Finger {
             Input::Gaps => Scene::Gaps(Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY }),
             _ => Scene::Objects(objects),
         };
-        let solved = match net {
-            Some(net) => solver.solve_for_force(scene, net, out),
-            None => solver.solve(scene, out).map(|()| 0.0),
+        let travel_mm = solver.solve(scene, net, out).map_err(|error| of_contact(&error))?;
+        let at_vertices = out.touched().iter().map(|v| out.pressure_pa[*v as usize]);
+        let peak = match solver.pixels() {
+            Some(pixels) => pixels.peak_pa(),
+            None => at_vertices.fold(0.0, f32::max),
         };
-        let travel_mm = solved.map_err(|error| of_contact(&error))?;
-        let peak = out.touched().iter().map(|v| out.pressure_pa[*v as usize]).fold(0.0, f32::max);
         self.touch = Touch {
             force_n: out.force_n.map(|v| v as f32),
             torque_n_mm: out.torque_n_mm.map(|v| v as f32),
@@ -198,8 +189,7 @@ impl Finger {
         let peak_pa = self.touch.pressure_max_pa / self.stiffness();
         if let Some(map_pa) = map_pa {
             if peak_pa > 0.0 {
-                // Both lengths are those of the atlas.
-                let _ = self.raster.rasterise(&self.out.pressure_pa, map_pa);
+                draw(&self.raster, self.pixels(), &self.out, map_pa);
             } else {
                 map_pa.fill(0.0);
             }
@@ -214,6 +204,10 @@ impl Finger {
         Taken { peak_pa, flags, iterations }
     }
 
+    fn pixels(&self) -> Option<&PixelContact> {
+        self.solver.as_ref().and_then(FingerSolver::pixels)
+    }
+
     /// Whether an answer depends on the frames before it.
     #[must_use]
     pub fn has_state(&self) -> bool {
@@ -223,7 +217,7 @@ impl Finger {
     /// Writes what answers depend on of the frames before.
     pub fn save(&self, state: &mut Writer) {
         if let Some(solver) = &self.solver {
-            warm_start::write(&solver.memory(), state);
+            solver.save(state);
         }
     }
 
@@ -232,9 +226,7 @@ impl Finger {
     /// # Errors
     /// The state is of another finger.
     pub fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
-        let Some(solver) = &mut self.solver else { return Ok(()) };
-        let memory = warm_start::read(state)?;
-        if solver.recall(&memory) { Ok(()) } else { Err(StateError::Value("a warm start")) }
+        self.solver.as_mut().map_or(Ok(()), |solver| solver.restore(state))
     }
 
     /// Appends what pushes back, and the pressure if it was asked for, each up to a multiple of 16.
@@ -242,13 +234,13 @@ impl Finger {
         if self.form.input != Input::Pressure {
             bytes.extend_from_slice(&self.touch.encode());
         }
+        let Self { raster, out, sent_pa, solver, .. } = self;
         let values = match self.pressure {
             None => return,
-            Some(SampleLayout::Vertices) => &self.out.pressure_pa,
+            Some(SampleLayout::Vertices) => &out.pressure_pa,
             Some(SampleLayout::Map) => {
-                // Both lengths are those of the atlas.
-                let _ = self.raster.rasterise(&self.out.pressure_pa, &mut self.sent_pa);
-                &self.sent_pa
+                draw(raster, solver.as_ref().and_then(FingerSolver::pixels), out, sent_pa);
+                sent_pa
             }
         };
         for value in values {
@@ -331,6 +323,15 @@ impl Finger {
     }
 }
 
+/// Draws the pressure that was found, of pixels or else of vertices, as a map, Pa.
+fn draw(raster: &Raster, pixels: Option<&PixelContact>, out: &Contact, map_pa: &mut [f32]) {
+    match pixels {
+        Some(pixels) => map_pa.copy_from_slice(pixels.map_pa()),
+        // Both lengths are those of the atlas.
+        None => _ = raster.rasterise(&out.pressure_pa, map_pa),
+    }
+}
+
 /// Multiplies all values, unless by one.
 fn scale(values: &mut [f32], factor: f32) {
     if factor.to_bits() != 1.0f32.to_bits() {
@@ -355,7 +356,7 @@ fn net_force([x, y, z, force_n]: [f32; 4]) -> Result<Option<NetForce>, Problem> 
     Ok(Some(NetForce { direction, force_n: f64::from(force_n) }))
 }
 
-fn of_contact(error: &ContactError) -> Problem {
+pub(crate) fn of_contact(error: &ContactError) -> Problem {
     let field = match error {
         ContactError::Value { member, .. } => (*member).to_owned(),
         ContactError::Rotation { object, .. } => format!("objects[{object}].quaternion"),

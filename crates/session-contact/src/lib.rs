@@ -15,7 +15,7 @@
 //!
 //! // A service without a contact model takes pressure alone.
 //! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
-//! let skin = Skin { atlas: &atlas, raster: &raster, model: None };
+//! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None };
 //! let hello = Hello { version: 3, ..Hello::default() };
 //! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
 //! let objects = Hello { input: Some(Input::Objects), ..hello };
@@ -28,6 +28,7 @@ mod announced;
 mod assets;
 mod finger;
 mod frame;
+mod solver;
 mod warm_start;
 
 #[cfg(test)]
@@ -35,11 +36,11 @@ mod tests;
 
 use std::sync::{Arc, Mutex};
 
-use papilla_contact::ContactModel;
+use papilla_contact::{ContactModel, PixelSkin};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem,
     atlas::{Atlas, Raster},
-    contact::{Input, SampleLayout, TOUCH_LEN},
+    contact::{ContactMethod, Input, SampleLayout, TOUCH_LEN},
     effects::{Section, SectionName},
 };
 
@@ -56,11 +57,14 @@ pub struct Skin<'a> {
     pub raster: &'a Arc<Raster>,
     /// What is known of the finger; none if the service has no contact model.
     pub model: Option<&'a Arc<ContactModel>>,
+    /// What contact on pixels has to know of it; none if the model names no layers.
+    pub pixels: Option<&'a Arc<PixelSkin>>,
 }
 
 /// The fingers of one session.
 pub struct Hand {
     form: FrameForm,
+    is_on_pixels: bool,
     fingers: Vec<Arc<Mutex<Finger>>>,
     sections: Vec<Section>,
 }
@@ -73,7 +77,7 @@ fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
 impl Hand {
     /// The fingers that a hello of version 3 announces.
     ///
-    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over.
+    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over, 16 on pixels.
     ///
     /// # Errors
     /// A member is unusable or missing; the problem names it.
@@ -103,7 +107,8 @@ impl Hand {
         };
         let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
         let sections = sections(hello, input, vertices);
-        Ok(Self { form, fingers, sections })
+        let is_on_pixels = hello.method == Some(ContactMethod::Pixels);
+        Ok(Self { form, is_on_pixels, fingers, sections })
     }
 
     /// Which frames the session takes.

@@ -1,11 +1,13 @@
-use papilla_contact::{Arrays, Header};
+use papilla_contact::{Arrays, Header, Layer};
 use papilla_proto::{
     FrameHeader, FrameKind, SampleType,
     atlas::{Patch, PatchVertices},
-    contact::{AnnouncedFinger, AnnouncedObject, POSE_LEN, Pose, ROW, Touch},
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, POSE_LEN, Pose, ROW, Touch},
     flags,
     sdf::{AnnouncedShape, Mesh, Sphere},
 };
+
+use papilla_session_state::{Reader, Writer};
 
 use super::*;
 
@@ -16,6 +18,7 @@ struct Plane {
     atlas: Atlas,
     raster: Arc<Raster>,
     model: Arc<ContactModel>,
+    pixels: Arc<PixelSkin>,
 }
 
 impl Plane {
@@ -37,6 +40,7 @@ impl Plane {
             vertices: SIDE * SIDE,
             triangles: triangles.len(),
             share_max: 1.0,
+            layers: vec![Layer { young_mpa: 0.15, poisson: 0.49, thickness_mm: 99.0 }],
             atlas_hash: atlas.hash().to_owned(),
             ..Header::current()
         };
@@ -49,12 +53,13 @@ impl Plane {
         );
         let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
         let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
-        Self { atlas, raster, model }
+        let pixels = PixelSkin::new(&model, &atlas, Arc::clone(&raster)).expect("layers");
+        Self { atlas, raster, model, pixels: Arc::new(pixels) }
     }
 
     fn hand(&self, hello: &Hello) -> Result<Hand, Problem> {
-        let skin = Skin { atlas: &self.atlas, raster: &self.raster, model: Some(&self.model) };
-        Hand::of(hello, skin)
+        let Self { atlas, raster, model, pixels } = self;
+        Hand::of(hello, Skin { atlas, raster, model: Some(model), pixels: Some(pixels) })
     }
 }
 
@@ -103,6 +108,42 @@ fn a_pose_becomes_a_force_and_air_becomes_none() {
     assert!(pressed.stiffness_n_per_mm > 0.0 && taken.flags == 0, "{pressed:?} {taken:?}");
     let (air, taken) = touch(&hand, 0, &pose(-5.0)).expect("an answer");
     assert_eq!((air.force_n.map(f32::to_bits), taken.flags), ([0; 3], flags::NO_CONTACT));
+}
+
+/// A ball between four vertices, none of which it touches.
+#[test]
+fn on_pixels_a_dot_between_vertices_presses_and_a_finger_goes_on_elsewhere() {
+    let plane = Plane::new();
+    let hello =
+        Hello { objects: Some(vec![ball(2.0)]), pressure: Some(SampleLayout::Map), ..objects() };
+    let dot = |depth_mm: f32| {
+        let origin_mm = [0.5, 0.5, depth_mm - 2.0];
+        Pose { origin_mm, ..Pose::default() }.encode()
+    };
+    let at_vertices = plane.hand(&hello).expect("a hand");
+    let (missed, taken) = touch(&at_vertices, 0, &dot(0.05)).expect("an answer");
+    assert_eq!((missed.force_n[2].to_bits(), taken.flags), (0, flags::NO_CONTACT));
+
+    let hello = Hello { method: Some(ContactMethod::Pixels), ..hello };
+    let hand = plane.hand(&hello).expect("a hand");
+    let (felt, taken) = touch(&hand, 0, &dot(0.05)).expect("an answer");
+    // Hertz: 4/3 E* sqrt(R) d^1.5.
+    let due = 4.0 / 3.0 * 0.2 * 2f32.sqrt() * 0.05f32.powf(1.5);
+    assert!((felt.force_n[2] / due - 1.0).abs() < 0.2, "{felt:?} for {due}");
+    assert!(taken.flags == 0 && felt.pressure_max_pa > 0.0, "{taken:?}");
+
+    let other = plane.hand(&hello).expect("a hand");
+    let mut state = Writer::default();
+    hand.fingers()[0].lock().expect("no panic").save(&mut state);
+    let state = state.finish();
+    let mut reader = Reader::new(&state);
+    other.fingers()[0].lock().expect("no panic").restore(&mut reader).expect("its state");
+    reader.end().expect("nothing more");
+    let [here, there] = [&hand, &other].map(|hand| {
+        let (touch, taken) = touch(hand, 0, &dot(0.051)).expect("an answer");
+        (Touch { solve_us: 0.0, ..touch }, taken)
+    });
+    assert_eq!(here, there);
 }
 
 #[test]
@@ -179,6 +220,15 @@ fn bad_hellos_are_refused_by_member() {
         (Hello { sample_type: SampleType::U8, ..objects() }, "sample_type"),
         (Hello { input_layout: Some(SampleLayout::Map), ..objects() }, "input_layout"),
         (Hello { input: None, ..objects() }, "objects"),
+        (
+            Hello {
+                input: Some(Input::Gaps),
+                objects: None,
+                method: Some(ContactMethod::Pixels),
+                ..objects()
+            },
+            "method",
+        ),
         (Hello { input: None, objects: None, stiffness: Some(true), ..objects() }, "stiffness"),
     ];
     for (hello, field) in cases {

@@ -1,9 +1,10 @@
 //! The warm start of a finger's solver as bytes.
 
-use papilla_contact::Memory;
+use papilla_contact::{Memory, PixelMemory};
 use papilla_session_state::{Reader, StateError, Writer};
 
-/// More vertices than any patch holds: what a damaged count can make the reader take.
+/// More vertices than any patch holds, and than a map has pixels: what a damaged count can make the
+/// reader take.
 const VERTICES_MAX: usize = 1 << 16;
 
 pub(crate) fn write(memory: &Memory, state: &mut Writer) {
@@ -17,6 +18,30 @@ pub(crate) fn write(memory: &Memory, state: &mut Writer) {
     let bits = |of: usize| reached.map(|reached| reached[of].to_bits());
     state.option(bits(0));
     state.option(bits(1));
+}
+
+pub(crate) fn write_pixels(memory: &PixelMemory, state: &mut Writer) {
+    let PixelMemory { vertices, forces_n, pixels, pressure_pa } = memory;
+    for indices in [vertices, pixels] {
+        state.number(indices.len() as u64);
+        indices.iter().for_each(|index| state.number(u64::from(*index)));
+    }
+    state.floats(forces_n.as_flattened());
+    state.floats(pressure_pa);
+}
+
+pub(crate) fn read_pixels(state: &mut Reader<'_>) -> Result<PixelMemory, StateError> {
+    let mut memory = PixelMemory::default();
+    for indices in [&mut memory.vertices, &mut memory.pixels] {
+        let count = state.count(VERTICES_MAX, "a number of vertices or pixels")?;
+        let index = |_| state.count(u32::MAX as usize, "a vertex or pixel").map(|i| i as u32);
+        *indices = (0..count).map(index).collect::<Result<_, _>>()?;
+    }
+    memory.forces_n.resize(memory.vertices.len(), [0.0; 6]);
+    memory.pressure_pa.resize(memory.pixels.len(), 0.0);
+    state.floats(memory.forces_n.as_flattened_mut())?;
+    state.floats(&mut memory.pressure_pa)?;
+    Ok(memory)
 }
 
 pub(crate) fn read(state: &mut Reader<'_>) -> Result<Memory, StateError> {

@@ -1,12 +1,14 @@
 //! `contact`: what the real-time contact solver has to know of the finger.
 
 use anyhow::Context;
-use papilla_contact::{Arrays, Header};
+use papilla_contact::{Arrays, Header, Layer};
 use papilla_dataset::{Dataset, Split};
+use papilla_fingertip::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use papilla_fingertip::influence::{self, Compliance, Load, SecondOrder};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::TissueTable;
 use papilla_fingertip::simulation::body::Body;
+use papilla_fingertip::tissue::Tissue;
 use papilla_output::atomic;
 use papilla_progress::Progress;
 use std::collections::HashMap;
@@ -77,6 +79,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         outputs: second.outputs,
         share_max: second.share_max as f32,
         depth_max_mm,
+        layers: layers_below_pad(&FingertipShape::default(), &materials)?,
         ..Header::current()
     };
     let arrays = arrays(&compliance, second, &skin.positions_mm, atlas.triangles());
@@ -93,6 +96,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         path.display()
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// Skin from the surface down to the bone, below the middle of the pad.
+fn layers_below_pad(shape: &FingertipShape, tissues: &TissueTable) -> anyhow::Result<Vec<Layer>> {
+    let bounds = shape.layers(SurfaceParameter::Body([0.0, -1.0], 0.0))?;
+    let tissue = [Tissue::Epidermis, Tissue::Dermis, Tissue::Subcutaneous];
+    let layer = |(tissue, ends): (Tissue, &[[f64; 3]])| {
+        let spec = tissues.of(tissue);
+        // The way goes up: bone lies above the palmar skin.
+        let thickness_mm = ends[1][2] - ends[0][2];
+        Layer { young_mpa: spec.youngs_modulus_mpa, poisson: spec.poissons_ratio, thickness_mm }
+    };
+    Ok(tissue.into_iter().zip(bounds.windows(2)).map(layer).collect())
 }
 
 /// Forces of the deepest and of a middle state of each training indentation: pressure times

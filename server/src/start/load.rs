@@ -14,28 +14,26 @@ use crate::{drain::begun, transport::app::App};
 const LOOK: Duration = Duration::from_secs(1);
 const LOOKS: usize = 10;
 
-/// What was asked for at a look: maps of each tier, contact solves. A look allocates nothing.
+/// What was asked for at a look: maps of each tier, time of contact solves. A look allocates nothing.
 struct Asked {
     maps: [u64; TIERS_MAX],
-    solves: u64,
+    contact_us: u64,
 }
 
 impl Asked {
     fn now(app: &App) -> Self {
         let of_tier = |place| app.metrics.tier(place).asked.load(Ordering::Relaxed);
         let maps = std::array::from_fn(of_tier);
-        Self { maps, solves: app.metrics.contact.asked.load(Ordering::Relaxed) }
+        Self { maps, contact_us: app.metrics.contact.asked_us.load(Ordering::Relaxed) }
     }
 
     /// Thread time that what came since asks for, s, as long as each takes here now.
     fn seconds_since(&self, before: &Self, app: &App) -> f64 {
-        let (catalogue, mut us) = (app.catalogue(), 0);
+        let (catalogue, mut us) = (app.catalogue(), self.contact_us - before.contact_us);
         for tier in 0..catalogue.tiers.len().min(TIERS_MAX) {
             let new = self.maps[tier] - before.maps[tier];
             us += new * catalogue.predicted_latency_us(tier);
         }
-        let of_solve = app.contact.as_ref().map_or(0, |contact| contact.frame_us);
-        us += (self.solves - before.solves) * of_solve;
         us as f64 * 1e-6
     }
 }

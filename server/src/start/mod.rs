@@ -160,10 +160,8 @@ pub(crate) fn load_contact(
             None => return Ok(None),
         },
     };
-    let contact = ContactAssets::read(&bytes).map_err(|error| bad(error.to_string()))?;
-    let fits = contact.model.require_atlas(catalogue.atlas.hash());
-    fits.map_err(|error| bad(error.to_string()))?;
-    Ok(Some(contact))
+    let contact = ContactAssets::read(&bytes, &catalogue.atlas, &catalogue.skin);
+    contact.map(Some).map_err(|error| bad(error.to_string()))
 }
 
 /// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not

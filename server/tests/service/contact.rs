@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::support::{
     GAIN, Service, Socket,
-    contact::{atlas, deep, hello_3, hertz_n, model, rows, service},
+    contact::{MODULUS_MPA, atlas, deep, hello_3, hertz_n, model, model_of, rows, service},
     floats_of, frame, hello, model_folder, model_folder_on, write,
 };
 
@@ -42,6 +42,56 @@ async fn poses_go_in_and_forces_come_out_without_a_network() {
     let (header, touch, _) = hear(&mut socket).await;
     assert_eq!(header.extension.unwrap().flags, flags::NO_CONTACT);
     assert_eq!(touch.force_n.map(f32::to_bits), [0; 3]);
+}
+
+/// A ball between four vertices, none of which it touches.
+#[tokio::test(flavor = "multi_thread")]
+async fn on_pixels_a_session_feels_what_lies_between_vertices() {
+    const BALL_MM: f32 = 2.0;
+    let service = service().await;
+    assert!(service.json("/v1/tiers").await["pixels_us"].is_u64());
+    let objects = json!([{"shape": {"shape": "sphere", "radius_mm": BALL_MM}}]);
+    let ball = Pose { origin_mm: [0.5, 0.5, 0.05 - BALL_MM], ..Pose::default() };
+    let mut socket = service.socket().await;
+    let hello = json!({"objects": objects, "out_of_range": "flag", "pressure": "map"});
+    socket.open(hello_3(&hello)).await;
+    socket.send(rows(1, 0, &[ball])).await;
+    let (header, missed, _) = hear(&mut socket).await;
+    assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, flags::NO_CONTACT);
+    assert_eq!(missed.force_n[2].to_bits(), 0);
+
+    let mut hello = hello;
+    hello["method"] = json!("pixels");
+    socket.open(hello_3(&hello)).await;
+    socket.send(rows(2, 0, &[ball])).await;
+    let (header, felt, payload) = hear(&mut socket).await;
+    assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, 0);
+    // Hertz: 4/3 E* sqrt(R) d^1.5.
+    let due = 4.0 / 3.0 * MODULUS_MPA * BALL_MM.sqrt() * 0.05f32.powf(1.5);
+    assert!((felt.force_n[2] / due - 1.0).abs() < 0.2, "{felt:?} for {due}");
+    // The network is asked about the pixels' pressure, which is sent too.
+    let maps = floats_of(&payload[TOUCH_LEN..]);
+    let (pressure_pa, sed) = maps.split_at(MAP_LEN);
+    let most = |map: &[f32]| map.iter().copied().fold(0.0, f32::max);
+    assert!((most(pressure_pa) / felt.pressure_max_pa - 1.0).abs() < 1e-6, "{felt:?}");
+    assert!((most(sed) / (GAIN * felt.pressure_max_pa) - 1.0).abs() < 1e-3, "{}", most(sed));
+}
+
+/// Of gaps, or by a model without layers, it cannot be done: the session is refused, by member.
+#[tokio::test(flavor = "multi_thread")]
+async fn pixels_need_objects_and_layers() {
+    let by_gaps = json!({"input": "gaps", "objects": null, "method": "pixels"});
+    let folder = model_folder_on(&atlas());
+    write(folder.path(), "finger.contact", &model_of(Vec::new()));
+    let without_layers = Service::on(folder, |_| ()).await.unwrap();
+    assert!(without_layers.json("/v1/tiers").await["pixels_us"].is_null());
+    for (service, members) in
+        [(service().await, by_gaps), (without_layers, json!({"method": "pixels"}))]
+    {
+        let mut socket = service.socket().await;
+        socket.send(hello_3(&members).to_string()).await;
+        assert_eq!(socket.hear_refusal("bad_contact").await["field"], "method");
+    }
 }
 
 /// One in the air, two in contact; a session that sends pressure is not counted.

@@ -90,10 +90,16 @@ async fn fingers_that_moved_start_as_warm_as_they_were() {
     let shared = Shared::new();
     let one = contact::service_with(shared.configure()).await;
     let other = contact::service_with(shared.configure()).await;
-    let hello = contact::hello_3(&json!({
-        "reconnect": true, "map": false, "pressure": "vertices", "stiffness": true,
-        "fingers": [{}, {}],
-    }));
+    for method in ["second_order", "pixels"] {
+        let hello = contact::hello_3(&json!({
+            "reconnect": true, "map": false, "pressure": "vertices", "stiffness": true,
+            "fingers": [{}, {}], "method": method,
+        }));
+        stays_and_moves_alike(&one, &other, hello).await;
+    }
+}
+
+async fn stays_and_moves_alike(one: &Service, other: &Service, hello: Value) {
     let (mut stays, mut moves) = (one.socket().await, one.socket().await);
     stays.open(hello.clone()).await;
     moves.open(hello.clone()).await;

@@ -79,6 +79,8 @@ fn the_shipped_contact_model_says_where_it_is_from() {
     assert_eq!(header.datasets, ["data/s1", "data/broad"].map(hash));
     assert_eq!(header.effects, ["finite_strain", "layers"]);
     assert!(header.modes > 0 && header.depth_max_mm > 1.0, "{header:?}");
+    // Epidermis, dermis, subcutaneous tissue.
+    assert_eq!(header.layers.len(), 3);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -21,9 +21,44 @@ struct Plan {
     across: [Arc<dyn Fft<f32>>; 2],
 }
 
+/// Transforms along windows of all lengths; made once, for any number of fingers.
+pub(super) struct Plans(Vec<Plan>);
+
+impl fmt::Debug for Plans {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.0.iter().map(|plan| plan.length)).finish()
+    }
+}
+
+impl Plans {
+    pub(super) fn new() -> Self {
+        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
+        let plan = |length| Plan {
+            length,
+            forward: real.plan_fft_forward(length),
+            back: real.plan_fft_inverse(length),
+            across: [complex.plan_fft_forward(length), complex.plan_fft_inverse(length)],
+        };
+        Self(LENGTHS.map(plan).into())
+    }
+
+    fn of(&self, length: usize) -> Option<&Plan> {
+        self.0.iter().find(|plan| plan.length == length)
+    }
+
+    fn scratch_len(&self) -> usize {
+        let scratch = |p: &Plan| {
+            let lines = p.across.iter().map(|fft| fft.get_inplace_scratch_len()).max();
+            let along = p.forward.get_scratch_len().max(p.back.get_scratch_len());
+            along.max(lines.unwrap_or(0))
+        };
+        self.0.iter().map(scratch).max().unwrap_or(0)
+    }
+}
+
 /// Memory for a window of any of the lengths, either way.
 pub(super) struct Convolution {
-    plans: Vec<Plan>,
+    plans: Arc<Plans>,
     rows: usize,
     columns: usize,
     /// `[rows][columns]`.
@@ -44,32 +79,18 @@ impl fmt::Debug for Convolution {
 }
 
 impl Convolution {
-    pub(super) fn new() -> Self {
-        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
-        let plan = |length| Plan {
-            length,
-            forward: real.plan_fft_forward(length),
-            back: real.plan_fft_inverse(length),
-            across: [complex.plan_fft_forward(length), complex.plan_fft_inverse(length)],
-        };
-        let plans: Vec<Plan> = LENGTHS.map(plan).into();
-        let scratch = |p: &Plan| {
-            let lines = p.across.iter().map(|fft| fft.get_inplace_scratch_len()).max();
-            let along = p.forward.get_scratch_len().max(p.back.get_scratch_len());
-            along.max(lines.unwrap_or(0))
-        };
-        let scratch = plans.iter().map(scratch).max().unwrap_or(0);
+    pub(super) fn new(plans: Arc<Plans>) -> Self {
         let longest = LENGTHS[LENGTHS.len() - 1];
         let half = longest * (longest / 2 + 1);
         let zero = C32::new(0.0, 0.0);
         Self {
+            scratch: vec![zero; plans.scratch_len()],
             plans,
             rows: 0,
             columns: 0,
             grid: vec![0.0; longest * longest],
             spectrum: vec![zero; half],
             turned: vec![zero; half],
-            scratch: vec![zero; scratch],
             compliance: vec![0.0; half],
         }
     }
@@ -129,8 +150,7 @@ impl Convolution {
     fn apply(&mut self) {
         let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance } = self;
         let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
-        let of = |length: usize| plans.iter().find(|p| p.length == length);
-        let (Some(along), Some(across)) = (of(columns), of(rows)) else { return };
+        let (Some(along), Some(across)) = (plans.of(columns), plans.of(rows)) else { return };
         let grid = &mut grid[..rows * columns];
         let [spectrum, turned] = [spectrum, turned].map(|v| &mut v[..rows * half]);
         // Lengths are those of the plans, so nothing here can be refused.
@@ -173,7 +193,7 @@ mod tests {
     fn a_wave_of_pressure_moves_by_its_compliance() {
         let layers = [Layer { young_mpa: 0.1, poisson: 0.4, thickness_mm: 3.0 }];
         let surface = SurfaceCompliance::new(&layers);
-        let mut convolution = Convolution::new();
+        let mut convolution = Convolution::new(Arc::new(Plans::new()));
         let [across_mm, along_mm] = [0.15, 0.12];
         convolution.open([40, 60], [across_mm, along_mm], &surface);
         assert_eq!([convolution.rows(), convolution.columns()], [48, 64]);

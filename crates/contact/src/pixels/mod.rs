@@ -5,17 +5,20 @@
 //! wave length. The displacement of a pixel is
 //!
 //! ```text
-//! u(x) = S [u_v - K p_v] + K p
+//! u(x) = S P [u_v - K p_v] + K p
 //! ```
 //!
 //! with the vertices' displacement `u_v` under their forces, the pressure `p_v` that is linear
 //! between vertices, interpolation `S` of second degree, and the pressure `p` on pixels. So a vertex'
-//! own dent makes way for the true one; what is far away cancels. `p >= 0`, `gap >= 0`,
+//! own dent makes way for the true one; what is far away cancels. `P` smooths over 36 vertices: a
+//! force at a vertex of linear elements moves it 2.3 times as far as `K` says, and its neighbours
+//! too little, which is the mesh's and not the skin's. `p >= 0`, `gap >= 0`,
 //! `p gap = 0` on pixels; the vertices' forces are the pressure's sums over their hats, and both go
 //! in turn until forces settle.
 
 mod convolution;
 mod layers;
+mod memory;
 mod smooth;
 mod turns;
 mod window;
@@ -23,19 +26,21 @@ mod window;
 use crate::answer::{Contact, Effort, Person};
 use crate::bounded::{BoundedSolver, Operator};
 use crate::error::ContactError;
+use crate::force_target::{NetForce, Search};
 use crate::model::ContactModel;
 use crate::objects::{Object, View};
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
-use convolution::Convolution;
+use convolution::{Convolution, Plans};
 use layers::SurfaceCompliance;
 use papilla_atlas::{Atlas, MAP_LEN, Raster};
-use smooth::{Stencil, stencils};
+use smooth::{PixelStencil, VertexStencil};
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
 
 pub use layers::Layer;
+pub use memory::PixelMemory;
 
 /// Rounds of vertices and pixels at most.
 const ROUNDS_MAX: usize = 8;
@@ -50,6 +55,8 @@ const VIOLATION_MM: f32 = 1e-4;
 /// Most products with the compliance in a round.
 const PRODUCTS_MAX: u32 = 80;
 const PA_PER_MPA: f32 = 1e6;
+/// Pixels settle to a hundredth of the force: [`SETTLED`].
+const PIXELS: Search = Search { tolerance: 0.01, tries_max: 12 };
 
 /// Pressure of a person for 1 MPa on the reference finger, Pa.
 fn unit_pa(person: Person) -> f32 {
@@ -61,17 +68,26 @@ fn unit_pa(person: Person) -> f32 {
 pub struct PixelSkin {
     raster: Arc<Raster>,
     uv_px: Vec<[f32; 2]>,
-    stencils: Vec<Stencil>,
+    /// By pixel, and by vertex.
+    stencils: Vec<PixelStencil>,
+    smoothed: Vec<VertexStencil>,
     surface: SurfaceCompliance,
+    plans: Arc<Plans>,
 }
 
 impl PixelSkin {
-    /// The skin of an atlas, its layers from the surface down to the bone.
+    /// The skin of an atlas and of a model of it; none if the model names no layers, or has other
+    /// vertices than the atlas.
     #[must_use]
-    pub fn new(atlas: &Atlas, raster: Arc<Raster>, layers: &[Layer]) -> Self {
+    pub fn new(model: &ContactModel, atlas: &Atlas, raster: Arc<Raster>) -> Option<Self> {
+        let layers = &model.header().layers;
+        if layers.is_empty() || model.vertices() != atlas.vertex_count() {
+            return None;
+        }
         let uv_px = atlas.patch(raster.patch()).uv_px.clone();
-        let stencils = stencils(atlas, &raster);
-        Self { raster, uv_px, stencils, surface: SurfaceCompliance::new(layers) }
+        let (stencils, smoothed) = (smooth::of_pixels(atlas, &raster), smooth::of_vertices(atlas));
+        let surface = SurfaceCompliance::new(layers);
+        Some(Self { raster, uv_px, stencils, smoothed, surface, plans: Arc::new(Plans::new()) })
     }
 }
 
@@ -88,6 +104,7 @@ pub struct PixelContact {
     rest: Vec<f32>,
     pressure: Vec<f32>,
     map_pa: Vec<f32>,
+    peak_pa: f32,
 }
 
 /// Compliance between the pixels of a window.
@@ -114,8 +131,8 @@ impl Operator for Nearby<'_> {
 
 impl Solver {
     /// Finds what presses on the finger, first at vertices, then on pixels; pressure at vertices is
-    /// the pixels' mean under their hats. Gaps at vertices say nothing of what lies between them,
-    /// so it is objects that are needed.
+    /// the pixels' mean under their hats, the local stiffness the vertices' own. Gaps at vertices say
+    /// nothing of what lies between them, so it is objects that are needed.
     ///
     /// # Errors
     /// As [`Self::solve`].
@@ -130,6 +147,30 @@ impl Solver {
             pixels.refine(solver, view, out)
         })
     }
+
+    /// As [`Self::solve_for_force`], on pixels: vertices find the travel, pixels correct it.
+    ///
+    /// # Errors
+    /// As [`Self::solve_for_force`].
+    pub fn solve_for_force_on_pixels(
+        &mut self,
+        objects: &[Object],
+        net: NetForce,
+        pixels: &mut PixelContact,
+        out: &mut Contact,
+    ) -> Result<f64, ContactError> {
+        net.validate()?;
+        self.within(objects.into(), 0.0, |solver, view| {
+            if solver.reached.is_none() {
+                // Vertices may see nothing of what pixels do; then the way begins where objects are.
+                let _ = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame);
+            }
+            solver.travel_until(view, net, PIXELS, out, |solver, view, out| {
+                solver.frame(view, out)?;
+                pixels.refine(solver, view, out)
+            })
+        })
+    }
 }
 
 impl PixelContact {
@@ -140,12 +181,13 @@ impl PixelContact {
         Self {
             window: Window::new(pixels, model.vertices()),
             bounded: BoundedSolver::new(pixels),
-            convolution: Convolution::new(),
+            convolution: Convolution::new(Arc::clone(&skin.plans)),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
             turns: Turns::new(model.vertices()),
             rest: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
             map_pa: vec![0.0; MAP_LEN],
+            peak_pa: 0.0,
             skin,
         }
     }
@@ -156,9 +198,16 @@ impl PixelContact {
         &self.map_pa
     }
 
+    /// Greatest pressure of the last frame, Pa.
+    #[must_use]
+    pub fn peak_pa(&self) -> f32 {
+        self.peak_pa
+    }
+
     /// Forgets the last frame.
     pub fn reset(&mut self) {
         self.map_pa.fill(0.0);
+        self.peak_pa = 0.0;
         self.turns.forget();
     }
 
@@ -170,7 +219,7 @@ impl PixelContact {
     ) -> Result<(), ContactError> {
         let Self { skin, window, pressure, map_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
-        if !window.open(skin, model, view) {
+        if !window.open(skin, solver.near()) {
             self.reset();
             return Ok(());
         }
@@ -186,7 +235,7 @@ impl PixelContact {
         let mut change = f32::INFINITY;
         for round in 0..ROUNDS_MAX {
             let start = (round == 0).then_some(warm);
-            change = self.round(model, person, view, start, &mut out.effort)?;
+            change = self.round(solver, view, start, &mut out.effort)?;
             if !change.is_finite() {
                 self.reset();
                 return Err(ContactError::Diverged);
@@ -207,8 +256,7 @@ impl PixelContact {
     /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
     fn round(
         &mut self,
-        model: &ContactModel,
-        person: Person,
+        solver: &Solver,
         view: View<'_>,
         start: Option<bool>,
         effort: &mut Effort,
@@ -216,9 +264,10 @@ impl PixelContact {
         let Self { skin, window, convolution, bounded, amplitudes, turns, rest, pressure, .. } =
             self;
         let n = window.len();
-        window.displace(model, amplitudes.as_mut());
+        let model = &solver.model;
+        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
         window.place(skin, model);
-        window.measure(view, person)?;
+        window.measure(view, solver.person())?;
         window.press_hats(skin, rest);
         if let Some(warm) = start {
             if !warm {
@@ -245,11 +294,12 @@ impl PixelContact {
     }
 
     fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
-        let Self { window, pressure, map_pa, skin, .. } = self;
+        let Self { window, pressure, map_pa, peak_pa, skin, .. } = self;
+        *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
-        let (quality, effort) = (out.quality, out.effort);
+        let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
         out.clear();
-        (out.quality, out.effort) = (quality, effort);
+        (out.quality, out.effort, out.stiffness_n_per_mm) = (quality, effort, stiffness_n_per_mm);
         let mut size_n = 0.0;
         for (i, p) in pressure[..window.len()].iter().enumerate() {
             if !(*p > 0.0) {
@@ -259,8 +309,10 @@ impl PixelContact {
             let force = window.normal[i].map(|n| f64::from(n) * size);
             out.add(window.at_mm[i].map(f64::from), force, size, f64::from(window.area_mm2[i]));
             size_n += size;
+            out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
             let index = skin.raster.indices()[window.entries[i] as usize];
             map_pa[index as usize] = p * unit_pa;
+            *peak_pa = peak_pa.max(p * unit_pa);
         }
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);

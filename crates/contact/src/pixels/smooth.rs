@@ -3,22 +3,29 @@
 use papilla_atlas::{Atlas, Patch, Raster};
 
 /// Vertices that a pixel's value is of.
-pub(super) const NEIGHBOURS: usize = 16;
+const NEAR: usize = 16;
+/// Vertices that a vertex' smoothed value is of.
+const FAR: usize = 36;
 /// Terms of a polynomial of second degree in two coordinates.
 const TERMS: usize = 6;
 /// Largest sum of the weights' sizes: beyond, where a pixel lies at the edge, the triangle's plane
 /// is taken.
 const WEIGHTS_MAX: f64 = 2.5;
 
-/// What a pixel's value is made of: vertices and weights, whose sum is 1.
+/// What a value is made of: vertices and weights, whose sum is 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stencil {
-    pub vertices: [u16; NEIGHBOURS],
-    pub weights: [f32; NEIGHBOURS],
+pub(super) struct Stencil<const N: usize> {
+    pub vertices: [u16; N],
+    pub weights: [f32; N],
 }
 
-impl Stencil {
-    /// Value of a field at the pixel.
+/// Of a value at a pixel.
+pub(super) type PixelStencil = Stencil<NEAR>;
+/// Of a smoothed value at a vertex.
+pub(super) type VertexStencil = Stencil<FAR>;
+
+impl<const N: usize> Stencil<N> {
+    /// Value of a field where the stencil is of.
     pub(super) fn value(&self, field: impl Fn(usize) -> f32) -> f32 {
         let terms = self.vertices.iter().zip(self.weights);
         terms.map(|(vertex, weight)| weight * field(usize::from(*vertex))).sum()
@@ -27,25 +34,35 @@ impl Stencil {
 
 /// A stencil for each pixel of the skin: the value at the pixel of the polynomial of second degree
 /// that is closest to the values at its neighbours, nearer ones counting more (moving least squares).
-pub(super) fn stencils(atlas: &Atlas, raster: &Raster) -> Vec<Stencil> {
+pub(super) fn of_pixels(atlas: &Atlas, raster: &Raster) -> Vec<PixelStencil> {
     let uv_px = &atlas.patch(Patch::Skin).uv_px;
     let side = papilla_atlas::MAP_SIDE_PX;
     let places = raster.indices().iter().map(|i| (*i as usize % side, *i as usize / side));
     let mut order: Vec<(f32, u16)> = Vec::with_capacity(uv_px.len());
     let stencil = |((column, row), pixel): ((usize, usize), &papilla_atlas::Pixel)| {
         let at = [column as f32 + 0.5, row as f32 + 0.5];
-        order.clear();
-        order.extend(uv_px.iter().enumerate().map(|(vertex, uv)| {
-            ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), vertex as u16)
-        }));
         least_squares(at, uv_px, &mut order).unwrap_or_else(|| plane(pixel))
     };
     places.zip(raster.pixels()).map(stencil).collect()
 }
 
+/// The same for each vertex, of so many neighbours that what changes from one to the next is gone.
+pub(super) fn of_vertices(atlas: &Atlas) -> Vec<VertexStencil> {
+    let uv_px = &atlas.patch(Patch::Skin).uv_px;
+    let mut order = Vec::with_capacity(uv_px.len());
+    let stencil = |(vertex, at): (usize, &[f32; 2])| {
+        least_squares(*at, uv_px, &mut order).unwrap_or_else(|| {
+            let mut itself = Stencil { vertices: [vertex as u16; FAR], weights: [0.0; FAR] };
+            itself.weights[0] = 1.0;
+            itself
+        })
+    };
+    uv_px.iter().enumerate().map(stencil).collect()
+}
+
 /// The triangle's plane.
-fn plane(pixel: &papilla_atlas::Pixel) -> Stencil {
-    let mut stencil = Stencil { vertices: [0; NEIGHBOURS], weights: [0.0; NEIGHBOURS] };
+fn plane(pixel: &papilla_atlas::Pixel) -> PixelStencil {
+    let mut stencil = Stencil { vertices: [0; NEAR], weights: [0.0; NEAR] };
     stencil.vertices.fill(pixel.vertices[0] as u16);
     for i in 0..3 {
         (stencil.vertices[i], stencil.weights[i]) = (pixel.vertices[i] as u16, pixel.weights[i]);
@@ -54,16 +71,27 @@ fn plane(pixel: &papilla_atlas::Pixel) -> Stencil {
 }
 
 /// None if there are too few neighbours, or they lie to one side.
-fn least_squares(at: [f32; 2], uv_px: &[[f32; 2]], order: &mut [(f32, u16)]) -> Option<Stencil> {
-    if order.len() <= NEIGHBOURS {
+fn least_squares<const N: usize>(
+    at: [f32; 2],
+    uv_px: &[[f32; 2]],
+    order: &mut Vec<(f32, u16)>,
+) -> Option<Stencil<N>> {
+    if uv_px.len() <= N {
         return None;
     }
+    order.clear();
+    order.extend(
+        uv_px
+            .iter()
+            .enumerate()
+            .map(|(vertex, uv)| ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), vertex as u16)),
+    );
     let by_place = |a: &(f32, u16), b: &(f32, u16)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-    let (near, next, _) = order.select_nth_unstable_by(NEIGHBOURS, by_place);
+    let (near, next, _) = order.select_nth_unstable_by(N, by_place);
     near.sort_unstable_by(by_place);
     let reach = f64::from(next.0);
-    let mut rows = [[0.0f64; TERMS]; NEIGHBOURS];
-    let mut counts = [0.0f64; NEIGHBOURS];
+    let mut rows = [[0.0f64; TERMS]; N];
+    let mut counts = [0.0f64; N];
     for (i, (square, vertex)) in near.iter().enumerate() {
         let uv = uv_px[usize::from(*vertex)];
         let [x, y] = [0, 1].map(|a| f64::from(uv[a] - at[a]) / reach.sqrt());
@@ -81,7 +109,7 @@ fn least_squares(at: [f32; 2], uv_px: &[[f32; 2]], order: &mut [(f32, u16)]) -> 
     }
     let first = solve(normal, std::array::from_fn(|i| f64::from(i == 0)))?;
     let weight = |i: usize| counts[i] * (0..TERMS).map(|a| rows[i][a] * first[a]).sum::<f64>();
-    let weights: [f64; NEIGHBOURS] = std::array::from_fn(weight);
+    let weights: [f64; N] = std::array::from_fn(weight);
     let size: f64 = weights.iter().map(|w| w.abs()).sum();
     (size <= WEIGHTS_MAX).then(|| Stencil {
         vertices: std::array::from_fn(|i| near[i].1),

@@ -42,6 +42,23 @@ impl Turns {
         &mut self.found
     }
 
+    /// Whether the next frame starts from this one.
+    pub(super) fn is_warm(&self) -> bool {
+        self.warm
+    }
+
+    /// Forces that vertices found by themselves in the last frame.
+    pub(super) fn found_without_pixels(&self) -> &Vectors {
+        &self.without
+    }
+
+    /// The same, empty and to be filled; the next frame starts from it.
+    pub(super) fn recall(&mut self) -> &mut Vectors {
+        self.warm = true;
+        self.without.iter_mut().for_each(|f| f.fill(0.0));
+        &mut self.without
+    }
+
     /// The next frame starts from nothing.
     pub(super) fn forget(&mut self) {
         self.warm = false;

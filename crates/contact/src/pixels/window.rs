@@ -34,12 +34,15 @@ pub(super) struct Window {
     size: [usize; 2],
     /// Vertices of the pixels' stencils, and where each stands among them.
     ids: Vec<u32>,
+    /// How many of these, the first, are of pixels; the others are what these are smoothed with.
+    inner: usize,
     place: Vec<u32>,
     near: Vec<bool>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
     /// By vertex of the skin: displacement by its own hats, mm; force, N; hat's area, mm2; pressure,
     /// MPa.
+    rough_mm: Vec<f32>,
     dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
@@ -64,10 +67,12 @@ impl Window {
             first: [0; 2],
             size: [0; 2],
             ids: Vec::with_capacity(vertices),
+            inner: 0,
             place: vec![NONE; vertices],
             near: vec![false; vertices],
             linear: vector(),
             moved: vector(),
+            rough_mm: zeros(),
             dent_mm: zeros(),
             force_n: vector(),
             hat_mm2: zeros(),
@@ -85,15 +90,20 @@ impl Window {
         self.size.map(|s| s + BETWEEN)
     }
 
-    /// Takes the pixels that things are near; false if there are none.
-    pub(super) fn open(&mut self, skin: &PixelSkin, model: &ContactModel, view: View<'_>) -> bool {
+    /// Takes the pixels round `candidates`, distances (reference mm) and vertices, that things are
+    /// near; false if there are none.
+    pub(super) fn open(&mut self, skin: &PixelSkin, candidates: &[(f64, u32)]) -> bool {
+        self.entries.clear();
+        self.ids.clear();
+        if candidates.is_empty() {
+            return false;
+        }
         self.near.fill(false);
         self.slot.fill(NONE);
         self.place.fill(NONE);
-        self.entries.clear();
-        self.ids.clear();
-        let near = &mut self.near;
-        view.near(model, NEAR_MM, |vertex, free| near[vertex as usize] |= free < NEAR_MM);
+        for (_, vertex) in candidates.iter().filter(|(free, _)| *free < NEAR_MM) {
+            self.near[*vertex as usize] = true;
+        }
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
         for (entry, (pixel, index)) in
             skin.raster.pixels().iter().zip(skin.raster.indices()).enumerate()
@@ -112,6 +122,15 @@ impl Window {
                 if self.place[usize::from(*vertex)] == NONE {
                     self.place[usize::from(*vertex)] = self.ids.len() as u32;
                     self.ids.push(u32::from(*vertex));
+                }
+            }
+        }
+        self.inner = self.ids.len();
+        for slot in 0..self.inner {
+            for vertex in skin.smoothed[self.ids[slot] as usize].vertices {
+                if self.place[usize::from(vertex)] == NONE {
+                    self.place[usize::from(vertex)] = self.ids.len() as u32;
+                    self.ids.push(u32::from(vertex));
                 }
             }
         }
@@ -134,7 +153,12 @@ impl Window {
     }
 
     /// Moves the stencils' vertices under the vertices' forces.
-    pub(super) fn displace(&mut self, model: &ContactModel, amplitudes: Option<&mut Amplitudes>) {
+    pub(super) fn displace(
+        &mut self,
+        skin: &PixelSkin,
+        model: &ContactModel,
+        amplitudes: Option<&mut Amplitudes>,
+    ) {
         let v = model.vertices();
         self.touched.clear();
         for vertex in 0..v {
@@ -169,6 +193,15 @@ impl Window {
                 moved.copy_from_slice(linear);
             }
         }
+        // What forces at vertices do to themselves and their neighbours is the mesh's, not the
+        // skin's: FE of linear elements moves a vertex twice as far as pressure on its hat does.
+        for (moved, smooth) in self.moved.iter().zip(&mut self.linear) {
+            for (slot, id) in self.ids[..self.inner].iter().enumerate() {
+                let stencil = &skin.smoothed[*id as usize];
+                smooth[slot] = stencil.value(|vertex| moved[self.place[vertex] as usize]);
+            }
+        }
+        std::mem::swap(&mut self.moved, &mut self.linear);
     }
 
     /// Places the pixels, and finds their deformed areas.
@@ -270,8 +303,12 @@ impl Window {
                 grid[row * columns + column]
             };
             let (a, b) = (x - left, y - top);
-            self.dent_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
+            self.rough_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
                 + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
+        }
+        for id in &self.ids[..self.inner] {
+            let stencil = &skin.smoothed[*id as usize];
+            self.dent_mm[*id as usize] = stencil.value(|vertex| self.rough_mm[vertex]);
         }
     }
 

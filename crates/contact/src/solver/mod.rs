@@ -170,6 +170,15 @@ impl Solver {
         }
     }
 
+    /// Free distances (reference mm) and vertices that things were near in the last frame.
+    pub(crate) fn near(&self) -> &[(f64, u32)] {
+        &self.candidates
+    }
+
+    pub(crate) fn has_second_order(&self) -> bool {
+        self.amplitudes.is_some()
+    }
+
     /// Whose finger it is.
     pub(crate) fn person(&self) -> Person {
         self.settings.person

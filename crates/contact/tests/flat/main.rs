@@ -5,7 +5,9 @@ mod memory;
 mod pixels;
 mod support;
 
-use papilla_contact::{Arrays, ContactModel, NetForce, Object, Person, Settings, Solver};
+use papilla_contact::{
+    Arrays, ContactModel, Header, Layer, NetForce, Object, Person, Settings, Solver,
+};
 use proptest::prelude::*;
 use support::{MODULUS_MPA, SIDE, arrays, ball, model, small_strain, solver, vertex};
 
@@ -248,13 +250,17 @@ fn a_file_comes_back_and_a_damaged_one_is_refused() {
         ContactModel::read(&[header.as_bytes(), &bytes[end..]].concat()).map(drop).unwrap_err()
     };
     // Of another version the members are not looked at, and a short file asks for no memory.
-    let older = with_header("\"format\":3", "\"format\":2,\"compliance_unit\":1").to_string();
+    let older = with_header("\"format\":4", "\"format\":2,\"compliance_unit\":1").to_string();
     assert!(older.contains("format 2") && older.contains("fe-datagen contact"), "{older}");
     let vast = with_header("\"vertices\":441", "\"vertices\":8192").to_string();
     assert!(vast.contains("too short"), "{vast}");
     let flipped: Vec<u8> =
         bytes.iter().enumerate().map(|(i, b)| if i == end + 900 { b ^ 16 } else { *b }).collect();
     assert!(ContactModel::read(&flipped).is_err());
+    let layer = Layer { young_mpa: 0.1, poisson: 0.5, thickness_mm: 1.0 };
+    let stiff = Header { layers: vec![layer], ..header.clone() };
+    let error = ContactModel::new(stiff, arrays.clone()).expect_err("refused").to_string();
+    assert!(error.contains("layers.poisson[0]"), "{error}");
     let mut bad = arrays;
     bad.compliance_mm_per_n[3] = f32::NAN;
     let error = ContactModel::new(header, bad).expect_err("refused").to_string();

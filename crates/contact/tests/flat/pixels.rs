@@ -3,8 +3,8 @@
 use crate::support::ball;
 use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, PatchVertices, Raster};
 use papilla_contact::{
-    Arrays, Contact, ContactModel, Header, Layer, Method, Object, PixelContact, PixelSkin,
-    Settings, Solver,
+    Arrays, Contact, ContactModel, Header, Layer, Method, NetForce, Object, PixelContact,
+    PixelSkin, Settings, Solver,
 };
 use std::sync::Arc;
 
@@ -59,12 +59,13 @@ fn plane() -> Plane {
         MODULUS_MPA,
     );
     let triangles = triangles.len();
-    let header = Header { vertices, triangles, share_max: 1.0, ..Header::current() };
-    let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
     let young_mpa = MODULUS_MPA * (1.0 - POISSON * POISSON);
-    let layers = [Layer { young_mpa, poisson: POISSON, thickness_mm: 100.0 }];
+    let layers = vec![Layer { young_mpa, poisson: POISSON, thickness_mm: 100.0 }];
+    let header = Header { vertices, triangles, share_max: 1.0, layers, ..Header::current() };
+    let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
     let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
-    let skin = Arc::new(PixelSkin::new(&atlas, Arc::clone(&raster), &layers));
+    let skin = PixelSkin::new(&model, &atlas, Arc::clone(&raster)).expect("layers");
+    let skin = Arc::new(skin);
     let settings = Settings { method: Method::SmallStrain, ..Settings::default() };
     Plane {
         pixels: PixelContact::new(skin, &model),
@@ -135,6 +136,9 @@ fn air_and_no_object_press_nothing() {
     let none: [Object; 0] = [];
     solver.solve_on_pixels(&none, pixels, out).unwrap();
     assert!(force_n(out) == 0.0);
+    // Far away one distance is asked, as at vertices.
+    solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], -20.0)], pixels, out).unwrap();
+    assert_eq!((out.effort.distances, out.effort.iterations), (1, 0));
 }
 
 fn force_n(out: &Contact) -> f64 {
@@ -173,4 +177,47 @@ fn what_gives_way_presses_less() {
     // A bed of springs alone under a ball: F = s pi R d^2. In series, less than either.
     let bed = 0.1 * std::f64::consts::PI * 3.0 * 0.3f64.powi(2);
     assert!(soft < bed && soft < rigid && soft > 0.3 * bed, "{soft} {bed} {rigid}");
+}
+
+/// The next frame has the same bits in place of and beside the one that remembers.
+#[test]
+fn a_memory_goes_on_as_the_contact_that_it_is_of() {
+    let [mut here, mut there] = [plane(), plane()];
+    let scene = |step: u32| [ball(3.0, [0.01 * f64::from(step), 0.0], 0.3)];
+    for step in 0..3 {
+        here.solver.solve_on_pixels(&scene(step), &mut here.pixels, &mut here.out).unwrap();
+    }
+    assert!(there.solver.recall(&here.solver.memory()));
+    assert!(there.pixels.recall(&here.pixels.memory()));
+    for Plane { solver, pixels, out, .. } in [&mut here, &mut there] {
+        solver.solve_on_pixels(&scene(3), pixels, out).unwrap();
+    }
+    assert!(here.pixels.map_pa() == there.pixels.map_pa() && here.out == there.out);
+
+    let mut foreign = here.pixels.memory();
+    foreign.vertices[0] = 1 << 20;
+    assert!(!there.pixels.recall(&foreign));
+    there.solver.reset();
+    let nothing = plane().pixels.memory();
+    assert!(nothing.pixels.is_empty() && there.pixels.recall(&nothing));
+}
+
+/// Vertices see a ball, and nothing of a dot between four of them: the force is met under both.
+#[test]
+fn a_net_force_is_met_on_pixels() {
+    for (radius_mm, at, force_n) in [(3.0, [0.0, 0.0], 0.05), (0.5, [0.35, 0.35], 0.005)] {
+        let mut plane = plane();
+        let Plane { solver, pixels, out, .. } = &mut plane;
+        let net = NetForce { direction: [0.0, 0.0, 1.0], force_n };
+        let scene = [ball(radius_mm, at, -0.02)];
+        let travel = solver.solve_for_force_on_pixels(&scene, net, pixels, out).unwrap();
+        assert!((out.force_n[2] / force_n - 1.0).abs() <= 0.01, "{:?}", out.force_n);
+        // Hertz: F = 4/3 E* sqrt(R) d^1.5.
+        let hertz = 4.0 / 3.0 * MODULUS_MPA * f64::sqrt(radius_mm);
+        let due = 0.02 + (force_n / hertz).powf(2.0 / 3.0);
+        assert!((travel / due - 1.0).abs() < 0.1, "{travel} {due}");
+        let cold = out.effort;
+        solver.solve_for_force_on_pixels(&scene, net, pixels, out).unwrap();
+        assert!(2 * out.effort.products < cold.products, "{:?} {cold:?}", out.effort);
+    }
 }

@@ -45,8 +45,9 @@ pub(crate) struct JobOptions {
     pub(crate) effects: Option<Arc<Mutex<Effects>>>,
     /// The session's finger that the frame is of, in version 3; locked as the effects are.
     pub(crate) finger: Option<Arc<Mutex<Finger>>>,
-    /// Whether a contact is to be solved, and whether that is all: no network is asked.
-    pub(crate) solves_contact: bool,
+    /// Time that the contact is expected to take, us, if one is to be solved.
+    pub(crate) contact_us: Option<u64>,
+    /// Whether that is all: no network is asked.
     pub(crate) is_contact_alone: bool,
     /// How the sink tells one answer from another; handed back as it is.
     pub(crate) header: Option<FrameHeader>,

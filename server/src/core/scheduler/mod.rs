@@ -127,8 +127,8 @@ impl PoolHandle {
         if !job.options.is_contact_alone {
             self.metrics.tier(job.tier).asked.fetch_add(1, Ordering::Relaxed);
         }
-        if job.options.solves_contact {
-            self.metrics.contact.asked.fetch_add(1, Ordering::Relaxed);
+        if let Some(contact_us) = job.options.contact_us {
+            self.metrics.contact.asked_us.fetch_add(contact_us, Ordering::Relaxed);
         }
         match slot.offer(job) {
             Offer::Scheduled { replaced } => Ok(replaced),

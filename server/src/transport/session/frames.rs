@@ -259,7 +259,7 @@ impl Session {
                 time_us: header.client_time_us,
                 effects: self.terms.effects.get(finger).cloned(),
                 finger: hand.and_then(|hand| hand.fingers().get(finger).cloned()),
-                solves_contact: hand.is_some_and(|hand| !hand.form().takes_pressure()),
+                contact_us: self.terms.contact_us,
                 is_contact_alone: !self.terms.shows_sed(),
                 header: Some(header),
             },

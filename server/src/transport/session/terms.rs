@@ -56,6 +56,8 @@ pub(super) struct Terms {
     pub(super) effects: Vec<Arc<Mutex<Effects>>>,
     /// The fingers, in version 3.
     pub(super) hand: Option<Hand>,
+    /// Time that a frame's contact is expected to take, us; none if nothing is solved.
+    pub(super) contact_us: Option<u64>,
     _fingers: Option<OwnedSemaphorePermit>,
     /// Of clients that follow a request to reconnect: what shapes their state.
     pub(super) follows: Option<Shape>,
@@ -165,7 +167,8 @@ fn hand(
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
     let places = app.admit_fingers(hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX))?;
     let model = app.contact.as_ref().map(|contact| &contact.model);
-    let skin = Skin { atlas: &catalogue.atlas, raster: &catalogue.skin, model };
+    let pixels = app.contact.as_ref().and_then(|contact| contact.pixels.as_ref());
+    let skin = Skin { atlas: &catalogue.atlas, raster: &catalogue.skin, model, pixels };
     Ok((Hand::of(hello, skin)?, places))
 }
 
@@ -229,6 +232,7 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
     }
     let hand = (hello.version > 2).then(|| hand(app, &catalogue, hello)).transpose()?;
     let (hand, fingers) = hand.unzip();
+    let contact_us = hand.as_ref().zip(app.contact.as_ref()).and_then(|(h, c)| c.us_of(h));
     let mut effects = Vec::new();
     for _ in 0..hand.as_ref().map_or(1, |hand| hand.fingers().len()) {
         let own = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
@@ -259,6 +263,7 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
         stale_after_us: hello.stale_after_us,
         effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
         hand,
+        contact_us,
         _fingers: fingers,
         follows: (hello.reconnect == Some(true)).then(|| Shape::of(hello)),
         resumption: None,
@@ -271,9 +276,7 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
 pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     let catalogue = app.catalogue();
     let tier = &catalogue.tiers[terms.tier];
-    let of_solve = |hand: &Hand| !hand.form().takes_pressure();
-    let contact_us = terms.hand.as_ref().filter(|hand| of_solve(hand)).and(app.contact.as_ref());
-    let contact_us = contact_us.map(|contact| contact.frame_us);
+    let contact_us = terms.contact_us;
     let of_tier = if terms.info.shows_sed {
         catalogue.predicted_latency_us(terms.tier)
     } else {

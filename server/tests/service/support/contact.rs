@@ -1,6 +1,6 @@
 //! A finger that is a plane of an elastic half-space, and frames of version 3 for it.
 
-use papilla_contact::{Arrays, Header};
+use papilla_contact::{Arrays, Header, Layer};
 use papilla_proto::{
     FrameHeader, FrameKind, SampleType,
     atlas::{Atlas, PatchVertices},
@@ -47,8 +47,14 @@ pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
     Service::on(folder, change).await.unwrap()
 }
 
-/// The contact model's file.
+/// The contact model's file; its skin is one deep layer.
 pub(crate) fn model() -> Vec<u8> {
+    let young_mpa = 0.75 * f64::from(MODULUS_MPA);
+    model_of(vec![Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm: 99.0 }])
+}
+
+/// The same with other layers.
+pub(crate) fn model_of(layers: Vec<Layer>) -> Vec<u8> {
     let atlas = atlas();
     let skin = atlas.patch(papilla_proto::atlas::Patch::Skin);
     let vertices = skin.positions_mm.len();
@@ -56,6 +62,7 @@ pub(crate) fn model() -> Vec<u8> {
         vertices,
         triangles: atlas.triangles().len(),
         share_max: 1.0,
+        layers,
         atlas_hash: atlas.hash().to_owned(),
         ..Header::current()
     };

@@ -1,0 +1,89 @@
+//! What finds a finger's pressure: a solver, and pixels if the hello asks for them.
+
+use std::sync::Arc;
+
+use papilla_contact::{
+    Contact, ContactError, ContactModel, Method, NetForce, Person, PixelContact, Scene, Settings,
+    Solver,
+};
+use papilla_proto::{Hello, Problem, contact::ContactMethod};
+use papilla_session_state::{Reader, StateError, Writer};
+
+use super::{Skin, finger::of_contact, unusable, warm_start};
+
+/// Contact of one finger by the method of its hello.
+pub(crate) struct FingerSolver {
+    solver: Solver,
+    pixels: Option<PixelContact>,
+}
+
+impl FingerSolver {
+    pub(crate) fn new(
+        hello: &Hello,
+        skin: Skin<'_>,
+        model: &Arc<ContactModel>,
+        person: Person,
+    ) -> Result<Self, Problem> {
+        let asked = hello.method.unwrap_or_default();
+        let method = match asked {
+            ContactMethod::Springs => Method::Springs,
+            ContactMethod::SmallStrain => Method::SmallStrain,
+            ContactMethod::SecondOrder | ContactMethod::Pixels => Method::SecondOrder,
+        };
+        let settings = Settings { method, person, stiffness: hello.stiffness == Some(true) };
+        let solver = Solver::new(Arc::clone(model), settings);
+        let pixels = match (asked, skin.pixels) {
+            (ContactMethod::Pixels, None) => {
+                let message = "this service's contact model names no layers of the skin, which \
+                               pixels need; make it again with `fe-datagen contact`, or leave \
+                               'method' out";
+                return Err(unusable("method", message));
+            }
+            (ContactMethod::Pixels, Some(skin)) => Some(PixelContact::new(Arc::clone(skin), model)),
+            _ => None,
+        };
+        Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels })
+    }
+
+    /// Finds what presses; returns how far things travelled to meet a net force, mm.
+    pub(crate) fn solve(
+        &mut self,
+        scene: Scene<'_>,
+        net: Option<NetForce>,
+        out: &mut Contact,
+    ) -> Result<f64, ContactError> {
+        let Self { solver, pixels } = self;
+        match (pixels, scene, net) {
+            (Some(pixels), Scene::Objects(objects), Some(net)) => {
+                solver.solve_for_force_on_pixels(objects, net, pixels, out)
+            }
+            (Some(pixels), Scene::Objects(objects), None) => {
+                solver.solve_on_pixels(objects, pixels, out).map(|()| 0.0)
+            }
+            (_, scene, Some(net)) => solver.solve_for_force(scene, net, out),
+            (_, scene, None) => solver.solve(scene, out).map(|()| 0.0),
+        }
+    }
+
+    /// The pixels, if the hello asks for them.
+    pub(crate) fn pixels(&self) -> Option<&PixelContact> {
+        self.pixels.as_ref()
+    }
+
+    /// Writes what the next frame starts from.
+    pub(crate) fn save(&self, state: &mut Writer) {
+        warm_start::write(&self.solver.memory(), state);
+        if let Some(pixels) = &self.pixels {
+            warm_start::write_pixels(&pixels.memory(), state);
+        }
+    }
+
+    /// Goes on from what a solver of the same hello has saved.
+    pub(crate) fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        let mut fits = self.solver.recall(&warm_start::read(state)?);
+        if let Some(pixels) = &mut self.pixels {
+            fits &= pixels.recall(&warm_start::read_pixels(state)?);
+        }
+        if fits { Ok(()) } else { Err(StateError::Value("a warm start")) }
+    }
+}
