@@ -47,8 +47,10 @@ export function readTouch(v) {
 
 /** Which indenter the server knows of. */
 export class Contact {
-  constructor(press) {
+  /** @param {string} method how pressure is found, as in a hello */
+  constructor(press, method) {
     this.press = press;
+    this.method = method;
     this.announcedAtMs = -Infinity;
     this.announced = '';
   }
@@ -58,7 +60,7 @@ export class Contact {
     const shape = shapeOf(this.press);
     this.announced = JSON.stringify(shape);
     this.announcedAtMs = nowMs;
-    return { input: 'objects', objects: [{ shape }], pressure: 'map' };
+    return { input: 'objects', objects: [{ shape }], pressure: 'map', method: this.method };
   }
 
   /** Whether the indenter is another than the announced one. */

@@ -27,7 +27,8 @@ class Page {
     this.mode = 'press';
     this.press = new Press(atlas);
     /** Null where the server has no contact model: pressure is then this page's estimate. */
-    this.contact = listing.contact_us === null ? null : new Contact(this.press);
+    const { contact_us: contactUs, pixels_us: pixelsUs } = listing;
+    this.contact = contactUs === null ? null : new Contact(this.press, pixelsUs === null ? 'second_order' : 'pixels');
     document.body.toggleAttribute('data-contact', this.contact !== null);
     this.unsent = true;
     this.stream = byId('stream');

@@ -14,7 +14,8 @@
 //! force at a vertex of linear elements moves it 2.3 times as far as `K` says, and its neighbours
 //! too little, which is the mesh's and not the skin's. `p >= 0`, `gap >= 0`,
 //! `p gap = 0` on pixels; the vertices' forces are the pressure's sums over their hats, and both go
-//! in turn until forces settle.
+//! in turn until forces settle. Pixels of triangles at the skin's edge hold the pressure that
+//! vertices find by themselves: contact goes on beyond the map, where no pixel could carry it.
 
 mod convolution;
 mod layers;
@@ -71,6 +72,8 @@ pub struct PixelSkin {
     /// By pixel, and by vertex.
     stencils: Vec<PixelStencil>,
     smoothed: Vec<VertexStencil>,
+    /// Whether a vertex is at the skin's edge.
+    at_edge: Vec<bool>,
     surface: SurfaceCompliance,
     plans: Arc<Plans>,
 }
@@ -87,7 +90,16 @@ impl PixelSkin {
         let uv_px = atlas.patch(raster.patch()).uv_px.clone();
         let (stencils, smoothed) = (smooth::of_pixels(atlas, &raster), smooth::of_vertices(atlas));
         let surface = SurfaceCompliance::new(layers);
-        Some(Self { raster, uv_px, stencils, smoothed, surface, plans: Arc::new(Plans::new()) })
+        let at_edge = smooth::at_edge(atlas);
+        Some(Self {
+            raster,
+            uv_px,
+            stencils,
+            smoothed,
+            at_edge,
+            surface,
+            plans: Arc::new(Plans::new()),
+        })
     }
 }
 
@@ -268,24 +280,27 @@ impl PixelContact {
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
         window.place(skin, model);
         window.measure(view, solver.person())?;
-        window.press_hats(skin, rest);
+        window.measure_hats(skin, model);
+        let m = window.free();
         if let Some(warm) = start {
-            if !warm {
-                pressure[..n].copy_from_slice(&rest[..n]);
-            }
+            window.press_hats(skin, turns.found_without_pixels(), rest);
+            let first = if warm { m } else { 0 };
+            pressure[first..n].copy_from_slice(&rest[first..n]);
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());
         }
         let size = [convolution.rows(), convolution.columns()];
+        window.press_hats(skin, &window.force_n, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
         window.own_dents(skin, grid, size);
-        window.rest(skin, &mut rest[..n]);
-        let give = &window.give[..n];
+        let held = (m < n).then(|| convolution.press(&window.cells[m..], &pressure[m..n]));
+        window.rest(skin, held, &mut rest[..m]);
+        let give = &window.give[..m];
         let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
-        let nearby = Nearby { convolution, cells: &window.cells, give, norm };
+        let nearby = Nearby { convolution, cells: &window.cells[..m], give, norm };
         effort.products += bounded
-            .solve(nearby, &rest[..n], &mut pressure[..n], VIOLATION_MM, PRODUCTS_MAX)
+            .solve(nearby, &rest[..m], &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
             .products;
         effort.distances += n as u32;
         effort.iterations += 1;

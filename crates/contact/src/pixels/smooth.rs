@@ -60,6 +60,23 @@ pub(super) fn of_vertices(atlas: &Atlas) -> Vec<VertexStencil> {
     uv_px.iter().enumerate().map(stencil).collect()
 }
 
+/// Whether each vertex is at the skin's edge, on a side of one triangle alone, or next to one that is.
+pub(super) fn at_edge(atlas: &Atlas) -> Vec<bool> {
+    let sides = |[a, b, c]: &[u32; 3]| [[*a, *b], [*b, *c], [*c, *a]];
+    let all: std::collections::HashSet<[u32; 2]> =
+        atlas.triangles().iter().flat_map(sides).collect();
+    let mut found = vec![false; atlas.vertex_count()];
+    for [a, b] in all.iter().filter(|[a, b]| !all.contains(&[*b, *a])) {
+        found[*a as usize] = true;
+        found[*b as usize] = true;
+    }
+    let edge = found.clone();
+    for corners in atlas.triangles().iter().filter(|c| c.iter().any(|v| edge[*v as usize])) {
+        corners.iter().for_each(|corner| found[*corner as usize] = true);
+    }
+    found
+}
+
 /// The triangle's plane.
 fn plane(pixel: &papilla_atlas::Pixel) -> PixelStencil {
     let mut stencil = Stencil { vertices: [0; NEAR], weights: [0.0; NEAR] };

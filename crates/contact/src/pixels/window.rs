@@ -14,13 +14,16 @@ const NEAR_MM: f64 = 0.6;
 const FREE_MM: f32 = 0.3;
 /// Pixels between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
+/// Most area that a pixel at the skin's edge stands for, over its own.
+const BEYOND_MAX: f32 = 3.0;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
 #[derive(Debug)]
 pub(super) struct Window {
-    /// Entries of the raster, and their cells in the grid.
+    /// Entries of the raster, the held ones last, and their cells in the grid.
     pub entries: Vec<u32>,
+    held: Vec<u32>,
     pub cells: Vec<u32>,
     pub at_mm: Vec<[f32; 3]>,
     pub normal: Vec<[f32; 3]>,
@@ -57,6 +60,7 @@ impl Window {
         let vector = || std::array::from_fn(|_| zeros());
         Self {
             entries: Vec::with_capacity(pixels),
+            held: Vec::with_capacity(pixels),
             cells: Vec::with_capacity(pixels),
             at_mm: vec![[0.0; 3]; pixels],
             normal: vec![[0.0; 3]; pixels],
@@ -86,6 +90,11 @@ impl Window {
         self.entries.len()
     }
 
+    /// How many pixels, the first, are solved for; the others are held.
+    pub(super) fn free(&self) -> usize {
+        self.entries.len() - self.held.len()
+    }
+
     pub(super) fn size(&self) -> [usize; 2] {
         self.size.map(|s| s + BETWEEN)
     }
@@ -94,6 +103,7 @@ impl Window {
     /// near; false if there are none.
     pub(super) fn open(&mut self, skin: &PixelSkin, candidates: &[(f64, u32)]) -> bool {
         self.entries.clear();
+        self.held.clear();
         self.ids.clear();
         if candidates.is_empty() {
             return false;
@@ -104,16 +114,19 @@ impl Window {
         for (_, vertex) in candidates.iter().filter(|(free, _)| *free < NEAR_MM) {
             self.near[*vertex as usize] = true;
         }
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for (entry, (pixel, index)) in
-            skin.raster.pixels().iter().zip(skin.raster.indices()).enumerate()
-        {
-            if !pixel.vertices.iter().any(|v| self.near[*v as usize]) {
-                continue;
+        for (entry, pixel) in skin.raster.pixels().iter().enumerate() {
+            if pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+                let is_held = pixel.vertices.iter().any(|v| skin.at_edge[*v as usize]);
+                if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
             }
-            self.slot[*index as usize] = self.entries.len() as u32;
-            self.entries.push(entry as u32);
-            let at = [*index as usize / MAP_SIDE_PX, *index as usize % MAP_SIDE_PX];
+        }
+        self.entries.extend(&self.held);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let entry = *entry as usize;
+            let (pixel, index) = (&skin.raster.pixels()[entry], skin.raster.indices()[entry]);
+            self.slot[index as usize] = slot as u32;
+            let at = [index as usize / MAP_SIDE_PX, index as usize % MAP_SIDE_PX];
             for i in 0..2 {
                 (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
             }
@@ -248,8 +261,25 @@ impl Window {
         Ok(())
     }
 
-    /// Pressure of the vertices' forces, linear between them, MPa.
-    pub(super) fn press_hats(&mut self, skin: &PixelSkin, pressure: &mut [f32]) {
+    /// Areas of the vertices' hats. Those at the skin's edge reach beyond the map: pixels there stand
+    /// for what lies beyond, too.
+    pub(super) fn measure_hats(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        self.sum_hats(skin);
+        for slot in self.free()..self.entries.len() {
+            let pixel = &skin.raster.pixels()[self.entries[slot] as usize];
+            let beyond = |vertex: &u32| {
+                let vertex = *vertex as usize;
+                (model.areas_mm2[vertex] / self.hat_mm2[vertex]).clamp(1.0, BEYOND_MAX)
+            };
+            let corners = pixel.vertices.iter().zip(pixel.weights);
+            self.area_mm2[slot] *= corners.map(|(v, w)| w * beyond(v)).sum::<f32>();
+        }
+        if !self.held.is_empty() {
+            self.sum_hats(skin);
+        }
+    }
+
+    fn sum_hats(&mut self, skin: &PixelSkin) {
         self.hat_mm2.fill(0.0);
         for (entry, area) in self.entries.iter().zip(&self.area_mm2) {
             let pixel = &skin.raster.pixels()[*entry as usize];
@@ -257,8 +287,17 @@ impl Window {
                 self.hat_mm2[*vertex as usize] += weight * area;
             }
         }
+    }
+
+    /// Pressure of forces of the vertices, linear between them, MPa.
+    pub(super) fn press_hats(
+        &self,
+        skin: &PixelSkin,
+        force_n: &[Vec<f32>; 3],
+        pressure: &mut [f32],
+    ) {
         let hat = |vertex: usize| {
-            let force: f32 = self.force_n.iter().map(|f| f[vertex].powi(2)).sum();
+            let force: f32 = force_n.iter().map(|f| f[vertex].powi(2)).sum();
             force.sqrt() / self.hat_mm2[vertex].max(1e-3)
         };
         for (slot, entry) in self.entries.iter().enumerate() {
@@ -312,13 +351,15 @@ impl Window {
         }
     }
 
-    /// Gaps of pixels without their own pressure, mm.
-    pub(super) fn rest(&self, skin: &PixelSkin, rest: &mut [f32]) {
-        for (slot, entry) in self.entries.iter().enumerate() {
+    /// Gaps of the pixels that are solved for, without their own pressure, mm. `held` is the
+    /// displacement of the grid by those that are held, if any.
+    pub(super) fn rest(&self, skin: &PixelSkin, held: Option<&[f32]>, rest: &mut [f32]) {
+        for (slot, entry) in self.entries[..self.free()].iter().enumerate() {
             let stencil = &skin.stencils[*entry as usize];
             let gap = self.gap_mm[slot];
             let dent = stencil.value(|vertex| self.dent_mm[vertex]);
-            rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent };
+            let by_held = held.map_or(0.0, |grid| grid[self.cells[slot] as usize]);
+            rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent + by_held };
         }
     }
 

@@ -141,6 +141,19 @@ fn air_and_no_object_press_nothing() {
     assert_eq!((out.effort.distances, out.effort.iterations), (1, 0));
 }
 
+/// Half of the ball presses where the skin goes on and the map does not: no rim of pressure.
+#[test]
+fn the_skins_edge_is_no_edge_of_a_punch() {
+    let mut plane = plane();
+    let scene = [ball(6.0, [4.9, 0.0], 0.3)];
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    solver.solve(&scene, out).unwrap();
+    let (peak_pa, force) = (out.pressure_pa.iter().copied().fold(0.0, f32::max), force_n(out));
+    solver.solve_on_pixels(&scene, pixels, out).unwrap();
+    assert!((force_n(out) / force - 1.0).abs() < 0.05, "{} {force}", force_n(out));
+    assert!(pixels.peak_pa() < 1.3 * peak_pa, "{} {peak_pa}", pixels.peak_pa());
+}
+
 fn force_n(out: &Contact) -> f64 {
     out.force_n.map(f64::abs).iter().sum()
 }
