@@ -22,6 +22,10 @@ const WARM: usize = 10;
 /// How far the warm path goes, mm.
 const STEP_MM: f64 = 0.01;
 
+/// Frames of the path sideways, and how far each goes, mm.
+const SIDEWAYS: usize = 10;
+const SIDE_STEP_MM: f64 = 1e-3;
+
 /// A way from poses to pressure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rung {
@@ -81,6 +85,8 @@ pub struct Row {
     pub cold_us: [f64; 2],
     /// Processor time of a frame that moved by 10 um, us.
     pub warm_us: [f64; 2],
+    /// Relative L2 by which a step of 1 um sideways changes the pressure; median and the largest.
+    pub side_step: [f64; 2],
     /// Answers told to be unsettled, and out of range, of all.
     pub told: [usize; 3],
 }
@@ -173,6 +179,16 @@ pub fn measure(
                 let warm = figures.frame(rung, &mut solver, &moved, dataset, &mut out);
                 figures.warm_us.push(warm);
             }
+            figures.last_pa.clear();
+            figures.note_change(&out);
+            let side = [0, 1, 2].map(|i| moved.placement.rotation[i][0]);
+            for _ in 0..SIDEWAYS {
+                for (at, side) in moved.placement.origin_mm.iter_mut().zip(side) {
+                    *at += SIDE_STEP_MM * side;
+                }
+                figures.frame(rung, &mut solver, &moved, dataset, &mut out);
+                figures.note_change(&out);
+            }
         }
     }
     Ok(figures.row(rung, dataset.name()))
@@ -186,6 +202,8 @@ struct Figures {
     sed: Vec<f64>,
     cold_us: Vec<f64>,
     warm_us: Vec<f64>,
+    side_step: Vec<f64>,
+    last_pa: Vec<f32>,
     told: [usize; 3],
     depth_mm: Vec<f32>,
     pixels: Option<PixelContact>,
@@ -222,6 +240,21 @@ impl Figures {
         let us = (thread_s() - clock) * 1e6;
         self.told[0] += usize::from(solved.is_err());
         us
+    }
+
+    /// Notes by how much the pressure is another than before.
+    fn note_change(&mut self, out: &Contact) {
+        let now_pa = self.pixels.as_ref().map_or(&out.pressure_pa[..], PixelContact::map_pa);
+        let (mut by, mut size) = (0.0, 0.0);
+        for (now, last) in now_pa.iter().zip(&self.last_pa) {
+            by += f64::from(now - last).powi(2);
+            size += f64::from(*last).powi(2);
+        }
+        if size > 0.0 {
+            self.side_step.push((by / size).sqrt());
+        }
+        self.last_pa.clear();
+        self.last_pa.extend_from_slice(now_pa);
     }
 
     /// Holds an answer against FE.
@@ -276,6 +309,7 @@ impl Figures {
             sed: (!self.sed.is_empty()).then(|| both(&self.sed)),
             cold_us: both(&self.cold_us),
             warm_us: both(&self.warm_us),
+            side_step: [0.5, 1.0].map(|q| quantile(&self.side_step, q).unwrap_or(f64::NAN)),
             told: self.told,
         }
     }

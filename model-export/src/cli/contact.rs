@@ -51,11 +51,14 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     if json {
         return print_json(&rows);
     }
-    println!("| rung | set | pressure, % | force, % | SED, % | cold, us | warm, us | flagged |");
-    println!("|---|---|---|---|---|---|---|---|");
+    println!(
+        "| rung | set | pressure, % | force, % | SED, % | cold, us | warm, us | 1 um, % | flagged |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
     rows.iter().for_each(print_row);
     println!(
-        "\nRelative L2 against FE and processor time, median / 95 %; unsettled + out of range of all."
+        "\nRelative L2 against FE and processor time, median / 95 %; by how much 1 um sideways changes \
+         the pressure, median / most; unsettled + out of range of all."
     );
     Ok(())
 }
@@ -65,7 +68,7 @@ fn print_row(row: &Row) {
     let us = |[median, p95]: [f64; 2]| format!("{median:.0} / {p95:.0}");
     let [unsettled, outside, all] = row.told;
     println!(
-        "| {} | {} | {} | {} | {} | {} | {} | {unsettled} + {outside} of {all} |",
+        "| {} | {} | {} | {} | {} | {} | {} | {} | {unsettled} + {outside} of {all} |",
         row.rung,
         row.set,
         percent(row.pressure),
@@ -73,5 +76,6 @@ fn print_row(row: &Row) {
         row.sed.map_or_else(|| "-".to_owned(), percent),
         us(row.cold_us),
         us(row.warm_us),
+        percent(row.side_step),
     );
 }
