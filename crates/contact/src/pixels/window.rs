@@ -1,5 +1,7 @@
 //! The part of the skin that things are near: its pixels, and the vertices that move them.
 
+mod hats;
+
 use super::PixelSkin;
 use crate::answer::Person;
 use crate::error::ContactError;
@@ -14,8 +16,6 @@ const NEAR_MM: f64 = 0.6;
 const FREE_MM: f32 = 0.3;
 /// Pixels between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
-/// Most area that a pixel at the skin's edge stands for, over its own.
-const BEYOND_MAX: f32 = 3.0;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
@@ -261,52 +261,6 @@ impl Window {
         Ok(())
     }
 
-    /// Areas of the vertices' hats. Those at the skin's edge reach beyond the map: pixels there stand
-    /// for what lies beyond, too.
-    pub(super) fn measure_hats(&mut self, skin: &PixelSkin, model: &ContactModel) {
-        self.sum_hats(skin);
-        for slot in self.free()..self.entries.len() {
-            let pixel = &skin.raster.pixels()[self.entries[slot] as usize];
-            let beyond = |vertex: &u32| {
-                let vertex = *vertex as usize;
-                (model.areas_mm2[vertex] / self.hat_mm2[vertex]).clamp(1.0, BEYOND_MAX)
-            };
-            let corners = pixel.vertices.iter().zip(pixel.weights);
-            self.area_mm2[slot] *= corners.map(|(v, w)| w * beyond(v)).sum::<f32>();
-        }
-        if !self.held.is_empty() {
-            self.sum_hats(skin);
-        }
-    }
-
-    fn sum_hats(&mut self, skin: &PixelSkin) {
-        self.hat_mm2.fill(0.0);
-        for (entry, area) in self.entries.iter().zip(&self.area_mm2) {
-            let pixel = &skin.raster.pixels()[*entry as usize];
-            for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
-                self.hat_mm2[*vertex as usize] += weight * area;
-            }
-        }
-    }
-
-    /// Pressure of forces of the vertices, linear between them, MPa.
-    pub(super) fn press_hats(
-        &self,
-        skin: &PixelSkin,
-        force_n: &[Vec<f32>; 3],
-        pressure: &mut [f32],
-    ) {
-        let hat = |vertex: usize| {
-            let force: f32 = force_n.iter().map(|f| f[vertex].powi(2)).sum();
-            force.sqrt() / self.hat_mm2[vertex].max(1e-3)
-        };
-        for (slot, entry) in self.entries.iter().enumerate() {
-            let pixel = &skin.raster.pixels()[*entry as usize];
-            let corners = pixel.vertices.iter().zip(pixel.weights);
-            pressure[slot] = corners.map(|(v, w)| w * hat(*v as usize)).sum();
-        }
-    }
-
     /// Mean distance of neighbouring pixels under pressure, down and along rows, mm.
     pub(super) fn pitch_mm(&self, pressure: &[f32]) -> [f64; 2] {
         let pressed = pressure[..self.len()].iter().any(|p| *p > 0.0);
@@ -361,33 +315,5 @@ impl Window {
             let by_held = held.map_or(0.0, |grid| grid[self.cells[slot] as usize]);
             rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent + by_held };
         }
-    }
-
-    /// Sums the pixels' pressure to forces of the vertices.
-    pub(super) fn sum_forces(
-        &mut self,
-        skin: &PixelSkin,
-        pressure: &[f32],
-        force_n: &mut [Vec<f32>; 3],
-    ) {
-        for force in force_n.iter_mut() {
-            force.fill(0.0);
-        }
-        self.hat_n.fill(0.0);
-        for (slot, entry) in self.entries.iter().enumerate().filter(|(i, _)| pressure[*i] > 0.0) {
-            let size = pressure[slot] * self.area_mm2[slot];
-            let pixel = &skin.raster.pixels()[*entry as usize];
-            for (vertex, weight) in pixel.vertices.iter().zip(pixel.weights) {
-                self.hat_n[*vertex as usize] += weight * size;
-                for (force, normal) in force_n.iter_mut().zip(self.normal[slot]) {
-                    force[*vertex as usize] += weight * size * normal;
-                }
-            }
-        }
-    }
-
-    /// Mean pressure under a vertex' hat, MPa.
-    pub(super) fn vertex_pressure(&self, vertex: usize) -> f32 {
-        if self.hat_mm2[vertex] > 0.0 { self.hat_n[vertex] / self.hat_mm2[vertex] } else { 0.0 }
     }
 }
