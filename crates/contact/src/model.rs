@@ -2,7 +2,7 @@
 
 use crate::clusters::Clusters;
 use crate::error::ModelError;
-use crate::pixels::Layer;
+use crate::layer::Layer;
 use crate::second_order::SecondOrder;
 use crate::slopes::{Slopes, slopes};
 use serde::{Deserialize, Serialize};

@@ -3,9 +3,7 @@
 use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
-use papilla_contact::{
-    Contact, ContactError, ContactModel, Gaps, NetForce, Object, Person, PixelContact, Scene,
-};
+use papilla_contact::{Contact, ContactModel, Gaps, NetForce, Object, Person, PixelContact, Scene};
 use papilla_proto::{
     ErrorCode, Hello, MAP_LEN, Problem, SampleType,
     atlas::{Raster, VertexSampler},
@@ -15,7 +13,11 @@ use papilla_proto::{
 
 use papilla_session_state::{Reader, StateError, Writer};
 
-use super::{FrameForm, Skin, solver::FingerSolver, unusable};
+use super::{
+    FrameForm, Skin,
+    solver::{FingerSolver, of_contact},
+    unusable,
+};
 
 /// A finger.
 pub struct Finger {
@@ -354,18 +356,4 @@ fn net_force([x, y, z, force_n]: [f32; 4]) -> Result<Option<NetForce>, Problem> 
     }
     let direction = direction.map(|v| v / size);
     Ok(Some(NetForce { direction, force_n: f64::from(force_n) }))
-}
-
-pub(crate) fn of_contact(error: &ContactError) -> Problem {
-    let field = match error {
-        ContactError::Value { member, .. } => (*member).to_owned(),
-        ContactError::Rotation { object, .. } => format!("objects[{object}].quaternion"),
-        ContactError::Gaps { .. } => "payload".to_owned(),
-        ContactError::Depth { vertex, .. } => format!("depth_mm[{vertex}]"),
-        ContactError::Force { .. } => "force_n".to_owned(),
-        ContactError::Diverged => {
-            return Problem::new(ErrorCode::BadContact, error.to_string());
-        }
-    };
-    unusable(field, error.to_string())
 }

@@ -6,10 +6,10 @@ use papilla_contact::{
     Contact, ContactError, ContactModel, Method, NetForce, Person, PixelContact, Scene, Settings,
     Solver,
 };
-use papilla_proto::{Hello, Problem, contact::ContactMethod};
+use papilla_proto::{ErrorCode, Hello, Problem, contact::ContactMethod};
 use papilla_session_state::{Reader, StateError, Writer};
 
-use super::{Skin, finger::of_contact, unusable, warm_start};
+use super::{Skin, unusable, warm_start};
 
 /// Contact of one finger by the method of its hello.
 pub(crate) struct FingerSolver {
@@ -86,4 +86,19 @@ impl FingerSolver {
         }
         if fits { Ok(()) } else { Err(StateError::Value("a warm start")) }
     }
+}
+
+/// What a client is told of what stopped a solve.
+pub(crate) fn of_contact(error: &ContactError) -> Problem {
+    let field = match error {
+        ContactError::Value { member, .. } => (*member).to_owned(),
+        ContactError::Rotation { object, .. } => format!("objects[{object}].quaternion"),
+        ContactError::Gaps { .. } => "payload".to_owned(),
+        ContactError::Depth { vertex, .. } => format!("depth_mm[{vertex}]"),
+        ContactError::Force { .. } => "force_n".to_owned(),
+        ContactError::Diverged => {
+            return Problem::new(ErrorCode::BadContact, error.to_string());
+        }
+    };
+    unusable(field, error.to_string())
 }

@@ -44,6 +44,16 @@ async fn accepted_work_is_answered_and_sessions_are_told() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_that_come_during_the_drain_are_refused_by_name() {
+    for _ in 0..20 {
+        if is_refused_by_name().await {
+            return;
+        }
+    }
+    panic!("twenty drains ended before a second frame came");
+}
+
+/// Sends a frame while the drain waits for the one before it; false if that ended too soon.
+async fn is_refused_by_name() -> bool {
     let service = Service::start().await;
     let mut socket = service.socket().await;
     socket.open(hello(&json!({"tier": "slow"}))).await;
@@ -59,10 +69,11 @@ async fn frames_that_come_during_the_drain_are_refused_by_name() {
     for _ in 0..2 {
         match socket.receive().await {
             Received::Json(problem) => {
-                assert_eq!(
-                    (&problem["code"], &problem["sequence"]),
-                    (&json!("shutting_down"), &json!(2))
-                );
+                assert_eq!(problem["code"], "shutting_down");
+                if problem["sequence"].is_null() {
+                    return false;
+                }
+                assert_eq!(problem["sequence"], 2);
                 refused += 1;
             }
             Received::Frame(header, _) => {
@@ -76,6 +87,7 @@ async fn frames_that_come_during_the_drain_are_refused_by_name() {
     assert_eq!((refused, answered), (1, 1));
     socket.hear_end("shutting_down", 1001).await;
     drain.await.unwrap().unwrap();
+    true
 }
 
 #[tokio::test(flavor = "multi_thread")]

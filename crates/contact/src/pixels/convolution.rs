@@ -185,8 +185,8 @@ fn turn(from: &[C32], length: usize, to: &mut [C32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::layers::Layer;
     use super::*;
+    use crate::layer::Layer;
 
     /// A wave moves as the table says; all else stays still.
     #[test]

@@ -1,19 +1,7 @@
 //! How far the surface of layered skin gives way under waves of pressure.
 
-use serde::{Deserialize, Serialize};
+use crate::layer::Layer;
 use std::f64::consts::TAU;
-
-/// A layer of the skin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Layer {
-    /// Young's modulus, MPa.
-    pub young_mpa: f64,
-    /// Poisson's ratio.
-    pub poisson: f64,
-    /// Thickness, mm.
-    pub thickness_mm: f64,
-}
 
 /// Waves that are tabulated, by length, mm.
 const LONGEST_MM: f64 = 130.0;

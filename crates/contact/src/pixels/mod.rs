@@ -40,7 +40,6 @@ use std::sync::Arc;
 use turns::Turns;
 use window::Window;
 
-pub use layers::Layer;
 pub use memory::PixelMemory;
 
 /// Rounds of vertices and pixels at most.
