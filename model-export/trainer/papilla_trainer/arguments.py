@@ -206,6 +206,13 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         help="part of a face network's correction that each step leaves out (0)",
     )
     add(
+        "--shift-px",
+        type=int,
+        default=0,
+        metavar="N",
+        help="move each sample by up to N rows and columns in each step (networks on maps; 0)",
+    )
+    add(
         "--train-presses",
         type=int,
         metavar="N",

@@ -19,6 +19,8 @@ from papilla_trainer.network import NetworkSpec, parse_network
 PRECISIONS = ("f32", "bf16")
 SCHEDULES = ("constant", "cosine")
 LOSS_CHOICES = ("auto", *LOSSES)
+# A millimetre.
+LARGEST_SHIFT_PX = 7
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class TrainConfig:
     train_presses: int | None = None
     base_rate: float = 0.05
     dropout: float = 0.0
+    shift_px: int = 0
 
     def __post_init__(self) -> None:
         if (self.operator is not None) != isinstance(self.spec, FaceSpec):
@@ -49,6 +52,13 @@ class TrainConfig:
             )
         if not 0.0 <= self.base_rate <= 1.0:
             raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
+        if self.shift_px and not isinstance(self.spec, MapSpec):
+            raise UsageError("--shift-px is for networks on maps (map-...) alone")
+        if not 0 <= self.shift_px <= LARGEST_SHIFT_PX:
+            raise UsageError(
+                f"--shift-px must lie between 0 and {LARGEST_SHIFT_PX}, not {self.shift_px}: "
+                "further away the finger is another"
+            )
         if not 0.0 <= self.dropout < 1.0:
             raise UsageError(f"--dropout must lie in 0 .. 1, not {self.dropout}")
         if self.loss not in LOSS_CHOICES or self.far_weight < 0.0:

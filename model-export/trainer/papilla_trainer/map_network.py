@@ -10,15 +10,19 @@ with weights that vary smoothly over the finger, and a global map of low rank on
 the skin the fine part of a pressure is felt nearby alone, so few blocks do. What differs between
 bone and tip, the global map knows.
 
+Skin knows no blocks. So a block's four pixels have the same kernel of (2 K - 1)^2 weights, each
+about itself, and what a level adds to the next is linear between the middles of its pixels.
+
 A network of coarse pixels (``-p2``) works on means of two by two pixels, at a quarter of the cost,
 and interpolates SED between them.
 """
 
 from __future__ import annotations
 
+import copy
 import re
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -95,28 +99,66 @@ def parse_map_network(name: str) -> MapSpec:
 
 
 class Level(nn.Module):
-    """Components on blocks of one size, from their pressures and from those of the next size up."""
+    """Components on blocks of one size, from their pressures and from those of the next size up.
+
+    ``kernel``: ``[C, T^2]``, T = 2 K - 1, of each component about its own pixel; ``mix``:
+    ``[C, C]``, what the components above give; ``over_finger``: ``[C, 5]``, how the kernels vary.
+    """
 
     place: Tensor
+    tap: Tensor
+    between: Tensor
 
     def __init__(self, spec: MapSpec, side: int) -> None:
         super().__init__()
-        channels = _BLOCK * spec.components
-        self.near = _convolution(_BLOCK, channels, spec.kernel)
-        self.above = _convolution(spec.components, channels, 3)
-        nn.init.normal_(self.near.weight, std=0.3 / (_BLOCK * spec.kernel**2) ** 0.5)
-        # At first a block's pixels have what their place has in the blocks above.
-        nn.init.zeros_(self.above.weight)
-        with torch.no_grad():
-            for channel in range(channels):
-                self.above.weight[channel, channel // _BLOCK, 1, 1] = 1.0
-        self.over_finger = nn.Parameter(torch.zeros(channels, _PLACES))
+        width = 2 * spec.kernel - 1
+        self.kernel = nn.Parameter(torch.randn(spec.components, width**2) * (0.3 / width))
+        self.mix = nn.Parameter(torch.eye(spec.components))
+        self.over_finger = nn.Parameter(torch.zeros(spec.components, _PLACES))
         self.register_buffer("place", _place(side), persistent=False)
+        self.register_buffer("tap", _taps(spec.kernel), persistent=False)
+        self.register_buffer("between", _between(), persistent=False)
 
     def forward(self, blocks: Tensor, above: Tensor) -> Tensor:
         """``[N, 4, n, n]`` and ``[N, C, n, n]`` to ``[N, 4 C, n, n]``."""
-        linear: Tensor = self.near(blocks) * _gain(self.over_finger, self.place) + self.above(above)
-        return linear
+        return _level(blocks, above, self.on_blocks(), self.place)
+
+    def on_blocks(self) -> BlockWeights:
+        """The same weights as convolutions over blocks."""
+        components, taps = len(self.kernel), self.tap.shape
+        # The last weight stands for those beyond the kernel.
+        padded = functional.pad(self.kernel, (0, 1))
+        near = padded[:, self.tap.flatten()].reshape(components * _BLOCK, *taps[1:])
+        above = self.mix[:, None, :, None, None] * self.between[None]
+        return BlockWeights(
+            near, above.flatten(0, 1), self.over_finger.repeat_interleave(_BLOCK, dim=0)
+        )
+
+
+class BlockWeights(NamedTuple):
+    """A level's convolutions.
+
+    ``near``: ``[4 C, 4, K, K]``; ``above``: ``[4 C, C, 3, 3]``; ``over_finger``: ``[4 C, 5]``.
+    """
+
+    near: Tensor
+    above: Tensor
+    over_finger: Tensor
+
+
+class ServedLevel(nn.Module):
+    """A level whose weights are constants, as they are exported."""
+
+    place: Tensor
+
+    def __init__(self, level: Level) -> None:
+        super().__init__()
+        self.weights = BlockWeights(*(weight.detach().clone() for weight in level.on_blocks()))
+        self.register_buffer("place", level.place, persistent=False)
+
+    def forward(self, blocks: Tensor, above: Tensor) -> Tensor:
+        """As :class:`Level`."""
+        return _level(blocks, above, self.weights, self.place)
 
 
 class Correction(nn.Module):
@@ -202,21 +244,17 @@ class ServedMapModel(nn.Module):
 
     mask: Tensor
 
-    def __init__(self, network: nn.Module, mask: Tensor) -> None:
+    def __init__(self, network: MapNet, mask: Tensor) -> None:
         """``mask``: float32 ``[224, 224]``, 1 on the interface patch and 0 outside."""
         super().__init__()
-        self.network = network
+        self.network = copy.deepcopy(network)
+        self.network.levels = nn.ModuleList(ServedLevel(level) for level in network.levels)
         self.register_buffer("mask", mask[None, None].contiguous())
 
     def forward(self, pressure_pa: Tensor) -> Tensor:
         """``[N, 1, 224, 224]`` Pa to ``[N, 1, 224, 224]`` J/m3."""
         sed: Tensor = self.network(pressure_pa) * self.mask
         return sed
-
-
-def mirrored(maps: Tensor) -> Tensor:
-    """Maps ``[..., 224, 224]`` of the mirror image: the middle column is the finger's axis."""
-    return maps.flip(-1)
 
 
 def _convolution(channels_in: int, channels_out: int, kernel: int) -> nn.Conv2d:
@@ -226,6 +264,30 @@ def _convolution(channels_in: int, channels_out: int, kernel: int) -> nn.Conv2d:
 def _mean(blocks: Tensor) -> Tensor:
     """``[N, 4, n, n]`` to ``[N, 1, n, n]``; a convolution, which runs faster than a reduction."""
     return functional.conv2d(blocks, blocks.new_full((1, _BLOCK, 1, 1), 1.0 / _BLOCK))
+
+
+def _level(blocks: Tensor, above: Tensor, weights: BlockWeights, place: Tensor) -> Tensor:
+    """What blocks and the level above give: ``[N, 4, n, n]`` and ``[N, C, n, n]``."""
+    near = functional.conv2d(blocks, weights.near, padding=weights.near.shape[-1] // 2)
+    return near * _gain(weights.over_finger, place) + functional.conv2d(
+        above, weights.above, padding=1
+    )
+
+
+def _taps(kernel: int) -> Tensor:
+    """``[4, 4, K, K]``: the place in a pixel's kernel of each pixel of the blocks around its own.
+
+    (2 K - 1)^2 is no place: such a pixel is further from this one than from its block's others.
+    """
+    width = 2 * kernel - 1
+    pixel = torch.arange(2)
+    block = 2 * (torch.arange(kernel) - kernel // 2)
+    # Of pixel i of a block b away from pixel o: [o, i, b].
+    away = block + pixel[None, :, None] - pixel[:, None, None] + width // 2
+    y, x = away[:, None, :, None, :, None], away[None, :, None, :, None, :]
+    inside = (y >= 0) & (y < width) & (x >= 0) & (x < width)
+    tap = torch.where(inside, y * width + x, torch.tensor(width**2))
+    return tap.reshape(_BLOCK, _BLOCK, kernel, kernel)
 
 
 def _between() -> Tensor:

@@ -13,12 +13,13 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from papilla_trainer.augment import varied
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
 from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
 from papilla_trainer.dataset import Dataset, fewer, validation_split
 from papilla_trainer.errors import RunError, TrainerError
 from papilla_trainer.face_network import FaceNet
-from papilla_trainer.map_network import MapNet, mirrored
+from papilla_trainer.map_network import MapNet
 from papilla_trainer.report import write_history
 from papilla_trainer.tasks import frame_of, make_task
 
@@ -106,13 +107,13 @@ class Trainer:
     def _train_epoch(self, epoch: int, listener: Listener) -> float:
         self.network.train()
         total = 0.0
-        for chosen in self._batches(epoch):
+        # By seed and epoch alone, so a resumed run sees the same samples.
+        generator = torch.Generator().manual_seed(self.config.seed * 1_000_003 + epoch)
+        for chosen in self._batches(generator):
             inputs = self.fit_samples.inputs[chosen]
             targets = self.fit_samples.targets[chosen]
             if self.on_pixels:
-                # Every other sample of a batch as in the mirror: another choice in each epoch.
-                inputs = torch.cat([inputs[::2], mirrored(inputs[1::2])])
-                targets = torch.cat([targets[::2], mirrored(targets[1::2])])
+                inputs, targets = varied(inputs, targets, self.config.shift_px, generator)
             self.optimizer.zero_grad()
             loss = self.loss(self._forward(inputs), targets)
             loss.backward()
@@ -130,9 +131,7 @@ class Trainer:
             )
         return mean
 
-    def _batches(self, epoch: int) -> tuple[Tensor, ...]:
-        """Shuffled by seed and epoch alone, so a resumed run sees the same order."""
-        generator = torch.Generator().manual_seed(self.config.seed * 1_000_003 + epoch)
+    def _batches(self, generator: torch.Generator) -> tuple[Tensor, ...]:
         order = torch.randperm(len(self.fit_samples), generator=generator)
         return order.to(self.device).split(self.config.batch)
 

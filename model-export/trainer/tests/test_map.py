@@ -11,13 +11,14 @@ import pytest
 import torch
 from torch.nn import functional
 
+from papilla_trainer.augment import mirrored, varied
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import UsageError
 from papilla_trainer.evaluation import evaluate_run, served_model
 from papilla_trainer.export import export_run
-from papilla_trainer.map_network import MapNet, MapSpec, mirrored, parse_map_network
+from papilla_trainer.map_network import MapNet, MapSpec, parse_map_network
 from papilla_trainer.training import Trainer
 
 NAMES = ("map-c2-k3-r4", "map-c3-k5-r2-h4", "map-c3-k3-r2-h4-p2")
@@ -92,6 +93,49 @@ def test_a_pixel_is_felt_in_blocks_around_it_and_through_the_global_map_elsewher
 
 
 @torch.no_grad()
+def test_the_finest_level_is_the_same_about_every_pixel_of_a_block() -> None:
+    network = build("map-c2-k3-r4")
+    network.reach_out.zero_()
+    for level in network.levels:
+        level.over_finger.zero_()
+    for level in list(network.levels)[1:]:
+        level.kernel.zero_()
+    spots = torch.zeros(4, 1, 224, 224)
+    for spot, (y, x) in zip(spots, ((112, 112), (112, 113), (113, 112), (113, 113)), strict=True):
+        spot[0, y, x] = 1e4
+    first, *others = network(spots)
+    assert first.max() > 0.0
+    # It reaches two pixels far: 2 K - 1 = 5 of them.
+    assert (first[0].amax(dim=0) > 0.0).nonzero().flatten().tolist() == [110, 111, 112, 113, 114]
+    for sed, step in zip(others, ((0, 1), (1, 0), (1, 1)), strict=True):
+        assert torch.allclose(sed, first.roll(step, (1, 2)), rtol=1e-4, atol=1e-6 * first.max())
+
+
+def test_samples_are_moved_with_their_sed() -> None:
+    maps = torch.rand(5, 1, 224, 224)
+    straight, _ = varied(maps, maps, 0, torch.Generator().manual_seed(1))
+    assert torch.equal(straight, torch.cat([maps[::2], mirrored(maps[1::2])]))
+    pressure, sed = varied(maps, 2.0 * maps, 3, torch.Generator().manual_seed(1))
+    assert torch.equal(2.0 * pressure, sed)
+    steps = [(y, x) for y in range(-3, 4) for x in range(-3, 4)]
+    moves = {
+        step
+        for step in steps
+        for before, after in zip(straight, pressure, strict=True)
+        if torch.equal(before.roll(step, (1, 2)), after)
+    }
+    assert len(moves) > 2
+    again, _ = varied(maps, maps, 3, torch.Generator().manual_seed(1))
+    assert torch.equal(again, pressure)
+
+
+def test_shifts_are_for_maps_and_small() -> None:
+    for network, shift in (("s1-base4", 2), ("map-c2-k3-r4", 8), ("map-c2-k3-r4", -1)):
+        with pytest.raises(UsageError, match="--shift-px"):
+            TrainConfig(network=network, shift_px=shift)
+
+
+@torch.no_grad()
 def test_between_coarse_pixels_values_are_linear() -> None:
     between = build("map-c2-k3-r4-p2").between
     y, x = torch.meshgrid(torch.arange(24.0), torch.arange(24.0), indexing="ij")
@@ -110,7 +154,13 @@ def test_what_varies_over_the_finger_is_even_in_the_mirror() -> None:
 @pytest.fixture(scope="module")
 def config() -> TrainConfig:
     return TrainConfig(
-        network="map-c2-k3-r4-h4", epochs=4, batch=4, learning_rate=1e-2, threads=1, seed=3
+        network="map-c2-k3-r4-h4",
+        epochs=4,
+        batch=4,
+        learning_rate=1e-2,
+        threads=1,
+        seed=3,
+        shift_px=2,
     )
 
 
