@@ -100,13 +100,19 @@ mod tests {
         assert!(slow.force_n < fast.force_n);
     }
 
-    /// Srinivasan, Gulati & Dandekar 1992 found at most 5 %.
+    /// Srinivasan, Gulati & Dandekar 1992 found at most 5 %. In 1e4 s fluid moves .6 mm. In a second it
+    /// moves 6 um: what changes then is the outermost row of elements, which is drained at once, since
+    /// the fluid's pressure at its outer nodes is none: it grows where the pad bulges.
     #[test]
     #[ignore = "long: ./test --all"]
     fn a_drained_finger_loses_at_most_a_twentieth_of_its_volume() {
-        let p = press(FINGER, "drained", 1.0);
-        println!("lost {} {} N {:?}", p.lost, p.force_n, p.checks);
-        assert_sound(&p);
-        assert!(p.lost > 0.0 && p.lost <= 0.05, "{}", p.lost);
+        let [fast, slow] = [1.0, 1e4].map(|s| press(FINGER, "drained", s));
+        for p in [&fast, &slow] {
+            println!("lost {} {} N {:?}", p.lost, p.force_n, p.checks);
+            assert_sound(p);
+        }
+        assert!(slow.lost > 0.0 && slow.lost <= 0.05, "{}", slow.lost);
+        assert!(fast.lost.abs() < 0.2 * slow.lost, "{}", fast.lost);
+        assert!(slow.force_n < fast.force_n);
     }
 }
