@@ -95,6 +95,11 @@ fn every_rung_has_the_known_errors() {
     near(reference.seconds.map(|s| s.p50), 10.0);
     let error = ladder.discretisation_error.as_ref().unwrap();
     near(Some(error.sed_relative_l2), 0.1 / (25.0 / 9.0 - 1.0));
+    let readings = ladder.readings.as_ref().unwrap();
+    assert_eq!((readings.states, readings.mesh.as_str()), (6, "fe-medium-graded"));
+    // The bench's meshes differ in SED alone.
+    near(Some(readings.pressure.p95), 0.0);
+    near(readings.answers.get("tiny").map(|s| s.median), 0.0);
     assert_eq!(ladder.pareto_set.as_deref(), Some("reference"));
     for rung in &ladder.rungs {
         // Each is the faster or the better one; a floor takes no time and is no choice.
@@ -116,6 +121,7 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
         "| tiny | network |",
         "the truth",
         "good to 5.63 %",
+        "| SED that `tiny` answers | 0.00 % | 0.00 % |",
     ] {
         assert!(page.replace("**tiny**", "tiny").contains(word), "{word}: {page}");
     }

@@ -32,6 +32,9 @@ pub struct Ladder {
     /// Relative L2 by which the reference itself may be off; absent without a reference.
     #[serde(default)]
     pub discretisation_error: Option<Discretisation>,
+    /// What the reference's pressure maps are worth; absent without the same states on another mesh.
+    #[serde(default)]
+    pub readings: Option<Readings>,
     /// The rungs.
     pub rungs: Vec<Rung>,
 }
@@ -58,6 +61,21 @@ pub struct Discretisation {
     pub sed_relative_l2: f64,
     /// How it was estimated.
     pub how: String,
+}
+
+/// One state's pressure, read on the reference and on another mesh, relative L2.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Readings {
+    /// The other mesh.
+    pub mesh: String,
+    /// States on both.
+    pub states: usize,
+    /// Between the two maps of pressure.
+    pub pressure: Spread,
+    /// The same of maps under a Gaussian of .1 mm.
+    pub averaged: Spread,
+    /// Between a model's answers to the two, by its name.
+    pub answers: BTreeMap<String, Spread>,
 }
 
 /// What a rung is.

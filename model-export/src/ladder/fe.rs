@@ -17,7 +17,7 @@ use std::path::Path;
 /// the reference: .2 and .12 mm (docs/concepts/accuracy.md).
 const SPACING_RATIO: f64 = 0.2 / 0.12;
 /// The mesh before the reference.
-const NEXT_FINEST: &str = "fe-medium-graded";
+pub(super) const NEXT_FINEST: &str = "fe-medium-graded";
 
 /// The reference's own error by Richardson's extrapolation, if SED errs as the square of the
 /// spacing: its distance from the next finest mesh over the ratio's square less one.

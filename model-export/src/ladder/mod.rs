@@ -10,6 +10,7 @@ mod floor;
 pub mod here;
 mod model;
 pub mod plot;
+mod readings;
 pub mod report;
 mod sets;
 
@@ -129,6 +130,8 @@ pub fn measure(
         .map_err(|source| ExportError::Engine { path: index_path, source })?;
     let samples: usize = sets.iter().map(|set| set.states.len()).sum();
     progress.total((index.models.len() * samples) as u64);
+    let reference = sets.iter().find(|set| set.name == "reference" && !set.states.is_empty());
+    let mut pairs = readings::Pairs::read(&task.fe, reference, &canvas)?;
     let mut models = Vec::with_capacity(index.models.len());
     for name in &index.models {
         progress.stage(name);
@@ -137,6 +140,7 @@ pub fn measure(
             &path,
             &canvas,
             &sets,
+            &mut pairs,
             Timing::of(task.quick),
             progress,
             footprint,
@@ -152,9 +156,9 @@ pub fn measure(
         sets: sets.iter().map(SampleSet::described).collect(),
         pareto_set: None,
         discretisation_error: None,
+        readings: pairs.found(),
         rungs: models,
     };
-    let reference = sets.iter().find(|set| set.name == "reference" && !set.states.is_empty());
     if let Some(reference) = reference {
         for folder in &task.fe {
             ladder.rungs.push(fe::rung(folder, reference, &canvas)?);

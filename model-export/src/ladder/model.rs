@@ -1,5 +1,6 @@
 //! A servable rung: errors, refusals, times and footprint of one model.
 
+use super::readings::Pairs;
 use super::{Canvas, Progress, SampleSet, Timing};
 use crate::evaluate::require_same_atlas;
 use crate::metrics::{SampleMetrics, quantile, summarise};
@@ -28,6 +29,7 @@ pub(super) fn measure(
     path: &Path,
     canvas: &Canvas,
     sets: &[SampleSet],
+    pairs: &mut Pairs,
     timing: Timing,
     progress: &dyn Progress,
     footprint: &dyn Fn(&Path) -> Option<Footprint>,
@@ -46,6 +48,7 @@ pub(super) fn measure(
             errors.insert(set.name.to_owned(), metrics.into());
         }
     }
+    pairs.ask(&info.name, |pressure_pa, sed| judge.infer(pressure_pa, sed))?;
     let zero_answer = judge.zero_answer(info)?;
     judge.hostile(info)?;
     let refused = judge.refused;

@@ -2,7 +2,7 @@
 
 use crate::metrics::NAIL_BASE_MM;
 use papilla_engine::card::Spread;
-use papilla_engine::ladder::{Kind, Ladder, Percentiles, Rung, SetErrors};
+use papilla_engine::ladder::{Kind, Ladder, Percentiles, Readings, Rung, SetErrors};
 use std::fmt::Write;
 
 /// What is written by hand: what is measured and how.
@@ -37,8 +37,31 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
             errors(&mut text, ladder, &set.name);
         }
     }
+    if let Some(found) = &ladder.readings {
+        readings(&mut text, found);
+    }
     zone(&mut text, stem);
     text
+}
+
+fn readings(text: &mut String, found: &Readings) {
+    let line = |text: &mut String, what: &str, of: Spread| {
+        let _ = writeln!(text, "| {what} | {} |", spread(Some(of)));
+    };
+    let _ = write!(
+        text,
+        "## What a pressure map is worth\n\n\
+         {} states of the reference, their pressure read on its mesh and on {}. A model cannot know better than the map it is\n\
+         given: how far its two answers are apart is in its error, and no training takes it away.\n\n\
+         | relative L2 between the two | median | p95 |\n|---|---|---|\n",
+        found.states, found.mesh
+    );
+    line(text, "pressure", found.pressure);
+    line(text, "pressure under a Gaussian of .1 mm", found.averaged);
+    for (name, apart) in &found.answers {
+        line(text, &format!("SED that `{name}` answers"), *apart);
+    }
+    text.push('\n');
 }
 
 fn sentence(text: &str) -> String {
