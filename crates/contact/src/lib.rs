@@ -29,6 +29,7 @@
 mod answer;
 mod bounded;
 mod clusters;
+mod discs;
 mod error;
 mod file;
 mod force_target;
@@ -57,4 +58,4 @@ pub use layer::Layer;
 pub use model::{Arrays, ContactModel, Header};
 pub use objects::{Object, Scene};
 pub use pixels::{PixelContact, PixelMemory, PixelSkin};
-pub use solver::{Memory, Settings, Solver};
+pub use solver::{Anchor, Memory, Settings, Solver};
