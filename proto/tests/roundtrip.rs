@@ -119,8 +119,13 @@ fn contact() -> impl Strategy<Value = Hello> {
             AnnouncedShape::Mesh(Mesh { vertices_mm, triangles: vec![[0, 1, 2]] })
         }),
     ];
-    let object = (shape, prop::option::of(0.1..9.0f64))
-        .prop_map(|(shape, stiffness_mpa_per_mm)| AnnouncedObject { shape, stiffness_mpa_per_mm });
+    let object = (shape, prop::option::of(0.1..9.0f64), prop::option::of(0.0..2.0f64)).prop_map(
+        |(shape, stiffness_mpa_per_mm, friction)| AnnouncedObject {
+            shape,
+            stiffness_mpa_per_mm,
+            friction,
+        },
+    );
     let finger = (0.5..2.0f64, 0.5..2.0f64)
         .prop_map(|(width, stiffness)| AnnouncedFinger { width, stiffness });
     let inputs = vec![Input::Pressure, Input::Gaps, Input::Objects];

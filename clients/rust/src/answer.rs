@@ -66,6 +66,8 @@ pub struct Answer {
     pub touch: Option<Touch>,
     /// The pressure that was found, Pa, if asked for.
     pub pressure_pa: Vec<f32>,
+    /// Traction along the skin at each vertex, Pa, in the finger's frame, if asked for.
+    pub shear_pa: Vec<[f32; 3]>,
     /// What the map shows at the vertices, if asked for in its place.
     pub vertices: Vec<f32>,
     /// The effect `summary`.
@@ -111,6 +113,7 @@ impl Answer {
             map: Vec::new(),
             touch: None,
             pressure_pa: Vec::new(),
+            shear_pa: Vec::new(),
             vertices: Vec::new(),
             summary: None,
             points: Vec::new(),
@@ -176,6 +179,9 @@ impl Answer {
             match section.name {
                 SectionName::Touch => self.touch = Touch::decode(part),
                 SectionName::Pressure => self.pressure_pa = floats(part)?,
+                SectionName::Shear => {
+                    self.shear_pa = floats(part)?.as_chunks::<3>().0.to_vec();
+                }
                 SectionName::Vertices => {
                     self.vertices = vec![0.0; part.len() / header.sample_type.bytes()];
                     header

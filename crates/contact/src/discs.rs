@@ -125,13 +125,14 @@ pub(crate) fn size([x, y]: [f32; 2]) -> f32 {
     (x * x + y * y).sqrt()
 }
 
-/// Steps of the points: one over the sum of absolute values along the rows of each.
-pub(crate) fn steps(blocks: &[Vec<f32>; 4], stride: usize, step: &mut [f32]) {
+/// Steps of the points: one over the sum of absolute values along the rows of each, or over `least`
+/// (mm/N) where that is more: without compliance the least slip would ask for any force.
+pub(crate) fn steps(blocks: &[Vec<f32>; 4], stride: usize, least: f32, step: &mut [f32]) {
     let n = step.len();
     for (i, step) in step.iter_mut().enumerate() {
         let of = |block: &[f32]| block[i * stride..][..n].iter().map(|v| v.abs()).sum::<f32>();
         let sum = (of(&blocks[0]) + of(&blocks[1])).max(of(&blocks[2]) + of(&blocks[3]));
-        *step = 1.0 / sum.max(f32::MIN_POSITIVE.sqrt());
+        *step = 1.0 / sum.max(least);
     }
 }
 
@@ -167,7 +168,7 @@ mod tests {
         fn coulombs_law_holds_at_random_points(seed in any::<u64>(), n in 1usize..60) {
             let (m, s, bound) = problem(seed, n);
             let mut step = vec![0.0; n];
-            steps(&m, n, &mut step);
+            steps(&m, n, 1e-6, &mut step);
             let mut q = [vec![0.0; n], vec![0.0; n]];
             let [q1, q2] = &mut q;
             let matrix = Tangential { blocks: &m, stride: n, step: &step };

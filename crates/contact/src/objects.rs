@@ -36,7 +36,7 @@ const ROTATION_MISS_MAX: f64 = 1e-3;
 /// Farthest place of an object, mm.
 const PLACE_MAX_MM: f64 = 1e5;
 /// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
-const FRICTION_MAX: f64 = 10.0;
+pub const FRICTION_MAX: f64 = 10.0;
 
 impl Object {
     /// A rigid object.

@@ -17,6 +17,8 @@ use crate::patch::{Patch, Slots};
 const VIOLATION_MM: f32 = 2e-5;
 /// Most products with the matrix in a linearisation.
 const PRODUCTS_MAX: u32 = 60;
+/// Least compliance along the skin that steps count on, as part of the greatest along normals.
+const STEP_PART: f32 = 1e-3;
 /// Part of its bound below which a force holds a point where it is.
 const HELD: f32 = 0.999;
 
@@ -41,6 +43,8 @@ struct Touch {
     next: Option<Anchor>,
 }
 
+/// Normals that the compliance along them was made for, and a bound of its eigenvalues.
+type MadeFor<'a> = (&'a [Vec<f32>; 3], f32);
 /// Two tangents of each slot, component by component.
 type Tangents = [[Vec<f32>; 3]; 2];
 
@@ -95,6 +99,14 @@ impl Friction {
         }
     }
 
+    /// Begins a frame in which something has friction, or nothing.
+    pub(super) fn expect(&mut self, is_rough: bool) {
+        self.is_rough = is_rough;
+        if !is_rough {
+            self.forget();
+        }
+    }
+
     /// Takes note of the object that is nearest to a vertex.
     pub(super) fn meet(&mut self, vertex: usize, object: u32, friction: f64) {
         let touch = &mut self.touches[vertex];
@@ -130,7 +142,7 @@ impl Friction {
         view: View<'_>,
         model: &ContactModel,
         patch: &mut Patch,
-        made_for: &[Vec<f32>; 3],
+        made_for: MadeFor<'_>,
         (scale, left): (f32, u32),
     ) -> u32 {
         let m = patch.near();
@@ -209,7 +221,7 @@ impl Friction {
     }
 
     /// Compliance along tangents of the normals that the matrix along normals was made for.
-    fn make_matrix(&mut self, patch: &Patch, made_for: &[Vec<f32>; 3]) {
+    fn make_matrix(&mut self, patch: &Patch, (made_for, norm): MadeFor<'_>) {
         let m = patch.near();
         if self.made == m {
             return;
@@ -224,7 +236,8 @@ impl Friction {
         {
             patch.along(rows, columns, block);
         }
-        steps(&self.matrix, patch.stride(), &mut self.step[..m]);
+        let least = (STEP_PART * norm).max(f32::MIN_POSITIVE.sqrt());
+        steps(&self.matrix, patch.stride(), least, &mut self.step[..m]);
         self.made = m;
     }
 
@@ -279,19 +292,17 @@ fn put(tangents: &mut Tangents, slot: usize, n: [f32; 3], toward: [f32; 3]) {
 impl Solver {
     /// Adds what resists slip to the forces that were found, if anything has friction.
     pub(super) fn resist_slip(&mut self, view: View<'_>, scale: f32, left: u32) -> u32 {
-        let Self { friction, model, patch, made_for, .. } = self;
+        let Self { friction, model, patch, made_for, norm, .. } = self;
         match friction {
-            Some(f) if f.is_rough => f.resist(view, model, patch, made_for, (scale, left)),
+            Some(f) if f.is_rough => f.resist(view, model, patch, (made_for, *norm), (scale, left)),
             _ => 0,
         }
     }
 
     /// Ends a frame: what stuck is held where it was, what slipped where it is.
     pub(crate) fn follow_slip(&mut self, view: View<'_>) {
-        match &mut self.friction {
-            Some(friction) if friction.is_rough => friction.follow(view, &self.model, &self.patch),
-            Some(friction) => friction.forget(),
-            None => {}
+        if let Some(friction) = self.friction.as_mut().filter(|f| f.is_rough) {
+            friction.follow(view, &self.model, &self.patch);
         }
     }
 }

@@ -248,7 +248,7 @@ impl Solver {
     /// Takes note of whether anything has friction.
     fn expect_friction(&mut self, view: View<'_>) -> Result<(), ContactError> {
         match &mut self.friction {
-            Some(friction) => friction.is_rough = view.is_rough(),
+            Some(friction) => friction.expect(view.is_rough()),
             None if view.is_rough() => {
                 return Err(ContactError::Friction("the solver was made without it"));
             }

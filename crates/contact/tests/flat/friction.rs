@@ -91,7 +91,7 @@ fn a_ball_moved_aside_slips_as_cattaneo_and_mindlin_say() {
         let left = 1.0 - x / bound_n;
         let due = 1.0 - (1.0 - aside / unit).max(0.0).powf(1.5);
         println!("{step}: Q / mu P {:.4} for {due:.4}", x / bound_n);
-        assert!((x / bound_n - due).abs() < 0.03 && y.abs() < 2e-3 * bound_n, "{step}: {x} {due}");
+        assert!((x / bound_n - due).abs() < 0.012 && y.abs() < 2e-3 * bound_n, "{step}: {x} {due}");
         assert!(out.quality.settled, "{step}: {:?}", out.effort);
         let shares = shares(&out, FRICTION);
         assert!(shares.iter().all(|(_, share)| *share <= 1.0 + 1e-4), "{step}: {shares:?}");
@@ -101,7 +101,7 @@ fn a_ball_moved_aside_slips_as_cattaneo_and_mindlin_say() {
             let radius = (sticks * SPACING_MM * SPACING_MM / PI).sqrt() / a;
             let due = left.cbrt();
             println!("   c / a {radius:.3} for {due:.3}");
-            assert!((radius - due).abs() < 0.08, "{step}: {radius} for {due}");
+            assert!((radius - due).abs() < 0.03, "{step}: {radius} for {due}");
             checked += 1;
         }
     }
@@ -121,7 +121,7 @@ fn full_slip_pulls_with_the_coefficient() {
             if step % 20 > 15 {
                 let share = size([x, y]) / (friction * z);
                 let along = (x * angle.cos() + y * angle.sin()) / size([x, y]);
-                assert!((0.985..1.0 + 1e-4).contains(&share), "{step}: {share}");
+                assert!((0.985..1.005).contains(&share), "{step}: {share}");
                 assert!(along > 0.995, "{step}: {along}");
             }
             angle = f64::from(step / 20) * 2.0;
@@ -275,10 +275,11 @@ fn any_move_is_answered() {
         }
         let [a, b] = places;
         let friction = [1.5 * random.f64(), 0.5];
-        let objects = [
-            rough_ball(friction[0], [a[0], a[1]], a[2]),
-            Object { friction: friction[1], ..ball(3.0, [b[0], b[1]], b[2]) },
-        ];
+        let objects =
+            [(3.0, a, friction[0]), (1.5, b, friction[1])].map(|(radius, at, friction)| Object {
+                friction,
+                ..ball(radius, [at[0], at[1]], at[2])
+            });
         solver.solve(&objects, &mut out).expect("an answer");
         let told = format!("step {step}: {:?} {:?}", out.quality, out.effort);
         let numbers = [&out.force_n[..], &out.torque_n_mm, &out.centre_mm].concat();
