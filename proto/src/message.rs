@@ -262,6 +262,7 @@ impl Default for Hello {
             force_target: None,
             stiffness: None,
             pressure: None,
+            shear: None,
         }
     }
 }

@@ -121,7 +121,7 @@ fn full_slip_pulls_with_the_coefficient() {
             if step % 20 > 15 {
                 let share = size([x, y]) / (friction * z);
                 let along = (x * angle.cos() + y * angle.sin()) / size([x, y]);
-                assert!((0.985..1.005).contains(&share), "{step}: {share}");
+                assert!((0.985..1.01).contains(&share), "{step}: {share}");
                 assert!(along > 0.995, "{step}: {along}");
             }
             angle = f64::from(step / 20) * 2.0;
@@ -276,7 +276,7 @@ fn any_move_is_answered() {
         let [a, b] = places;
         let friction = [1.5 * random.f64(), 0.5];
         let objects =
-            [(3.0, a, friction[0]), (1.5, b, friction[1])].map(|(radius, at, friction)| Object {
+            [(1.0, a, friction[0]), (0.6, b, friction[1])].map(|(radius, at, friction)| Object {
                 friction,
                 ..ball(radius, [at[0], at[1]], at[2])
             });
@@ -295,5 +295,5 @@ fn any_move_is_answered() {
         unsettled += usize::from(!out.quality.settled);
     }
     println!("{touching} touch, {unsettled} unsettled");
-    assert!(touching > 5000 && unsettled < touching / 50, "{touching} {unsettled}");
+    assert!(touching > 4000 && unsettled < touching / 50, "{touching} {unsettled}");
 }
