@@ -141,7 +141,7 @@ fn contact() -> impl Strategy<Value = Hello> {
         prop::option::of(prop::collection::vec(object, 0..3)),
         prop::option::of(prop::collection::vec(finger, 0..3)),
         prop::option::of(prop::sample::select(methods)),
-        any::<(Option<bool>, Option<bool>)>(),
+        any::<(Option<bool>, Option<bool>, Option<bool>)>(),
     )
         .prop_map(|(input, layouts, objects, fingers, method, asked)| Hello {
             input,
@@ -153,6 +153,7 @@ fn contact() -> impl Strategy<Value = Hello> {
             method,
             force_target: asked.0,
             stiffness: asked.1,
+            shear: asked.2,
             ..Hello::default()
         })
 }
