@@ -75,9 +75,9 @@ pub struct Settings {
     pub method: Method,
     /// Whose finger it is.
     pub person: Person,
-    /// Whether to find the local stiffness too.
+    /// Whether to find the local stiffness too, of the pressure alone.
     pub stiffness: bool,
-    /// Whether objects may have friction.
+    /// Whether objects may have friction: at vertices, with a method that knows compliance.
     pub friction: bool,
 }
 
