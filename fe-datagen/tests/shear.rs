@@ -170,7 +170,7 @@ fn shear_and_what_it_costs_at_finite_strain() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/finger.contact");
     let model = Arc::new(ContactModel::read(&std::fs::read(path).unwrap()).unwrap());
     for (name, indenter) in [("ball", BALL), ("plate", PLATE)] {
-        let drags = [[0.1, 0.0], [1.0, 0.0]];
+        let drags = [[0.1, 0.0]];
         let press = |effects: &str| scene("medium", effects, indenter, 1.0, &drags);
         let rough = press("\"finite_strain\", \"layers\", \"friction\"");
         let (records, shape, places) = truth(&rough);
@@ -181,6 +181,7 @@ fn shear_and_what_it_costs_at_finite_strain() {
             let sed = relative_l2(&without.sed_dermis_mpa, &record.sed_dermis_mpa);
             let pressure = relative_l2(&without.pressure_mpa, &record.pressure_mpa);
             println!("{name}: {errors:.3?}; without friction pressure {pressure:.3}, SED {sed:.3}");
+            assert!(errors.shear < 0.4 && errors.pressure < 0.1, "{errors:?}");
             let [due, found] = errors.pull;
             assert!((found - due).abs() < 0.1 * FRICTION, "{errors:?}");
         }
