@@ -74,6 +74,9 @@ pub struct AnnouncedObject {
     /// Pressure over how far its surface gives way, MPa/mm; none: it is rigid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness_mpa_per_mm: Option<f64>,
+    /// Coulomb's coefficient of friction with the skin, 0 to 10; none: it is slippery.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
 }
 
 /// A finger of the hand.

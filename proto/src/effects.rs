@@ -308,6 +308,8 @@ pub enum SectionName {
     Touch,
     /// Pressure, one f32 a vertex or pixel. Version 3.
     Pressure,
+    /// Traction along the skin, three f32 a vertex, Pa, in the finger's frame. Version 3.
+    Shear,
     /// A [`Summary`](crate::Summary).
     Summary,
     /// One f32 a point.

@@ -181,6 +181,9 @@ pub struct Hello {
     /// Whether, and where, answers carry the pressure that was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure: Option<SampleLayout>,
+    /// Whether answers carry the traction along the skin at the atlas' vertices. Of objects alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shear: Option<bool>,
 }
 
 impl Hello {
@@ -219,6 +222,7 @@ impl Hello {
             (self.force_target.is_some(), "force_target"),
             (self.stiffness.is_some(), "stiffness"),
             (self.pressure.is_some(), "pressure"),
+            (self.shear.is_some(), "shear"),
         ]
         .into_iter()
         .find_map(|(there, name)| there.then_some(name))
@@ -258,6 +262,7 @@ impl Default for Hello {
             force_target: None,
             stiffness: None,
             pressure: None,
+            shear: None,
         }
     }
 }

@@ -119,8 +119,13 @@ fn contact() -> impl Strategy<Value = Hello> {
             AnnouncedShape::Mesh(Mesh { vertices_mm, triangles: vec![[0, 1, 2]] })
         }),
     ];
-    let object = (shape, prop::option::of(0.1..9.0f64))
-        .prop_map(|(shape, stiffness_mpa_per_mm)| AnnouncedObject { shape, stiffness_mpa_per_mm });
+    let object = (shape, prop::option::of(0.1..9.0f64), prop::option::of(0.0..2.0f64)).prop_map(
+        |(shape, stiffness_mpa_per_mm, friction)| AnnouncedObject {
+            shape,
+            stiffness_mpa_per_mm,
+            friction,
+        },
+    );
     let finger = (0.5..2.0f64, 0.5..2.0f64)
         .prop_map(|(width, stiffness)| AnnouncedFinger { width, stiffness });
     let inputs = vec![Input::Pressure, Input::Gaps, Input::Objects];
@@ -136,7 +141,7 @@ fn contact() -> impl Strategy<Value = Hello> {
         prop::option::of(prop::collection::vec(object, 0..3)),
         prop::option::of(prop::collection::vec(finger, 0..3)),
         prop::option::of(prop::sample::select(methods)),
-        any::<(Option<bool>, Option<bool>)>(),
+        any::<(Option<bool>, Option<bool>, Option<bool>)>(),
     )
         .prop_map(|(input, layouts, objects, fingers, method, asked)| Hello {
             input,
@@ -148,6 +153,7 @@ fn contact() -> impl Strategy<Value = Hello> {
             method,
             force_target: asked.0,
             stiffness: asked.1,
+            shear: asked.2,
             ..Hello::default()
         })
 }

@@ -78,8 +78,8 @@ impl Layout {
                 SectionName::Vertices => &mut answer.vertices,
                 SectionName::Touch => &mut answer.touch,
                 SectionName::Pressure => &mut answer.pressure_pa,
-                // No hello gets this far with it.
-                SectionName::Spikes => continue,
+                // No hello gets this far with them.
+                SectionName::Spikes | SectionName::Shear => continue,
             };
             *list = part;
         }

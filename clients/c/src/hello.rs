@@ -47,6 +47,10 @@ fn check_form(hello: &Hello) -> Result<(), Problem> {
             return Err(Problem::new(ErrorCode::BadJson, message).at(member));
         }
     }
+    if hello.shear == Some(true) {
+        let message = "the library answers no shear at vertices; a touch has its force";
+        return Err(Problem::new(ErrorCode::BadContact, message).at("shear"));
+    }
     Ok(())
 }
 

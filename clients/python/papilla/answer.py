@@ -104,6 +104,8 @@ class Answer:
     """Of objects and gaps."""
     pressure_pa: Map | None = None
     """The pressure that was found, if asked for: a map, or a value a vertex."""
+    shear_pa: Map | None = None
+    """The traction along the skin, if asked for: x y z a vertex, in the finger's frame."""
     vertices: Map | None = None
     """What the map shows at the vertices, if asked for in its place."""
     summary: Summary | None = None
@@ -161,6 +163,8 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
             answer.touch = read_touch(message, offset)
         elif name == "pressure":
             answer.pressure_pa = wire.floats(message, offset, size)
+        elif name == "shear":
+            answer.shear_pa = wire.floats(message, offset, size).reshape(-1, 3)
         elif name == "vertices":
             answer.vertices = wire.scaled(message, offset, ready["vertices"], header)
         elif name == "summary":

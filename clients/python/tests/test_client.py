@@ -59,6 +59,18 @@ def test_a_contact_presses_with_its_force(url):
     assert answer.summary.contact_area_mm2 == pytest.approx(np.pi * 4, rel=0.1)
 
 
+def test_a_rough_ball_pulls_the_skin_along(url):
+    ball = {"shape": {"shape": "sphere", "radius_mm": 10}, "friction": 0.5}
+    with papilla.Session(url, input="objects", objects=[ball], map=False, shear=True) as session:
+        session.touch([11.25, 0.0, -16.0, 0, 0, 0, 1])
+        answer = session.touch([11.25, 0.5, -16.0, 0, 0, 0, 1])
+        vertices = session.ready["vertices"]
+    pull_n, press_n = answer.touch.force_n[1:]
+    assert pull_n == pytest.approx(0.5 * press_n, rel=0.25)
+    assert answer.shear_pa.shape == (vertices, 3)
+    assert answer.shear_pa[:, 1].sum() == pytest.approx(abs(answer.shear_pa[:, 1]).sum(), rel=0.1)
+
+
 def test_misuse_is_told(url):
     with pytest.raises(papilla.Unreachable, match="papilla-server"):
         papilla.Session("http://127.0.0.1:1")

@@ -27,9 +27,10 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (frames, hz): (u32, f64) = (argument(2, "1000").parse()?, argument(3, "1000").parse()?);
     let fingers: u8 = argument(4, "1").parse()?;
     let shape = AnnouncedShape::Sphere(Sphere { radius_mm: 10.0 });
+    let object = AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None };
     let hello = Hello {
         input: Some(Input::Objects),
-        objects: Some(vec![AnnouncedObject { shape, stiffness_mpa_per_mm: None }]),
+        objects: Some(vec![object]),
         fingers: Some(vec![AnnouncedFinger::default(); fingers.into()]),
         map: Some(tier.is_some()),
         answer_layout: Some(SampleLayout::Vertices),

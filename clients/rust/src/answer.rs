@@ -66,6 +66,8 @@ pub struct Answer {
     pub touch: Option<Touch>,
     /// The pressure that was found, Pa, if asked for.
     pub pressure_pa: Vec<f32>,
+    /// Traction along the skin at each vertex, Pa, in the finger's frame, if asked for.
+    pub shear_pa: Vec<[f32; 3]>,
     /// What the map shows at the vertices, if asked for in its place.
     pub vertices: Vec<f32>,
     /// The effect `summary`.
@@ -111,6 +113,7 @@ impl Answer {
             map: Vec::new(),
             touch: None,
             pressure_pa: Vec::new(),
+            shear_pa: Vec::new(),
             vertices: Vec::new(),
             summary: None,
             points: Vec::new(),
@@ -176,6 +179,9 @@ impl Answer {
             match section.name {
                 SectionName::Touch => self.touch = Touch::decode(part),
                 SectionName::Pressure => self.pressure_pa = floats(part)?,
+                SectionName::Shear => {
+                    self.shear_pa = floats(part)?.as_chunks::<3>().0.to_vec();
+                }
                 SectionName::Vertices => {
                     self.vertices = vec![0.0; part.len() / header.sample_type.bytes()];
                     header
@@ -217,15 +223,32 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn spikes_are_read_by_the_clock_of_the_frame() {
-        let ready: Ready = from_value(json!({
+    fn ready(section: &str, bytes: usize) -> Ready {
+        from_value(json!({
             "version": 2, "session": 1, "tier": "nano", "effects": [], "atlas_hash": "",
             "predicted_latency_us": 1, "width": 224, "height": 224, "sample_type": "f32",
             "pressure_max_pa": 1e4, "sed_scale_j_per_m3": 1.0,
-            "sections": [{"name": "spikes", "offset": HEADER_LEN_V2, "bytes": 24}],
+            "sections": [{"name": section, "offset": HEADER_LEN_V2, "bytes": bytes}],
         }))
-        .unwrap();
+        .unwrap()
+    }
+
+    #[test]
+    fn shear_is_three_numbers_a_vertex() {
+        let ready = ready("shear", 24);
+        let header = FrameHeader::pressure(1, 0, 0, SampleType::F32, 1.0);
+        let header = header.windowed(Window::EMPTY);
+        let mut message = header.encode().to_vec();
+        message.extend([1f32, 2.0, 3.0, 4.0, 5.0].map(f32::to_le_bytes).as_flattened());
+        let read = |message: &[u8]| Answer::read(&header, message, &ready, String::new());
+        assert!(read(&message).is_err(), "the section has 24 bytes");
+        message.extend(6f32.to_le_bytes());
+        assert_eq!(read(&message).unwrap().shear_pa, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    }
+
+    #[test]
+    fn spikes_are_read_by_the_clock_of_the_frame() {
+        let ready = ready("spikes", 24);
         let time_us = 7_000_000;
         let header = FrameHeader::pressure(1, time_us, 0, SampleType::F32, 1.0);
         let header = header.windowed(Window::EMPTY);

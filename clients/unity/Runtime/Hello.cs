@@ -24,7 +24,7 @@ namespace Papilla
 
         static readonly string[] OfVersion3 =
         {
-            "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure",
+            "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear",
         };
 
         /// <summary>A hello from its members on the wire, without type and version.</summary>

@@ -54,7 +54,7 @@ export type Shape =
 
 /** What a hand asks for; answers are f32. */
 export interface HandHello {
-  objects?: { shape: Shape; stiffness_mpa_per_mm?: number }[];
+  objects?: { shape: Shape; stiffness_mpa_per_mm?: number; friction?: number }[];
   fingers?: { width?: number; stiffness?: number }[];
   input_layout?: 'map' | 'vertices';
   answer_layout?: 'map' | 'vertices';

@@ -8,6 +8,9 @@ use crate::patch::Patch;
 pub struct Contact {
     /// True normal pressure at each vertex of the skin, Pa.
     pub pressure_pa: Vec<f32>,
+    /// True tangential traction on the skin at each vertex, Pa, in the finger's frame; empty of a
+    /// solver without friction.
+    pub shear_pa: Vec<[f32; 3]>,
     /// Force on the finger, N, in its frame.
     pub force_n: [f64; 3],
     /// Torque of it about the origin of the finger's frame, N mm.
@@ -96,12 +99,16 @@ impl Contact {
     pub(crate) fn clear(&mut self) {
         for &vertex in &self.touched {
             self.pressure_pa[vertex as usize] = 0.0;
+            if let Some(shear_pa) = self.shear_pa.get_mut(vertex as usize) {
+                *shear_pa = [0.0; 3];
+            }
         }
+        let shear_pa = std::mem::take(&mut self.shear_pa);
         let pressure_pa = std::mem::take(&mut self.pressure_pa);
         let mut touched = std::mem::take(&mut self.touched);
         touched.clear();
         let quality = Quality { settled: true, ..Quality::default() };
-        *self = Self { pressure_pa, touched, quality, ..Self::default() };
+        *self = Self { pressure_pa, shear_pa, touched, quality, ..Self::default() };
     }
 
     /// Puts pressure (Pa) at a vertex.
@@ -153,8 +160,14 @@ impl Contact {
     }
 }
 
-/// Sums the patch's forces into `out`.
-pub(crate) fn collect(model: &ContactModel, patch: &Patch, person: Person, out: &mut Contact) {
+/// Sums the patch's forces into `out`; `shear_n` is the part of each slot along the skin.
+pub(crate) fn collect(
+    model: &ContactModel,
+    patch: &Patch,
+    person: Person,
+    shear_n: impl Fn(usize) -> [f32; 3],
+    out: &mut Contact,
+) {
     let v = &patch.values;
     let mut size_n = 0.0;
     for slot in 0..patch.near() {
@@ -166,6 +179,10 @@ pub(crate) fn collect(model: &ContactModel, patch: &Patch, person: Person, out: 
         let area = f64::from(model.areas_mm2[vertex as usize]) * stretch(model, patch, vertex);
         let pressure = person.stiffness * PA_PER_MPA * size / area;
         out.press(vertex, pressure as f32);
+        if let Some(shear_pa) = out.shear_pa.get_mut(vertex as usize) {
+            let per = person.stiffness * PA_PER_MPA / area;
+            *shear_pa = shear_n(slot).map(|force| (per * f64::from(force)) as f32);
+        }
         let at = std::array::from_fn(|i| {
             model.positions_mm[vertex as usize][i] + f64::from(v.moved[i][slot])
         });

@@ -100,6 +100,9 @@ pub enum ContactError {
         /// Found.
         value: f32,
     },
+    /// Friction where none can be found.
+    #[error("an object has friction, but {0}")]
+    Friction(&'static str),
     /// The iteration ran away; the last frame is forgotten.
     #[error("no finite pressure was found for this frame; the next one starts anew")]
     Diverged,

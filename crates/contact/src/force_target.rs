@@ -73,7 +73,10 @@ impl Solver {
         net.validate()?;
         let everywhere = f32::INFINITY;
         self.within(scene.into(), everywhere, |solver, view| {
-            solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame)
+            let travel = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame)?;
+            let shift_mm = net.direction.map(|d| d * travel / view.length);
+            solver.follow_slip(View { shift_mm, ..view });
+            Ok(travel)
         })
     }
 

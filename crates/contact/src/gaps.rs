@@ -91,7 +91,8 @@ impl Field {
         let normal = self.normal[vertex].map(f64::from);
         let along: f64 = (0..3).map(|i| normal[i] * moved[i]).sum();
         let gap_mm = f64::from(self.gap_mm[vertex]) + along;
-        Nearest { gap_mm, normal, stiffness_mpa_per_mm: self.stiffness_mpa_per_mm }
+        let stiffness_mpa_per_mm = self.stiffness_mpa_per_mm;
+        Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction: 0.0, object: 0 }
     }
 
     pub(crate) fn with_capacity(vertices: usize) -> Self {

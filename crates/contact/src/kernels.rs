@@ -116,30 +116,32 @@ impl WithSimd for Displace<'_> {
     }
 }
 
-/// `matrix[i][k] = sum_ab normal[a][i] blocks[i][3 a + b][k] normal[b][k]`.
-pub(crate) struct AlongNormals<'a> {
+/// `matrix[i][k] = sum_ab rows[a][i] blocks[i][3 a + b][k] columns[b][k]`: compliance along unit
+/// vectors.
+pub(crate) struct Along<'a> {
     pub blocks: &'a [f32],
     pub stride: usize,
-    pub normal: [&'a [f32]; 3],
+    pub rows: [&'a [f32]; 3],
+    pub columns: [&'a [f32]; 3],
     pub matrix: &'a mut [f32],
 }
 
-impl WithSimd for AlongNormals<'_> {
+impl WithSimd for Along<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { blocks, stride, normal, matrix } = self;
-        let m = normal[0].len();
+        let Self { blocks, stride, rows, columns, matrix } = self;
+        let m = columns[0].len();
         for (i, row) in matrix.chunks_mut(stride).take(m).enumerate() {
             let row = &mut row[..m];
             row.fill(0.0);
             for b in 0..3 {
                 let of = |a: usize| &blocks[(9 * i + 3 * a + b) * stride..][..m];
                 let (row, row_rest) = S::as_mut_simd_f32s(row);
-                let (other, other_rest) = S::as_simd_f32s(normal[b]);
+                let (other, other_rest) = S::as_simd_f32s(columns[b]);
                 for a in 0..3 {
-                    let own = normal[a][i];
+                    let own = rows[a][i];
                     let factor = simd.splat_f32s(own);
                     let (plane, plane_rest) = S::as_simd_f32s(of(a));
                     for ((sum, p), n) in row.iter_mut().zip(plane).zip(other) {

@@ -29,6 +29,7 @@
 mod answer;
 mod bounded;
 mod clusters;
+mod discs;
 mod error;
 mod file;
 mod force_target;
@@ -55,6 +56,6 @@ pub use gaps::Gaps;
 pub use ladder::Method;
 pub use layer::Layer;
 pub use model::{Arrays, ContactModel, Header};
-pub use objects::{Object, Scene};
+pub use objects::{FRICTION_MAX, Object, Scene};
 pub use pixels::{PixelContact, PixelMemory, PixelSkin};
-pub use solver::{Memory, Settings, Solver};
+pub use solver::{Anchor, Memory, Settings, Solver};

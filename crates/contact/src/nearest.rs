@@ -8,6 +8,10 @@ pub(crate) struct Nearest {
     pub gap_mm: f64,
     pub normal: [f64; 3],
     pub stiffness_mpa_per_mm: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
+    /// Index of the object; of what is told by gaps 0.
+    pub object: u32,
 }
 
 /// Refuses a stiffness that is none.

@@ -17,6 +17,9 @@ pub struct Object {
     /// Stiffness of its surface, MPa/mm: pressure over how far it gives way there. Infinite for
     /// a rigid one.
     pub stiffness_mpa_per_mm: f64,
+    /// Coulomb's coefficient of friction; 0 of a slippery one. An object that has it keeps its
+    /// place in the list from frame to frame.
+    pub friction: f64,
 }
 
 /// What lies round a finger in a frame.
@@ -32,12 +35,14 @@ pub enum Scene<'a> {
 const ROTATION_MISS_MAX: f64 = 1e-3;
 /// Farthest place of an object, mm.
 const PLACE_MAX_MM: f64 = 1e5;
+/// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
+pub const FRICTION_MAX: f64 = 10.0;
 
 impl Object {
     /// A rigid object.
     #[must_use]
     pub fn rigid(shape: Arc<dyn SignedDistance>, placement: Placement) -> Self {
-        Self { shape, placement, stiffness_mpa_per_mm: f64::INFINITY }
+        Self { shape, placement, stiffness_mpa_per_mm: f64::INFINITY, friction: 0.0 }
     }
 }
 
@@ -90,6 +95,10 @@ pub(crate) fn validate(objects: &[Object]) -> Result<(), ContactError> {
             return Err(ContactError::Rotation { object: index, miss });
         }
         require_stiffness("objects[].stiffness_mpa_per_mm", object.stiffness_mpa_per_mm)?;
+        if !(0.0..=FRICTION_MAX).contains(&object.friction) {
+            let (member, value) = ("objects[].friction", object.friction);
+            return Err(ContactError::Value { member, value, rule: "has to be 0 to 10" });
+        }
     }
     Ok(())
 }
@@ -138,20 +147,20 @@ impl View<'_> {
             gap_mm: f64::INFINITY,
             normal: [0.0, 0.0, 1.0],
             stiffness_mpa_per_mm: f64::INFINITY,
+            friction: 0.0,
+            object: 0,
         };
-        for o in objects {
-            let Placement { rotation: r, origin_mm } = &o.placement;
-            let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
-            let local = [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2]);
-            let found = o.shape.distance(local);
+        for (object, o) in (0..).zip(objects) {
+            let r = &o.placement.rotation;
+            let found = o.shape.distance(local(&o.placement, p));
             let gap_mm = found.gap_mm / self.length;
             if gap_mm < nearest.gap_mm {
                 let n = found.normal;
                 let size = n.iter().map(|v| v * v).sum::<f64>().sqrt();
                 let turned = r.map(|row| (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]) / size);
                 let normal = if size > 1e-6 { turned } else { nearest.normal };
-                let stiffness_mpa_per_mm = o.stiffness_mpa_per_mm;
-                nearest = Nearest { gap_mm, normal, stiffness_mpa_per_mm };
+                let (stiffness_mpa_per_mm, friction) = (o.stiffness_mpa_per_mm, o.friction);
+                nearest = Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object };
             }
         }
         nearest
@@ -204,7 +213,34 @@ impl View<'_> {
         objects.iter().map(free).fold(f64::INFINITY, f64::min) / self.length
     }
 
+    /// Whether any object has friction.
+    pub(crate) fn is_rough(&self) -> bool {
+        matches!(self.things, Things::Objects(objects) if objects.iter().any(|o| o.friction > 0.0))
+    }
+
+    /// A place (reference mm) in an object's own frame, mm.
+    pub(crate) fn on_object(&self, object: u32, at_mm: [f64; 3]) -> Option<[f64; 3]> {
+        let Things::Objects(objects) = self.things else { return None };
+        objects.get(object as usize).map(|o| local(&o.placement, self.seen(at_mm)))
+    }
+
+    /// Where a place in an object's own frame (mm) is now, reference mm.
+    pub(crate) fn off_object(&self, object: u32, place_mm: [f64; 3]) -> Option<[f64; 3]> {
+        let Things::Objects(objects) = self.things else { return None };
+        let Placement { rotation, origin_mm } = &objects.get(object as usize)?.placement;
+        Some(std::array::from_fn(|i| {
+            let turned: f64 = (0..3).map(|k| rotation[i][k] * place_mm[k]).sum();
+            (turned + origin_mm[i]) / self.length + self.shift_mm[i]
+        }))
+    }
+
     fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.length * (at_mm[i] - self.shift_mm[i]))
     }
+}
+
+/// A place in the frame of a placed object.
+fn local(Placement { rotation: r, origin_mm }: &Placement, p: [f64; 3]) -> [f64; 3] {
+    let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
+    [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
 }

@@ -4,7 +4,7 @@
 //! densely, from frame to frame: a vertex that comes costs a row and a column. The
 //! first [`Patch::near`] slots are those that can carry force.
 
-use crate::kernels::{AlongNormals, Displace, run};
+use crate::kernels::{Along, Displace, run};
 use crate::model::ContactModel;
 
 /// No slot.
@@ -270,12 +270,22 @@ impl Patch {
     pub(crate) fn along_normals(&self, matrix: &mut [f32]) {
         let (m, stride) = (self.near, self.stride);
         let Slots { normal, object, .. } = &self.values;
-        let [x, y, z] = normal;
-        let normal = [&x[..m], &y[..m], &z[..m]];
-        run(AlongNormals { blocks: &self.blocks, stride, normal, matrix });
+        let normal = normal.each_ref().map(|v| &v[..m]);
+        self.along(normal, normal, matrix);
         for (i, give) in object[..m].iter().enumerate() {
             matrix[i * stride + i] += give;
         }
+    }
+
+    /// Fills rows of compliance between near slots, from unit vectors `columns` to `rows`.
+    pub(crate) fn along(&self, rows: [&[f32]; 3], columns: [&[f32]; 3], matrix: &mut [f32]) {
+        run(Along { blocks: &self.blocks, stride: self.stride, rows, columns, matrix });
+    }
+
+    /// Displacement of the near slots by compliance alone under forces on them.
+    pub(crate) fn displacement(&self, force: [&[f32]; 3], linear: &mut [Vec<f32>; 3]) {
+        let (blocks, stride, rows) = (&self.blocks[..], self.stride, self.near);
+        run(Displace { blocks, stride, rows, force, linear });
     }
 
     pub(crate) fn stride(&self) -> usize {

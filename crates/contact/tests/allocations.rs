@@ -74,7 +74,12 @@ fn ball(step: u32) -> Object {
 #[test]
 fn a_warm_frame_takes_no_memory() {
     let (model, mut pixels) = model();
-    let settings = Settings { method: Method::SmallStrain, stiffness: true, ..Settings::default() };
+    let settings = Settings {
+        method: Method::SmallStrain,
+        stiffness: true,
+        friction: true,
+        ..Settings::default()
+    };
     let mut solver = Solver::new(model.clone(), settings).expect("a solver");
     let mut out = Contact::new(model.vertices());
     let objects: Vec<_> = (0..20).map(ball).collect();
@@ -83,6 +88,9 @@ fn a_warm_frame_takes_no_memory() {
     let mut frame = |object: &Object| {
         solver.solve(std::slice::from_ref(object), &mut out).expect("an answer");
         assert!(out.force_n[2] > 0.0);
+        let rough = [Object { friction: 0.4, ..object.clone() }];
+        solver.solve(&rough, &mut out).expect("an answer");
+        solver.solve_for_force(&rough, net, &mut out).expect("a travel");
         let gaps = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
         solver.solve(gaps, &mut out).expect("an answer");
         solver.solve_for_force(std::slice::from_ref(object), net, &mut out).expect("a travel");

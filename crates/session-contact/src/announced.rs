@@ -1,9 +1,12 @@
 //! What a hello announces: objects and fingers.
 
-use papilla_contact::{Object, Person};
+use papilla_contact::{FRICTION_MAX, Object, Person};
 use papilla_proto::{
     Hello, Problem, SampleType,
-    contact::{AnnouncedFinger, ContactMethod, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
+    contact::{
+        AnnouncedFinger, AnnouncedObject, ContactMethod, FINGERS_MAX, Input, OBJECTS_MAX,
+        SampleLayout,
+    },
     sdf::Placement,
 };
 
@@ -21,6 +24,7 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         (hello.force_target.is_some(), "force_target"),
         (hello.stiffness.is_some(), "stiffness"),
         (hello.pressure.is_some(), "pressure"),
+        (hello.shear.is_some(), "shear"),
     ];
     if let (Input::Pressure, Some((_, member))) = (input, of_solve.iter().find(|(there, _)| *there))
     {
@@ -34,6 +38,14 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         let message = "'pixels' is of input 'objects': gaps say nothing of what is between them";
         return Err(unusable("method", message));
     }
+    if input == Input::Gaps && hello.shear == Some(true) {
+        return Err(unusable("shear", "'shear' is of input 'objects': gaps tell no motion"));
+    }
+    let at_vertices = [ContactMethod::SmallStrain, ContactMethod::SecondOrder];
+    if has_friction(hello) && !at_vertices.contains(&hello.method.unwrap_or_default()) {
+        let message = "friction and 'shear' are of the methods 'small_strain' and 'second_order'";
+        return Err(unusable("method", message));
+    }
     let exact = match input {
         Input::Pressure => true,
         Input::Objects => hello.sample_type == SampleType::F32,
@@ -44,6 +56,12 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         return Err(unusable("sample_type", message));
     }
     Ok(())
+}
+
+/// Whether contact has to find friction.
+pub(crate) fn has_friction(hello: &Hello) -> bool {
+    let rough = |object: &AnnouncedObject| object.friction.is_some_and(|f| f != 0.0);
+    hello.shear == Some(true) || hello.objects.iter().flatten().any(rough)
 }
 
 /// The objects, each as far away as can be.
@@ -65,7 +83,7 @@ pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Proble
         let message = format!("{size} triangles and heights in all; {SIZE_MAX} at most");
         return Err(unusable("objects", message));
     }
-    let object = |(index, announced): (usize, &papilla_proto::contact::AnnouncedObject)| {
+    let object = |(index, announced): (usize, &AnnouncedObject)| {
         let field = format!("objects[{index}].shape");
         let shape = announced.shape.build(&field);
         let shape = shape.map_err(|error| unusable(field, error.to_string()))?;
@@ -75,9 +93,14 @@ pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Proble
             let field = format!("objects[{index}].stiffness_mpa_per_mm");
             return Err(unusable(field, message));
         }
+        let friction = announced.friction.unwrap_or(0.0);
+        if !(0.0..=FRICTION_MAX).contains(&friction) {
+            let message = format!("{friction}; a coefficient of friction is 0 to {FRICTION_MAX}");
+            return Err(unusable(format!("objects[{index}].friction"), message));
+        }
         let mut placement = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
         placement.origin_mm[2] = -AWAY_MM;
-        Ok(Object { shape, placement, stiffness_mpa_per_mm })
+        Ok(Object { shape, placement, stiffness_mpa_per_mm, friction })
     };
     list.iter().enumerate().map(object).collect()
 }

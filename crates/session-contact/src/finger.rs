@@ -14,7 +14,7 @@ use papilla_proto::{
 use papilla_session_state::{Reader, StateError, Writer};
 
 use super::{
-    FrameForm, Skin,
+    FrameForm, Skin, announced,
     solver::{FingerSolver, of_contact},
     unusable,
 };
@@ -32,6 +32,7 @@ pub struct Finger {
     raster: Arc<Raster>,
     sampler: Option<VertexSampler>,
     pressure: Option<SampleLayout>,
+    has_shear: bool,
     /// The pressure that is sent, if as a map.
     sent_pa: Vec<f32>,
     touch: Touch,
@@ -73,18 +74,23 @@ impl Finger {
             Input::Pressure if of_map => 0,
             _ => form.payload_len_max(1),
         };
+        let mut out = Contact::new(if form.is_window() { 0 } else { vertices });
+        if announced::has_friction(hello) {
+            out.shear_pa.resize(vertices, [0.0; 3]);
+        }
         let sends_map = hello.pressure == Some(SampleLayout::Map);
         Ok(Self {
             form,
             person,
             solver,
-            out: Contact::new(if form.is_window() { 0 } else { vertices }),
+            out,
             objects,
             samples: vec![0.0; samples],
             depth_mm: vec![0.0; if is_gaps { vertices } else { 0 }],
             raster: Arc::clone(skin.raster),
             sampler: (is_gaps && of_map).then(|| VertexSampler::new(skin.atlas, skin.raster)),
             pressure: hello.pressure,
+            has_shear: hello.shear == Some(true),
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
             touch: Touch::default(),
         })
@@ -110,7 +116,8 @@ impl Finger {
             SampleLayout::Map => 4 * self.sent_pa.len(),
             SampleLayout::Vertices => 4 * self.out.pressure_pa.len(),
         });
-        (touch + pressure).next_multiple_of(16)
+        let shear = if self.has_shear { 12 * self.out.shear_pa.len() } else { 0 };
+        (touch + pressure).next_multiple_of(16) + shear.next_multiple_of(16)
     }
 
     /// Stiffness of the tissue over that of the reference finger: the network is asked about
@@ -231,24 +238,28 @@ impl Finger {
         self.solver.as_mut().map_or(Ok(()), |solver| solver.restore(state))
     }
 
-    /// Appends what pushes back, and the pressure if it was asked for, each up to a multiple of 16.
+    /// Appends what pushes back, and pressure and shear if they were asked for, each up to a
+    /// multiple of 16.
     pub fn write(&mut self, bytes: &mut BytesMut) {
         if self.form.input != Input::Pressure {
             bytes.extend_from_slice(&self.touch.encode());
         }
         let Self { raster, out, sent_pa, solver, .. } = self;
-        let values = match self.pressure {
-            None => return,
+        let pressure_pa: &[f32] = match self.pressure {
+            None => &[],
             Some(SampleLayout::Vertices) => &out.pressure_pa,
             Some(SampleLayout::Map) => {
                 draw(raster, solver.as_ref().and_then(FingerSolver::pixels), out, sent_pa);
                 sent_pa
             }
         };
-        for value in values {
-            bytes.extend_from_slice(&value.to_le_bytes());
+        let shear_pa = if self.has_shear { out.shear_pa.as_flattened() } else { &[] };
+        for values in [pressure_pa, shear_pa] {
+            for value in values {
+                bytes.extend_from_slice(&value.to_le_bytes());
+            }
+            bytes.resize(bytes.len().next_multiple_of(16), 0);
         }
-        bytes.resize(bytes.len().next_multiple_of(16), 0);
     }
 
     fn read_samples(

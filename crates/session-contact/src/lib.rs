@@ -77,7 +77,8 @@ fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
 impl Hand {
     /// The fingers that a hello of version 3 announces.
     ///
-    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over, 16 on pixels.
+    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over, 16 on pixels or
+    /// with friction.
     ///
     /// # Errors
     /// A member is unusable or missing; the problem names it.
@@ -148,7 +149,13 @@ fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {
     let pressure = hello.pressure.map(|layout| 4 * samples(layout));
     let mut offset = HEADER_LEN_V2;
     let mut sections = Vec::new();
-    for (name, bytes) in [(SectionName::Touch, touch), (SectionName::Pressure, pressure)] {
+    let shear = (hello.shear == Some(true)).then_some(12 * vertices);
+    let all = [
+        (SectionName::Touch, touch),
+        (SectionName::Pressure, pressure),
+        (SectionName::Shear, shear),
+    ];
+    for (name, bytes) in all {
         let Some(bytes) = bytes else { continue };
         sections.push(Section { name, offset: offset as u32, bytes: bytes as u32 });
         offset = (offset + bytes).next_multiple_of(16);

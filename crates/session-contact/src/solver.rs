@@ -9,12 +9,13 @@ use papilla_contact::{
 use papilla_proto::{ErrorCode, Hello, Problem, contact::ContactMethod};
 use papilla_session_state::{Reader, StateError, Writer};
 
-use super::{Skin, unusable, warm_start};
+use super::{Skin, announced, unusable, warm_start};
 
 /// Contact of one finger by the method of its hello.
 pub(crate) struct FingerSolver {
     solver: Solver,
     pixels: Option<PixelContact>,
+    has_friction: bool,
 }
 
 impl FingerSolver {
@@ -30,7 +31,9 @@ impl FingerSolver {
             ContactMethod::SmallStrain => Method::SmallStrain,
             ContactMethod::SecondOrder | ContactMethod::Pixels => Method::SecondOrder,
         };
-        let settings = Settings { method, person, stiffness: hello.stiffness == Some(true) };
+        let stiffness = hello.stiffness == Some(true);
+        let has_friction = announced::has_friction(hello);
+        let settings = Settings { method, person, stiffness, friction: has_friction };
         let solver = Solver::new(Arc::clone(model), settings);
         let pixels = match (asked, skin.pixels) {
             (ContactMethod::Pixels, None) => {
@@ -42,7 +45,7 @@ impl FingerSolver {
             (ContactMethod::Pixels, Some(skin)) => Some(PixelContact::new(Arc::clone(skin), model)),
             _ => None,
         };
-        Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels })
+        Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels, has_friction })
     }
 
     /// Finds what presses; returns how far things travelled to meet a net force, mm.
@@ -52,7 +55,7 @@ impl FingerSolver {
         net: Option<NetForce>,
         out: &mut Contact,
     ) -> Result<f64, ContactError> {
-        let Self { solver, pixels } = self;
+        let Self { solver, pixels, .. } = self;
         match (pixels, scene, net) {
             (Some(pixels), Scene::Objects(objects), Some(net)) => {
                 solver.solve_for_force_on_pixels(objects, net, pixels, out)
@@ -72,7 +75,11 @@ impl FingerSolver {
 
     /// Writes what the next frame starts from.
     pub(crate) fn save(&self, state: &mut Writer) {
-        warm_start::write(&self.solver.memory(), state);
+        let memory = self.solver.memory();
+        warm_start::write(&memory, state);
+        if self.has_friction {
+            warm_start::write_anchors(&memory.anchors, state);
+        }
         if let Some(pixels) = &self.pixels {
             warm_start::write_pixels(&pixels.memory(), state);
         }
@@ -80,7 +87,11 @@ impl FingerSolver {
 
     /// Goes on from what a solver of the same hello has saved.
     pub(crate) fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
-        let mut fits = self.solver.recall(&warm_start::read(state)?);
+        let mut memory = warm_start::read(state)?;
+        if self.has_friction {
+            memory.anchors = warm_start::read_anchors(state)?;
+        }
+        let mut fits = self.solver.recall(&memory);
         if let Some(pixels) = &mut self.pixels {
             fits &= pixels.recall(&warm_start::read_pixels(state)?);
         }
@@ -96,6 +107,7 @@ pub(crate) fn of_contact(error: &ContactError) -> Problem {
         ContactError::Gaps { .. } => "payload".to_owned(),
         ContactError::Depth { vertex, .. } => format!("depth_mm[{vertex}]"),
         ContactError::Force { .. } => "force_n".to_owned(),
+        ContactError::Friction(_) => "method".to_owned(),
         ContactError::Diverged => {
             return Problem::new(ErrorCode::BadContact, error.to_string());
         }

@@ -65,7 +65,7 @@ impl Plane {
 
 fn ball(radius_mm: f64) -> AnnouncedObject {
     let shape = AnnouncedShape::Sphere(Sphere { radius_mm });
-    AnnouncedObject { shape, stiffness_mpa_per_mm: None }
+    AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None }
 }
 
 fn objects() -> Hello {
@@ -170,6 +170,80 @@ fn a_net_force_is_met_by_poses_and_by_gaps() {
     assert!((by_gaps.travel_mm - found.travel_mm).abs() < 0.02, "{by_gaps:?} {found:?}");
 }
 
+fn rough(friction: f64) -> Hello {
+    Hello {
+        objects: Some(vec![AnnouncedObject { friction: Some(friction), ..ball(20.0) }]),
+        shear: Some(true),
+        ..objects()
+    }
+}
+
+fn aside(by_mm: f32) -> [u8; POSE_LEN] {
+    Pose { origin_mm: [0.0, by_mm, 0.3 - 20.0], ..Pose::default() }.encode()
+}
+
+/// The touch has the pull, the section behind it the traction at each vertex; and it goes on where
+/// the session goes.
+#[test]
+fn a_rough_ball_pulls_and_goes_on_elsewhere() {
+    let plane = Plane::new();
+    let hand = plane.hand(&rough(0.5)).expect("a hand");
+    let vertices = SIDE * SIDE;
+    let shear = Section {
+        name: SectionName::Shear,
+        offset: (HEADER_LEN_V2 + TOUCH_LEN) as u32,
+        bytes: 12 * vertices as u32,
+    };
+    assert_eq!(hand.sections()[1], shear);
+    let (pressed, _) = touch(&hand, 0, &aside(0.0)).expect("an answer");
+    assert!(pressed.force_n[1].abs() < 1e-3 * pressed.force_n[2], "{pressed:?}");
+    let other = plane.hand(&rough(0.5)).expect("a hand");
+    let mut state = Writer::default();
+    hand.fingers()[0].lock().expect("no panic").save(&mut state);
+    let state = state.finish();
+    let mut reader = Reader::new(&state);
+    other.fingers()[0].lock().expect("no panic").restore(&mut reader).expect("its state");
+    reader.end().expect("nothing more");
+    let mut answers = [&hand, &other].map(|hand| {
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        finger.take(&aside(0.4), SampleType::F32, 1.0, None).expect("an answer");
+        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        finger.write(&mut bytes);
+        bytes
+    });
+    // The time of the solve differs.
+    answers.iter_mut().for_each(|bytes| bytes[HEADER_LEN_V2 + 60..][..4].fill(0));
+    assert_eq!(answers[0], answers[1]);
+    let pulled = Touch::decode(&answers[0][HEADER_LEN_V2..]).expect("it lies there");
+    let share = pulled.force_n[1] / pulled.force_n[2];
+    assert!((0.49..0.51).contains(&share), "{pulled:?}");
+    let section = &answers[0][shear.offset as usize..][..shear.bytes as usize];
+    let sum: f32 = section
+        .as_chunks::<12>()
+        .0
+        .iter()
+        .map(|v| f32::from_le_bytes([v[4], v[5], v[6], v[7]]))
+        .sum();
+    // Each vertex stands for a square millimetre.
+    assert!((1e-6 * sum / pulled.force_n[1] - 1.0).abs() < 0.02, "{sum} Pa, {pulled:?}");
+}
+
+/// A session that names no friction remembers in the bytes that it always did.
+#[test]
+fn what_has_no_friction_remembers_none() {
+    let plane = Plane::new();
+    let len = |hello: &Hello| {
+        let hand = plane.hand(hello).expect("a hand");
+        touch(&hand, 0, &aside(0.0)).expect("an answer");
+        let mut state = Writer::default();
+        hand.fingers()[0].lock().expect("no panic").save(&mut state);
+        state.finish().len()
+    };
+    let slippery = Hello { objects: rough(0.0).objects, ..objects() };
+    assert_eq!(len(&slippery), len(&objects()));
+    assert!(len(&rough(0.5)) > len(&objects()));
+}
+
 #[test]
 fn a_map_of_gaps_presses_as_vertices_do() {
     let plane = Plane::new();
@@ -203,7 +277,7 @@ fn each_finger_has_its_own_state_and_factors() {
 fn bad_hellos_are_refused_by_member() {
     let plane = Plane::new();
     let open = Mesh { vertices_mm: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]; 4] };
-    let open = AnnouncedObject { shape: AnnouncedShape::Mesh(open), stiffness_mpa_per_mm: None };
+    let open = AnnouncedObject { shape: AnnouncedShape::Mesh(open), ..ball(1.0) };
     let soft = AnnouncedObject { stiffness_mpa_per_mm: Some(-1.0), ..ball(1.0) };
     let thin = AnnouncedFinger { width: 0.0, stiffness: 1.0 };
     let with = |objects_: Vec<AnnouncedObject>| Hello { objects: Some(objects_), ..objects() };
@@ -214,6 +288,13 @@ fn bad_hellos_are_refused_by_member() {
         (with(vec![ball(1.0), ball(0.0)]), "objects[1].shape"),
         (with(vec![open]), "objects[0].shape"),
         (with(vec![soft]), "objects[0].stiffness_mpa_per_mm"),
+        (rough(-0.1), "objects[0].friction"),
+        (rough(f64::NAN), "objects[0].friction"),
+        (rough(11.0), "objects[0].friction"),
+        (Hello { method: Some(ContactMethod::Springs), ..rough(0.5) }, "method"),
+        (Hello { method: Some(ContactMethod::Pixels), ..rough(0.5) }, "method"),
+        (Hello { input: Some(Input::Gaps), objects: None, ..rough(0.5) }, "shear"),
+        (Hello { input: None, objects: None, ..rough(0.5) }, "shear"),
         (Hello { fingers: Some(Vec::new()), ..objects() }, "fingers"),
         (Hello { fingers: Some(vec![AnnouncedFinger::default(); 11]), ..objects() }, "fingers"),
         (Hello { fingers: Some(vec![thin]), ..objects() }, "fingers[0].width"),

@@ -1,6 +1,6 @@
 //! The warm start of a finger's solver as bytes.
 
-use papilla_contact::{Memory, PixelMemory};
+use papilla_contact::{Anchor, Memory, PixelMemory};
 use papilla_session_state::{Reader, StateError, Writer};
 
 /// More vertices than any patch holds, and than a map has pixels: what a damaged count can make the
@@ -8,7 +8,7 @@ use papilla_session_state::{Reader, StateError, Writer};
 const VERTICES_MAX: usize = 1 << 16;
 
 pub(crate) fn write(memory: &Memory, state: &mut Writer) {
-    let Memory { vertices, near, stride, made, forces_n, made_with, reached } = memory;
+    let Memory { vertices, near, stride, made, forces_n, made_with, reached, .. } = memory;
     for count in [vertices.len(), *near, *stride, *made] {
         state.number(count as u64);
     }
@@ -18,6 +18,30 @@ pub(crate) fn write(memory: &Memory, state: &mut Writer) {
     let bits = |of: usize| reached.map(|reached| reached[of].to_bits());
     state.option(bits(0));
     state.option(bits(1));
+}
+
+/// Of a session whose objects may have friction.
+pub(crate) fn write_anchors(anchors: &[Anchor], state: &mut Writer) {
+    state.number(anchors.len() as u64);
+    for Anchor { vertex, object, place_mm } in anchors {
+        state.number(u64::from(*vertex));
+        state.number(u64::from(*object));
+        place_mm.iter().for_each(|value| state.number(value.to_bits()));
+    }
+}
+
+pub(crate) fn read_anchors(state: &mut Reader<'_>) -> Result<Vec<Anchor>, StateError> {
+    let count = state.count(VERTICES_MAX, "a number of anchors")?;
+    let anchor = |_| {
+        let vertex = state.count(u32::MAX as usize, "a vertex")? as u32;
+        let object = state.count(u32::MAX as usize, "an object")? as u32;
+        let mut place_mm = [0.0; 3];
+        for value in &mut place_mm {
+            *value = f64::from_bits(state.number()?);
+        }
+        Ok(Anchor { vertex, object, place_mm })
+    };
+    (0..count).map(anchor).collect()
 }
 
 pub(crate) fn write_pixels(memory: &PixelMemory, state: &mut Writer) {
@@ -56,5 +80,6 @@ pub(crate) fn read(state: &mut Reader<'_>) -> Result<Memory, StateError> {
     state.floats(made_with.as_flattened_mut())?;
     let [travel_mm, slope] = [state.option()?, state.option()?];
     let reached = travel_mm.zip(slope).map(|(a, b)| [a, b].map(f64::from_bits));
-    Ok(Memory { vertices, near, stride, made, forces_n, made_with, reached })
+    let anchors = Vec::new();
+    Ok(Memory { vertices, near, stride, made, forces_n, made_with, reached, anchors })
 }

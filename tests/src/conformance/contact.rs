@@ -147,6 +147,7 @@ impl ContactRecorder {
                 },
                 person: Person { width: finger.width, stiffness: finger.stiffness },
                 stiffness: hello.stiffness == Some(true),
+                friction: hello.objects.iter().flatten().any(|o| o.friction.is_some()),
             };
             Solver::new(Arc::clone(&self.model), settings).map_err(|error| error.to_string())
         };
@@ -225,7 +226,8 @@ fn placed([x, y, z, a, b, c, d]: [f32; 7], object: &AnnouncedObject) -> Result<O
     let shape = object.shape.build("objects").map_err(|error| error.to_string())?;
     let placement = Placement { rotation, origin_mm: pose.origin_mm.map(f64::from) };
     let stiffness_mpa_per_mm = object.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
-    Ok(Object { shape, placement, stiffness_mpa_per_mm })
+    let friction = object.friction.unwrap_or(0.0);
+    Ok(Object { shape, placement, stiffness_mpa_per_mm, friction })
 }
 
 /// A value to seven digits and its tolerance to two.

@@ -40,7 +40,8 @@ impl Contact {
         hello.answer_sample_type = Some(hello.sample_type);
         hello.sample_type = SampleType::F32;
         hello.input = Some(Input::Objects);
-        hello.objects = Some(vec![AnnouncedObject { shape, stiffness_mpa_per_mm: None }]);
+        let object = AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None };
+        hello.objects = Some(vec![object]);
         hello.fingers = Some(vec![AnnouncedFinger::default(); fingers.into()]);
         hello.map = Some(self == Self::Vertices);
         hello.answer_layout = (self == Self::Vertices).then_some(SampleLayout::Vertices);

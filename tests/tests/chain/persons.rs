@@ -54,6 +54,7 @@ fn hand() -> (Hand, [f32; 3]) {
     let ball = |radius_mm| AnnouncedObject {
         shape: AnnouncedShape::Sphere(Sphere { radius_mm }),
         stiffness_mpa_per_mm: None,
+        friction: None,
     };
     let other = AnnouncedFinger { width: WIDTH, stiffness: STIFFNESS };
     let hello = Hello {

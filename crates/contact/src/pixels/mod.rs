@@ -154,6 +154,7 @@ impl Solver {
         out: &mut Contact,
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
+            require_slippery(view)?;
             solver.frame(view, out)?;
             pixels.refine(solver, view, out)
         })
@@ -172,6 +173,7 @@ impl Solver {
     ) -> Result<f64, ContactError> {
         net.validate()?;
         self.within(objects.into(), 0.0, |solver, view| {
+            require_slippery(view)?;
             if solver.reached.is_none() {
                 // Vertices may see nothing of what pixels do; then the way begins where objects are.
                 let _ = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame);
@@ -182,6 +184,14 @@ impl Solver {
             })
         })
     }
+}
+
+/// Refuses friction.
+fn require_slippery(view: View<'_>) -> Result<(), ContactError> {
+    if view.is_rough() {
+        return Err(ContactError::Friction("pixels know no shear: solve at vertices"));
+    }
+    Ok(())
 }
 
 impl PixelContact {

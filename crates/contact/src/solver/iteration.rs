@@ -26,6 +26,7 @@ impl Solver {
             self.remake_matrix();
             let left = FRAME_PRODUCTS_MAX.saturating_sub(effort.products);
             effort.products += self.complement(1.0 - 2.0 * taken, left);
+            effort.products += self.resist_slip(view, 1.0 - 2.0 * taken, left);
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
             if change <= SETTLED_MM {
@@ -100,6 +101,9 @@ impl Solver {
         }
         self.made_with[..m].copy_from_slice(&self.patch.values.object[..m]);
         self.made = m;
+        if let Some(friction) = &mut self.friction {
+            friction.made = 0;
+        }
     }
 
     /// Solves for the sizes of the forces with the compliance scaled by `scale`, of a frame with so
@@ -165,6 +169,9 @@ impl Solver {
             for i in 0..3 {
                 found[i][slot] = size[slot] * normal[i][slot];
             }
+        }
+        if let Some(friction) = self.friction.as_mut().filter(|f| f.is_rough) {
+            friction.take_mean(&mut self.patch);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What a solver keeps from frame to frame: the start of the next one, elsewhere as here.
 
-use super::{Reached, Solver};
+use super::{Anchor, Reached, Solver};
 use crate::bounded::Symmetric;
 
 /// The warm start of a [`Solver`]: from the same memory the same frame gets the same bits.
@@ -20,6 +20,8 @@ pub struct Memory {
     pub made_with: Vec<[f32; 4]>,
     /// Where a net force was met: travel, mm, and slope, N/mm.
     pub reached: Option<[f64; 2]>,
+    /// Where points in contact would be carried from by friction.
+    pub anchors: Vec<Anchor>,
 }
 
 impl Solver {
@@ -38,6 +40,7 @@ impl Solver {
             forces_n: slots.map(|i| [x[i], y[i], z[i], values.size[i]]).collect(),
             made_with: (0..self.made).map(|i| [a[i], b[i], c[i], self.made_with[i]]).collect(),
             reached: self.reached.map(|r| [r.travel_mm, r.slope_n_per_mm]),
+            anchors: self.friction.iter().flat_map(|f| f.anchors()).collect(),
         }
     }
 
@@ -46,12 +49,13 @@ impl Solver {
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
         self.reset();
-        let Memory { vertices, near, stride, made, forces_n, made_with, reached } = memory;
+        let Memory { vertices, near, stride, made, forces_n, made_with, reached, anchors } = memory;
         let fits = forces_n.len() == vertices.len()
             && *near <= vertices.len()
             && (*made == 0 || made == near)
             && made_with.len() == *made
-            && self.patch.refill(&self.model, vertices, *near, *stride);
+            && self.patch.refill(&self.model, vertices, *near, *stride)
+            && anchors.iter().all(|a| self.friction.as_mut().is_some_and(|f| f.hold(*a)));
         if !fits {
             self.reset();
             return false;

@@ -8,6 +8,7 @@
 
 mod approach;
 mod candidates;
+mod friction;
 mod iteration;
 mod memory;
 
@@ -21,6 +22,8 @@ use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
 use crate::springs;
+pub use friction::Anchor;
+use friction::Friction;
 pub use memory::Memory;
 use std::sync::Arc;
 
@@ -72,8 +75,10 @@ pub struct Settings {
     pub method: Method,
     /// Whose finger it is.
     pub person: Person,
-    /// Whether to find the local stiffness too.
+    /// Whether to find the local stiffness too, of the pressure alone.
     pub stiffness: bool,
+    /// Whether objects may have friction: at vertices, with a method that knows compliance.
+    pub friction: bool,
 }
 
 /// Where a net force was met; the next frame starts there.
@@ -106,6 +111,7 @@ pub struct Solver {
     overflow: bool,
     /// Gaps of this frame.
     field: Field,
+    friction: Option<Friction>,
     /// Where the last frame under a net force ended.
     pub(crate) reached: Option<Reached>,
 }
@@ -114,13 +120,17 @@ impl Solver {
     /// A solver of a finger that nothing touches yet.
     ///
     /// # Errors
-    /// [`ContactError::Value`] for factors of a person out of range.
+    /// [`ContactError::Value`] for factors of a person out of range, [`ContactError::Friction`] for
+    /// springs that are to have friction.
     pub fn new(model: Arc<ContactModel>, settings: Settings) -> Result<Self, ContactError> {
         let Person { width, stiffness } = settings.person;
         for (member, value) in [("person.width", width), ("person.stiffness", stiffness)] {
             if !(PERSON[0]..=PERSON[1]).contains(&value) {
                 return Err(ContactError::Value { member, value, rule: "has to be 0.25 to 4" });
             }
+        }
+        if settings.friction && settings.method == Method::Springs {
+            return Err(ContactError::Friction("springs have no compliance along the skin"));
         }
         let patch = Patch::new(model.vertices());
         let [slots, row] = patch.room();
@@ -140,6 +150,7 @@ impl Solver {
             overflow: false,
             field: Field::with_capacity(model.vertices()),
             reached: None,
+            friction: settings.friction.then(|| Friction::new(model.vertices(), [slots, row])),
             patch,
             model,
             settings,
@@ -151,6 +162,9 @@ impl Solver {
         self.patch.clear();
         self.made = 0;
         self.reached = None;
+        if let Some(friction) = &mut self.friction {
+            friction.forget();
+        }
     }
 
     /// The model that it solves with.
@@ -195,7 +209,11 @@ impl Solver {
         scene: impl Into<Scene<'a>>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        self.within(scene.into(), KEPT_MM as f32, |solver, view| solver.frame(view, out))
+        self.within(scene.into(), KEPT_MM as f32, |solver, view| {
+            solver.frame(view, out)?;
+            solver.follow_slip(view);
+            Ok(())
+        })
     }
 
     /// Runs `work` on a view of the scene, of which gaps are told up to `reach_mm`.
@@ -209,20 +227,34 @@ impl Solver {
         match scene {
             Scene::Objects(objects) => {
                 validate(objects)?;
-                let things = Things::Objects(objects);
-                work(self, View { things, length, shift_mm: [0.0; 3] })
+                let view = View { things: Things::Objects(objects), length, shift_mm: [0.0; 3] };
+                self.expect_friction(view)?;
+                work(self, view)
             }
             Scene::Gaps(gaps) => {
                 let mut field = std::mem::take(&mut self.field);
                 let read = field.read(&self.model, gaps, length, reach_mm);
                 let result = read.and_then(|()| {
-                    let things = Things::Field(&field);
-                    work(self, View { things, length, shift_mm: [0.0; 3] })
+                    let view = View { things: Things::Field(&field), length, shift_mm: [0.0; 3] };
+                    self.expect_friction(view)?;
+                    work(self, view)
                 });
                 self.field = field;
                 result
             }
         }
+    }
+
+    /// Takes note of whether anything has friction.
+    fn expect_friction(&mut self, view: View<'_>) -> Result<(), ContactError> {
+        match &mut self.friction {
+            Some(friction) => friction.expect(view.is_rough()),
+            None if view.is_rough() => {
+                return Err(ContactError::Friction("the solver was made without it"));
+            }
+            None => {}
+        }
+        Ok(())
     }
 
     /// Finds what presses on the finger in `view`. A warm frame that runs away is tried once more
@@ -252,11 +284,15 @@ impl Solver {
         self.choose_near();
         self.remake_matrix();
         effort.products += self.complement(1.0, PRODUCTS_MAX);
+        effort.products += self.resist_slip(view, 1.0, PRODUCTS_MAX);
     }
 
     /// Whether what came out is finite.
     fn attempt(&mut self, view: View<'_>, out: &mut Contact) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
+        if self.settings.friction {
+            out.shear_pa.resize(self.model.vertices(), [0.0; 3]);
+        }
         out.clear();
         self.find_candidates(view, &mut out.effort);
         // Where no undeformed vertex lies in a thing, no force is an answer; a warm start could find
@@ -320,7 +356,7 @@ impl Solver {
     }
 
     fn measure_first(&mut self, view: View<'_>, slots: usize, effort: &mut Effort) {
-        let Self { patch, model, settings, .. } = self;
+        let Self { patch, model, settings, friction, .. } = self;
         let Person { width, stiffness } = settings.person;
         effort.distances += slots as u32;
         for slot in 0..slots {
@@ -335,6 +371,9 @@ impl Solver {
             let give = stiffness / (nearest.stiffness_mpa_per_mm * width);
             v.object[slot] = (give / f64::from(model.areas_mm2[vertex])) as f32;
             v.gap[slot] = nearest.gap_mm.min(1e3) as f32 + v.object[slot] * v.size[slot];
+            if let Some(friction) = friction {
+                friction.meet(vertex, nearest.object, nearest.friction);
+            }
         }
     }
 
@@ -352,7 +391,10 @@ impl Solver {
         out.quality.share = self.amplitudes.as_ref().map_or(0.0, |a| a.share);
         out.quality.out_of_range = self.overflow || is_deep || !(out.quality.share <= share_max);
         out.quality.settled = change <= UNSETTLED_MM && least >= -INSIDE_MAX_MM;
-        collect(&self.model, &self.patch, self.settings.person, out);
+        let friction = self.friction.as_ref().filter(|f| f.is_rough);
+        out.quality.settled &= friction.is_none_or(|f| f.violation_mm <= UNSETTLED_MM);
+        let shear_n = |slot: usize| friction.map_or([0.0; 3], |f| f.shear_n(slot));
+        collect(&self.model, &self.patch, self.settings.person, shear_n, out);
         if self.settings.stiffness {
             out.stiffness_n_per_mm = self.stiffness(out);
         }
