@@ -42,6 +42,15 @@ class Lines(unittest.TestCase):
         self.assertEqual(documents.words(text), 4)
 
 
+class Plots(unittest.TestCase):
+    def test_a_text_beyond_the_edge_is_named(self) -> None:
+        text = '<text x="{}" y="9" text-anchor="{}" font-size="10">\n{}\n</text>'
+        svg = '<svg width="100" height="50">' + "".join(text.format(*a) for a in [
+            (50, "middle", "within"), (90, "end", "within too"), (80, "start", "beyond"), (10, "middle", "beyond it"),
+        ])
+        self.assertEqual([fault.split("'")[1] for fault in documents.cut_off(svg)], ["beyond", "beyond it"])
+
+
 class Crates(unittest.TestCase):
     def test_a_circle_is_found(self) -> None:
         self.assertEqual(crates.circle({"a": {"b"}, "b": set()}), [])
