@@ -52,6 +52,12 @@ class Plots(unittest.TestCase):
 
 
 class Crates(unittest.TestCase):
+    def test_what_builds_on_unix_alone_is_named(self) -> None:
+        needs = [("rustix", None, None), ("nix", None, "cfg(unix)"), ("rustix", "dev", None), ("serde", None, None)]
+        dependencies = [{"name": n, "kind": k, "target": t} for n, k, t in needs]
+        found = crates.unix_only({"packages": [{"name": "a", "dependencies": dependencies}]})
+        self.assertEqual([fault.split()[2] for fault in found], ["rustix"])
+
     def test_a_circle_is_found(self) -> None:
         self.assertEqual(crates.circle({"a": {"b"}, "b": set()}), [])
         self.assertIn("a", crates.circle({"a": {"b"}, "b": {"a"}}))

@@ -48,7 +48,7 @@ use std::sync::Arc;
 
 pub use backend::Backend;
 pub use card::Card;
-pub use choice::Choice;
+pub use choice::{Choice, processor_time};
 pub use error::EngineError;
 pub use info::ModelInfo;
 pub use ladder::Ladder;
