@@ -24,6 +24,7 @@
 //! Runtime, faster on large networks; its shared library is opened at
 //! run time from `ORT_DYLIB_PATH`. A [`Choice`] takes the faster of the two for each model.
 
+pub mod agreement;
 mod backend;
 pub mod card;
 mod choice;

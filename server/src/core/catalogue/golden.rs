@@ -6,7 +6,10 @@
 
 use std::sync::Arc;
 
-use papilla_engine::{Backend, EngineError, Model};
+use papilla_engine::{
+    Backend, EngineError, Model,
+    agreement::{relative_l2, share},
+};
 use papilla_proto::{MAP_LEN, atlas::Raster};
 use serde::Serialize;
 
@@ -136,70 +139,16 @@ pub(crate) fn fall_back(
     Ok(())
 }
 
-/// `|found - due| / |due|` over the pixels of the mask; 0 where nothing is due and found.
-fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
-    let (mut difference, mut size) = (0.0, 0.0);
-    for ((found, due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
-        difference += f64::from(found - due).powi(2);
-        size += f64::from(*due).powi(2);
-    }
-    if difference > 0.0 { (difference / size.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 }
-}
-
-/// `sum found due / sum due^2` over the pixels of the mask; 1 where nothing is due.
-fn share(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
-    let (mut common, mut size) = (0.0, 0.0);
-    for ((&found, &due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
-        common += f64::from(found) * f64::from(due);
-        size += f64::from(due).powi(2);
-    }
-    if size > 0.0 { common / size } else { 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
-    use papilla_engine::{ModelInfo, Session};
-    use serde_json::Value;
+    use serde_json::json;
 
     use super::*;
-    use crate::core::catalogue::{replay::State, testing};
-
-    /// Answers the pressure, times a factor.
-    struct Times {
-        info: ModelInfo,
-        backend: Backend,
-        factor: f32,
-    }
-
-    struct TimesSession(f32);
-
-    impl Model for Times {
-        fn info(&self) -> &ModelInfo {
-            &self.info
-        }
-
-        fn backend(&self) -> Backend {
-            self.backend
-        }
-
-        fn session(&self) -> Result<Box<dyn Session>, EngineError> {
-            Ok(Box::new(TimesSession(self.factor)))
-        }
-    }
-
-    impl Session for TimesSession {
-        fn infer(&mut self, pressure_pa: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
-            sed.iter_mut().zip(pressure_pa).for_each(|(sed, pressure)| *sed = self.0 * pressure);
-            Ok(())
-        }
-    }
-
-    fn model(name: &str, backend: Backend, factor: f32) -> Arc<dyn Model> {
-        Arc::new(Times { info: testing::info(name), backend, factor })
-    }
+    use crate::core::catalogue::testing::{self, model};
 
     /// Finite elements answer the pressure; one model in each backend does, and one is wrong.
-    fn with_states(of: impl FnOnce(States<'_>, &mut [Tier])) {
+    #[test]
+    fn a_backend_that_misses_golden_answers_gives_the_model_back() {
         let models = [
             model("right", Backend::Ort, 1.0),
             model("wrong", Backend::Ort, 0.001),
@@ -208,56 +157,19 @@ mod tests {
         let tiers = models.map(|model| testing::tier(model, 0.1)).to_vec();
         let mut catalogue = testing::catalogue(tiers);
         let values = vec![3.0; catalogue.skin.pixel_count()];
-        let replay = Replay {
-            states: vec![State {
-                name: "flat".to_owned(),
-                pose: Value::Null,
-                depth_mm: 1.0,
-                pressure_pa: values.clone(),
-                sed_j_per_m3: values,
-            }],
-        };
+        let state =
+            json!({"name": "flat", "depth_mm": 1, "pressure_pa": values, "sed_j_per_m3": values});
+        let replay = serde_json::from_value(json!({"presses": [state]})).unwrap();
         let (skin, interface) = (&catalogue.skin, &catalogue.interface);
-        of(States { replay: &replay, skin, interface }, &mut catalogue.tiers);
-    }
-
-    #[test]
-    fn a_backend_that_misses_golden_answers_gives_the_model_back() {
-        with_states(|states, tiers| {
-            let in_tract = |tier: &Tier| Ok(model(&tier.name, Backend::Tract, 1.0));
-            fall_back(states, tiers, in_tract).unwrap();
-            let backends: Vec<Backend> = tiers.iter().map(|tier| tier.model.backend()).collect();
-            assert_eq!(backends, [Backend::Ort, Backend::Tract, Backend::Tract]);
-            assert!(check(states, &tiers[1]).is_ok());
-            // What tract answers is not asked for here: `papilla-server check` and a reload do.
-            assert!(check(states, &tiers[2]).is_err());
-        });
-    }
-
-    #[test]
-    fn a_model_that_nothing_runs_is_an_error() {
-        with_states(|states, tiers| {
-            let failed = |_: &Tier| Err(EngineError::NonFiniteOutput);
-            assert_eq!(fall_back(states, tiers, failed).unwrap_err().0, "wrong");
-        });
-    }
-
-    #[test]
-    fn the_share_of_a_multiple_is_its_factor() {
-        let (due, mask) = ([6.0, 8.0, 5.0], [true, true, false]);
-        for factor in [0.0, 0.001, 0.5, 1.0, 2.0] {
-            let found = due.map(|due| factor * due);
-            assert!((share(&found, &due, &mask) - f64::from(factor)).abs() < 1e-7);
-        }
-        assert!((share(&[8.0, -6.0, 9.0], &due, &mask)).abs() < 1e-12, "nothing in common");
-        assert!((share(&[1.0; 3], &[0.0; 3], &mask) - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_error_is_relative_and_of_the_patch_alone() {
-        let mask = [true, true, false];
-        assert!((relative_l2(&[3.0, 4.0, 9.0], &[6.0, 8.0, 0.0], &mask) - 0.5).abs() < 1e-12);
-        assert!(relative_l2(&[0.0; 3], &[0.0; 3], &mask).abs() < 1e-12);
-        assert!(relative_l2(&[1.0, 0.0, 0.0], &[0.0; 3], &mask) > 1e100);
+        let (states, tiers) = (States { replay: &replay, skin, interface }, &mut catalogue.tiers);
+        let failed = |_: &Tier| Err(EngineError::NonFiniteOutput);
+        assert_eq!(fall_back(states, tiers, failed).unwrap_err().0, "wrong");
+        let in_tract = |tier: &Tier| Ok(model(&tier.name, Backend::Tract, 1.0));
+        fall_back(states, tiers, in_tract).unwrap();
+        let backends: Vec<Backend> = tiers.iter().map(|tier| tier.model.backend()).collect();
+        assert_eq!(backends, [Backend::Ort, Backend::Tract, Backend::Tract]);
+        assert!(check(states, &tiers[1]).is_ok());
+        // What tract answers is not asked for here: `papilla-server check` and a reload do.
+        assert!(check(states, &tiers[2]).is_err());
     }
 }
