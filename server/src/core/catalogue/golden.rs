@@ -162,7 +162,7 @@ mod tests {
         let replay = serde_json::from_value(json!({"presses": [state]})).unwrap();
         let (skin, interface) = (&catalogue.skin, &catalogue.interface);
         let (states, tiers) = (States { replay: &replay, skin, interface }, &mut catalogue.tiers);
-        let failed = |_: &Tier| Err(EngineError::NonFiniteOutput);
+        let failed = |_: &Tier| Err(EngineError::BadCard { reason: "none".to_owned() });
         assert_eq!(fall_back(states, tiers, failed).unwrap_err().0, "wrong");
         let in_tract = |tier: &Tier| Ok(model(&tier.name, Backend::Tract, 1.0));
         fall_back(states, tiers, in_tract).unwrap();
