@@ -97,7 +97,7 @@ export async function listTiers() {
   const listing = await fetchJson('v1/tiers');
   byId('tier').append(...listing.tiers.map((tier) => {
     const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
-    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
+    const error = tier.relative_l2_median > 0 ? `, ${oneDigit(100 * tier.relative_l2_median)} % off` : '';
     return new Option(`${tier.name} (${ms}${error})`, tier.name);
   }));
   return listing;
