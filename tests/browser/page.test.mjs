@@ -410,6 +410,7 @@ test('every choice is read whole', async () => {
     await page.setViewportSize({ width, height });
     for (const mode of ['press', 'replay']) {
       await chooseRadio('mode', mode);
+      await until(() => [...document.querySelectorAll('select')].every((select) => select.options.length > 0 || !select.checkVisibility()));
       const cut = await page.evaluate(() => [...document.querySelectorAll('select')].filter((select) => select.checkVisibility()).flatMap((select) => {
         const { fontFamily, fontSize, fontWeight, paddingLeft, paddingRight } = getComputedStyle(select);
         const probe = document.createElement('span');
