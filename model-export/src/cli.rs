@@ -34,12 +34,12 @@ will serve it, on indentations that no training saw, and writes its card.";
 const EXAMPLES: &str = "\
 A new model, from the trainer's file to the service:
   model-export check    models/small.onnx --atlas models/atlas.json
-  model-export evaluate models/small.onnx data/broad-graded --out out/models/small.json --pictures docs/reports/pictures/small
+  model-export evaluate models/small.onnx data/broad-graded --card out/models/small.json --pictures docs/reports/pictures/small
   model-export index    models --default small
-  model-export patterns models --dataset data/s1
+  model-export patterns models --dataset data/more-graded --dataset data/broad-graded
   model-export table    models/*.json
 All models and the solver itself, error against time:
-  model-export ladder   --data data --models models --fe out/rungs --out docs/reports/accuracy-vs-time
+  model-export ladder   --data data --models models --fe out/rungs --out docs/reports
   model-export here     --out out/here";
 
 /// Parsed command line.
@@ -184,4 +184,26 @@ fn load_model(
 fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     println!("{}", serde_json::to_string_pretty(value)?);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    /// Files have flags of their own, so that nobody has to look up which it is.
+    fn out_is_a_folder(command: &clap::Command) -> usize {
+        let mut found = 0;
+        for argument in command.get_arguments().filter(|a| a.get_long() == Some("out")) {
+            let (name, help) = (command.get_name(), argument.get_help().unwrap().to_string());
+            assert!(help.contains("older"), "{name} --out: {help}");
+            found += 1;
+        }
+        found + command.get_subcommands().map(out_is_a_folder).sum::<usize>()
+    }
+
+    #[test]
+    fn out_is_a_folder_everywhere() {
+        assert!(out_is_a_folder(&Arguments::command()) >= 2);
+    }
 }

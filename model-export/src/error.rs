@@ -73,7 +73,7 @@ pub enum ExportError {
     },
     /// The dataset is not the one that the model was trained on.
     #[error(
-        "the model was trained on dataset {trained}, this is {found}: which presses it never saw is not known, so no card can be written; leave --out away to measure it all the same"
+        "the model was trained on dataset {trained}, this is {found}: which presses it never saw is not known, so no card can be written; leave --card away to measure it all the same"
     )]
     OtherDataset {
         /// Hash of the dataset in the model.

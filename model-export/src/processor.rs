@@ -2,6 +2,5 @@
 
 /// Of this thread, s.
 pub(crate) fn thread_s() -> f64 {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+    papilla_engine::processor_time().as_secs_f64()
 }

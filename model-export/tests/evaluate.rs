@@ -18,7 +18,7 @@ fn a_card_tells_the_known_errors() {
         "evaluate",
         "models/tiny.onnx",
         "data",
-        "--out",
+        "--card",
         "models/tiny.json",
         "--pictures",
         "pictures",
@@ -79,7 +79,7 @@ fn json_holds_every_sample() {
 fn what_does_not_belong_together_is_refused() {
     let bench = Bench::new();
     let model = fs::read(bench.path("models/tiny.onnx")).unwrap();
-    let evaluate = ["evaluate", "models/tiny.onnx", "data", "--out", "models/tiny.json"];
+    let evaluate = ["evaluate", "models/tiny.onnx", "data", "--card", "models/tiny.json"];
 
     // An engine that answers otherwise.
     bench.write_reference(&model, 1.01);
@@ -95,7 +95,7 @@ fn what_does_not_belong_together_is_refused() {
     fs::write(bench.path("models/other.onnx"), replaced(&model, &trained, &"0".repeat(64)))
         .unwrap();
     let stderr =
-        bench.refused(1, &["evaluate", "models/other.onnx", "data", "--out", "models/other.json"]);
+        bench.refused(1, &["evaluate", "models/other.onnx", "data", "--card", "models/other.json"]);
     assert!(stderr.contains("was trained on dataset 0000"), "{stderr}");
     bench.done(&["evaluate", "models/other.onnx", "data"]);
 

@@ -12,7 +12,7 @@ use serde_json::json;
 use std::fs;
 
 const COMMAND: [&str; 8] =
-    ["ladder", "--data", "sets", "--fe", "fe/final", "fe/medium", "--out", "out/ladder"];
+    ["ladder", "--data", "sets", "--fe", "fe/final", "fe/medium", "--out", "out"];
 
 /// The bench with its dataset as `sets/s1`, `sets/deep` and the reference, `sets/final`; in `fe`
 /// the reference and a coarser mesh, whose SED is a tenth more, with what each took.
@@ -53,7 +53,7 @@ fn every_rung_has_the_known_errors() {
     let bench = bench();
     let text = bench.done(&COMMAND);
     assert!(text.contains("wrote models/ladder.json"), "{text}");
-    let json = fs::read_to_string(bench.path("out/ladder.json")).unwrap();
+    let json = fs::read_to_string(bench.path("out/accuracy-vs-time.json")).unwrap();
     assert_eq!(json, fs::read_to_string(bench.path("models/ladder.json")).unwrap());
     let ladder = Ladder::from_json(&json).unwrap();
     let samples: Vec<(&str, usize)> =
@@ -112,12 +112,12 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
     let bench = bench();
     bench.done(&COMMAND);
     let read = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
-    let page = read("out/ladder.md");
+    let page = read("out/accuracy-vs-time.md");
     for word in [
         "Not measured",
         "there is no dataset 'broad-graded'",
-        "](ladder.svg)",
-        "](ladder-zone.svg)",
+        "](accuracy-vs-time.svg)",
+        "](accuracy-vs-time-zone.svg)",
         "| tiny | network |",
         "the truth",
         "good to 5.63 %",
@@ -130,11 +130,11 @@ fn the_page_and_the_pictures_name_every_rung_and_every_gap() {
         let first = table.lines().next().map(columns);
         assert!(table.lines().all(|line| Some(columns(line)) == first), "{table}");
     }
-    let plot = read("out/ladder.svg");
+    let plot = read("out/accuracy-vs-time.svg");
     for word in ["tiny", "fe-fine-graded", "fe-medium-graded", "discretisation", "Pareto"] {
         assert!(plot.contains(word), "{word}");
     }
-    for svg in [plot, read("out/ladder-zone.svg")] {
+    for svg in [plot, read("out/accuracy-vs-time-zone.svg")] {
         assert!(svg.contains("</svg>") && !svg.contains("NaN") && !svg.contains("inf"));
     }
 }
@@ -144,7 +144,7 @@ fn quick_leaves_the_shipped_ladder_alone() {
     let bench = bench();
     let text = bench.done(&[&COMMAND[..], &["--quick", "--json"]].concat());
     let ladder = Ladder::from_json(&text).unwrap();
-    assert!(ladder.quick && bench.path("out/ladder.json").is_file());
+    assert!(ladder.quick && bench.path("out/accuracy-vs-time.json").is_file());
     assert!(!bench.path("models/ladder.json").exists());
     // Without FE and without data there is nothing to judge by, and it says so.
     let text =

@@ -20,7 +20,7 @@ fn root() -> PathBuf {
 #[test]
 fn a_card_notes_the_roughest_and_heaviest_map() {
     let bench = Bench::new();
-    let evaluate = ["evaluate", "models/tiny.onnx", "data", "--out", "models/tiny.json"];
+    let evaluate = ["evaluate", "models/tiny.onnx", "data", "--card", "models/tiny.json"];
     let note = ["patterns", "models", "--dataset", "data"];
     bench.done(&evaluate);
     bench.done(&["index", "models", "--default", "tiny"]);

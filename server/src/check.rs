@@ -150,7 +150,7 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
     }
     for (index, tier) in catalogue.offered() {
         let what = format!("model {}", tier.name);
-        let golden = match golden::check(catalogue, tier) {
+        let golden = match golden::check(catalogue.golden_states(), tier) {
             Ok(golden) => golden,
             Err(error) => {
                 report.bad(&what, 3, &error);

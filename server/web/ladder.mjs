@@ -92,12 +92,21 @@ export function placeName(taken, x, y, width, right) {
 
 const oneDigit = (value) => value.toFixed(value < 10 ? 1 : 0);
 
+/** The tier to advise where `late` misses its budget: of the faster ones that meet it the most accurate, or else the fastest. */
+export function adviseTier(tiers, late, budgetMs) {
+  const leastUs = tiers.find(({ name }) => name === late)?.predicted_latency_us ?? Infinity;
+  const faster = tiers.filter((tier) => !tier.for_comparison && tier.predicted_latency_us < leastUs);
+  const meeting = faster.filter((tier) => tier.predicted_latency_us <= 1000 * budgetMs);
+  const least = (among, key) => among.reduce((a, b) => (a[key] <= b[key] ? a : b), among[0])?.name;
+  return least(meeting, 'relative_l2_median') ?? least(faster, 'predicted_latency_us');
+}
+
 /** What the server says of its tiers; they go into the choice beside `by budget`. */
 export async function listTiers() {
   const listing = await fetchJson('v1/tiers');
   byId('tier').append(...listing.tiers.map((tier) => {
     const ms = `${oneDigit(tier.predicted_latency_us / 1000)} ms`;
-    const error = tier.relative_l2_median > 0 ? `, error ${oneDigit(100 * tier.relative_l2_median)} %` : '';
+    const error = tier.relative_l2_median > 0 ? `, ${oneDigit(100 * tier.relative_l2_median)} % off` : '';
     return new Option(`${tier.name} (${ms}${error})`, tier.name);
   }));
   return listing;

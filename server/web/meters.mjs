@@ -28,9 +28,9 @@ function showRow(row) {
 }
 
 export class Meters {
-  /** `fastest`: the tier to advise where another is late. */
-  constructor(fastest) {
-    this.fastest = fastest;
+  /** `advise(tier, budgetMs)`: the tier to take instead, if there is one. */
+  constructor(advise) {
+    this.advise = advise;
     this.stats = new Stats();
     this.pair = [NaN, NaN];
     /** Median time in the server of the last answers, ms. */
@@ -118,7 +118,8 @@ export class Meters {
     const late = stats.lateInARow >= LATE_TO_TELL;
     // An old answer must not pass for the answer to this press.
     byId('sed').classList.toggle('stale', late || !connected);
-    const cure = this.tier === this.fastest ? 'raise the budget' : `raise the budget or take ${this.fastest}`;
+    const other = this.advise(this.tier, this.budgetMs);
+    const cure = other ? `raise the budget or take ${other}` : 'raise the budget';
     put('stale', connected ? `${this.tier} needs more than ${this.budgetMs} ms: ${cure}` : 'no connection');
     const top = drawStrip(byId('strip'), stats.roundTripMs, this.budgetMs);
     const budget = `budget ${this.budgetMs} ms`;

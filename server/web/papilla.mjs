@@ -4,7 +4,7 @@ import { Atlas } from './atlas.mjs';
 import { Contact, poseOf, readTouch } from './contact.mjs';
 import { PressControl } from './control.mjs';
 import { FingerView } from './finger.mjs';
-import { LadderView, listTiers } from './ladder.mjs';
+import { LadderView, adviseTier, listTiers } from './ladder.mjs';
 import { LOG_DECADES, MapView } from './map.mjs';
 import { countDifferences } from './mask.mjs';
 import { Meters } from './meters.mjs';
@@ -35,7 +35,7 @@ class Page {
     this.log = false;
     this.sent = { mode: 'press', pressurePa: new Float32Array(MAP_LEN) };
     this.answered = { sequence: 0, tier: '', pressurePa: new Float32Array(MAP_LEN), sedJPerM3: new Float32Array(MAP_LEN) };
-    this.meters = new Meters(fastest(listing.tiers));
+    this.meters = new Meters((tier, budgetMs) => adviseTier(listing.tiers, tier, budgetMs));
     this.replay = new Replay(atlas);
     this.spikes = new SpikeView();
     this.#makeViews();
@@ -290,14 +290,6 @@ class Page {
     byId('replay-play').setAttribute('aria-pressed', String(on));
     byId('replay-play').textContent = on ? 'Pause' : 'Play';
   }
-}
-
-/** The tier to advise where another is late: of those that are about as fast as any the most accurate. */
-function fastest(tiers) {
-  const choices = tiers.filter((tier) => !tier.for_comparison);
-  const leastUs = Math.min(...choices.map((tier) => tier.predicted_latency_us));
-  const fast = choices.filter((tier) => tier.predicted_latency_us <= 1.5 * leastUs);
-  return fast.reduce((a, b) => (a.relative_l2_median <= b.relative_l2_median ? a : b)).name;
 }
 
 /** A press that does not move is answered alike again and again: no reason to draw it again. */

@@ -23,7 +23,7 @@ const { HERTZ, Press } = await load('press.mjs');
 const { poseOf } = await load('contact.mjs');
 const { errorFigures } = await load('replay.mjs');
 const { Ring } = await load('stats.mjs');
-const { logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
+const { adviseTier, logAxis, placeName, rungsOn, setsOf, short, showTime } = await load('ladder.mjs');
 
 test('a request frame has the documented bytes', () => {
   const frame = RequestFrame.map();
@@ -225,6 +225,14 @@ test('error figures follow their definitions', () => {
   near(figures.farFieldL2, Math.sqrt(0.5 / 0.25));
   near(figures.peak, 0.1);
   near(figures.energy, 1 / 14.5);
+});
+
+test('a tier that is late makes way for the most accurate that is in time', () => {
+  const tier = (name, ms, error, more = {}) => ({ name, predicted_latency_us: 1000 * ms, relative_l2_median: error, for_comparison: false, ...more });
+  const tiers = [tier('form', 0.2, 0.5), tier('nano', 1, 0.14), tier('small', 4, 0.12), tier('unet', 3, 0.1, { for_comparison: true }), tier('large', 20, 0.1)];
+  for (const [late, budgetMs, advised] of [['large', 11, 'small'], ['large', 2, 'nano'], ['small', 0.5, 'form'], ['large', 0.1, 'form'], ['form', 0.1, undefined]]) {
+    assert.equal(adviseTier(tiers, late, budgetMs), advised, `${late} within ${budgetMs} ms`);
+  }
 });
 
 /** What /v1/tiers answers, in small. */

@@ -405,6 +405,21 @@ test('on a phone a swipe scrolls, a tap presses, and targets are as large as a t
   await context.close();
 });
 
+test('every choice is read whole', async () => {
+  for (const [width, mode] of [[390, 'press'], [390, 'replay'], [1280, 'replay'], [1280, 'press']]) {
+    await Promise.all([page.setViewportSize({ width, height: 900 }), chooseRadio('mode', mode)]);
+    await until(() => [...document.querySelectorAll('select')].every((select) => select.options.length > 0 || !select.checkVisibility()));
+    const cut = await page.evaluate(() => [...document.querySelectorAll('.field select')].filter((select) => select.checkVisibility()).flatMap((select) => {
+      const copy = Object.assign(select.cloneNode(true), { style: 'width: max-content' });
+      select.after(copy);
+      const [needed, has] = [copy.offsetWidth + 8, select.offsetWidth]; // one that just fits loses a letter to the arrow
+      copy.remove();
+      return needed > has ? [`${select.id}: ${needed} of ${has} px`] : [];
+    }));
+    assert.deepEqual(cut, [], `${width} px wide, ${mode}`);
+  }
+});
+
 test('the page fits a phone and follows the dark theme', async () => {
   await page.emulateMedia({ colorScheme: 'dark' });
   await page.setViewportSize({ width: 360, height: 740 });

@@ -5,8 +5,9 @@
 
 Without --write compares the picture in ARCHITECTURE.md with the workspace. --sizes prints each
 crate's lines. Exit code 1 if the picture is out of date, if crates need each other in a circle
-(dependencies of tests alone are not drawn), or if a size is above its limit: CRATE_MAX lines in the
-`src` of a crate, FILE_MAX in a file of any language, MEDIAN_MAX in the median Rust file.
+(dependencies of tests alone are not drawn), if a crate builds on Unix alone (a crate of UNIX_ONLY
+that is not under `cfg(unix)`), or if a size is above its limit: CRATE_MAX lines in the `src` of a
+crate, FILE_MAX in a file of any language, MEDIAN_MAX in the median Rust file.
 """
 
 import json
@@ -22,6 +23,7 @@ PAGE = ROOT / "ARCHITECTURE.md"
 CRATE_MAX = 13_000
 FILE_MAX = 450
 MEDIAN_MAX = 130
+UNIX_ONLY = {"nix", "rustix", "libc"}
 PLACE = re.compile(r"(<!-- tests/suite/crates\.py -->\n).*?(<!-- end -->\n)", re.DOTALL)
 Arrows = dict[str, set[str]]
 SOURCE = re.compile(r"\.(rs|py|pyi|c?js|mjs|ts|cs|gd|cpp|hpp|h|css|html|sh)$|/(run|wire|test|bench|docs-test|cycles|generate)$")
@@ -35,6 +37,16 @@ def folders(metadata: dict) -> Arrows:
         where[p["name"]]: {where[d["name"]] for d in p["dependencies"] if d["name"] in where and d["kind"] != "dev"}
         for p in metadata["packages"]
     }
+
+
+def unix_only(metadata: dict) -> list[str]:
+    """A line for each dependency that keeps a crate from being built on Windows."""
+    return [
+        f"{p['name']} needs {d['name']} everywhere: put it under [target.'cfg(unix)'.dependencies]"
+        for p in metadata["packages"]
+        for d in p["dependencies"]
+        if d["name"] in UNIX_ONLY and d["kind"] is None and not d["target"]
+    ]
 
 
 def direct(arrows: Arrows) -> Arrows:
@@ -102,12 +114,13 @@ def too_large(crates: list[str], found: dict[str, int]) -> list[str]:
 
 def main() -> int:
     command = ["cargo", "metadata", "--format-version", "1", "--no-deps", "--offline"]
-    arrows = folders(json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout))
+    metadata = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout)
+    arrows = folders(metadata)
     if found := circle(arrows):
         print(f"a circle of crates: {' -> '.join(found)}")
         return 1
     found = lines()
-    if wrong := too_large(list(arrows), found):
+    if wrong := too_large(list(arrows), found) + unix_only(metadata):
         print("\n".join(wrong))
         return 1
     if "--sizes" in sys.argv[1:]:

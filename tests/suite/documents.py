@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the documents to their rules: links, length of lines, number of words.
+"""Holds the documents to their rules: links, length of lines, number of words, plots.
 
     tests/suite/documents.py [--words]
 
@@ -7,7 +7,8 @@ In every tracked Markdown file each relative link leads to a file or folder of t
 each anchor to a heading. Hand-written files keep to LINE_MAX columns outside of tables, code and
 links, and to WORDS_MAX words together. Reports (docs/reports) are written by commands: of them
 only links are looked at. A word is anything between blanks that holds a letter; tables count, fenced
-code, comments and the targets of links do not. --words prints each file's share.
+code, comments and the targets of links do not. --words prints each file's share. No text of a plot
+(docs/**/*.svg) is cut off by the picture's edge.
 Exit code 1 if a rule is broken.
 """
 
@@ -27,6 +28,8 @@ GENERATED = re.compile(r"docs/reports/")
 HEADS = re.compile(r".*/(introduction|head)\.md$")
 FENCE = re.compile(r"^\s*(```+|~~~+)")
 LINK = re.compile(r"\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\)")
+# Mean width of a letter over its height.
+LETTER = 0.5
 OUTSIDE = re.compile(r"^[a-z][a-z0-9+.-]*:", re.IGNORECASE)
 
 
@@ -99,6 +102,20 @@ def words(text: str) -> int:
     return sum(1 for word in shown.split() if re.search(r"[^\W\d_]", word))
 
 
+def cut_off(svg: str) -> Iterator[str]:
+    """A line for each level text that reaches beyond the picture."""
+    width = re.search(r"<svg width=\"(\d+)\"", svg)
+    # matplotlib draws letters as paths, and sees to this itself.
+    for tag, said in re.findall(r"<text ([^>]*)>\s*([^<]*?)\s*</text>", svg) if width else ():
+        of = dict(re.findall(r"([\w-]+)=\"([^\"]*)\"", tag))
+        if "transform" in of:
+            continue
+        x, long = float(of["x"]), LETTER * float(of["font-size"]) * len(said)
+        left = x - long * {"start": 0.0, "middle": 0.5, "end": 1.0}[of.get("text-anchor", "start")]
+        if left < 0 or left + long > float(width[1]):
+            yield f"'{said}' reaches from {left:.0f} to {left + long:.0f} px of {width[1]}"
+
+
 def main() -> int:
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
@@ -116,6 +133,8 @@ def main() -> int:
         wrong += [f"{name}:{rule}" for rule in rules]
     if "--words" in sys.argv[1:]:
         print("\n".join(f"{count:6} {name}" for name, count in counts.items()))
+    for path in sorted((ROOT / "docs").rglob("*.svg")):
+        wrong += [f"{path.relative_to(ROOT)}: {fault}" for fault in cut_off(path.read_text())]
     total = sum(counts.values())
     if total > WORDS_MAX:
         wrong.append(f"{total} words are written by hand, {WORDS_MAX} are the most (--words)")

@@ -42,7 +42,22 @@ class Lines(unittest.TestCase):
         self.assertEqual(documents.words(text), 4)
 
 
+class Plots(unittest.TestCase):
+    def test_a_text_beyond_the_edge_is_named(self) -> None:
+        text = '<text x="{}" y="9" text-anchor="{}" font-size="10">\n{}\n</text>'
+        svg = '<svg width="100" height="50">' + "".join(text.format(*a) for a in [
+            (50, "middle", "within"), (90, "end", "within too"), (80, "start", "beyond"), (10, "middle", "beyond it"),
+        ])
+        self.assertEqual([fault.split("'")[1] for fault in documents.cut_off(svg)], ["beyond", "beyond it"])
+
+
 class Crates(unittest.TestCase):
+    def test_what_builds_on_unix_alone_is_named(self) -> None:
+        needs = [("rustix", None, None), ("nix", None, "cfg(unix)"), ("rustix", "dev", None), ("serde", None, None)]
+        dependencies = [{"name": n, "kind": k, "target": t} for n, k, t in needs]
+        found = crates.unix_only({"packages": [{"name": "a", "dependencies": dependencies}]})
+        self.assertEqual([fault.split()[2] for fault in found], ["rustix"])
+
     def test_a_circle_is_found(self) -> None:
         self.assertEqual(crates.circle({"a": {"b"}, "b": set()}), [])
         self.assertIn("a", crates.circle({"a": {"b"}, "b": {"a"}}))

@@ -146,7 +146,7 @@ def fast() -> list[Step]:
             "python3 tests/suite/documents_test.py\n"
             "python3 tests/suite/documents.py\n"
             "python3 tests/suite/crates.py",
-            tests_min=8,
+            tests_min=10,
         ),
         Step(
             "build",

@@ -2,6 +2,12 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <papilla/papilla.hpp>
 #include <papilla/pieces.hpp>
@@ -111,6 +117,30 @@ static void proofs() {
   CHECK(papilla::net::Address::of("lab.example").port == "7224");
 }
 
+// Whoever takes a connection and says nothing is told by its address.
+static void silence() {
+  const int listening = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in place{};
+  socklen_t size = sizeof place;
+  place.sin_family = AF_INET;
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  sockaddr* const at = reinterpret_cast<sockaddr*>(&place);
+  CHECK(::bind(listening, at, size) == 0 && ::listen(listening, 4) == 0 && ::getsockname(listening, at, &size) == 0);
+  std::thread mute([&] {
+    for (int taken; (taken = ::accept(listening, nullptr, nullptr)) >= 0;) ::close(taken);
+  });
+  papilla::Session::Options options;
+  options.url = "127.0.0.1:" + std::to_string(ntohs(place.sin_port));
+  papilla::Session session(options);
+  const std::string due = options.url + ": no answer; is papilla-server running there?";
+  CHECK(!session.open() && session.problem().message == due);
+  CHECK(papilla::http(options.url, "GET", "/v1/atlas").problem.message == due);
+  ::shutdown(listening, SHUT_RDWR);
+  mute.join();
+  ::close(listening);
+  CHECK(!session.open() && session.problem().message == options.url + ": nobody listens; is papilla-server running there?");
+}
+
 int main() {
   pieces();
   halves();
@@ -118,6 +148,7 @@ int main() {
   messages();
   fingers();
   proofs();
+  silence();
   std::printf(failures ? "%d checks failed\n" : "all checks passed\n", failures);
   return failures ? 1 : 0;
 }

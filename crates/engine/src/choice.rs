@@ -121,16 +121,19 @@ impl Choice {
 }
 
 /// Time that this thread has had of a processor: on a busy machine a run is interrupted more often
-/// than not.
+/// than not. Where the system does not tell (Windows), time that has passed.
 #[cfg(unix)]
-fn processor_time() -> Duration {
+#[must_use]
+pub fn processor_time() -> Duration {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     let seconds = u64::try_from(now.tv_sec).unwrap_or_default();
     Duration::new(seconds, u32::try_from(now.tv_nsec).unwrap_or_default())
 }
 
+/// Time that has passed since this was first asked: the system does not tell the thread's own.
 #[cfg(not(unix))]
-fn processor_time() -> Duration {
+#[must_use]
+pub fn processor_time() -> Duration {
     static BEGUN: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
     BEGUN.get_or_init(Instant::now).elapsed()
 }

@@ -24,6 +24,7 @@
 //! Runtime, faster on large networks; its shared library is opened at
 //! run time from `ORT_DYLIB_PATH`. A [`Choice`] takes the faster of the two for each model.
 
+pub mod agreement;
 mod backend;
 pub mod card;
 mod choice;
@@ -48,7 +49,7 @@ use std::sync::Arc;
 
 pub use backend::Backend;
 pub use card::Card;
-pub use choice::Choice;
+pub use choice::{Choice, processor_time};
 pub use error::EngineError;
 pub use info::ModelInfo;
 pub use ladder::Ladder;

@@ -28,11 +28,20 @@ fn date(days: i64) -> [i64; 3] {
     [year + era * 400 + i64::from(month <= 2), month, of_year - (153 * shifted + 2) / 5 + 1]
 }
 
-/// Of this thread, s.
+/// Of this thread, s. Where the system does not tell (Windows), time that has passed.
+#[cfg(unix)]
 #[must_use]
 pub fn thread_s() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+}
+
+/// Since this was first asked, s: the system does not tell the thread's own.
+#[cfg(not(unix))]
+#[must_use]
+pub fn thread_s() -> f64 {
+    static BEGUN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    BEGUN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }
 
 /// Of all processes that this one has started and waited for, s; `None` where the system

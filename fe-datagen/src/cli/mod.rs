@@ -124,3 +124,25 @@ fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    /// Files have flags of their own, so that nobody has to look up which it is.
+    fn out_is_a_folder(command: &clap::Command) -> usize {
+        let mut found = 0;
+        for argument in command.get_arguments().filter(|a| a.get_long() == Some("out")) {
+            let (name, help) = (command.get_name(), argument.get_help().unwrap().to_string());
+            assert!(help.contains("older"), "{name} --out: {help}");
+            found += 1;
+        }
+        found + command.get_subcommands().map(out_is_a_folder).sum::<usize>()
+    }
+
+    #[test]
+    fn out_is_a_folder_everywhere() {
+        assert!(out_is_a_folder(&Cli::command()) >= 12);
+    }
+}

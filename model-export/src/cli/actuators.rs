@@ -27,7 +27,7 @@ pub(crate) struct Options {
     every: usize,
     /// The page; its pictures go into `pictures/actuators` beside it.
     #[arg(long, default_value = "docs/reports/actuators.md", value_name = "FILE")]
-    out: PathBuf,
+    markdown: PathBuf,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -42,14 +42,14 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         for &pitch_mm in &options.pitch_mm {
             let (table, image) = measure(&dataset, networks, pitch_mm, options.every)?;
             let name = format!("pictures/actuators/{}-{pitch_mm}.png", table.set);
-            picture::write_png(&image, &options.out.with_file_name(&name))?;
+            picture::write_png(&image, &options.markdown.with_file_name(&name))?;
             tables.push((table, name));
             progress.inc();
         }
     }
     drop(progress);
     let page = markdown(&tables);
-    write(&options.out, page.as_bytes())?;
+    write(&options.markdown, page.as_bytes())?;
     if json {
         let tables: Vec<_> = tables.iter().map(|(table, _)| table).collect();
         return print_json(&tables);

@@ -24,7 +24,7 @@ pub(crate) struct Options {
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
     /// trained on (of several, one of them) and the split `test`.
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    card: Option<PathBuf>,
     /// Write NAME-best.png, NAME-median.png and NAME-worst.png into this folder: pressure,
     /// truth, prediction and error of those samples.
     #[arg(long, value_name = "FOLDER")]
@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let model = load_model(&options.model, options.backend, None)?;
     let info = model.info();
     let dataset = Dataset::open(&options.dataset)?;
-    if options.out.is_some() {
+    if options.card.is_some() {
         require_held_out(options, info, &dataset)?;
     }
     let subject = Subject { path: &options.model, model: model.as_ref() };
@@ -58,7 +58,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         agree(difference, info, &other.info().backend, options.tolerance)?;
     }
     let mut card = evaluation.card(info, difference);
-    if let Some(path) = &options.out {
+    if let Some(path) = &options.card {
         // Input statistics are the data's, not the model's: those noted for them still hold.
         let noted = load_card(path).ok().filter(|old| old.dataset_sha256 == card.dataset_sha256);
         card.input_statistics_max = noted.and_then(|old| old.input_statistics_max);
@@ -74,7 +74,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         }));
     }
     print!("{}", describe(&card, &evaluation));
-    for path in options.out.iter().chain(&pictures) {
+    for path in options.card.iter().chain(&pictures) {
         println!("wrote {}", path.display());
     }
     Ok(())
@@ -83,7 +83,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 /// A card tells of indentations that the training never saw.
 fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> anyhow::Result<()> {
     if options.split != "test" {
-        anyhow::bail!("a card tells of held-out presses: --out needs --split test");
+        anyhow::bail!("a card tells of held-out presses: --card needs --split test");
     }
     let trained = info.datasets();
     if !trained.contains(&dataset.sha256()) {

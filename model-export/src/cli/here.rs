@@ -10,20 +10,19 @@ pub(crate) struct Options {
     /// Folder of the models, with ladder.json.
     #[arg(long, default_value = "models", value_name = "FOLDER")]
     models: PathBuf,
-    /// Writes STEM.md, STEM.svg and STEM.json.
-    #[arg(long, default_value = "out/here", value_name = "STEM")]
+    /// Folder for here.md, here.svg and here.json.
+    #[arg(long, default_value = "out/here", value_name = "FOLDER")]
     out: PathBuf,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let shown = Shown(papilla_progress::Progress::new("models", 0, 0, json));
     let ladder = here::measure(&options.models, &shown)?;
-    let stem = options.out.file_name().and_then(|name| name.to_str()).unwrap_or("here");
     let chart = |reason| ExportError::Chart { what: "error against time", reason };
     let picture = plot::error_against_time(&here::by_engine(&ladder)).map_err(chart)?;
-    let page = here::markdown(&ladder, stem);
+    let page = here::markdown(&ladder, "here");
     for (ending, text) in [("md", &page), ("svg", &picture), ("json", &ladder.to_json()?)] {
-        write(&options.out.with_file_name(format!("{stem}.{ending}")), text.as_bytes())?;
+        write(&options.out.join(format!("here.{ending}")), text.as_bytes())?;
     }
     if json {
         return print_json(&ladder);

@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
+/// Page, pictures and figures have this name.
+const STEM: &str = "accuracy-vs-time";
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// Folder of the datasets `broad-graded`, `heldout-graded`, `final`, `s1` and `deep`; those
@@ -21,13 +24,13 @@ pub(crate) struct Options {
     /// [default: DATA/final and the folders in DATA/rungs].
     #[arg(long, num_args = 1.., value_name = "FOLDER")]
     fe: Vec<PathBuf>,
-    /// Writes STEM.md, STEM.svg, STEM-zone.svg and STEM.json.
-    #[arg(long, default_value = "docs/reports/accuracy-vs-time", value_name = "STEM")]
+    /// Folder for accuracy-vs-time.md, .svg and .json, and accuracy-vs-time-zone.svg.
+    #[arg(long, default_value = "docs/reports", value_name = "FOLDER")]
     out: PathBuf,
     /// 16 samples of each set and short timings; does not touch MODELS/ladder.json.
     #[arg(long)]
     quick: bool,
-    /// Draw page and pictures anew from these figures (STEM.json or ladder.json); measures
+    /// Draw page and pictures anew from these figures (accuracy-vs-time.json or ladder.json); measures
     /// nothing.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["quick", "fe"])]
     from: Option<PathBuf>,
@@ -71,16 +74,15 @@ fn fe_folders(data: &Path) -> Vec<PathBuf> {
 }
 
 fn write_all(options: &Options, ladder: &Ladder) -> anyhow::Result<Vec<PathBuf>> {
-    let stem = options.out.file_name().and_then(|name| name.to_str()).unwrap_or("ladder");
-    let beside = |ending: &str| options.out.with_file_name(format!("{stem}{ending}"));
+    let named = |ending: &str| options.out.join(format!("{STEM}{ending}"));
     let chart = |what| move |reason| ExportError::Chart { what, reason };
     let canvas = Canvas::read(&options.models)?;
     let json = ladder.to_json()?;
     let mut files = vec![
-        (beside(".md"), report::markdown(ladder, stem)),
-        (beside(".svg"), plot::error_against_time(ladder).map_err(chart("error against time"))?),
-        (beside("-zone.svg"), plot::nail_base_zone(&canvas.ground).map_err(chart("the zone"))?),
-        (beside(".json"), json.clone()),
+        (named(".md"), report::markdown(ladder, STEM)),
+        (named(".svg"), plot::error_against_time(ladder).map_err(chart("error against time"))?),
+        (named("-zone.svg"), plot::nail_base_zone(&canvas.ground).map_err(chart("the zone"))?),
+        (named(".json"), json.clone()),
     ];
     if !ladder.quick {
         files.push((options.models.join("ladder.json"), json));

@@ -11,7 +11,7 @@ pub(crate) struct Options {
     models: Vec<PathBuf>,
     /// The page.
     #[arg(long, default_value = "docs/reports/operators.md", value_name = "FILE")]
-    out: PathBuf,
+    markdown: PathBuf,
 }
 
 pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
@@ -21,7 +21,7 @@ pub(crate) fn run(options: &Options) -> anyhow::Result<()> {
         profiles.push(Profile::measure(&read(path)?).map_err(refused)?);
     }
     let page = markdown(&profiles, &Rates::measure());
-    write(&options.out, page.as_bytes())?;
+    write(&options.markdown, page.as_bytes())?;
     print!("{page}");
     Ok(())
 }

@@ -17,7 +17,7 @@ Trains a network that maps fingertip pressure to strain energy density (SED) and
 From a dataset to a model that the server loads:
 
   python -m papilla_trainer train    --dataset data/s1 --network s1-base8 --out runs/s1-base8
-  python -m papilla_trainer export   runs/s1-base8 --out runs/s1-base8/s1-base8.onnx
+  python -m papilla_trainer export   runs/s1-base8 --onnx runs/s1-base8/s1-base8.onnx
   python -m papilla_trainer check    runs/s1-base8/s1-base8.onnx --dataset data/s1 \\
                                      --run runs/s1-base8
 
@@ -122,7 +122,7 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
 
     export = command("export", "write a run's model as ONNX", _EXPORT)
     export.add_argument("run_dir", type=Path, metavar="RUN_DIR", help="the --out of train")
-    export.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    export.add_argument("--onnx", type=Path, required=True, metavar="FILE")
     export.add_argument("--name", help="name of the model (default: the file's stem)")
     _weights_argument(export)
 
@@ -147,7 +147,7 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
 
 def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE.onnx")
+    parser.add_argument("--onnx", type=Path, required=True, metavar="FILE")
     parser.add_argument("--name", help="name of the model (default: the file's stem)")
     parser.add_argument("--rank", type=int, default=64, help="of the global part, even (64)")
     parser.add_argument(

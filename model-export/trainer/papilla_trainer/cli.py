@@ -70,7 +70,7 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         f"{state.best_epoch} chosen\nheld-out presses ({metrics['samples']} samples of "
         f"{metrics['presses']} presses):\n{_table(metrics, metrics_table)}\n"
         f"next: python -m papilla_trainer export {options.out} "
-        f"--out {options.out}/{config.network}.onnx"
+        f"--onnx {options.out}/{config.network}.onnx"
     )
     return result, text
 
@@ -106,7 +106,7 @@ def _evaluate(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 def _export(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.export import export_run
 
-    out = export_run(options.run_dir, options.out, options.name, options.weights)
+    out = export_run(options.run_dir, options.onnx, options.name, options.weights)
     size = out.stat().st_size
     return {"model": str(out), "bytes": size}, f"{out}: {size} bytes"
 
@@ -148,7 +148,7 @@ def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         open_datasets(options.dataset),
         options.rank,
         options.near,
-        options.out,
+        options.onnx,
         options.name,
     )
     return result, _untrained_text(result)
@@ -164,7 +164,7 @@ def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     if body.youngs_modulus_pa <= 0 or not 0 <= body.poissons_ratio < 0.5 or body.depth_mm <= 0:
         raise UsageError("modulus and depth must be positive, Poisson's ratio in 0 .. 0.5")
     result = write_half_space(
-        body, open_datasets(options.dataset), options.rank, options.near, options.out, options.name
+        body, open_datasets(options.dataset), options.rank, options.near, options.onnx, options.name
     )
     return result, _untrained_text(result)
 

@@ -25,7 +25,7 @@ def test_from_dataset_to_checked_onnx(
     assert (run / "loss.png").read_bytes().startswith(b"\x89PNG")
     assert len((run / "history.csv").read_text().splitlines()) == 4
 
-    assert main(["export", str(run), "--out", str(model)]) == 0
+    assert main(["export", str(run), "--onnx", str(model)]) == 0
     capsys.readouterr()
     assert main(["check", str(model), "--dataset", data, "--run", str(run), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["failures"] == []
@@ -42,7 +42,7 @@ def test_exit_codes(
     assert error["code"] == "bad_dataset"
     assert "fe-datagen generate" in error["message"]
     assert main(["train", "--dataset", data, "--out", str(run_dir)]) == 4
-    assert main(["export", str(tmp_path / "none"), "--out", str(tmp_path / "m.onnx")]) == 4
+    assert main(["export", str(tmp_path / "none"), "--onnx", str(tmp_path / "m.onnx")]) == 4
     (tmp_path / "broken.onnx").write_bytes(b"not a model")
     assert main(["check", str(tmp_path / "broken.onnx"), "--dataset", data]) == 1
     with pytest.raises(SystemExit) as stopped:
@@ -56,3 +56,11 @@ def test_help_teaches(capsys: pytest.CaptureFixture[str]) -> None:
             main([*command, "--help"])
         assert stopped.value.code == 0
         assert "exit codes" in capsys.readouterr().out
+
+
+def test_out_is_a_folder_everywhere(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("train", "curve", "export", "operator", "half-space"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        shown = capsys.readouterr().out
+        assert "--out " not in shown or "--out RUN_DIR" in shown or "--out DIR" in shown, command

@@ -122,8 +122,8 @@ def test_metrics_of_other_weights_are_not_exported(
     stale.mkdir()
     (stale / "checkpoint.pt").write_bytes((run_dir / "checkpoint.pt").read_bytes())
     (stale / "metrics.json").write_text(json.dumps({**metrics, "epoch": 99}))
-    assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 4
+    assert main(["export", str(stale), "--onnx", str(tmp_path / "m.onnx")]) == 4
     torch.set_num_threads(2)  # the run had one, and so has its evaluation
     again = evaluate_run(stale, tiny)
     assert again == metrics
-    assert main(["export", str(stale), "--out", str(tmp_path / "m.onnx")]) == 0
+    assert main(["export", str(stale), "--onnx", str(tmp_path / "m.onnx")]) == 0

@@ -144,7 +144,7 @@ def test_two_datasets_are_one(
     run, model = str(tmp_path / "run"), str(tmp_path / "model.onnx")
     settings = ["--network", face.network, "--operator", str(face.operator), "--epochs", "2"]
     assert main(["train", *datasets, "--out", run, *settings, "--threads", "1"]) == 0
-    assert main(["export", run, "--out", model]) == 0
+    assert main(["export", run, "--onnx", model]) == 0
     assert main(["check", model, *datasets, "--run", run]) == 0
     assert main(["check", model, *datasets[:2]]) == 1
     found = {entry.key: entry.value for entry in onnx.load(model).metadata_props}

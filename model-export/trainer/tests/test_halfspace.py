@@ -76,12 +76,12 @@ def test_untrained_models_from_the_command_line(
     data = str(tiny.directory)
     half_space, operator = str(tmp_path / "half-space.onnx"), str(tmp_path / "fe-operator.onnx")
     shape = ["--rank", "8", "--near", "5", "--json"]
-    assert main(["half-space", "--dataset", data, "--out", half_space, *shape]) == 0
+    assert main(["half-space", "--dataset", data, "--onnx", half_space, *shape]) == 0
     ours = json.loads(capsys.readouterr().out)["metrics"]
-    assert main(["operator", str(operator_file), "--dataset", data, "--out", operator, *shape]) == 0
+    assert main(["operator", str(operator_file), "--dataset", data, "--onnx", operator, *shape]) == 0
     assert json.loads(capsys.readouterr().out)["metrics"] != ours
     for model in (half_space, operator):
         assert main(["check", model, "--dataset", data, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["zero_gives_zero"] is True
-    odd = ["half-space", "--dataset", data, "--out", half_space, "--rank", "7"]
+    odd = ["half-space", "--dataset", data, "--onnx", half_space, "--rank", "7"]
     assert main(odd) == 2

@@ -126,10 +126,10 @@ fn load(
 }
 
 /// Holds all tiers to their golden answers: the library of ONNX Runtime is not the one that the models
-/// were tried with. A backend that is chosen for its speed has been compared with tract already.
+/// were tried with. Where the backend is chosen for its speed, loading has done so already.
 fn require_golden_answers(catalogue: &Catalogue) -> Result<(), StartError> {
     for tier in &catalogue.tiers {
-        golden::check(catalogue, tier).map_err(|error| StartError::Unusable {
+        golden::check(catalogue.golden_states(), tier).map_err(|error| StartError::Unusable {
             file: format!("{}.onnx", tier.name),
             origin: tier.model.info().backend.clone(),
             reason: format!("{error}; --backend tract does without ONNX Runtime"),

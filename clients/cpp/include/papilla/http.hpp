@@ -40,7 +40,8 @@ inline HttpAnswer http(const std::string& url, const std::string& method, const 
   net::Socket socket;
   if (address.secure) return failed("TLS: put a proxy in front, or use another client");
   if (!socket.open(address)) return failed("nobody listens; is papilla-server running there?");
-  socket.patience(120);
+  // As long as a request may wait for models that are being loaded.
+  socket.patience(30);
   const std::string request = method + " " + path + " HTTP/1.1\r\nHost: " + address.text() +
                               "\r\nConnection: close\r\nContent-Length: " +
                               std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body;
@@ -60,7 +61,7 @@ inline HttpAnswer http(const std::string& url, const std::string& method, const 
     }
   }
   if (split == std::string::npos || (due != std::string::npos && all.size() < due)) {
-    return failed("the answer broke off");
+    return failed(all.empty() ? "no answer; is papilla-server running there?" : "the answer broke off");
   }
   answer.body = all.substr(split + 4);
   answer.status = std::atoi(all.c_str() + std::min<std::size_t>(all.find(' ') + 1, all.size()));

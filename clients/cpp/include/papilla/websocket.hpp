@@ -73,7 +73,7 @@ class WebSocket {
             std::string& error, std::string& answer) {
     filled_ = read_ = 0;
     if (address.secure) return error = "TLS: put a proxy in front, or use another client", false;
-    if (!socket_.open(address)) return error = address.text() + ": nobody listens", false;
+    if (!socket_.open(address)) return error = address.text() + ": nobody listens; is papilla-server running there?", false;
     std::uint8_t nonce[16];
     for (auto& byte : nonce) byte = static_cast<std::uint8_t>(random_());
     const std::string key = detail::base64(nonce, sizeof nonce);
@@ -87,7 +87,7 @@ class WebSocket {
     std::string head;
     while (head.size() < 16384 && head.find("\r\n\r\n") == std::string::npos) {
       std::uint8_t byte;
-      if (!fill(&byte, 1)) return error = "the handshake broke off", false;
+      if (!fill(&byte, 1)) return error = address.text() + ": no answer; is papilla-server running there?", false;
       head.push_back(static_cast<char>(byte));
     }
     if (head.find(" 101 ") == std::string::npos) {

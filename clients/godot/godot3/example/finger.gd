@@ -8,7 +8,6 @@ const SED_OF_WHITE = 300.0
 
 var maps = 0
 var _atlas
-var _pressures_pa = []
 
 onready var session = $Session
 onready var picture = $Picture
@@ -16,9 +15,6 @@ onready var picture = $Picture
 
 func _ready():
 	_atlas = Atlas.new(Http.atlas_text(session.url, session.token))
-	# Contact maps take tens of ms in GDScript: made once here, a few places on the way round.
-	for k in 12:
-		_pressures_pa.append(_atlas.contact_map(_contacts(TAU * k / 12)))
 	session.connect("map_received", self, "_on_map")
 	picture.modulate = Color(1 / SED_OF_WHITE, 1, 1)
 
@@ -28,7 +24,7 @@ func _contacts(angle):
 
 
 func _process(_delta):
-	session.send(_pressures_pa[OS.get_ticks_msec() / 80 % _pressures_pa.size()])
+	session.send(_atlas.contact_map(_contacts(TAU * OS.get_ticks_msec() / 1000.0)))
 
 
 func _on_map(answer):

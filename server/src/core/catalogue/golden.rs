@@ -4,11 +4,16 @@
 //! one: other units, another orientation, an engine that computes it wrongly. So it is asked for
 //! the states of `replay.json`, and its answers are held against the FE solver's.
 
-use papilla_engine::EngineError;
+use std::sync::Arc;
+
+use papilla_engine::{
+    Backend, EngineError, Model,
+    agreement::{relative_l2, share},
+};
 use papilla_proto::{MAP_LEN, atlas::Raster};
 use serde::Serialize;
 
-use super::{Catalogue, Tier};
+use super::{Tier, replay::Replay};
 
 /// A state may err by so many times the 95th percentile of the card's test states: rare ones do,
 /// while a wrong scale or orientation errs by about 1.
@@ -62,14 +67,22 @@ pub(crate) enum GoldenError {
     Empty(Golden),
 }
 
-/// Asks `tier` for every state of the catalogue's replay; None if there are none.
+/// What is asked for, and where on a map it lies.
+#[derive(Clone, Copy)]
+pub(crate) struct States<'a> {
+    pub(crate) replay: &'a Replay,
+    pub(crate) skin: &'a Raster,
+    pub(crate) interface: &'a Raster,
+}
+
+/// Asks `tier` for every state of the replay; None if there are none.
 ///
 /// # Errors
 /// It does not run, or an answer is further off than its card allows.
-pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>, GoldenError> {
+pub(crate) fn check(of: States<'_>, tier: &Tier) -> Result<Option<Golden>, GoldenError> {
     let mut session = tier.model.session()?;
     let [mut pressure_pa, mut due, mut found] = [0, 1, 2].map(|_| vec![0.0; MAP_LEN]);
-    let states = &catalogue.replay.states;
+    let states = &of.replay.states;
     let mut worst: Option<Golden> = None;
     for state in states {
         let fill = |raster: &Raster, values: &[f32], map: &mut [f32]| {
@@ -78,10 +91,10 @@ pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>
                 reason: error.to_string(),
             })
         };
-        fill(&catalogue.skin, &state.pressure_pa, &mut pressure_pa)?;
-        fill(&catalogue.interface, &state.sed_j_per_m3, &mut due)?;
+        fill(of.skin, &state.pressure_pa, &mut pressure_pa)?;
+        fill(of.interface, &state.sed_j_per_m3, &mut due)?;
         session.infer(&pressure_pa, &mut found)?;
-        let mask = catalogue.interface.mask();
+        let mask = of.interface.mask();
         let relative_l2 = relative_l2(&found, &due, mask);
         let share = worst
             .as_ref()
@@ -107,46 +120,56 @@ pub(crate) fn check(catalogue: &Catalogue, tier: &Tier) -> Result<Option<Golden>
     }
 }
 
-/// `|found - due| / |due|` over the pixels of the mask; 0 where nothing is due and found.
-fn relative_l2(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
-    let (mut difference, mut size) = (0.0, 0.0);
-    for ((found, due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
-        difference += f64::from(found - due).powi(2);
-        size += f64::from(*due).powi(2);
+/// Gives back to tract every model that another backend answers wrongly; `in_tract` loads it there.
+/// That backend was the faster one and did well on one map.
+///
+/// # Errors
+/// A model does not load in tract.
+pub(crate) fn fall_back(
+    states: States<'_>,
+    tiers: &mut [Tier],
+    in_tract: impl Fn(&Tier) -> Result<Arc<dyn Model>, EngineError>,
+) -> Result<(), (String, EngineError)> {
+    for tier in tiers.iter_mut().filter(|tier| tier.model.backend() != Backend::Tract) {
+        let Err(error) = check(states, tier) else { continue };
+        let backend = &tier.model.info().backend;
+        tracing::warn!(tier = tier.name, backend, %error, "tract runs this model");
+        tier.model = in_tract(tier).map_err(|error| (tier.name.clone(), error))?;
     }
-    if difference > 0.0 { (difference / size.max(f64::MIN_POSITIVE)).sqrt() } else { 0.0 }
-}
-
-/// `sum found due / sum due^2` over the pixels of the mask; 1 where nothing is due.
-fn share(found: &[f32], due: &[f32], mask: &[bool]) -> f64 {
-    let (mut common, mut size) = (0.0, 0.0);
-    for ((&found, &due), _) in found.iter().zip(due).zip(mask).filter(|(_, inside)| **inside) {
-        common += f64::from(found) * f64::from(due);
-        size += f64::from(due).powi(2);
-    }
-    if size > 0.0 { common / size } else { 1.0 }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
+    use crate::core::catalogue::testing::{self, model};
 
+    /// Finite elements answer the pressure; one model in each backend does, and one is wrong.
     #[test]
-    fn the_share_of_a_multiple_is_its_factor() {
-        let (due, mask) = ([6.0, 8.0, 5.0], [true, true, false]);
-        for factor in [0.0, 0.001, 0.5, 1.0, 2.0] {
-            let found = due.map(|due| factor * due);
-            assert!((share(&found, &due, &mask) - f64::from(factor)).abs() < 1e-7);
-        }
-        assert!((share(&[8.0, -6.0, 9.0], &due, &mask)).abs() < 1e-12, "nothing in common");
-        assert!((share(&[1.0; 3], &[0.0; 3], &mask) - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_error_is_relative_and_of_the_patch_alone() {
-        let mask = [true, true, false];
-        assert!((relative_l2(&[3.0, 4.0, 9.0], &[6.0, 8.0, 0.0], &mask) - 0.5).abs() < 1e-12);
-        assert!(relative_l2(&[0.0; 3], &[0.0; 3], &mask).abs() < 1e-12);
-        assert!(relative_l2(&[1.0, 0.0, 0.0], &[0.0; 3], &mask) > 1e100);
+    fn a_backend_that_misses_golden_answers_gives_the_model_back() {
+        let models = [
+            model("right", Backend::Ort, 1.0),
+            model("wrong", Backend::Ort, 0.001),
+            model("tract's own", Backend::Tract, 0.001),
+        ];
+        let tiers = models.map(|model| testing::tier(model, 0.1)).to_vec();
+        let mut catalogue = testing::catalogue(tiers);
+        let values = vec![3.0; catalogue.skin.pixel_count()];
+        let state =
+            json!({"name": "flat", "depth_mm": 1, "pressure_pa": values, "sed_j_per_m3": values});
+        let replay = serde_json::from_value(json!({"presses": [state]})).unwrap();
+        let (skin, interface) = (&catalogue.skin, &catalogue.interface);
+        let (states, tiers) = (States { replay: &replay, skin, interface }, &mut catalogue.tiers);
+        let failed = |_: &Tier| Err(EngineError::BadCard { reason: "none".to_owned() });
+        assert_eq!(fall_back(states, tiers, failed).unwrap_err().0, "wrong");
+        let in_tract = |tier: &Tier| Ok(model(&tier.name, Backend::Tract, 1.0));
+        fall_back(states, tiers, in_tract).unwrap();
+        let backends: Vec<Backend> = tiers.iter().map(|tier| tier.model.backend()).collect();
+        assert_eq!(backends, [Backend::Ort, Backend::Tract, Backend::Tract]);
+        assert!(check(states, &tiers[1]).is_ok());
+        // What tract answers is not asked for here: `papilla-server check` and a reload do.
+        assert!(check(states, &tiers[2]).is_err());
     }
 }

@@ -3,14 +3,16 @@
 use std::{sync::Arc, time::Duration};
 
 use papilla_engine::{
-    Card, Choice, EngineError, Ladder, Model,
+    Backend, Card, Choice, EngineError, Ladder, Model,
     ladder::{Kind, SET_NAMES},
+    load_with,
 };
 use papilla_proto::atlas::Atlas;
 use serde_json::Value;
 
-use super::Tier;
+use super::{Tier, assets::Assets, golden};
 use crate::{
+    StartError,
     config::Config,
     core::{digest::sha256_hex, latency::Latency},
 };
@@ -125,6 +127,28 @@ impl<'a> Loading<'a> {
     ) -> Result<Arc<dyn Model>, EngineError> {
         let shares = u32::try_from(2 * of).unwrap_or(u32::MAX).max(1);
         self.backend.load(onnx, Some(card), self.calibration / shares)
+    }
+
+    /// Tries what was chosen for its speed on golden answers; what fails runs in tract.
+    ///
+    /// # Errors
+    /// Tract does not load that model.
+    pub(super) fn hold_to_golden_answers(
+        self,
+        states: golden::States<'_>,
+        tiers: &mut [Tier],
+        assets: &Assets,
+    ) -> Result<(), StartError> {
+        if self.backend != Choice::Auto {
+            return Ok(());
+        }
+        let in_tract = |tier: &Tier| {
+            let read = |ending| assets.get(&format!("{}.{ending}", tier.name)).unwrap_or_default();
+            let card = std::str::from_utf8(read("json")).unwrap_or_default();
+            load_with(Backend::Tract, read("onnx"), Some(&Card::from_json(card)?))
+        };
+        golden::fall_back(states, tiers, in_tract)
+            .map_err(|(tier, source)| StartError::Engine { tier, source })
     }
 }
 

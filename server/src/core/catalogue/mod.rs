@@ -185,6 +185,8 @@ impl Catalogue {
             }
             None => None,
         };
+        let states = golden::States { replay: &replay, skin: &skin, interface: &interface };
+        loading.hold_to_golden_answers(states, &mut tiers, assets)?;
         let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let overhead = Overhead::default();
@@ -203,6 +205,11 @@ impl Catalogue {
             runtime: effects::Shared::default(),
             cache: Cache::default(),
         })
+    }
+
+    /// What models are tried on.
+    pub(crate) fn golden_states(&self) -> golden::States<'_> {
+        golden::States { replay: &self.replay, skin: &self.skin, interface: &self.interface }
     }
 
     /// What effects are placed on.

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, atomic::AtomicUsize};
 
-use papilla_engine::{Model, ModelInfo, ladder::Kind};
+use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session, ladder::Kind};
 use papilla_proto::atlas::{Atlas, PatchVertices};
 use serde_json::json;
 
@@ -26,6 +26,35 @@ pub(crate) fn info(name: &str) -> ModelInfo {
         trainer_metrics: json!({}),
         backend: "test".to_owned(),
     }
+}
+
+/// Answers the pressure, times a factor.
+struct Times(ModelInfo, Backend, f32);
+
+impl Model for Times {
+    fn info(&self) -> &ModelInfo {
+        &self.0
+    }
+
+    fn backend(&self) -> Backend {
+        self.1
+    }
+
+    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
+        Ok(Box::new(Self(self.0.clone(), self.1, self.2)))
+    }
+}
+
+impl Session for Times {
+    fn infer(&mut self, pressure_pa: &[f32], sed: &mut [f32]) -> Result<(), EngineError> {
+        sed.iter_mut().zip(pressure_pa).for_each(|(sed, pressure)| *sed = self.2 * pressure);
+        Ok(())
+    }
+}
+
+/// A model that answers the pressure, times a factor.
+pub(crate) fn model(name: &str, backend: Backend, factor: f32) -> Arc<dyn Model> {
+    Arc::new(Times(info(name), backend, factor))
 }
 
 /// A tier that errs by so much.

@@ -153,7 +153,7 @@ impl Reloader {
         for tier in new.tiers.iter().filter(|tier| is_new(tier, &old)) {
             let name = || tier.name.clone();
             go_on()?;
-            golden::check(&new, tier)
+            golden::check(new.golden_states(), tier)
                 .map_err(|source| ReloadError::Golden { tier: name(), source })?;
             keeps_promises(tier, &old)?;
         }

@@ -5,6 +5,8 @@
 extends Reference
 
 const HALF_MAX = 65504.0
+# Threes of samples in a map, rounded up.
+const THREES = 16726
 
 
 # A map of 224 x 224 zeros.
@@ -13,6 +15,24 @@ static func zeros():
 	# New images are black: a native way to 50176 zeros.
 	image.create(224, 224, false, Image.FORMAT_RF)
 	return bytes_to_floats(image.get_data())
+
+
+# The same in threes of samples, as a PoolVector3Array; the last has two to spare.
+static func zero_threes():
+	var image = Image.new()
+	image.create(6, THREES / 2, false, Image.FORMAT_RF)
+	return _whole(TYPE_VECTOR3_ARRAY, THREES, image.get_data())
+
+
+# Such threes, times a number.
+static func scaled_threes(threes, factor):
+	return Transform(Basis().scaled(Vector3(factor, factor, factor)), Vector3()).xform(threes)
+
+
+# Such threes as a map.
+static func threes_to_floats(threes):
+	var bytes = var2bytes(threes)
+	return _whole(TYPE_REAL_ARRAY, 224 * 224, bytes.subarray(8, 8 + 4 * 224 * 224 - 1))
 
 
 # Floats to bytes, f32 little-endian.
@@ -28,7 +48,12 @@ static func bytes_to_floats(bytes):
 	var count = bytes.size() / 4
 	if count == 0:
 		return PoolRealArray()
-	var whole = PoolByteArray([TYPE_REAL_ARRAY, 0, 0, 0, count & 255, count >> 8 & 255, count >> 16 & 255, count >> 24 & 255])
+	return _whole(TYPE_REAL_ARRAY, count, bytes)
+
+
+# An array of a type, of the bytes of its elements.
+static func _whole(type, count, bytes):
+	var whole = PoolByteArray([type, 0, 0, 0, count & 255, count >> 8 & 255, count >> 16 & 255, count >> 24 & 255])
 	whole.append_array(bytes)
 	return bytes2var(whole)
 

@@ -24,10 +24,13 @@ var first = PackedInt32Array()
 var areas_mm2 = PackedFloat32Array()
 var places_mm = PackedFloat32Array()
 
-# The same pixels block by block: what contacts read.
+# What contacts read, block by block. The map in threes of its samples, so that one operation takes three: `_offsets` takes a place
+# beside the block's centre, u, to 2 p.u - p.p of their places p, and adding R^2 - u.u gives R^2 minus the squared distance.
 var _places = []
-var _areas = []
 var _indices = []
+var _threes = []
+var _offsets = []
+var _areas = []
 var _blocks = []
 
 
@@ -78,82 +81,129 @@ func pressure_map(vertex_pa):
 # radius around the nearest point of the skin; one more than 5 mm off the skin adds nothing. Without a radius it is the finger's own
 # on a flat object.
 func contact_map(contacts):
-	var map = zeros()
+	var map = null
 	for contact in contacts:
-		var radius_mm = contact.get("radius_mm", RADIUS_AT_1_N_MM * pow(contact.force_n, 1.0 / 3.0))
-		map = _add_contact(map, contact.at_mm, contact.force_n, radius_mm)
-	return map
+		var near = []
+		var added = _contact_threes(contact, near)
+		if map == null:
+			map = added
+			continue
+		for block in near:
+			for n in block.threes:
+				map[_threes[n]] += added[_threes[n]]
+	return zeros() if map == null else Compat.threes_to_floats(map)
 
 
-func _add_contact(map, at, force_n, radius_mm):
-	var nearest = _nearest(Vector3(at[0], at[1], at[2]))
+# One contact as threes of samples; `near` takes the blocks that it reaches.
+func _contact_threes(contact, near):
+	var map = Compat.zero_threes()
+	var nearest = _nearest(Vector3(contact.at_mm[0], contact.at_mm[1], contact.at_mm[2]))
 	if nearest < 0:
 		return map
+	var own = _places[nearest]
+	# What is narrower than .01 mm is on that pixel alone as well.
+	var radius_mm = max(contact.get("radius_mm", RADIUS_AT_1_N_MM * pow(contact.force_n, 1.0 / 3.0)), 0.01)
 	# Of locals and plain arrays, since this loop is what a contact costs.
-	var places = _places
+	var offsets = _offsets
 	var areas = _areas
-	var own = places[nearest]
-	var per_mm2 = 1.0 / (radius_mm * radius_mm)
-	var touched = [nearest]
-	var parts = [1.0]
-	var total = areas[nearest]
+	var threes = _threes
+	var total = 0.0
 	for block in _blocks:
-		if own.distance_to(block.centre) > radius_mm + block.radius:
+		var distance = own.distance_to(block.centre)
+		if distance > radius_mm + block.radius:
 			continue
-		for n in range(block.first, block.end):
-			var part = 1.0 - own.distance_squared_to(places[n]) * per_mm2
-			if part > 0.0 and n != nearest:
-				part = sqrt(part)
-				total += part * areas[n]
-				touched.append(n)
-				parts.append(part)
-	var top_pa = 1e6 * force_n / total
-	var indices = _indices
-	for k in touched.size():
-		map[indices[touched[k]]] += top_pa * parts[k]
-	# Arrays of floats are handed over by value in Godot 3: hence the return.
-	return map
+		near.append(block)
+		var u = own - block.centre
+		var rest = radius_mm * radius_mm - u.length_squared()
+		rest = Vector3(rest, rest, rest)
+		if block.whole and distance + block.radius < radius_mm:
+			for n in block.threes:
+				var part = offsets[n] * u + rest
+				part = Vector3(sqrt(part.x), sqrt(part.y), sqrt(part.z))
+				total += areas[n].dot(part)
+				map[threes[n]] = part
+			continue
+		for n in block.threes:
+			var part = offsets[n] * u + rest
+			if part.x > 0.0 or part.y > 0.0 or part.z > 0.0:
+				part = Vector3(sqrt(max(part.x, 0.0)), sqrt(max(part.y, 0.0)), sqrt(max(part.z, 0.0)))
+				total += areas[n].dot(part)
+				map[threes[n]] = part
+	return Compat.scaled_threes(map, 1e6 * contact.force_n / total)
 
 
 # The place of the skin's pixel nearest to a point, the first of equals; -1 beyond REACH_MM.
 func _nearest(at):
-	# No pixel of the nearest block can be farther than this.
-	var within = REACH_MM
+	# The block with the nearest centre first: hardly another is as near as its nearest pixel.
+	var first_block = _blocks[0]
 	for block in _blocks:
-		within = min(within, at.distance_to(block.centre) + block.radius)
+		if at.distance_squared_to(block.centre) < at.distance_squared_to(first_block.centre):
+			first_block = block
 	var nearest = -1
-	var least = REACH_MM * REACH_MM
-	for block in _blocks:
+	var within = REACH_MM
+	for block in [first_block] + _blocks:
 		if at.distance_to(block.centre) - block.radius > within:
 			continue
-		for n in range(block.first, block.end):
-			var d2 = at.distance_squared_to(_places[n])
-			if d2 < least or (d2 == least and (nearest < 0 or _indices[n] < _indices[nearest])):
-				least = d2
+		for n in block.pixels:
+			var distance = at.distance_to(_places[n])
+			if distance < within or (distance == within and (nearest < 0 or _indices[n] < _indices[nearest])):
+				within = distance
 				nearest = n
 	return nearest
 
 
-# Pixels by squares of BLOCK_PX, each with the sphere that holds it: a contact looks at those that it may touch.
+# Blocks of BLOCK_PX by BLOCK_PX pixels, each with the sphere that holds it: a contact looks at those that it may touch.
 func _sort_into_blocks():
 	var members = {}
 	for n in pixels.size():
-		var key = pixels[n] / SIDE_PX / BLOCK_PX * SIDE_PX + pixels[n] % SIDE_PX / BLOCK_PX
+		var three = pixels[n] / 3
+		var key = 3 * three / SIDE_PX / BLOCK_PX * SIDE_PX + 3 * three % SIDE_PX / BLOCK_PX
 		if not members.has(key):
-			members[key] = []
-		members[key].append(n)
+			members[key] = {}
+		if not members[key].has(three):
+			members[key][three] = [-1, -1, -1]
+		members[key][three][pixels[n] % 3] = n
 	for key in members:
-		var centre = Vector3()
-		var begin = _places.size()
-		for n in members[key]:
-			_places.append(Vector3(places_mm[3 * n], places_mm[3 * n + 1], places_mm[3 * n + 2]))
-			_areas.append(areas_mm2[n])
-			_indices.append(pixels[n])
-			centre += _places[_places.size() - 1] / members[key].size()
-		var radius = 0.0
-		for n in range(begin, _places.size()):
-			radius = max(radius, centre.distance_to(_places[n]))
-		_blocks.append({"centre": centre, "radius": radius + 1e-4, "first": begin, "end": _places.size()})
+		_add_block(members[key])
+
+
+# Of pixels by their threes: -1 where a sample is none of the skin.
+func _add_block(members):
+	var begin = _threes.size()
+	var first_pixel = _places.size()
+	var centre = Vector3()
+	for three in members:
+		for n in members[three]:
+			if n >= 0:
+				_places.append(Vector3(places_mm[3 * n], places_mm[3 * n + 1], places_mm[3 * n + 2]))
+				_indices.append(pixels[n])
+				centre += _places[-1]
+	centre /= _places.size() - first_pixel
+	var radius = 0.0
+	var whole = true
+	for three in members:
+		var p = []
+		# No contact reaches what is none of the skin.
+		var squares = Vector3(1e6, 1e6, 1e6)
+		var area = Vector3()
+		for k in 3:
+			var n = members[three][k]
+			p.append(Vector3())
+			if n < 0:
+				whole = false
+				continue
+			p[k] = Vector3(places_mm[3 * n], places_mm[3 * n + 1], places_mm[3 * n + 2]) - centre
+			squares[k] = p[k].length_squared()
+			area[k] = areas_mm2[n]
+			radius = max(radius, p[k].length())
+		var columns = []
+		for axis in 3:
+			columns.append(2.0 * Vector3(p[0][axis], p[1][axis], p[2][axis]))
+		_threes.append(three)
+		_offsets.append(Transform3D(columns[0], columns[1], columns[2], -squares))
+		_areas.append(area)
+	_blocks.append({"centre": centre, "radius": radius + 1e-4, "whole": whole,
+		"threes": range(begin, _threes.size()), "pixels": range(first_pixel, _places.size())})
 
 
 # Force of a pressure map over the undeformed skin, N.

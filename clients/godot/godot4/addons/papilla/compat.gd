@@ -2,6 +2,8 @@
 extends RefCounted
 
 const HALF_MAX = 65504.0
+# Threes of samples in a map, rounded up.
+const THREES = 16726
 
 
 # A map of 224 x 224 zeros.
@@ -10,6 +12,24 @@ static func zeros():
 	# New room is filled with zeros.
 	map.resize(224 * 224)
 	return map
+
+
+# The same in threes of samples, as a PackedVector3Array; the last has two to spare.
+static func zero_threes():
+	var threes = PackedVector3Array()
+	threes.resize(THREES)
+	threes.fill(Vector3())
+	return threes
+
+
+# Such threes, times a number.
+static func scaled_threes(threes, factor):
+	return Transform3D(Basis().scaled(Vector3(factor, factor, factor)), Vector3()) * threes
+
+
+# Such threes as a map.
+static func threes_to_floats(threes):
+	return threes.to_byte_array().to_float32_array().slice(0, 224 * 224)
 
 
 # Floats to bytes, f32 little-endian.

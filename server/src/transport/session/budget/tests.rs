@@ -1,27 +1,9 @@
 //! Machines that are slower than was said, become slower, and recover.
 
-use std::sync::Arc;
-
-use papilla_engine::{Backend, EngineError, Model, ModelInfo, Session};
+use papilla_engine::Backend;
 
 use super::*;
 use crate::core::catalogue::testing;
-
-struct Named(ModelInfo);
-
-impl Model for Named {
-    fn info(&self) -> &ModelInfo {
-        &self.0
-    }
-
-    fn backend(&self) -> Backend {
-        Backend::Tract
-    }
-
-    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
-        unreachable!("nothing is rendered here")
-    }
-}
 
 /// Error and shipped time (us) of the tiers, fastest first.
 const TIERS: [(f64, u64); 4] = [(0.07, 200), (0.03, 1400), (0.026, 4800), (0.025, 9400)];
@@ -40,7 +22,7 @@ struct Simulated {
 impl Simulated {
     fn new() -> Self {
         let tier = |(error, us): (f64, u64)| {
-            let tier = testing::tier(Arc::new(Named(testing::info("some"))), error);
+            let tier = testing::tier(testing::model("some", Backend::Tract, 1.0), error);
             tier.latency.expect(Duration::from_micros(us));
             tier
         };
