@@ -75,6 +75,8 @@ pub struct PixelSkin {
     at_edge: Vec<bool>,
     surface: SurfaceCompliance,
     plans: Arc<Plans>,
+    /// Places of the pixels at rest.
+    rest_mm: Vec<[f32; 3]>,
 }
 
 impl PixelSkin {
@@ -90,6 +92,10 @@ impl PixelSkin {
         let (stencils, smoothed) = (smooth::of_pixels(atlas, &raster), smooth::of_vertices(atlas));
         let surface = SurfaceCompliance::new(layers);
         let at_edge = smooth::at_edge(atlas);
+        let place = |stencil: &PixelStencil| {
+            std::array::from_fn(|i| stencil.value(|v| model.positions_mm[v][i] as f32))
+        };
+        let rest_mm = stencils.iter().map(place).collect();
         Some(Self {
             raster,
             uv_px,
@@ -98,6 +104,7 @@ impl PixelSkin {
             at_edge,
             surface,
             plans: Arc::new(Plans::new()),
+            rest_mm,
         })
     }
 }
@@ -111,9 +118,11 @@ pub struct PixelContact {
     convolution: Convolution,
     amplitudes: Option<Amplitudes>,
     turns: Turns,
-    /// By pixel of the window: gap without the pressure on pixels, mm, and pressure, MPa.
+    /// By pixel of the window: gap, mm, and pressure, MPa.
     rest: Vec<f32>,
     pressure: Vec<f32>,
+    /// By pixel of the map: what pixels hold, and its means over pixels, Pa.
+    held_pa: Vec<f32>,
     map_pa: Vec<f32>,
     peak_pa: f32,
 }
@@ -197,6 +206,7 @@ impl PixelContact {
             turns: Turns::new(model.vertices()),
             rest: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
+            held_pa: vec![0.0; MAP_LEN],
             map_pa: vec![0.0; MAP_LEN],
             peak_pa: 0.0,
             skin,
@@ -217,6 +227,7 @@ impl PixelContact {
 
     /// Forgets the last frame.
     pub fn reset(&mut self) {
+        self.held_pa.fill(0.0);
         self.map_pa.fill(0.0);
         self.peak_pa = 0.0;
         self.turns.forget();
@@ -228,7 +239,7 @@ impl PixelContact {
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        let Self { skin, window, pressure, map_pa, turns, .. } = self;
+        let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
         if !window.open(skin, solver.near()) {
             self.reset();
@@ -239,9 +250,10 @@ impl PixelContact {
         let warm = turns.begin(&mut window.force_n);
         if warm {
             for (p, entry) in pressure.iter_mut().zip(&window.entries) {
-                *p = map_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
+                *p = held_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
             }
         }
+        held_pa.fill(0.0);
         map_pa.fill(0.0);
         let mut change = f32::INFINITY;
         for round in 0..ROUNDS_MAX {
@@ -276,12 +288,10 @@ impl PixelContact {
             self;
         let n = window.len();
         let model = &solver.model;
-        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
-        window.place(skin, model);
-        window.measure(view, solver.person())?;
-        window.measure_hats(skin, model);
         let m = window.free();
         if let Some(warm) = start {
+            window.start(skin, model);
+            window.measure_hats(skin, model);
             window.press_hats(skin, turns.found_without_pixels(), rest);
             let first = if warm { m } else { 0 };
             pressure[first..n].copy_from_slice(&rest[first..n]);
@@ -293,22 +303,26 @@ impl PixelContact {
         window.press_hats(skin, &window.force_n, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
         window.own_dents(skin, grid, size);
-        let held = (m < n).then(|| convolution.press(&window.cells[m..], &pressure[m..n]));
-        window.rest(skin, held, &mut rest[..m]);
+        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
+        window.place(skin, model);
+        let grid = convolution.press(&window.cells, &pressure[..n]);
+        window.measure(skin, view, solver.person(), grid, effort)?;
+        window.measure_hats(skin, model);
+        let gradient = &mut rest[..m];
+        window.gradient(&pressure[..m], gradient);
         let give = &window.give[..m];
         let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
         let nearby = Nearby { convolution, cells: &window.cells[..m], give, norm };
         effort.products += bounded
-            .solve(nearby, &rest[..m], &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
+            .improve(nearby, gradient, &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
             .products;
-        effort.distances += n as u32;
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
         Ok(turns.take(&mut window.force_n))
     }
 
     fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
-        let Self { window, pressure, map_pa, peak_pa, skin, .. } = self;
+        let Self { window, pressure, held_pa, map_pa, peak_pa, skin, .. } = self;
         *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
         let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
@@ -325,9 +339,10 @@ impl PixelContact {
             size_n += size;
             out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
             let index = skin.raster.indices()[window.entries[i] as usize];
-            map_pa[index as usize] = p * unit_pa;
-            *peak_pa = peak_pa.max(p * unit_pa);
+            held_pa[index as usize] = p * unit_pa;
+            window.spread(skin, index as usize, p * unit_pa, map_pa);
         }
+        *peak_pa = map_pa.iter().copied().fold(0.0, f32::max);
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);
             if p > 0.0 {

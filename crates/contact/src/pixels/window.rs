@@ -3,7 +3,7 @@
 mod hats;
 
 use super::PixelSkin;
-use crate::answer::Person;
+use crate::answer::{Effort, Person};
 use crate::error::ContactError;
 use crate::model::ContactModel;
 use crate::objects::View;
@@ -16,6 +16,14 @@ const NEAR_MM: f64 = 0.6;
 const FREE_MM: f32 = 0.3;
 /// Pixels between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
+/// Depth of a displaced pixel from which the side that it has to come out of is looked for, mm.
+const DEEP_MM: f32 = 0.01;
+/// Cosine between the skin's and the object's normal below which that is done.
+const STEEP: f32 = 0.5;
+/// The least that counts.
+const LEVEL_MIN: f32 = 0.2;
+/// Most steps of it.
+const TURNS_MAX: u32 = 8;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
@@ -28,6 +36,8 @@ pub(super) struct Window {
     pub at_mm: Vec<[f32; 3]>,
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
+    /// The skin's normal, into the finger.
+    inward: Vec<[f32; 3]>,
     gap_mm: Vec<f32>,
     /// How far the object gives way, mm/MPa.
     pub give: Vec<f32>,
@@ -65,6 +75,7 @@ impl Window {
             at_mm: vec![[0.0; 3]; pixels],
             normal: vec![[0.0; 3]; pixels],
             area_mm2: vec![0.0; pixels],
+            inward: vec![[0.0; 3]; pixels],
             gap_mm: vec![0.0; pixels],
             give: vec![0.0; pixels],
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
@@ -228,12 +239,25 @@ impl Window {
                 })
             });
         }
+        self.measure_planes(skin, model);
+    }
+
+    fn measure_planes(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for slot in 0..self.entries.len() {
             let index = skin.raster.indices()[self.entries[slot] as usize] as usize;
             let [a, b] = [MAP_SIDE_PX, 1].map(|step| self.across(index, slot, step));
-            let n =
-                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-            self.area_mm2[slot] = n.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let n = cross(a, b);
+            let area = n.iter().map(|v| v * v).sum::<f32>().sqrt();
+            self.area_mm2[slot] = area;
+            let vertex = skin.raster.pixels()[self.entries[slot] as usize].vertices[0] as usize;
+            let outward = model.normals[vertex];
+            // A pixel without neighbours has no plane.
+            self.inward[slot] = if area > 0.0 {
+                let along: f32 = n.iter().zip(outward).map(|(a, b)| a * b).sum();
+                n.map(|v| -v * along.signum() / area)
+            } else {
+                outward.map(|v| -v)
+            };
         }
     }
 
@@ -248,14 +272,43 @@ impl Window {
         std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
     }
 
-    pub(super) fn measure(&mut self, view: View<'_>, person: Person) -> Result<(), ContactError> {
+    /// Gaps of the pixels along the skin's normal, under the pressure whose displacement is
+    /// `grid`, mm.
+    pub(super) fn measure(
+        &mut self,
+        skin: &PixelSkin,
+        view: View<'_>,
+        person: Person,
+        grid: &[f32],
+        effort: &mut Effort,
+    ) -> Result<(), ContactError> {
         for slot in 0..self.entries.len() {
-            let nearest = view.nearest_at(self.at_mm[slot].map(f64::from));
-            let nearest = nearest.ok_or(ContactError::Diverged)?;
-            self.gap_mm[slot] = nearest.gap_mm.min(1e3) as f32;
+            let inward = self.inward[slot];
+            let stencil = &skin.stencils[self.entries[slot] as usize];
+            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
+            let own = grid[self.cells[slot] as usize] - dent;
+            let (mut way, mut turns) = (0.0, 0);
+            let (nearest, along) = loop {
+                let at: [f32; 3] =
+                    std::array::from_fn(|i| self.at_mm[slot][i] + (own + way) * inward[i]);
+                let nearest = view.nearest_at(at.map(f64::from)).ok_or(ContactError::Diverged)?;
+                effort.distances += 1;
+                let along: f32 =
+                    nearest.normal.iter().zip(inward).map(|(a, b)| *a as f32 * b).sum();
+                let gap = nearest.gap_mm as f32;
+                // Deep inside, the nearest side need not be the one in whose way the skin is.
+                if turns < TURNS_MAX && gap < -DEEP_MM && (along < STEEP || gap < -FREE_MM) {
+                    way += -gap;
+                    turns += 1;
+                    continue;
+                }
+                break (nearest, along);
+            };
+            let gap = (nearest.gap_mm.min(1e3) as f32) / along.clamp(LEVEL_MIN, 1.0) - way;
             // In the units of the reference finger: pressure over stiffness, length over width.
             self.give[slot] =
                 (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
+            self.gap_mm[slot] = gap;
             self.normal[slot] = nearest.normal.map(|n| n as f32);
         }
         Ok(())
@@ -305,15 +358,38 @@ impl Window {
         }
     }
 
-    /// Gaps of the pixels that are solved for, without their own pressure, mm. `held` is the
-    /// displacement of the grid by those that are held, if any.
-    pub(super) fn rest(&self, skin: &PixelSkin, held: Option<&[f32]>, rest: &mut [f32]) {
-        for (slot, entry) in self.entries[..self.free()].iter().enumerate() {
-            let stencil = &skin.stencils[*entry as usize];
-            let gap = self.gap_mm[slot];
-            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
-            let by_held = held.map_or(0.0, |grid| grid[self.cells[slot] as usize]);
-            rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent + by_held };
+    /// Gaps of the pixels that are solved for, mm.
+    pub(super) fn gradient(&self, pressure: &[f32], gradient: &mut [f32]) {
+        for (slot, gradient) in gradient.iter_mut().enumerate() {
+            let (gap, p) = (self.gap_mm[slot], pressure[slot]);
+            let is_free = gap > FREE_MM && !(p > 0.0);
+            *gradient = if is_free { 1e3 } else { gap + self.give[slot] * p };
         }
     }
+
+    /// Adds a pixel's pressure to the means over pixels of pressure that is linear between them.
+    pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
+        const SHARE: [f32; 3] = [0.125, 0.75, 0.125];
+        let mask = skin.raster.mask();
+        for (row, a) in SHARE.iter().enumerate() {
+            for (column, b) in SHARE.iter().enumerate() {
+                let to = (index + row * MAP_SIDE_PX + column).checked_sub(MAP_SIDE_PX + 1);
+                // What would leave the skin stays.
+                let to = to.filter(|to| mask.get(*to) == Some(&true)).unwrap_or(index);
+                map[to] += a * b * pressure;
+            }
+        }
+    }
+
+    /// Places and areas of the pixels at rest.
+    pub(super) fn start(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        for (slot, entry) in self.entries.iter().enumerate() {
+            self.at_mm[slot] = skin.rest_mm[*entry as usize];
+        }
+        self.measure_planes(skin, model);
+    }
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
