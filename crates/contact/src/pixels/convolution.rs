@@ -11,7 +11,7 @@ use std::sync::Arc;
 type C32 = Complex<f32>;
 
 /// Lengths of windows: a transform of each is fast.
-const LENGTHS: [usize; 10] = [32, 48, 64, 80, 96, 128, 160, 192, 224, 288];
+const LENGTHS: [usize; 14] = [32, 40, 48, 56, 64, 72, 80, 96, 112, 128, 160, 192, 224, 288];
 
 /// Transforms along a window of one length.
 struct Plan {

@@ -20,6 +20,7 @@
 mod convolution;
 mod layers;
 mod memory;
+mod own_dents;
 mod smooth;
 mod turns;
 mod window;
@@ -34,8 +35,9 @@ use crate::second_order::Amplitudes;
 use crate::solver::Solver;
 use convolution::{Convolution, Plans};
 use layers::SurfaceCompliance;
+use own_dents::{Correction, OwnDents};
 use papilla_atlas::{Atlas, MAP_LEN, Raster};
-use smooth::{PixelStencil, VertexStencil};
+use smooth::PixelStencil;
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
@@ -70,7 +72,7 @@ pub struct PixelSkin {
     uv_px: Vec<[f32; 2]>,
     /// By pixel, and by vertex.
     stencils: Vec<PixelStencil>,
-    smoothed: Vec<VertexStencil>,
+    corrections: Vec<Correction>,
     /// Whether a vertex is at the skin's edge.
     at_edge: Vec<bool>,
     surface: SurfaceCompliance,
@@ -89,23 +91,17 @@ impl PixelSkin {
             return None;
         }
         let uv_px = atlas.patch(raster.patch()).uv_px.clone();
-        let (stencils, smoothed) = (smooth::of_pixels(atlas, &raster), smooth::of_vertices(atlas));
+        let stencils = smooth::of_pixels(atlas, &raster);
         let surface = SurfaceCompliance::new(layers);
         let at_edge = smooth::at_edge(atlas);
         let place = |stencil: &PixelStencil| {
             std::array::from_fn(|i| stencil.value(|v| model.positions_mm[v][i] as f32))
         };
-        let rest_mm = stencils.iter().map(place).collect();
-        Some(Self {
-            raster,
-            uv_px,
-            stencils,
-            smoothed,
-            at_edge,
-            surface,
-            plans: Arc::new(Plans::new()),
-            rest_mm,
-        })
+        let rest_mm: Vec<[f32; 3]> = stencils.iter().map(place).collect();
+        let plans = Arc::new(Plans::new());
+        let own = OwnDents { model, uv_px: &uv_px, raster: &raster, rest_mm: &rest_mm };
+        let corrections = own.corrections(&surface, &plans, &at_edge);
+        Some(Self { raster, uv_px, stencils, corrections, at_edge, surface, plans, rest_mm })
     }
 }
 
@@ -241,7 +237,7 @@ impl PixelContact {
     ) -> Result<(), ContactError> {
         let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
-        if !window.open(skin, solver.near()) {
+        if !window.open(skin, solver.near(), view, &mut out.effort) {
             self.reset();
             return Ok(());
         }
@@ -293,8 +289,20 @@ impl PixelContact {
             window.start(skin, model);
             window.measure_hats(skin, model);
             window.press_hats(skin, turns.found_without_pixels(), rest);
+            if warm {
+                // What is pressed is pressed on as vertices press on by themselves.
+                for (p, now) in pressure[..m].iter_mut().zip(&*rest).filter(|(p, _)| **p > 0.0) {
+                    *p += now;
+                }
+            }
             let first = if warm { m } else { 0 };
             pressure[first..n].copy_from_slice(&rest[first..n]);
+            if warm {
+                window.press_hats(skin, turns.last(), rest);
+                for (p, last) in pressure[..m].iter_mut().zip(&*rest).filter(|(p, _)| **p > 0.0) {
+                    *p = (*p - last).max(0.0);
+                }
+            }
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());

@@ -52,6 +52,11 @@ impl Turns {
         &self.without
     }
 
+    /// The same of the frame before it.
+    pub(super) fn last(&self) -> &Vectors {
+        &self.last
+    }
+
     /// The same, empty and to be filled; the next frame starts from it.
     pub(super) fn recall(&mut self) -> &mut Vectors {
         self.warm = true;

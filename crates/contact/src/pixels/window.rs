@@ -5,6 +5,7 @@ mod hats;
 use super::PixelSkin;
 use crate::answer::{Effort, Person};
 use crate::error::ContactError;
+use crate::kernels::{DisplaceRuns, run};
 use crate::model::ContactModel;
 use crate::objects::View;
 use crate::second_order::Amplitudes;
@@ -12,6 +13,8 @@ use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels round vertices nearer than this are looked at, reference mm.
 const NEAR_MM: f64 = 0.6;
+/// Of these, pixels nearer than this can come to touch, reference mm.
+const REACH_MM: f64 = 0.3;
 /// Gap of a displaced pixel beyond which nothing presses, reference mm.
 const FREE_MM: f32 = 0.3;
 /// Pixels between the window and itself, where it repeats.
@@ -24,6 +27,8 @@ const STEEP: f32 = 0.5;
 const LEVEL_MIN: f32 = 0.2;
 /// Most steps of it.
 const TURNS_MAX: u32 = 8;
+/// Columns that are taken together.
+const BLOCK: usize = 16;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
@@ -47,21 +52,22 @@ pub(super) struct Window {
     size: [usize; 2],
     /// Vertices of the pixels' stencils, and where each stands among them.
     ids: Vec<u32>,
-    /// How many of these, the first, are of pixels; the others are what these are smoothed with.
-    inner: usize,
     place: Vec<u32>,
     near: Vec<bool>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
     /// By vertex of the skin: displacement by its own hats, mm; force, N; hat's area, mm2; pressure,
     /// MPa.
-    rough_mm: Vec<f32>,
     dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
     hat_n: Vec<f32>,
     touched: Vec<u32>,
     packed: [Vec<f32>; 3],
+    /// Forces by the compliance's columns, and where they are not 0.
+    dense: [Vec<f32>; 3],
+    blocks: Vec<bool>,
+    runs: Vec<[usize; 2]>,
 }
 
 impl Window {
@@ -82,18 +88,19 @@ impl Window {
             first: [0; 2],
             size: [0; 2],
             ids: Vec::with_capacity(vertices),
-            inner: 0,
             place: vec![NONE; vertices],
             near: vec![false; vertices],
             linear: vector(),
             moved: vector(),
-            rough_mm: zeros(),
             dent_mm: zeros(),
             force_n: vector(),
             hat_mm2: zeros(),
             hat_n: zeros(),
             touched: Vec::with_capacity(vertices),
             packed: vector(),
+            dense: vector(),
+            blocks: vec![false; vertices.div_ceil(BLOCK)],
+            runs: Vec::with_capacity(vertices.div_ceil(BLOCK)),
         }
     }
 
@@ -112,7 +119,13 @@ impl Window {
 
     /// Takes the pixels round `candidates`, distances (reference mm) and vertices, that things are
     /// near; false if there are none.
-    pub(super) fn open(&mut self, skin: &PixelSkin, candidates: &[(f64, u32)]) -> bool {
+    pub(super) fn open(
+        &mut self,
+        skin: &PixelSkin,
+        candidates: &[(f64, u32)],
+        view: View<'_>,
+        effort: &mut Effort,
+    ) -> bool {
         self.entries.clear();
         self.held.clear();
         self.ids.clear();
@@ -126,7 +139,12 @@ impl Window {
             self.near[*vertex as usize] = true;
         }
         for (entry, pixel) in skin.raster.pixels().iter().enumerate() {
-            if pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+            if !pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+                continue;
+            }
+            effort.distances += 1;
+            let nearest = view.nearest_at(skin.rest_mm[entry].map(f64::from));
+            if nearest.is_some_and(|nearest| nearest.gap_mm < REACH_MM) {
                 let is_held = pixel.vertices.iter().any(|v| skin.at_edge[*v as usize]);
                 if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
             }
@@ -146,15 +164,6 @@ impl Window {
                 if self.place[usize::from(*vertex)] == NONE {
                     self.place[usize::from(*vertex)] = self.ids.len() as u32;
                     self.ids.push(u32::from(*vertex));
-                }
-            }
-        }
-        self.inner = self.ids.len();
-        for slot in 0..self.inner {
-            for vertex in skin.smoothed[self.ids[slot] as usize].vertices {
-                if self.place[usize::from(vertex)] == NONE {
-                    self.place[usize::from(vertex)] = self.ids.len() as u32;
-                    self.ids.push(u32::from(vertex));
                 }
             }
         }
@@ -194,19 +203,16 @@ impl Window {
                 }
             }
         }
-        for (slot, id) in self.ids.iter().enumerate() {
-            let rows = &model.compliance[9 * *id as usize * v..][..9 * v];
-            for (a, linear) in self.linear.iter_mut().enumerate() {
-                let mut sum = 0.0;
-                for (b, packed) in self.packed.iter().enumerate() {
-                    let row = &rows[(3 * a + b) * v..][..v];
-                    for (k, other) in self.touched.iter().enumerate() {
-                        sum += row[model.rank[*other as usize] as usize] * packed[k];
-                    }
-                }
-                linear[slot] = sum;
-            }
-        }
+        self.find_runs(model);
+        run(DisplaceRuns {
+            compliance: &model.compliance,
+            columns: v,
+            ids: &self.ids,
+            runs: &self.runs,
+            force: &self.dense,
+            moved: &mut self.linear,
+        });
+        self.correct(skin, model);
         if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
             let m = self.touched.len();
             let [x, y, z] = &self.packed;
@@ -217,15 +223,47 @@ impl Window {
                 moved.copy_from_slice(linear);
             }
         }
-        // What forces at vertices do to themselves and their neighbours is the mesh's, not the
-        // skin's: FE of linear elements moves a vertex twice as far as pressure on its hat does.
-        for (moved, smooth) in self.moved.iter().zip(&mut self.linear) {
-            for (slot, id) in self.ids[..self.inner].iter().enumerate() {
-                let stencil = &skin.smoothed[*id as usize];
-                smooth[slot] = stencil.value(|vertex| moved[self.place[vertex] as usize]);
+    }
+
+    /// Spreads the packed forces over the compliance's columns, and finds runs of those that are
+    /// not 0.
+    fn find_runs(&mut self, model: &ContactModel) {
+        self.dense.iter_mut().for_each(|force| force.fill(0.0));
+        self.blocks.fill(false);
+        for (k, vertex) in self.touched.iter().enumerate() {
+            let column = model.rank[*vertex as usize] as usize;
+            self.blocks[column / BLOCK] = true;
+            for (dense, packed) in self.dense.iter_mut().zip(&self.packed) {
+                dense[column] = packed[k];
             }
         }
-        std::mem::swap(&mut self.moved, &mut self.linear);
+        self.runs.clear();
+        for (block, _) in self.blocks.iter().enumerate().filter(|(_, is_touched)| **is_touched) {
+            let (first, last) = (block * BLOCK, ((block + 1) * BLOCK).min(model.vertices()));
+            match self.runs.last_mut() {
+                Some(run) if run[1] == first => run[1] = last,
+                _ => self.runs.push([first, last]),
+            }
+        }
+    }
+
+    /// Puts the skin's own dents in the place of the mesh's.
+    fn correct(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        for (k, vertex) in self.touched.iter().enumerate() {
+            let normal = model.normals[*vertex as usize];
+            let force: f32 = normal.iter().zip(&self.packed).map(|(n, f)| n * f[k]).sum();
+            let near = &skin.corrections[*vertex as usize];
+            for (other, by) in near.vertices.iter().zip(near.weights) {
+                let slot = self.place[usize::from(*other)];
+                if slot == NONE {
+                    continue;
+                }
+                let normal = model.normals[usize::from(*other)];
+                for (linear, n) in self.linear.iter_mut().zip(normal) {
+                    linear[slot as usize] += by * force * n;
+                }
+            }
+        }
     }
 
     /// Places the pixels, and finds their deformed areas.
@@ -349,12 +387,8 @@ impl Window {
                 grid[row * columns + column]
             };
             let (a, b) = (x - left, y - top);
-            self.rough_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
+            self.dent_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
                 + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
-        }
-        for id in &self.ids[..self.inner] {
-            let stencil = &skin.smoothed[*id as usize];
-            self.dent_mm[*id as usize] = stencil.value(|vertex| self.rough_mm[vertex]);
         }
     }
 
