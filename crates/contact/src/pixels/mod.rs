@@ -5,22 +5,28 @@
 //! wave length. The displacement of a pixel is
 //!
 //! ```text
-//! u(x) = S P [u_v - K p_v] + K p
+//! u(x) = S [u_v - K p_v] + K p
 //! ```
 //!
 //! with the vertices' displacement `u_v` under their forces, the pressure `p_v` that is linear
 //! between vertices, interpolation `S` of second degree, and the pressure `p` on pixels. So a vertex'
-//! own dent makes way for the true one; what is far away cancels. `P` smooths over 36 vertices: a
-//! force at a vertex of linear elements moves it 2.3 times as far as `K` says, and its neighbours
-//! too little, which is the mesh's and not the skin's. `p >= 0`, `gap >= 0`,
-//! `p gap = 0` on pixels; the vertices' forces are the pressure's sums over their hats, and both go
-//! in turn until forces settle. Pixels of triangles at the skin's edge hold the pressure that
-//! vertices find by themselves: contact goes on beyond the map, where no pixel could carry it.
+//! own dent makes way for the true one; what is far away cancels. In `u_v` the mesh's own dent, 2.3
+//! times as deep as `K` says, is [replaced](own_dents) by the layers'.
+//!
+//! Pixels move along the skin's normal. Gaps are asked where pixels are displaced to and
+//! measured along that normal, `d / (n . m)`: a pixel meets the side that is in its way, also where
+//! another one is nearer to where it was at rest. `p >= 0`, `gap >= 0`, `p gap = 0` on
+//! pixels; the vertices' forces are the pressure's sums over their hats, and both go in turn until
+//! forces settle. A map tells means over pixels of the pressure that is linear between them, so
+//! that a pixel which the contact's edge crosses has its part. Pixels of triangles at the
+//! skin's edge hold the pressure that vertices find by themselves: contact goes on beyond the
+//! map, where no pixel could carry it.
 
 mod convolution;
 mod layers;
 mod memory;
 mod own_dents;
+mod skin;
 mod smooth;
 mod turns;
 mod window;
@@ -33,16 +39,14 @@ use crate::model::ContactModel;
 use crate::objects::{Object, View};
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
-use convolution::{Convolution, Plans};
-use layers::SurfaceCompliance;
-use own_dents::{Correction, OwnDents};
-use papilla_atlas::{Atlas, MAP_LEN, Raster};
-use smooth::PixelStencil;
+use convolution::Convolution;
+use papilla_atlas::MAP_LEN;
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
 
 pub use memory::PixelMemory;
+pub use skin::PixelSkin;
 
 /// Rounds of vertices and pixels at most.
 const ROUNDS_MAX: usize = 8;
@@ -63,46 +67,6 @@ const PIXELS: Search = Search { tolerance: 0.01, tries_max: 12 };
 /// Pressure of a person for 1 MPa on the reference finger, Pa.
 fn unit_pa(person: Person) -> f32 {
     PA_PER_MPA * person.stiffness as f32
-}
-
-/// What pixels have to know of a skin; made once, for any number of fingers.
-#[derive(Debug)]
-pub struct PixelSkin {
-    raster: Arc<Raster>,
-    uv_px: Vec<[f32; 2]>,
-    /// By pixel, and by vertex.
-    stencils: Vec<PixelStencil>,
-    corrections: Vec<Correction>,
-    /// Whether a vertex is at the skin's edge.
-    at_edge: Vec<bool>,
-    surface: SurfaceCompliance,
-    plans: Arc<Plans>,
-    /// Places of the pixels at rest.
-    rest_mm: Vec<[f32; 3]>,
-}
-
-impl PixelSkin {
-    /// The skin of an atlas and of a model of it; none if the model names no layers, or has other
-    /// vertices than the atlas.
-    #[must_use]
-    pub fn new(model: &ContactModel, atlas: &Atlas, raster: Arc<Raster>) -> Option<Self> {
-        let layers = &model.header().layers;
-        if layers.is_empty() || model.vertices() != atlas.vertex_count() {
-            return None;
-        }
-        let uv_px = atlas.patch(raster.patch()).uv_px.clone();
-        let stencils = smooth::of_pixels(atlas, &raster);
-        let surface = SurfaceCompliance::new(layers);
-        let at_edge = smooth::at_edge(atlas);
-        let place = |stencil: &PixelStencil| {
-            std::array::from_fn(|i| stencil.value(|v| model.positions_mm[v][i] as f32))
-        };
-        let rest_mm: Vec<[f32; 3]> = stencils.iter().map(place).collect();
-        let plans = Arc::new(Plans::new());
-        let own = OwnDents { model, uv_px: &uv_px, raster: &raster, rest_mm: &rest_mm };
-        let corrections = own.corrections(&surface, &plans, &at_edge);
-        Some(Self { raster, uv_px, stencils, corrections, at_edge, surface, plans, rest_mm })
-    }
 }
 
 /// Contact on the pixels of one finger. All memory is taken at construction.
@@ -271,6 +235,29 @@ impl PixelContact {
         Ok(())
     }
 
+    /// The pressure that the first round starts from: the last frame's, pressed on as vertices press
+    /// on by themselves, or theirs.
+    fn start(
+        skin: &PixelSkin,
+        window: &Window,
+        turns: &Turns,
+        [of_vertices, pressure]: [&mut [f32]; 2],
+        warm: bool,
+    ) {
+        let (n, m) = (window.len(), window.free());
+        let first = if warm { m } else { 0 };
+        window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+        pressure[first..n].copy_from_slice(&of_vertices[first..n]);
+        let pressed = |p: &&mut f32| **p > 0.0;
+        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
+            *p += of_vertices[i];
+        }
+        window.press_hats(skin, turns.last(), of_vertices);
+        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
+            *p = (*p - of_vertices[i]).max(0.0);
+        }
+    }
+
     /// Vertices, then pixels; returns the change of the vertices' forces over their sum. The first
     /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
     fn round(
@@ -288,21 +275,7 @@ impl PixelContact {
         if let Some(warm) = start {
             window.start(skin, model);
             window.measure_hats(skin, model);
-            window.press_hats(skin, turns.found_without_pixels(), rest);
-            if warm {
-                // What is pressed is pressed on as vertices press on by themselves.
-                for (p, now) in pressure[..m].iter_mut().zip(&*rest).filter(|(p, _)| **p > 0.0) {
-                    *p += now;
-                }
-            }
-            let first = if warm { m } else { 0 };
-            pressure[first..n].copy_from_slice(&rest[first..n]);
-            if warm {
-                window.press_hats(skin, turns.last(), rest);
-                for (p, last) in pressure[..m].iter_mut().zip(&*rest).filter(|(p, _)| **p > 0.0) {
-                    *p = (*p - last).max(0.0);
-                }
-            }
+            Self::start(skin, window, turns, [&mut *rest, &mut *pressure], warm);
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());

@@ -17,7 +17,7 @@ const NEAR: usize = 9;
 /// Vertices up to the end of the ring from which the polynomial comes.
 const FAR: usize = 36;
 /// Pixels of a side of the window, of which the pressed vertex is in the middle.
-const SIDE: usize = 80;
+const SIDE: usize = 64;
 
 /// By force along the normal of a vertex: what its neighbours move more along theirs, mm/N.
 pub(super) type Correction = Stencil<NEAR>;
@@ -98,6 +98,15 @@ impl OwnDents<'_> {
         let pressure: Vec<f32> =
             hat.iter().map(|(_, w)| (f64::from(*w) / force_n) as f32).collect();
         let grid = convolution.press(&cells, &pressure);
+        self.go_on(vertex, |other| {
+            self.compliance(usize::from(other), vertex) - self.read(grid, first, other)
+        })
+    }
+
+    /// What a field that is smooth round a vertex, but not at it, differs from its own continuation
+    /// by at the vertex and its neighbours.
+    fn go_on(&self, vertex: usize, field: impl Fn(u16) -> f64) -> Option<Correction> {
+        let at = self.uv_px[vertex];
         let mut order: Vec<(f32, u16)> = self
             .uv_px
             .iter()
@@ -111,20 +120,15 @@ impl OwnDents<'_> {
         let (near, next, _) = order.select_nth_unstable_by(FAR, by_place);
         near.sort_unstable_by(by_place);
         let reach = next.0.sqrt();
-        let rows: Vec<[f64; TERMS]> = near
-            .iter()
-            .map(|(_, v)| {
-                let uv = self.uv_px[usize::from(*v)];
-                let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / reach));
-                [1.0, x, y, x * x, x * y, y * y]
-            })
-            .collect();
-        let differs: Vec<f64> = near
-            .iter()
-            .map(|(_, v)| self.compliance(usize::from(*v), vertex) - self.read(grid, first, *v))
-            .collect();
+        let row = |(_, v): &(f32, u16)| {
+            let uv = self.uv_px[usize::from(*v)];
+            let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / reach));
+            [1.0, x, y, x * x, x * y, y * y]
+        };
+        let rows: Vec<[f64; TERMS]> = near.iter().map(row).collect();
+        let values: Vec<f64> = near.iter().map(|(_, v)| field(*v)).collect();
         let (mut normal, mut side) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
-        for (row, due) in rows.iter().zip(&differs).skip(NEAR) {
+        for (row, due) in rows.iter().zip(&values).skip(NEAR) {
             for a in 0..TERMS {
                 side[a] += row[a] * due;
                 for b in 0..TERMS {
@@ -136,7 +140,7 @@ impl OwnDents<'_> {
         let goes_on = |i: usize| (0..TERMS).map(|a| polynomial[a] * rows[i][a]).sum::<f64>();
         Some(Correction {
             vertices: std::array::from_fn(|i| near[i].1),
-            weights: std::array::from_fn(|i| (goes_on(i) - differs[i]) as f32),
+            weights: std::array::from_fn(|i| (goes_on(i) - values[i]) as f32),
         })
     }
 

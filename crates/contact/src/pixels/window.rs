@@ -1,34 +1,21 @@
 //! The part of the skin that things are near: its pixels, and the vertices that move them.
 
+mod gaps;
 mod hats;
+mod vertices;
 
 use super::PixelSkin;
-use crate::answer::{Effort, Person};
-use crate::error::ContactError;
-use crate::kernels::{DisplaceRuns, run};
+use crate::answer::Effort;
 use crate::model::ContactModel;
 use crate::objects::View;
-use crate::second_order::Amplitudes;
 use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels round vertices nearer than this are looked at, reference mm.
 const NEAR_MM: f64 = 0.6;
 /// Of these, pixels nearer than this can come to touch, reference mm.
-const REACH_MM: f64 = 0.3;
-/// Gap of a displaced pixel beyond which nothing presses, reference mm.
-const FREE_MM: f32 = 0.3;
+const REACH_MM: f64 = 0.2;
 /// Pixels between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
-/// Depth of a displaced pixel from which the side that it has to come out of is looked for, mm.
-const DEEP_MM: f32 = 0.01;
-/// Cosine between the skin's and the object's normal below which that is done.
-const STEEP: f32 = 0.5;
-/// The least that counts.
-const LEVEL_MIN: f32 = 0.2;
-/// Most steps of it.
-const TURNS_MAX: u32 = 8;
-/// Columns that are taken together.
-const BLOCK: usize = 16;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
@@ -99,8 +86,8 @@ impl Window {
             touched: Vec::with_capacity(vertices),
             packed: vector(),
             dense: vector(),
-            blocks: vec![false; vertices.div_ceil(BLOCK)],
-            runs: Vec::with_capacity(vertices.div_ceil(BLOCK)),
+            blocks: vec![false; vertices.div_ceil(vertices::BLOCK)],
+            runs: Vec::with_capacity(vertices.div_ceil(vertices::BLOCK)),
         }
     }
 
@@ -185,87 +172,6 @@ impl Window {
         }
     }
 
-    /// Moves the stencils' vertices under the vertices' forces.
-    pub(super) fn displace(
-        &mut self,
-        skin: &PixelSkin,
-        model: &ContactModel,
-        amplitudes: Option<&mut Amplitudes>,
-    ) {
-        let v = model.vertices();
-        self.touched.clear();
-        for vertex in 0..v {
-            if (0..3).any(|i| self.force_n[i][vertex] != 0.0) {
-                let at = self.touched.len();
-                self.touched.push(vertex as u32);
-                for i in 0..3 {
-                    self.packed[i][at] = self.force_n[i][vertex];
-                }
-            }
-        }
-        self.find_runs(model);
-        run(DisplaceRuns {
-            compliance: &model.compliance,
-            columns: v,
-            ids: &self.ids,
-            runs: &self.runs,
-            force: &self.dense,
-            moved: &mut self.linear,
-        });
-        self.correct(skin, model);
-        if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
-            let m = self.touched.len();
-            let [x, y, z] = &self.packed;
-            s.evaluate(&self.touched, [&x[..m], &y[..m], &z[..m]], a);
-            s.displace(a, &self.ids, &self.linear, &mut self.moved);
-        } else {
-            for (moved, linear) in self.moved.iter_mut().zip(&self.linear) {
-                moved.copy_from_slice(linear);
-            }
-        }
-    }
-
-    /// Spreads the packed forces over the compliance's columns, and finds runs of those that are
-    /// not 0.
-    fn find_runs(&mut self, model: &ContactModel) {
-        self.dense.iter_mut().for_each(|force| force.fill(0.0));
-        self.blocks.fill(false);
-        for (k, vertex) in self.touched.iter().enumerate() {
-            let column = model.rank[*vertex as usize] as usize;
-            self.blocks[column / BLOCK] = true;
-            for (dense, packed) in self.dense.iter_mut().zip(&self.packed) {
-                dense[column] = packed[k];
-            }
-        }
-        self.runs.clear();
-        for (block, _) in self.blocks.iter().enumerate().filter(|(_, is_touched)| **is_touched) {
-            let (first, last) = (block * BLOCK, ((block + 1) * BLOCK).min(model.vertices()));
-            match self.runs.last_mut() {
-                Some(run) if run[1] == first => run[1] = last,
-                _ => self.runs.push([first, last]),
-            }
-        }
-    }
-
-    /// Puts the skin's own dents in the place of the mesh's.
-    fn correct(&mut self, skin: &PixelSkin, model: &ContactModel) {
-        for (k, vertex) in self.touched.iter().enumerate() {
-            let normal = model.normals[*vertex as usize];
-            let force: f32 = normal.iter().zip(&self.packed).map(|(n, f)| n * f[k]).sum();
-            let near = &skin.corrections[*vertex as usize];
-            for (other, by) in near.vertices.iter().zip(near.weights) {
-                let slot = self.place[usize::from(*other)];
-                if slot == NONE {
-                    continue;
-                }
-                let normal = model.normals[usize::from(*other)];
-                for (linear, n) in self.linear.iter_mut().zip(normal) {
-                    linear[slot as usize] += by * force * n;
-                }
-            }
-        }
-    }
-
     /// Places the pixels, and finds their deformed areas.
     pub(super) fn place(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for (slot, entry) in self.entries.iter().enumerate() {
@@ -310,48 +216,6 @@ impl Window {
         std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
     }
 
-    /// Gaps of the pixels along the skin's normal, under the pressure whose displacement is
-    /// `grid`, mm.
-    pub(super) fn measure(
-        &mut self,
-        skin: &PixelSkin,
-        view: View<'_>,
-        person: Person,
-        grid: &[f32],
-        effort: &mut Effort,
-    ) -> Result<(), ContactError> {
-        for slot in 0..self.entries.len() {
-            let inward = self.inward[slot];
-            let stencil = &skin.stencils[self.entries[slot] as usize];
-            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
-            let own = grid[self.cells[slot] as usize] - dent;
-            let (mut way, mut turns) = (0.0, 0);
-            let (nearest, along) = loop {
-                let at: [f32; 3] =
-                    std::array::from_fn(|i| self.at_mm[slot][i] + (own + way) * inward[i]);
-                let nearest = view.nearest_at(at.map(f64::from)).ok_or(ContactError::Diverged)?;
-                effort.distances += 1;
-                let along: f32 =
-                    nearest.normal.iter().zip(inward).map(|(a, b)| *a as f32 * b).sum();
-                let gap = nearest.gap_mm as f32;
-                // Deep inside, the nearest side need not be the one in whose way the skin is.
-                if turns < TURNS_MAX && gap < -DEEP_MM && (along < STEEP || gap < -FREE_MM) {
-                    way += -gap;
-                    turns += 1;
-                    continue;
-                }
-                break (nearest, along);
-            };
-            let gap = (nearest.gap_mm.min(1e3) as f32) / along.clamp(LEVEL_MIN, 1.0) - way;
-            // In the units of the reference finger: pressure over stiffness, length over width.
-            self.give[slot] =
-                (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
-            self.gap_mm[slot] = gap;
-            self.normal[slot] = nearest.normal.map(|n| n as f32);
-        }
-        Ok(())
-    }
-
     /// Mean distance of neighbouring pixels under pressure, down and along rows, mm.
     pub(super) fn pitch_mm(&self, pressure: &[f32]) -> [f64; 2] {
         let pressed = pressure[..self.len()].iter().any(|p| *p > 0.0);
@@ -368,37 +232,6 @@ impl Window {
             count += 1.0;
         }
         sums.map(|sum| (sum / count).max(1e-3))
-    }
-
-    /// Displacement of the stencils' vertices in a grid of displacements.
-    pub(super) fn own_dents(
-        &mut self,
-        skin: &PixelSkin,
-        grid: &[f32],
-        [rows, columns]: [usize; 2],
-    ) {
-        for id in &self.ids {
-            let [u, v] = skin.uv_px[*id as usize];
-            let [x, y] = [u - 0.5 - self.first[1] as f32, v - 0.5 - self.first[0] as f32];
-            let (left, top) = (x.floor(), y.floor());
-            let at = |down: i32, right: i32| {
-                let row = (top as i32 + down).rem_euclid(rows as i32) as usize;
-                let column = (left as i32 + right).rem_euclid(columns as i32) as usize;
-                grid[row * columns + column]
-            };
-            let (a, b) = (x - left, y - top);
-            self.dent_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
-                + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
-        }
-    }
-
-    /// Gaps of the pixels that are solved for, mm.
-    pub(super) fn gradient(&self, pressure: &[f32], gradient: &mut [f32]) {
-        for (slot, gradient) in gradient.iter_mut().enumerate() {
-            let (gap, p) = (self.gap_mm[slot], pressure[slot]);
-            let is_free = gap > FREE_MM && !(p > 0.0);
-            *gradient = if is_free { 1e3 } else { gap + self.give[slot] * p };
-        }
     }
 
     /// Adds a pixel's pressure to the means over pixels of pressure that is linear between them.
