@@ -207,8 +207,9 @@ mod tests {
         let layers = [Layer { young_mpa: 0.1, poisson: 0.4, thickness_mm: 3.0 }];
         let surface = SurfaceCompliance::new(&layers);
         let mut convolution = Convolution::new(Arc::new(Plans::new()));
-        let [across_mm, along_mm] = [0.15, 0.12];
-        convolution.open([40, 60], [across_mm, along_mm], &surface);
+        // At steps of the table.
+        let [across_mm, along_mm] = [-760.0, -850.0].map(|step| (step * PITCH_STEP).exp());
+        convolution.open([44, 60], [across_mm, along_mm], &surface);
         assert_eq!([convolution.rows(), convolution.columns()], [48, 64]);
         let phase = |i: usize| TAU * (3.0 * (i / 64) as f64 / 48.0 + 5.0 * (i % 64) as f64 / 64.0);
         for (i, p) in convolution.grid().iter_mut().enumerate() {

@@ -16,8 +16,8 @@ use std::sync::Arc;
 const NEAR: usize = 9;
 /// Vertices up to the end of the ring from which the polynomial comes.
 const FAR: usize = 36;
-/// Pixels of a side of the window, of which the pressed vertex is in the middle.
-const SIDE: usize = 64;
+/// Pixels of the window beyond the ring.
+const BEYOND: usize = 12;
 
 /// By force along the normal of a vertex: what its neighbours move more along theirs, mm/N.
 pub(super) type Correction = Stencil<NEAR>;
@@ -83,29 +83,34 @@ impl OwnDents<'_> {
             hat.iter().map(|(e, w)| f64::from(*w) * pitch(*e, step)).sum::<f64>() / total
         };
         let pitch_mm = [MAP_SIDE_PX, 1].map(mean);
-        convolution.open([SIDE, SIDE], pitch_mm, surface);
-        let at = self.uv_px[vertex];
-        let first = at.map(|c| c.floor() as i64 - SIDE as i64 / 2);
+        let near = self.near(vertex)?;
+        let reach = near.iter().map(|(square, _)| square.sqrt()).fold(0.0, f32::max);
+        let side = 2 * (reach.ceil() as usize + BEYOND);
+        convolution.open([side; 2], pitch_mm, surface);
+        // Square, as the plans of both ways are the same.
+        let side = convolution.columns();
+        let first = self.uv_px[vertex].map(|c| c.floor() as i64 - side as i64 / 2);
         let cell = |(entry, _): &(usize, f32)| {
             let index = self.raster.indices()[*entry] as i64;
             let [row, column] = [index / MAP_SIDE_PX as i64, index % MAP_SIDE_PX as i64];
-            let row = (row - first[1]).clamp(0, SIDE as i64 - 1);
-            let column = (column - first[0]).clamp(0, SIDE as i64 - 1);
-            (row * SIDE as i64 + column) as u32
+            let row = (row - first[1]).clamp(0, side as i64 - 1);
+            let column = (column - first[0]).clamp(0, side as i64 - 1);
+            (row * side as i64 + column) as u32
         };
         let cells: Vec<u32> = hat.iter().map(cell).collect();
         let force_n = total * pitch_mm[0] * pitch_mm[1];
         let pressure: Vec<f32> =
             hat.iter().map(|(_, w)| (f64::from(*w) / force_n) as f32).collect();
         let grid = convolution.press(&cells, &pressure);
-        self.go_on(vertex, |other| {
-            self.compliance(usize::from(other), vertex) - self.read(grid, first, other)
+        self.go_on(vertex, &near, |other| {
+            let own = read(grid, side, first, self.uv_px[usize::from(other)]);
+            self.compliance(usize::from(other), vertex) - own
         })
     }
 
-    /// What a field that is smooth round a vertex, but not at it, differs from its own continuation
-    /// by at the vertex and its neighbours.
-    fn go_on(&self, vertex: usize, field: impl Fn(u16) -> f64) -> Option<Correction> {
+    /// A vertex and those round it, with the squares of their distances, px2; none if there are too
+    /// few.
+    fn near(&self, vertex: usize) -> Option<Vec<(f32, u16)>> {
         let at = self.uv_px[vertex];
         let mut order: Vec<(f32, u16)> = self
             .uv_px
@@ -113,13 +118,26 @@ impl OwnDents<'_> {
             .enumerate()
             .map(|(v, uv)| ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), v as u16))
             .collect();
-        if order.len() <= FAR {
+        if order.len() < FAR {
             return None;
         }
         let by_place = |a: &(f32, u16), b: &(f32, u16)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        let (near, next, _) = order.select_nth_unstable_by(FAR, by_place);
-        near.sort_unstable_by(by_place);
-        let reach = next.0.sqrt();
+        order.select_nth_unstable_by(FAR - 1, by_place);
+        order.truncate(FAR);
+        order.sort_unstable_by(by_place);
+        Some(order)
+    }
+
+    /// What a field that is smooth round a vertex, but not at it, differs from its own continuation
+    /// by at the vertex and its neighbours.
+    fn go_on(
+        &self,
+        vertex: usize,
+        near: &[(f32, u16)],
+        field: impl Fn(u16) -> f64,
+    ) -> Option<Correction> {
+        let at = self.uv_px[vertex];
+        let reach = near.last()?.0.sqrt();
         let row = |(_, v): &(f32, u16)| {
             let uv = self.uv_px[usize::from(*v)];
             let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / reach));
@@ -157,21 +175,18 @@ impl OwnDents<'_> {
         }
         f64::from(sum)
     }
+}
 
-    /// Displacement of a vertex in the window.
-    fn read(&self, grid: &[f32], first: [i64; 2], vertex: u16) -> f64 {
-        let [u, v] = self.uv_px[usize::from(vertex)];
-        let [x, y] = [u - 0.5 - first[0] as f32, v - 0.5 - first[1] as f32];
-        let (left, top) = (x.floor(), y.floor());
-        let at = |down: f32, right: f32| {
-            let row = (top + down).rem_euclid(SIDE as f32) as usize;
-            let column = (left + right).rem_euclid(SIDE as f32) as usize;
-            grid[row * SIDE + column]
-        };
-        let (a, b) = (x - left, y - top);
-        f64::from(
-            (1.0 - b) * ((1.0 - a) * at(0.0, 0.0) + a * at(0.0, 1.0))
-                + b * ((1.0 - a) * at(1.0, 0.0) + a * at(1.0, 1.0)),
-        )
-    }
+/// Displacement at a place of the map, of a square window that begins at `first`, mm.
+fn read(grid: &[f32], side: usize, first: [i64; 2], [u, v]: [f32; 2]) -> f64 {
+    let [x, y] = [u - 0.5 - first[0] as f32, v - 0.5 - first[1] as f32];
+    let (left, top) = (x.floor(), y.floor());
+    let at = |down: f32, right: f32| {
+        let row = (top + down).rem_euclid(side as f32) as usize;
+        let column = (left + right).rem_euclid(side as f32) as usize;
+        f64::from(grid[row * side + column])
+    };
+    let (a, b) = (f64::from(x - left), f64::from(y - top));
+    (1.0 - b) * ((1.0 - a) * at(0.0, 0.0) + a * at(0.0, 1.0))
+        + b * ((1.0 - a) * at(1.0, 0.0) + a * at(1.0, 1.0))
 }

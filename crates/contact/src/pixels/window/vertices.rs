@@ -7,7 +7,7 @@ use crate::pixels::PixelSkin;
 use crate::second_order::Amplitudes;
 
 /// Columns that are taken together.
-pub(super) const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = 8;
 
 impl Window {
     /// Moves the stencils' vertices under the vertices' forces.
