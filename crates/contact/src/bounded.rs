@@ -88,21 +88,34 @@ impl BoundedSolver {
         tolerance_mm: f32,
         products_max: u32,
     ) -> Effort {
-        let n = f.len();
-        let Self { gradient, free, chopped, direction, product } = self;
-        let [gradient, free, chopped, direction, product] =
-            [gradient, free, chopped, direction, product].map(|v| &mut v[..n]);
         for f in f.iter_mut() {
             *f = if *f > 0.0 { *f } else { 0.0 };
         }
-        let refresh = |m: &mut dyn Operator, f: &[f32], gradient: &mut [f32]| {
-            m.times(f, gradient);
-            for (w, g) in gradient.iter_mut().zip(g) {
-                *w += g;
-            }
-        };
-        refresh(&mut m, f, gradient);
-        let mut effort = Effort { products: 1, violation_mm: 0.0 };
+        let mut gradient = std::mem::take(&mut self.gradient);
+        let w = &mut gradient[..f.len()];
+        m.times(f, w);
+        for (w, g) in w.iter_mut().zip(g) {
+            *w += g;
+        }
+        let effort = self.improve(m, w, f, tolerance_mm, products_max.saturating_sub(1));
+        self.gradient = gradient;
+        Effort { products: effort.products + 1, ..effort }
+    }
+
+    /// The same from forces `f >= 0` whose gaps `gradient` are known.
+    pub(crate) fn improve(
+        &mut self,
+        mut m: impl Operator,
+        gradient: &mut [f32],
+        f: &mut [f32],
+        tolerance_mm: f32,
+        products_max: u32,
+    ) -> Effort {
+        let n = f.len();
+        let Self { free, chopped, direction, product, .. } = self;
+        let [free, chopped, direction, product] =
+            [free, chopped, direction, product].map(|v| &mut v[..n]);
+        let mut effort = Effort::default();
         let step = 1.0 / m.norm().max(f32::MIN_POSITIVE);
         let mut restart = true;
         loop {
@@ -169,11 +182,14 @@ impl BoundedSolver {
                     gradient[i] -= longest * product[i];
                 }
                 for i in 0..n {
-                    if f[i] > 0.0 {
-                        f[i] = (f[i] - step * gradient[i]).max(0.0);
+                    let before = f[i];
+                    if before > 0.0 {
+                        f[i] = (before - step * gradient[i]).max(0.0);
                     }
+                    direction[i] = f[i] - before;
                 }
-                refresh(&mut m, f, gradient);
+                m.times(direction, product);
+                add_scaled(gradient, 1.0, product);
                 effort.products += 1;
                 restart = true;
             }

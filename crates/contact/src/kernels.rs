@@ -116,6 +116,40 @@ impl WithSimd for Displace<'_> {
     }
 }
 
+/// Displacement of `ids` under forces that are dense over columns but 0 outside `runs`:
+/// `moved[a][i] = sum_b rows(id)[3 a + b] . force[b]`.
+pub(crate) struct DisplaceRuns<'a> {
+    /// `[vertex][9][columns]`.
+    pub compliance: &'a [f32],
+    pub columns: usize,
+    pub ids: &'a [u32],
+    pub runs: &'a [[usize; 2]],
+    pub force: &'a [Vec<f32>; 3],
+    pub moved: &'a mut [Vec<f32>; 3],
+}
+
+impl WithSimd for DisplaceRuns<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { compliance, columns, ids, runs, force, moved } = self;
+        for (slot, id) in ids.iter().enumerate() {
+            let rows = &compliance[9 * *id as usize * columns..][..9 * columns];
+            for (a, moved) in moved.iter_mut().enumerate() {
+                let mut sum = 0.0;
+                for (b, force) in force.iter().enumerate() {
+                    let row = &rows[(3 * a + b) * columns..][..columns];
+                    for &[first, last] in runs {
+                        sum += dot(simd, &row[first..last], &force[first..last]);
+                    }
+                }
+                moved[slot] = sum;
+            }
+        }
+    }
+}
+
 /// `matrix[i][k] = sum_ab rows[a][i] blocks[i][3 a + b][k] columns[b][k]`: compliance along unit
 /// vectors.
 pub(crate) struct Along<'a> {

@@ -11,7 +11,10 @@ use std::sync::Arc;
 type C32 = Complex<f32>;
 
 /// Lengths of windows: a transform of each is fast.
-const LENGTHS: [usize; 10] = [32, 48, 64, 80, 96, 128, 160, 192, 224, 288];
+const LENGTHS: [usize; 14] = [32, 40, 48, 56, 64, 72, 80, 96, 112, 128, 160, 192, 224, 288];
+
+/// Steps of the pixels' distance, as a share of it: a frame like the last one needs no new table.
+const PITCH_STEP: f64 = 2.5e-3;
 
 /// Transforms along a window of one length.
 struct Plan {
@@ -61,6 +64,8 @@ pub(super) struct Convolution {
     plans: Arc<Plans>,
     rows: usize,
     columns: usize,
+    /// Logarithms of the pixels' distances, in steps.
+    steps: [i32; 2],
     /// `[rows][columns]`.
     grid: Vec<f32>,
     /// `[rows][columns / 2 + 1]`, and the same the other way round.
@@ -88,6 +93,7 @@ impl Convolution {
             plans,
             rows: 0,
             columns: 0,
+            steps: [0; 2],
             grid: vec![0.0; longest * longest],
             spectrum: vec![zero; half],
             turned: vec![zero; half],
@@ -105,7 +111,13 @@ impl Convolution {
     ) {
         let longest = LENGTHS[LENGTHS.len() - 1];
         let fitting = |least| LENGTHS.into_iter().find(|l| *l >= least).unwrap_or(longest);
-        (self.rows, self.columns) = (fitting(rows), fitting(columns));
+        let steps = [across_mm, along_mm].map(|mm| (mm.ln() / PITCH_STEP).round() as i32);
+        let window = (fitting(rows), fitting(columns), steps);
+        if (self.rows, self.columns, self.steps) == window {
+            return;
+        }
+        (self.rows, self.columns, self.steps) = window;
+        let [across_mm, along_mm] = steps.map(|step| (f64::from(step) * PITCH_STEP).exp());
         let wave = |index: usize, length: usize, pitch_mm: f64| {
             TAU * index.min(length - index) as f64 / (length as f64 * pitch_mm)
         };
@@ -113,7 +125,8 @@ impl Convolution {
         for column in 0..=self.columns / 2 {
             let x = wave(column, self.columns, along_mm);
             for row in 0..self.rows {
-                let k = x.hypot(wave(row, self.rows, across_mm));
+                let y = wave(row, self.rows, across_mm);
+                let k = (x * x + y * y).sqrt();
                 self.compliance[column * self.rows + row] = (surface.at(k) / pixels) as f32;
             }
         }
@@ -148,7 +161,7 @@ impl Convolution {
 
     /// Pressure to displacement. The window is periodic.
     fn apply(&mut self) {
-        let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance } = self;
+        let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance, .. } = self;
         let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
         let (Some(along), Some(across)) = (plans.of(columns), plans.of(rows)) else { return };
         let grid = &mut grid[..rows * columns];
@@ -194,8 +207,9 @@ mod tests {
         let layers = [Layer { young_mpa: 0.1, poisson: 0.4, thickness_mm: 3.0 }];
         let surface = SurfaceCompliance::new(&layers);
         let mut convolution = Convolution::new(Arc::new(Plans::new()));
-        let [across_mm, along_mm] = [0.15, 0.12];
-        convolution.open([40, 60], [across_mm, along_mm], &surface);
+        // At steps of the table.
+        let [across_mm, along_mm] = [-760.0, -850.0].map(|step| (step * PITCH_STEP).exp());
+        convolution.open([44, 60], [across_mm, along_mm], &surface);
         assert_eq!([convolution.rows(), convolution.columns()], [48, 64]);
         let phase = |i: usize| TAU * (3.0 * (i / 64) as f64 / 48.0 + 5.0 * (i % 64) as f64 / 64.0);
         for (i, p) in convolution.grid().iter_mut().enumerate() {

@@ -35,7 +35,7 @@ impl PixelContact {
                 memory.forces_n.push(forces);
             }
         }
-        for (index, pressure_pa) in self.map_pa.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+        for (index, pressure_pa) in self.held_pa.iter().enumerate().filter(|(_, p)| **p > 0.0) {
             memory.pixels.push(index as u32);
             memory.pressure_pa.push(*pressure_pa);
         }
@@ -52,7 +52,7 @@ impl PixelContact {
         let fits = vertices.len() == forces_n.len()
             && pixels.len() == pressure_pa.len()
             && vertices.iter().all(|v| (*v as usize) < count)
-            && pixels.iter().all(|i| (*i as usize) < self.map_pa.len())
+            && pixels.iter().all(|i| (*i as usize) < self.held_pa.len())
             && forces_n.as_flattened().iter().chain(pressure_pa).all(|v| v.is_finite());
         if !fits {
             return false;
@@ -69,7 +69,7 @@ impl PixelContact {
             }
         }
         for (index, p) in pixels.iter().zip(pressure_pa) {
-            self.map_pa[*index as usize] = *p;
+            self.held_pa[*index as usize] = *p;
         }
         true
     }

@@ -5,21 +5,28 @@
 //! wave length. The displacement of a pixel is
 //!
 //! ```text
-//! u(x) = S P [u_v - K p_v] + K p
+//! u(x) = S [u_v - K p_v] + K p
 //! ```
 //!
 //! with the vertices' displacement `u_v` under their forces, the pressure `p_v` that is linear
 //! between vertices, interpolation `S` of second degree, and the pressure `p` on pixels. So a vertex'
-//! own dent makes way for the true one; what is far away cancels. `P` smooths over 36 vertices: a
-//! force at a vertex of linear elements moves it 2.3 times as far as `K` says, and its neighbours
-//! too little, which is the mesh's and not the skin's. `p >= 0`, `gap >= 0`,
-//! `p gap = 0` on pixels; the vertices' forces are the pressure's sums over their hats, and both go
-//! in turn until forces settle. Pixels of triangles at the skin's edge hold the pressure that
-//! vertices find by themselves: contact goes on beyond the map, where no pixel could carry it.
+//! own dent makes way for the true one; what is far away cancels. In `u_v` the mesh's own dent, 2.3
+//! times as deep as `K` says, is [replaced](own_dents) by the layers'.
+//!
+//! Pixels move along the skin's normal. Gaps are asked where pixels are displaced to and
+//! measured along that normal, `d / (n . m)`: a pixel meets the side that is in its way, also where
+//! another one is nearer to where it was at rest. `p >= 0`, `gap >= 0`, `p gap = 0` on
+//! pixels; the vertices' forces are the pressure's sums over their hats, and both go in turn until
+//! forces settle. A map tells means over pixels of the pressure that is linear between them, so
+//! that a pixel which the contact's edge crosses has its part. Pixels of triangles at the
+//! skin's edge hold the pressure that vertices find by themselves: contact goes on beyond the
+//! map, where no pixel could carry it.
 
 mod convolution;
 mod layers;
 mod memory;
+mod own_dents;
+mod skin;
 mod smooth;
 mod turns;
 mod window;
@@ -32,15 +39,14 @@ use crate::model::ContactModel;
 use crate::objects::{Object, View};
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
-use convolution::{Convolution, Plans};
-use layers::SurfaceCompliance;
-use papilla_atlas::{Atlas, MAP_LEN, Raster};
-use smooth::{PixelStencil, VertexStencil};
+use convolution::Convolution;
+use papilla_atlas::MAP_LEN;
 use std::sync::Arc;
 use turns::Turns;
 use window::Window;
 
 pub use memory::PixelMemory;
+pub use skin::PixelSkin;
 
 /// Rounds of vertices and pixels at most.
 const ROUNDS_MAX: usize = 8;
@@ -63,45 +69,6 @@ fn unit_pa(person: Person) -> f32 {
     PA_PER_MPA * person.stiffness as f32
 }
 
-/// What pixels have to know of a skin; made once, for any number of fingers.
-#[derive(Debug)]
-pub struct PixelSkin {
-    raster: Arc<Raster>,
-    uv_px: Vec<[f32; 2]>,
-    /// By pixel, and by vertex.
-    stencils: Vec<PixelStencil>,
-    smoothed: Vec<VertexStencil>,
-    /// Whether a vertex is at the skin's edge.
-    at_edge: Vec<bool>,
-    surface: SurfaceCompliance,
-    plans: Arc<Plans>,
-}
-
-impl PixelSkin {
-    /// The skin of an atlas and of a model of it; none if the model names no layers, or has other
-    /// vertices than the atlas.
-    #[must_use]
-    pub fn new(model: &ContactModel, atlas: &Atlas, raster: Arc<Raster>) -> Option<Self> {
-        let layers = &model.header().layers;
-        if layers.is_empty() || model.vertices() != atlas.vertex_count() {
-            return None;
-        }
-        let uv_px = atlas.patch(raster.patch()).uv_px.clone();
-        let (stencils, smoothed) = (smooth::of_pixels(atlas, &raster), smooth::of_vertices(atlas));
-        let surface = SurfaceCompliance::new(layers);
-        let at_edge = smooth::at_edge(atlas);
-        Some(Self {
-            raster,
-            uv_px,
-            stencils,
-            smoothed,
-            at_edge,
-            surface,
-            plans: Arc::new(Plans::new()),
-        })
-    }
-}
-
 /// Contact on the pixels of one finger. All memory is taken at construction.
 #[derive(Debug)]
 pub struct PixelContact {
@@ -111,9 +78,11 @@ pub struct PixelContact {
     convolution: Convolution,
     amplitudes: Option<Amplitudes>,
     turns: Turns,
-    /// By pixel of the window: gap without the pressure on pixels, mm, and pressure, MPa.
+    /// By pixel of the window: gap, mm, and pressure, MPa.
     rest: Vec<f32>,
     pressure: Vec<f32>,
+    /// By pixel of the map: what pixels hold, and its means over pixels, Pa.
+    held_pa: Vec<f32>,
     map_pa: Vec<f32>,
     peak_pa: f32,
 }
@@ -207,6 +176,7 @@ impl PixelContact {
             turns: Turns::new(model.vertices()),
             rest: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
+            held_pa: vec![0.0; MAP_LEN],
             map_pa: vec![0.0; MAP_LEN],
             peak_pa: 0.0,
             skin,
@@ -227,6 +197,7 @@ impl PixelContact {
 
     /// Forgets the last frame.
     pub fn reset(&mut self) {
+        self.held_pa.fill(0.0);
         self.map_pa.fill(0.0);
         self.peak_pa = 0.0;
         self.turns.forget();
@@ -238,9 +209,9 @@ impl PixelContact {
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        let Self { skin, window, pressure, map_pa, turns, .. } = self;
+        let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
-        if !window.open(skin, solver.near()) {
+        if !window.open(skin, solver.near(), view, &mut out.effort) {
             self.reset();
             return Ok(());
         }
@@ -249,9 +220,10 @@ impl PixelContact {
         let warm = turns.begin(&mut window.force_n);
         if warm {
             for (p, entry) in pressure.iter_mut().zip(&window.entries) {
-                *p = map_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
+                *p = held_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
             }
         }
+        held_pa.fill(0.0);
         map_pa.fill(0.0);
         let mut change = f32::INFINITY;
         for round in 0..ROUNDS_MAX {
@@ -273,6 +245,29 @@ impl PixelContact {
         Ok(())
     }
 
+    /// The pressure that the first round starts from: the last frame's, pressed on as vertices press
+    /// on by themselves, or theirs.
+    fn start(
+        skin: &PixelSkin,
+        window: &Window,
+        turns: &Turns,
+        [of_vertices, pressure]: [&mut [f32]; 2],
+        warm: bool,
+    ) {
+        let (n, m) = (window.len(), window.free());
+        let first = if warm { m } else { 0 };
+        window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+        pressure[first..n].copy_from_slice(&of_vertices[first..n]);
+        let pressed = |p: &&mut f32| **p > 0.0;
+        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
+            *p += of_vertices[i];
+        }
+        window.press_hats(skin, turns.last(), of_vertices);
+        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
+            *p = (*p - of_vertices[i]).max(0.0);
+        }
+    }
+
     /// Vertices, then pixels; returns the change of the vertices' forces over their sum. The first
     /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
     fn round(
@@ -286,15 +281,11 @@ impl PixelContact {
             self;
         let n = window.len();
         let model = &solver.model;
-        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
-        window.place(skin, model);
-        window.measure(view, solver.person())?;
-        window.measure_hats(skin, model);
         let m = window.free();
         if let Some(warm) = start {
-            window.press_hats(skin, turns.found_without_pixels(), rest);
-            let first = if warm { m } else { 0 };
-            pressure[first..n].copy_from_slice(&rest[first..n]);
+            window.start(skin, model);
+            window.measure_hats(skin, model);
+            Self::start(skin, window, turns, [&mut *rest, &mut *pressure], warm);
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), pitch_mm, &skin.surface);
             window.number_cells(convolution.rows(), convolution.columns());
@@ -303,22 +294,26 @@ impl PixelContact {
         window.press_hats(skin, &window.force_n, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
         window.own_dents(skin, grid, size);
-        let held = (m < n).then(|| convolution.press(&window.cells[m..], &pressure[m..n]));
-        window.rest(skin, held, &mut rest[..m]);
+        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
+        window.place(skin, model);
+        let grid = convolution.press(&window.cells, &pressure[..n]);
+        window.measure(skin, view, solver.person(), grid, effort)?;
+        window.measure_hats(skin, model);
+        let gradient = &mut rest[..m];
+        window.gradient(&pressure[..m], gradient);
         let give = &window.give[..m];
         let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
         let nearby = Nearby { convolution, cells: &window.cells[..m], give, norm };
         effort.products += bounded
-            .solve(nearby, &rest[..m], &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
+            .improve(nearby, gradient, &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
             .products;
-        effort.distances += n as u32;
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
         Ok(turns.take(&mut window.force_n))
     }
 
     fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
-        let Self { window, pressure, map_pa, peak_pa, skin, .. } = self;
+        let Self { window, pressure, held_pa, map_pa, peak_pa, skin, .. } = self;
         *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
         let Contact { quality, effort, stiffness_n_per_mm, .. } = *out;
@@ -335,9 +330,10 @@ impl PixelContact {
             size_n += size;
             out.penetration_mm = out.penetration_mm.max(f64::from(p * window.give[i]));
             let index = skin.raster.indices()[window.entries[i] as usize];
-            map_pa[index as usize] = p * unit_pa;
-            *peak_pa = peak_pa.max(p * unit_pa);
+            held_pa[index as usize] = p * unit_pa;
+            window.spread(skin, index as usize, p * unit_pa, map_pa);
         }
+        *peak_pa = map_pa.iter().copied().fold(0.0, f32::max);
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);
             if p > 0.0 {

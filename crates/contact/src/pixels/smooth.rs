@@ -4,10 +4,8 @@ use papilla_atlas::{Atlas, Patch, Raster};
 
 /// Vertices that a pixel's value is of.
 const NEAR: usize = 16;
-/// Vertices that a vertex' smoothed value is of.
-const FAR: usize = 36;
 /// Terms of a polynomial of second degree in two coordinates.
-const TERMS: usize = 6;
+pub(super) const TERMS: usize = 6;
 /// Largest sum of the weights' sizes: beyond, where a pixel lies at the edge, the triangle's plane
 /// is taken.
 const WEIGHTS_MAX: f64 = 2.5;
@@ -21,8 +19,6 @@ pub(super) struct Stencil<const N: usize> {
 
 /// Of a value at a pixel.
 pub(super) type PixelStencil = Stencil<NEAR>;
-/// Of a smoothed value at a vertex.
-pub(super) type VertexStencil = Stencil<FAR>;
 
 impl<const N: usize> Stencil<N> {
     /// Value of a field where the stencil is of.
@@ -44,20 +40,6 @@ pub(super) fn of_pixels(atlas: &Atlas, raster: &Raster) -> Vec<PixelStencil> {
         least_squares(at, uv_px, &mut order).unwrap_or_else(|| plane(pixel))
     };
     places.zip(raster.pixels()).map(stencil).collect()
-}
-
-/// The same for each vertex, of so many neighbours that what changes from one to the next is gone.
-pub(super) fn of_vertices(atlas: &Atlas) -> Vec<VertexStencil> {
-    let uv_px = &atlas.patch(Patch::Skin).uv_px;
-    let mut order = Vec::with_capacity(uv_px.len());
-    let stencil = |(vertex, at): (usize, &[f32; 2])| {
-        least_squares(*at, uv_px, &mut order).unwrap_or_else(|| {
-            let mut itself = Stencil { vertices: [vertex as u16; FAR], weights: [0.0; FAR] };
-            itself.weights[0] = 1.0;
-            itself
-        })
-    };
-    uv_px.iter().enumerate().map(stencil).collect()
 }
 
 /// Whether each vertex is at the skin's edge, on a side of one triangle alone, or next to one that is.
@@ -135,7 +117,7 @@ fn least_squares<const N: usize>(
 }
 
 /// Gauss' elimination of a positive definite matrix; none if it is not.
-fn solve(mut m: [[f64; TERMS]; TERMS], mut b: [f64; TERMS]) -> Option<[f64; TERMS]> {
+pub(super) fn solve(mut m: [[f64; TERMS]; TERMS], mut b: [f64; TERMS]) -> Option<[f64; TERMS]> {
     for pivot in 0..TERMS {
         if !(m[pivot][pivot] > 1e-9) {
             return None;

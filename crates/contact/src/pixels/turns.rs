@@ -4,6 +4,9 @@ use super::JUMP;
 
 /// Farthest that a round goes beyond, or stays behind, what it found.
 const SHARE_MAX: f32 = 0.7;
+/// How far the first one stays behind: over long distances skin gives way as far as over short
+/// ones, so that a round overshoots by a half to all of its change.
+const FIRST: f32 = 0.4;
 
 type Vectors = [Vec<f32>; 3];
 
@@ -52,6 +55,11 @@ impl Turns {
         &self.without
     }
 
+    /// The same of the frame before it.
+    pub(super) fn last(&self) -> &Vectors {
+        &self.last
+    }
+
     /// The same, empty and to be filled; the next frame starts from it.
     pub(super) fn recall(&mut self) -> &mut Vectors {
         self.warm = true;
@@ -94,11 +102,12 @@ impl Turns {
             square += by * by;
             *residual = now;
         }
-        let share = if self.rounds > 0 && square > 0.0 { along / square } else { 0.0 };
-        let share = share.clamp(-SHARE_MAX, SHARE_MAX);
+        let share = if square > 0.0 { along / square } else { 0.0 };
+        let share = if self.rounds == 0 { FIRST } else { share.clamp(-SHARE_MAX, SHARE_MAX) };
         let both = self.found.iter().flatten().zip(self.before.iter_mut().flatten());
         for (force, (found, before)) in force_n.iter_mut().flatten().zip(both) {
-            *force = found + share * (*before - found);
+            let last = if self.rounds == 0 { *force } else { *before };
+            *force = found + share * (last - found);
             *before = *found;
         }
         self.rounds += 1;

@@ -1,19 +1,19 @@
 //! The part of the skin that things are near: its pixels, and the vertices that move them.
 
+mod gaps;
 mod hats;
+mod vertices;
 
 use super::PixelSkin;
-use crate::answer::Person;
-use crate::error::ContactError;
+use crate::answer::Effort;
 use crate::model::ContactModel;
 use crate::objects::View;
-use crate::second_order::Amplitudes;
 use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels round vertices nearer than this are looked at, reference mm.
 const NEAR_MM: f64 = 0.6;
-/// Gap of a displaced pixel beyond which nothing presses, reference mm.
-const FREE_MM: f32 = 0.3;
+/// Of these, pixels nearer than this can come to touch, reference mm.
+const REACH_MM: f64 = 0.2;
 /// Pixels between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
 const NONE: u32 = u32::MAX;
@@ -28,6 +28,8 @@ pub(super) struct Window {
     pub at_mm: Vec<[f32; 3]>,
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
+    /// The skin's normal, into the finger.
+    inward: Vec<[f32; 3]>,
     gap_mm: Vec<f32>,
     /// How far the object gives way, mm/MPa.
     pub give: Vec<f32>,
@@ -37,21 +39,22 @@ pub(super) struct Window {
     size: [usize; 2],
     /// Vertices of the pixels' stencils, and where each stands among them.
     ids: Vec<u32>,
-    /// How many of these, the first, are of pixels; the others are what these are smoothed with.
-    inner: usize,
     place: Vec<u32>,
     near: Vec<bool>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
     /// By vertex of the skin: displacement by its own hats, mm; force, N; hat's area, mm2; pressure,
     /// MPa.
-    rough_mm: Vec<f32>,
     dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
     hat_n: Vec<f32>,
     touched: Vec<u32>,
     packed: [Vec<f32>; 3],
+    /// Forces by the compliance's columns, and where they are not 0.
+    dense: [Vec<f32>; 3],
+    blocks: Vec<bool>,
+    runs: Vec<[usize; 2]>,
 }
 
 impl Window {
@@ -65,24 +68,26 @@ impl Window {
             at_mm: vec![[0.0; 3]; pixels],
             normal: vec![[0.0; 3]; pixels],
             area_mm2: vec![0.0; pixels],
+            inward: vec![[0.0; 3]; pixels],
             gap_mm: vec![0.0; pixels],
             give: vec![0.0; pixels],
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
             size: [0; 2],
             ids: Vec::with_capacity(vertices),
-            inner: 0,
             place: vec![NONE; vertices],
             near: vec![false; vertices],
             linear: vector(),
             moved: vector(),
-            rough_mm: zeros(),
             dent_mm: zeros(),
             force_n: vector(),
             hat_mm2: zeros(),
             hat_n: zeros(),
             touched: Vec::with_capacity(vertices),
             packed: vector(),
+            dense: vector(),
+            blocks: vec![false; vertices.div_ceil(vertices::BLOCK)],
+            runs: Vec::with_capacity(vertices.div_ceil(vertices::BLOCK)),
         }
     }
 
@@ -101,7 +106,13 @@ impl Window {
 
     /// Takes the pixels round `candidates`, distances (reference mm) and vertices, that things are
     /// near; false if there are none.
-    pub(super) fn open(&mut self, skin: &PixelSkin, candidates: &[(f64, u32)]) -> bool {
+    pub(super) fn open(
+        &mut self,
+        skin: &PixelSkin,
+        candidates: &[(f64, u32)],
+        view: View<'_>,
+        effort: &mut Effort,
+    ) -> bool {
         self.entries.clear();
         self.held.clear();
         self.ids.clear();
@@ -115,7 +126,12 @@ impl Window {
             self.near[*vertex as usize] = true;
         }
         for (entry, pixel) in skin.raster.pixels().iter().enumerate() {
-            if pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+            if !pixel.vertices.iter().any(|v| self.near[*v as usize]) {
+                continue;
+            }
+            effort.distances += 1;
+            let nearest = view.nearest_at(skin.rest_mm[entry].map(f64::from));
+            if nearest.is_some_and(|nearest| nearest.gap_mm < REACH_MM) {
                 let is_held = pixel.vertices.iter().any(|v| skin.at_edge[*v as usize]);
                 if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
             }
@@ -138,15 +154,6 @@ impl Window {
                 }
             }
         }
-        self.inner = self.ids.len();
-        for slot in 0..self.inner {
-            for vertex in skin.smoothed[self.ids[slot] as usize].vertices {
-                if self.place[usize::from(vertex)] == NONE {
-                    self.place[usize::from(vertex)] = self.ids.len() as u32;
-                    self.ids.push(u32::from(vertex));
-                }
-            }
-        }
         if self.entries.is_empty() {
             return false;
         }
@@ -165,58 +172,6 @@ impl Window {
         }
     }
 
-    /// Moves the stencils' vertices under the vertices' forces.
-    pub(super) fn displace(
-        &mut self,
-        skin: &PixelSkin,
-        model: &ContactModel,
-        amplitudes: Option<&mut Amplitudes>,
-    ) {
-        let v = model.vertices();
-        self.touched.clear();
-        for vertex in 0..v {
-            if (0..3).any(|i| self.force_n[i][vertex] != 0.0) {
-                let at = self.touched.len();
-                self.touched.push(vertex as u32);
-                for i in 0..3 {
-                    self.packed[i][at] = self.force_n[i][vertex];
-                }
-            }
-        }
-        for (slot, id) in self.ids.iter().enumerate() {
-            let rows = &model.compliance[9 * *id as usize * v..][..9 * v];
-            for (a, linear) in self.linear.iter_mut().enumerate() {
-                let mut sum = 0.0;
-                for (b, packed) in self.packed.iter().enumerate() {
-                    let row = &rows[(3 * a + b) * v..][..v];
-                    for (k, other) in self.touched.iter().enumerate() {
-                        sum += row[model.rank[*other as usize] as usize] * packed[k];
-                    }
-                }
-                linear[slot] = sum;
-            }
-        }
-        if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
-            let m = self.touched.len();
-            let [x, y, z] = &self.packed;
-            s.evaluate(&self.touched, [&x[..m], &y[..m], &z[..m]], a);
-            s.displace(a, &self.ids, &self.linear, &mut self.moved);
-        } else {
-            for (moved, linear) in self.moved.iter_mut().zip(&self.linear) {
-                moved.copy_from_slice(linear);
-            }
-        }
-        // What forces at vertices do to themselves and their neighbours is the mesh's, not the
-        // skin's: FE of linear elements moves a vertex twice as far as pressure on its hat does.
-        for (moved, smooth) in self.moved.iter().zip(&mut self.linear) {
-            for (slot, id) in self.ids[..self.inner].iter().enumerate() {
-                let stencil = &skin.smoothed[*id as usize];
-                smooth[slot] = stencil.value(|vertex| moved[self.place[vertex] as usize]);
-            }
-        }
-        std::mem::swap(&mut self.moved, &mut self.linear);
-    }
-
     /// Places the pixels, and finds their deformed areas.
     pub(super) fn place(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for (slot, entry) in self.entries.iter().enumerate() {
@@ -228,12 +183,25 @@ impl Window {
                 })
             });
         }
+        self.measure_planes(skin, model);
+    }
+
+    fn measure_planes(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for slot in 0..self.entries.len() {
             let index = skin.raster.indices()[self.entries[slot] as usize] as usize;
             let [a, b] = [MAP_SIDE_PX, 1].map(|step| self.across(index, slot, step));
-            let n =
-                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-            self.area_mm2[slot] = n.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let n = cross(a, b);
+            let area = n.iter().map(|v| v * v).sum::<f32>().sqrt();
+            self.area_mm2[slot] = area;
+            let vertex = skin.raster.pixels()[self.entries[slot] as usize].vertices[0] as usize;
+            let outward = model.normals[vertex];
+            // A pixel without neighbours has no plane.
+            self.inward[slot] = if area > 0.0 {
+                let along: f32 = n.iter().zip(outward).map(|(a, b)| a * b).sum();
+                n.map(|v| -v * along.signum() / area)
+            } else {
+                outward.map(|v| -v)
+            };
         }
     }
 
@@ -246,19 +214,6 @@ impl Window {
         let apart = f32::from(u8::from(before.is_some()) + u8::from(after.is_some()));
         let [from, to] = [before, after].map(|s| self.at_mm[s.unwrap_or(slot)]);
         std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
-    }
-
-    pub(super) fn measure(&mut self, view: View<'_>, person: Person) -> Result<(), ContactError> {
-        for slot in 0..self.entries.len() {
-            let nearest = view.nearest_at(self.at_mm[slot].map(f64::from));
-            let nearest = nearest.ok_or(ContactError::Diverged)?;
-            self.gap_mm[slot] = nearest.gap_mm.min(1e3) as f32;
-            // In the units of the reference finger: pressure over stiffness, length over width.
-            self.give[slot] =
-                (person.stiffness / (nearest.stiffness_mpa_per_mm * person.width)) as f32;
-            self.normal[slot] = nearest.normal.map(|n| n as f32);
-        }
-        Ok(())
     }
 
     /// Mean distance of neighbouring pixels under pressure, down and along rows, mm.
@@ -279,41 +234,29 @@ impl Window {
         sums.map(|sum| (sum / count).max(1e-3))
     }
 
-    /// Displacement of the stencils' vertices in a grid of displacements.
-    pub(super) fn own_dents(
-        &mut self,
-        skin: &PixelSkin,
-        grid: &[f32],
-        [rows, columns]: [usize; 2],
-    ) {
-        for id in &self.ids {
-            let [u, v] = skin.uv_px[*id as usize];
-            let [x, y] = [u - 0.5 - self.first[1] as f32, v - 0.5 - self.first[0] as f32];
-            let (left, top) = (x.floor(), y.floor());
-            let at = |down: i32, right: i32| {
-                let row = (top as i32 + down).rem_euclid(rows as i32) as usize;
-                let column = (left as i32 + right).rem_euclid(columns as i32) as usize;
-                grid[row * columns + column]
-            };
-            let (a, b) = (x - left, y - top);
-            self.rough_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
-                + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
-        }
-        for id in &self.ids[..self.inner] {
-            let stencil = &skin.smoothed[*id as usize];
-            self.dent_mm[*id as usize] = stencil.value(|vertex| self.rough_mm[vertex]);
+    /// Adds a pixel's pressure to the means over pixels of pressure that is linear between them.
+    pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
+        const SHARE: [f32; 3] = [0.125, 0.75, 0.125];
+        let mask = skin.raster.mask();
+        for (row, a) in SHARE.iter().enumerate() {
+            for (column, b) in SHARE.iter().enumerate() {
+                let to = (index + row * MAP_SIDE_PX + column).checked_sub(MAP_SIDE_PX + 1);
+                // What would leave the skin stays.
+                let to = to.filter(|to| mask.get(*to) == Some(&true)).unwrap_or(index);
+                map[to] += a * b * pressure;
+            }
         }
     }
 
-    /// Gaps of the pixels that are solved for, without their own pressure, mm. `held` is the
-    /// displacement of the grid by those that are held, if any.
-    pub(super) fn rest(&self, skin: &PixelSkin, held: Option<&[f32]>, rest: &mut [f32]) {
-        for (slot, entry) in self.entries[..self.free()].iter().enumerate() {
-            let stencil = &skin.stencils[*entry as usize];
-            let gap = self.gap_mm[slot];
-            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
-            let by_held = held.map_or(0.0, |grid| grid[self.cells[slot] as usize]);
-            rest[slot] = if gap > FREE_MM { 1e3 } else { gap - dent + by_held };
+    /// Places and areas of the pixels at rest.
+    pub(super) fn start(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        for (slot, entry) in self.entries.iter().enumerate() {
+            self.at_mm[slot] = skin.rest_mm[*entry as usize];
         }
+        self.measure_planes(skin, model);
     }
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -6,6 +6,7 @@ use papilla_contact::{
     Arrays, Contact, ContactModel, Header, Layer, Method, NetForce, Object, PixelContact,
     PixelSkin, Settings, Solver,
 };
+use papilla_sdf::{Placement, Plate, RoundedPlate};
 use std::sync::Arc;
 
 /// Vertices of a side, and pixels between them.
@@ -31,6 +32,11 @@ struct Plane {
 
 /// A half-space whose vertices are .7 mm apart.
 fn plane() -> Plane {
+    plane_of(1.0)
+}
+
+/// The same, of a mesh on which a force moves its own vertex `own` times as far.
+fn plane_of(own: f32) -> Plane {
     let margin = (MAP_SIDE_PX as f64 - SPACING_PX * (SIDE - 1) as f64) / 2.0;
     let uv = |i: usize| [i % SIDE, i / SIDE].map(|k| margin + SPACING_PX * k as f64);
     let uv_px: Vec<[f32; 2]> = (0..SIDE * SIDE).map(|i| uv(i).map(|c| c as f32)).collect();
@@ -51,13 +57,18 @@ fn plane() -> Plane {
         Atlas::new(PITCH_MM as f32, triangles.clone(), patch.clone(), patch).expect("an atlas");
     let area = (SPACING_PX * PITCH_MM).powi(2) as f32;
     let vertices = positions_mm.len();
-    let arrays = Arrays::half_space(
+    let mut arrays = Arrays::half_space(
         positions_mm.into_flattened(),
         [0.0, 0.0, -1.0].repeat(vertices),
         vec![area; vertices],
         triangles.as_flattened().to_vec(),
         MODULUS_MPA,
     );
+    let mut diagonal = 0;
+    for row in 0..3 * vertices {
+        arrays.compliance_mm_per_n[diagonal] *= own;
+        diagonal += 3 * vertices - row;
+    }
     let triangles = triangles.len();
     let young_mpa = MODULUS_MPA * (1.0 - POISSON * POISSON);
     let layers = vec![Layer { young_mpa, poisson: POISSON, thickness_mm: 100.0 }];
@@ -109,6 +120,53 @@ fn hertz_pressure_comes_out_of_a_contact_of_few_vertices() {
         let due = 4.0 / 3.0 * MODULUS_MPA * radius_mm.sqrt() * depth_mm.powf(1.5);
         assert!((out.force_n[2] / due - 1.0).abs() < 0.05, "{} {due}", out.force_n[2]);
     }
+}
+
+/// Means over pixels are the force, too.
+#[test]
+fn a_map_holds_the_force() {
+    let mut plane = plane();
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    solver.solve_on_pixels(&[ball(3.0, [0.1, 0.0], 0.1)], pixels, out).unwrap();
+    let sum_n: f64 =
+        pixels.map_pa().iter().map(|p| 1e-6 * f64::from(*p) * PITCH_MM * PITCH_MM).sum();
+    assert!((sum_n / out.force_n[2] - 1.0).abs() < 0.02, "{sum_n} {}", out.force_n[2]);
+}
+
+/// Linear elements move the vertex that is pressed more than twice as far as skin moves.
+#[test]
+fn a_meshs_own_dent_leaves_no_trace() {
+    for (radius_mm, at, depth_mm) in [(3.0, [0.0, 0.0], 0.3), (1.0, [0.1, 0.2], 0.15)] {
+        let scene = [ball(radius_mm, at, depth_mm)];
+        let [true_n, found_n] = [1.0, 2.3].map(|own| {
+            let mut plane = plane_of(own);
+            let Plane { solver, pixels, out, .. } = &mut plane;
+            solver.solve_on_pixels(&scene, pixels, out).unwrap();
+            assert!(out.quality.settled);
+            out.force_n[2]
+        });
+        assert!((found_n / true_n - 1.0).abs() < 0.05, "{found_n} {true_n}");
+    }
+}
+
+/// Skin inside a ridge, as deep as that is wide, is nearer to its sides than to its top.
+#[test]
+fn a_ridge_deeper_than_it_is_wide_presses_with_its_top() {
+    let ridge = Plate { size_mm: [0.5, 3.0], edge_radius_mm: 0.1 };
+    let shape = RoundedPlate::from(&ridge);
+    let mut plane = plane();
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    let mut press = |depth_mm: f64| {
+        let place = Placement::turned(0.0, 0.0, 0.0, [0.35, 0.0, depth_mm - shape.half_mm[2]]);
+        solver.reset();
+        pixels.reset();
+        let object = Object::rigid(Arc::new(shape), place);
+        solver.solve_on_pixels(&[object], pixels, out).unwrap();
+        force_n(out)
+    };
+    // A punch's force is in proportion to its depth; from nothing such frames do not quite settle.
+    let [half, whole] = [0.2, 0.4].map(&mut press);
+    assert!((1.5..2.5).contains(&(whole / half)), "{half} {whole}");
 }
 
 /// A dot between four vertices touches none of them.
