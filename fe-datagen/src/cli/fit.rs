@@ -1,7 +1,7 @@
 //! `fit`: constants that come closest to people's fingers.
 
-use super::print;
-use papilla_people::fit::{self, Options};
+use super::{print, refuse_unknown};
+use papilla_people::fit::{self, Options, PARTS};
 use papilla_people::measured::Measured;
 use papilla_progress::Progress;
 use std::path::PathBuf;
@@ -16,6 +16,9 @@ use std::process::ExitCode;
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen fit --out out/fit")]
 pub(super) struct Args {
+    /// Only this part (plates, taps, maps; plates are pressed in any case); may be given several times.
+    #[arg(long, value_name = "PART")]
+    only: Vec<String>,
     /// Evaluations at most, two presses each.
     #[arg(long, default_value_t = 40, value_parser = clap::value_parser!(u16).range(1..=1000))]
     evaluations: u16,
@@ -34,18 +37,19 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    refuse_unknown(&args.only, &PARTS)?;
     let measured = match &args.measured {
         Some(file) => Measured::read(file)?,
         None => Measured::shipped()?,
     };
-    let options = Options { evaluations: args.evaluations.into() };
+    let options = Options { evaluations: args.evaluations.into(), only: args.only.clone() };
     let progress = Progress::new("evaluations", args.evaluations.into(), 0, args.json);
     let tell = &mut |what: &str, done: usize, all: usize| {
         progress.set_length(all);
         progress.set_position(done);
         progress.set_message(what);
     };
-    let fit = fit::run(&measured, options, &args.out, tell)?;
+    let fit = fit::run(&measured, &options, &args.out, tell)?;
     drop(progress);
     if let Some(page) = &args.markdown {
         fit.write_page(page)?;

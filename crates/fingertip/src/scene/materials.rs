@@ -26,7 +26,8 @@ pub struct TissueTable {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MaterialSet {
-    /// Maeno 1998 (moduli of dermis and fat); Chen, Shuai & Zhu (everything else).
+    /// Maeno 1998 (Young's moduli of dermis and fat); Chen, Shuai & Zhu (everything else, Ogden and
+    /// Prony series too).
     #[default]
     Papers,
     /// Soft tissues fitted to what was measured on people (docs/reports/fit.md), for the effects
@@ -37,7 +38,6 @@ pub enum MaterialSet {
 /// What a file says of the tissues.
 #[derive(Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-#[schemars(rename = "Materials")]
 struct Given {
     /// The set that gives what no table here gives.
     set: MaterialSet,
@@ -96,18 +96,19 @@ impl MaterialSet {
     }
 }
 
-/// Epidermis, dermis and fat of [`MaterialSet::People`].
+/// Epidermis, dermis and fat of [`MaterialSet::People`]: what `fe-datagen fit` writes, and the values
+/// that it holds (docs/reports/fit.md).
 fn people() -> [MaterialSpec; 3] {
     let prony = PronySpec {
-        share: vec![0.3, 0.3, 0.3],
+        share: vec![0.8, 0.0667, 0.0667],
         time_s: vec![0.004, 0.070, 1.4],
         moduli: Moduli::LongTerm,
     };
-    [
-        MaterialSpec { prony: Some(prony.clone()), ..MaterialSpec::elastic(0.136, 0.48) },
-        MaterialSpec { prony: Some(prony.clone()), ..MaterialSpec::one_term(0.0645, 9.0, 0.48) },
-        MaterialSpec { prony: Some(prony), ..MaterialSpec::one_term(0.005, 9.0, 0.48) },
-    ]
+    let epidermis = MaterialSpec::elastic(0.6, 0.495);
+    let dermis = MaterialSpec::one_term(0.070, 9.0, 0.495);
+    let subcutaneous = MaterialSpec::one_term(0.008, 9.78, 0.495);
+    [epidermis, dermis, subcutaneous]
+        .map(|tissue| MaterialSpec { prony: Some(prony.clone()), ..tissue })
 }
 
 impl Default for TissueTable {

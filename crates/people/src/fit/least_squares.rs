@@ -67,7 +67,7 @@ pub fn search<E>(
     most: usize,
     residuals: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, E>,
 ) -> Result<Found, E> {
-    let mut tried = Vec::new();
+    let mut tried: Vec<Tried> = Vec::new();
     let mut evaluate = |at: &[f64]| {
         let found = residuals(at)?;
         tried.push(Tried { at: at.to_vec(), cost: cost(&found) });
@@ -79,12 +79,20 @@ pub fn search<E>(
     let mut damping = DAMPING;
     let ended = loop {
         if jacobian.is_empty() {
+            let mut better: Option<(Vec<f64>, Vec<f64>)> = None;
             jacobian = differences(&at, &here, &mut |x| {
-                evaluate(x).map(|(r, n)| {
-                    count = n;
-                    r
-                })
+                let (there, n) = evaluate(x)?;
+                count = n;
+                let least = better.as_ref().map_or(cost(&here), |(_, r)| cost(r));
+                if cost(&there) < least {
+                    better = Some((x.to_vec(), there.clone()));
+                }
+                Ok(there)
             })?;
+            // What was tried anyway may be a step.
+            if let Some(better) = better {
+                (at, here) = better;
+            }
             fresh = true;
         }
         if count >= most {

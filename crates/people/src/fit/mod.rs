@@ -84,11 +84,16 @@ pub struct Fit {
 }
 
 /// What is fitted to, and how far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Options {
-    /// Evaluations at most.
+    /// Evaluations at most; those of the first Jacobian are made in any case.
     pub evaluations: usize,
+    /// Some of [`PARTS`]; empty is all.
+    pub only: Vec<String>,
 }
+
+/// Parts of a fit, as the command line names them: the elastic constants, relaxation, maps.
+pub const PARTS: [&str; 3] = ["plates", "taps", "maps"];
 
 /// Two plates of one finger.
 type Presses = Vec<(f64, Solution)>;
@@ -102,7 +107,7 @@ type Presses = Vec<(f64, Solution)>;
 /// [`PeopleError`]; a force that a plate does not reach is read at the largest that it does.
 pub fn run(
     measured: &Measured,
-    options: Options,
+    options: &Options,
     folder: &Path,
     told: &mut dyn FnMut(&str, usize, usize),
 ) -> Result<Fit, PeopleError> {
@@ -125,7 +130,9 @@ pub fn run(
     let best = values(&found.at);
     let states = [pressed(&values(&start()))?, pressed(&best)?];
     let tissues = table(&best);
+    let wanted = |part: &str| options.only.is_empty() || options.only.iter().any(|o| o == part);
     let shares = shares::asked(&measured.figures)
+        .filter(|_| wanted("taps"))
         .map(|asked| {
             let told = &mut |_| told("taps", done, options.evaluations);
             shares::found(&tissues, asked, folder, told)
@@ -137,10 +144,9 @@ pub fn run(
         None => tissues,
     };
     let fitted = Tissues { table: tissues.clone(), hyperelastic: true };
-    let sets =
-        Sets::new(measured, [&Materials::NeoHookean.tissues(), &fitted], folder, &mut |what| {
-            told(what, done, options.evaluations);
-        })?;
+    let both = [&Materials::NeoHookean.tissues(), &fitted];
+    let told_sets = &mut |what: &str| told(what, done, options.evaluations);
+    let sets = Sets::new(measured, both, [shares.is_some(), wanted("maps")], folder, told_sets)?;
     let fit = Fit {
         made: today_here(),
         constants: constants(&found, &best),
@@ -154,7 +160,7 @@ pub fn run(
         solve_s,
     };
     fit.write(folder)?;
-    told("done", done, done);
+    told("done", 1, 1);
     Ok(fit)
 }
 
@@ -218,4 +224,48 @@ mod tests {
         let [felt, unfelt] = uncertainties(&found)[..] else { panic!("two") };
         assert!(felt < 0.05 && (unfelt - 1.0).abs() < 1e-12, "{felt} {unfelt}");
     }
+
+    /// The shipped set is what this module makes of three values within their bounds, and relaxes as
+    /// [`shares`] has it.
+    #[test]
+    fn the_set_people_is_a_fit() {
+        let set = Materials::People.tissues().table;
+        let term = |spec: &papilla_fingertip::materials::MaterialSpec| {
+            let ogden = spec.ogden.clone().unwrap();
+            (ogden.mu_mpa[0], ogden.alpha[0])
+        };
+        let ((fat, exponent), (dermis, _)) = (term(&set.subcutaneous), term(&set.dermis));
+        let values = [fat, exponent, dermis];
+        for (p, v) in PARAMETERS.iter().zip(values) {
+            assert!((p.low..=p.high).contains(&v), "{}: {v}", p.name);
+        }
+        let prony = set.dermis.prony.clone().unwrap();
+        let series = shares::series(&prony.time_s, prony.share[0]);
+        let fitted = shares::relaxing(&table(&values), &series);
+        for (a, b) in [&set.epidermis, &set.dermis, &set.subcutaneous].into_iter().zip([
+            &fitted.epidermis,
+            &fitted.dermis,
+            &fitted.subcutaneous,
+        ]) {
+            assert_eq!((&a.ogden, a.poissons_ratio), (&b.ogden, b.poissons_ratio));
+            assert!((a.youngs_modulus_mpa / b.youngs_modulus_mpa - 1.0).abs() < 1e-12);
+            let (a, b) = (a.prony.as_ref().unwrap(), b.prony.as_ref().unwrap());
+            assert!(a.share.iter().zip(&b.share).all(|(x, y)| (x - y).abs() < 1e-4), "{a:?} {b:?}");
+            assert_eq!((&a.time_s, a.moduli), (&b.time_s, b.moduli));
+        }
+        assert_eq!(prony.time_s, [0.004, 0.070, 1.4]);
+    }
+
+    /// Its plate, inclined, to half a newton: Hertz' modulus of the page.
+    #[test]
+    fn the_set_people_is_as_stiff_as_the_page_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let tissues = Materials::People.tissues();
+        let presses = pad::pressed_together(&[(30.0, 0.5)], &tissues, folder.path()).unwrap();
+        let hertz = Quantity::HertzModulus { force_n: 0.5, pitch_deg: 30.0 };
+        let found = pad::figure(&hertz, &presses[0].1).unwrap();
+        assert!((found / HERTZ_MPA - 1.0).abs() < 0.02, "{found}");
+    }
+
+    const HERTZ_MPA: f64 = 0.0719;
 }

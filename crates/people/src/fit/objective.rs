@@ -23,11 +23,15 @@ pub(crate) struct Target<'a> {
 }
 
 /// The rows of `figures` that a slow press with a plate decides: not the ratio of two others, nor a
-/// coefficient of determination, nor what takes time.
+/// coefficient of determination, nor what takes time, nor peak over mean pressure, which on the even
+/// coarse mesh tells of the mesh.
 pub(crate) fn targets(figures: &[Figure]) -> Vec<Target<'_>> {
     let fits = |f: &&Figure| {
         use Quantity as Q;
-        let left = matches!(f.quantity, Q::Stiffening { .. } | Q::Exponential { .. });
+        let left = matches!(
+            f.quantity,
+            Q::Stiffening { .. } | Q::Exponential { .. } | Q::PeakOverMean { .. }
+        );
         f.quantity.plate().is_some() && !left
     };
     let rows: Vec<&Figure> = figures.iter().filter(fits).collect();
@@ -73,9 +77,9 @@ mod tests {
     fn every_quantity_counts_once_and_its_range_is_one() {
         let measured = Measured::shipped().unwrap();
         let targets = targets(&measured.figures);
-        // Stiffness, peak over mean, area, Hertz' modulus, volume.
+        // Stiffness, area, Hertz' modulus, volume.
         let weights: f64 = targets.iter().map(|t| t.weight * t.weight).sum();
-        assert!((weights - 5.0).abs() < 1e-12, "{weights}");
+        assert!((weights - 4.0).abs() < 1e-12, "{weights}");
         let hertz = targets.iter().find(|t| t.figure.range.is_some()).unwrap();
         let [low, high] = hertz.figure.range.unwrap();
         assert!((hertz.residual(low) / hertz.weight + 1.0).abs() < 1e-12);

@@ -26,6 +26,7 @@ impl Sets {
     pub(super) fn new(
         measured: &Measured,
         [papers, people]: [&Tissues; 2],
+        [relaxes, maps]: [bool; 2],
         folder: &Path,
         told: &mut dyn FnMut(&str),
     ) -> Result<Self, PeopleError> {
@@ -33,10 +34,14 @@ impl Sets {
             told("plates with both sets");
             let presses = pad::pressed_together(&plates(measured), tissues, folder)?;
             let row = |figure| row(figure, &presses, tissues, folder);
-            measured.figures.iter().map(row).collect::<Result<Vec<_>, PeopleError>>()
+            let known = measured.figures.iter().filter(|f| relaxes || f.quantity.plate().is_some());
+            known.map(row).collect::<Result<Vec<_>, PeopleError>>()
         };
         let (first, second) = (rows(papers)?, rows(people)?);
-        let maps = maps::changes([papers, people], folder, told)?;
+        let maps = match maps {
+            true => maps::changes([papers, people], folder, told)?,
+            false => Vec::new(),
+        };
         Ok(Self { papers: first, people: second, maps })
     }
 
@@ -59,6 +64,9 @@ impl Sets {
                 b.verdict.text(),
                 if near(&b.verdict) { "" } else { mends(&b.quantity) }
             );
+        }
+        if self.maps.is_empty() {
+            return;
         }
         text.push_str(
             "\n## What it does to maps\n\nAt the same force, fitted against default; even Hex8, coarse; \
