@@ -106,7 +106,7 @@ fn people() -> [MaterialSpec; 3] {
     };
     let epidermis = MaterialSpec::elastic(0.6, 0.495);
     let dermis = MaterialSpec::one_term(0.070, 9.0, 0.495);
-    let subcutaneous = MaterialSpec::one_term(0.008, 9.78, 0.495);
+    let subcutaneous = MaterialSpec::one_term(0.008, 9.743, 0.495);
     [epidermis, dermis, subcutaneous]
         .map(|tissue| MaterialSpec { prony: Some(prony.clone()), ..tissue })
 }
