@@ -63,6 +63,8 @@ pub struct Fitted {
 pub struct Fit {
     /// Date and processor.
     pub made: String,
+    /// Parts that were not asked for.
+    pub left_out: Vec<&'static str>,
     /// The constants.
     pub constants: Vec<Identified>,
     /// Half the sum of squared residuals at the start and at the end.
@@ -149,6 +151,7 @@ pub fn run(
     let sets = Sets::new(measured, both, [shares.is_some(), wanted("maps")], folder, told_sets)?;
     let fit = Fit {
         made: today_here(),
+        left_out: PARTS.into_iter().skip(1).filter(|p| !wanted(p)).collect(),
         constants: constants(&found, &best),
         cost: [found.tried[0].cost, cost(&found.residuals)],
         rows,

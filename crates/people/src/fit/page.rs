@@ -37,7 +37,11 @@ impl Fit {
 
     /// The page.
     fn markdown(&self) -> String {
-        let mut text = format!("{HEAD}\n{}.\n\n## Constants\n\n", self.made);
+        let mut text = format!("{HEAD}\n{}.", self.made);
+        if !self.left_out.is_empty() {
+            let _ = write!(text, " **Left out of this run: {}.**", self.left_out.join(", "));
+        }
+        text.push_str("\n\n## Constants\n\n");
         text.push_str(
             "| constant | value | least | largest | known to | least: source | largest: source |\n\
              |---|---|---|---|---|---|---|\n",
