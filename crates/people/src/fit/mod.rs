@@ -261,6 +261,7 @@ mod tests {
 
     /// Its plate, inclined, to half a newton: Hertz' modulus of the page.
     #[test]
+    #[ignore = "long"]
     fn the_set_people_is_as_stiff_as_the_page_says() {
         let folder = tempfile::tempdir().unwrap();
         let tissues = Materials::People.tissues();
