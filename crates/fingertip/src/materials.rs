@@ -211,6 +211,10 @@ impl PronySpec {
     }
 }
 
+/// Stretches beyond which a law of one term is continued: heel pads and skin, to which such laws
+/// are fitted, are squeezed and pulled less.
+const ONE_TERM_STRETCH: [f64; 2] = [0.35, 2.8];
+
 /// All that a scene may say of one tissue. Effects choose what of it is used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -235,6 +239,20 @@ impl MaterialSpec {
     #[must_use]
     pub fn elastic(youngs_modulus_mpa: f64, poissons_ratio: f64) -> Self {
         Self { youngs_modulus_mpa, poissons_ratio, ogden: None, prony: None, biphasic: None }
+    }
+
+    /// Ogden's law of one term, which stiffens the more the larger `alpha`; the elastic constants
+    /// are those of its rest.
+    #[must_use]
+    pub fn one_term(mu_mpa: f64, alpha: f64, poissons_ratio: f64) -> Self {
+        let ogden = OgdenSpec {
+            mu_mpa: vec![mu_mpa],
+            alpha: vec![alpha],
+            poissons_ratio,
+            calibrated_stretch: ONE_TERM_STRETCH,
+        };
+        let youngs_modulus_mpa = 2.0 * mu_mpa * (1.0 + poissons_ratio);
+        Self { ogden: Some(ogden), ..Self::elastic(youngs_modulus_mpa, poissons_ratio) }
     }
 
     /// The constants at rest.

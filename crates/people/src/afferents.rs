@@ -93,7 +93,7 @@ impl Afferents {
     ) -> Result<Self, PeopleError> {
         let mut presses = Vec::with_capacity(sa1.curvature_per_m.len());
         for &curvature in &sa1.curvature_per_m {
-            let press = Press::sphere(curvature, materials);
+            let press = Press::sphere(curvature, materials.tissues());
             told(&press.name);
             presses.push(held_at(&press, &sa1.force_n, density, folder)?);
         }

@@ -23,7 +23,9 @@
 pub mod afferents;
 mod contact;
 mod error;
+pub mod fit;
 pub mod force_path;
+mod maps;
 pub mod measured;
 pub mod mesh_error;
 mod pad;

@@ -184,6 +184,16 @@ impl Measured {
 }
 
 impl Figure {
+    /// What people have, as tables say it.
+    #[must_use]
+    pub(crate) fn people(&self) -> String {
+        match (self.range, self.at_most, self.value) {
+            (Some([low, high]), ..) => format!("{low} to {high}"),
+            (_, Some(most), _) => format!("at most {most}"),
+            (.., value) => format!("{}", value.unwrap_or(f64::NAN)),
+        }
+    }
+
     fn validate(&self, at: &str) -> Result<(), PeopleError> {
         let given = [self.value.is_some(), self.range.is_some(), self.at_most.is_some()];
         let count = given.iter().filter(|g| **g).count();
@@ -212,6 +222,25 @@ impl Quantity {
             | Self::VolumeLost { to_n, pitch_deg } => Some((pitch_deg, to_n)),
             Self::RelaxationTime { .. } | Self::EnergyLost { .. } => None,
         }
+    }
+
+    /// The same at forces of at most `most_n`, N.
+    #[must_use]
+    pub(crate) fn at_most_n(&self, most_n: f64) -> Self {
+        let mut less = *self;
+        match &mut less {
+            Self::Stiffness { force_n, .. }
+            | Self::PeakOverMean { force_n, .. }
+            | Self::HertzModulus { force_n, .. }
+            | Self::Exponential { to_n: force_n, .. }
+            | Self::VolumeLost { to_n: force_n, .. } => *force_n = force_n.min(most_n),
+            Self::Stiffening { from_n, to_n, .. } | Self::AreaRatio { from_n, to_n, .. } => {
+                *from_n = from_n.min(most_n);
+                *to_n = to_n.min(most_n);
+            }
+            Self::RelaxationTime { .. } | Self::EnergyLost { .. } => {}
+        }
+        less
     }
 
     fn validate(&self, at: &str) -> Result<(), PeopleError> {

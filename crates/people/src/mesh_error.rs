@@ -36,7 +36,7 @@ pub(crate) fn mesh_errors(
     let mut errors = Vec::new();
     // A plate costs several times what a sphere does.
     for p in sa1.profiles.iter().filter(|p| p.curvature_per_m > 0.0) {
-        let press = Press::sphere(p.curvature_per_m, materials);
+        let press = Press::sphere(p.curvature_per_m, materials.tissues());
         told(&format!("{} on the finer mesh", press.name));
         let fine = held_at(&press, &sa1.force_n, finer, folder)?;
         let coarse = held_at(&press, &sa1.force_n, coarser, folder)?;

@@ -2,7 +2,7 @@
 
 use crate::PeopleError;
 use crate::measured::Quantity;
-use crate::press::{Materials, Press};
+use crate::press::{Cells, Press, Tissues, plate_radius_mm};
 use crate::rates::r_squared;
 use crate::solution::{Reads, Solution, State, until};
 use std::path::Path;
@@ -11,10 +11,31 @@ use std::path::Path;
 pub(crate) fn pressed(
     pitch_deg: f64,
     until_n: f64,
-    materials: Materials,
+    tissues: Tissues,
+    cells: Cells,
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
-    until(&Press::plate(pitch_deg, materials), until_n, Reads::Contact, folder)
+    until(&Press::plate(pitch_deg, tissues), until_n, cells, Reads::Contact, folder)
+}
+
+/// Plates on the even coarse mesh, side by side; each is an inclination, degrees, and a force, N.
+pub(crate) fn pressed_together(
+    plates: &[(f64, f64)],
+    tissues: &Tissues,
+    folder: &Path,
+) -> Result<Vec<(f64, Solution)>, PeopleError> {
+    let press = |(pitch_deg, until_n): (f64, f64)| {
+        let found = pressed(pitch_deg, until_n, tissues.clone(), Cells::COARSE, folder)?;
+        Ok((pitch_deg, found))
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> =
+            plates.iter().map(|&plate| scope.spawn(move || press(plate))).collect();
+        let join = |t: std::thread::ScopedJoinHandle<'_, Result<_, PeopleError>>| {
+            t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        threads.into_iter().map(join).collect()
+    })
 }
 
 /// A figure of the finger, or why there is none.
@@ -47,7 +68,7 @@ pub(crate) fn figure(quantity: &Quantity, press: &Solution) -> Result<f64, Peopl
             at(force_n, &of(|s| s.contact.map_or(f64::NAN, |c| c.peak_over_mean)))
         }
         Quantity::HertzModulus { force_n, pitch_deg } => {
-            let radius_mm = Press::plate(pitch_deg, Materials::NeoHookean).finger_radius_mm()?;
+            let radius_mm = plate_radius_mm(pitch_deg)?;
             let depth_mm = path.depth_at(force_n).unwrap_or(f64::NAN);
             hertz_modulus_mpa(force_n, depth_mm, radius_mm)
         }

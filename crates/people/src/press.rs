@@ -5,7 +5,9 @@ use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::mesh::grading::Contact;
-use papilla_fingertip::scene::{EffectName, Geometry, Motion, Pose, Scene};
+use papilla_fingertip::scene::{
+    EffectName, Geometry, MaterialSet, Motion, Pose, Scene, TissueTable,
+};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_sdf::{IndenterSpec, Plate, Sphere};
 use serde::{Deserialize, Serialize};
@@ -18,6 +20,8 @@ pub enum Materials {
     NeoHookean,
     /// Ogden's law with the constants of Chen, Shuai & Zhu for dermis and fat.
     Ogden,
+    /// The set `people`: one Ogden term each in dermis and fat, fitted to people's fingers.
+    People,
 }
 
 impl Materials {
@@ -27,15 +31,42 @@ impl Materials {
         match self {
             Self::NeoHookean => "neo-Hookean, moduli of Maeno 1998 and Chen, Shuai & Zhu",
             Self::Ogden => "Ogden, dermis and fat of Chen, Shuai & Zhu's Table 2",
+            Self::People => "the set `people`, Ogden",
         }
     }
 
-    pub(crate) fn effects(self) -> Vec<EffectName> {
+    pub(crate) fn tissues(self) -> Tissues {
+        let set = match self {
+            Self::NeoHookean | Self::Ogden => MaterialSet::Papers,
+            Self::People => MaterialSet::People,
+        };
+        Tissues { table: set.table(), hyperelastic: self != Self::NeoHookean }
+    }
+}
+
+/// Constants of the tissues, and whether the laws of their tables `ogden` are used.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tissues {
+    pub table: TissueTable,
+    pub hyperelastic: bool,
+}
+
+impl Tissues {
+    pub(crate) fn effects(&self) -> Vec<EffectName> {
         let mut effects = papilla_fingertip::scene::effects::usual();
-        if self == Self::Ogden {
+        if self.hyperelastic {
             effects.extend(EffectName::named("hyperelastic"));
         }
         effects
+    }
+
+    /// The constants of what does not relax: a press is stored under what it was solved from.
+    fn elastic(&self) -> TissueTable {
+        let mut table = self.table.clone();
+        for tissue in [&mut table.epidermis, &mut table.dermis, &mut table.subcutaneous] {
+            tissue.prony = None;
+        }
+        table
     }
 }
 
@@ -46,36 +77,51 @@ pub(crate) struct Press {
     pub name: String,
     pub indenter: IndenterSpec,
     pub pitch_deg: f64,
-    pub materials: Materials,
+    pub tissues: Tissues,
+}
+
+/// The mesh that a press is solved on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct Cells {
+    pub density: Density,
+    pub order: Order,
+}
+
+impl Cells {
+    /// Split where the indenter touches, Hex27.
+    pub(crate) const fn graded(density: Density) -> Self {
+        Self { density, order: Order::Graded }
+    }
+
+    /// Even, Hex8: a tenth of the time.
+    pub(crate) const COARSE: Self = Self { density: Density::Coarse, order: Order::Linear };
 }
 
 impl Press {
     /// A plate that is inclined tip first.
-    pub(crate) fn plate(pitch_deg: f64, materials: Materials) -> Self {
+    pub(crate) fn plate(pitch_deg: f64, tissues: Tissues) -> Self {
         let indenter = IndenterSpec::Plate(Plate { size_mm: [30.0, 30.0], ..Plate::default() });
-        Self { name: format!("plate-{pitch_deg}"), indenter, pitch_deg, materials }
+        Self { name: format!("plate-{pitch_deg}"), indenter, pitch_deg, tissues }
     }
 
     /// A sphere of a curvature in 1/m; 0 is a plate.
-    pub(crate) fn sphere(curvature_per_m: f64, materials: Materials) -> Self {
+    pub(crate) fn sphere(curvature_per_m: f64, tissues: Tissues) -> Self {
         if curvature_per_m == 0.0 {
-            return Self { name: "sphere-0".into(), ..Self::plate(0.0, materials) };
+            return Self { name: "sphere-0".into(), ..Self::plate(0.0, tissues) };
         }
         let indenter = IndenterSpec::Sphere(Sphere { radius_mm: 1e3 / curvature_per_m });
-        Self { name: format!("sphere-{curvature_per_m}"), indenter, pitch_deg: 0.0, materials }
+        Self { name: format!("sphere-{curvature_per_m}"), indenter, pitch_deg: 0.0, tissues }
     }
 
     /// The scene that presses the default finger, up to a depth.
-    pub(crate) fn scene(&self, density: Density, depth_mm: f64) -> Scene {
+    pub(crate) fn scene(&self, cells: Cells, depth_mm: f64) -> Scene {
+        let Cells { density, order } = cells;
         Scene {
-            geometry: Geometry::Fingertip {
-                density,
-                order: Order::Graded,
-                shape: FingertipShape::default(),
-            },
+            geometry: Geometry::Fingertip { density, order, shape: FingertipShape::default() },
+            materials: self.tissues.elastic(),
             indenter: self.indenter.clone(),
             motion: Motion::to_depth(depth_mm, 1, self.pose()),
-            effects: self.materials.effects(),
+            effects: self.tissues.effects(),
             ..Scene::usual()
         }
     }
@@ -121,6 +167,11 @@ impl Press {
         };
         Ok((0.75 * 0.75 * force_n * curvature.sqrt() / SOFT_MPA).powf(2.0 / 3.0))
     }
+}
+
+/// Radius of the finger where a plate first touches it, mm; see [`Press::finger_radius_mm`].
+pub(crate) fn plate_radius_mm(pitch_deg: f64) -> Result<f64, PeopleError> {
+    Press::plate(pitch_deg, Materials::NeoHookean.tissues()).finger_radius_mm()
 }
 
 /// Distance over which normals are compared, mm.
@@ -179,9 +230,10 @@ mod tests {
 
     #[test]
     fn a_sphere_of_curvature_0_is_flat_and_one_of_694_small() {
-        let flat = Press::sphere(0.0, Materials::NeoHookean);
+        let flat = Press::sphere(0.0, Materials::NeoHookean.tissues());
         assert_eq!(flat.indenter.name(), "plate");
-        let IndenterSpec::Sphere(ball) = Press::sphere(694.0, Materials::Ogden).indenter else {
+        let IndenterSpec::Sphere(ball) = Press::sphere(694.0, Materials::Ogden.tissues()).indenter
+        else {
             panic!("no sphere")
         };
         assert!((ball.radius_mm - 1.441).abs() < 1e-3);

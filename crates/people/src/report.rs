@@ -3,7 +3,7 @@
 mod charts;
 mod page;
 mod rates;
-mod words;
+pub(crate) mod words;
 
 use crate::PeopleError;
 use crate::afferents::Afferents;
@@ -66,21 +66,16 @@ impl Row {
     pub(crate) fn new(figure: &Figure, here: Result<f64, String>) -> Self {
         let Figure { quantity, value, range, at_most, source, second_hand } = figure;
         let within = |ok: bool| if ok { Verdict::Ok } else { Verdict::Failed };
-        let (people, spread, verdict): (_, _, Box<dyn Fn(f64) -> Verdict>) =
-            match (*range, *at_most, *value) {
-                (Some([low, high]), ..) => {
-                    let verdict = move |v: f64| within(low <= v && v <= high);
-                    (format!("{low} to {high}"), "least and largest", Box::new(verdict))
-                }
-                (_, Some(most), _) => {
-                    (format!("at most {most}"), "largest", Box::new(move |v| within(v <= most)))
-                }
-                (.., value) => {
-                    let value = value.unwrap_or(f64::NAN);
-                    let verdict = move |v: f64| Verdict::TimesPeople(v / value);
-                    (format!("{value}"), "one figure, no spread", Box::new(verdict))
-                }
-            };
+        let (spread, verdict): (_, Box<dyn Fn(f64) -> Verdict>) = match (*range, *at_most, *value) {
+            (Some([low, high]), ..) => {
+                ("least and largest", Box::new(move |v| within(low <= v && v <= high)))
+            }
+            (_, Some(most), _) => ("largest", Box::new(move |v| within(v <= most))),
+            (.., value) => {
+                let value = value.unwrap_or(f64::NAN);
+                ("one figure, no spread", Box::new(move |v| Verdict::TimesPeople(v / value)))
+            }
+        };
         let verdict = match &here {
             Ok(here) => verdict(*here),
             Err(why) => Verdict::NotReached(why.clone()),
@@ -89,7 +84,7 @@ impl Row {
         Self {
             quantity: words::quantity(quantity),
             here: here.ok(),
-            people,
+            people: figure.people(),
             spread,
             source: format!("{source}{hand}"),
             verdict,

@@ -3,7 +3,7 @@
 use crate::PeopleError;
 use crate::contact::{self, ContactRead};
 use crate::force_path::{ForcePath, steps_mm};
-use crate::press::Press;
+use crate::press::{Cells, Press};
 use crate::receptors::{Felt, Receptors};
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::{Options, Solver, StepReport};
@@ -66,7 +66,7 @@ pub(crate) enum Reads {
 /// How far a press goes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Course {
-    pub density: Density,
+    pub cells: Cells,
     /// Stored states.
     pub depths_mm: Vec<f64>,
     /// It stops at the first state with this force, N.
@@ -76,9 +76,9 @@ pub(crate) struct Course {
 
 impl Course {
     /// Even steps to `limit_mm`, or until a force is met.
-    pub(crate) fn until(until_n: f64, density: Density, reads: Reads, limit_mm: f64) -> Self {
+    pub(crate) fn until(until_n: f64, cells: Cells, reads: Reads, limit_mm: f64) -> Self {
         let count = (limit_mm / STEP_MAX_MM).ceil().max(STATES_MIN);
-        Self { density, depths_mm: steps_mm(limit_mm / count, limit_mm), until_n, reads }
+        Self { cells, depths_mm: steps_mm(limit_mm / count, limit_mm), until_n, reads }
     }
 }
 
@@ -94,7 +94,7 @@ impl Solution {
         course: &Course,
         folder: &Path,
     ) -> Result<Self, PeopleError> {
-        let scene = press.scene(course.density, course.depths_mm.last().copied().unwrap_or(1.0));
+        let scene = press.scene(course.cells, course.depths_mm.last().copied().unwrap_or(1.0));
         let fingerprint = part::fingerprint(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))?;
         let path = folder.join(format!("{}-{}.json", press.name, &fingerprint[..8]));
         let found: Option<Self> = part::read_json(&path)?;
@@ -113,7 +113,7 @@ impl Solution {
         let begun_s = processor::thread_s();
         let finger = FingertipShape::default();
         let touch = press.first_touch(&course.depths_mm)?;
-        let mut body = body(scene, &finger, course.density, &touch).map_err(failed)?;
+        let mut body = body(scene, &finger, course.cells, &touch).map_err(failed)?;
         body.read_at_nodes();
         self.unknowns = body.problem.system.dofs.count;
         let receptors = match course.reads {
@@ -173,20 +173,24 @@ impl Solution {
     }
 }
 
-/// The finger, its cells split for the very depths that are stored.
+/// The finger, its cells, if any are split, for the very depths that are stored.
 fn body(
     scene: &Scene,
     finger: &FingertipShape,
-    density: Density,
+    cells: Cells,
     touch: &Contact,
 ) -> Result<Body, SimulationError> {
     let plan = scene.plan()?;
     let tissues = solids(&scene.materials, &plan)?;
-    Body::fingertip(finger, tissues, density, Order::Graded, plan.parts, Some(touch))
+    let touch = (cells.order == Order::Graded).then_some(touch);
+    Body::fingertip(finger, tissues, cells.density, cells.order, plan.parts, touch)
 }
 
-/// Deepest that a force is looked for, mm.
-const LIMIT_MM: f64 = 4.25;
+/// Deepest that a force is looked for on a split mesh, of which all that may be touched is split, mm.
+const LIMIT_SPLIT_MM: f64 = 4.25;
+/// Deepest on an even one: a finger of Hertz' modulus .2 MPa has 10 N at 4.3 mm, one of .15 MPa at
+/// 5.2 mm.
+const LIMIT_EVEN_MM: f64 = 5.25;
 /// How much deeper than Hertz' guess a press may go at first.
 const BEYOND_GUESS: f64 = 1.25;
 
@@ -195,17 +199,19 @@ const BEYOND_GUESS: f64 = 1.25;
 pub(crate) fn until(
     press: &Press,
     until_n: f64,
+    cells: Cells,
     reads: Reads,
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
-    let mut limit_mm = (BEYOND_GUESS * press.hertz_depth_mm(until_n)?).min(LIMIT_MM);
+    let deepest_mm = if cells.order == Order::Graded { LIMIT_SPLIT_MM } else { LIMIT_EVEN_MM };
+    let mut limit_mm = (BEYOND_GUESS * press.hertz_depth_mm(until_n)?).min(deepest_mm);
     loop {
-        let course = Course::until(until_n, Density::Coarse, reads, limit_mm);
+        let course = Course::until(until_n, cells, reads, limit_mm);
         let found = Solution::found_or_solved(press, &course, folder)?;
-        if found.path.reaches(until_n) || found.ended.is_some() || limit_mm >= LIMIT_MM {
+        if found.path.reaches(until_n) || found.ended.is_some() || limit_mm >= deepest_mm {
             return Ok(found);
         }
-        limit_mm = (2.0 * limit_mm).min(LIMIT_MM);
+        limit_mm = (2.0 * limit_mm).min(deepest_mm);
     }
 }
 
@@ -221,7 +227,8 @@ pub(crate) fn held_at(
     folder: &Path,
 ) -> Result<Solution, PeopleError> {
     let most_n = forces_n.last().copied().unwrap_or(0.0);
-    let way = until(press, WAY_BEYOND * most_n, Reads::Force, folder)?;
+    let coarse = Cells::graded(Density::Coarse);
+    let way = until(press, WAY_BEYOND * most_n, coarse, Reads::Force, folder)?;
     let depth = |&force_n: &f64| {
         way.path.depth_at(force_n).ok_or_else(|| {
             let (reached_n, depth_mm) = way.path.deepest();
@@ -235,7 +242,8 @@ pub(crate) fn held_at(
         })
     };
     let depths_mm = forces_n.iter().map(depth).collect::<Result<_, _>>()?;
-    let course = Course { density, depths_mm, until_n: f64::INFINITY, reads: Reads::Receptors };
+    let cells = Cells::graded(density);
+    let course = Course { cells, depths_mm, until_n: f64::INFINITY, reads: Reads::Receptors };
     let held = Solution::found_or_solved(press, &course, folder)?;
     if held.states.len() == forces_n.len() && held.ended.is_none() {
         return Ok(held);

@@ -6,10 +6,12 @@ use crate::measured::{Figure, Measured, Quantity};
 use crate::mesh_error::mesh_errors;
 use crate::pad;
 pub use crate::press::Materials;
+use crate::press::{Cells, Tissues};
 use crate::report::{Plate, Report, Row};
 use crate::solution::Solution;
-use crate::tap;
+use crate::tap::{self, Tap};
 use papilla_fingertip::mesh::fingertip::Density;
+use papilla_fingertip::scene::TissueTable;
 use papilla_output::atomic;
 use std::path::Path;
 
@@ -68,15 +70,17 @@ pub fn run(
         report.mesh_errors = mesh_errors(&measured.sa1, options.materials, pair, folder, told)?;
     }
     let mut pressed = Vec::new();
+    let (tissues, coarse) = (options.materials.tissues(), Cells::graded(Density::Coarse));
     for &(pitch_deg, until_n) in &plates {
         told(&format!("plate at {pitch_deg} degrees"), done, all);
-        pressed.push((pitch_deg, pad::pressed(pitch_deg, until_n, options.materials, folder)?));
+        pressed
+            .push((pitch_deg, pad::pressed(pitch_deg, until_n, tissues.clone(), coarse, folder)?));
         done += 1;
     }
     for figure in &measured.figures {
         if wanted(part(&figure.quantity)) {
             told(part(&figure.quantity), done, all);
-            report.rows.push(row(figure, &pressed, options)?);
+            report.rows.push(row(figure, &pressed, &tissues, folder)?);
         }
     }
     report.plates = pressed.into_iter().map(|(pitch_deg, s)| Plate::new(pitch_deg, s)).collect();
@@ -104,7 +108,7 @@ fn part(quantity: &Quantity) -> &'static str {
 }
 
 /// Inclinations of the plates that figures ask for, degrees, each with its largest force, N.
-fn plates(measured: &Measured) -> Vec<(f64, f64)> {
+pub(crate) fn plates(measured: &Measured) -> Vec<(f64, f64)> {
     let mut plates: Vec<(f64, f64)> = Vec::new();
     for (pitch_deg, force_n) in measured.figures.iter().filter_map(|f| f.quantity.plate()) {
         match plates.iter_mut().find(|p| p.0.total_cmp(&pitch_deg).is_eq()) {
@@ -116,11 +120,19 @@ fn plates(measured: &Measured) -> Vec<(f64, f64)> {
 }
 
 /// What the finger has of a figure.
-fn row(figure: &Figure, plates: &[(f64, Solution)], options: &Options) -> Result<Row, PeopleError> {
+pub(crate) fn row(
+    figure: &Figure,
+    plates: &[(f64, Solution)],
+    tissues: &Tissues,
+    folder: &Path,
+) -> Result<Row, PeopleError> {
     let here = match figure.quantity {
-        Quantity::RelaxationTime { .. } => Ok(nearest(figure.value.unwrap_or(f64::NAN))),
+        Quantity::RelaxationTime { .. } => {
+            Ok(nearest(figure.value.unwrap_or(f64::NAN), &tissues.table))
+        }
         Quantity::EnergyLost { depth_mm, time_s } => {
-            Ok(tap::energy_lost_percent(options.materials, true, depth_mm, time_s)?)
+            let tap = Tap::found_or_solved(tissues, true, depth_mm, time_s, folder)?;
+            Ok(tap.lost_percent)
         }
         _ => {
             let pitch = figure.quantity.plate().map(|p| p.0);
@@ -137,9 +149,9 @@ fn row(figure: &Figure, plates: &[(f64, Solution)], options: &Options) -> Result
 }
 
 /// The relaxation time of the tissues that is nearest by its ratio, s.
-fn nearest(people_s: f64) -> f64 {
+fn nearest(people_s: f64, table: &TissueTable) -> f64 {
     let apart = |t: &f64| (t / people_s).ln().abs();
-    let times = tap::relaxation_times_s();
+    let times = tap::relaxation_times_s(table);
     times.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(f64::NAN)
 }
 
@@ -154,7 +166,7 @@ mod tests {
 
     #[test]
     fn the_nearest_time_is_nearest_by_ratio() {
-        assert_eq!(nearest(0.004), 0.2136);
-        assert_eq!(nearest(1.4), 4.6731);
+        assert_eq!(nearest(0.004, &TissueTable::default()), 0.2136);
+        assert_eq!(nearest(1.4, &TissueTable::default()), 4.6731);
     }
 }

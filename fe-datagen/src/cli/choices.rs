@@ -42,6 +42,8 @@ choice! {
         NeoHookean,
         /// Ogden's law of Chen, Shuai & Zhu for dermis and fat.
         Ogden,
+        /// The set `people`, fitted to people's fingers.
+        People,
     }
 }
 

@@ -11,6 +11,7 @@ mod effects;
 mod explain;
 mod explain_campaign;
 mod export;
+mod fit;
 mod generate;
 mod human;
 mod influence;
@@ -54,6 +55,7 @@ enum Command {
     Atlas(atlas::Args),
     Convergence(convergence::Args),
     Human(human::Args),
+    Fit(fit::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
@@ -73,6 +75,7 @@ pub fn run() -> ExitCode {
         Command::Atlas(args) => atlas::run(&args),
         Command::Convergence(args) => convergence::run(&args),
         Command::Human(args) => human::run(&args),
+        Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),

@@ -1,31 +1,77 @@
 //! What each tissue may be made of.
 
-use crate::materials::{MaterialError, MaterialSpec, OgdenSpec, PronySpec};
+use crate::materials::{MaterialError, MaterialSpec, Moduli, OgdenSpec, PronySpec};
 use crate::tissue::Tissue;
 use papilla_fem::material::Isochoric as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Constants of every tissue; the design's table where a scene gives none.
+/// Constants of every tissue; those of a named set where a scene gives none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+#[serde(from = "Given")]
 pub struct TissueTable {
-    /// Epidermis: Chen, Shuai & Zhu.
+    /// Epidermis.
     pub epidermis: MaterialSpec,
-    /// Dermis: Maeno 1998; Ogden and Prony from Chen, Shuai & Zhu.
+    /// Dermis.
     pub dermis: MaterialSpec,
-    /// Subcutaneous tissue: Maeno 1998; Ogden and Prony from Chen, Shuai & Zhu.
+    /// Subcutaneous tissue.
     pub subcutaneous: MaterialSpec,
-    /// Nail plate: Chen, Shuai & Zhu.
+    /// Nail plate.
     pub nail: MaterialSpec,
-    /// Bone: Chen, Shuai & Zhu.
+    /// Bone.
     pub bone: MaterialSpec,
 }
 
-impl Default for TissueTable {
-    fn default() -> Self {
-        let elastic = MaterialSpec::elastic;
+/// A set of constants for every tissue, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MaterialSet {
+    /// Maeno 1998 (Young's moduli of dermis and fat); Chen, Shuai & Zhu (everything else, Ogden and
+    /// Prony series too).
+    #[default]
+    Papers,
+    /// Soft tissues fitted to what was measured on people (docs/reports/fit.md), for the effects
+    /// `hyperelastic` and `viscoelastic`.
+    People,
+}
+
+/// What a file says of the tissues.
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+struct Given {
+    /// The set that gives what no table here gives.
+    set: MaterialSet,
+    /// Epidermis.
+    epidermis: Option<MaterialSpec>,
+    /// Dermis.
+    dermis: Option<MaterialSpec>,
+    /// Subcutaneous tissue.
+    subcutaneous: Option<MaterialSpec>,
+    /// Nail plate.
+    nail: Option<MaterialSpec>,
+    /// Bone.
+    bone: Option<MaterialSpec>,
+}
+
+impl From<Given> for TissueTable {
+    fn from(given: Given) -> Self {
+        let set = given.set.table();
         Self {
+            epidermis: given.epidermis.unwrap_or(set.epidermis),
+            dermis: given.dermis.unwrap_or(set.dermis),
+            subcutaneous: given.subcutaneous.unwrap_or(set.subcutaneous),
+            nail: given.nail.unwrap_or(set.nail),
+            bone: given.bone.unwrap_or(set.bone),
+        }
+    }
+}
+
+impl MaterialSet {
+    /// Its constants.
+    #[must_use]
+    pub fn table(self) -> TissueTable {
+        let elastic = MaterialSpec::elastic;
+        let papers = TissueTable {
             epidermis: elastic(0.136, 0.48),
             dermis: MaterialSpec {
                 ogden: Some(OgdenSpec::skin()),
@@ -39,7 +85,35 @@ impl Default for TissueTable {
             },
             nail: elastic(170.0, 0.30),
             bone: elastic(17_000.0, 0.30),
+        };
+        match self {
+            Self::Papers => papers,
+            Self::People => {
+                let [epidermis, dermis, subcutaneous] = people();
+                TissueTable { epidermis, dermis, subcutaneous, ..papers }
+            }
         }
+    }
+}
+
+/// Epidermis, dermis and fat of [`MaterialSet::People`]: what `fe-datagen fit` writes, and the values
+/// that it holds (docs/reports/fit.md).
+fn people() -> [MaterialSpec; 3] {
+    let prony = PronySpec {
+        share: vec![0.8, 0.0667, 0.0667],
+        time_s: vec![0.004, 0.070, 1.4],
+        moduli: Moduli::LongTerm,
+    };
+    let epidermis = MaterialSpec::elastic(0.6, 0.495);
+    let dermis = MaterialSpec::one_term(0.070, 9.0, 0.495);
+    let subcutaneous = MaterialSpec::one_term(0.008, 9.743, 0.495);
+    [epidermis, dermis, subcutaneous]
+        .map(|tissue| MaterialSpec { prony: Some(prony.clone()), ..tissue })
+}
+
+impl Default for TissueTable {
+    fn default() -> Self {
+        MaterialSet::default().table()
     }
 }
 

@@ -20,7 +20,7 @@ pub use census::Census;
 pub use effects::{EffectName, Plan};
 pub use error::SceneError;
 pub use geometry::{Geometry, Layer};
-pub use materials::{TissueError, TissueTable};
+pub use materials::{MaterialSet, TissueError, TissueTable};
 pub use motion::{Motion, PathPoint, Pose};
 pub use origin::{Located, Origin, Place};
 pub use outputs::Output;

@@ -20,6 +20,40 @@ fn a_minimal_scene_takes_the_defaults() {
 }
 
 #[test]
+fn a_set_gives_what_no_table_does() {
+    let people = MaterialSet::People.table();
+    let scene = parse(&format!("{FINGER}[materials]\nset = \"people\"\n")).unwrap();
+    assert_eq!(scene.materials, people);
+    assert_ne!(people, TissueTable::default());
+    let own = "[materials]\nset = \"people\"\n[materials.dermis]\nyoungs_modulus_mpa = 0.1\n\
+               poissons_ratio = 0.4\n";
+    let scene = parse(&format!("{FINGER}{own}")).unwrap();
+    assert_eq!(scene.materials.dermis, crate::materials::MaterialSpec::elastic(0.1, 0.4));
+    assert_eq!(scene.materials.subcutaneous, people.subcutaneous);
+    // What a program writes has the constants, and is read as the same.
+    let written = toml::to_string(&people).unwrap();
+    assert!(!written.contains("set"), "{written}");
+    assert_eq!(toml::from_str::<TissueTable>(&written).unwrap(), people);
+    let unknown = format!("{FINGER}[materials]\nset = \"pigs\"\n");
+    assert_refused(&[(unknown, 8, &["pigs", "papers", "people"])]);
+}
+
+/// Every set makes laws, stable at rest, with and without its effects; the neo-Hookean law of a
+/// tissue has the modulus that its Ogden law has at rest.
+#[test]
+fn the_set_people_makes_laws_of_one_modulus_at_rest() {
+    let table = MaterialSet::People.table();
+    table.validate().unwrap();
+    let plan = |law| Plan { law, ..Plan::usual() };
+    let [neo, ogden] = [effects::Law::NeoHookean, effects::Law::Ogden]
+        .map(|law| crate::simulation::laws::solids(&table, &plan(law)).unwrap());
+    for tissue in crate::tissue::Tissue::ALL {
+        let [a, b] = [&neo, &ogden].map(|m| m[tissue.region()].shear_modulus_mpa());
+        assert!((a / b - 1.0).abs() < 1e-12, "{}: {a} {b}", tissue.name());
+    }
+}
+
+#[test]
 fn outputs_are_what_is_named_or_all_that_the_geometry_has() {
     let of = |text: &str| {
         let scene = parse(text).unwrap();

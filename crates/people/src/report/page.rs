@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 const HEAD: &str = include_str!("head.md");
 
 impl Verdict {
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         match self {
             Self::Ok => "ok".into(),
             Self::Failed => "**failed**".into(),
@@ -19,7 +19,7 @@ impl Verdict {
 }
 
 impl Row {
-    fn here_text(&self) -> String {
+    pub(crate) fn here_text(&self) -> String {
         match self.here {
             None => String::new(),
             Some(v) if v.abs() < 0.1 => format!("{v:.4}"),

@@ -7,7 +7,7 @@ pub(super) const RATES_MEND: &str =
     "another stimulus, deeper and over a disc (table below); a monkey's finger, which is smaller";
 
 /// A quantity with its unit.
-pub(super) fn quantity(quantity: &Quantity) -> String {
+pub(crate) fn quantity(quantity: &Quantity) -> String {
     let plate = |pitch_deg: f64| match pitch_deg {
         0.0 => "flat plate".to_owned(),
         p => format!("plate at {p} degrees"),

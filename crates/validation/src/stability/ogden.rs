@@ -33,6 +33,7 @@ pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     }
     lines.extend(strips()?);
     lines.extend(blocks(suite)?);
+    lines.extend(people(suite)?);
     let unstable = single(&[0.02, -0.021], &[2.0, -8.0]).law().map(drop);
     lines.push(Line::refused(
         "unstable at rest",
@@ -224,6 +225,50 @@ fn blocks(suite: &Suite) -> Result<Vec<Line>, CaseError> {
             }
             Err(error) => return Err(error.into()),
         });
+    }
+    Ok(lines)
+}
+
+/// The set `people`: a block of its fat squeezed to half its height, and the finger under a plate to
+/// 10 N, from below and inclined.
+fn people(suite: &Suite) -> Result<Vec<Line>, CaseError> {
+    let set = "effects = [\"finite_strain\", \"layers\", \"hyperelastic\"]
+        [materials]
+        set = \"people\"";
+    let block = format!(
+        "{set}
+        [geometry]
+        kind = \"block\"
+        size_mm = [6.0, 6.0]
+        elements = [8, 8]
+        layers = [{{ tissue = \"subcutaneous\", thickness_mm = 2.0, elements = 3 }}]
+        [indenter]
+        shape = \"sphere\"
+        radius_mm = 1.5
+        [motion]
+        depth_mm = 1.0
+        increments = 5"
+    );
+    let pressed = press(&scene(&block)?, Options::default())?;
+    let mut lines = vec![pressed.line("block of the fat of `people`, 1 mm", Vec::new())];
+    for pitch in if suite.quick() { &[][..] } else { &[0.0, 30.0][..] } {
+        let finger = format!(
+            "{set}
+            [geometry]
+            kind = \"fingertip\"
+            density = \"coarse\"
+            [indenter]
+            shape = \"plate\"
+            size_mm = [30.0, 30.0]
+            [motion]
+            force_n = 10.0
+            increments = 4
+            pitch_deg = {pitch:?}"
+        );
+        let pressed = press(&scene(&finger)?, Options::default())?;
+        let force =
+            Check::relative("force, N", pressed.force_n(), 10.0, 1e-3, "what was asked for");
+        lines.push(pressed.line(format!("`people`, plate at {pitch} deg to 10 N"), vec![force]));
     }
     Ok(lines)
 }
