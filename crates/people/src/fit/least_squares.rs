@@ -56,6 +56,9 @@ pub(crate) fn cost(residuals: &[f64]) -> f64 {
     0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
 }
 
+/// Weighted differences at a point of the unit box.
+type Residuals<'a, E> = dyn FnMut(&[f64]) -> Result<Vec<f64>, E> + 'a;
+
 /// Minimizes the sum of squares of `residuals` over the unit box, from `start`, with at most `most`
 /// evaluations (and those of the Jacobian that is begun). A residual that is not a number makes a
 /// point one that is not taken.
@@ -65,7 +68,7 @@ pub(crate) fn cost(residuals: &[f64]) -> f64 {
 pub fn search<E>(
     start: &[f64],
     most: usize,
-    residuals: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, E>,
+    residuals: &mut Residuals<'_, E>,
 ) -> Result<Found, E> {
     let mut tried: Vec<Tried> = Vec::new();
     let mut evaluate = |at: &[f64]| {
@@ -134,7 +137,7 @@ pub fn search<E>(
 fn differences<E>(
     at: &[f64],
     here: &[f64],
-    residuals: &mut dyn FnMut(&[f64]) -> Result<Vec<f64>, E>,
+    residuals: &mut Residuals<'_, E>,
 ) -> Result<Vec<Vec<f64>>, E> {
     let mut rows = vec![vec![0.0; at.len()]; here.len()];
     for k in 0..at.len() {
