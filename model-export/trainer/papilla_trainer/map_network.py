@@ -153,12 +153,15 @@ class ServedLevel(nn.Module):
 
     def __init__(self, level: Level) -> None:
         super().__init__()
-        self.weights = BlockWeights(*(weight.detach().clone() for weight in level.on_blocks()))
+        # Parameters stay small constants of the graph; plain tensors would become whole maps.
+        fixed = (nn.Parameter(weight.detach().clone()) for weight in level.on_blocks())
+        self.near, self.above, self.over_finger = fixed
         self.register_buffer("place", level.place, persistent=False)
 
     def forward(self, blocks: Tensor, above: Tensor) -> Tensor:
         """As :class:`Level`."""
-        return _level(blocks, above, self.weights, self.place)
+        weights = BlockWeights(self.near, self.above, self.over_finger)
+        return _level(blocks, above, weights, self.place)
 
 
 class Correction(nn.Module):

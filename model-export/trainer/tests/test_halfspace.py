@@ -78,7 +78,9 @@ def test_untrained_models_from_the_command_line(
     shape = ["--rank", "8", "--near", "5", "--json"]
     assert main(["half-space", "--dataset", data, "--onnx", half_space, *shape]) == 0
     ours = json.loads(capsys.readouterr().out)["metrics"]
-    assert main(["operator", str(operator_file), "--dataset", data, "--onnx", operator, *shape]) == 0
+    assert (
+        main(["operator", str(operator_file), "--dataset", data, "--onnx", operator, *shape]) == 0
+    )
     assert json.loads(capsys.readouterr().out)["metrics"] != ours
     for model in (half_space, operator):
         assert main(["check", model, "--dataset", data, "--json"]) == 0

@@ -65,11 +65,7 @@ type Residuals<'a, E> = dyn FnMut(&[f64]) -> Result<Vec<f64>, E> + 'a;
 ///
 /// # Errors
 /// What `residuals` returns.
-pub fn search<E>(
-    start: &[f64],
-    most: usize,
-    residuals: &mut Residuals<'_, E>,
-) -> Result<Found, E> {
+pub fn search<E>(start: &[f64], most: usize, residuals: &mut Residuals<'_, E>) -> Result<Found, E> {
     let mut tried: Vec<Tried> = Vec::new();
     let mut evaluate = |at: &[f64]| {
         let found = residuals(at)?;
