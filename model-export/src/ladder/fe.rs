@@ -3,7 +3,7 @@
 //! `fe-datagen generate CAMPAIGN --mesh NAME` makes the dataset of each. A state is the same if
 //! indentation and depth are; the reference's SED is the truth, pixel by pixel.
 
-use super::model::draw;
+use super::sets::draw;
 use super::{Canvas, SampleSet};
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, summarise};

@@ -1,7 +1,7 @@
 //! Floors: one map for every pressure. A model that is no better has learnt nothing of it.
 
-use super::model::draw;
 use super::sets::TRAINING;
+use super::sets::draw;
 use super::{Canvas, SampleSet};
 use crate::ExportError;
 use crate::metrics::{SampleMetrics, summarise};

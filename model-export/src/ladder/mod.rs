@@ -131,7 +131,7 @@ pub fn measure(
     let samples: usize = sets.iter().map(|set| set.states.len()).sum();
     progress.total((index.models.len() * samples) as u64);
     let reference = sets.iter().find(|set| set.name == "reference" && !set.states.is_empty());
-    let mut pairs = readings::Pairs::read(&task.fe, reference, &canvas)?;
+    let mut pairs = readings::Pairs::read(fe::NEXT_FINEST, &task.fe, reference, &canvas)?;
     let mut models = Vec::with_capacity(index.models.len());
     for name in &index.models {
         progress.stage(name);

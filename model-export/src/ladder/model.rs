@@ -1,13 +1,13 @@
 //! A servable rung: errors, refusals, times and footprint of one model.
 
 use super::readings::Pairs;
+use super::sets::draw;
 use super::{Canvas, Progress, SampleSet, Timing};
 use crate::evaluate::require_same_atlas;
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::{ExportError, read, read_text};
 use papilla_engine::ladder::{Kind, LatencyByEngine, Percentiles, Rung};
 use papilla_engine::{Backend, Card, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session};
-use papilla_proto::atlas::Raster;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -159,14 +159,6 @@ fn hostile_maps(most_pa: f32) -> Vec<Vec<f32>> {
         map(&|_| 1e-3),
         map(&|_| 1e-30),
     ]
-}
-
-/// Draws a patch's values: overwrites the map, 0 outside the patch.
-pub(super) fn draw(raster: &Raster, values: &[f32], map: &mut [f32]) {
-    map.fill(0.0);
-    for (&pixel, value) in raster.indices().iter().zip(values) {
-        map[pixel as usize] = *value;
-    }
 }
 
 /// Maps for the clock: of the first set there is, or else hostile ones.

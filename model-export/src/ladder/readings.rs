@@ -4,8 +4,7 @@
 //! against the next finest mesh's, as read and averaged over a tenth of a millimetre, and each
 //! model's answers to the two against each other.
 
-use super::fe::NEXT_FINEST;
-use super::model::draw;
+use super::sets::draw;
 use super::{Canvas, SampleSet};
 use crate::ExportError;
 use crate::dataset::Dataset;
@@ -23,22 +22,24 @@ const BLUR_REACH_PX: usize = 2;
 
 /// The same states on the reference and on the next finest mesh.
 pub(super) struct Pairs {
+    mesh: &'static str,
     maps_pa: Vec<[Vec<f32>; 2]>,
     answers: BTreeMap<String, Vec<f64>>,
 }
 
 impl Pairs {
-    /// Pairs of the reference's states; none if no folder has the next finest mesh.
+    /// Pairs of the reference's states and those on `mesh`; none if no folder has that mesh.
     pub(super) fn read(
+        mesh: &'static str,
         folders: &[PathBuf],
         reference: Option<&SampleSet>,
         canvas: &Canvas,
     ) -> Result<Self, ExportError> {
-        let mut pairs = Self { maps_pa: Vec::new(), answers: BTreeMap::new() };
+        let mut pairs = Self { mesh, maps_pa: Vec::new(), answers: BTreeMap::new() };
         let Some(reference) = reference else { return Ok(pairs) };
         for folder in folders {
             let dataset = Dataset::open(folder)?;
-            if format!("fe-{}", dataset.mesh()) != NEXT_FINEST {
+            if format!("fe-{}", dataset.mesh()) != mesh {
                 continue;
             }
             let solved = SampleSet::of(folder, &dataset, canvas)?;
@@ -81,7 +82,7 @@ impl Pairs {
         };
         let answers = self.answers.iter().filter_map(|(name, v)| Some((name.clone(), spread(v)?)));
         Some(Readings {
-            mesh: NEXT_FINEST.to_owned(),
+            mesh: self.mesh.to_owned(),
             states: self.maps_pa.len(),
             pressure: over_pairs(&<[f32]>::to_vec)?,
             averaged: over_pairs(&averaged)?,

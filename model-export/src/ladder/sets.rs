@@ -5,7 +5,7 @@ use crate::ExportError;
 use crate::dataset::{Dataset, Indentation};
 use crate::evaluate::require_same_atlas;
 use papilla_engine::{MAP_LEN, ladder::Set};
-use papilla_proto::atlas::Patch;
+use papilla_proto::atlas::{Patch, Raster};
 use std::path::Path;
 
 /// The set `deep` takes the states pressed deeper than this, mm: beyond all training.
@@ -36,6 +36,14 @@ impl State {
     /// What is wrong with a truth that is zero everywhere.
     pub(super) fn without_sed(&self, sample: usize) -> ExportError {
         ExportError::Truth { path: (&self.origin).into(), sample, reason: "it is zero" }
+    }
+}
+
+/// Draws a patch's values: overwrites the map, 0 outside the patch.
+pub(super) fn draw(raster: &Raster, values: &[f32], map: &mut [f32]) {
+    map.fill(0.0);
+    for (&pixel, value) in raster.indices().iter().zip(values) {
+        map[pixel as usize] = *value;
     }
 }
 
