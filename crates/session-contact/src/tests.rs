@@ -81,6 +81,16 @@ fn pose(depth_mm: f32) -> [u8; POSE_LEN] {
     Pose { origin_mm: [0.0, 0.0, depth_mm - 20.0], ..Pose::default() }.encode()
 }
 
+/// Gives what a hand's first finger remembers to another's.
+fn carry(from: &Hand, to: &Hand) {
+    let mut state = Writer::default();
+    from.fingers()[0].lock().expect("no panic").save(&mut state);
+    let state = state.finish();
+    let mut reader = Reader::new(&state);
+    to.fingers()[0].lock().expect("no panic").restore(&mut reader).expect("its state");
+    reader.end().expect("nothing more");
+}
+
 fn touch(hand: &Hand, finger: usize, payload: &[u8]) -> Result<(Touch, Taken), Problem> {
     let mut finger = hand.fingers()[finger].lock().expect("no panic");
     let mut map_pa = vec![0.0; MAP_LEN];
@@ -133,12 +143,7 @@ fn on_pixels_a_dot_between_vertices_presses_and_a_finger_goes_on_elsewhere() {
     assert!(taken.flags == 0 && felt.pressure_max_pa > 0.0, "{taken:?}");
 
     let other = plane.hand(&hello).expect("a hand");
-    let mut state = Writer::default();
-    hand.fingers()[0].lock().expect("no panic").save(&mut state);
-    let state = state.finish();
-    let mut reader = Reader::new(&state);
-    other.fingers()[0].lock().expect("no panic").restore(&mut reader).expect("its state");
-    reader.end().expect("nothing more");
+    carry(&hand, &other);
     let [here, there] = [&hand, &other].map(|hand| {
         let (touch, taken) = touch(hand, 0, &dot(0.051)).expect("an answer");
         (Touch { solve_us: 0.0, ..touch }, taken)
@@ -198,12 +203,7 @@ fn a_rough_ball_pulls_and_goes_on_elsewhere() {
     let (pressed, _) = touch(&hand, 0, &aside(0.0)).expect("an answer");
     assert!(pressed.force_n[1].abs() < 1e-3 * pressed.force_n[2], "{pressed:?}");
     let other = plane.hand(&rough(0.5)).expect("a hand");
-    let mut state = Writer::default();
-    hand.fingers()[0].lock().expect("no panic").save(&mut state);
-    let state = state.finish();
-    let mut reader = Reader::new(&state);
-    other.fingers()[0].lock().expect("no panic").restore(&mut reader).expect("its state");
-    reader.end().expect("nothing more");
+    carry(&hand, &other);
     let mut answers = [&hand, &other].map(|hand| {
         let mut finger = hand.fingers()[0].lock().expect("no panic");
         finger.take(&aside(0.4), SampleType::F32, 1.0, None).expect("an answer");

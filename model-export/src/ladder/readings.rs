@@ -8,8 +8,7 @@ use super::sets::draw;
 use super::{Canvas, SampleSet};
 use crate::ExportError;
 use crate::dataset::Dataset;
-use crate::metrics::quantile;
-use papilla_engine::card::Spread;
+use crate::metrics::{relative_l2, spread};
 use papilla_engine::ladder::Readings;
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
 use std::collections::BTreeMap;
@@ -89,18 +88,6 @@ impl Pairs {
             answers: answers.collect(),
         })
     }
-}
-
-fn spread(values: &[f64]) -> Option<Spread> {
-    Some(Spread { median: quantile(values, 0.5)?, p95: quantile(values, 0.95)? })
-}
-
-/// `|a - b| / |b|`; none where b is zero.
-fn relative_l2(a: &[f32], b: &[f32]) -> Option<f64> {
-    let square = |v: f32| f64::from(v) * f64::from(v);
-    let apart: f64 = a.iter().zip(b).map(|(a, b)| square(a - b)).sum();
-    let size: f64 = b.iter().map(|b| square(*b)).sum();
-    (size > 0.0).then(|| (apart / size).sqrt())
 }
 
 /// A map under a Gaussian of [`BLUR_PX`], row by row, then column by column.

@@ -153,6 +153,15 @@ impl Sums {
     }
 }
 
+/// `|predicted - truth| / |truth|` over all values; none where the truth is zero.
+pub(crate) fn relative_l2(predicted: &[f32], truth: &[f32]) -> Option<f64> {
+    let mut all = Sums::default();
+    for (p, t) in predicted.iter().zip(truth) {
+        all.add(*p, *t);
+    }
+    all.relative_l2()
+}
+
 /// Quantile of `values` at `q` in 0..=1, interpolated linearly between the two nearest
 /// order statistics (numpy's default). None if there are no values.
 #[must_use]
@@ -188,7 +197,8 @@ pub fn summarise(split: &str, samples: &[SampleMetrics]) -> Option<Metrics> {
     })
 }
 
-fn spread(values: &[f64]) -> Option<Spread> {
+/// Median and 95th percentile; none if there are no values.
+pub(crate) fn spread(values: &[f64]) -> Option<Spread> {
     Some(Spread { median: quantile(values, 0.5)?, p95: quantile(values, 0.95)? })
 }
 
