@@ -11,7 +11,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from papilla_trainer.augment import mirrored, varied
+from papilla_trainer.augment import mirrored, reach_px, varied
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
@@ -111,8 +111,23 @@ def test_the_finest_level_is_the_same_about_every_pixel_of_a_block() -> None:
         assert torch.allclose(sed, first.roll(step, (1, 2)), rtol=1e-4, atol=1e-6 * first.max())
 
 
+def spots(width_px: int, count: int) -> torch.Tensor:
+    maps = torch.zeros(count, 1, 224, 224)
+    maps[..., 100 : 100 + width_px, 90 : 90 + width_px] = 1e4 * torch.rand(count, 1, 1, 1)
+    return maps
+
+
+def test_wide_contacts_are_moved_by_less() -> None:
+    reaches = [reach_px(spots(width, 2), 3).tolist() for width in (1, 15, 30, 60, 120)]
+    assert reaches == [[3, 3], [3, 3], [2, 2], [1, 1], [0, 0]]
+    assert reach_px(torch.zeros(1, 1, 224, 224), 3).tolist() == [3]
+    wide = spots(120, 4)
+    straight, _ = varied(wide, wide, 0, torch.Generator())
+    assert torch.equal(varied(wide, wide, 3, torch.Generator())[0], straight)
+
+
 def test_samples_are_moved_with_their_sed() -> None:
-    maps = torch.rand(5, 1, 224, 224)
+    maps = spots(9, 5) * torch.rand(5, 1, 224, 224)
     straight, _ = varied(maps, maps, 0, torch.Generator().manual_seed(1))
     assert torch.equal(straight, torch.cat([maps[::2], mirrored(maps[1::2])]))
     pressure, sed = varied(maps, 2.0 * maps, 3, torch.Generator().manual_seed(1))
