@@ -1,5 +1,6 @@
 //! `fe-datagen` command line.
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 use tracing_subscriber::Layer as _;
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -17,7 +18,10 @@ fn main() -> ExitCode {
         },
         Err(_) => Targets::new().with_default(LevelFilter::ERROR),
     };
-    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter);
+    let log = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_filter(filter);
     tracing_subscriber::registry().with(log).init();
     papilla_fe_datagen::cli::run()
 }

@@ -31,11 +31,12 @@ fn a_solve_that_is_given_up_tells_its_story_and_leaves_its_last_state() {
     let found = Command::new(env!("CARGO_BIN_EXE_fe-datagen"))
         .args(["solve".as_ref(), scene.as_os_str(), "--out".as_ref(), out.as_os_str()])
         .env("RUST_LOG", "papilla=debug")
-        .env("NO_COLOR", "1")
+        .env_remove("NO_COLOR")
         .output()
         .unwrap();
     let text = String::from_utf8_lossy(&found.stderr);
     assert_eq!(found.status.code(), Some(1), "{text}");
+    assert!(!text.contains('\u{1b}'), "a redirected log has no colours:\n{text}");
     for event in ["load step cut", "solve given up", "no equilibrium beyond load fraction"] {
         assert!(text.contains(event), "'{event}' is missing:\n{text}");
     }
