@@ -127,13 +127,16 @@ pub(super) fn write_equations(followers: &Followers, out: &mut String) {
 mod tests {
     use super::super::cross_check::graded_block;
     use super::*;
+    use crate::calculix::{Deck, StepControl};
+    use papilla_fem::mesh::Block;
     use papilla_fingertip::scene::Scene;
     use papilla_fingertip::simulation::Simulation;
+    use papilla_fingertip::tissue::Tissue;
 
     fn used(mesh: &Mesh) -> Vec<u32> {
-        let blocks = mesh.blocks.iter();
+        let block = &mesh.blocks[0];
         let mut used: Vec<u32> =
-            blocks.flat_map(|b| (0..b.len()).flat_map(|e| b.element(e)[..20].to_vec())).collect();
+            (0..block.len()).flat_map(|e| block.element(e)[..20].to_vec()).collect();
         used.sort_unstable();
         used.dedup();
         used
@@ -207,6 +210,29 @@ mod tests {
             let (found, at) = (position_mm(&mesh, terms), mesh.nodes[*node as usize]);
             assert!((0..3).all(|i| (found[i] - at[i]).abs() < 1e-12), "{found:?} {at:?}");
         }
+    }
+
+    #[test]
+    fn what_a_deck_cannot_hold_is_refused() {
+        let mut mesh = graded_block();
+        let types = ElementTypes::default();
+        let node = *followers(&mesh, types, &used(&mesh)).unwrap().keys().next().unwrap();
+        let deck = Deck {
+            title: "",
+            mesh: &mesh,
+            materials: &[const { None }; Tissue::ALL.len()],
+            fixed: &vec![false; 3 * mesh.nodes.len()],
+            prescribed_mm: &[(3 * node as usize + 1, 0.1)],
+            press: None,
+            types,
+            step: StepControl::default(),
+        };
+        let refused = Err(ExportError::HangingPrescribed { node: node as usize + 1 });
+        assert_eq!(deck.to_text(), refused);
+        let (kind, region) = (ElementKind::Hex8, mesh.blocks[0].region[..1].to_vec());
+        mesh.blocks.push(Block { kind, connectivity: (0..8).collect(), region });
+        let refused = Err(ExportError::Hanging { element: "C3D8" });
+        assert_eq!(followers(&mesh, types, &used(&mesh)), refused);
     }
 
     #[test]

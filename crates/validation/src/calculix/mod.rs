@@ -10,6 +10,7 @@ mod dat;
 mod deck;
 mod elements;
 mod hanging;
+mod lines;
 mod material;
 mod rigid;
 mod run;

@@ -10,9 +10,9 @@ mod section;
 mod sphere;
 
 use super::Ccx;
+use crate::verify::{CaseError, Check, Report, Row};
 #[cfg(test)]
 pub(super) use patch::graded_block;
-use crate::verify::{CaseError, Check, Report, Row};
 use std::path::Path;
 
 /// Where the references come from.
@@ -78,12 +78,12 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "finger-ball",
-        shows: "The ball on the mesh that datasets are made with; an hour.",
+        shows: "The ball on the finger that datasets are made with, medium.",
         run: finger::ball,
     },
     Case {
         name: "finger-bar",
-        shows: "The bar on the mesh that datasets are made with; an hour.",
+        shows: "The bar on the finger that datasets are made with, medium: an hour.",
         run: finger::bar,
     },
 ];
