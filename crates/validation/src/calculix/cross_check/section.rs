@@ -4,7 +4,7 @@
 //! their layers to each other, so that its unknowns are as many as ours. A slab of
 //! bricks in the deck would have three times as many.
 
-use super::indentation::{Pressing, Tolerance};
+use super::indentation::{CPU_SHARE, Pressing, Tolerance};
 use super::ours::Cards;
 use super::{Check, Context};
 use crate::calculix::{
@@ -74,6 +74,7 @@ fn pressing<'a>(
         steps: 1,
         first: StepControl::default().first,
         tolerance: TOLERANCE,
+        cpu_share: CPU_SHARE,
     })
 }
 

@@ -1,6 +1,6 @@
 //! Two layers under a rigid sphere: contact, and SED where the layers meet.
 
-use super::indentation::{Pressing, Tolerance};
+use super::indentation::{CPU_SHARE, Pressing, Tolerance};
 use super::ours::Cards;
 use super::{Check, Context};
 use crate::calculix::{
@@ -128,6 +128,7 @@ fn pressing<'a>(pair: &Pair, per_mm: f64, tolerance: Tolerance) -> Pressing<'a> 
         steps: 1,
         first: StepControl::default().first,
         tolerance,
+        cpu_share: CPU_SHARE,
     }
 }
 
