@@ -1,6 +1,8 @@
 //! The input deck: mesh, materials, supports, rigid indenter, contact, one step.
 
 use super::elements::{element_faces, takes_node_contact};
+use super::hanging::{Followers, followers, position_mm, write_equations};
+use super::lines::{write_element, write_node, write_set};
 use super::rigid::RigidMesh;
 use super::{ElementTypes, ExportError, MaterialCard, RigidIndenter, number};
 use papilla_fem::mesh::Mesh;
@@ -86,16 +88,23 @@ impl Deck<'_> {
         if !self.is_nonlinear() && uses("CPE8R") {
             return Err(ExportError::ZeroEnergy);
         }
-        self.body(&mut out);
+        let nodes = self.nodes();
+        let followers = followers(self.mesh, self.types, &nodes)?;
+        let follows = |dof: &usize| followers.contains_key(&((dof / 3) as u32));
+        if let Some(dof) = self.prescribed_mm.iter().map(|(dof, _)| *dof).find(follows) {
+            return Err(ExportError::HangingPrescribed { node: dof / 3 + 1 });
+        }
+        self.body(&nodes, &followers, &mut out);
+        write_equations(&followers, &mut out);
         self.sections(&mut out)?;
-        self.supports(&mut out);
+        self.supports(&nodes, &followers, &mut out);
         let rigid = self.press.as_ref().map(|p| p.indenter.mesh()).transpose()?;
         if let (Some(press), Some(rigid)) = (&self.press, &rigid) {
             self.indenter(rigid, &mut out);
             self.contact(press, &mut out)?;
         }
         self.amplitudes(&mut out);
-        self.step(&mut out);
+        self.step(&nodes, &mut out);
         Ok(out)
     }
 
@@ -115,10 +124,14 @@ impl Deck<'_> {
         (0..used.len() as u32).filter(|&n| used[n as usize]).collect()
     }
 
-    fn body(&self, out: &mut String) {
+    fn body(&self, nodes: &[u32], followers: &Followers, out: &mut String) {
         let _ = writeln!(out, "*NODE, NSET={BODY}");
-        for n in self.nodes() {
-            write_node(out, n as usize + 1, self.mesh.nodes[n as usize]);
+        for n in nodes {
+            let at = match followers.get(n) {
+                Some(terms) => position_mm(self.mesh, terms),
+                None => self.mesh.nodes[*n as usize],
+            };
+            write_node(out, *n as usize + 1, at);
         }
         let mut number = 0;
         for block in &self.mesh.blocks {
@@ -166,12 +179,13 @@ impl Deck<'_> {
         Ok(())
     }
 
-    fn supports(&self, out: &mut String) {
+    /// What is held. A node that follows others does so there too, as in our solver.
+    fn supports(&self, nodes: &[u32], followers: &Followers, out: &mut String) {
         let mut held = Vec::new();
         let mut boundary = String::new();
         // Plane strain holds the third one itself.
         let components = if self.mesh.is_planar() { 2 } else { 3 };
-        for n in self.nodes() {
+        for &n in nodes.iter().filter(|n| !followers.contains_key(n)) {
             let dofs = &self.fixed[3 * n as usize..3 * n as usize + components];
             for (i, _) in dofs.iter().enumerate().filter(|(_, fixed)| **fixed) {
                 let _ = writeln!(boundary, "{},{},{}", n + 1, i + 1, i + 1);
@@ -260,7 +274,7 @@ impl Deck<'_> {
         }
     }
 
-    fn step(&self, out: &mut String) {
+    fn step(&self, nodes: &[u32], out: &mut String) {
         let StepControl { first, largest, outputs, residual_tolerance } = &self.step;
         let when = if outputs.is_empty() {
             "FREQUENCY=1000000"
@@ -279,7 +293,7 @@ impl Deck<'_> {
             number(*largest),
             number(*residual_tolerance)
         );
-        self.motion(out);
+        self.motion(nodes, out);
         let _ = write!(out, "*NODE PRINT, NSET={BODY}, {when}\nU\n");
         if self.fixed.contains(&true) {
             let _ = write!(out, "*NODE PRINT, NSET={HELD}, TOTALS=YES, {when}\nRF\n");
@@ -299,13 +313,14 @@ impl Deck<'_> {
             .any(MaterialCard::is_hyperelastic)
     }
 
-    /// Everything that moves as prescribed.
-    fn motion(&self, out: &mut String) {
+    /// Everything that moves as prescribed, of `nodes`, which the deck has.
+    fn motion(&self, nodes: &[u32], out: &mut String) {
         if self.prescribed_mm.is_empty() && self.press.is_none() {
             return;
         }
         out.push_str("*BOUNDARY\n");
-        for &(dof, value) in self.prescribed_mm {
+        let has = |dof: usize| nodes.binary_search(&((dof / 3) as u32)).is_ok();
+        for &(dof, value) in self.prescribed_mm.iter().filter(|(dof, _)| has(*dof)) {
             let _ = writeln!(out, "{},{2},{2},{1}", dof / 3 + 1, number(value), dof % 3 + 1);
         }
         let Some(press) = &self.press else { return };
@@ -323,34 +338,4 @@ impl Deck<'_> {
 
 fn set_of(tissue: Tissue) -> String {
     format!("E{}", tissue.name().to_uppercase())
-}
-
-fn write_node(out: &mut String, id: usize, p: [f64; 3]) {
-    let _ = writeln!(out, "{id},{},{},{}", number(p[0]), number(p[1]), number(p[2]));
-}
-
-/// An element line holds at most 16 numbers and goes on after a comma.
-fn write_element(out: &mut String, id: usize, nodes: impl Iterator<Item = usize>) {
-    let mut line: Vec<usize> = vec![id];
-    line.extend(nodes);
-    write_lines(out, &line, 16);
-}
-
-fn write_set(out: &mut String, name: &str, nodes: &[usize]) {
-    let _ = writeln!(out, "*NSET, NSET={name}");
-    for line in nodes.chunks(16) {
-        write_lines(out, line, 16);
-    }
-}
-
-fn write_lines(out: &mut String, numbers: &[usize], per_line: usize) {
-    for (i, n) in numbers.iter().enumerate() {
-        let end = i + 1 == numbers.len();
-        let separator = match (end, (i + 1) % per_line == 0) {
-            (true, _) => "\n",
-            (false, true) => ",\n",
-            (false, false) => ",",
-        };
-        let _ = write!(out, "{n}{separator}");
-    }
 }

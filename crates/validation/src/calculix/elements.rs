@@ -1,6 +1,6 @@
 //! CalculiX' element types against ours: names, node order, faces, printed points.
 
-use papilla_fem::element::ElementKind;
+use papilla_fem::element::{ElementKind, extrapolate};
 use papilla_fem::mesh::{FaceKind, Mesh, Surface};
 use std::collections::HashMap;
 
@@ -90,6 +90,13 @@ impl ElementTypes {
 }
 
 impl CcxElement {
+    /// Weights of the values at [`Self::points`] that give the value at `xi`: the polynomial
+    /// through them.
+    #[must_use]
+    pub fn extrapolation(self, xi: [f64; 3]) -> Vec<f64> {
+        self.points_of.map_or_else(|| vec![1.0], |kind| extrapolate::weights(kind, xi))
+    }
+
     /// Reference coordinates of the points at which `*EL PRINT` gives values.
     #[must_use]
     pub fn points(self) -> Vec<[f64; 3]> {

@@ -9,6 +9,8 @@ pub mod cross_check;
 mod dat;
 mod deck;
 mod elements;
+mod hanging;
+mod lines;
 mod material;
 mod rigid;
 mod run;
@@ -83,6 +85,27 @@ pub enum ExportError {
         name: String,
         /// Names that exist.
         known: String,
+    },
+    /// Nodes hang beside elements whose faces have other functions than those that they follow.
+    #[error(
+        "the mesh has nodes that hang, which a deck holds between C3D20 or C3D20R alone, and \
+         elements of {element}"
+    )]
+    Hanging {
+        /// CalculiX' type.
+        element: &'static str,
+    },
+    /// Nodes that follow each other in a circle.
+    #[error("node {node} follows nodes that follow it")]
+    HangingCircle {
+        /// Its number in the deck.
+        node: usize,
+    },
+    /// A node cannot follow others and be where it is told.
+    #[error("node {node} follows others, so its displacement cannot be prescribed")]
+    HangingPrescribed {
+        /// Its number in the deck.
+        node: usize,
     },
     /// A face of the contact surface is no face of an element.
     #[error("the face with nodes {nodes:?} of surface '{name}' belongs to no element")]

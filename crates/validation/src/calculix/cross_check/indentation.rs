@@ -1,11 +1,13 @@
 //! One body pressed in both codes.
 
+use super::limit::{LimitFace, limit_faces};
 use super::ours::{Cards, laws, sed_mpa};
 use super::{Check, Context, SOURCE};
 use crate::calculix::deck::{BODY, ELEMENTS, INDENTER};
 use crate::calculix::{Deck, ElementTypes, Indentation, Quantity, RigidIndenter, StepControl};
 use crate::processor;
 use crate::verify::CaseError;
+use papilla_fem::contact::ContactRule;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 use papilla_fingertip::simulation::record::relative_l2;
@@ -27,12 +29,18 @@ pub(super) struct Pressing<'a> {
     /// The indenter for CalculiX; its shape for our solver.
     pub indenter: RigidIndenter,
     pub shape: Arc<dyn SignedDistance>,
+    /// Where our solver's contact acts.
+    pub rule: ContactRule,
     pub types: ElementTypes,
     /// SED is compared in the elements of the first tissue beside the second.
     pub interface: [Tissue; 2],
     /// Equal steps that our solver is led through; it takes more where it must.
     pub steps: u32,
+    /// CalculiX' first increment.
+    pub first: f64,
     pub tolerance: Tolerance,
+    /// Most of CalculiX' CPU time that ours may take.
+    pub cpu_share: f64,
 }
 
 /// Largest relative differences.
@@ -43,10 +51,12 @@ pub(super) struct Tolerance {
     pub displacement: f64,
     /// Peak, and norm over all points beside the interface.
     pub sed: f64,
+    /// Peak and norm, by area, of SED's limit at the interface; `None`: not compared.
+    pub limit: Option<f64>,
 }
 
-/// Most of CalculiX' CPU time that an indentation may take.
-const CPU_SHARE: f64 = 0.1;
+/// Most of CalculiX' CPU time that an indentation on equal unknowns may take.
+pub(super) const CPU_SHARE: f64 = 0.1;
 
 /// What a code found.
 struct Answer {
@@ -72,7 +82,11 @@ impl Pressing<'_> {
     fn compare(self, context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
         let theirs = self.calculix(context)?;
         let beside = beside(&self.mesh, self.interface);
-        let (name, tolerance) = (self.name, self.tolerance);
+        let faces = match self.tolerance.limit {
+            Some(_) => limit_faces(&self.mesh, self.types, self.interface),
+            None => Vec::new(),
+        };
+        let (name, tolerance, cpu_share) = (self.name, self.tolerance, self.cpu_share);
         let [side, _] = self.interface.map(Tissue::name);
         let ours = self.solver()?;
         let row = |what: &str| format!("{name}: {what}");
@@ -100,9 +114,12 @@ impl Pressing<'_> {
                 SOURCE,
             ),
         ];
+        if let Some(limit) = tolerance.limit {
+            rows.extend(limit_rows(name, side, &faces, [&ours, &theirs], limit));
+        }
         if let (Some(a), Some(b), false) = (ours.cpu_s, theirs.cpu_s, context.quick) {
             let quantity = row(&format!("CPU s, {a:.2} over {b:.1}"));
-            rows.push(Check::within(quantity, a / b, [0.0, CPU_SHARE], SOURCE));
+            rows.push(Check::within(quantity, a / b, [0.0, cpu_share], SOURCE));
         }
         Ok(rows)
     }
@@ -120,7 +137,7 @@ impl Pressing<'_> {
                 stiffness_mpa_per_mm: None,
             }),
             types: self.types,
-            step: StepControl::default(),
+            step: StepControl { first: self.first, ..StepControl::default() },
         };
         let run = context.ccx.run(context.folder, self.job, &deck.to_text()?)?;
         let total = &run.dat.table(Quantity::TotalForce, INDENTER, 1.0)?.rows;
@@ -152,7 +169,8 @@ impl Pressing<'_> {
         let begun_s = processor::thread_s();
         let problem = Problem::new(self.mesh, laws(&self.cards)?, self.fixed, Some(self.contact))?;
         let RigidIndenter { start, path, .. } = self.indenter;
-        let indenter = MovingIndenter::along(self.shape, start, path);
+        let along_path = MovingIndenter::along(self.shape, start, path);
+        let indenter = MovingIndenter { contact: self.rule, ..along_path };
         let mut solver = Solver::new(&problem, Options::default())?;
         solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
         for step in 1..=self.steps {
@@ -173,6 +191,37 @@ impl Pressing<'_> {
         }
         Ok(Answer { force_n, displacement_mm, sed_mpa, cpu_s })
     }
+}
+
+/// Rows of SED's limit at the interface, from what both codes have at the same points.
+fn limit_rows(
+    name: &str,
+    side: &str,
+    faces: &[LimitFace],
+    answers: [&Answer; 2],
+    tolerance: f64,
+) -> [Check; 2] {
+    // Norms weigh with the area, peaks do not.
+    let [(ours, ours_by_area), (theirs, theirs_by_area)] = answers.map(|a| {
+        let at = |f: &LimitFace| {
+            let root = f.point_mm2.sqrt();
+            f.values(&a.sed_mpa[f.element]).into_iter().map(move |v| (v, v * root))
+        };
+        faces.iter().flat_map(at).unzip::<f64, f64, Vec<_>, Vec<_>>()
+    });
+    let peak = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
+    let row = |what: &str| format!("{name}: {what} SED of {side} at the interface");
+    let norm = relative_l2(&ours_by_area, &theirs_by_area);
+    [
+        Check::relative(
+            format!("{}, MPa", row("peak of the limit of")),
+            peak(&ours),
+            peak(&theirs),
+            tolerance,
+            SOURCE,
+        ),
+        Check::vanishes(format!("{}, L2", row("limit of")), norm, tolerance, SOURCE),
+    ]
 }
 
 /// Elements of the first tissue that share a node with the second.

@@ -2,13 +2,17 @@
 
 mod finger;
 mod indentation;
+mod limit;
 mod one_element;
 mod ours;
+mod patch;
 mod section;
 mod sphere;
 
 use super::Ccx;
 use crate::verify::{CaseError, Check, Report, Row};
+#[cfg(test)]
+pub(super) use patch::graded_block;
 use std::path::Path;
 
 /// Where the references come from.
@@ -41,6 +45,12 @@ pub const CASES: &[Case] = &[
         run: one_element::run,
     },
     Case {
+        name: "patch",
+        shows: "Even strain of a block whose cells are halved: nodes that hang follow exactly in \
+                both codes.",
+        run: patch::run,
+    },
+    Case {
         name: "sphere",
         shows: "A block of two layers under a rigid sphere: contact, force, displacement, and SED \
                 where the layers meet.",
@@ -54,7 +64,28 @@ pub const CASES: &[Case] = &[
     Case {
         name: "finger",
         shows: "The fingertip under a tilted plate, from a scene.",
-        run: finger::run,
+        run: finger::plate,
+    },
+    Case {
+        name: "finger-ball-compressible",
+        shows: "The finger with cells halved where a ball of 6 mm touches, coarse, nu = 0.3: \
+                without the elements' treatment of volume both codes agree.",
+        run: finger::ball_compressible,
+    },
+    Case {
+        name: "finger-ball-coarse",
+        shows: "The same as it is, nu = 0.48.",
+        run: finger::ball_coarse,
+    },
+    Case {
+        name: "finger-bar-coarse",
+        shows: "The finger with cells halved where a bar of 1 mm touches, coarse.",
+        run: finger::bar_coarse,
+    },
+    Case {
+        name: "finger-ball",
+        shows: "The ball on the finger that datasets are made with, medium.",
+        run: finger::ball,
     },
 ];
 

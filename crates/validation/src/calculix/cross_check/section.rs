@@ -4,11 +4,14 @@
 //! their layers to each other, so that its unknowns are as many as ours. A slab of
 //! bricks in the deck would have three times as many.
 
-use super::indentation::{Pressing, Tolerance};
+use super::indentation::{CPU_SHARE, Pressing, Tolerance};
 use super::ours::Cards;
 use super::{Check, Context};
-use crate::calculix::{ElementTypes, MaterialCard, QuadraticHex, RigidIndenter, RigidShape};
+use crate::calculix::{
+    ElementTypes, MaterialCard, QuadraticHex, RigidIndenter, RigidShape, StepControl,
+};
 use crate::verify::CaseError;
+use papilla_fem::contact::ContactRule;
 use papilla_fem::element::ElementKind;
 use papilla_fingertip::geometry::section::SectionShape;
 use papilla_fingertip::mesh::fingertip::{Density, Parts};
@@ -22,7 +25,7 @@ use std::sync::Arc;
 const DEPTH_MM: f64 = 1.0;
 /// Half sides of the plate, mm; its edges do not touch.
 const PLATE: RoundedPlate = RoundedPlate { half_mm: [10.0, 10.0, 2.0], edge_radius_mm: 0.0 };
-const TOLERANCE: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2 };
+const TOLERANCE: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2, limit: None };
 
 pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     let mut rows = Vec::new();
@@ -65,10 +68,13 @@ fn pressing<'a>(
             path: vec![(1.0, [0.0, DEPTH_MM, 0.0])],
         },
         shape: Arc::new(PLATE),
+        rule: ContactRule::Nodal,
         types: ElementTypes { quadratic, ..ElementTypes::default() },
         interface: [Tissue::Dermis, Tissue::Epidermis],
         steps: 1,
+        first: StepControl::default().first,
         tolerance: TOLERANCE,
+        cpu_share: CPU_SHARE,
     })
 }
 

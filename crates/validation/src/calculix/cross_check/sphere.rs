@@ -1,10 +1,13 @@
 //! Two layers under a rigid sphere: contact, and SED where the layers meet.
 
-use super::indentation::{Pressing, Tolerance};
+use super::indentation::{CPU_SHARE, Pressing, Tolerance};
 use super::ours::Cards;
 use super::{Check, Context};
-use crate::calculix::{ElementTypes, LinearHex, MaterialCard, RigidIndenter, RigidShape};
+use crate::calculix::{
+    ElementTypes, LinearHex, MaterialCard, RigidIndenter, RigidShape, StepControl,
+};
 use crate::verify::CaseError;
+use papilla_fem::contact::ContactRule;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::block::{BlockLattice, build, even};
 use papilla_fem::mesh::lattice::tetrahedra;
@@ -34,15 +37,15 @@ struct Pair {
 }
 
 /// Equal elements.
-const EQUAL: Tolerance = Tolerance { force: 1e-3, displacement: 1e-3, sed: 2e-3 };
+const EQUAL: Tolerance = Tolerance { force: 1e-3, displacement: 1e-3, sed: 2e-3, limit: None };
 /// Elements that differ but do not lock.
-const EXPECTED: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2 };
+const EXPECTED: Tolerance = Tolerance { force: 5e-3, displacement: 5e-3, sed: 2e-2, limit: None };
 /// Linear elements that treat volume and bending differently.
-const UNLIKE: Tolerance = Tolerance { force: 1e-2, displacement: 1e-2, sed: 6e-2 };
+const UNLIKE: Tolerance = Tolerance { force: 1e-2, displacement: 1e-2, sed: 6e-2, limit: None };
 /// One of the two locks: the rows show how much.
-const LOCKED: Tolerance = Tolerance { force: 6e-2, displacement: 5e-2, sed: 1e-1 };
+const LOCKED: Tolerance = Tolerance { force: 6e-2, displacement: 5e-2, sed: 1e-1, limit: None };
 /// Meshes too small for any of these.
-const SMALL: Tolerance = Tolerance { force: 3e-2, displacement: 4e-2, sed: 8e-2 };
+const SMALL: Tolerance = Tolerance { force: 3e-2, displacement: 4e-2, sed: 8e-2, limit: None };
 
 pub(super) fn run(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     let pairs = [
@@ -119,10 +122,13 @@ fn pressing<'a>(pair: &Pair, per_mm: f64, tolerance: Tolerance) -> Pressing<'a> 
         contact: "z_max",
         indenter: RigidIndenter { shape: RigidShape::Sphere { radius_mm: RADIUS_MM }, start, path },
         shape: Arc::new(Sphere { radius_mm: RADIUS_MM }),
+        rule: ContactRule::Nodal,
         types: ElementTypes { linear: pair.linear, ..ElementTypes::default() },
         interface: [Tissue::Dermis, Tissue::Subcutaneous],
         steps: 1,
+        first: StepControl::default().first,
         tolerance,
+        cpu_share: CPU_SHARE,
     }
 }
 
