@@ -21,11 +21,18 @@ fn a_guess_leads_to_the_equilibrium_of_the_path() {
     let near: Vec<_> = due.iter().map(|u| u.map(|v| 0.97 * v)).collect();
     let mut folded = due.clone();
     folded.reverse();
-    for guess in [near, folded] {
+    for (guess, is_beside) in [(near, true), (folded, false)] {
         let mut solver = Solver::new(&problem, tight).unwrap();
         solver.start(loading.clone());
         let guess = Guess { displacement_mm: guess, dilatation: Vec::new() };
-        solver.advance_from(1.0, guess).unwrap();
+        match solver.advance_from(1.0, guess) {
+            Ok(report) => assert!(is_beside && report.effort.steps == 1, "{report:?}"),
+            Err(effort) => {
+                assert!(!is_beside && effort.cuts == 1, "{effort:?}");
+                assert!(solver.displacement_mm().as_flattened().iter().all(|v| v.abs() <= 0.0));
+                solver.advance_to(1.0).unwrap();
+            }
+        }
         let largest = due.as_flattened().iter().fold(0.0f64, |m, v| m.max(v.abs()));
         for (found, due) in solver.displacement_mm().as_flattened().iter().zip(due.as_flattened()) {
             assert!((found - due).abs() < 1e-5 * largest, "{found} {due}");

@@ -6,7 +6,7 @@
 
 use super::state::{State, StepReport};
 use super::stepping::Solver;
-use super::{SolveError, StepError, mixed};
+use super::{Effort, StepError, mixed};
 use crate::element::Dilatation;
 
 /// Where an equilibrium may be.
@@ -21,12 +21,12 @@ pub struct Guess {
 }
 
 impl Solver<'_> {
-    /// Goes on to `target` in one step from what is close to the equilibrium there; as
-    /// [`Self::advance_to`] where that fails.
+    /// Goes on to `target` in one step from what is close to the equilibrium there.
     ///
     /// # Errors
-    /// As [`Self::advance_to`].
-    pub fn advance_from(&mut self, target: f64, guess: Guess) -> Result<StepReport, SolveError> {
+    /// What was spent where no equilibrium is found beside the guess; the state is then the one
+    /// before, and [`Self::advance_to`] goes on by small steps.
+    pub fn advance_from(&mut self, target: f64, guess: Guess) -> Result<StepReport, Effort> {
         let first = self.newton.effort;
         match self.try_guess(target, guess) {
             Ok(()) => {
@@ -37,8 +37,7 @@ impl Solver<'_> {
                 tracing::debug!(target, %cause, "no equilibrium beside the guess");
                 self.newton.effort.cuts += 1;
                 self.settle();
-                self.advance_to(target)?;
-                Ok(self.report(&first))
+                Err(self.newton.effort.since(&first))
             }
         }
     }

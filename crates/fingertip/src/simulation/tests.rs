@@ -318,3 +318,18 @@ fn states_after_a_guide_are_those_of_the_path() {
         assert!(led.checks.energy_vs_work < 1e-2, "{}", led.checks.energy_vs_work);
     }
 }
+
+/// A level plate, some 7 N: in one step from half of its depth, the same force was found with an
+/// element crushed to 2 % of its volume.
+#[test]
+#[ignore = "long: ./test --all"]
+fn a_level_plate_deep_in_the_finger_crushes_no_element() {
+    let text = "effects = [\"finite_strain\", \"layers\"]\n[geometry]\nkind = \"fingertip\"\n\
+                density = \"coarse\"\norder = \"graded\"\n[motion]\ndepth_mm = 3.8\nincrements = 2\n\
+                pitch_deg = 2.628\nroll_deg = -6.119\nyaw_deg = 46.443\n";
+    let simulation =
+        Simulation::new(&Scene::parse(Path::new("level.toml"), text.into()).unwrap()).unwrap();
+    let mut j_min = Vec::new();
+    simulation.run(&mut |_, record, _| j_min.push(record.checks.j_min)).unwrap();
+    assert!(j_min.len() == 2 && j_min.iter().all(|j| *j > 0.3), "{j_min:?}");
+}
