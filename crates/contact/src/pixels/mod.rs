@@ -102,7 +102,7 @@ impl Operator for Nearby<'_> {
     }
 
     fn times(&mut self, x: &[f32], y: &mut [f32]) {
-        let grid = self.convolution.press(self.cells, x);
+        let grid = self.convolution.press_rows(self.cells, x);
         for (((cell, give), x), y) in self.cells.iter().zip(self.give).zip(x).zip(y) {
             *y = grid[*cell as usize] + give * x;
         }
@@ -169,7 +169,7 @@ impl PixelContact {
     pub fn new(skin: Arc<PixelSkin>, model: &ContactModel) -> Self {
         let pixels = skin.raster.pixel_count();
         Self {
-            window: Window::new(pixels, model.vertices()),
+            window: Window::new(&skin, model),
             bounded: BoundedSolver::new(pixels),
             convolution: Convolution::new(Arc::clone(&skin.plans)),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
@@ -211,7 +211,7 @@ impl PixelContact {
     ) -> Result<(), ContactError> {
         let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
-        if !window.open(skin, solver.near(), view, &mut out.effort) {
+        if !window.open(skin, model, solver.near(), view, &mut out.effort) {
             self.reset();
             return Ok(());
         }
@@ -249,7 +249,7 @@ impl PixelContact {
     /// on by themselves, or theirs.
     fn start(
         skin: &PixelSkin,
-        window: &Window,
+        window: &mut Window,
         turns: &Turns,
         [of_vertices, pressure]: [&mut [f32]; 2],
         warm: bool,
@@ -287,17 +287,17 @@ impl PixelContact {
             window.measure_hats(skin, model);
             Self::start(skin, window, turns, [&mut *rest, &mut *pressure], warm);
             let pitch_mm = window.pitch_mm(pressure);
-            convolution.open(window.size(), pitch_mm, &skin.surface);
-            window.number_cells(convolution.rows(), convolution.columns());
+            convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
+            window.number_cells(skin, [convolution.rows(), convolution.columns()]);
         }
         let size = [convolution.rows(), convolution.columns()];
-        window.press_hats(skin, &window.force_n, rest);
+        window.press_forces(skin, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
         window.own_dents(skin, grid, size);
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
         window.place(skin, model);
-        let grid = convolution.press(&window.cells, &pressure[..n]);
-        window.measure(skin, view, solver.person(), grid, effort)?;
+        let grid = convolution.press_rows(&window.cells, &pressure[..n]);
+        window.measure(view, solver.person(), grid, effort)?;
         window.measure_hats(skin, model);
         let gradient = &mut rest[..m];
         window.gradient(&pressure[..m], gradient);
