@@ -282,9 +282,10 @@ impl PixelContact {
         let n = window.len();
         let model = &solver.model;
         let m = window.free();
+        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
+        window.place(skin, model);
+        window.measure_hats(skin, model);
         if let Some(warm) = start {
-            window.start(skin, model);
-            window.measure_hats(skin, model);
             Self::start(skin, window, turns, [&mut *rest, &mut *pressure], warm);
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
@@ -294,11 +295,8 @@ impl PixelContact {
         window.press_forces(skin, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
         window.own_dents(skin, grid, size);
-        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
-        window.place(skin, model);
         let grid = convolution.press_rows(&window.cells, &pressure[..n]);
-        window.measure(view, solver.person(), grid, effort)?;
-        window.measure_hats(skin, model);
+        window.measure(skin, view, solver.person(), grid, effort)?;
         let gradient = &mut rest[..m];
         window.gradient(&pressure[..m], gradient);
         let give = &window.give[..m];

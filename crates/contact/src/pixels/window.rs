@@ -19,9 +19,6 @@ const REACH_MM: f64 = 0.2;
 const BETWEEN: usize = 24;
 const NONE: u32 = u32::MAX;
 
-/// Where a vertex' own dent stands beside its place.
-const DENT: usize = 3;
-
 /// Pixels that things are near, and the vertices that move them.
 #[derive(Debug)]
 pub(super) struct Window {
@@ -32,8 +29,6 @@ pub(super) struct Window {
     /// Slots of the pixels above, below, before and after each.
     beside: Vec<[u32; 4]>,
     pub at_mm: Vec<[f32; 3]>,
-    /// Displacement by the vertices' own hats, mm.
-    dent_mm: Vec<f32>,
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
     /// The skin's normal, into the finger.
@@ -52,9 +47,10 @@ pub(super) struct Window {
     place: Vec<u32>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
-    /// By vertex of the skin: deformed place and displacement by its own hats, mm; force, N; hat's
-    /// area, mm2; pressure, MPa; force, N.
+    /// By vertex of the skin: deformed place, mm, beside which a fourth number keeps it together;
+    /// displacement by its own hats, mm; force, N; hat's area, mm2; pressure, MPa; force, N.
     vertices: Vec<[f32; 4]>,
+    dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
     hat_mpa: Vec<f32>,
@@ -82,7 +78,6 @@ impl Window {
             cells: Vec::with_capacity(pixels),
             beside: Vec::with_capacity(pixels),
             at_mm: vec![[0.0; 3]; pixels],
-            dent_mm: vec![0.0; pixels],
             normal: vec![[0.0; 3]; pixels],
             area_mm2: vec![0.0; pixels],
             inward: vec![[0.0; 3]; pixels],
@@ -97,6 +92,7 @@ impl Window {
             linear: vector(),
             moved: vector(),
             vertices: vec![[0.0; 4]; vertices],
+            dent_mm: zeros(),
             force_n: vector(),
             hat_mm2: zeros(),
             hat_mpa: zeros(),
@@ -254,9 +250,8 @@ impl Window {
     /// Places the pixels, and finds their deformed areas.
     pub(super) fn place(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for (slot, entry) in self.entries.iter().enumerate() {
-            let [x, y, z, dent] = skin.stencils[*entry as usize].vector(&self.vertices);
+            let [x, y, z, _] = skin.stencils[*entry as usize].vector(&self.vertices);
             self.at_mm[slot] = [x, y, z];
-            self.dent_mm[slot] = dent;
         }
         self.measure_planes(skin, model);
     }
@@ -315,14 +310,6 @@ impl Window {
                 map[to] += a * b * pressure;
             }
         }
-    }
-
-    /// Places and areas of the pixels at rest.
-    pub(super) fn start(&mut self, skin: &PixelSkin, model: &ContactModel) {
-        for (slot, entry) in self.entries.iter().enumerate() {
-            self.at_mm[slot] = skin.rest_mm[*entry as usize];
-        }
-        self.measure_planes(skin, model);
     }
 }
 

@@ -4,6 +4,7 @@ use super::Window;
 use crate::answer::{Effort, Person};
 use crate::error::ContactError;
 use crate::objects::View;
+use crate::pixels::PixelSkin;
 
 /// Gap of a displaced pixel beyond which nothing presses, reference mm.
 const FREE_MM: f32 = 0.3;
@@ -21,6 +22,7 @@ impl Window {
     /// `grid`, mm.
     pub(in super::super) fn measure(
         &mut self,
+        skin: &PixelSkin,
         view: View<'_>,
         person: Person,
         grid: &[f32],
@@ -28,7 +30,9 @@ impl Window {
     ) -> Result<(), ContactError> {
         for slot in 0..self.entries.len() {
             let inward = self.inward[slot];
-            let own = grid[self.cells[slot] as usize] - self.dent_mm[slot];
+            let stencil = &skin.stencils[self.entries[slot] as usize];
+            let dent = stencil.value(|vertex| self.dent_mm[vertex]);
+            let own = grid[self.cells[slot] as usize] - dent;
             let (mut way, mut turns) = (0.0, 0);
             let (nearest, along) = loop {
                 let at: [f32; 3] =

@@ -1,6 +1,6 @@
 //! The vertices that move a window's pixels.
 
-use super::{DENT, NONE, Window};
+use super::{NONE, Window};
 use crate::kernels::{DisplaceTiles, run};
 use crate::model::ContactModel;
 use crate::pixels::PixelSkin;
@@ -110,7 +110,7 @@ impl Window {
                 grid[row * columns + column]
             };
             let (a, b) = (x - left, y - top);
-            self.vertices[*id as usize][DENT] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
+            self.dent_mm[*id as usize] = (1.0 - b) * ((1.0 - a) * at(0, 0) + a * at(0, 1))
                 + b * ((1.0 - a) * at(1, 0) + a * at(1, 1));
         }
     }
