@@ -147,6 +147,17 @@ impl Convolution {
         self.rows
     }
 
+    /// `1 / h^2` by the pixels' distances `h` down and along rows, and the square of the mean (of
+    /// logarithms) between the wave numbers of the window and of a pixel, mm^-2.
+    pub(super) fn bends(&self) -> [f32; 3] {
+        let pitch_mm = self.steps.map(|step| (f64::from(step) * PITCH_STEP).exp());
+        let [down, along] = pitch_mm.map(|h| 1.0 / (h * h));
+        let longest = pitch_mm[0] * self.rows as f64;
+        let longest = longest.max(pitch_mm[1] * self.columns as f64);
+        let middle = TAU / longest * (4.0 * (down + along)).sqrt();
+        [down, along, middle].map(|v| v as f32)
+    }
+
     /// The window, to be filled with pressure (MPa) before, and read displacement (mm) after
     /// [`Self::apply`].
     fn grid(&mut self) -> &mut [f32] {
@@ -206,12 +217,17 @@ impl Convolution {
     }
 }
 
-/// Transposes lines of `length`.
+/// Transposes lines of `length`, some lines at once so that both sides are read and written
+/// along.
 fn turn(from: &[C32], length: usize, to: &mut [C32]) {
+    const TOGETHER: usize = 8;
     let lines = from.len() / length;
-    for (line, values) in from.chunks_exact(length).enumerate() {
-        for (column, value) in values.iter().enumerate() {
-            to[column * lines + line] = *value;
+    for first in (0..lines).step_by(TOGETHER) {
+        let last = (first + TOGETHER).min(lines);
+        for column in 0..length {
+            for (line, to) in (first..last).zip(&mut to[column * lines + first..]) {
+                *to = from[line * length + column];
+            }
         }
     }
 }

@@ -94,6 +94,10 @@ struct Nearby<'a> {
     /// How far the object gives way at each pixel, mm/MPa.
     give: &'a [f32],
     norm: f32,
+    beside: &'a [[u32; 4]],
+    /// `1 / h^2` by the pixels' distances `h` down and along rows, and `k^2` by the wave number in
+    /// the middle, mm^-2.
+    bends: [f32; 3],
 }
 
 impl Operator for Nearby<'_> {
@@ -105,6 +109,22 @@ impl Operator for Nearby<'_> {
         let grid = self.convolution.press_rows(self.cells, x);
         for (((cell, give), x), y) in self.cells.iter().zip(self.give).zip(x).zip(y) {
             *y = grid[*cell as usize] + give * x;
+        }
+    }
+
+    /// Compliance falls as `1 / k` with the wave number: `-laplacian + k^2` over it is as large for
+    /// the longest waves as for the shortest, and half of it in the middle.
+    fn towards_inverse(&self, r: &[f32], f: &[f32], z: &mut [f32]) {
+        let [down, along, middle] = self.bends;
+        let at = |slot: u32| r.get(slot as usize).copied().unwrap_or(0.0);
+        for (i, (z, sides)) in z.iter_mut().zip(self.beside).enumerate() {
+            *z = 0.0;
+            if f[i] > 0.0 {
+                let [up, low, left, right] = sides.map(at);
+                *z = middle * r[i]
+                    + down * (2.0 * r[i] - up - low)
+                    + along * (2.0 * r[i] - left - right);
+            }
         }
     }
 }
@@ -301,7 +321,9 @@ impl PixelContact {
         window.gradient(&pressure[..m], gradient);
         let give = &window.give[..m];
         let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
-        let nearby = Nearby { convolution, cells: &window.cells[..m], give, norm };
+        let (cells, beside) = (&window.cells[..m], &window.beside[..m]);
+        let bends = convolution.bends();
+        let nearby = Nearby { convolution, cells, give, norm, beside, bends };
         effort.products += bounded
             .improve(nearby, gradient, &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
             .products;

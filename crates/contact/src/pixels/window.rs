@@ -27,7 +27,7 @@ pub(super) struct Window {
     held: Vec<u32>,
     pub cells: Vec<u32>,
     /// Slots of the pixels above, below, before and after each.
-    beside: Vec<[u32; 4]>,
+    pub beside: Vec<[u32; 4]>,
     pub at_mm: Vec<[f32; 3]>,
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
