@@ -72,3 +72,67 @@ impl Compliance {
         [rank / TILE, rank % TILE]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::{DisplaceTiles, Vectors, run};
+
+    /// Vertices that fill no whole number of tiles, in an order of their own.
+    fn random(v: usize) -> (Vec<Vec<f32>>, Compliance) {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut full = vec![vec![0.0; 3 * v]; 3 * v];
+        let mut packed = Vec::new();
+        for i in 0..3 * v {
+            for k in i..3 * v {
+                let value = random.f32();
+                (full[i][k], full[k][i]) = (value, value);
+                packed.push(value);
+            }
+        }
+        let mut rank: Vec<u32> = (0..v as u32).collect();
+        random.shuffle(&mut rank);
+        (full, Compliance::unpacked(&packed, rank).expect("a compliance"))
+    }
+
+    #[test]
+    fn a_pair_is_what_the_triangle_holds() {
+        let (full, compliance) = random(19);
+        for moving in 0..19 {
+            for pushing in 0..19 {
+                let pair = compliance.pair(moving, pushing);
+                for (at, value) in pair.into_iter().enumerate() {
+                    let due: f32 = full[3 * moving + at / 3][3 * pushing + at % 3];
+                    assert_eq!(value.to_bits(), due.to_bits(), "{moving} {pushing} {at}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn tiles_move_as_the_whole_matrix_does() {
+        let (full, compliance) = random(19);
+        let tiles = compliance.side();
+        let (mut force, mut moved) =
+            (vec![Vectors::default(); tiles], vec![Vectors::default(); tiles]);
+        let mut flat = vec![0.0f32; 57];
+        for (vertex, component, value) in [(3, 0, 0.5), (11, 2, -1.5), (18, 1, 2.0)] {
+            let [tile, at] = compliance.place(vertex);
+            force[tile][component][at] = value;
+            flat[3 * vertex + component] = value;
+        }
+        let all: Vec<u32> = (0..tiles as u32).collect();
+        let [pushing, moving] = [&all[..], &all[..]];
+        let (compliance, moved) = (&compliance, &mut moved[..]);
+        run(DisplaceTiles { compliance, pushing, force: &force, moving, moved: &mut *moved });
+        for vertex in 0..19 {
+            let [tile, at] = compliance.place(vertex);
+            for component in 0..3 {
+                let row = &full[3 * vertex + component];
+                let due: f32 = row.iter().zip(&flat).map(|(c, f)| c * f).sum();
+                let found = moved[tile][component][at];
+                assert!((found - due).abs() <= 1e-5 * due.abs().max(1.0), "{found} {due}");
+            }
+        }
+    }
+}

@@ -48,6 +48,9 @@ use window::Window;
 pub use memory::PixelMemory;
 pub use skin::PixelSkin;
 
+/// Change of the vertices' displacement that ends what they find by themselves, reference mm: pixels
+/// only go on by its change from frame to frame.
+const AT_VERTICES_MM: f32 = 5e-4;
 /// Rounds of vertices and pixels at most.
 const ROUNDS_MAX: usize = 8;
 /// Change of the vertices' forces, of their sum, that ends them.
@@ -144,7 +147,7 @@ impl Solver {
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
             require_slippery(view)?;
-            solver.frame(view, out)?;
+            solver.frame_until(AT_VERTICES_MM, view, out)?;
             pixels.refine(solver, view, out)
         })
     }
@@ -168,7 +171,7 @@ impl Solver {
                 let _ = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame);
             }
             solver.travel_until(view, net, PIXELS, out, |solver, view, out| {
-                solver.frame(view, out)?;
+                solver.frame_until(AT_VERTICES_MM, view, out)?;
                 pixels.refine(solver, view, out)
             })
         })
