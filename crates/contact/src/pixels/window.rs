@@ -16,7 +16,7 @@ const NEAR_MM: f64 = 0.6;
 /// Of these, pixels nearer than this can come to touch, reference mm.
 const REACH_MM: f64 = 0.2;
 /// Pixels between the window and itself, where it repeats.
-const BETWEEN: usize = 12;
+const BETWEEN: usize = 24;
 const NONE: u32 = u32::MAX;
 
 /// Pixels that things are near, and the vertices that move them.
@@ -101,7 +101,7 @@ impl Window {
             packed: vector(),
             pushing: Vec::with_capacity(tiles),
             is_pushing: vec![false; tiles],
-            moving: Vec::with_capacity(tiles),
+            moving: Vec::with_capacity(vertices),
             tile_force: vec![Vectors::default(); tiles],
             tile_moved: vec![Vectors::default(); tiles],
         }
