@@ -6,7 +6,8 @@
 //! the points in contact, a projected step where one of them would be pulled, a step towards
 //! contact where points outside penetrate. One product with `M` an iteration, or two.
 
-use crate::kernels::{multiply, product as dot};
+use crate::kernels::{multiply, product as dot, run};
+use pulp::{Simd, WithSimd};
 
 /// Weighs points that penetrate against points out of balance: 1 treats them alike.
 const PROPORTION: f32 = 1.0;
@@ -16,6 +17,7 @@ const PROPORTION: f32 = 1.0;
 pub(crate) struct BoundedSolver {
     gradient: Vec<f32>,
     free: Vec<f32>,
+    towards: Vec<f32>,
     chopped: Vec<f32>,
     direction: Vec<f32>,
     product: Vec<f32>,
@@ -36,6 +38,11 @@ pub(crate) trait Operator {
     fn norm(&self) -> f32;
     /// Fills `y` with its product with `x`.
     fn times(&mut self, x: &[f32], y: &mut [f32]);
+    /// Fills `z` with something closer to the inverse's product with `r`, which is 0 where `f` is;
+    /// symmetric and positive definite among the points under force.
+    fn towards_inverse(&self, r: &[f32], _f: &[f32], z: &mut [f32]) {
+        z.copy_from_slice(r);
+    }
 }
 
 impl Operator for Symmetric<'_> {
@@ -72,6 +79,7 @@ impl BoundedSolver {
         Self {
             gradient: zeros(),
             free: zeros(),
+            towards: zeros(),
             chopped: zeros(),
             direction: zeros(),
             product: zeros(),
@@ -105,95 +113,13 @@ impl BoundedSolver {
     /// The same from forces `f >= 0` whose gaps `gradient` are known.
     pub(crate) fn improve(
         &mut self,
-        mut m: impl Operator,
+        m: impl Operator,
         gradient: &mut [f32],
         f: &mut [f32],
         tolerance_mm: f32,
         products_max: u32,
     ) -> Effort {
-        let n = f.len();
-        let Self { free, chopped, direction, product, .. } = self;
-        let [free, chopped, direction, product] =
-            [free, chopped, direction, product].map(|v| &mut v[..n]);
-        let mut effort = Effort::default();
-        let step = 1.0 / m.norm().max(f32::MIN_POSITIVE);
-        let mut restart = true;
-        loop {
-            let (mut out_of_balance, mut penetrating) = (0.0f32, 0.0f32);
-            effort.violation_mm = 0.0;
-            // The reduced free gradient: what a projected step of the fixed length can use.
-            let mut usable = 0.0f32;
-            for i in 0..n {
-                let w = gradient[i];
-                let touching = f[i] > 0.0;
-                free[i] = if touching { w } else { 0.0 };
-                chopped[i] = if touching { 0.0 } else { w.min(0.0) };
-                // A force of no consequence that is about to vanish is in balance.
-                let counts = if touching { w.min(f[i] / step) } else { chopped[i] };
-                effort.violation_mm = effort.violation_mm.max(counts.abs());
-                out_of_balance += free[i] * free[i];
-                usable += free[i] * free[i].min(f[i] / step);
-                penetrating += chopped[i] * chopped[i];
-            }
-            let done = effort.violation_mm <= tolerance_mm;
-            if done || effort.products >= products_max || !out_of_balance.is_finite() {
-                return effort;
-            }
-            if penetrating > PROPORTION * usable.max(0.0) {
-                m.times(chopped, product);
-                effort.products += 1;
-                let bends = dot(chopped, product);
-                let length = penetrating / bends.max(f32::MIN_POSITIVE);
-                add_scaled(f, -length, chopped);
-                add_scaled(gradient, -length, product);
-                restart = true;
-                continue;
-            }
-            if restart {
-                direction.copy_from_slice(free);
-                restart = false;
-            }
-            m.times(direction, product);
-            effort.products += 1;
-            let bends = dot(direction, product).max(f32::MIN_POSITIVE);
-            let length = dot(gradient, direction) / bends;
-            let mut longest = f32::INFINITY;
-            for i in 0..n {
-                if direction[i] > 0.0 {
-                    longest = longest.min(f[i] / direction[i]);
-                }
-            }
-            if length <= longest {
-                add_scaled(f, -length, direction);
-                add_scaled(gradient, -length, product);
-                let mut along = 0.0;
-                for i in 0..n {
-                    free[i] = if f[i] > 0.0 { gradient[i] } else { 0.0 };
-                    along += free[i] * product[i];
-                }
-                let turn = along / bends;
-                for i in 0..n {
-                    direction[i] = free[i] - turn * direction[i];
-                }
-            } else {
-                // To the first point that lets go, then a projected step of fixed length.
-                for i in 0..n {
-                    f[i] = (f[i] - longest * direction[i]).max(0.0);
-                    gradient[i] -= longest * product[i];
-                }
-                for i in 0..n {
-                    let before = f[i];
-                    if before > 0.0 {
-                        f[i] = (before - step * gradient[i]).max(0.0);
-                    }
-                    direction[i] = f[i] - before;
-                }
-                m.times(direction, product);
-                add_scaled(gradient, 1.0, product);
-                effort.products += 1;
-                restart = true;
-            }
-        }
+        run(Improve { solver: self, m, gradient, f, tolerance_mm, products_max })
     }
 
     /// Sum of `travel f` for the forces `f` with `M f = travel` at the points whose travel is not
@@ -236,7 +162,109 @@ impl BoundedSolver {
     }
 }
 
+/// The iteration, in the widest vectors of the processor.
+struct Improve<'a, M> {
+    solver: &'a mut BoundedSolver,
+    m: M,
+    gradient: &'a mut [f32],
+    f: &'a mut [f32],
+    tolerance_mm: f32,
+    products_max: u32,
+}
+
+impl<M: Operator> WithSimd for Improve<'_, M> {
+    type Output = Effort;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Effort {
+        let Self { solver, mut m, gradient, f, tolerance_mm, products_max } = self;
+        let n = f.len();
+        let BoundedSolver { free, towards, chopped, direction, product, .. } = solver;
+        let [free, towards, chopped, direction, product] =
+            [free, towards, chopped, direction, product].map(|v| &mut v[..n]);
+        let mut effort = Effort::default();
+        let step = 1.0 / m.norm().max(f32::MIN_POSITIVE);
+        let mut restart = true;
+        loop {
+            let (mut out_of_balance, mut penetrating) = (0.0f32, 0.0f32);
+            effort.violation_mm = 0.0;
+            // The reduced free gradient: what a projected step of the fixed length can use.
+            let mut usable = 0.0f32;
+            for i in 0..n {
+                let w = gradient[i];
+                let touching = f[i] > 0.0;
+                free[i] = if touching { w } else { 0.0 };
+                chopped[i] = if touching { 0.0 } else { w.min(0.0) };
+                // A force of no consequence that is about to vanish is in balance.
+                let counts = if touching { w.min(f[i] / step) } else { chopped[i] };
+                effort.violation_mm = effort.violation_mm.max(counts.abs());
+                out_of_balance += free[i] * free[i];
+                usable += free[i] * free[i].min(f[i] / step);
+                penetrating += chopped[i] * chopped[i];
+            }
+            let done = effort.violation_mm <= tolerance_mm;
+            if done || effort.products >= products_max || !out_of_balance.is_finite() {
+                return effort;
+            }
+            if penetrating > PROPORTION * usable.max(0.0) {
+                m.times(chopped, product);
+                effort.products += 1;
+                let bends = dot(chopped, product);
+                let length = penetrating / bends.max(f32::MIN_POSITIVE);
+                add_scaled(f, -length, chopped);
+                add_scaled(gradient, -length, product);
+                restart = true;
+                continue;
+            }
+            if restart {
+                m.towards_inverse(free, f, direction);
+                restart = false;
+            }
+            m.times(direction, product);
+            effort.products += 1;
+            let bends = dot(direction, product).max(f32::MIN_POSITIVE);
+            let length = dot(gradient, direction) / bends;
+            let mut longest = f32::INFINITY;
+            for i in 0..n {
+                if direction[i] > 0.0 {
+                    longest = longest.min(f[i] / direction[i]);
+                }
+            }
+            if length <= longest {
+                add_scaled(f, -length, direction);
+                add_scaled(gradient, -length, product);
+                for i in 0..n {
+                    free[i] = if f[i] > 0.0 { gradient[i] } else { 0.0 };
+                }
+                m.towards_inverse(free, f, towards);
+                let turn = dot(towards, product) / bends;
+                for i in 0..n {
+                    direction[i] = towards[i] - turn * direction[i];
+                }
+            } else {
+                // To the first point that lets go, then a projected step of fixed length.
+                for i in 0..n {
+                    f[i] = (f[i] - longest * direction[i]).max(0.0);
+                    gradient[i] -= longest * product[i];
+                }
+                for i in 0..n {
+                    let before = f[i];
+                    if before > 0.0 {
+                        f[i] = (before - step * gradient[i]).max(0.0);
+                    }
+                    direction[i] = f[i] - before;
+                }
+                m.times(direction, product);
+                add_scaled(gradient, 1.0, product);
+                effort.products += 1;
+                restart = true;
+            }
+        }
+    }
+}
+
 /// `y += k x`.
+#[inline(always)]
 fn add_scaled(y: &mut [f32], k: f32, x: &[f32]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y += k * x;

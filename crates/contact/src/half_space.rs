@@ -68,11 +68,11 @@ impl ContactModel {
                 if p != q && shape * PI * NEAR_MM < 1.0 {
                     continue;
                 }
-                let own: f64 = (0..9)
-                    .map(|pair| {
+                let values = self.compliance.pair(p, q).into_iter().enumerate();
+                let own: f64 = values
+                    .map(|(pair, value)| {
                         let n = self.normals[p][pair / 3] * self.normals[q][pair % 3];
-                        let at = (9 * p + pair) * v + self.rank[q] as usize;
-                        f64::from(n * self.compliance[at])
+                        f64::from(n * value)
                     })
                     .sum();
                 shared += own * shape;

@@ -3,6 +3,7 @@
 //! What runs over vectors is a type with [`WithSimd`]: a closure is compiled for the plainest
 //! processor unless the compiler happens to inline it.
 
+use crate::compliance::{Compliance, TILE, TILE_LEN};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Runs `work` for the widest vectors of this processor.
@@ -116,35 +117,46 @@ impl WithSimd for Displace<'_> {
     }
 }
 
-/// Displacement of `ids` under forces that are dense over columns but 0 outside `runs`:
-/// `moved[a][i] = sum_b rows(id)[3 a + b] . force[b]`.
-pub(crate) struct DisplaceRuns<'a> {
-    /// `[vertex][9][columns]`.
-    pub compliance: &'a [f32],
-    pub columns: usize,
-    pub ids: &'a [u32],
-    pub runs: &'a [[usize; 2]],
-    pub force: &'a [Vec<f32>; 3],
-    pub moved: &'a mut [Vec<f32>; 3],
+/// Displacement of the vertices of some tiles, `[tile][component][vertex]`, under the forces of
+/// others.
+pub(crate) struct DisplaceTiles<'a> {
+    pub compliance: &'a Compliance,
+    /// Tiles under force; each has one.
+    pub pushing: &'a [u32],
+    pub force: &'a [Vectors],
+    /// Tiles that are displaced.
+    pub moving: &'a [u32],
+    pub moved: &'a mut [Vectors],
 }
 
-impl WithSimd for DisplaceRuns<'_> {
+/// Vectors of a tile's vertices, component by component.
+pub(crate) type Vectors = [[f32; TILE]; 3];
+
+impl WithSimd for DisplaceTiles<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { compliance, columns, ids, runs, force, moved } = self;
-        for (slot, id) in ids.iter().enumerate() {
-            let rows = &compliance[9 * *id as usize * columns..][..9 * columns];
-            for (a, moved) in moved.iter_mut().enumerate() {
-                let mut sum = 0.0;
+        const PLANE: usize = TILE * TILE;
+        let Self { compliance, pushing, force, moving, moved } = self;
+        for tile in moving {
+            moved[*tile as usize] = Default::default();
+        }
+        for from in pushing {
+            let force = &force[*from as usize];
+            let row = &compliance.tiles()[*from as usize * compliance.side() * TILE_LEN..];
+            for to in moving {
+                let tile = &row[*to as usize * TILE_LEN..][..TILE_LEN];
+                let mut sums = moved[*to as usize];
                 for (b, force) in force.iter().enumerate() {
-                    let row = &rows[(3 * a + b) * columns..][..columns];
-                    for &[first, last] in runs {
-                        sum += dot(simd, &row[first..last], &force[first..last]);
+                    for (j, force) in force.iter().enumerate().filter(|(_, f)| **f != 0.0) {
+                        for (a, sum) in sums.iter_mut().enumerate() {
+                            let column = &tile[(3 * b + a) * PLANE + j * TILE..][..TILE];
+                            add_scaled(simd, sum, *force, column);
+                        }
                     }
                 }
-                moved[slot] = sum;
+                moved[*to as usize] = sums;
             }
         }
     }

@@ -29,6 +29,7 @@
 mod answer;
 mod bounded;
 mod clusters;
+mod compliance;
 mod discs;
 mod error;
 mod file;

@@ -1,6 +1,7 @@
 //! What is known of a finger before anything touches it: the contact model.
 
 use crate::clusters::Clusters;
+use crate::compliance::Compliance;
 use crate::error::ModelError;
 use crate::layer::Layer;
 use crate::second_order::SecondOrder;
@@ -81,11 +82,7 @@ pub struct ContactModel {
     pub(crate) normals: Vec<[f32; 3]>,
     pub(crate) areas_mm2: Vec<f32>,
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// `[V][9][V]`: blocks of compliance by component pair. Columns stand by [`Self::rank`], so
-    /// that those of neighbours share cache lines.
-    pub(crate) compliance: Vec<f32>,
-    /// Column of each vertex.
-    pub(crate) rank: Vec<u32>,
+    pub(crate) compliance: Compliance,
     pub(crate) clusters: Clusters,
     pub(crate) second_order: Option<SecondOrder>,
     /// Gradients over each triangle.
@@ -144,8 +141,7 @@ impl ContactModel {
             normals: triples(&arrays.normals),
             areas_mm2: arrays.areas_mm2,
             triangles,
-            compliance: unpacked(&arrays.compliance_mm_per_n, &rank)?,
-            rank,
+            compliance: Compliance::unpacked(&arrays.compliance_mm_per_n, rank)?,
             clusters,
             second_order,
             slopes,
@@ -272,27 +268,4 @@ pub(crate) fn lengths(header: &Header) -> Result<[(&'static str, usize); 7], Mod
         ("products", r * (r + 1) / 2 * k),
         ("displacements", 3 * v * k),
     ])
-}
-
-/// Blocks `[V][9][V]` of a packed upper triangle, columns by `rank`.
-fn unpacked(packed: &[f32], rank: &[u32]) -> Result<Vec<f32>, ModelError> {
-    let v = rank.len();
-    let mut blocks = vec![0.0; 9 * v * v];
-    let mut place = |i: usize, k: usize, value: f32| {
-        blocks[((i / 3) * 9 + 3 * (i % 3) + k % 3) * v + rank[k / 3] as usize] = value;
-    };
-    let mut values = packed.iter();
-    for i in 0..3 * v {
-        for k in i..3 * v {
-            let &value = values.next().unwrap_or(&0.0);
-            if i == k && !(value >= 0.0) {
-                let (array, index, rule) =
-                    ("compliance_mm_per_n", i, "a force cannot pull its own point back");
-                return Err(ModelError::Value { array, index, value: f64::from(value), rule });
-            }
-            place(i, k, value);
-            place(k, i, value);
-        }
-    }
-    Ok(blocks)
 }

@@ -141,7 +141,7 @@ impl Patch {
 
     /// Takes a vertex in, at rest and without force, if there is room.
     pub(crate) fn add(&mut self, model: &ContactModel, vertex: u32) {
-        let (slot, v) = (self.ids.len(), model.vertices());
+        let slot = self.ids.len();
         if slot == self.slots_max {
             return;
         }
@@ -151,11 +151,10 @@ impl Patch {
         let stride = self.stride;
         self.ids.push(vertex);
         self.slot_of[vertex as usize] = slot as u16;
-        for pair in 0..9 {
-            let turned = 3 * (pair % 3) + pair / 3;
-            let row = &model.compliance[(9 * vertex as usize + pair) * v..][..v];
-            for (k, &other) in self.ids.iter().enumerate() {
-                let value = row[model.rank[other as usize] as usize];
+        for (k, &other) in self.ids.iter().enumerate() {
+            let values = model.compliance.pair(vertex as usize, other as usize);
+            for (pair, value) in values.into_iter().enumerate() {
+                let turned = 3 * (pair % 3) + pair / 3;
                 self.blocks[(9 * slot + pair) * stride + k] = value;
                 self.blocks[(9 * k + turned) * stride + slot] = value;
             }

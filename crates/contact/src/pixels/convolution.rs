@@ -64,6 +64,8 @@ pub(super) struct Convolution {
     plans: Arc<Plans>,
     rows: usize,
     columns: usize,
+    /// Rows, the first, that pressure stands in.
+    pressed: usize,
     /// Logarithms of the pixels' distances, in steps.
     steps: [i32; 2],
     /// `[rows][columns]`.
@@ -93,6 +95,7 @@ impl Convolution {
             plans,
             rows: 0,
             columns: 0,
+            pressed: 0,
             steps: [0; 2],
             grid: vec![0.0; longest * longest],
             spectrum: vec![zero; half],
@@ -102,10 +105,11 @@ impl Convolution {
     }
 
     /// Takes a window of at least so many rows and columns, as far as there is one, of pixels
-    /// `pitch_mm` apart along rows and columns.
+    /// `pitch_mm` apart along rows and columns; pressure stands in the first `pressed` rows.
     pub(super) fn open(
         &mut self,
         [rows, columns]: [usize; 2],
+        pressed: usize,
         [across_mm, along_mm]: [f64; 2],
         surface: &SurfaceCompliance,
     ) {
@@ -113,6 +117,7 @@ impl Convolution {
         let fitting = |least| LENGTHS.into_iter().find(|l| *l >= least).unwrap_or(longest);
         let steps = [across_mm, along_mm].map(|mm| (mm.ln() / PITCH_STEP).round() as i32);
         let window = (fitting(rows), fitting(columns), steps);
+        self.pressed = pressed.min(window.0);
         if (self.rows, self.columns, self.steps) == window {
             return;
         }
@@ -142,6 +147,17 @@ impl Convolution {
         self.rows
     }
 
+    /// `1 / h^2` by the pixels' distances `h` down and along rows, and the square of the mean (of
+    /// logarithms) between the wave numbers of the window and of a pixel, mm^-2.
+    pub(super) fn bends(&self) -> [f32; 3] {
+        let pitch_mm = self.steps.map(|step| (f64::from(step) * PITCH_STEP).exp());
+        let [down, along] = pitch_mm.map(|h| 1.0 / (h * h));
+        let longest = pitch_mm[0] * self.rows as f64;
+        let longest = longest.max(pitch_mm[1] * self.columns as f64);
+        let middle = TAU / longest * (4.0 * (down + along)).sqrt();
+        [down, along, middle].map(|v| v as f32)
+    }
+
     /// The window, to be filled with pressure (MPa) before, and read displacement (mm) after
     /// [`Self::apply`].
     fn grid(&mut self) -> &mut [f32] {
@@ -150,26 +166,40 @@ impl Convolution {
 
     /// Displacement of the window (mm) under pressure (MPa) on some of its cells, none elsewhere.
     pub(super) fn press(&mut self, cells: &[u32], pressure: &[f32]) -> &[f32] {
-        let grid = self.grid();
+        self.fill(cells, pressure);
+        self.apply(self.rows);
+        self.grid()
+    }
+
+    /// The same of the rows that pressure stands in; the others tell nothing.
+    pub(super) fn press_rows(&mut self, cells: &[u32], pressure: &[f32]) -> &[f32] {
+        self.fill(cells, pressure);
+        self.apply(self.pressed);
+        self.grid()
+    }
+
+    fn fill(&mut self, cells: &[u32], pressure: &[f32]) {
+        let filled = self.pressed * self.columns;
+        let grid = &mut self.grid()[..filled];
         grid.fill(0.0);
         for (cell, p) in cells.iter().zip(pressure) {
             grid[*cell as usize] = *p;
         }
-        self.apply();
-        self.grid()
     }
 
-    /// Pressure to displacement. The window is periodic.
-    fn apply(&mut self) {
-        let Self { plans, rows, columns, grid, spectrum, turned, scratch, compliance, .. } = self;
+    /// Pressure to displacement of the first `wanted` rows. The window is periodic.
+    fn apply(&mut self, wanted: usize) {
+        let Self { plans, rows, columns, pressed, .. } = self;
         let (rows, columns, half) = (*rows, *columns, *columns / 2 + 1);
         let (Some(along), Some(across)) = (plans.of(columns), plans.of(rows)) else { return };
-        let grid = &mut grid[..rows * columns];
+        let Self { grid, spectrum, turned, scratch, compliance, .. } = self;
+        let filled = &mut grid[..*pressed * columns];
         let [spectrum, turned] = [spectrum, turned].map(|v| &mut v[..rows * half]);
         // Lengths are those of the plans, so nothing here can be refused.
-        for (row, waves) in grid.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
+        for (row, waves) in filled.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
             let _ = along.forward.process_with_scratch(row, waves, scratch);
         }
+        spectrum[*pressed * half..].fill(C32::new(0.0, 0.0));
         turn(spectrum, half, turned);
         across.across[0].process_with_scratch(turned, scratch);
         for (wave, compliance) in turned.iter_mut().zip(&*compliance) {
@@ -177,7 +207,8 @@ impl Convolution {
         }
         across.across[1].process_with_scratch(turned, scratch);
         turn(turned, rows, spectrum);
-        for (row, waves) in grid.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
+        let wanted = &mut grid[..wanted * columns];
+        for (row, waves) in wanted.chunks_exact_mut(columns).zip(spectrum.chunks_exact_mut(half)) {
             // Rounding leaves a trace of what is real.
             waves[0].im = 0.0;
             waves[half - 1].im = 0.0;
@@ -186,12 +217,17 @@ impl Convolution {
     }
 }
 
-/// Transposes lines of `length`.
+/// Transposes lines of `length`, some lines at once so that both sides are read and written
+/// along.
 fn turn(from: &[C32], length: usize, to: &mut [C32]) {
+    const TOGETHER: usize = 8;
     let lines = from.len() / length;
-    for (line, values) in from.chunks_exact(length).enumerate() {
-        for (column, value) in values.iter().enumerate() {
-            to[column * lines + line] = *value;
+    for first in (0..lines).step_by(TOGETHER) {
+        let last = (first + TOGETHER).min(lines);
+        for column in 0..length {
+            for (line, to) in (first..last).zip(&mut to[column * lines + first..]) {
+                *to = from[line * length + column];
+            }
         }
     }
 }
@@ -209,13 +245,13 @@ mod tests {
         let mut convolution = Convolution::new(Arc::new(Plans::new()));
         // At steps of the table.
         let [across_mm, along_mm] = [-760.0, -850.0].map(|step| (step * PITCH_STEP).exp());
-        convolution.open([44, 60], [across_mm, along_mm], &surface);
+        convolution.open([44, 60], 48, [across_mm, along_mm], &surface);
         assert_eq!([convolution.rows(), convolution.columns()], [48, 64]);
         let phase = |i: usize| TAU * (3.0 * (i / 64) as f64 / 48.0 + 5.0 * (i % 64) as f64 / 64.0);
         for (i, p) in convolution.grid().iter_mut().enumerate() {
             *p = phase(i).cos() as f32;
         }
-        convolution.apply();
+        convolution.apply(48);
         let k = (TAU * 3.0 / (48.0 * across_mm)).hypot(TAU * 5.0 / (64.0 * along_mm));
         for (i, u) in convolution.grid().iter().enumerate() {
             let due = surface.at(k) * phase(i).cos();

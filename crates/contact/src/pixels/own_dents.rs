@@ -86,7 +86,7 @@ impl OwnDents<'_> {
         let near = self.near(vertex)?;
         let reach = near.iter().map(|(square, _)| square.sqrt()).fold(0.0, f32::max);
         let side = 2 * (reach.ceil() as usize + BEYOND);
-        convolution.open([side; 2], pitch_mm, surface);
+        convolution.open([side; 2], usize::MAX, pitch_mm, surface);
         // Square, as the plans of both ways are the same.
         let side = convolution.columns();
         let first = self.uv_px[vertex].map(|c| c.floor() as i64 - side as i64 / 2);
@@ -164,16 +164,10 @@ impl OwnDents<'_> {
 
     /// Displacement of a vertex along its normal under a force along another one's, mm/N.
     fn compliance(&self, to: usize, from: usize) -> f64 {
-        let (model, v) = (self.model, self.model.vertices());
-        let rows = &model.compliance[9 * to * v..][..9 * v];
-        let mut sum = 0.0;
-        for a in 0..3 {
-            for b in 0..3 {
-                let value = rows[(3 * a + b) * v + model.rank[from] as usize];
-                sum += model.normals[to][a] * value * model.normals[from][b];
-            }
-        }
-        f64::from(sum)
+        let pair = self.model.compliance.pair(to, from);
+        let [n, m] = [to, from].map(|vertex| self.model.normals[vertex]);
+        let along = |a: usize| (0..3).map(|b| n[a] * pair[3 * a + b] * m[b]).sum::<f32>();
+        f64::from((0..3).map(along).sum::<f32>())
     }
 }
 

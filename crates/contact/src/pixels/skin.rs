@@ -16,6 +16,8 @@ pub struct PixelSkin {
     /// By pixel, and by vertex.
     pub(super) stencils: Vec<PixelStencil>,
     pub(super) corrections: Vec<Correction>,
+    /// By vertex: pixels of the triangles round it.
+    pub(super) around: Vec<Vec<u32>>,
     /// Whether a vertex is at the skin's edge.
     pub(super) at_edge: Vec<bool>,
     pub(super) surface: SurfaceCompliance,
@@ -41,9 +43,23 @@ impl PixelSkin {
             std::array::from_fn(|i| stencil.value(|v| model.positions_mm[v][i] as f32))
         };
         let rest_mm: Vec<[f32; 3]> = stencils.iter().map(place).collect();
+        let mut around = vec![Vec::new(); model.vertices()];
+        for (entry, pixel) in raster.pixels().iter().enumerate() {
+            pixel.vertices.iter().for_each(|corner| around[*corner as usize].push(entry as u32));
+        }
         let plans = Arc::new(Plans::new());
         let own = OwnDents { model, uv_px: &uv_px, raster: &raster, rest_mm: &rest_mm };
         let corrections = own.corrections(&surface, &plans, &at_edge);
-        Some(Self { raster, uv_px, stencils, corrections, at_edge, surface, plans, rest_mm })
+        Some(Self {
+            raster,
+            uv_px,
+            stencils,
+            corrections,
+            around,
+            at_edge,
+            surface,
+            plans,
+            rest_mm,
+        })
     }
 }

@@ -26,6 +26,20 @@ impl<const N: usize> Stencil<N> {
         let terms = self.vertices.iter().zip(self.weights);
         terms.map(|(vertex, weight)| weight * field(usize::from(*vertex))).sum()
     }
+
+    /// The same of fields that stand beside each other.
+    #[inline]
+    pub(super) fn vector<const M: usize>(&self, fields: &[[f32; M]]) -> [f32; M] {
+        // Two sums, as one would wait for itself.
+        let mut sums = [[0.0; M]; 2];
+        for (i, (vertex, weight)) in self.vertices.iter().zip(self.weights).enumerate() {
+            let (sum, value) = (&mut sums[i % 2], &fields[usize::from(*vertex)]);
+            for k in 0..M {
+                sum[k] += weight * value[k];
+            }
+        }
+        std::array::from_fn(|k| sums[0][k] + sums[1][k])
+    }
 }
 
 /// A stencil for each pixel of the skin: the value at the pixel of the polynomial of second degree

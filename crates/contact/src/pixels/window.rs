@@ -6,6 +6,7 @@ mod vertices;
 
 use super::PixelSkin;
 use crate::answer::Effort;
+use crate::kernels::Vectors;
 use crate::model::ContactModel;
 use crate::objects::View;
 use papilla_atlas::MAP_SIDE_PX;
@@ -25,6 +26,8 @@ pub(super) struct Window {
     pub entries: Vec<u32>,
     held: Vec<u32>,
     pub cells: Vec<u32>,
+    /// Slots of the pixels above, below, before and after each.
+    pub beside: Vec<[u32; 4]>,
     pub at_mm: Vec<[f32; 3]>,
     pub normal: Vec<[f32; 3]>,
     pub area_mm2: Vec<f32>,
@@ -37,34 +40,43 @@ pub(super) struct Window {
     slot: Vec<u32>,
     first: [usize; 2],
     size: [usize; 2],
+    /// Pixels, as bits, that are looked at.
+    looked_at: Vec<u64>,
     /// Vertices of the pixels' stencils, and where each stands among them.
     ids: Vec<u32>,
     place: Vec<u32>,
-    near: Vec<bool>,
     linear: [Vec<f32>; 3],
     moved: [Vec<f32>; 3],
-    /// By vertex of the skin: displacement by its own hats, mm; force, N; hat's area, mm2; pressure,
-    /// MPa.
+    /// By vertex of the skin: deformed place, mm, beside which a fourth number keeps it together;
+    /// displacement by its own hats, mm; force, N; hat's area, mm2; pressure, MPa; force, N.
+    vertices: Vec<[f32; 4]>,
     dent_mm: Vec<f32>,
     pub force_n: [Vec<f32>; 3],
     hat_mm2: Vec<f32>,
+    hat_mpa: Vec<f32>,
     hat_n: Vec<f32>,
+    /// Vertices under force, and their forces.
     touched: Vec<u32>,
     packed: [Vec<f32>; 3],
-    /// Forces by the compliance's columns, and where they are not 0.
-    dense: [Vec<f32>; 3],
-    blocks: Vec<bool>,
-    runs: Vec<[usize; 2]>,
+    /// Tiles of the compliance under force, and those that are displaced.
+    pushing: Vec<u32>,
+    is_pushing: Vec<bool>,
+    moving: Vec<u32>,
+    tile_force: Vec<Vectors>,
+    tile_moved: Vec<Vectors>,
 }
 
 impl Window {
-    pub(super) fn new(pixels: usize, vertices: usize) -> Self {
+    pub(super) fn new(skin: &PixelSkin, model: &ContactModel) -> Self {
+        let (pixels, vertices) = (skin.raster.pixel_count(), model.vertices());
+        let tiles = model.compliance.side();
         let zeros = || vec![0.0f32; vertices];
         let vector = || std::array::from_fn(|_| zeros());
         Self {
             entries: Vec::with_capacity(pixels),
             held: Vec::with_capacity(pixels),
             cells: Vec::with_capacity(pixels),
+            beside: Vec::with_capacity(pixels),
             at_mm: vec![[0.0; 3]; pixels],
             normal: vec![[0.0; 3]; pixels],
             area_mm2: vec![0.0; pixels],
@@ -74,20 +86,24 @@ impl Window {
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
             size: [0; 2],
+            looked_at: vec![0; pixels.div_ceil(64)],
             ids: Vec::with_capacity(vertices),
             place: vec![NONE; vertices],
-            near: vec![false; vertices],
             linear: vector(),
             moved: vector(),
+            vertices: vec![[0.0; 4]; vertices],
             dent_mm: zeros(),
             force_n: vector(),
             hat_mm2: zeros(),
+            hat_mpa: zeros(),
             hat_n: zeros(),
             touched: Vec::with_capacity(vertices),
             packed: vector(),
-            dense: vector(),
-            blocks: vec![false; vertices.div_ceil(vertices::BLOCK)],
-            runs: Vec::with_capacity(vertices.div_ceil(vertices::BLOCK)),
+            pushing: Vec::with_capacity(tiles),
+            is_pushing: vec![false; tiles],
+            moving: Vec::with_capacity(vertices),
+            tile_force: vec![Vectors::default(); tiles],
+            tile_moved: vec![Vectors::default(); tiles],
         }
     }
 
@@ -100,6 +116,11 @@ impl Window {
         self.entries.len() - self.held.len()
     }
 
+    /// Rows that pixels stand in.
+    pub(super) fn rows(&self) -> usize {
+        self.size[0]
+    }
+
     pub(super) fn size(&self) -> [usize; 2] {
         self.size.map(|s| s + BETWEEN)
     }
@@ -109,87 +130,135 @@ impl Window {
     pub(super) fn open(
         &mut self,
         skin: &PixelSkin,
+        model: &ContactModel,
         candidates: &[(f64, u32)],
         view: View<'_>,
         effort: &mut Effort,
     ) -> bool {
-        self.entries.clear();
-        self.held.clear();
-        self.ids.clear();
-        if candidates.is_empty() {
-            return false;
-        }
-        self.near.fill(false);
-        self.slot.fill(NONE);
-        self.place.fill(NONE);
-        for (_, vertex) in candidates.iter().filter(|(free, _)| *free < NEAR_MM) {
-            self.near[*vertex as usize] = true;
-        }
-        for (entry, pixel) in skin.raster.pixels().iter().enumerate() {
-            if !pixel.vertices.iter().any(|v| self.near[*v as usize]) {
-                continue;
-            }
-            effort.distances += 1;
-            let nearest = view.nearest_at(skin.rest_mm[entry].map(f64::from));
-            if nearest.is_some_and(|nearest| nearest.gap_mm < REACH_MM) {
-                let is_held = pixel.vertices.iter().any(|v| skin.at_edge[*v as usize]);
-                if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
-            }
-        }
-        self.entries.extend(&self.held);
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for (slot, entry) in self.entries.iter().enumerate() {
-            let entry = *entry as usize;
-            let (pixel, index) = (&skin.raster.pixels()[entry], skin.raster.indices()[entry]);
-            self.slot[index as usize] = slot as u32;
-            let at = [index as usize / MAP_SIDE_PX, index as usize % MAP_SIDE_PX];
-            for i in 0..2 {
-                (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
-            }
-            let corners = pixel.vertices.map(|v| v as u16);
-            for vertex in skin.stencils[entry].vertices.iter().chain(&corners) {
-                if self.place[usize::from(*vertex)] == NONE {
-                    self.place[usize::from(*vertex)] = self.ids.len() as u32;
-                    self.ids.push(u32::from(*vertex));
-                }
-            }
-        }
+        self.close(skin);
+        self.look_at(skin, candidates);
+        self.take_near(skin, view, effort);
         if self.entries.is_empty() {
             return false;
         }
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let index = skin.raster.indices()[*entry as usize] as usize;
+            self.slot[index] = slot as u32;
+            let at = [index / MAP_SIDE_PX, index % MAP_SIDE_PX];
+            for i in 0..2 {
+                (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
+            }
+        }
         self.first = low;
         self.size = [high[0] - low[0], high[1] - low[1]];
+        for entry in &self.entries {
+            let index = skin.raster.indices()[*entry as usize] as usize;
+            let side = |to: Option<usize>| to.and_then(|i| self.slot.get(i)).copied();
+            let [up, left] = [MAP_SIDE_PX, 1].map(|step| side(index.checked_sub(step)));
+            let [down, right] = [MAP_SIDE_PX, 1].map(|step| side(Some(index + step)));
+            self.beside.push([up, down, left, right].map(|slot| slot.unwrap_or(NONE)));
+        }
+        self.take_vertices(skin, model);
         true
     }
 
-    pub(super) fn number_cells(&mut self, rows: usize, columns: usize) {
+    /// Forgets the last window.
+    fn close(&mut self, skin: &PixelSkin) {
+        for entry in self.entries.drain(..) {
+            self.slot[skin.raster.indices()[entry as usize] as usize] = NONE;
+        }
+        for id in self.ids.drain(..) {
+            self.place[id as usize] = NONE;
+        }
+        self.held.clear();
+        self.beside.clear();
+        self.looked_at.fill(0);
+    }
+
+    /// Marks the pixels of triangles with a near corner.
+    fn look_at(&mut self, skin: &PixelSkin, candidates: &[(f64, u32)]) {
+        for (_, vertex) in candidates.iter().filter(|(free, _)| *free < NEAR_MM) {
+            for entry in &skin.around[*vertex as usize] {
+                self.looked_at[*entry as usize / 64] |= 1 << (entry % 64);
+            }
+        }
+    }
+
+    /// Takes those of them that things are near. A distance changes no faster than a place, so
+    /// that most follow from the one before.
+    fn take_near(&mut self, skin: &PixelSkin, view: View<'_>, effort: &mut Effort) {
+        let mut asked: Option<([f32; 3], f64)> = None;
+        for (word, bits) in self.looked_at.iter().enumerate() {
+            let mut bits = *bits;
+            while bits != 0 {
+                let entry = 64 * word + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let at = skin.rest_mm[entry];
+                let told = asked.and_then(|(from, gap_mm)| {
+                    let square: f32 = (0..3).map(|i| (at[i] - from[i]).powi(2)).sum();
+                    let away = f64::from(square.sqrt());
+                    let is_near = gap_mm + away < REACH_MM;
+                    (is_near || gap_mm - away > REACH_MM).then_some(is_near)
+                });
+                let is_near = told.unwrap_or_else(|| {
+                    effort.distances += 1;
+                    let nearest = view.nearest_at(at.map(f64::from));
+                    let gap_mm = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_mm);
+                    asked = Some((at, gap_mm));
+                    gap_mm < REACH_MM
+                });
+                if is_near {
+                    let corners = skin.raster.pixels()[entry].vertices;
+                    let is_held = corners.iter().any(|v| skin.at_edge[*v as usize]);
+                    if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
+                }
+            }
+        }
+        self.entries.extend(&self.held);
+    }
+
+    /// Takes the vertices of the pixels' stencils, and of their triangles.
+    fn take_vertices(&mut self, skin: &PixelSkin, model: &ContactModel) {
+        self.moving.clear();
+        for entry in &self.entries {
+            let corners = skin.raster.pixels()[*entry as usize].vertices.map(|v| v as u16);
+            for vertex in skin.stencils[*entry as usize].vertices.iter().chain(&corners) {
+                let place = &mut self.place[usize::from(*vertex)];
+                if *place == NONE {
+                    *place = self.ids.len() as u32;
+                    self.ids.push(u32::from(*vertex));
+                    let [tile, _] = model.compliance.place(usize::from(*vertex));
+                    self.moving.push(tile as u32);
+                }
+            }
+        }
+        self.moving.sort_unstable();
+        self.moving.dedup();
+    }
+
+    pub(super) fn number_cells(&mut self, skin: &PixelSkin, [rows, columns]: [usize; 2]) {
         self.cells.clear();
-        self.cells.resize(self.entries.len(), 0);
-        for (index, slot) in self.slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
+        for entry in &self.entries {
+            let index = skin.raster.indices()[*entry as usize] as usize;
             let row = (index / MAP_SIDE_PX - self.first[0]) % rows;
             let column = (index % MAP_SIDE_PX - self.first[1]) % columns;
-            self.cells[*slot as usize] = (row * columns + column) as u32;
+            self.cells.push((row * columns + column) as u32);
         }
     }
 
     /// Places the pixels, and finds their deformed areas.
     pub(super) fn place(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for (slot, entry) in self.entries.iter().enumerate() {
-            let stencil = &skin.stencils[*entry as usize];
-            self.at_mm[slot] = std::array::from_fn(|i| {
-                stencil.value(|vertex| {
-                    let moved = self.moved[i][self.place[vertex] as usize];
-                    model.positions_mm[vertex][i] as f32 + moved
-                })
-            });
+            let [x, y, z, _] = skin.stencils[*entry as usize].vector(&self.vertices);
+            self.at_mm[slot] = [x, y, z];
         }
         self.measure_planes(skin, model);
     }
 
     fn measure_planes(&mut self, skin: &PixelSkin, model: &ContactModel) {
         for slot in 0..self.entries.len() {
-            let index = skin.raster.indices()[self.entries[slot] as usize] as usize;
-            let [a, b] = [MAP_SIDE_PX, 1].map(|step| self.across(index, slot, step));
+            let [a, b] = self.across(slot);
             let n = cross(a, b);
             let area = n.iter().map(|v| v * v).sum::<f32>().sqrt();
             self.area_mm2[slot] = area;
@@ -205,28 +274,23 @@ impl Window {
         }
     }
 
-    /// From one pixel to the next, mm, along rows or columns.
-    fn across(&self, index: usize, slot: usize, step: usize) -> [f32; 3] {
-        let side = |to: Option<usize>| {
-            to.and_then(|i| self.slot.get(i)).filter(|s| **s != NONE).map(|s| *s as usize)
-        };
-        let (before, after) = (side(index.checked_sub(step)), side(index.checked_add(step)));
-        let apart = f32::from(u8::from(before.is_some()) + u8::from(after.is_some()));
-        let [from, to] = [before, after].map(|s| self.at_mm[s.unwrap_or(slot)]);
-        std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
+    /// From one pixel to the next, mm, down and along rows.
+    fn across(&self, slot: usize) -> [[f32; 3]; 2] {
+        let [up, down, left, right] = self.beside[slot];
+        [[up, down], [left, right]].map(|sides| {
+            let apart = sides.iter().filter(|side| **side != NONE).count() as f32;
+            let at = |side: u32| self.at_mm[if side == NONE { slot } else { side as usize }];
+            let [from, to] = sides.map(at);
+            std::array::from_fn(|i| (to[i] - from[i]) / apart.max(1.0))
+        })
     }
 
     /// Mean distance of neighbouring pixels under pressure, down and along rows, mm.
     pub(super) fn pitch_mm(&self, pressure: &[f32]) -> [f64; 2] {
         let pressed = pressure[..self.len()].iter().any(|p| *p > 0.0);
         let (mut sums, mut count) = ([0.0f64; 2], 0.0);
-        for (index, slot) in self.slot.iter().enumerate().filter(|(_, slot)| **slot != NONE) {
-            let slot = *slot as usize;
-            if pressed && !(pressure[slot] > 0.0) {
-                continue;
-            }
-            for (sum, step) in sums.iter_mut().zip([MAP_SIDE_PX, 1]) {
-                let by = self.across(index, slot, step);
+        for slot in (0..self.len()).filter(|slot| !pressed || pressure[*slot] > 0.0) {
+            for (sum, by) in sums.iter_mut().zip(self.across(slot)) {
                 *sum += f64::from(by.iter().map(|v| v * v).sum::<f32>().sqrt());
             }
             count += 1.0;
@@ -246,14 +310,6 @@ impl Window {
                 map[to] += a * b * pressure;
             }
         }
-    }
-
-    /// Places and areas of the pixels at rest.
-    pub(super) fn start(&mut self, skin: &PixelSkin, model: &ContactModel) {
-        for (slot, entry) in self.entries.iter().enumerate() {
-            self.at_mm[slot] = skin.rest_mm[*entry as usize];
-        }
-        self.measure_planes(skin, model);
     }
 }
 

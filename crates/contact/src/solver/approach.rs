@@ -1,6 +1,6 @@
 //! Objects that jumped deep into the skin, brought in by steps.
 
-use super::{BACK_MAX_MM, ITERATIONS_ON_THE_WAY, STEP_MM, STEPS_MAX, Solver};
+use super::{BACK_MAX_MM, ITERATIONS_ON_THE_WAY, SETTLED_MM, STEP_MM, STEPS_MAX, Solver};
 use crate::answer::Effort;
 use crate::objects::View;
 use crate::patch::Patch;
@@ -31,7 +31,7 @@ impl Solver {
         let steps = (back / STEP_MM).ceil().min(f64::from(STEPS_MAX)) as u32;
         for step in 0..steps {
             let left = back * (1.0 - f64::from(step) / f64::from(steps));
-            self.iterate(held(left), ITERATIONS_ON_THE_WAY, effort);
+            self.iterate(held(left), ITERATIONS_ON_THE_WAY, SETTLED_MM, effort);
         }
     }
 

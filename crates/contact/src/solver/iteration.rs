@@ -1,8 +1,8 @@
 //! Linearisation, complementarity solve and displacement in turn, until displacements settle.
 
 use super::{
-    FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SETTLED_MM,
-    SHARE, Solver, TURN_MAX, VIOLATION_MM,
+    FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SHARE,
+    Solver, TURN_MAX, VIOLATION_MM,
 };
 use crate::answer::Effort;
 use crate::bounded::Symmetric;
@@ -15,6 +15,7 @@ impl Solver {
         &mut self,
         view: View<'_>,
         iterations_max: u32,
+        settled_mm: f32,
         effort: &mut Effort,
     ) -> f32 {
         let (mut relaxation, mut change) = (1.0f32, f32::INFINITY);
@@ -29,7 +30,7 @@ impl Solver {
             effort.products += self.resist_slip(view, 1.0 - 2.0 * taken, left);
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
-            if change <= SETTLED_MM {
+            if change <= settled_mm {
                 // Slots that carry no force have stood still meanwhile.
                 self.displace(self.patch.vertices().len());
                 self.measure_all(view, effort);

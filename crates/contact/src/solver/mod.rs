@@ -260,11 +260,21 @@ impl Solver {
     /// Finds what presses on the finger in `view`. A warm frame that runs away is tried once more
     /// from nothing.
     pub(crate) fn frame(&mut self, view: View<'_>, out: &mut Contact) -> Result<(), ContactError> {
-        if self.attempt(view, out) {
+        self.frame_until(SETTLED_MM, view, out)
+    }
+
+    /// The same, until displacements change by no more than `settled_mm` (reference mm).
+    pub(crate) fn frame_until(
+        &mut self,
+        settled_mm: f32,
+        view: View<'_>,
+        out: &mut Contact,
+    ) -> Result<(), ContactError> {
+        if self.attempt(settled_mm, view, out) {
             return Ok(());
         }
         self.reset();
-        if self.attempt(view, out) {
+        if self.attempt(settled_mm, view, out) {
             return Ok(());
         }
         self.reset();
@@ -288,7 +298,7 @@ impl Solver {
     }
 
     /// Whether what came out is finite.
-    fn attempt(&mut self, view: View<'_>, out: &mut Contact) -> bool {
+    fn attempt(&mut self, settled_mm: f32, view: View<'_>, out: &mut Contact) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         if self.settings.friction {
             out.shear_pa.resize(self.model.vertices(), [0.0; 3]);
@@ -309,7 +319,7 @@ impl Solver {
         self.keep_candidates();
         self.displace(self.patch.vertices().len());
         self.approach(view, &mut out.effort);
-        let change = self.iterate(view, ITERATIONS_MAX, &mut out.effort);
+        let change = self.iterate(view, ITERATIONS_MAX, settled_mm, &mut out.effort);
         if !change.is_finite() {
             return false;
         }

@@ -232,6 +232,27 @@ fn a_warm_frame_finds_what_a_cold_one_does_with_less() {
     assert!(2 * warm.products < out.effort.products, "{warm:?} {:?}", out.effort);
 }
 
+/// Hats are as large at a frame's start as they were at the end of the last one.
+#[test]
+fn a_frame_that_stands_still_takes_one_round_and_stays() {
+    let mut plane = plane();
+    let scene = [ball(3.0, [0.0, 0.0], 0.3)];
+    let Plane { solver, pixels, out, .. } = &mut plane;
+    for _ in 0..3 {
+        solver.solve_on_pixels(&scene, pixels, out).unwrap();
+    }
+    let before = pixels.map_pa().to_vec();
+    solver.solve_on_pixels(&scene, pixels, out).unwrap();
+    let (mut off, mut size) = (0.0, 0.0);
+    for (now, last) in pixels.map_pa().iter().zip(&before) {
+        off += f64::from(now - last).powi(2);
+        size += f64::from(*last).powi(2);
+    }
+    assert!((off / size).sqrt() < 1e-2, "{}", (off / size).sqrt());
+    // A linearisation or two at vertices find that nothing moves, then one round.
+    assert!(out.effort.iterations <= 3, "{:?}", out.effort);
+}
+
 #[test]
 fn what_gives_way_presses_less() {
     let mut plane = plane();

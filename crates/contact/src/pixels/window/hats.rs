@@ -36,21 +36,29 @@ impl Window {
         }
     }
 
+    /// Pressure of the vertices' forces, linear between them, MPa.
+    pub(in super::super) fn press_forces(&mut self, skin: &PixelSkin, pressure: &mut [f32]) {
+        let force_n = std::mem::take(&mut self.force_n);
+        self.press_hats(skin, &force_n, pressure);
+        self.force_n = force_n;
+    }
+
     /// Pressure of forces of the vertices, linear between them, MPa.
     pub(in super::super) fn press_hats(
-        &self,
+        &mut self,
         skin: &PixelSkin,
         force_n: &[Vec<f32>; 3],
         pressure: &mut [f32],
     ) {
-        let hat = |vertex: usize| {
-            let force: f32 = force_n.iter().map(|f| f[vertex].powi(2)).sum();
-            force.sqrt() / self.hat_mm2[vertex].max(1e-3)
-        };
+        let [x, y, z] = force_n;
+        for (vertex, pressure) in self.hat_mpa.iter_mut().enumerate() {
+            let square = x[vertex].powi(2) + y[vertex].powi(2) + z[vertex].powi(2);
+            *pressure = square.sqrt() / self.hat_mm2[vertex].max(1e-3);
+        }
         for (slot, entry) in self.entries.iter().enumerate() {
             let pixel = &skin.raster.pixels()[*entry as usize];
             let corners = pixel.vertices.iter().zip(pixel.weights);
-            pressure[slot] = corners.map(|(v, w)| w * hat(*v as usize)).sum();
+            pressure[slot] = corners.map(|(v, w)| w * self.hat_mpa[*v as usize]).sum();
         }
     }
 

@@ -1,13 +1,10 @@
 //! The vertices that move a window's pixels.
 
 use super::{NONE, Window};
-use crate::kernels::{DisplaceRuns, run};
+use crate::kernels::{DisplaceTiles, run};
 use crate::model::ContactModel;
 use crate::pixels::PixelSkin;
 use crate::second_order::Amplitudes;
-
-/// Columns that are taken together.
-pub(super) const BLOCK: usize = 8;
 
 impl Window {
     /// Moves the stencils' vertices under the vertices' forces.
@@ -17,26 +14,20 @@ impl Window {
         model: &ContactModel,
         amplitudes: Option<&mut Amplitudes>,
     ) {
-        let v = model.vertices();
-        self.touched.clear();
-        for vertex in 0..v {
-            if (0..3).any(|i| self.force_n[i][vertex] != 0.0) {
-                let at = self.touched.len();
-                self.touched.push(vertex as u32);
-                for i in 0..3 {
-                    self.packed[i][at] = self.force_n[i][vertex];
-                }
+        self.spread_forces(model);
+        run(DisplaceTiles {
+            compliance: &model.compliance,
+            pushing: &self.pushing,
+            force: &self.tile_force,
+            moving: &self.moving,
+            moved: &mut self.tile_moved,
+        });
+        for (slot, id) in self.ids.iter().enumerate() {
+            let [tile, at] = model.compliance.place(*id as usize);
+            for (linear, moved) in self.linear.iter_mut().zip(&self.tile_moved[tile]) {
+                linear[slot] = moved[at];
             }
         }
-        self.find_runs(model);
-        run(DisplaceRuns {
-            compliance: &model.compliance,
-            columns: v,
-            ids: &self.ids,
-            runs: &self.runs,
-            force: &self.dense,
-            moved: &mut self.linear,
-        });
         self.correct(skin, model);
         if let (Some(a), Some(s)) = (amplitudes, &model.second_order) {
             let m = self.touched.len();
@@ -44,32 +35,43 @@ impl Window {
             s.evaluate(&self.touched, [&x[..m], &y[..m], &z[..m]], a);
             s.displace(a, &self.ids, &self.linear, &mut self.moved);
         } else {
+            let n = self.ids.len();
             for (moved, linear) in self.moved.iter_mut().zip(&self.linear) {
-                moved.copy_from_slice(linear);
+                moved[..n].copy_from_slice(&linear[..n]);
+            }
+        }
+        for (slot, id) in self.ids.iter().enumerate() {
+            let rest = model.positions_mm[*id as usize];
+            for i in 0..3 {
+                self.vertices[*id as usize][i] = rest[i] as f32 + self.moved[i][slot];
             }
         }
     }
 
-    /// Spreads the packed forces over the compliance's columns, and finds runs of those that are
-    /// not 0.
-    fn find_runs(&mut self, model: &ContactModel) {
-        self.dense.iter_mut().for_each(|force| force.fill(0.0));
-        self.blocks.fill(false);
-        for (k, vertex) in self.touched.iter().enumerate() {
-            let column = model.rank[*vertex as usize] as usize;
-            self.blocks[column / BLOCK] = true;
-            for (dense, packed) in self.dense.iter_mut().zip(&self.packed) {
-                dense[column] = packed[k];
+    /// Packs the vertices' forces, and puts them into the compliance's tiles.
+    fn spread_forces(&mut self, model: &ContactModel) {
+        for tile in self.pushing.drain(..) {
+            self.tile_force[tile as usize] = Default::default();
+            self.is_pushing[tile as usize] = false;
+        }
+        self.touched.clear();
+        for vertex in 0..model.vertices() {
+            let force = [0, 1, 2].map(|i| self.force_n[i][vertex]);
+            if force.iter().all(|f| *f == 0.0) {
+                continue;
+            }
+            let at = self.touched.len();
+            self.touched.push(vertex as u32);
+            let [tile, place] = model.compliance.place(vertex);
+            self.is_pushing[tile] = true;
+            for i in 0..3 {
+                self.packed[i][at] = force[i];
+                self.tile_force[tile][i][place] = force[i];
             }
         }
-        self.runs.clear();
-        for (block, _) in self.blocks.iter().enumerate().filter(|(_, is_touched)| **is_touched) {
-            let (first, last) = (block * BLOCK, ((block + 1) * BLOCK).min(model.vertices()));
-            match self.runs.last_mut() {
-                Some(run) if run[1] == first => run[1] = last,
-                _ => self.runs.push([first, last]),
-            }
-        }
+        // In their order in memory, whichever came first.
+        let tiles = self.is_pushing.iter().enumerate().filter(|(_, is_pushing)| **is_pushing);
+        self.pushing.extend(tiles.map(|(tile, _)| tile as u32));
     }
 
     /// Puts the skin's own dents in the place of the mesh's.
