@@ -35,16 +35,14 @@ def varied(
     """A batch ``[N, 1, 224, 224]`` as a training step sees it; pressure and SED alike.
 
     Every other sample stands in the mirror: which ones, the batch's order decides. Each is moved by
-    up to ``shift_px`` rows and columns, wide contacts by less (:func:`reach_px`): what is learnt of a
-    pressure must not depend on which pixels it falls on.
+    up to ``shift_px`` rows and columns, wide contacts by less (:func:`reach_px`): what is learnt of
+    a pressure must not depend on which pixels it falls on.
     """
     pair = torch.cat([pressure, sed], dim=1)
     pair = torch.cat([pair[::2], mirrored(pair[1::2])])
     if shift_px > 0:
         far = reach_px(pair[:, :1], shift_px)[:, None]
         by = (torch.rand((len(pair), 2), generator=generator) * (2 * far + 1)).long() - far
-        moved = [
-            maps.roll(steps, (1, 2)) for maps, steps in zip(pair, by.tolist(), strict=True)
-        ]
+        moved = [maps.roll(steps, (1, 2)) for maps, steps in zip(pair, by.tolist(), strict=True)]
         pair = torch.stack(moved)
     return pair[:, :1], pair[:, 1:]
