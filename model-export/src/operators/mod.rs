@@ -139,16 +139,16 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/nano.onnx");
         let operators = profile(&std::fs::read(path).unwrap(), 1).unwrap();
         let sum = |of: fn(&Operator) -> u64| operators.iter().map(of).sum::<u64>();
-        // map-c3-k3-r32-h4: at each level 12 channels from 4 pressures and 3 components above, by
-        // kernels of 3 x 3, and the mean of 4 pressures; at the finest the correction, 16 to 4 twice
-        // and 4 to 12.
+        // map-c4-k3-r32-h4: at each level 16 channels from 4 pressures and 4 components above, by
+        // kernels of 3 x 3, and the mean of 4 pressures; at the finest the correction, 20 to 4 twice
+        // and 4 to 16.
         let blocks = [112, 56, 28].map(|side: u64| side * side);
         let products =
-            blocks.iter().sum::<u64>() * (12 * (4 + 3) * 9 + 4) + blocks[0] * (2 * 16 * 4 + 4 * 12);
+            blocks.iter().sum::<u64>() * (16 * (4 + 4) * 9 + 4) + blocks[0] * (2 * 20 * 4 + 4 * 16);
         let direct = || operators.iter().filter(|o| o.kind == "DirectConvolution");
         assert_eq!(direct().count(), 12, "{operators:?}");
         assert_eq!(direct().map(|o| o.operations).sum::<u64>(), 2 * products);
-        assert_eq!(direct().map(|o| o.constant_bytes).sum::<u64>(), 4 * (3 * (756 + 4) + 176));
+        assert_eq!(direct().map(|o| o.constant_bytes).sum::<u64>(), 4 * (3 * (1152 + 4) + 224));
         assert!(sum(|o| o.operations) > 2 * products, "{operators:?}");
     }
 }
