@@ -90,6 +90,10 @@ pub(super) fn ball(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     graded("finger-ball", "medium", BALL, MEDIUM).rows(context)
 }
 
+pub(super) fn bar(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
+    graded("finger-bar", "medium", BAR, MEDIUM).rows(context)
+}
+
 pub(super) fn bar_coarse(context: &Context<'_>) -> Result<Vec<Check>, CaseError> {
     graded("finger-bar-coarse", "coarse", BAR, COARSE).rows(context)
 }

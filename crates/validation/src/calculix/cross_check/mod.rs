@@ -87,6 +87,11 @@ pub const CASES: &[Case] = &[
         shows: "The ball on the finger that datasets are made with, medium.",
         run: finger::ball,
     },
+    Case {
+        name: "finger-bar",
+        shows: "The bar on that finger, medium: some ten minutes of CalculiX.",
+        run: finger::bar,
+    },
 ];
 
 /// Runs the cases that `wanted` accepts, with decks and results in `folder`;
