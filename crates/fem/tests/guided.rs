@@ -7,8 +7,8 @@ use papilla_fem::element::ElementKind;
 use papilla_fem::solve::{Guess, Options, Solver};
 use papilla_fem::testing::squeezed_block;
 
-/// From a displacement nearby or a turned one, the equilibrium is that of the path; from elements inside
-/// out there is none, and the body stays as it was.
+/// From a displacement nearby or a turned one, the equilibrium is that of the path; from elements
+/// inside out there is none, and the body stays as it was.
 #[test]
 fn a_guess_leads_to_the_equilibrium_of_the_path() {
     let (problem, loading, _) = squeezed_block(ElementKind::Hex8, 3, 0.48).unwrap();

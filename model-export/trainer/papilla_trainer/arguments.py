@@ -210,7 +210,8 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="N",
-        help="move each sample by up to N rows and columns in each step (networks on maps; 0)",
+        help="move each sample by up to N rows and columns in each step, wide contacts by less "
+        "(networks on maps; 0)",
     )
     add(
         "--train-presses",

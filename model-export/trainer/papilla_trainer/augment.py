@@ -25,7 +25,7 @@ def reach_px(pressure: Tensor, shift_px: int) -> Tensor:
     total = pressure.sum(dim=(1, 2, 3))
     squares = (pressure * pressure).sum(dim=(1, 2, 3))
     width = total / squares.clamp(min=torch.finfo(squares.dtype).tiny).sqrt()
-    part = (_NARROW_PX / width.clamp(min=_NARROW_PX)).clamp(max=1.0)
+    part = _NARROW_PX / width.clamp(min=_NARROW_PX)
     return (shift_px * part).round().to(torch.int64)
 
 

@@ -8,9 +8,9 @@ use papilla_fem::solve::{Effort, Mark, Solver, StepReport};
 /// a guide: the coarse mesh errs most at first touch, and what it misses there does not grow.
 const GUIDED: f64 = 2.0;
 
-/// Farthest from one equilibrium to the next, mm. A longer step, deep in a finger, starts so far from
-/// equilibrium that the tangent is indefinite on the way, and may end in a state of the same force
-/// in which an element is crushed (a level plate, 1.9 to 3.8 mm in one step: J = .02 for .47).
+/// Farthest from one equilibrium to the next, mm. A longer step, deep in a finger, starts so far
+/// from equilibrium that the tangent is indefinite on the way, and may end in a state of the same
+/// force in which an element is crushed (a level plate, 1.9 to 3.8 mm in one step: J = .02 for .47).
 const STEP_MAX_MM: f64 = 0.75;
 
 /// A straight way through stored depths.
@@ -67,16 +67,17 @@ impl Way<'_> {
         let depth_mm = self.depths_mm[i];
         let known: Vec<_> = self.energy_vs_work_max.map(|_| solver.mark()).into_iter().collect();
         let mut report = match solver.advance_from(self.fraction(depth_mm), guided.guess()) {
-            Ok(report) => report,
+            Ok(mut report) => {
+                solver.take_course(&guided.solver);
+                self.mend(solver, known, GUIDED, &mut report);
+                report
+            }
             Err(spent) => {
                 let mut report = self.to_state(solver, i)?;
-                report.effort = report.effort.plus(&spent).plus(&guided.effort);
-                report.guiding = guided.effort;
-                return Ok(report);
+                report.effort = report.effort.plus(&spent);
+                report
             }
         };
-        solver.take_course(&guided.solver);
-        self.mend(solver, known, GUIDED, &mut report);
         report.effort = report.effort.plus(&guided.effort);
         report.guiding = guided.effort;
         Ok(report)

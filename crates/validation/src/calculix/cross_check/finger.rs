@@ -59,8 +59,7 @@ const BAR: Press = Press {
 /// quadratic element through each layer: docs/reports/calculix.md.
 const EVEN: Tolerance = Tolerance { force: 5e-2, displacement: 8e-2, sed: 2e-1, limit: None };
 /// On meshes whose cells are halved under what touches. The 0.5 % of force that is expected holds
-/// where nothing is nearly incompressible; 3 % of SED for the peaks of `MEDIUM` and
-/// under the bar:
+/// where nothing is nearly incompressible; 3 % of SED for the peaks of `MEDIUM` and under the bar:
 /// docs/reports/calculix.md.
 const COARSE: Tolerance =
     Tolerance { force: 2e-2, displacement: 4e-2, sed: 2e-1, limit: Some(1.5e-1) };
