@@ -36,7 +36,8 @@ A new model, from the trainer's file to the service:
   model-export check    models/small.onnx --atlas models/atlas.json
   model-export evaluate models/small.onnx data/broad-graded --card out/models/small.json --pictures docs/reports/pictures/small
   model-export index    models --default small
-  model-export patterns models --dataset data/more-graded --dataset data/broad-graded
+  model-export patterns models --dataset data/more-graded --dataset data/pressed-graded \
+      --dataset data/broad-graded
   model-export table    models/*.json
 All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/reports
@@ -93,7 +94,7 @@ enum Command {
     /// Measure the ladder: error against time of every model and of FE itself.
     ///
     /// Every model of the index is run on all held-out sets (held-out indentations, held-out shapes,
-    /// deeper than any training, the published campaign, the states of the FE reference); FE rungs
+    /// pressed hard, the published campaign, the states of the FE reference); FE rungs
     /// are held against the reference. Written: a page with tables and pictures, the figures as
     /// JSON, and the same as MODELS/ladder.json, by which the server chooses.
     #[command(after_long_help = EXIT_CODES)]

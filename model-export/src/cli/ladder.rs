@@ -13,8 +13,8 @@ const STEM: &str = "accuracy-vs-time";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Folder of the datasets `broad-graded`, `heldout-graded`, `final`, `s1` and `deep`; those
-    /// that are not there are reported as not measured.
+    /// Folder of the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final` and `s1`;
+    /// those that are not there are reported as not measured.
     #[arg(long, default_value = "data", value_name = "FOLDER")]
     data: PathBuf,
     /// Folder of the models, with index.json and atlas.json.

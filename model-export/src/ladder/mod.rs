@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 pub use model::Footprint;
-pub use sets::{DEEP_MM, SampleSet, State};
+pub use sets::{SampleSet, State};
 
 /// Samples of each set that `--quick` takes, evenly spread.
 pub const QUICK_SAMPLES: usize = 16;
@@ -32,7 +32,8 @@ pub const QUICK_SAMPLES: usize = 16;
 /// What to measure.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Folder that holds the datasets `broad-graded`, `heldout-graded`, `final`, `s1`, `deep`.
+    /// Folder that holds the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final`,
+    /// `s1`.
     pub data: PathBuf,
     /// Folder of the models, their index and atlas.
     pub models: PathBuf,
@@ -166,7 +167,7 @@ pub fn measure(
         ladder.discretisation_error = fe::reference_error(&ladder.rungs, reference.name);
     }
     // FE can only be held against the reference, so the reference comes first here.
-    let order = ["reference", "heldout-presses", "heldout-shapes", "s1", "deep"];
+    let order = ["reference", "heldout-presses", "heldout-shapes", "pressed", "s1"];
     let measured =
         |name: &&str| ladder.sets.iter().any(|set| set.name == **name && set.samples > 0);
     ladder.pareto_set = order.iter().find(|name| measured(name)).map(|name| (*name).to_owned());

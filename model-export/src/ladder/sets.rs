@@ -8,9 +8,6 @@ use papilla_engine::{MAP_LEN, ladder::Set};
 use papilla_proto::atlas::{Patch, Raster};
 use std::path::Path;
 
-/// The set `deep` takes the states pressed deeper than this, mm: beyond all training.
-pub const DEEP_MM: f32 = 2.0;
-
 /// One state: values at the pixels of the atlas' patches, in the rasters' order.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -98,7 +95,6 @@ pub(super) struct Source {
     folder: &'static str,
     about: &'static str,
     split: Option<&'static str>,
-    deeper_than_mm: Option<f32>,
 }
 
 const REFERENCE: Source = Source {
@@ -106,7 +102,6 @@ const REFERENCE: Source = Source {
     folder: "final",
     about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
     split: None,
-    deeper_than_mm: None,
 };
 
 const SOURCES: [Source; 5] = [
@@ -115,43 +110,41 @@ const SOURCES: [Source; 5] = [
         folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
         split: Some("test"),
-        deeper_than_mm: None,
     },
     Source {
         name: "heldout-shapes",
         folder: "heldout-graded",
         about: "shapes that no training saw",
         split: None,
-        deeper_than_mm: None,
     },
     REFERENCE,
+    Source {
+        name: "pressed",
+        folder: "pressed-graded",
+        about: "presses that no training saw: a plate to 7 N, a key, gratings, Braille",
+        split: Some("test"),
+    },
     Source {
         name: "s1",
         folder: "s1",
         about: "held-out presses of the published campaign, a plate alone, on the even lattice: \
                 its SED is 20 to 40 % off the reference's",
         split: Some("test"),
-        deeper_than_mm: None,
-    },
-    Source {
-        name: "deep",
-        folder: "deep",
-        about: "deeper than any training (more than 2.0 mm), on the even lattice",
-        split: None,
-        deeper_than_mm: Some(DEEP_MM),
     },
 ];
 
 /// What the networks on maps learnt from.
-pub(super) const TRAINING: [Source; 2] =
-    [Source { folder: "more-graded", ..LEARNT }, Source { folder: "broad-graded", ..LEARNT }];
+pub(super) const TRAINING: [Source; 3] = [
+    Source { folder: "more-graded", ..LEARNT },
+    Source { folder: "broad-graded", ..LEARNT },
+    Source { folder: "pressed-graded", ..LEARNT },
+];
 
 const LEARNT: Source = Source {
     name: "training",
     folder: "",
     about: "what networks learnt from",
     split: Some("train"),
-    deeper_than_mm: None,
 };
 
 /// Reads the sets whose datasets are in `data`; the others come out empty and say why.
@@ -208,10 +201,6 @@ impl Source {
             dataset.maps.raster(patch).indices().iter().map(|&pixel| map[pixel as usize]).collect()
         };
         for (index, depth_mm) in shard.depth_mm.iter().enumerate() {
-            // Stored depths are rounded: 2.0 mm itself must not count as deeper.
-            if self.deeper_than_mm.is_some_and(|limit| *depth_mm <= limit + 1e-4) {
-                continue;
-            }
             dataset.draw_pressure(indentation, &shard, index, &mut on_skin)?;
             dataset.draw_sed(indentation, &shard, index, &mut below)?;
             states.push(State {

@@ -1,14 +1,17 @@
 """Networks from maps of pressure to maps of SED, on blocks of pixels at three resolutions.
 
 As on faces, strain is linear in pressure to first order and SED a sum of squares. At every pixel a
-network forms C components e, linear in the pressure, corrects them for finite strain, and answers
-their squared length: never negative, and zero without pressure, for there is no bias anywhere.
+network forms C components e and answers their squared length: never negative, and zero without
+pressure, for there is no bias anywhere.
 
-Two by two pixels are a block: its four pressures are channels, its four times C components too. The
-linear map adds three levels, of blocks of 2, 4 and 8 pixels, each a convolution over K by K blocks
-with weights that vary smoothly over the finger, and a global map of low rank on pixels of 8. Below
-the skin the fine part of a pressure is felt nearby alone, so few blocks do. What differs between
-bone and tip, the global map knows.
+Two by two pixels are a block: its four pressures are channels, its four times C components too.
+A global map of low rank on pixels of 8 comes first. Three levels, of blocks of 8, 4 and 2 pixels,
+add to it, each a convolution over K by K blocks, linear in the pressure, with weights that vary
+smoothly over the finger. Below the skin the fine part of a pressure is felt nearby alone, so few
+blocks do. What differs between bone and tip, the global map knows.
+
+Finite strain is a correction of the two coarse levels: a contact turns and stretches the skin
+around it, and what the next level adds starts from there. At the finest level it was worth nothing.
 
 Skin knows no blocks. So a block's four pixels have the same kernel of (2 K - 1)^2 weights, each
 about itself, and what a level adds to the next is linear between the middles of its pixels.
@@ -48,8 +51,8 @@ _PLACES = 5
 class MapSpec:
     """What decides a map network's shape.
 
-    ``components``: C; ``kernel``: K, odd; ``rank``: of the global map; ``hidden``: width of the
-    correction at each block (0: none); ``pixel``: pixels of the map across one of the network's, 1
+    ``components``: C; ``kernel``: K, odd; ``rank``: of the global map; ``hidden``: width of
+    the correction (0: none), four times that at the coarsest level; ``pixel``: pixels of the map across one of the network's, 1
     or 2.
     """
 
@@ -167,23 +170,26 @@ class ServedLevel(nn.Module):
 class Correction(nn.Module):
     """What finite strain adds at a block, from its components and pressures.
 
-    To lowest order it is quadratic in them, as it should be; for large ones it is linear.
+    The coarsest level sees the eight blocks around it too. To lowest order what is added is
+    quadratic, as it should be; for large pressures it is linear.
     """
 
     place: Tensor
 
-    def __init__(self, spec: MapSpec) -> None:
+    def __init__(self, spec: MapSpec, level: int) -> None:
         super().__init__()
         channels = _BLOCK * spec.components
-        inputs = channels + _BLOCK
-        self.value = _convolution(inputs, spec.hidden, 1)
-        self.gate = _convolution(inputs, spec.hidden, 1)
-        self.out = _convolution(spec.hidden, channels, 1)
+        coarsest = level == len(spec.sides) - 1
+        inputs, kernel = channels + _BLOCK, 3 if coarsest else 1
+        hidden = spec.hidden * (_BLOCK if coarsest else 1)
+        self.value = _convolution(inputs, hidden, kernel)
+        self.gate = _convolution(inputs, hidden, kernel)
+        self.out = _convolution(hidden, channels, 1)
         for layer in (self.value, self.gate):
-            nn.init.normal_(layer.weight, std=inputs**-0.5)
+            nn.init.normal_(layer.weight, std=inputs**-0.5 / kernel)
         nn.init.zeros_(self.out.weight)
-        self.over_finger = nn.Parameter(torch.zeros(spec.hidden, _PLACES))
-        self.register_buffer("place", _place(spec.sides[0]), persistent=False)
+        self.over_finger = nn.Parameter(torch.zeros(hidden, _PLACES))
+        self.register_buffer("place", _place(spec.sides[level]), persistent=False)
 
     def forward(self, components: Tensor, blocks: Tensor) -> Tensor:
         """``[N, 4 C, n, n]`` and ``[N, 4, n, n]`` to what is added to the components."""
@@ -208,7 +214,10 @@ class MapNet(nn.Module):
         self.reach_out = nn.Parameter(
             torch.randn(spec.rank, spec.components * pixels) * 0.05 / spec.rank**0.5
         )
-        self.correction = Correction(spec) if spec.hidden else None
+        corrected = range(len(spec.sides))[-2:] if spec.hidden else ()
+        self.corrections = nn.ModuleDict(
+            {str(level): Correction(spec, level) for level in corrected}
+        )
         self.register_buffer("between", _between(), persistent=False)
 
     def forward(self, pressure_pa: Tensor) -> Tensor:
@@ -217,9 +226,7 @@ class MapNet(nn.Module):
         if self.spec.pixel > 1:
             pressure = _mean(functional.pixel_unshuffle(pressure, 2))
         blocks = functional.pixel_unshuffle(pressure, 2)
-        components = self._linear(blocks)
-        if self.correction is not None:
-            components = components + self.correction(components, blocks)
+        components = self._components(blocks)
         squares = components * components
         shape = (-1, self.spec.components, _BLOCK, *squares.shape[2:])
         sed = functional.pixel_shuffle(squares.reshape(shape).sum(dim=1), 2)
@@ -227,7 +234,7 @@ class MapNet(nn.Module):
             sed = functional.pixel_shuffle(functional.conv2d(sed, self.between, padding=1), 2)
         return sed * SED_UNIT_J_PER_M3
 
-    def _linear(self, finest: Tensor) -> Tensor:
+    def _components(self, finest: Tensor) -> Tensor:
         """Components on the finest blocks."""
         blocks = [finest]
         for _ in self.spec.sides[1:]:
@@ -236,8 +243,11 @@ class MapNet(nn.Module):
         shape = (-1, self.spec.components, self.coarse_side, self.coarse_side)
         above = ((coarse @ self.reach_in) @ self.reach_out).reshape(shape)
         components = above
-        for level, own in zip(reversed(self.levels), reversed(blocks), strict=True):
-            components = level(own, above)
+        for index in reversed(range(len(blocks))):
+            components = self.levels[index](blocks[index], above)
+            if str(index) in self.corrections:
+                correction = self.corrections[str(index)]
+                components = components + correction(components, blocks[index])
             above = functional.pixel_shuffle(components, 2)
         return components
 
