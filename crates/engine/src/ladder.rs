@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Names of the held-out sets, in the order in which errors are looked up for a choice.
-pub const SET_NAMES: [&str; 5] = ["heldout-presses", "heldout-shapes", "reference", "pressed", "s1"];
+pub const SET_NAMES: [&str; 5] =
+    ["heldout-presses", "heldout-shapes", "reference", "pressed", "s1"];
 
 /// All rungs, measured on the same sets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

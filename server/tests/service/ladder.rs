@@ -31,7 +31,8 @@ fn rung(name: &str, model: Option<&str>, ms: f64, error: f64) -> Value {
 
 /// By this ladder, other than by the cards, `quick` is the more accurate.
 fn ladder() -> Value {
-    let sets = json!([{"name": "heldout-presses", "samples": 3}, {"name": "pressed", "samples": 0}]);
+    let sets =
+        json!([{"name": "heldout-presses", "samples": 3}, {"name": "pressed", "samples": 0}]);
     json!({"format": 1, "atlas_hash": atlas().hash(), "machine": "another", "sets": sets,
         "rungs": [rung("quick", Some("quick"), 4.0, 0.01), rung("slow", Some("slow"), 9.0, 0.02),
                   rung("fe-medium", None, 30_000.0, 0.03)]})
