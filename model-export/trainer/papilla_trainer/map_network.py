@@ -52,8 +52,8 @@ class MapSpec:
     """What decides a map network's shape.
 
     ``components``: C; ``kernel``: K, odd; ``rank``: of the global map; ``hidden``: width of
-    the correction (0: none), four times that at the coarsest level; ``pixel``: pixels of the map across one of the network's, 1
-    or 2.
+    the correction (0: none), four times that at the coarsest level; ``pixel``: pixels of the map
+    across one of the network's, 1 or 2.
     """
 
     components: int
