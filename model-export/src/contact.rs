@@ -228,7 +228,7 @@ impl Figures {
             self.depth_mm.clear();
             self.depth_mm.extend(skin.iter().map(depth));
             let depth_mm = &self.depth_mm;
-            Scene::Gaps(Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY })
+            Scene::Gaps(Gaps::rigid(depth_mm))
         } else {
             Scene::Objects(objects)
         };

@@ -181,9 +181,15 @@ pub struct Hello {
     /// Whether, and where, answers carry the pressure that was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure: Option<SampleLayout>,
-    /// Whether answers carry the traction along the skin at the atlas' vertices. Of objects alone.
+    /// Whether answers carry the traction along the skin at the atlas' vertices.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shear: Option<bool>,
+    /// Coulomb's coefficient of friction of what gaps tell of, 0 to 10; none: it is slippery.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+    /// Whether frames of gaps hold how fast things move at each vertex.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<bool>,
 }
 
 impl Hello {
@@ -223,6 +229,8 @@ impl Hello {
             (self.stiffness.is_some(), "stiffness"),
             (self.pressure.is_some(), "pressure"),
             (self.shear.is_some(), "shear"),
+            (self.friction.is_some(), "friction"),
+            (self.velocity.is_some(), "velocity"),
         ]
         .into_iter()
         .find_map(|(there, name)| there.then_some(name))
@@ -263,6 +271,8 @@ impl Default for Hello {
             stiffness: None,
             pressure: None,
             shear: None,
+            friction: None,
+            velocity: None,
         }
     }
 }

@@ -183,7 +183,7 @@ PapillaStatus papilla_send_map(PapillaSession *session, uint8_t finger, const fl
 PapillaStatus papilla_send_poses(PapillaSession *session, uint8_t finger, const PapillaPose *poses, size_t count,
                                  const PapillaNetForce *net, uint64_t time_us, PapillaAnswer *answer);
 /* "input": "gaps": how deep the undeformed skin lies in things, mm; negative in air. A map, or
- * vertex_count with "input_layout": "vertices". */
+ * vertex_count with "input_layout": "vertices"; with "velocity": true as many x y z mm/s behind. */
 PapillaStatus papilla_send_gaps(PapillaSession *session, uint8_t finger, const float *depth_mm, size_t count,
                                 const PapillaNetForce *net, uint64_t time_us, PapillaAnswer *answer);
 

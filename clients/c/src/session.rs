@@ -10,7 +10,7 @@ use papilla_proto::{
     effects::OutOfRange,
 };
 use papilla_render::Maps;
-use papilla_session_contact::{Finger, Hand, Skin};
+use papilla_session_contact::{Finger, Frame, Hand, Skin};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
 
@@ -222,7 +222,8 @@ impl Session {
             let part = finger.to_reference(&mut maps.pressure_pa);
             (MapSummary { peak_pa: summary.peak_pa * part }, 0)
         } else {
-            let frame = (&self.payload[..], SampleType::F32, 1.0);
+            let frame =
+                Frame { payload: &self.payload, sample_type: SampleType::F32, scale: 1.0, time_us };
             let taken = maps.take(&mut finger, frame, *range, shows_sed)?;
             (MapSummary { peak_pa: taken.peak_pa }, taken.flags)
         };

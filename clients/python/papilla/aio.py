@@ -33,7 +33,7 @@ NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
 _OF_VERSION_3: Final = {
     "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target",
-    "stiffness", "pressure", "shear",
+    "stiffness", "pressure", "shear", "friction", "velocity",
 }  # fmt: skip
 
 
@@ -181,7 +181,10 @@ class AsyncSession:
         return await asyncio.wrap_future(self.send_poses(poses, finger=finger, net=net))
 
     def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
-        """Hands over how deep the undeformed skin lies in things, mm; negative in air."""
+        """Hands over how deep the undeformed skin lies in things, mm; negative in air.
+
+        With `velocity` in the hello, x y z mm/s of each vertex follow the depths.
+        """
         frame = self.encode_rows("gaps", np.atleast_2d(np.asarray(depth_mm, np.float32)), finger, net)
         self.hand_over(frame)
         return frame.outcome

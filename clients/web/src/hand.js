@@ -121,7 +121,8 @@ export class Hand {
 
   /**
    * Sends how deep the undeformed skin lies in things, mm, negative in air.
-   * @param {Float32Array} depthMm at the vertices, or 224 x 224, as the hello says
+   * @param {Float32Array} depthMm at the vertices, or 224 x 224, as the hello says; with its
+   *   `velocity`, x y z mm/s of each vertex behind them
    * @param {{finger?: number, net?: NetForce}} [more]
    * @returns {Promise<HandAnswer>}
    */

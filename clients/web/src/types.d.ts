@@ -62,6 +62,9 @@ export interface HandHello {
   force_target?: boolean;
   stiffness?: boolean;
   pressure?: 'map' | 'vertices';
+  /** Of gaps: a coefficient, and whether frames tell how things move. */
+  friction?: number;
+  velocity?: boolean;
   map?: boolean;
   effects?: string[];
   tier?: string | null;

@@ -100,8 +100,16 @@ pub enum ContactError {
         /// Found.
         value: f32,
     },
+    /// A motion that is none.
+    #[error("moved_mm[{vertex}] is {value}: it has to be finite and within 100 m")]
+    Moved {
+        /// Vertex.
+        vertex: usize,
+        /// Found.
+        value: f32,
+    },
     /// Friction where none can be found.
-    #[error("an object has friction, but {0}")]
+    #[error("something has friction, but {0}")]
     Friction(&'static str),
     /// The iteration ran away; the last frame is forgotten.
     #[error("no finite pressure was found for this frame; the next one starts anew")]

@@ -6,7 +6,7 @@
 
 use crate::error::ContactError;
 use crate::model::ContactModel;
-use crate::nearest::{Nearest, require_stiffness};
+use crate::nearest::{Nearest, require_friction, require_stiffness};
 
 /// How deep each vertex of the undeformed finger lies in things.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +15,19 @@ pub struct Gaps<'a> {
     pub depth_mm: &'a [f32],
     /// As [`Object`](crate::Object)'s, of all things.
     pub stiffness_mpa_per_mm: f64,
+    /// As [`Object`](crate::Object)'s, of all things.
+    pub friction: f64,
+    /// How far the thing at each vertex has moved since the last frame, mm of this person; what
+    /// moves along its normal changes nothing. Empty: things rest.
+    pub moved_mm: &'a [[f32; 3]],
+}
+
+impl<'a> Gaps<'a> {
+    /// Of rigid things without friction.
+    #[must_use]
+    pub fn rigid(depth_mm: &'a [f32]) -> Self {
+        Self { depth_mm, stiffness_mpa_per_mm: f64::INFINITY, friction: 0.0, moved_mm: &[] }
+    }
 }
 
 /// Deepest, and farthest, that a vertex may be said to be, mm.
@@ -30,6 +43,9 @@ pub(crate) struct Field {
     /// Area of the triangles that told each normal.
     area_mm2: Vec<f32>,
     stiffness_mpa_per_mm: f64,
+    friction: f64,
+    /// How far things have moved, mm of the person; empty if they rest.
+    moved_mm: Vec<[f32; 3]>,
 }
 
 impl Field {
@@ -53,7 +69,10 @@ impl Field {
             return Err(ContactError::Depth { vertex, value: gaps.depth_mm[vertex] });
         }
         require_stiffness("stiffness_mpa_per_mm", gaps.stiffness_mpa_per_mm)?;
+        require_friction("friction", gaps.friction)?;
         self.stiffness_mpa_per_mm = gaps.stiffness_mpa_per_mm;
+        self.friction = gaps.friction;
+        self.read_motion(gaps.moved_mm, expected)?;
         let per = (1.0 / length) as f32;
         self.gap_mm.clear();
         self.gap_mm.extend(gaps.depth_mm.iter().map(|d| -d * per));
@@ -85,6 +104,31 @@ impl Field {
         Ok(())
     }
 
+    fn read_motion(&mut self, moved_mm: &[[f32; 3]], expected: usize) -> Result<(), ContactError> {
+        let found = moved_mm.len();
+        if found != 0 && found != expected {
+            return Err(ContactError::Gaps { found, expected });
+        }
+        for (vertex, moved) in moved_mm.iter().enumerate() {
+            if let Some(value) = moved.iter().copied().find(|v| !(v.abs() <= DEPTH_MAX_MM)) {
+                return Err(ContactError::Moved { vertex, value });
+            }
+        }
+        self.moved_mm.clear();
+        self.moved_mm.extend_from_slice(moved_mm);
+        Ok(())
+    }
+
+    /// Coefficient of friction of all things.
+    pub(crate) fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    /// How far the thing at a vertex has moved since the last frame, mm of the person.
+    pub(crate) fn moved_mm(&self, vertex: usize) -> [f64; 3] {
+        self.moved_mm.get(vertex).map_or([0.0; 3], |moved| moved.map(f64::from))
+    }
+
     /// What lies at a vertex that has moved by `moved` (reference mm).
     #[inline]
     pub(crate) fn at(&self, vertex: usize, moved: [f64; 3]) -> Nearest {
@@ -92,7 +136,7 @@ impl Field {
         let along: f64 = (0..3).map(|i| normal[i] * moved[i]).sum();
         let gap_mm = f64::from(self.gap_mm[vertex]) + along;
         let stiffness_mpa_per_mm = self.stiffness_mpa_per_mm;
-        Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction: 0.0, object: 0 }
+        Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction: self.friction, object: 0 }
     }
 
     pub(crate) fn with_capacity(vertices: usize) -> Self {
@@ -101,6 +145,8 @@ impl Field {
             normal: Vec::with_capacity(vertices),
             area_mm2: Vec::with_capacity(vertices),
             stiffness_mpa_per_mm: f64::INFINITY,
+            friction: 0.0,
+            moved_mm: Vec::with_capacity(vertices),
         }
     }
 }

@@ -57,6 +57,7 @@ pub use gaps::Gaps;
 pub use ladder::Method;
 pub use layer::Layer;
 pub use model::{Arrays, ContactModel, Header};
-pub use objects::{FRICTION_MAX, Object, Scene};
+pub use nearest::FRICTION_MAX;
+pub use objects::{Object, Scene};
 pub use pixels::{PixelContact, PixelMemory, PixelSkin};
 pub use solver::{Anchor, Memory, Settings, Solver};

@@ -14,6 +14,18 @@ pub(crate) struct Nearest {
     pub object: u32,
 }
 
+/// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
+pub const FRICTION_MAX: f64 = 10.0;
+
+/// Refuses what is no coefficient of friction.
+pub(crate) fn require_friction(member: &'static str, value: f64) -> Result<(), ContactError> {
+    let rule = "has to be 0 to 10";
+    if (0.0..=FRICTION_MAX).contains(&value) {
+        return Ok(());
+    }
+    Err(ContactError::Value { member, value, rule })
+}
+
 /// Refuses a stiffness that is none.
 pub(crate) fn require_stiffness(member: &'static str, value: f64) -> Result<(), ContactError> {
     let rule = "has to be positive";

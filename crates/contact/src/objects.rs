@@ -3,7 +3,7 @@
 use crate::error::ContactError;
 use crate::gaps::{Field, Gaps};
 use crate::model::ContactModel;
-use crate::nearest::{Nearest, require_stiffness};
+use crate::nearest::{Nearest, require_friction, require_stiffness};
 use papilla_sdf::{Placement, SignedDistance};
 use std::sync::Arc;
 
@@ -35,8 +35,6 @@ pub enum Scene<'a> {
 const ROTATION_MISS_MAX: f64 = 1e-3;
 /// Farthest place of an object, mm.
 const PLACE_MAX_MM: f64 = 1e5;
-/// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
-pub const FRICTION_MAX: f64 = 10.0;
 
 impl Object {
     /// A rigid object.
@@ -95,10 +93,7 @@ pub(crate) fn validate(objects: &[Object]) -> Result<(), ContactError> {
             return Err(ContactError::Rotation { object: index, miss });
         }
         require_stiffness("objects[].stiffness_mpa_per_mm", object.stiffness_mpa_per_mm)?;
-        if !(0.0..=FRICTION_MAX).contains(&object.friction) {
-            let (member, value) = ("objects[].friction", object.friction);
-            return Err(ContactError::Value { member, value, rule: "has to be 0 to 10" });
-        }
+        require_friction("objects[].friction", object.friction)?;
     }
     Ok(())
 }
@@ -213,25 +208,37 @@ impl View<'_> {
         objects.iter().map(free).fold(f64::INFINITY, f64::min) / self.length
     }
 
-    /// Whether any object has friction.
+    /// Whether anything has friction.
     pub(crate) fn is_rough(&self) -> bool {
-        matches!(self.things, Things::Objects(objects) if objects.iter().any(|o| o.friction > 0.0))
+        match self.things {
+            Things::Objects(objects) => objects.iter().any(|o| o.friction > 0.0),
+            Things::Field(field) => field.friction() > 0.0,
+        }
     }
 
-    /// A place (reference mm) in an object's own frame, mm.
+    /// A place (reference mm) in an object's own frame, mm. What gaps tell of has the finger's, in
+    /// which its places move.
     pub(crate) fn on_object(&self, object: u32, at_mm: [f64; 3]) -> Option<[f64; 3]> {
-        let Things::Objects(objects) = self.things else { return None };
-        objects.get(object as usize).map(|o| local(&o.placement, self.seen(at_mm)))
+        let seen = self.seen(at_mm);
+        match self.things {
+            Things::Objects(objects) => {
+                objects.get(object as usize).map(|o| local(&o.placement, seen))
+            }
+            Things::Field(_) => Some(seen),
+        }
     }
 
     /// Where a place in an object's own frame (mm) is now, reference mm.
     pub(crate) fn off_object(&self, object: u32, place_mm: [f64; 3]) -> Option<[f64; 3]> {
-        let Things::Objects(objects) = self.things else { return None };
-        let Placement { rotation, origin_mm } = &objects.get(object as usize)?.placement;
-        Some(std::array::from_fn(|i| {
-            let turned: f64 = (0..3).map(|k| rotation[i][k] * place_mm[k]).sum();
-            (turned + origin_mm[i]) / self.length + self.shift_mm[i]
-        }))
+        let there: [f64; 3] = match self.things {
+            Things::Objects(objects) => {
+                let Placement { rotation, origin_mm } = &objects.get(object as usize)?.placement;
+                let turned = |i: usize| (0..3).map(|k| rotation[i][k] * place_mm[k]).sum::<f64>();
+                std::array::from_fn(|i| turned(i) + origin_mm[i])
+            }
+            Things::Field(_) => place_mm,
+        };
+        Some(std::array::from_fn(|i| there[i] / self.length + self.shift_mm[i]))
     }
 
     fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {

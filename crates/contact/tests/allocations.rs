@@ -91,7 +91,7 @@ fn a_warm_frame_takes_no_memory() {
         let rough = [Object { friction: 0.4, ..object.clone() }];
         solver.solve(&rough, &mut out).expect("an answer");
         solver.solve_for_force(&rough, net, &mut out).expect("a travel");
-        let gaps = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
+        let gaps = Gaps::rigid(&depth_mm);
         solver.solve(gaps, &mut out).expect("an answer");
         solver.solve_for_force(std::slice::from_ref(object), net, &mut out).expect("a travel");
         let objects = std::slice::from_ref(object);

@@ -32,9 +32,9 @@ mod skin;
 
 use papilla_engine::{EngineError, Session};
 use papilla_proto::{
-    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, SampleType, flags, keep_inside,
+    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
 };
-use papilla_session_contact::{Finger, Taken};
+use papilla_session_contact::{Finger, Frame, Taken};
 
 pub use skin::SkinPixels;
 
@@ -91,12 +91,12 @@ impl Maps {
     pub fn take(
         &mut self,
         finger: &mut Finger,
-        (payload, sample_type, scale): (&[u8], SampleType, f32),
+        frame: Frame<'_>,
         range: PressureRange,
         shows_sed: bool,
     ) -> Result<Taken, Problem> {
         let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
-        let taken = finger.take(payload, sample_type, scale, map_pa)?;
+        let taken = finger.take(frame, map_pa)?;
         if finger.takes_pressure() {
             range.check(&self.pressure_pa)?;
         }

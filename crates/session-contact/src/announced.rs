@@ -38,9 +38,7 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         let message = "'pixels' is of input 'objects': gaps say nothing of what is between them";
         return Err(unusable("method", message));
     }
-    if input == Input::Gaps && hello.shear == Some(true) {
-        return Err(unusable("shear", "'shear' is of input 'objects': gaps tell no motion"));
-    }
+    check_friction_of_gaps(hello, input)?;
     let at_vertices = [ContactMethod::SmallStrain, ContactMethod::SecondOrder];
     if has_friction(hello) && !at_vertices.contains(&hello.method.unwrap_or_default()) {
         let message = "friction and 'shear' are of the methods 'small_strain' and 'second_order'";
@@ -58,10 +56,42 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
     Ok(())
 }
 
+/// Whether what gaps tell of rubs, and how it moves.
+fn check_friction_of_gaps(hello: &Hello, input: Input) -> Result<(), Problem> {
+    let of_gaps = [(hello.friction.is_some(), "friction"), (hello.velocity.is_some(), "velocity")];
+    if let (true, Some((_, member))) = (input != Input::Gaps, of_gaps.iter().find(|(on, _)| *on)) {
+        let message = format!("'{member}' is of input 'gaps'; each object has its own friction");
+        return Err(unusable(*member, message));
+    }
+    if let Some(friction) = hello.friction {
+        require_friction(friction, "friction".to_owned())?;
+    }
+    if hello.velocity == Some(true) {
+        if layout(hello) == SampleLayout::Map {
+            return Err(unusable("velocity", "'velocity' needs the 'input_layout' \"vertices\""));
+        }
+        if !hello.friction.is_some_and(|f| f > 0.0) {
+            return Err(unusable("velocity", "without 'friction' no motion changes anything"));
+        }
+    }
+    Ok(())
+}
+
+fn require_friction(value: f64, field: String) -> Result<(), Problem> {
+    if (0.0..=FRICTION_MAX).contains(&value) {
+        return Ok(());
+    }
+    let message = format!("{value}; a coefficient of friction is 0 to {FRICTION_MAX}");
+    Err(unusable(field, message))
+}
+
 /// Whether contact has to find friction.
 pub(crate) fn has_friction(hello: &Hello) -> bool {
-    let rough = |object: &AnnouncedObject| object.friction.is_some_and(|f| f != 0.0);
-    hello.shear == Some(true) || hello.objects.iter().flatten().any(rough)
+    let rough = |friction: Option<f64>| friction.is_some_and(|f| f != 0.0);
+    let objects = hello.objects.iter().flatten();
+    hello.shear == Some(true)
+        || rough(hello.friction)
+        || objects.into_iter().any(|object: &AnnouncedObject| rough(object.friction))
 }
 
 /// The objects, each as far away as can be.
@@ -94,10 +124,7 @@ pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Proble
             return Err(unusable(field, message));
         }
         let friction = announced.friction.unwrap_or(0.0);
-        if !(0.0..=FRICTION_MAX).contains(&friction) {
-            let message = format!("{friction}; a coefficient of friction is 0 to {FRICTION_MAX}");
-            return Err(unusable(format!("objects[{index}].friction"), message));
-        }
+        require_friction(friction, format!("objects[{index}].friction"))?;
         let mut placement = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
         placement.origin_mm[2] = -AWAY_MM;
         Ok(Object { shape, placement, stiffness_mpa_per_mm, friction })

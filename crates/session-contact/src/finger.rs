@@ -3,10 +3,10 @@
 use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
-use papilla_contact::{Contact, ContactModel, Gaps, NetForce, Object, Person, PixelContact, Scene};
+use papilla_contact::{Contact, ContactModel, NetForce, Object, Person, PixelContact, Scene};
 use papilla_proto::{
     ErrorCode, Hello, MAP_LEN, Problem, SampleType,
-    atlas::{Raster, VertexSampler},
+    atlas::Raster,
     contact::{Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     flags,
 };
@@ -15,6 +15,7 @@ use papilla_session_state::{Reader, StateError, Writer};
 
 use super::{
     FrameForm, Skin, announced,
+    gaps::GapReader,
     solver::{FingerSolver, of_contact},
     unusable,
 };
@@ -28,9 +29,8 @@ pub struct Finger {
     objects: Vec<Object>,
     /// Samples of a frame, and of what follows them.
     samples: Vec<f32>,
-    depth_mm: Vec<f32>,
+    gaps: Option<GapReader>,
     raster: Arc<Raster>,
-    sampler: Option<VertexSampler>,
     pressure: Option<SampleLayout>,
     has_shear: bool,
     /// The pressure that is sent, if as a map.
@@ -42,6 +42,19 @@ impl fmt::Debug for Finger {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Finger").field("form", &self.form).finish_non_exhaustive()
     }
+}
+
+/// A frame of any input but windows of pressure, whose header fits.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// What follows the header.
+    pub payload: &'a [u8],
+    /// Type of its samples.
+    pub sample_type: SampleType,
+    /// Unit of scaled samples of pressure, Pa.
+    pub scale: f32,
+    /// Time by the client's clock.
+    pub time_us: u64,
 }
 
 /// What a frame came to.
@@ -68,7 +81,6 @@ impl Finger {
         let solver =
             model.map(|model| FingerSolver::new(hello, skin, model, person)).transpose()?;
         let of_map = form.layout == SampleLayout::Map;
-        let is_gaps = form.input == Input::Gaps;
         let samples = match form.input {
             Input::Objects => 0,
             Input::Pressure if of_map => 0,
@@ -86,9 +98,8 @@ impl Finger {
             out,
             objects,
             samples: vec![0.0; samples],
-            depth_mm: vec![0.0; if is_gaps { vertices } else { 0 }],
+            gaps: GapReader::new(hello, form, skin),
             raster: Arc::clone(skin.raster),
-            sampler: (is_gaps && of_map).then(|| VertexSampler::new(skin.atlas, skin.raster)),
             pressure: hello.pressure,
             has_shear: hello.shear == Some(true),
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
@@ -144,13 +155,8 @@ impl Finger {
     ///
     /// # Errors
     /// What cannot be placed, is no depth or no pressure; the finger stays as it was.
-    pub fn take(
-        &mut self,
-        payload: &[u8],
-        sample_type: SampleType,
-        scale: f32,
-        map_pa: Option<&mut [f32]>,
-    ) -> Result<Taken, Problem> {
+    pub fn take(&mut self, frame: Frame<'_>, map_pa: Option<&mut [f32]>) -> Result<Taken, Problem> {
+        let Frame { payload, sample_type, scale, time_us } = frame;
         let net = match self.form.input {
             Input::Pressure => {
                 self.read_samples(payload, sample_type, scale)?;
@@ -160,18 +166,18 @@ impl Finger {
             Input::Objects => self.place(payload)?,
             Input::Gaps => {
                 self.read_samples(payload, sample_type, 1.0)?;
-                self.read_gaps()?
+                self.read_gaps(time_us)?
             }
         };
         let start = Instant::now();
-        let Self { solver: Some(solver), out, objects, depth_mm, .. } = self else {
+        let Self { solver: Some(solver), out, objects, gaps, .. } = self else {
             return Err(Problem::new(ErrorCode::Internal, "a finger without a solver"));
         };
-        let scene = match self.form.input {
-            Input::Gaps => Scene::Gaps(Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY }),
-            _ => Scene::Objects(objects),
-        };
+        let scene = gaps.as_ref().map_or(Scene::Objects(objects), |g| Scene::Gaps(g.gaps()));
         let travel_mm = solver.solve(scene, net, out).map_err(|error| of_contact(&error))?;
+        if let Some(gaps) = gaps {
+            gaps.solved(time_us);
+        }
         let at_vertices = out.touched().iter().map(|v| out.pressure_pa[*v as usize]);
         let peak = match solver.pixels() {
             Some(pixels) => pixels.peak_pa(),
@@ -228,6 +234,9 @@ impl Finger {
         if let Some(solver) = &self.solver {
             solver.save(state);
         }
+        if let Some(gaps) = &self.gaps {
+            gaps.save(state);
+        }
     }
 
     /// Goes on from what the same finger of the same hello has [saved](Self::save).
@@ -235,7 +244,8 @@ impl Finger {
     /// # Errors
     /// The state is of another finger.
     pub fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
-        self.solver.as_mut().map_or(Ok(()), |solver| solver.restore(state))
+        self.solver.as_mut().map_or(Ok(()), |solver| solver.restore(state))?;
+        self.gaps.as_mut().map_or(Ok(()), |gaps| gaps.restore(state))
     }
 
     /// Appends what pushes back, and pressure and shear if they were asked for, each up to a
@@ -321,13 +331,11 @@ impl Finger {
         })
     }
 
-    fn read_gaps(&mut self) -> Result<Option<NetForce>, Problem> {
-        let gaps = self.samples.len() - if self.form.has_force { ROW } else { 0 };
-        let (depths, row) = self.samples.split_at(gaps);
-        match &self.sampler {
-            // A NaN anywhere on the skin shows at a vertex, and is refused there.
-            Some(sampler) => _ = sampler.sample(depths, &mut self.depth_mm),
-            None => self.depth_mm.copy_from_slice(depths),
+    fn read_gaps(&mut self, time_us: u64) -> Result<Option<NetForce>, Problem> {
+        let Self { samples, gaps, form, .. } = self;
+        let (samples, row) = samples.split_at(samples.len() - if form.has_force { ROW } else { 0 });
+        if let Some(gaps) = gaps {
+            gaps.read(samples, time_us)?;
         }
         match row {
             [x, y, z, force, ..] => net_force([*x, *y, *z, *force]),

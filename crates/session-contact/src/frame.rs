@@ -13,6 +13,7 @@ pub struct FrameForm {
     pub(crate) input: Input,
     pub(crate) layout: SampleLayout,
     pub(crate) has_force: bool,
+    pub(crate) has_velocity: bool,
     objects: usize,
     fingers: usize,
     vertices: usize,
@@ -26,6 +27,7 @@ impl FrameForm {
             input: hello.input.unwrap_or_default(),
             layout,
             has_force,
+            has_velocity: hello.velocity == Some(true),
             objects,
             fingers,
             vertices,
@@ -60,7 +62,9 @@ impl FrameForm {
         match (self.input, self.layout) {
             (Input::Pressure, SampleLayout::Map) => None,
             (Input::Objects, _) => Some([ROW, self.objects + usize::from(self.has_force)]),
-            (_, SampleLayout::Vertices) => Some([self.vertices, 1]),
+            (_, SampleLayout::Vertices) => {
+                Some([if self.has_velocity { 4 * self.vertices } else { self.vertices }, 1])
+            }
             (Input::Gaps, SampleLayout::Map) => Some([MAP_SIDE_PX, MAP_SIDE_PX]),
         }
     }

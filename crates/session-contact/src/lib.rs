@@ -28,6 +28,7 @@ mod announced;
 mod assets;
 mod finger;
 mod frame;
+mod gaps;
 mod solver;
 mod warm_start;
 
@@ -45,7 +46,7 @@ use papilla_proto::{
 };
 
 pub use assets::ContactAssets;
-pub use finger::{Finger, Taken};
+pub use finger::{Finger, Frame, Taken};
 pub use frame::FrameForm;
 
 /// The skin that things press on.

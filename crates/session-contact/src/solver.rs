@@ -106,6 +106,7 @@ pub(crate) fn of_contact(error: &ContactError) -> Problem {
         ContactError::Rotation { object, .. } => format!("objects[{object}].quaternion"),
         ContactError::Gaps { .. } => "payload".to_owned(),
         ContactError::Depth { vertex, .. } => format!("depth_mm[{vertex}]"),
+        ContactError::Moved { vertex, .. } => format!("velocity_mm_per_s[{vertex}]"),
         ContactError::Force { .. } => "force_n".to_owned(),
         ContactError::Friction(_) => "method".to_owned(),
         ContactError::Diverged => {

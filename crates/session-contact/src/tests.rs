@@ -91,10 +91,14 @@ fn carry(from: &Hand, to: &Hand) {
     reader.end().expect("nothing more");
 }
 
+fn frame(payload: &[u8], time_us: u64) -> Frame<'_> {
+    Frame { payload, sample_type: SampleType::F32, scale: 1.0, time_us }
+}
+
 fn touch(hand: &Hand, finger: usize, payload: &[u8]) -> Result<(Touch, Taken), Problem> {
     let mut finger = hand.fingers()[finger].lock().expect("no panic");
     let mut map_pa = vec![0.0; MAP_LEN];
-    let taken = finger.take(payload, SampleType::F32, 1.0, Some(&mut map_pa))?;
+    let taken = finger.take(frame(payload, 0), Some(&mut map_pa))?;
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
     finger.write(&mut bytes);
     assert_eq!(bytes.len(), HEADER_LEN_V2 + hand.sections_len());
@@ -206,7 +210,7 @@ fn a_rough_ball_pulls_and_goes_on_elsewhere() {
     carry(&hand, &other);
     let mut answers = [&hand, &other].map(|hand| {
         let mut finger = hand.fingers()[0].lock().expect("no panic");
-        finger.take(&aside(0.4), SampleType::F32, 1.0, None).expect("an answer");
+        finger.take(frame(&aside(0.4), 0), None).expect("an answer");
         let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
         finger.write(&mut bytes);
         bytes
@@ -259,6 +263,85 @@ fn a_map_of_gaps_presses_as_vertices_do() {
     assert!((found.force_n[2] / due.force_n[2] - 1.0).abs() < 0.05, "{found:?} {due:?}");
 }
 
+/// A ball that is dragged, as an object and as gaps with a velocity.
+#[test]
+fn gaps_that_say_how_things_move_pull_as_the_object_does() {
+    let plane = Plane::new();
+    let ball = AnnouncedObject { friction: Some(0.5), ..ball(20.0) };
+    let by_object = plane.hand(&Hello { objects: Some(vec![ball]), ..objects() }).expect("a hand");
+    let hello = Hello {
+        input: Some(Input::Gaps),
+        input_layout: Some(SampleLayout::Vertices),
+        objects: None,
+        friction: Some(0.5),
+        velocity: Some(true),
+        shear: Some(true),
+        ..objects()
+    };
+    let by_gaps = plane.hand(&hello).expect("a hand");
+    assert_eq!(by_gaps.form().size(), Some([4 * SIDE * SIDE, 1]));
+    let skin_mm = &plane.atlas.patch(Patch::Skin).positions_mm;
+    let mut hand = by_gaps;
+    for step in 0..20u64 {
+        // 2 mm/s along x from the third frame on, 10 ms a frame.
+        let x = 0.02 * step.saturating_sub(2) as f32;
+        let pose = Pose { origin_mm: [x, 0.0, 0.3 - 20.0], ..Pose::default() }.encode();
+        let due = touch(&by_object, 0, &pose).expect("an answer").0;
+        let depths =
+            skin_mm.iter().map(|p| 20.0 - ((p[0] - x).powi(2) + p[1].powi(2) + 19.7 * 19.7).sqrt());
+        let speed = if step > 2 { 2.0 } else { 0.0 };
+        let velocities = skin_mm.iter().flat_map(|_| [speed, 0.0, 0.0]);
+        let payload: Vec<u8> = depths.chain(velocities).flat_map(f32::to_le_bytes).collect();
+        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        {
+            let mut finger = hand.fingers()[0].lock().expect("no panic");
+            finger.take(frame(&payload, 10_000 * step), None).expect("an answer");
+            finger.write(&mut bytes);
+        }
+        let found = Touch::decode(&bytes[HEADER_LEN_V2..]).expect("it lies there");
+        let miss = (found.force_n[0] - due.force_n[0]).hypot(found.force_n[1] - due.force_n[1]);
+        assert!(miss < 0.05 * 0.5 * due.force_n[2], "{step}: {found:?} {due:?}");
+        if step == 19 {
+            assert!(due.force_n[0] > 0.3 * 0.5 * due.force_n[2], "{due:?}");
+        }
+        // Another connection goes on in its place, time and all.
+        let other = plane.hand(&hello).expect("a hand");
+        carry(&hand, &other);
+        hand = other;
+    }
+    let depth = skin_mm.iter().map(|_| -1.0);
+    let swift = skin_mm.iter().flat_map(|_| [0.0, f32::NAN, 0.0]);
+    let payload: Vec<u8> = depth.chain(swift).flat_map(f32::to_le_bytes).collect();
+    let mut finger = hand.fingers()[0].lock().expect("no panic");
+    let refused = finger.take(frame(&payload, 0), None).expect_err("refused");
+    assert_eq!(refused.field.as_deref(), Some("velocity_mm_per_s[0]"));
+}
+
+#[test]
+fn friction_and_velocity_are_of_gaps() {
+    let plane = Plane::new();
+    let gaps = Hello {
+        input: Some(Input::Gaps),
+        input_layout: Some(SampleLayout::Vertices),
+        objects: None,
+        friction: Some(0.5),
+        velocity: Some(true),
+        ..objects()
+    };
+    plane.hand(&gaps).expect("a hand");
+    for (hello, field) in [
+        (Hello { friction: Some(0.5), ..objects() }, "friction"),
+        (Hello { velocity: Some(true), ..objects() }, "velocity"),
+        (Hello { input_layout: None, ..gaps.clone() }, "velocity"),
+        (Hello { friction: None, ..gaps.clone() }, "velocity"),
+        (Hello { friction: Some(-1.0), ..gaps.clone() }, "friction"),
+        (Hello { method: Some(ContactMethod::Springs), ..gaps.clone() }, "method"),
+    ] {
+        let refused = plane.hand(&hello).map(|_| ()).expect_err("refused");
+        assert_eq!(refused.field.as_deref(), Some(field), "{refused:?}");
+    }
+}
+
 /// Fingers know nothing of each other, and a finger twice as stiff answers twice the force.
 #[test]
 fn each_finger_has_its_own_state_and_factors() {
@@ -293,7 +376,6 @@ fn bad_hellos_are_refused_by_member() {
         (rough(11.0), "objects[0].friction"),
         (Hello { method: Some(ContactMethod::Springs), ..rough(0.5) }, "method"),
         (Hello { method: Some(ContactMethod::Pixels), ..rough(0.5) }, "method"),
-        (Hello { input: Some(Input::Gaps), objects: None, ..rough(0.5) }, "shear"),
         (Hello { input: None, objects: None, ..rough(0.5) }, "shear"),
         (Hello { fingers: Some(Vec::new()), ..objects() }, "fingers"),
         (Hello { fingers: Some(vec![AnnouncedFinger::default(); 11]), ..objects() }, "fingers"),
@@ -383,7 +465,7 @@ fn any_bytes_are_answered_or_refused() {
                 let small = |_: &[u8; 4]| (2.0 * random.f32() - 1.0).to_le_bytes();
                 bytes = bytes.as_chunks::<4>().0.iter().flat_map(small).collect();
             }
-            let taken = finger.take(&bytes, SampleType::F32, 1.0, None);
+            let taken = finger.take(frame(&bytes, 0), None);
             assert!(taken.is_err() || taken.is_ok_and(|taken| taken.peak_pa.is_finite()));
         }
     }

@@ -171,7 +171,7 @@ impl ContactRecorder {
             depth_mm.extend(
                 self.atlas.patch(Patch::Skin).positions_mm.iter().map(|p| depth(*p, sphere)),
             );
-            Scene::Gaps(Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY })
+            Scene::Gaps(Gaps::rigid(&depth_mm))
         } else {
             let poses: Vec<[f32; 7]> = member(step, "poses")?;
             for (pose, object) in poses.iter().zip(&hand.objects) {

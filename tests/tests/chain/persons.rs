@@ -12,7 +12,7 @@ use papilla_proto::{
     contact::{AnnouncedFinger, AnnouncedObject, Input, Pose, SampleLayout, TOUCH_LEN, Touch},
     sdf::{AnnouncedShape, Sphere},
 };
-use papilla_session_contact::{Hand, Skin};
+use papilla_session_contact::{Frame, Hand, Skin};
 use papilla_tests::conformance::ContactRecorder;
 use serde_json::Value;
 
@@ -75,7 +75,9 @@ fn hand() -> (Hand, [f32; 3]) {
 fn felt(hand: &Hand, finger: usize, origins_mm: [[f32; 3]; 2]) -> (Touch, Vec<f64>) {
     let pose = |origin_mm| Pose { origin_mm, ..Pose::default() }.encode();
     let mut finger = hand.fingers()[finger].lock().unwrap();
-    finger.take(&origins_mm.map(pose).concat(), SampleType::F32, 1.0, None).unwrap();
+    let payload = origins_mm.map(pose).concat();
+    let frame = Frame { payload: &payload, sample_type: SampleType::F32, scale: 1.0, time_us: 0 };
+    finger.take(frame, None).unwrap();
     let mut bytes = BytesMut::new();
     finger.write(&mut bytes);
     let values = bytes[TOUCH_LEN..].as_chunks::<4>().0;

@@ -96,7 +96,7 @@ class Core {
   }
 
   /// Takes how deep the undeformed skin lies in things, mm, negative in air: 224 x 224, or a value
-  /// a vertex, as the hello says.
+  /// a vertex, as the hello says; with its "velocity", x y z mm/s of each vertex behind them.
   std::uint32_t send_gaps(const float* depth_mm, std::size_t count, std::uint64_t client_time_us,
                           std::uint8_t finger = 0, const NetForce* net = nullptr) {
     count = std::min(count, map_len);
@@ -282,7 +282,7 @@ class Core {
     json::Value hello;
     if (!json::parse("{" + members + "}", hello)) return false;  // the service says what is wrong
     for (const char* name : {"input", "input_layout", "answer_layout", "objects", "fingers", "method",
-                             "force_target", "stiffness", "pressure", "shear"}) {
+                             "force_target", "stiffness", "pressure", "shear", "friction", "velocity"}) {
       if (hello.has(name)) return true;
     }
     return false;

@@ -53,7 +53,8 @@ impl Session {
     }
 
     /// Hands over how deep the undeformed skin lies in things (mm, negative in air), at the vertices
-    /// or pixels as the hello said, f32.
+    /// or pixels as the hello said, f32. With [`Hello::velocity`](papilla_proto::Hello::velocity),
+    /// x y z mm/s of each vertex follow the depths.
     ///
     /// # Errors
     /// The session is over.

@@ -27,9 +27,9 @@ const HELD: f32 = 0.999;
 pub struct Anchor {
     /// Vertex of the skin.
     pub vertex: u32,
-    /// Index of the object.
+    /// Index of the object; of what is told by gaps 0.
     pub object: u32,
-    /// Place in the object's own frame, mm.
+    /// Place in the object's own frame, mm; of what is told by gaps in the finger's.
     pub place_mm: [f64; 3],
 }
 
@@ -51,7 +51,7 @@ type Tangents = [[Vec<f32>; 3]; 2];
 /// Memory of the friction of one finger.
 #[derive(Debug)]
 pub(super) struct Friction {
-    /// Whether any object of this frame has friction.
+    /// Whether anything of this frame has friction.
     pub(super) is_rough: bool,
     /// Largest slip left in the last linearisation against a force below its bound, mm.
     pub(super) violation_mm: f32,
@@ -104,6 +104,16 @@ impl Friction {
         self.is_rough = is_rough;
         if !is_rough {
             self.forget();
+        }
+    }
+
+    /// Moves anchors with the things that they are on, by what is said of each vertex, mm.
+    pub(super) fn carry(&mut self, moved_mm: impl Fn(usize) -> [f64; 3]) {
+        for vertex in &self.anchored {
+            let moved = moved_mm(*vertex as usize);
+            if let Some(anchor) = &mut self.touches[*vertex as usize].anchor {
+                anchor.place_mm.iter_mut().zip(moved).for_each(|(place, by)| *place += by);
+            }
         }
     }
 

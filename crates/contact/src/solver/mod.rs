@@ -77,7 +77,7 @@ pub struct Settings {
     pub person: Person,
     /// Whether to find the local stiffness too, of the pressure alone.
     pub stiffness: bool,
-    /// Whether objects may have friction: at vertices, with a method that knows compliance.
+    /// Whether things may have friction: at vertices, with a method that knows compliance.
     pub friction: bool,
 }
 
@@ -237,6 +237,9 @@ impl Solver {
                 let result = read.and_then(|()| {
                     let view = View { things: Things::Field(&field), length, shift_mm: [0.0; 3] };
                     self.expect_friction(view)?;
+                    if let Some(friction) = &mut self.friction {
+                        friction.carry(|vertex| field.moved_mm(vertex));
+                    }
                     work(self, view)
                 });
                 self.field = field;

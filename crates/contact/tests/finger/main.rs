@@ -125,7 +125,7 @@ fn gaps_press_nearly_as_the_object_does() {
             let mut solver =
                 Solver::new(finger.model.clone(), Settings::default()).expect("a solver");
             let mut out = Contact::new(finger.model.vertices());
-            let gap = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: f64::INFINITY };
+            let gap = Gaps::rigid(&depth_mm);
             let result = if gaps {
                 solver.solve(gap, &mut out)
             } else {

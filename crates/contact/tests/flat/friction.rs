@@ -1,9 +1,12 @@
 //! Friction on an incompressible half-space, where normal and tangential forces do not mix.
 
-use papilla_contact::{Arrays, Contact, ContactModel, Header, NetForce, Object, Settings, Solver};
+use papilla_contact::{
+    Arrays, Contact, ContactError, ContactModel, Gaps, Header, NetForce, Object, Settings, Solver,
+};
 use std::f64::consts::PI;
 use std::sync::{Arc, OnceLock};
 
+use super::gaps::depths;
 use super::support::{MODULUS_MPA, SIDE, SPACING_MM, arrays, ball, small_strain, vertex};
 
 /// E* = 4 G of an incompressible half-space.
@@ -296,4 +299,62 @@ fn any_move_is_answered() {
     }
     println!("{touching} touch, {unsettled} unsettled");
     assert!(touching > 4000 && unsettled < touching / 50, "{touching} {unsettled}");
+}
+
+/// A ball that rests on the skin as gaps, and moves on as gaps and motion, pulls as the object does.
+#[test]
+fn gaps_that_move_pull_as_the_object_does() {
+    const FRICTION: f64 = 0.5;
+    let (mut by_object, mut due) = rough(small_strain());
+    let (mut by_gaps, mut out) = rough(small_strain());
+    let mut at = [0.0; 2];
+    for step in 0..24 {
+        // Straight in, aside, and back another way.
+        let way = match step {
+            0..3 => [0.0, 0.0],
+            3..12 => [2e-3, 0.0],
+            _ => [-1e-3, 2e-3],
+        };
+        at = [at[0] + way[0], at[1] + way[1]];
+        let ball = rough_ball(FRICTION, at, DEPTH_MM);
+        let (depth_mm, moved) = (depths(&ball), [way[0] as f32, way[1] as f32, 0.0]);
+        let moved_mm = vec![moved; SIDE * SIDE];
+        let gaps = Gaps { friction: FRICTION, moved_mm: &moved_mm, ..Gaps::rigid(&depth_mm) };
+        by_object.solve(&[ball], &mut due).expect("an answer");
+        by_gaps.solve(gaps, &mut out).expect("an answer");
+        let miss = size([0, 1].map(|i| out.force_n[i] - due.force_n[i]));
+        assert!(
+            miss < 0.02 * FRICTION * due.force_n[2],
+            "{step}: {:?} {:?}",
+            out.force_n,
+            due.force_n
+        );
+    }
+    assert!(size([due.force_n[0], due.force_n[1]]) > 0.2 * FRICTION * due.force_n[2]);
+    // What rests goes on pulling, and what has no friction does not.
+    let depth_mm = depths(&rough_ball(FRICTION, at, DEPTH_MM));
+    let before = out.force_n;
+    by_gaps
+        .solve(Gaps { friction: FRICTION, ..Gaps::rigid(&depth_mm) }, &mut out)
+        .expect("an answer");
+    assert!((out.force_n[1] / before[1] - 1.0).abs() < 0.01, "{before:?} {:?}", out.force_n);
+    by_gaps.solve(Gaps::rigid(&depth_mm), &mut out).expect("an answer");
+    assert!(size([out.force_n[0], out.force_n[1]]) < 1e-4 * out.force_n[2], "{:?}", out.force_n);
+}
+
+#[test]
+fn what_is_no_motion_is_named() {
+    let (mut solver, mut out) = rough(small_strain());
+    let depth_mm = depths(&rough_ball(0.5, [0.0; 2], DEPTH_MM));
+    let mut moved_mm = vec![[0.0; 3]; SIDE * SIDE];
+    moved_mm[3] = [0.0, f32::INFINITY, 0.0];
+    let gaps = Gaps { friction: 0.5, moved_mm: &moved_mm, ..Gaps::rigid(&depth_mm) };
+    let error = solver.solve(gaps, &mut out).expect_err("refused").to_string();
+    assert!(error.contains("moved_mm[3]"), "{error}");
+    let few = Gaps { moved_mm: &moved_mm[..5], ..gaps };
+    let error = solver.solve(few, &mut out).expect_err("refused");
+    assert_eq!(error, ContactError::Gaps { found: 5, expected: SIDE * SIDE });
+    let sticky = Gaps { friction: 11.0, moved_mm: &[], ..gaps };
+    let error = solver.solve(sticky, &mut out).expect_err("refused").to_string();
+    assert!(error.contains("friction"), "{error}");
 }

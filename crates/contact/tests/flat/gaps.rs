@@ -3,16 +3,12 @@
 use crate::support::{SIDE, ball, small_strain, solver, vertex};
 use papilla_contact::{ContactError, Gaps, NetForce, Object};
 
-fn depths(object: &Object) -> Vec<f32> {
+pub fn depths(object: &Object) -> Vec<f32> {
     let depth = |i: usize| {
         let [x, y] = vertex(i);
         -object.placement.distance(object.shape.as_ref(), [x, y, 0.0]).gap_mm as f32
     };
     (0..SIDE * SIDE).map(depth).collect()
-}
-
-fn rigid(depth_mm: &[f32]) -> Gaps<'_> {
-    Gaps { depth_mm, stiffness_mpa_per_mm: f64::INFINITY }
 }
 
 #[test]
@@ -22,7 +18,7 @@ fn gaps_press_as_the_object_does() {
         let (mut by_object, mut due) = solver(small_strain());
         by_object.solve(std::slice::from_ref(&object), &mut due).expect("an answer");
         let (mut by_gaps, mut out) = solver(small_strain());
-        by_gaps.solve(rigid(&depths(&object)), &mut out).expect("an answer");
+        by_gaps.solve(Gaps::rigid(&depths(&object)), &mut out).expect("an answer");
         let miss: f32 =
             out.pressure_pa.iter().zip(&due.pressure_pa).map(|(a, b)| (a - b).powi(2)).sum();
         let size: f32 = due.pressure_pa.iter().map(|p| p * p).sum();
@@ -36,11 +32,11 @@ fn gaps_press_as_the_object_does() {
 fn gaps_meet_a_force_and_air_is_air() {
     let (mut solver, mut out) = solver(small_strain());
     let far = depths(&ball(10.0, [0.0; 2], -5.0));
-    solver.solve(rigid(&far), &mut out).expect("an answer");
+    solver.solve(Gaps::rigid(&far), &mut out).expect("an answer");
     assert!(out.touched().is_empty() && out.effort.iterations == 0);
     let net = NetForce { direction: [0.0, 0.0, 1.0], force_n: 0.006 };
     let near = depths(&ball(10.0, [0.0; 2], -0.01));
-    solver.solve_for_force(rigid(&near), net, &mut out).expect("a travel");
+    solver.solve_for_force(Gaps::rigid(&near), net, &mut out).expect("a travel");
     assert!((out.force_n[2] / 0.006 - 1.0).abs() < 3e-3, "{}", out.force_n[2]);
 }
 
@@ -49,12 +45,12 @@ fn what_is_no_gap_is_named() {
     let (mut solver, mut out) = solver(small_strain());
     let mut depth_mm = depths(&ball(10.0, [0.0; 2], 0.05));
     depth_mm[7] = f32::NAN;
-    let error = solver.solve(rigid(&depth_mm), &mut out).expect_err("refused");
+    let error = solver.solve(Gaps::rigid(&depth_mm), &mut out).expect_err("refused");
     assert!(error.to_string().contains("depth_mm[7]"), "{error}");
-    let few = solver.solve(rigid(&depth_mm[..5]), &mut out).expect_err("refused");
+    let few = solver.solve(Gaps::rigid(&depth_mm[..5]), &mut out).expect_err("refused");
     assert_eq!(few, ContactError::Gaps { found: 5, expected: SIDE * SIDE });
     depth_mm[7] = -1.0;
-    let limp = Gaps { depth_mm: &depth_mm, stiffness_mpa_per_mm: 0.0 };
+    let limp = Gaps { stiffness_mpa_per_mm: 0.0, ..Gaps::rigid(&depth_mm) };
     assert!(solver.solve(limp, &mut out).expect_err("refused").to_string().contains("stiffness"));
-    solver.solve(rigid(&depth_mm), &mut out).expect("the solver lives on");
+    solver.solve(Gaps::rigid(&depth_mm), &mut out).expect("the solver lives on");
 }

@@ -12,7 +12,7 @@ use papilla_engine::Session;
 use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem};
 use papilla_render::{Judged, Maps};
-use papilla_session_contact::Finger;
+use papilla_session_contact::{Finger, Frame};
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
@@ -242,7 +242,7 @@ impl Worker {
             return Err(Problem::new(ErrorCode::Internal, "a frame that is no window"));
         };
         let range = self.range(job);
-        let frame = (payload, sample_type, scale);
+        let frame = Frame { payload, sample_type, scale, time_us: job.options.time_us };
         let taken = self.maps.take(finger, frame, range, shows_sed)?;
         meta.flags |= taken.flags;
         if let Some(iterations) = taken.iterations {
