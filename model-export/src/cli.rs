@@ -9,6 +9,7 @@ mod index;
 mod ladder;
 mod operators;
 mod patterns;
+mod shear;
 
 use clap::{Parser, Subcommand};
 use papilla_engine::{Backend, Card, Model};
@@ -117,6 +118,12 @@ enum Command {
     /// each against the FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
+    /// Measure what traction along the skin adds to SED, against FE with friction.
+    ///
+    /// SED of a network that knows pressure alone, and with what layered skin makes of FE's traction at
+    /// the vertices: the effect `shear_energy` of sessions.
+    #[command(after_long_help = EXIT_CODES)]
+    Shear(shear::Options),
     /// Measure drives of arrays of pins: the formula of sessions, and its inversion.
     ///
     /// For each held-out indentation both find the drive whose SED comes closest to it; a second
@@ -144,6 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Here(options) => here::run(options, json),
         Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
+        Command::Shear(options) => shear::run(options, json),
         Command::Actuators(options) => actuators::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

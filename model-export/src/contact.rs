@@ -109,6 +109,10 @@ impl Models {
         Ok(Self { finger: Arc::new(finger), half_space })
     }
 
+    pub(crate) fn finger(&self) -> &ContactModel {
+        &self.finger
+    }
+
     /// Refuses a dataset of another atlas.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 
 use crate::metrics::Ground;
 use crate::{ExportError, read, read_text};
-use ndarray::{Array1, Array2, Ix2, OwnedRepr};
+use ndarray::{Array1, Array2, Array3, Ix2, OwnedRepr};
 use ndarray_npy::{NpzReader, ReadNpzError, ReadableElement};
 use papilla_dataset::{Cells, Maps};
 use papilla_proto::{
@@ -99,6 +99,8 @@ pub struct Shard {
     pub depth_mm: Array1<f32>,
     /// Force on the finger, N; `[D, 3]`; none if the shard does not hold it.
     pub force_n: Option<Array2<f32>>,
+    /// Traction along the skin, Pa; `[D, V, 3]`; none without friction.
+    pub shear_pa: Option<Array3<f32>>,
 }
 
 /// A dataset whose manifest and atlas have been read and agree.
@@ -249,6 +251,7 @@ impl Dataset {
             sed_j_per_m3: read_array(&mut npz, "sed_dermis_j_per_m3").map_err(unreadable)?,
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
             force_n: read_array(&mut npz, "force_n").ok(),
+            shear_pa: read_array(&mut npz, "shear_pa").ok(),
         };
         let expected = (indentation.samples, values);
         for (name, array) in
@@ -260,6 +263,10 @@ impl Dataset {
             if let Some(value) = array.iter().find(|value| !value.is_finite()) {
                 return Err(bad(format!("{name} holds {value}")));
             }
+        }
+        let by_value = |shear: &Array3<f32>| shear.dim() == (expected.0, expected.1, 3);
+        if let Some(shear) = shard.shear_pa.as_ref().filter(|shear| !by_value(shear)) {
+            return Err(bad(format!("shear_pa is {:?}", shear.dim())));
         }
         if shard.depth_mm.len() != indentation.samples {
             return Err(bad(format!("depth_mm has {} values", shard.depth_mm.len())));
@@ -303,7 +310,7 @@ impl Dataset {
         )
     }
 
-    fn draw(
+    pub(crate) fn draw(
         &self,
         indentation: &Indentation,
         patch: Patch,

@@ -34,6 +34,7 @@ pub mod operators;
 pub mod picture;
 mod processor;
 pub mod reference;
+pub mod shear;
 pub mod table;
 
 pub use error::{ExportError, read, read_text, write};

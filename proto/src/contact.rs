@@ -7,7 +7,8 @@
 //! | `pressure` | 1 | a window, or vertices x 1 | samples, Pa |
 //! | `objects` | 4 | 7 x objects | a [`Pose`] of each object of the hello, f32 |
 //! | `gaps` | 5 | 224 x 224, or vertices x 1 | depth of the undeformed skin, mm; f32 or f16 |
-//! | with `velocity` | 5 | 4 vertices x 1 | depths, then how fast the thing at each vertex moves, x y z mm/s |
+//! | `pressure` with `traction` | 1 | 4 vertices x 1 | pressures, then traction along the skin at each vertex, x y z Pa; f32 or f16 |
+//! | `gaps` with `velocity` | 5 | 4 vertices x 1 | depths, then how fast the thing at each vertex moves, x y z mm/s |
 //!
 //! With `force_target` a row of seven f32 more follows poses, and so many samples gaps: a unit
 //! vector, the net force along it, N (0: none is asked), and three to be ignored. An answer to

@@ -26,12 +26,15 @@ pub enum RuntimeEffect {
     Spikes,
     /// The tissue creeps under the pressure.
     Relaxation,
+    /// SED feels traction along the skin. Version 3.
+    ShearEnergy,
 }
 
 impl RuntimeEffect {
     /// All of them, in the order in which they act.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Relaxation,
+        Self::ShearEnergy,
         Self::Afferents,
         Self::Spikes,
         Self::ContactWindow,
@@ -51,6 +54,7 @@ impl RuntimeEffect {
             Self::Afferents => "afferents",
             Self::Spikes => "spikes",
             Self::Relaxation => "relaxation",
+            Self::ShearEnergy => "shear_energy",
         }
     }
 
@@ -65,6 +69,7 @@ impl RuntimeEffect {
             Self::Afferents => "turns SED into the firing rate of SA1 afferents in map and points",
             Self::Spikes => "adds when SA1, RA and Pacinian units of the finger fire",
             Self::Relaxation => "lets the tissue creep: a Prony filter on pressure before the map",
+            Self::ShearEnergy => "adds to SED what traction along the skin changes",
         }
     }
 }

@@ -190,9 +190,21 @@ pub struct Hello {
     /// Whether frames of gaps hold how fast things move at each vertex.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<bool>,
+    /// Whether frames of pressure at vertices hold the traction along the skin too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traction: Option<bool>,
 }
 
 impl Hello {
+    /// Whether frames or contact tell traction along the skin.
+    #[must_use]
+    pub fn has_traction(&self) -> bool {
+        let rough = |friction: Option<f64>| friction.is_some_and(|f| f != 0.0);
+        self.traction == Some(true)
+            || rough(self.friction)
+            || self.objects.iter().flatten().any(|object| rough(object.friction))
+    }
+
     /// The first member of version 2 that is there.
     #[must_use]
     pub fn member_of_version_2(&self) -> Option<&'static str> {
@@ -231,6 +243,7 @@ impl Hello {
             (self.shear.is_some(), "shear"),
             (self.friction.is_some(), "friction"),
             (self.velocity.is_some(), "velocity"),
+            (self.traction.is_some(), "traction"),
         ]
         .into_iter()
         .find_map(|(there, name)| there.then_some(name))
@@ -273,6 +286,7 @@ impl Default for Hello {
             shear: None,
             friction: None,
             velocity: None,
+            traction: None,
         }
     }
 }

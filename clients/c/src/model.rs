@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use papilla_contact::{ContactModel, PixelSkin};
+use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_engine::{Card, EngineError, card::Index};
 use papilla_proto::atlas::{Atlas, AtlasError, Patch, Raster};
 use papilla_render::SkinPixels;
@@ -88,6 +88,7 @@ pub struct Model {
     pub(crate) card: Card,
     pub(crate) contact: Option<Arc<ContactModel>>,
     pub(crate) pixel_skin: Option<Arc<PixelSkin>>,
+    pub(crate) interface_skin: Option<Arc<InterfaceSkin>>,
 }
 
 impl std::fmt::Debug for Model {
@@ -147,7 +148,20 @@ impl Model {
         let skin = Arc::new(skin);
         let pixel_skin = contact.as_ref().and_then(|m| PixelSkin::new(m, &atlas, skin.clone()));
         let pixel_skin = pixel_skin.map(Arc::new);
-        Ok(Self { atlas, skin, interface, pixels, shared, network, card, contact, pixel_skin })
+        let of_interface = |m| InterfaceSkin::new(m, &atlas, skin.clone()).map(Arc::new);
+        let interface_skin = contact.as_deref().and_then(of_interface);
+        Ok(Self {
+            atlas,
+            skin,
+            interface,
+            pixels,
+            shared,
+            network,
+            card,
+            contact,
+            pixel_skin,
+            interface_skin,
+        })
     }
 
     /// Draws values at the vertices of the skin as a map.

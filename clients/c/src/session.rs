@@ -68,8 +68,14 @@ impl Session {
     pub fn open(model: &Arc<Model>, hello: &str) -> Result<Self, Problem> {
         let hello = hello::read(hello, model)?;
         let Model { atlas, skin, interface, shared, contact, pixel_skin, .. } = &**model;
-        let (contact, pixels) = (contact.as_ref(), pixel_skin.as_ref());
-        let hand = Hand::of(&hello, Skin { atlas, raster: skin, model: contact, pixels })?;
+        let of_hand = Skin {
+            atlas,
+            raster: skin,
+            model: contact.as_ref(),
+            pixels: pixel_skin.as_ref(),
+            interface: model.interface_skin.as_ref(),
+        };
+        let hand = Hand::of(&hello, of_hand)?;
         let finger = effects::Finger { atlas, skin, interface, shared };
         let mut effects = Vec::with_capacity(hand.fingers().len());
         for _ in hand.fingers() {
@@ -237,6 +243,7 @@ impl Session {
             found |= judged.flags;
             if !judged.is_zero {
                 maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
+                maps.feel_shear(&mut finger);
             }
             if let Some(effects) = &mut effects {
                 let infer = |pressure_pa: &[f32], sed: &mut [f32]| network.infer(pressure_pa, sed);

@@ -33,7 +33,7 @@ NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
 _OF_VERSION_3: Final = {
     "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target",
-    "stiffness", "pressure", "shear", "friction", "velocity",
+    "stiffness", "pressure", "shear", "friction", "velocity", "traction",
 }  # fmt: skip
 
 

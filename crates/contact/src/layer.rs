@@ -13,3 +13,11 @@ pub struct Layer {
     /// Thickness, mm.
     pub thickness_mm: f64,
 }
+
+impl Layer {
+    /// Lame's constants, MPa.
+    pub(crate) fn lame_mpa(&self) -> [f64; 2] {
+        let Self { young_mpa: e, poisson: nu, .. } = *self;
+        [e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu))]
+    }
+}

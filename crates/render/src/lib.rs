@@ -140,6 +140,11 @@ impl Maps {
         session.infer(seen_pa, &mut self.sed_j_per_m3)
     }
 
+    /// Adds to SED what traction along the skin changes, if the finger is to feel it.
+    pub fn feel_shear(&mut self, finger: &mut Finger) {
+        finger.feel_shear(&self.pressure_pa, &mut self.sed_j_per_m3);
+    }
+
     /// Turns pressure and SED of the finger of reference stiffness into this person's.
     pub fn to_person(&mut self, finger: &Finger) {
         finger.to_person(&mut self.pressure_pa);

@@ -39,6 +39,7 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         return Err(unusable("method", message));
     }
     check_friction_of_gaps(hello, input)?;
+    check_traction(hello, input)?;
     let at_vertices = [ContactMethod::SmallStrain, ContactMethod::SecondOrder];
     if has_friction(hello) && !at_vertices.contains(&hello.method.unwrap_or_default()) {
         let message = "friction and 'shear' are of the methods 'small_strain' and 'second_order'";
@@ -85,13 +86,24 @@ fn require_friction(value: f64, field: String) -> Result<(), Problem> {
     Err(unusable(field, message))
 }
 
+/// Whether traction can come with pressure.
+fn check_traction(hello: &Hello, input: Input) -> Result<(), Problem> {
+    if hello.traction != Some(true) {
+        return Ok(());
+    }
+    if input != Input::Pressure || layout(hello) == SampleLayout::Map {
+        let message = "'traction' is of input 'pressure' with \"input_layout\": \"vertices\"";
+        return Err(unusable("traction", message));
+    }
+    if !matches!(hello.sample_type, SampleType::F32 | SampleType::F16) {
+        return Err(unusable("sample_type", "traction has a sign: with it frames are f32 or f16"));
+    }
+    Ok(())
+}
+
 /// Whether contact has to find friction.
 pub(crate) fn has_friction(hello: &Hello) -> bool {
-    let rough = |friction: Option<f64>| friction.is_some_and(|f| f != 0.0);
-    let objects = hello.objects.iter().flatten();
-    hello.shear == Some(true)
-        || rough(hello.friction)
-        || objects.into_iter().any(|object: &AnnouncedObject| rough(object.friction))
+    hello.shear == Some(true) || hello.has_traction()
 }
 
 /// The objects, each as far away as can be.

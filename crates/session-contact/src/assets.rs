@@ -3,9 +3,11 @@
 use std::{sync::Arc, time::Instant};
 
 use papilla_contact::{
-    Contact, ContactModel, ModelError, Object, PixelContact, PixelSkin, Settings, Solver,
+    Contact, ContactModel, InterfaceSkin, ModelError, Object, PixelContact, PixelSkin, Settings,
+    ShearEnergy, Solver,
 };
 use papilla_proto::{
+    MAP_LEN,
     atlas::{Atlas, Raster},
     sdf::{Placement, RoundedPlate},
 };
@@ -21,6 +23,10 @@ pub struct ContactAssets {
     pub model: Arc<ContactModel>,
     /// What pixels have to know; none if the model names no layers.
     pub pixels: Option<Arc<PixelSkin>>,
+    /// What traction along the skin needs to be felt; none likewise.
+    pub interface: Option<Arc<InterfaceSkin>>,
+    /// Time that `shear_energy` adds to a frame, us.
+    pub shear_us: Option<u64>,
     /// Time of a warm frame under a plate that moves by 10 um, us.
     pub frame_us: u64,
     /// The same on pixels.
@@ -36,9 +42,11 @@ impl ContactAssets {
         let model = Arc::new(ContactModel::read(bytes)?);
         model.require_atlas(atlas.hash())?;
         let pixels = PixelSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
+        let interface = InterfaceSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
+        let shear_us = interface.as_ref().map(|of| shear_us(of, model.vertices()));
         let frame_us = frame_us(&model, None).unwrap_or(0);
         let pixel_frame_us = pixels.as_ref().and_then(|skin| frame_us_on(skin, &model));
-        Ok(Self { model, pixels, frame_us, pixel_frame_us })
+        Ok(Self { model, pixels, interface, shear_us, frame_us, pixel_frame_us })
     }
 
     /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
@@ -47,6 +55,21 @@ impl ContactAssets {
         let us = if hand.is_on_pixels { self.pixel_frame_us? } else { self.frame_us };
         (!hand.form().takes_pressure()).then_some(us)
     }
+}
+
+/// What traction takes to be felt; the time does not depend on the values.
+fn shear_us(of: &Arc<InterfaceSkin>, vertices: usize) -> u64 {
+    let mut energy = ShearEnergy::new(Arc::clone(of));
+    let (pressure_pa, mut sed) = (vec![1e3; MAP_LEN], vec![0.0; MAP_LEN]);
+    let shear_pa = vec![[100.0; 3]; vertices];
+    let mut times = [0; FRAMES as usize];
+    for time in &mut times {
+        let start = Instant::now();
+        energy.add(&pressure_pa, &shear_pa, 1.0, &mut sed);
+        *time = start.elapsed().as_micros() as u64;
+    }
+    times.sort_unstable();
+    times[times.len() / 2]
 }
 
 fn frame_us_on(skin: &Arc<PixelSkin>, model: &Arc<ContactModel>) -> Option<u64> {

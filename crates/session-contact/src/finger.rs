@@ -3,9 +3,11 @@
 use std::{fmt, sync::Arc, time::Instant};
 
 use bytes::BytesMut;
-use papilla_contact::{Contact, ContactModel, NetForce, Object, Person, PixelContact, Scene};
+use papilla_contact::{
+    Contact, ContactModel, NetForce, Object, Person, PixelContact, Scene, ShearEnergy,
+};
 use papilla_proto::{
-    ErrorCode, Hello, MAP_LEN, Problem, SampleType,
+    ErrorCode, Hello, MAP_LEN, Problem, RuntimeEffect, SampleType,
     atlas::Raster,
     contact::{Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
     flags,
@@ -33,6 +35,8 @@ pub struct Finger {
     raster: Arc<Raster>,
     pressure: Option<SampleLayout>,
     has_shear: bool,
+    /// By the effect `shear_energy`.
+    shear_energy: Option<ShearEnergy>,
     /// The pressure that is sent, if as a map.
     sent_pa: Vec<f32>,
     touch: Touch,
@@ -102,6 +106,7 @@ impl Finger {
             raster: Arc::clone(skin.raster),
             pressure: hello.pressure,
             has_shear: hello.shear == Some(true),
+            shear_energy: shear_energy(hello, skin)?,
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
             touch: Touch::default(),
         })
@@ -117,6 +122,16 @@ impl Finger {
     #[must_use]
     pub fn takes_pressure(&self) -> bool {
         self.form.input == Input::Pressure
+    }
+
+    /// Adds to SED (224 x 224, J/m3), which a network made of `pressure_pa` (224 x 224), what traction
+    /// along the skin changes, if the hello names the effect `shear_energy`. Both are of the finger of
+    /// reference stiffness.
+    pub fn feel_shear(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) {
+        let part = 1.0 / self.stiffness();
+        if let Some(energy) = &mut self.shear_energy {
+            energy.add(pressure_pa, &self.out.shear_pa, part, sed_j_per_m3);
+        }
     }
 
     /// Bytes that [`Self::write`] appends.
@@ -285,7 +300,14 @@ impl Finger {
 
     fn take_pressure(&mut self) -> Result<(), Problem> {
         let mut peak = 0.0f32;
-        for (vertex, p) in self.samples.iter().enumerate() {
+        let (pressures, tractions) = self.samples.split_at(self.out.pressure_pa.len());
+        let tractions = tractions.as_chunks::<3>().0;
+        if let Some(vertex) = tractions.iter().position(|t| !t.iter().all(|v| v.is_finite())) {
+            let message = format!("the traction at vertex {vertex} is {:?} Pa", tractions[vertex]);
+            let field = format!("traction_pa[{vertex}]");
+            return Err(Problem::new(ErrorCode::NotFinite, message).at(field));
+        }
+        for (vertex, p) in pressures.iter().enumerate() {
             if !(*p >= 0.0 && p.is_finite()) {
                 let code =
                     if p.is_finite() { ErrorCode::NegativePressure } else { ErrorCode::NotFinite };
@@ -294,8 +316,11 @@ impl Finger {
             }
             peak = peak.max(*p);
         }
-        self.out.pressure_pa.copy_from_slice(&self.samples);
+        self.out.pressure_pa.copy_from_slice(pressures);
         self.touch.pressure_max_pa = peak;
+        if self.form.has_vectors {
+            self.out.shear_pa.copy_from_slice(tractions);
+        }
         Ok(())
     }
 
@@ -342,6 +367,20 @@ impl Finger {
             _ => Ok(None),
         }
     }
+}
+
+/// What feels traction, if the hello asks for it.
+fn shear_energy(hello: &Hello, skin: Skin<'_>) -> Result<Option<ShearEnergy>, Problem> {
+    let name = RuntimeEffect::ShearEnergy.as_str();
+    if !hello.effects.iter().any(|effect| effect == name) {
+        return Ok(None);
+    }
+    let Some(interface) = skin.interface else {
+        let message = "this service has no contact model that names layers of the skin; make one \
+                       with `fe-datagen contact`, or leave 'shear_energy' out";
+        return Err(Problem::new(ErrorCode::BadEffect, message).at(name));
+    };
+    Ok(Some(ShearEnergy::new(Arc::clone(interface))))
 }
 
 /// Draws the pressure that was found, of pixels or else of vertices, as a map, Pa.

@@ -13,7 +13,8 @@ pub struct FrameForm {
     pub(crate) input: Input,
     pub(crate) layout: SampleLayout,
     pub(crate) has_force: bool,
-    pub(crate) has_velocity: bool,
+    /// Whether three numbers more for each vertex follow those of all vertices.
+    pub(crate) has_vectors: bool,
     objects: usize,
     fingers: usize,
     vertices: usize,
@@ -27,7 +28,7 @@ impl FrameForm {
             input: hello.input.unwrap_or_default(),
             layout,
             has_force,
-            has_velocity: hello.velocity == Some(true),
+            has_vectors: hello.velocity == Some(true) || hello.traction == Some(true),
             objects,
             fingers,
             vertices,
@@ -63,7 +64,7 @@ impl FrameForm {
             (Input::Pressure, SampleLayout::Map) => None,
             (Input::Objects, _) => Some([ROW, self.objects + usize::from(self.has_force)]),
             (_, SampleLayout::Vertices) => {
-                Some([if self.has_velocity { 4 * self.vertices } else { self.vertices }, 1])
+                Some([if self.has_vectors { 4 * self.vertices } else { self.vertices }, 1])
             }
             (Input::Gaps, SampleLayout::Map) => Some([MAP_SIDE_PX, MAP_SIDE_PX]),
         }

@@ -41,7 +41,7 @@ impl GapReader {
             depth_mm: vec![0.0; vertices],
             friction: hello.friction.unwrap_or(0.0),
             sampler: (form.layout == SampleLayout::Map).then(sampler),
-            motion: form.has_velocity.then(motion),
+            motion: form.has_vectors.then(motion),
         })
     }
 

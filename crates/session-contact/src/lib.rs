@@ -15,7 +15,7 @@
 //!
 //! // A service without a contact model takes pressure alone.
 //! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
-//! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None };
+//! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None, interface: None };
 //! let hello = Hello { version: 3, ..Hello::default() };
 //! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
 //! let objects = Hello { input: Some(Input::Objects), ..hello };
@@ -37,7 +37,7 @@ mod tests;
 
 use std::sync::{Arc, Mutex};
 
-use papilla_contact::{ContactModel, PixelSkin};
+use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem,
     atlas::{Atlas, Raster},
@@ -60,6 +60,8 @@ pub struct Skin<'a> {
     pub model: Option<&'a Arc<ContactModel>>,
     /// What contact on pixels has to know of it; none if the model names no layers.
     pub pixels: Option<&'a Arc<PixelSkin>>,
+    /// What traction along the skin needs to be felt; none likewise.
+    pub interface: Option<&'a Arc<InterfaceSkin>>,
 }
 
 /// The fingers of one session.

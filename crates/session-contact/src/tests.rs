@@ -1,4 +1,4 @@
-use papilla_contact::{Arrays, Header, Layer};
+use papilla_contact::{Arrays, Header, InterfaceSkin, Layer};
 use papilla_proto::{
     FrameHeader, FrameKind, SampleType,
     atlas::{Patch, PatchVertices},
@@ -19,6 +19,7 @@ struct Plane {
     raster: Arc<Raster>,
     model: Arc<ContactModel>,
     pixels: Arc<PixelSkin>,
+    interface: Arc<InterfaceSkin>,
 }
 
 impl Plane {
@@ -40,7 +41,9 @@ impl Plane {
             vertices: SIDE * SIDE,
             triangles: triangles.len(),
             share_max: 1.0,
-            layers: vec![Layer { young_mpa: 0.15, poisson: 0.49, thickness_mm: 99.0 }],
+            layers: [0.2, 98.8]
+                .map(|thickness_mm| Layer { young_mpa: 0.15, poisson: 0.49, thickness_mm })
+                .to_vec(),
             atlas_hash: atlas.hash().to_owned(),
             ..Header::current()
         };
@@ -54,12 +57,14 @@ impl Plane {
         let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
         let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
         let pixels = PixelSkin::new(&model, &atlas, Arc::clone(&raster)).expect("layers");
-        Self { atlas, raster, model, pixels: Arc::new(pixels) }
+        let interface = InterfaceSkin::new(&model, &atlas, Arc::clone(&raster)).expect("layers");
+        Self { atlas, raster, model, pixels: Arc::new(pixels), interface: Arc::new(interface) }
     }
 
     fn hand(&self, hello: &Hello) -> Result<Hand, Problem> {
-        let Self { atlas, raster, model, pixels } = self;
-        Hand::of(hello, Skin { atlas, raster, model: Some(model), pixels: Some(pixels) })
+        let Self { atlas, raster, model, pixels, interface } = self;
+        let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
+        Hand::of(hello, Skin { atlas, raster, model, pixels, interface })
     }
 }
 
@@ -315,6 +320,74 @@ fn gaps_that_say_how_things_move_pull_as_the_object_does() {
     let mut finger = hand.fingers()[0].lock().expect("no panic");
     let refused = finger.take(frame(&payload, 0), None).expect_err("refused");
     assert_eq!(refused.field.as_deref(), Some("velocity_mm_per_s[0]"));
+}
+
+/// Traction that the client sends, and the same that contact finds.
+#[test]
+fn traction_is_felt_where_the_hello_names_it() {
+    let plane = Plane::new();
+    let ball = AnnouncedObject { friction: Some(0.5), ..ball(20.0) };
+    let rough = Hello {
+        objects: Some(vec![ball]),
+        pressure: Some(SampleLayout::Vertices),
+        shear: Some(true),
+        effects: vec!["shear_energy".to_owned()],
+        ..objects()
+    };
+    let felt = |hand: &Hand, payload: &[u8], pressure_pa: &mut Vec<f32>| {
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        finger.take(frame(payload, 0), Some(pressure_pa)).expect("an answer");
+        let mut sed = vec![100.0; MAP_LEN];
+        finger.feel_shear(pressure_pa, &mut sed);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        finger.write(&mut bytes);
+        (sed, bytes)
+    };
+    let mut pressure_pa = vec![0.0; MAP_LEN];
+    let hand = plane.hand(&rough).expect("a hand");
+    for x in [0.0, 0.05, 0.1] {
+        let pose = Pose { origin_mm: [x, 0.0, 0.3 - 20.0], ..Pose::default() }.encode();
+        felt(&hand, &pose, &mut pressure_pa);
+    }
+    let pose = Pose { origin_mm: [0.15, 0.0, 0.3 - 20.0], ..Pose::default() }.encode();
+    let (due, bytes) = felt(&hand, &pose, &mut pressure_pa);
+    assert!(due.iter().any(|sed| (sed - 100.0).abs() > 1.0));
+
+    let section = |name| hand.sections().iter().find(|s| s.name == name).expect("a section");
+    let of = |name| {
+        let section = section(name);
+        bytes[section.offset as usize..][..section.bytes as usize].to_vec()
+    };
+    let payload = [of(SectionName::Pressure), of(SectionName::Shear)].concat();
+    let sent = Hello {
+        version: 3,
+        input_layout: Some(SampleLayout::Vertices),
+        traction: Some(true),
+        effects: rough.effects.clone(),
+        ..Hello::default()
+    };
+    let by_client = plane.hand(&sent).expect("a hand");
+    assert_eq!(by_client.form().size(), Some([4 * SIDE * SIDE, 1]));
+    let (found, _) = felt(&by_client, &payload, &mut pressure_pa);
+    let miss = found.iter().zip(&due).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(miss < 1e-3, "{miss}");
+
+    let plain = plane.hand(&Hello { effects: Vec::new(), ..sent.clone() }).expect("a hand");
+    let (untouched, _) = felt(&plain, &payload, &mut pressure_pa);
+    assert!(untouched.iter().all(|sed| sed.to_bits() == 100f32.to_bits()));
+    for (hello, field) in [
+        (Hello { input_layout: None, ..sent.clone() }, "traction"),
+        (Hello { sample_type: SampleType::U16, ..sent.clone() }, "sample_type"),
+        (Hello { traction: Some(true), ..objects() }, "traction"),
+    ] {
+        let refused = plane.hand(&hello).map(|_| ()).expect_err("refused");
+        assert_eq!(refused.field.as_deref(), Some(field), "{refused:?}");
+    }
+    let mut endless = payload.clone();
+    endless[4 * SIDE * SIDE..][..4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    let mut finger = by_client.fingers()[0].lock().expect("no panic");
+    let refused = finger.take(frame(&endless, 0), None).expect_err("refused");
+    assert_eq!(refused.field.as_deref(), Some("traction_pa[0]"));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! What a session asks for beside the SED map; one file an effect.
 //!
-//! A frame meets them in this order: `relaxation` before the network, `afferents` and `spikes` after
-//! it, and then whatever reads their results. **Invariant:** what the hello did not name is neither
+//! A frame meets them in this order: `relaxation` before the network, `shear_energy` after it (the
+//! session's finger, which knows traction, works it out), `afferents` and `spikes`, and then whatever
+//! reads their results. **Invariant:** what the hello did not name is neither
 //! computed nor allocated; what it named allocates at the hello and never in a frame.
 //!
 //! ```
@@ -421,6 +422,17 @@ fn named(hello: &Hello) -> Result<Vec<RuntimeEffect>, Problem> {
         if named && due && !given {
             let message = format!("the effect '{effect}' needs the member '{effect}'");
             return Err(unusable(effect.as_str(), message));
+        }
+    }
+    if names.contains(&RuntimeEffect::ShearEnergy) {
+        if !hello.has_traction() {
+            let message = "'shear_energy' needs traction: objects or gaps with friction, or \
+                           pressure with 'traction'";
+            return Err(unusable("shear_energy", message));
+        }
+        if names.contains(&RuntimeEffect::Relaxation) {
+            let message = "'shear_energy' and 'relaxation': traction has no creep here; name one";
+            return Err(unusable("shear_energy", message));
         }
     }
     let by_vertices = hello.answer_layout == Some(SampleLayout::Vertices);

@@ -9,7 +9,9 @@ use serde_json::{Value, json};
 
 use crate::support::{
     GAIN, Service, Socket,
-    contact::{MODULUS_MPA, atlas, deep, hello_3, hertz_n, model, model_of, rows, service},
+    contact::{
+        MODULUS_MPA, RADIUS_MM, atlas, deep, hello_3, hertz_n, model, model_of, rows, service,
+    },
     floats_of, frame, hello, model_folder, model_folder_on, write,
 };
 
@@ -91,6 +93,49 @@ async fn pixels_need_objects_and_layers() {
         let mut socket = service.socket().await;
         socket.send(hello_3(&members).to_string()).await;
         assert_eq!(socket.hear_refusal("bad_contact").await["field"], "method");
+    }
+}
+
+/// A ball that is dragged: its traction is felt where the hello names the effect, and only there.
+#[tokio::test(flavor = "multi_thread")]
+async fn traction_is_felt_by_name() {
+    let service = service().await;
+    let rough = json!([{"shape": {"shape": "sphere", "radius_mm": RADIUS_MM}, "friction": 0.5}]);
+    let mut maps = Vec::new();
+    for effects in [json!(["shear_energy"]), json!([])] {
+        let mut socket = service.socket().await;
+        let members = json!({"objects": rough, "effects": effects, "out_of_range": "flag"});
+        let ready = socket.open(hello_3(&members)).await;
+        assert_eq!(ready["session_effects"], effects);
+        let mut sed = Vec::new();
+        for sequence in 1..=4u32 {
+            let x = 0.05 * sequence as f32;
+            let pose = Pose { origin_mm: [x, 0.0, 0.3 - RADIUS_MM], ..Pose::default() };
+            socket.send(rows(sequence, 0, &[pose])).await;
+            let (_, touch, payload) = hear(&mut socket).await;
+            assert!(touch.force_n[0] > 0.0 || sequence == 1, "{touch:?}");
+            sed = floats_of(&payload[TOUCH_LEN..]);
+        }
+        maps.push(sed);
+    }
+    let most = |map: &[f32]| map.iter().copied().fold(0.0, f32::max);
+    let apart: Vec<f32> = maps[0].iter().zip(&maps[1]).map(|(a, b)| (a - b).abs()).collect();
+    assert!(most(&apart) > 1.0 && maps[0].iter().all(|sed| *sed >= 0.0), "{}", most(&apart));
+
+    let effects = service.json("/v1/effects").await;
+    let listed = effects["effects"].as_array().unwrap();
+    let of = listed.iter().find(|effect| effect["name"] == "shear_energy").unwrap();
+    assert!(of["cost_us"].as_f64().is_some_and(|us| us > 0.0), "{of}");
+    // Slippery things pull at nothing; without layers nothing is known of the interface.
+    let folder = model_folder_on(&atlas());
+    write(folder.path(), "finger.contact", &model_of(Vec::new()));
+    let without_layers = Service::on(folder, |_| ()).await.unwrap();
+    let named = json!({"effects": ["shear_energy"]});
+    let with_friction = json!({"effects": ["shear_energy"], "objects": rough});
+    for (service, members) in [(&service, named), (&without_layers, with_friction)] {
+        let mut socket = service.socket().await;
+        socket.send(hello_3(&members).to_string()).await;
+        assert_eq!(socket.hear_refusal("bad_effect").await["field"], "shear_energy");
     }
 }
 

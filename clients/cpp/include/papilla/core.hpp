@@ -282,7 +282,7 @@ class Core {
     json::Value hello;
     if (!json::parse("{" + members + "}", hello)) return false;  // the service says what is wrong
     for (const char* name : {"input", "input_layout", "answer_layout", "objects", "fingers", "method",
-                             "force_target", "stiffness", "pressure", "shear", "friction", "velocity"}) {
+                             "force_target", "stiffness", "pressure", "shear", "friction", "velocity", "traction"}) {
       if (hello.has(name)) return true;
     }
     return false;

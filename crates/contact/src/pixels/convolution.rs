@@ -1,6 +1,7 @@
 //! Products with a compliance that is the same everywhere, on a window of pixels.
 
-use super::layers::SurfaceCompliance;
+use crate::kernels::turn;
+use crate::layers::SurfaceCompliance;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
@@ -213,21 +214,6 @@ impl Convolution {
             waves[0].im = 0.0;
             waves[half - 1].im = 0.0;
             let _ = along.back.process_with_scratch(waves, row, scratch);
-        }
-    }
-}
-
-/// Transposes lines of `length`, some lines at once so that both sides are read and written
-/// along.
-fn turn(from: &[C32], length: usize, to: &mut [C32]) {
-    const TOGETHER: usize = 8;
-    let lines = from.len() / length;
-    for first in (0..lines).step_by(TOGETHER) {
-        let last = (first + TOGETHER).min(lines);
-        for column in 0..length {
-            for (line, to) in (first..last).zip(&mut to[column * lines + first..]) {
-                *to = from[line * length + column];
-            }
         }
     }
 }

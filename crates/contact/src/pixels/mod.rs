@@ -24,7 +24,7 @@
 //! map, where no pixel could carry it.
 
 mod convolution;
-mod layers;
+
 mod memory;
 mod nearby;
 mod own_dents;

@@ -6,8 +6,8 @@
 //! the force it goes on as the polynomial of second degree through what is round it.
 
 use super::convolution::{Convolution, Plans};
-use super::layers::SurfaceCompliance;
 use super::smooth::{Stencil, TERMS, solve};
+use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{MAP_SIDE_PX, Raster};
 use std::sync::Arc;

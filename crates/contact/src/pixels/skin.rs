@@ -1,9 +1,9 @@
 //! What pixels have to know of a skin.
 
 use super::convolution::Plans;
-use super::layers::SurfaceCompliance;
 use super::own_dents::{Correction, OwnDents};
 use super::smooth::{self, PixelStencil};
+use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{Atlas, Raster};
 use std::sync::Arc;

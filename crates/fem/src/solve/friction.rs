@@ -37,15 +37,16 @@ pub(super) fn update(friction: &mut FrictionTrial, found: &Evaluation) {
     }
 }
 
-/// How far multipliers and bounds are from those that the equilibrium found,
-/// over the largest bound.
-pub(super) fn change(friction: &FrictionTrial, found: &Evaluation) -> f64 {
+/// How far bounds, and multipliers unless there are none, are from those that the equilibrium
+/// found, over the largest bound.
+pub(super) fn change(friction: &FrictionTrial, found: &Evaluation, by_penalty: bool) -> f64 {
     let (mut worst, mut scale) = (0.0f64, 0.0f64);
     for ((point, t), pressure) in
         friction.points.iter().zip(&found.friction).zip(&found.traction_mpa)
     {
         let bound = friction.coefficient * pressure;
         let moved = norm(std::array::from_fn(|i| t[i] - point.traction_mpa[i]));
+        let moved = if by_penalty { 0.0 } else { moved };
         worst = worst.max(moved).max((bound - point.bound_mpa).abs());
         scale = scale.max(bound);
     }

@@ -2,6 +2,7 @@
 
 use super::bodies::{internal_force, solve, uniform};
 use super::{CaseError, Check, Context};
+use papilla_fem::contact::ContactRule;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::block::even;
@@ -15,22 +16,54 @@ const DEPTH_MM: f64 = 0.1;
 const SIDE_MM: f64 = 4.0;
 const HEIGHT_MM: f64 = 2.0;
 
+/// Elements between the block's nodes, and where contact is found.
+#[derive(Clone, Copy)]
+struct Form {
+    kind: ElementKind,
+    rule: ContactRule,
+    name: &'static str,
+}
+
+/// Multipliers at nodes, as on even meshes, and a penalty at points of quadratic faces, as on graded
+/// ones.
+const FORMS: [Form; 2] = [
+    Form { kind: ElementKind::Hex8, rule: ContactRule::Nodal, name: "" },
+    Form { kind: ElementKind::Hex27, rule: ContactRule::Gauss, name: " (quadratic faces)" },
+];
+
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {
-    let mut rows = slip(if context.quick { &[0.5] } else { &[0.2, 0.5, 0.8, 1.2] })?;
-    rows.extend(stick()?);
+    let mut rows = Vec::new();
+    for form in FORMS {
+        rows.extend(slip(form, if context.quick { &[0.5] } else { &[0.2, 0.5, 0.8, 1.2] })?);
+        rows.extend(stick(form)?);
+    }
     Ok(rows)
 }
 
 pub(crate) fn block() -> (Mesh, Vec<bool>) {
-    let axes = [even(SIDE_MM, 6), even(SIDE_MM, 6), even(HEIGHT_MM, 4)];
-    let mesh = lattice(ElementKind::Hex8, axes, |p| p);
-    let fixed = hold(&mesh, &[("z_min", [true; 3])]);
-    (mesh, fixed)
+    FORMS[0].block()
 }
 
-fn dragged(problem: &Problem, friction: f64, drag_mm: f64) -> Result<Solver<'_>, CaseError> {
-    let (loading, options) = drag(friction, drag_mm);
-    Ok(solve(problem, loading, options, 8)?.0)
+impl Form {
+    fn block(self) -> (Mesh, Vec<bool>) {
+        let axes = [even(SIDE_MM, 6), even(SIDE_MM, 6), even(HEIGHT_MM, 4)];
+        let mesh = lattice(self.kind, axes, |p| p);
+        let fixed = hold(&mesh, &[("z_min", [true; 3])]);
+        (mesh, fixed)
+    }
+
+    fn dragged(
+        self,
+        problem: &Problem,
+        friction: f64,
+        drag_mm: f64,
+    ) -> Result<Solver<'_>, CaseError> {
+        let (mut loading, options) = drag(friction, drag_mm);
+        if let Some(indenter) = &mut loading.indenter {
+            indenter.contact = self.rule;
+        }
+        Ok(solve(problem, loading, options, 8)?.0)
+    }
 }
 
 /// Presses the block's top and drags it by `drag_mm`; half of the load is each.
@@ -53,15 +86,15 @@ pub(crate) fn drag(friction: f64, drag_mm: f64) -> (Loading, Options) {
 }
 
 /// The drag wins: every node slips and the force is Coulomb's.
-fn slip(frictions: &[f64]) -> Result<Vec<Check>, CaseError> {
+fn slip(form: Form, frictions: &[f64]) -> Result<Vec<Check>, CaseError> {
     const SOURCE: &str = "Coulomb: T = mu N";
     let mut rows = Vec::new();
     for &friction in frictions {
-        let (mesh, fixed) = block();
+        let (mesh, fixed) = form.block();
         let problem = Problem::new(mesh, uniform(0.1, 0.4)?, fixed, Some("z_max"))?;
-        let solver = dragged(&problem, friction, 3.0)?;
+        let solver = form.dragged(&problem, friction, 3.0)?;
         let [x, y, z] = solver.balance().contact_force_n;
-        let quantity = |what: &str| format!("dragged 3 mm, mu {friction}: {what}");
+        let quantity = |what: &str| format!("dragged 3 mm, mu {friction}{}: {what}", form.name);
         rows.push(Check::relative(quantity("T / N"), (x / z).abs(), friction, 1e-3, SOURCE));
         rows.push(Check::vanishes(quantity("sideways force / N"), y / z, 1e-6, "symmetry"));
     }
@@ -69,16 +102,16 @@ fn slip(frictions: &[f64]) -> Result<Vec<Check>, CaseError> {
 }
 
 /// Friction wins from first touch on: the top moves as if glued to the plate.
-fn stick() -> Result<Vec<Check>, CaseError> {
+fn stick(form: Form) -> Result<Vec<Check>, CaseError> {
     const SOURCE: &str = "the same block glued to the plate";
     const DRAG_MM: f64 = 0.05;
-    let (mesh, fixed) = block();
+    let (mesh, fixed) = form.block();
     let problem = Problem::new(mesh, uniform(0.1, 0.4)?, fixed, Some("z_max"))?;
-    let rubbed = dragged(&problem, 10.0, DRAG_MM)?.balance().contact_force_n;
-    let glued = glued_n(DRAG_MM)?;
+    let rubbed = form.dragged(&problem, 10.0, DRAG_MM)?.balance().contact_force_n;
+    let glued = form.glued_n(DRAG_MM)?;
     Ok([(0, "along the drag"), (2, "down")]
         .map(|(i, what)| {
-            let quantity = format!("dragged 0.05 mm, mu 10: force {what}, N");
+            let quantity = format!("dragged 0.05 mm, mu 10{}: force {what}, N", form.name);
             Check::relative(quantity, rubbed[i].abs(), glued[i].abs(), 1e-3, SOURCE)
         })
         .into())
@@ -86,18 +119,24 @@ fn stick() -> Result<Vec<Check>, CaseError> {
 
 /// Force on the top of the block if it is glued to the plate, N.
 pub(crate) fn glued_n(drag_mm: f64) -> Result<[f64; 3], CaseError> {
-    let (mesh, mut fixed) = block();
-    for &n in &mesh.node_sets["z_max"] {
-        fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+    FORMS[0].glued_n(drag_mm)
+}
+
+impl Form {
+    fn glued_n(self, drag_mm: f64) -> Result<[f64; 3], CaseError> {
+        let (mesh, mut fixed) = self.block();
+        for &n in &mesh.node_sets["z_max"] {
+            fixed[3 * n as usize..3 * n as usize + 3].fill(true);
+        }
+        let prescribed_mm =
+            prescribe(&mesh, &fixed, |x| [drag_mm, 0.0, -DEPTH_MM].map(|v| v * x[2] / HEIGHT_MM));
+        let problem = Problem::new(mesh, uniform(0.1, 0.4)?, fixed, None)?;
+        let loading = Loading { prescribed_mm, ..Loading::default() };
+        let (glued, _) = solve(&problem, loading, Options::default(), 4)?;
+        let force = internal_force(&problem, glued.displacement_mm())?;
+        let sum = |i: usize| -> f64 {
+            problem.mesh.node_sets["z_max"].iter().map(|&n| force[3 * n as usize + i]).sum()
+        };
+        Ok([sum(0), sum(1), sum(2)])
     }
-    let prescribed_mm =
-        prescribe(&mesh, &fixed, |x| [drag_mm, 0.0, -DEPTH_MM].map(|v| v * x[2] / HEIGHT_MM));
-    let problem = Problem::new(mesh, uniform(0.1, 0.4)?, fixed, None)?;
-    let loading = Loading { prescribed_mm, ..Loading::default() };
-    let (glued, _) = solve(&problem, loading, Options::default(), 4)?;
-    let force = internal_force(&problem, glued.displacement_mm())?;
-    let sum = |i: usize| -> f64 {
-        problem.mesh.node_sets["z_max"].iter().map(|&n| force[3 * n as usize + i]).sum()
-    };
-    Ok([sum(0), sum(1), sum(2)])
 }

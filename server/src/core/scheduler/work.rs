@@ -175,6 +175,9 @@ impl Worker {
                 })?;
                 times.infer = decoded.elapsed();
                 tier.latency.learn(times.infer);
+                if let Some(finger) = &mut finger {
+                    self.maps.feel_shear(finger);
+                }
             }
         }
         let start = Instant::now();

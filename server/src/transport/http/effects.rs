@@ -9,13 +9,17 @@ use crate::transport::answer::{Shared, json_answer};
 pub(crate) async fn list(State(app): Shared) -> Response {
     let catalogue = app.catalogue();
     let costs = catalogue.runtime.costs();
+    // It is of the contact model, and timed with it.
+    let shear_us = app.contact.as_ref().and_then(|contact| contact.shear_us);
+    let of_traction =
+        |effect| shear_us.filter(|_| effect == RuntimeEffect::ShearEnergy).map(|us| us as f64);
     let of_sessions = RuntimeEffect::ALL.into_iter().map(|effect| {
         let cost = costs.and_then(|costs| costs.iter().find(|cost| cost.effect == effect));
         json!({
             "name": effect,
             "of": "session",
             "what": effect.what(),
-            "cost_us": cost.map(|cost| cost.us),
+            "cost_us": cost.map(|cost| cost.us).or(of_traction(effect)),
         })
     });
     let mut names: Vec<&String> = catalogue.tiers.iter().flat_map(|tier| &tier.effects).collect();

@@ -166,9 +166,14 @@ fn hand(
     hello: &Hello,
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
     let places = app.admit_fingers(hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX))?;
-    let model = app.contact.as_ref().map(|contact| &contact.model);
-    let pixels = app.contact.as_ref().and_then(|contact| contact.pixels.as_ref());
-    let skin = Skin { atlas: &catalogue.atlas, raster: &catalogue.skin, model, pixels };
+    let contact = app.contact.as_ref();
+    let skin = Skin {
+        atlas: &catalogue.atlas,
+        raster: &catalogue.skin,
+        model: contact.map(|contact| &contact.model),
+        pixels: contact.and_then(|contact| contact.pixels.as_ref()),
+        interface: contact.and_then(|contact| contact.interface.as_ref()),
+    };
     Ok((Hand::of(hello, skin)?, places))
 }
 
@@ -282,8 +287,11 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
     } else {
         catalogue.overhead.us()
     };
+    let shear_us = app.contact.as_ref().and_then(|contact| contact.shear_us);
+    let feels_shear = terms.info.names.contains(&RuntimeEffect::ShearEnergy);
     let predicted_latency_us = of_tier
         .saturating_add(contact_us.unwrap_or(0))
+        .saturating_add(shear_us.filter(|_| feels_shear).unwrap_or(0))
         .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
     let is_new = terms.version > 1;
     let value_max = terms.info.value_max.unwrap_or(tier.sed_max_j_per_m3);

@@ -47,10 +47,11 @@ pub(crate) async fn service_with(change: impl FnOnce(&mut Config)) -> Service {
     Service::on(folder, change).await.unwrap()
 }
 
-/// The contact model's file; its skin is one deep layer.
+/// The contact model's file; its skin is deep, of two layers that are alike.
 pub(crate) fn model() -> Vec<u8> {
     let young_mpa = 0.75 * f64::from(MODULUS_MPA);
-    model_of(vec![Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm: 99.0 }])
+    let layer = |thickness_mm| Layer { young_mpa, poisson: 0.5 - 1e-6, thickness_mm };
+    model_of(vec![layer(0.2), layer(98.8)])
 }
 
 /// The same with other layers.

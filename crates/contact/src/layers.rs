@@ -1,4 +1,4 @@
-//! How far the surface of layered skin gives way under waves of pressure.
+//! How layered skin gives way under waves of pressure: plane layers, one wave number at a time.
 
 use crate::layer::Layer;
 use std::f64::consts::TAU;
@@ -13,7 +13,7 @@ const PART_MM: f64 = 0.05;
 
 /// Displacement along the normal for a wave of pressure on a plane surface, mm/MPa, by wave number.
 #[derive(Clone, Debug)]
-pub(super) struct SurfaceCompliance {
+pub(crate) struct SurfaceCompliance {
     first: f64,
     step: f64,
     logarithms: Vec<f64>,
@@ -21,7 +21,7 @@ pub(super) struct SurfaceCompliance {
 
 impl SurfaceCompliance {
     /// Of layers from the surface down, held by something rigid.
-    pub(super) fn new(layers: &[Layer]) -> Self {
+    pub(crate) fn new(layers: &[Layer]) -> Self {
         let [first, last] = [LONGEST_MM, SHORTEST_MM].map(|length_mm| (TAU / length_mm).ln());
         let step = (last - first) / (ENTRIES - 1) as f64;
         let entry = |i| of_wave((first + step * i as f64).exp(), layers).ln();
@@ -29,7 +29,7 @@ impl SurfaceCompliance {
     }
 
     /// At a wave number, 1/mm; beyond the table's ends as at the end.
-    pub(super) fn at(&self, wave_number: f64) -> f64 {
+    pub(crate) fn at(&self, wave_number: f64) -> f64 {
         let place = (wave_number.max(f64::MIN_POSITIVE).ln() - self.first) / self.step;
         let place = place.clamp(0.0, (ENTRIES - 1) as f64);
         let low = (place as usize).min(ENTRIES - 2);
@@ -39,12 +39,12 @@ impl SurfaceCompliance {
     }
 
     /// The largest, mm/MPa.
-    pub(super) fn largest(&self) -> f64 {
+    pub(crate) fn largest(&self) -> f64 {
         self.logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max).exp()
     }
 }
 
-type Block = [[f64; 2]; 2];
+pub(crate) type Block = [[f64; 2]; 2];
 type Square = [[f64; 4]; 4];
 
 /// Normal displacement over pressure at one wave number `k`.
@@ -56,27 +56,44 @@ type Square = [[f64; 4]; 4];
 fn of_wave(k: f64, layers: &[Layer]) -> f64 {
     let mut compliance: Block = [[0.0; 2]; 2];
     for layer in layers.iter().rev() {
-        let Layer { young_mpa, poisson, thickness_mm } = *layer;
-        let mu = young_mpa / (2.0 * (1.0 + poisson));
-        let lambda = young_mpa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
-        let m = lambda + 2.0 * mu;
-        let a: Square = [
-            [0.0, k, 1.0 / mu, 0.0],
-            [-lambda * k / m, 0.0, 0.0, 1.0 / m],
-            [k * k * (m - lambda * lambda / m), 0.0, 0.0, lambda * k / m],
-            [0.0, 0.0, -k, 0.0],
-        ];
-        let parts = (thickness_mm / PART_MM.min(PART / k)).ceil().max(1.0);
-        let transfer = exponential(&a, thickness_mm / parts);
-        let [aa, ab, ba, bb] =
-            [[0, 0], [0, 2], [2, 0], [2, 2]].map(|[row, column]| block(&transfer, row, column));
-        for _ in 0..parts as usize {
-            let above = sum(times(aa, compliance), ab);
-            let below = sum(times(ba, compliance), bb);
-            compliance = times(above, inverse(below));
+        let (transfer, parts) = part_of(k, layer);
+        for _ in 0..parts {
+            compliance = transfer.up(compliance).0;
         }
     }
     compliance[1][1]
+}
+
+/// What a part of a layer makes of displacement and traction below it, both above it.
+pub(crate) struct Transfer {
+    blocks: [Block; 4],
+}
+
+impl Transfer {
+    /// Compliance above a part from that below it, and the traction below it over that above it.
+    pub(crate) fn up(&self, compliance: Block) -> (Block, Block) {
+        let [aa, ab, ba, bb] = self.blocks;
+        let above = sum(times(aa, compliance), ab);
+        let below = inverse(sum(times(ba, compliance), bb));
+        (times(above, below), below)
+    }
+}
+
+/// The transfer through a part of a layer at a wave number, and how many parts the layer has.
+pub(crate) fn part_of(k: f64, layer: &Layer) -> (Transfer, usize) {
+    let Layer { thickness_mm, .. } = *layer;
+    let [lambda, mu] = layer.lame_mpa();
+    let m = lambda + 2.0 * mu;
+    let a: Square = [
+        [0.0, k, 1.0 / mu, 0.0],
+        [-lambda * k / m, 0.0, 0.0, 1.0 / m],
+        [k * k * (m - lambda * lambda / m), 0.0, 0.0, lambda * k / m],
+        [0.0, 0.0, -k, 0.0],
+    ];
+    let parts = (thickness_mm / PART_MM.min(PART / k)).ceil().max(1.0);
+    let transfer = exponential(&a, thickness_mm / parts);
+    let blocks = [[0, 0], [0, 2], [2, 0], [2, 2]].map(|[r, column]| block(&transfer, r, column));
+    (Transfer { blocks }, parts as usize)
 }
 
 /// `exp(a h)` by its series; `a h` is small.
@@ -98,7 +115,7 @@ fn block(of: &Square, row: usize, column: usize) -> Block {
     std::array::from_fn(|i| std::array::from_fn(|j| of[row + i][column + j]))
 }
 
-fn times(a: Block, b: Block) -> Block {
+pub(crate) fn times(a: Block, b: Block) -> Block {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }
 
@@ -106,7 +123,7 @@ fn sum(a: Block, b: Block) -> Block {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] + b[i][j]))
 }
 
-fn inverse([[a, b], [c, d]]: Block) -> Block {
+pub(crate) fn inverse([[a, b], [c, d]]: Block) -> Block {
     let determinant = a * d - b * c;
     [[d / determinant, -b / determinant], [-c / determinant, a / determinant]]
 }

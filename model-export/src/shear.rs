@@ -1,0 +1,108 @@
+//! What traction along the skin is worth: SED of a network alone, and with what layered skin makes of
+//! the traction, against FE with friction.
+
+use crate::contact::Models;
+use crate::dataset::{Dataset, Indentation, Shard};
+use crate::metrics::SampleMetrics;
+use crate::processor::thread_s;
+use crate::{ExportError, metrics::quantile};
+use ndarray::Axis;
+use papilla_contact::{InterfaceSkin, ShearEnergy};
+use papilla_engine::{MAP_LEN, Session};
+use papilla_proto::atlas::{Patch, VertexSampler};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Figures of a dataset; pairs are median and 95th percentile.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// Campaign.
+    pub set: String,
+    /// Relative L2 of SED by the network alone.
+    pub alone: [f64; 2],
+    /// The same with traction.
+    pub felt: [f64; 2],
+    /// Processor time that traction adds to a frame, us.
+    pub us: [f64; 2],
+    /// States.
+    pub states: usize,
+}
+
+/// Measures all states of a dataset with friction, of whichever split: no network learns from it.
+/// The network is given FE's pressure; traction is FE's at the atlas' vertices.
+///
+/// # Errors
+/// [`ExportError`] of the dataset or the network, and for a dataset without traction or a contact
+/// model without layers.
+pub fn measure(
+    models: &Models,
+    dataset: &Dataset,
+    network: &mut (dyn Session + '_),
+) -> Result<Row, ExportError> {
+    let skin = Arc::new(dataset.maps.raster(Patch::Skin).clone());
+    let sampler = VertexSampler::new(&dataset.atlas, &skin);
+    let skin = InterfaceSkin::new(models.finger(), &dataset.atlas, skin);
+    let bad = |path: &Path, reason: &str| {
+        let (path, reason) = (path.to_owned(), reason.to_owned());
+        ExportError::Dataset { path, reason }
+    };
+    let skin = skin.ok_or_else(|| bad(Path::new(""), "the contact model names no layers"))?;
+    let mut energy = ShearEnergy::new(Arc::new(skin));
+    let [mut alone, mut felt, mut us] = [(); 3].map(|()| Vec::new());
+    let [mut pressure_pa, mut sed, mut truth] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
+    for indentation in dataset.every_indentation() {
+        let shard = dataset.load(indentation)?;
+        let path = dataset.shard_path(indentation);
+        for state in 0..indentation.samples {
+            let shear_pa = traction(dataset, indentation, &shard, state, &sampler)?
+                .ok_or_else(|| bad(&path, "it holds no shear_pa: solve it with friction"))?;
+            dataset.draw_pressure(indentation, &shard, state, &mut pressure_pa)?;
+            dataset.draw_sed(indentation, &shard, state, &mut truth)?;
+            let failed = |source| ExportError::Engine { path: path.clone(), source };
+            network.infer(&pressure_pa, &mut sed).map_err(failed)?;
+            let error = |sed: &[f32]| SampleMetrics::measure(sed, &truth, &dataset.ground);
+            alone.extend(error(&sed).map(|metrics| metrics.relative_l2));
+            let clock = thread_s();
+            energy.add(&pressure_pa, &shear_pa, 1.0, &mut sed);
+            us.push((thread_s() - clock) * 1e6);
+            felt.extend(error(&sed).map(|metrics| metrics.relative_l2));
+        }
+    }
+    let both = |values: &[f64]| [0.5, 0.95].map(|q| quantile(values, q).unwrap_or(f64::NAN));
+    Ok(Row {
+        set: dataset.name().to_owned(),
+        alone: both(&alone),
+        felt: both(&felt),
+        us: both(&us),
+        states: us.len(),
+    })
+}
+
+/// Traction along the skin at the vertices, Pa; none if the shard holds none.
+fn traction(
+    dataset: &Dataset,
+    indentation: &Indentation,
+    shard: &Shard,
+    state: usize,
+    sampler: &VertexSampler,
+) -> Result<Option<Vec<[f32; 3]>>, ExportError> {
+    let Some(shear_pa) = &shard.shear_pa else { return Ok(None) };
+    let of_state = shear_pa.index_axis(Axis(0), state);
+    let path = dataset.shard_path(indentation);
+    let refused = |source| ExportError::Atlas { path: path.clone(), source };
+    let mut found = vec![[0.0; 3]; sampler.vertex_count()];
+    let mut map = vec![0.0; MAP_LEN];
+    let mut vertices = vec![0.0; found.len()];
+    for axis in 0..3 {
+        let values = of_state.index_axis(Axis(1), axis);
+        // Maps are never negative, so that each sign is drawn by itself.
+        for sign in [1.0f32, -1.0] {
+            let part: Vec<f32> = values.iter().map(|v| (sign * v).max(0.0)).collect();
+            dataset.draw(indentation, Patch::Skin, shard, &part, &mut map)?;
+            sampler.sample(&map, &mut vertices).map_err(refused)?;
+            found.iter_mut().zip(&vertices).for_each(|(q, v)| q[axis] += sign * v);
+        }
+    }
+    Ok(Some(found))
+}
