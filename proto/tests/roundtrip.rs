@@ -171,7 +171,7 @@ proptest! {
         names in prop::collection::vec(".{0,12}", 3),
         numbers in any::<(u64, u64, Option<u32>, Option<bool>, Option<u16>)>(),
         scales in (number(), number()),
-        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=7)),
+        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=8)),
         offset in any::<u32>(),
     ) {
         let section = Section { name: SectionName::Points, offset, bytes: 8 };

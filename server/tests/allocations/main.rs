@@ -223,6 +223,7 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
     runtime.block_on(service.server.drain()).unwrap();
     let service = runtime.block_on(contact::service());
     fingers(&service);
+    felt_traction(&service, engines_own);
     runtime.block_on(service.server.drain()).unwrap();
 }
 
@@ -277,11 +278,29 @@ fn fingers(service: &Service) {
     assert_eq!(allocations(|| client.exchange(&frames[WARM_UP..], 1)), 0, "poses in, forces out");
 }
 
+/// A ball that is dragged to and fro, whose traction is felt.
+fn felt_traction(service: &Service, engines_own: u64) {
+    let objects = json!([{"shape": {"shape": "sphere", "radius_mm": 20.0}, "friction": 0.5}]);
+    let members = json!({"objects": objects, "effects": ["shear_energy"], "tier": "quick"});
+    let mut client = Client::connect(service, &contact::hello_3(&members));
+    let frame = |n: u32| {
+        let mut pose = contact::deep(0.2);
+        pose.origin_mm[0] = 0.01 * (n % 20) as f32;
+        masked(0x82, &contact::rows(n, 0, &[pose]))
+    };
+    let frames: Vec<_> = (1..=(WARM_UP + FRAMES) as u32).map(frame).collect();
+    client.exchange(&frames[..WARM_UP], 1);
+    let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
+    assert_eq!(all, FRAMES as u64 * engines_own, "with traction");
+}
+
 /// Every effect at once, windows both ways.
 ///
 /// Pins whose drive is corrected ask the network twice.
 fn every_effect(service: &Service, engines_own: u64, (drive, asked): (&str, u64)) {
-    let effects = RuntimeEffect::ALL.map(RuntimeEffect::as_str);
+    // Windows of pressure hold no traction.
+    let of_windows = |effect: &RuntimeEffect| *effect != RuntimeEffect::ShearEnergy;
+    let effects: Vec<_> = RuntimeEffect::ALL.into_iter().filter(of_windows).collect();
     let hello = json!({
         "type": "hello", "version": 2, "effects": effects, "tier": "quick",
         "points": [{"px": [110.0, 65.0]}],

@@ -3,7 +3,7 @@
 use crate::support::{SIDE, ball, small_strain, solver, vertex};
 use papilla_contact::{ContactError, Gaps, NetForce, Object};
 
-pub fn depths(object: &Object) -> Vec<f32> {
+pub(crate) fn depths(object: &Object) -> Vec<f32> {
     let depth = |i: usize| {
         let [x, y] = vertex(i);
         -object.placement.distance(object.shape.as_ref(), [x, y, 0.0]).gap_mm as f32
