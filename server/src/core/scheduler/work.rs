@@ -175,12 +175,13 @@ impl Worker {
                 })?;
                 times.infer = decoded.elapsed();
                 tier.latency.learn(times.infer);
-                if let Some(finger) = &mut finger {
-                    self.maps.feel_shear(finger);
-                }
             }
         }
         let start = Instant::now();
+        let touches = judged.is_some_and(|judged| !judged.is_zero);
+        if let Some(finger) = finger.as_mut().filter(|_| touches) {
+            self.maps.feel_shear(finger);
+        }
         if let Some(effects) = effects.as_mut().filter(|_| shows_sed) {
             let session = &mut self.sessions[job.tier];
             let infer = |pressure_pa: &[f32], sed: &mut [f32]| session.infer(pressure_pa, sed);
