@@ -11,8 +11,7 @@
 //! which are the same on both sides of it. The eight numbers are real; [`Response`] has them.
 
 use crate::layer::Layer;
-use crate::layers::{Block, part_of, times};
-use std::f64::consts::TAU;
+use crate::layers::{Block, WaveTable, part_of, times};
 
 /// Waves that are tabulated, by length, mm.
 const LONGEST_MM: f64 = 130.0;
@@ -81,29 +80,18 @@ fn through_across(k: f64, layer: &Layer, compliance: f64) -> (f64, f64) {
 
 /// Responses by wave number.
 #[derive(Clone, Debug)]
-pub(crate) struct InterfaceResponse {
-    first: f64,
-    step: f64,
-    entries: Vec<[f64; 8]>,
-}
+pub(crate) struct InterfaceResponse(WaveTable<8>);
 
 impl InterfaceResponse {
     /// Of layers from the surface down, held by something rigid.
     pub(crate) fn new(layers: &[Layer]) -> Self {
-        let [first, last] = [LONGEST_MM, SHORTEST_MM].map(|length_mm| (TAU / length_mm).ln());
-        let step = (last - first) / (ENTRIES - 1) as f64;
-        let entry = |i| Response::of_wave((first + step * i as f64).exp(), layers).numbers();
-        Self { first, step, entries: (0..ENTRIES).map(entry).collect() }
+        let entry = |k| Response::of_wave(k, layers).numbers();
+        Self(WaveTable::new([LONGEST_MM, SHORTEST_MM], ENTRIES, entry))
     }
 
     /// At a wave number, 1/mm; beyond the table's ends as at the end.
     pub(crate) fn at(&self, wave_number: f64) -> Response {
-        let place = (wave_number.max(f64::MIN_POSITIVE).ln() - self.first) / self.step;
-        let place = place.clamp(0.0, (ENTRIES - 1) as f64);
-        let low = (place as usize).min(ENTRIES - 2);
-        let part = place - low as f64;
-        let [a, b] = [self.entries[low], self.entries[low + 1]];
-        let [a, b, c, d, e, f, g, h] = std::array::from_fn(|i| a[i] + part * (b[i] - a[i]));
+        let [a, b, c, d, e, f, g, h] = self.0.at(wave_number);
         Response { along: [a, b], shear: [c, d], normal: [e, f], across: [g, h] }
     }
 }

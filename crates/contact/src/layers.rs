@@ -11,36 +11,59 @@ const ENTRIES: usize = 64;
 const PART: f64 = 0.5;
 const PART_MM: f64 = 0.05;
 
-/// Displacement along the normal for a wave of pressure on a plane surface, mm/MPa, by wave number.
+/// Numbers by wave number, linear in its logarithm between entries.
 #[derive(Clone, Debug)]
-pub(crate) struct SurfaceCompliance {
+pub(crate) struct WaveTable<const N: usize> {
     first: f64,
     step: f64,
-    logarithms: Vec<f64>,
+    entries: Vec<[f64; N]>,
 }
+
+impl<const N: usize> WaveTable<N> {
+    /// `entries` (two at least) of them, between waves of these lengths, mm.
+    pub(crate) fn new(
+        lengths_mm: [f64; 2],
+        entries: usize,
+        of_wave: impl Fn(f64) -> [f64; N],
+    ) -> Self {
+        let [first, last] = lengths_mm.map(|length_mm| (TAU / length_mm).ln());
+        let step = (last - first) / (entries - 1) as f64;
+        let entry = |i| of_wave((first + step * i as f64).exp());
+        Self { first, step, entries: (0..entries).map(entry).collect() }
+    }
+
+    /// At a wave number, 1/mm; beyond the table's ends as at the end.
+    pub(crate) fn at(&self, wave_number: f64) -> [f64; N] {
+        let last = self.entries.len() - 1;
+        let place = (wave_number.max(f64::MIN_POSITIVE).ln() - self.first) / self.step;
+        let place = place.clamp(0.0, last as f64);
+        let low = (place as usize).min(last - 1);
+        let part = place - low as f64;
+        let [a, b] = [self.entries[low], self.entries[low + 1]];
+        std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
+    }
+}
+
+/// Displacement along the normal for a wave of pressure on a plane surface, mm/MPa, by wave number:
+/// its logarithms are tabulated.
+#[derive(Clone, Debug)]
+pub(crate) struct SurfaceCompliance(WaveTable<1>);
 
 impl SurfaceCompliance {
     /// Of layers from the surface down, held by something rigid.
     pub(crate) fn new(layers: &[Layer]) -> Self {
-        let [first, last] = [LONGEST_MM, SHORTEST_MM].map(|length_mm| (TAU / length_mm).ln());
-        let step = (last - first) / (ENTRIES - 1) as f64;
-        let entry = |i| of_wave((first + step * i as f64).exp(), layers).ln();
-        Self { first, step, logarithms: (0..ENTRIES).map(entry).collect() }
+        let entry = |k| [of_wave(k, layers).ln()];
+        Self(WaveTable::new([LONGEST_MM, SHORTEST_MM], ENTRIES, entry))
     }
 
     /// At a wave number, 1/mm; beyond the table's ends as at the end.
     pub(crate) fn at(&self, wave_number: f64) -> f64 {
-        let place = (wave_number.max(f64::MIN_POSITIVE).ln() - self.first) / self.step;
-        let place = place.clamp(0.0, (ENTRIES - 1) as f64);
-        let low = (place as usize).min(ENTRIES - 2);
-        let part = place - low as f64;
-        let [a, b] = [self.logarithms[low], self.logarithms[low + 1]];
-        (a + part * (b - a)).exp()
+        self.0.at(wave_number)[0].exp()
     }
 
     /// The largest, mm/MPa.
     pub(crate) fn largest(&self) -> f64 {
-        self.logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max).exp()
+        self.0.entries.as_flattened().iter().copied().fold(f64::NEG_INFINITY, f64::max).exp()
     }
 }
 
