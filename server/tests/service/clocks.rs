@@ -41,7 +41,8 @@ impl Clocked {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_clock_that_is_set_back_makes_frames_stale_for_a_while_and_no_longer() {
     let service = Service::start().await;
-    let mut session = Clocked::open(&service, &json!({"stale_after_us": 2_000_000})).await;
+    // Longer than all of it takes anywhere: clients' clocks run by 1 ms a frame, this one's by more.
+    let mut session = Clocked::open(&service, &json!({"stale_after_us": 600_000_000})).await;
     let now = 20_000 * DAY_US;
     assert_eq!(session.held(now).await.0.status, FrameStatus::Ok);
     // Back by a day, to nothing, to before the wrap of 64 bits and of their sign.

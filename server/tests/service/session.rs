@@ -277,18 +277,28 @@ async fn the_latest_frame_wins() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
     socket.open(hello(&json!({"tier": "slow"}))).await;
-    for sequence in 1..=5 {
-        socket.send(frame(sequence, 0, SampleType::F32, 1.0, &ramp())).await;
+    let (mut superseded, mut rendered) = (0, 0);
+    // A round whose frames a busy machine brings later than it renders them tells nothing.
+    for round in 1..=50 {
+        let burst: Vec<u32> = (5 * round - 4..=5 * round).collect();
+        let frames = burst.iter().map(|&k| frame(k, 0, SampleType::F32, 1.0, &ramp()));
+        socket.send_burst(frames).await;
+        let (all, maps) = hear_all(&mut socket, 5).await;
+        assert!(all.keys().eq(&burst), "{all:?}");
+        assert_eq!(all[&(5 * round)], FrameStatus::Ok);
+        let in_vain = all.values().filter(|s| **s == FrameStatus::Superseded).count();
+        assert_eq!(in_vain + maps.len(), 5, "{all:?}");
+        assert!(maps.is_sorted(), "{maps:?}");
+        superseded += in_vain;
+        rendered += maps.len();
+        assert_eq!(service.metric(&outcome("superseded")).await as usize, superseded);
+        assert_eq!(service.metric(&outcome("ok")).await as usize, rendered);
+        // One was started before the last came; all between were superseded.
+        if in_vain >= 3 {
+            return;
+        }
     }
-    let (all, maps) = hear_all(&mut socket, 5).await;
-    assert_eq!(all[&5], FrameStatus::Ok);
-    // One was started before the last came; all between were superseded.
-    let superseded = all.values().filter(|s| **s == FrameStatus::Superseded).count();
-    assert_eq!(superseded + maps.len(), 5, "{all:?}");
-    assert!((3..=4).contains(&superseded), "{all:?}");
-    assert!(maps.is_sorted(), "{maps:?}");
-    assert_eq!(service.metric(&outcome("superseded")).await as usize, superseded);
-    assert_eq!(service.metric(&outcome("ok")).await as usize, maps.len());
+    panic!("of 50 bursts of 5 frames none was superseded but for two: {superseded}, {rendered}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -72,6 +72,39 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
         timeout(PATIENCE, self.stream.send(message.into())).await.unwrap().unwrap();
     }
 
+    /// Sends these with as few writes as can be.
+    pub(crate) async fn send_burst<M: Into<Message>>(&mut self, burst: impl Iterator<Item = M>) {
+        let all = async {
+            for message in burst {
+                self.stream.feed(message.into()).await.unwrap();
+            }
+            self.stream.flush().await.unwrap();
+        };
+        timeout(PATIENCE, all).await.unwrap();
+    }
+
+    /// Sends frames and waits until the service has taken them; returns what it answered to them
+    /// meanwhile.
+    pub(crate) async fn send_until_taken<M: Into<Message>>(
+        &mut self,
+        frames: impl IntoIterator<Item = M>,
+    ) -> Vec<FrameHeader> {
+        // The answer to what comes after a frame says that the frame was taken.
+        let after = std::iter::once(Message::from("?"));
+        self.send_burst(frames.into_iter().map(Into::into).chain(after)).await;
+        let mut answered = Vec::new();
+        loop {
+            match self.receive().await {
+                Received::Frame(header, _) => answered.push(header),
+                Received::Json(problem) => {
+                    assert_eq!(problem["code"], "unexpected_text", "{problem}");
+                    return answered;
+                }
+                other => panic!("an answer is due, not {other:?}"),
+            }
+        }
+    }
+
     /// As `send`, but the server may close meanwhile.
     pub(crate) async fn try_send(&mut self, message: impl Into<Message>) {
         let _ = timeout(PATIENCE, self.stream.send(message.into())).await.unwrap();
