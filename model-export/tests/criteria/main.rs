@@ -53,7 +53,7 @@ fn baseline(ladder: &Ladder) -> &Rung {
 }
 
 /// What was asked for, every figure within a millisecond, is missed in one: `nano` places the peak
-/// .54 mm off (median; 2.0 at the 95th percentile), `small` .39 (2.6), the published network .39
+/// .44 mm off (median; 2.2 at the 95th percentile), `small` .46 (2.3), the published network .39
 /// (2.4).
 #[test]
 fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure_but_the_peak_s_place() {
@@ -82,12 +82,12 @@ fn the_best_network_is_as_accurate_as_the_documents_say() {
     let reference = errors(best, "reference").relative_l2;
     let far_field = indentations.far_field_relative_l2.unwrap();
     for (what, value, limit) in [
-        ("the reference, median", reference.median, 0.10),
-        ("the reference, 95th percentile", reference.p95, 0.16),
-        ("held-out simulations, median", indentations.relative_l2.median, 0.11),
-        ("held-out simulations, 95th percentile", indentations.relative_l2.p95, 0.19),
-        ("shapes that no training saw, median", shapes.relative_l2.median, 0.12),
-        ("far field, median", far_field.median, 0.18),
+        ("the reference, median", reference.median, 0.085),
+        ("the reference, 95th percentile", reference.p95, 0.13),
+        ("held-out simulations, median", indentations.relative_l2.median, 0.10),
+        ("held-out simulations, 95th percentile", indentations.relative_l2.p95, 0.18),
+        ("shapes that no training saw, median", shapes.relative_l2.median, 0.10),
+        ("far field, median", far_field.median, 0.15),
     ] {
         assert!(value <= limit, "{}: {what} is {value}, {limit} was reached", best.name);
     }
