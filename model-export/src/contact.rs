@@ -167,7 +167,7 @@ pub fn measure(
                 continue;
             }
             let Some(placed) = &placed else { continue };
-            let object = placed.at(f64::from(shard.depth_mm[state]));
+            let object = placed.at(f64::from(shard.depth_mm[state]), shard.slide_mm(state));
             solver.reset();
             figures.pixels.iter_mut().for_each(PixelContact::reset);
             let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);

@@ -97,10 +97,21 @@ pub struct Shard {
     pub sed_j_per_m3: Array2<f32>,
     /// Depth of each sample, mm; `[D]`.
     pub depth_mm: Array1<f32>,
+    /// Where the indenter has slid to, mm along its own x and y; `[D, 2]`; none if it does not slide.
+    pub slide_mm: Option<Array2<f32>>,
     /// Force on the finger, N; `[D, 3]`; none if the shard does not hold it.
     pub force_n: Option<Array2<f32>>,
     /// Traction along the skin, Pa; `[D, V, 3]`; none without friction.
     pub shear_pa: Option<Array3<f32>>,
+}
+
+impl Shard {
+    /// Where the indenter has slid to in a state, mm along its own x and y.
+    #[must_use]
+    pub fn slide_mm(&self, state: usize) -> [f64; 2] {
+        let at = |s: &Array2<f32>| [0, 1].map(|k: usize| f64::from(s[[state, k]]));
+        self.slide_mm.as_ref().map_or([0.0; 2], at)
+    }
 }
 
 /// A dataset whose manifest and atlas have been read and agree.
@@ -147,6 +158,12 @@ impl Dataset {
         let maps = Maps::read(folder, &atlas).map_err(|error| bad(error.to_string()))?;
         let ground = Ground::new(&atlas, maps.raster(Patch::Interface));
         Ok(Self { folder: folder.to_owned(), manifest, atlas, ground, maps })
+    }
+
+    /// The folder it is in.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// SHA-256 that names the dataset.
@@ -252,6 +269,7 @@ impl Dataset {
             depth_mm: read_array(&mut npz, "depth_mm").map_err(unreadable)?,
             force_n: read_array(&mut npz, "force_n").ok(),
             shear_pa: read_array(&mut npz, "shear_pa").ok(),
+            slide_mm: read_array(&mut npz, "slide_mm").ok(),
         };
         let expected = (indentation.samples, values);
         for (name, array) in
@@ -265,6 +283,10 @@ impl Dataset {
             }
         }
         let by_value = |shear: &Array3<f32>| shear.dim() == (expected.0, expected.1, 3);
+        let by_state = |slide: &Array2<f32>| slide.dim() == (expected.0, 2);
+        if let Some(slide) = shard.slide_mm.as_ref().filter(|slide| !by_state(slide)) {
+            return Err(bad(format!("slide_mm is {:?}", slide.dim())));
+        }
         if let Some(shear) = shard.shear_pa.as_ref().filter(|shear| !by_value(shear)) {
             return Err(bad(format!("shear_pa is {:?}", shear.dim())));
         }

@@ -1,33 +1,18 @@
 //! What traction along the skin is worth: SED of a network alone, and with what layered skin makes of
 //! the traction, against FE with friction.
 
+use crate::ExportError;
 use crate::contact::Models;
 use crate::dataset::{Dataset, Indentation, Shard};
-use crate::metrics::SampleMetrics;
+use crate::metrics::{SampleMetrics, spread};
 use crate::processor::thread_s;
-use crate::{ExportError, metrics::quantile};
 use ndarray::Axis;
 use papilla_contact::{InterfaceSkin, ShearEnergy};
-use papilla_engine::{MAP_LEN, Session};
+use papilla_engine::ladder::Traction;
+use papilla_engine::{MAP_LEN, Model};
 use papilla_proto::atlas::{Patch, VertexSampler};
-use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Figures of a dataset; pairs are median and 95th percentile.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    /// Campaign.
-    pub set: String,
-    /// Relative L2 of SED by the network alone.
-    pub alone: [f64; 2],
-    /// The same with traction.
-    pub felt: [f64; 2],
-    /// Processor time that traction adds to a frame, us.
-    pub us: [f64; 2],
-    /// States.
-    pub states: usize,
-}
 
 /// Measures all states of a dataset with friction, of whichever split: no network learns from it.
 /// The network is given FE's pressure; traction is FE's at the atlas' vertices.
@@ -38,8 +23,10 @@ pub struct Row {
 pub fn measure(
     models: &Models,
     dataset: &Dataset,
-    network: &mut (dyn Session + '_),
-) -> Result<Row, ExportError> {
+    network: &dyn Model,
+) -> Result<Traction, ExportError> {
+    let failed = ExportError::engine(dataset.folder());
+    let mut session = network.session().map_err(failed)?;
     let skin = Arc::new(dataset.maps.raster(Patch::Skin).clone());
     let sampler = VertexSampler::new(&dataset.atlas, &skin);
     let skin = InterfaceSkin::new(models.finger(), &dataset.atlas, skin);
@@ -49,7 +36,7 @@ pub fn measure(
     };
     let skin = skin.ok_or_else(|| bad(Path::new(""), "the contact model names no layers"))?;
     let mut energy = ShearEnergy::new(Arc::new(skin));
-    let [mut alone, mut felt, mut us] = [(); 3].map(|()| Vec::new());
+    let [mut alone, mut felt, mut added_ms] = [(); 3].map(|()| Vec::new());
     let [mut pressure_pa, mut sed, mut truth] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
     for indentation in dataset.every_indentation() {
         let shard = dataset.load(indentation)?;
@@ -60,22 +47,26 @@ pub fn measure(
             dataset.draw_pressure(indentation, &shard, state, &mut pressure_pa)?;
             dataset.draw_sed(indentation, &shard, state, &mut truth)?;
             let failed = |source| ExportError::Engine { path: path.clone(), source };
-            network.infer(&pressure_pa, &mut sed).map_err(failed)?;
+            session.infer(&pressure_pa, &mut sed).map_err(failed)?;
             let error = |sed: &[f32]| SampleMetrics::measure(sed, &truth, &dataset.ground);
             alone.extend(error(&sed).map(|metrics| metrics.relative_l2));
             let clock = thread_s();
             energy.add(&pressure_pa, &shear_pa, 1.0, &mut sed);
-            us.push((thread_s() - clock) * 1e6);
+            added_ms.push((thread_s() - clock) * 1e3);
             felt.extend(error(&sed).map(|metrics| metrics.relative_l2));
         }
     }
-    let both = |values: &[f64]| [0.5, 0.95].map(|q| quantile(values, q).unwrap_or(f64::NAN));
-    Ok(Row {
+    let figure = |values: &[f64]| {
+        spread(values)
+            .ok_or_else(|| bad(dataset.folder(), "it holds no state whose SED is above zero"))
+    };
+    Ok(Traction {
+        model: network.info().name.clone(),
         set: dataset.name().to_owned(),
-        alone: both(&alone),
-        felt: both(&felt),
-        us: both(&us),
-        states: us.len(),
+        samples: added_ms.len(),
+        alone: figure(&alone)?,
+        felt: figure(&felt)?,
+        added_ms: figure(&added_ms)?,
     })
 }
 

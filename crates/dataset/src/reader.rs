@@ -162,9 +162,10 @@ fn verify_values(path: &Path, manifest: &Manifest, shard: &Shard) -> Result<(), 
             return Err(OutputError::malformed(path, &message).into());
         }
     }
-    let further = shard.shear_pa.iter().flatten().chain(shard.outside_calibration.iter().flatten());
+    let further = shard.shear_pa.iter().flatten().chain(shard.slide_mm.iter().flatten());
+    let further = further.chain(shard.outside_calibration.iter().flatten());
     if let Some(value) = further.into_iter().find(|v| !v.is_finite()) {
-        let message = format!("shear_pa or outside_calibration holds {value}");
+        let message = format!("shear_pa, slide_mm or outside_calibration holds {value}");
         return Err(OutputError::malformed(path, &message).into());
     }
     Ok(())

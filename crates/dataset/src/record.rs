@@ -73,6 +73,9 @@ pub struct Sample {
     pub cells: Option<Arc<Cells>>,
     /// Indentation depth from first touch, mm.
     pub depth_mm: f64,
+    /// Where the indenter has slid to, mm along its own x and y.
+    #[serde(default)]
+    pub slide_mm: [f64; 2],
     /// Force of the plate on the finger in the finger's frame, N.
     pub force_n: [f64; 3],
     /// True contact pressure at the skin patch's vertices, MPa; length V.

@@ -30,7 +30,7 @@ const fn array(
 }
 
 /// Arrays of a shard.
-pub const SHARD_ARRAYS: [ArraySpec; 10] = [
+pub const SHARD_ARRAYS: [ArraySpec; 11] = [
     array("pressure_pa", "f32", &["D", "V"], "Pa"),
     array("sed_dermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
     array("sed_epidermis_j_per_m3", "f32", &["D", "V"], "J/m3"),
@@ -40,6 +40,7 @@ pub const SHARD_ARRAYS: [ArraySpec; 10] = [
     ArraySpec { optional: true, ..array("cell_place", "u32", &["L", "5"], "1") },
     ArraySpec { optional: true, ..array("cell_nodes", "u32", &["L", "9"], "1") },
     ArraySpec { optional: true, ..array("shear_pa", "f32", &["D", "V", "3"], "Pa") },
+    ArraySpec { optional: true, ..array("slide_mm", "f32", &["D", "2"], "mm") },
     ArraySpec { optional: true, ..array("outside_calibration", "f32", &["D"], "1") },
 ];
 
@@ -65,7 +66,7 @@ pub struct FormatSchema {
     /// JSON schema of `manifest.json`.
     pub manifest: Schema,
     /// Arrays of each shard.
-    pub shard: [ArraySpec; 10],
+    pub shard: [ArraySpec; 11],
     /// Arrays of `raster.npz`.
     pub raster: [ArraySpec; 10],
 }
@@ -130,7 +131,13 @@ mod tests {
             .map(|depth| {
                 let shear_mpa = vec![[0.0, 0.0, 0.1]; v];
                 let cells = Some(Arc::new(two_cells()));
-                Sample { cells, shear_mpa, outside_calibration: 0.1, ..record(depth, v) }
+                Sample {
+                    cells,
+                    shear_mpa,
+                    slide_mm: [0.1, 0.0],
+                    outside_calibration: 0.1,
+                    ..record(depth, v)
+                }
             })
             .into();
         let whole = encode(&samples, v).unwrap().unwrap();

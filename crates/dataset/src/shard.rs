@@ -55,6 +55,8 @@ pub struct Shard {
     pub sed_epidermis_j_per_m3: Array2<f32>,
     /// Depth, mm \[D\].
     pub depth_mm: Array1<f32>,
+    /// Where the indenter has slid to, mm along its own x and y \[D, 2\]; only if it slides.
+    pub slide_mm: Option<Array2<f32>>,
     /// Force of the plate on the finger, N \[D, 3\].
     pub force_n: Array2<f32>,
     /// Self-checks \[D, 11\], see [`CHECK_COLUMNS`].
@@ -140,6 +142,10 @@ pub fn encode(
     if kept.iter().any(|r| !r.shear_mpa.is_empty()) {
         npz.add_slice("shear_pa", &[d, v, 3], &field(|r| r.shear_mpa.as_flattened()))?;
     }
+    if kept.iter().any(|r| r.slide_mm.iter().any(|s| *s != 0.0)) {
+        let slide: Vec<f32> = kept.iter().flat_map(|r| r.slide_mm).map(|s| s as f32).collect();
+        npz.add_slice("slide_mm", &[d, 2], &slide)?;
+    }
     if kept.iter().any(|r| r.outside_calibration > 0.0) {
         let share: Vec<f32> = kept.iter().map(|r| r.outside_calibration as f32).collect();
         npz.add_slice("outside_calibration", &[d], &share)?;
@@ -174,6 +180,7 @@ impl Shard {
     pub fn decode(path: &Path, bytes: &[u8], vertex_count: usize) -> Result<Self, DatasetError> {
         let mut npz = NpzArrays::new(path, bytes)?;
         let (rubs, flagged) = (npz.has("shear_pa")?, npz.has("outside_calibration")?);
+        let slides = npz.has("slide_mm")?;
         let cells = if npz.has("cell_place")? { Some(read_cells(path, &mut npz)?) } else { None };
         let vertex_count = cells.as_ref().map_or(vertex_count, Cells::node_count);
         let shard = Self {
@@ -182,6 +189,7 @@ impl Shard {
             sed_dermis_j_per_m3: npz.get::<f32, Ix2>("sed_dermis_j_per_m3")?,
             sed_epidermis_j_per_m3: npz.get::<f32, Ix2>("sed_epidermis_j_per_m3")?,
             depth_mm: npz.get::<f32, Ix1>("depth_mm")?,
+            slide_mm: slides.then(|| npz.get::<f32, Ix2>("slide_mm")).transpose()?,
             force_n: npz.get::<f32, Ix2>("force_n")?,
             checks: npz.get::<f64, Ix2>("checks")?,
             shear_pa: rubs.then(|| npz.get::<f32, Ix3>("shear_pa")).transpose()?,
@@ -200,6 +208,7 @@ impl Shard {
                 shard.sed_epidermis_j_per_m3.dim(),
                 (d, vertex_count),
             ),
+            ("shape of slide_mm", shard.slide_mm.as_ref().map_or((d, 2), Array2::dim), (d, 2)),
             ("shape of force_n", shard.force_n.dim(), (d, 3)),
             ("shape of checks", shard.checks.dim(), (d, CHECK_COLUMNS.len())),
             (
@@ -344,15 +353,17 @@ mod tests {
     fn further_arrays_are_there_only_with_their_effects() {
         let plain = encode(&[record(1.0, 4)], 4).unwrap().unwrap();
         let plain = Shard::decode(Path::new("x"), &plain.bytes, 4).unwrap();
-        assert_eq!((plain.shear_pa, plain.outside_calibration), (None, None));
+        assert_eq!((plain.shear_pa, plain.slide_mm, plain.outside_calibration), (None, None, None));
         let mut records = [record(0.5, 4), record(1.0, 4)];
         for r in &mut records {
             r.shear_mpa = vec![[1e-3, -2e-3, 0.0]; 4];
         }
+        records[1].slide_mm = [0.5, -0.25];
         records[1].outside_calibration = 0.125;
         let encoded = encode(&records, 4).unwrap().unwrap();
         let shard = Shard::decode(Path::new("x"), &encoded.bytes, 4).unwrap();
         assert_eq!(shard.outside_calibration.unwrap().to_vec(), [0.0, 0.125]);
+        assert_eq!(shard.slide_mm.unwrap().as_slice().unwrap(), [0.0, 0.0, 0.5, -0.25]);
         let shear = shard.shear_pa.unwrap();
         assert_eq!((shear.dim(), shear[[1, 3, 1]].to_bits()), ((2, 4, 3), (-2000f32).to_bits()));
     }

@@ -32,6 +32,7 @@ pub fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> Sample {
     Sample {
         cells: None,
         depth_mm,
+        slide_mm: [0.0; 2],
         force_n: [0.0, 0.0, depth_mm * depth_mm],
         pressure_mpa: field(0.01),
         sed_dermis_mpa: field(0.002),

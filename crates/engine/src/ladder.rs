@@ -36,6 +36,9 @@ pub struct Ladder {
     /// What the reference's pressure maps are worth; absent without the same states on another mesh.
     #[serde(default)]
     pub readings: Option<Readings>,
+    /// What traction along the skin is worth; empty without datasets of presses with friction.
+    #[serde(default)]
+    pub traction: Vec<Traction>,
     /// The rungs.
     pub rungs: Vec<Rung>,
 }
@@ -77,6 +80,23 @@ pub struct Readings {
     pub averaged: Spread,
     /// Between a model's answers to the two, by its name.
     pub answers: BTreeMap<String, Spread>,
+}
+
+/// What the effect `shear_energy` makes of traction, on states with friction that no network learnt.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Traction {
+    /// Name of the network.
+    pub model: String,
+    /// Campaign.
+    pub set: String,
+    /// States.
+    pub samples: usize,
+    /// Relative L2 of SED that the network makes of pressure alone.
+    pub alone: Spread,
+    /// The same with what traction adds.
+    pub felt: Spread,
+    /// Processor time that traction adds to a frame, ms.
+    pub added_ms: Spread,
 }
 
 /// What a rung is.

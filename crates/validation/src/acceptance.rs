@@ -10,6 +10,7 @@ pub fn sample(record: &IncrementRecord) -> Sample {
     Sample {
         cells: None,
         depth_mm: record.depth_mm,
+        slide_mm: [0.0; 2],
         force_n: record.force_n,
         pressure_mpa: record.pressure_mpa.clone(),
         sed_dermis_mpa: record.sed_dermis_mpa.clone(),

@@ -120,7 +120,7 @@ impl Queue<'_> {
         };
         let (start, processor_start_s) = (Instant::now(), thread_s());
         let id = press.id;
-        let states_due = press.depths_mm.len();
+        let states_due = press.states().count();
         let reached = |states| {
             let _ = events.send(Event::Reached(Running { press: id, states, states_due }));
         };
@@ -197,10 +197,10 @@ impl Queue<'_> {
 
 /// Each depth has to have its record, in order.
 fn complete(press: &Indentation, records: Vec<Sample>) -> Result<Vec<Sample>, String> {
-    let due = &press.depths_mm;
+    let due: Vec<f64> = press.states().map(|(depth_mm, _)| depth_mm).collect();
     // A depth that is no number is left to the sample's own checks.
     let fit = |r: &Sample, d: &f64| r.depth_mm.is_nan() || (r.depth_mm - d).abs() <= 1e-9;
-    let fits = records.len() == due.len() && records.iter().zip(due).all(|(r, d)| fit(r, d));
+    let fits = records.len() == due.len() && records.iter().zip(&due).all(|(r, d)| fit(r, d));
     let found: Vec<f64> = records.iter().map(|r| r.depth_mm).collect();
     let message = || format!("the solver returned depths {found:?} mm where {due:?} are due");
     if fits { Ok(records) } else { Err(message()) }

@@ -49,13 +49,10 @@ pub(super) fn run(file: &Path, json: bool) -> anyhow::Result<()> {
     let mut indenters = Vec::new();
     for (k, candidate) in spec.candidates().iter().enumerate() {
         let own: Vec<&Indentation> = planned.iter().filter(|p| p.candidate == k).collect();
-        let depth = |p: &Indentation| p.depths_mm.last().copied().unwrap_or_default();
-        let Some(press) = own.iter().max_by(|a, b| depth(a).total_cmp(&depth(b))) else { continue };
+        let deepest = own.iter().max_by(|a, b| a.deepest_mm().total_cmp(&b.deepest_mm()));
+        let Some(press) = deepest else { continue };
         let mut scene = spec.scene(candidate);
-        scene.motion = Motion {
-            offset_mm: press.offset_mm,
-            ..Motion::to_depth(depth(press), press.depths_mm.len(), press.pose)
-        };
+        scene.motion = press.motion();
         let clock = Instant::now();
         let setup = Simulation::new(&scene)?;
         let setup_s = clock.elapsed().as_secs_f64();

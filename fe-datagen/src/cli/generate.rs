@@ -14,11 +14,10 @@ use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation};
 use papilla_fingertip::indenter::IndenterError;
 use papilla_fingertip::mesh::fingertip::{Leaf, Order, Vertices};
-use papilla_fingertip::scene::Motion;
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
 use papilla_fingertip::simulation::body::{Body, SimulationError};
-use papilla_fingertip::simulation::drive::{Approach, Drive};
+use papilla_fingertip::simulation::drive::Approach;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_validation::acceptance;
 use serde::Serialize;
@@ -103,12 +102,8 @@ impl IndentationSolver for OwnMesh<'_> {
         indentation: &Indentation,
         checkpoints: &mut Checkpoints<'_>,
     ) -> Result<Vec<Sample>, PressError> {
-        let deepest_mm = indentation.depths_mm.last().copied().unwrap_or_default();
         let mut scene = self.spec.scene(&self.candidates[indentation.candidate]);
-        scene.motion = Motion {
-            offset_mm: indentation.offset_mm,
-            ..Motion::to_depth(deepest_mm, 1, indentation.pose)
-        };
+        scene.motion = indentation.motion();
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
         let no_patch = || PressError::Failed("a fingertip has a patch".into());
         let cells = Arc::new(cells(&body.read_at_nodes().ok_or_else(no_patch)?));
@@ -137,10 +132,12 @@ fn pressed(
     indentation: &Indentation,
     checkpoints: &mut Checkpoints<'_>,
 ) -> Result<Vec<Sample>, PressError> {
-    let keep = &mut |_, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
-        acceptance::sample(record)
+    let states: Vec<_> = indentation.states().collect();
+    let keep = &mut |state: usize, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
+        let slide_mm = states.get(state).map_or([0.0; 2], |(_, slide_mm)| *slide_mm);
+        Sample { slide_mm, ..acceptance::sample(record) }
     };
-    let drive = Drive::Depths(indentation.depths_mm.clone());
+    let drive = indentation.drive();
     let mut from = checkpoints.stored();
     loop {
         let at_state =

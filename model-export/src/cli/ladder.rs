@@ -14,10 +14,11 @@ const STEM: &str = "accuracy-vs-time";
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// Folder of the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final` and `s1`;
-    /// those that are not there are reported as not measured.
+    /// those that are not there are reported as not measured. `friction-graded` and
+    /// `sliding-graded` say what traction is worth.
     #[arg(long, default_value = "data", value_name = "FOLDER")]
     data: PathBuf,
-    /// Folder of the models, with index.json and atlas.json.
+    /// Folder of the models, with index.json, atlas.json and finger.contact.
     #[arg(long, default_value = "models", value_name = "FOLDER")]
     models: PathBuf,
     /// Datasets of the campaign `final` on other meshes, the solver's own rungs

@@ -2,10 +2,10 @@
 
 use super::{load_model, print_json};
 use papilla_engine::Backend;
-use papilla_model_export::ExportError;
+use papilla_engine::ladder::Traction;
 use papilla_model_export::contact::Models;
 use papilla_model_export::dataset::Dataset;
-use papilla_model_export::shear::{Row, measure};
+use papilla_model_export::shear::measure;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -23,24 +23,22 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let models = Models::read(&options.model)?;
     let network = load_model(&options.network, Backend::default(), None)?;
-    let failed = |source| ExportError::Engine { path: options.network.clone(), source };
-    let mut session = network.session().map_err(failed)?;
     let mut rows = Vec::new();
     for folder in &options.datasets {
         let dataset = Dataset::open(folder)?;
         models.require_atlas(&dataset, folder)?;
-        rows.push(measure(&models, &dataset, session.as_mut())?);
+        rows.push(measure(&models, &dataset, network.as_ref())?);
     }
     if json {
         return print_json(&rows);
     }
-    println!("| set | states | SED, pressure alone, % | with traction, % | traction, us |");
+    println!("| set | states | SED, pressure alone, % | with traction, % | traction, ms |");
     println!("|---|---|---|---|---|");
-    for Row { set, alone, felt, us, states } in &rows {
-        let percent =
-            |[median, p95]: [f64; 2]| format!("{:.1} / {:.1}", 100.0 * median, 100.0 * p95);
-        let [alone, felt] = [alone, felt].map(|pair| percent(*pair));
-        println!("| {set} | {states} | {alone} | {felt} | {:.0} / {:.0} |", us[0], us[1]);
+    for Traction { set, alone, felt, added_ms, samples, .. } in &rows {
+        let [alone, felt] =
+            [alone, felt].map(|of| format!("{:.1} / {:.1}", 100.0 * of.median, 100.0 * of.p95));
+        let ms = format!("{:.2} / {:.2}", added_ms.median, added_ms.p95);
+        println!("| {set} | {samples} | {alone} | {felt} | {ms} |");
     }
     println!("\nRelative L2 against FE and processor time, median / 95 %.");
     Ok(())

@@ -44,11 +44,13 @@ impl Placed {
         Ok(touch.map(|(first_touch, direction)| Self { shape, first_touch, direction }))
     }
 
-    /// It at a depth from there.
-    pub(super) fn at(&self, depth_mm: f64) -> Object {
+    /// It at a depth from there, slid along its own x and y.
+    pub(super) fn at(&self, depth_mm: f64, slide_mm: [f64; 2]) -> Object {
         let mut placement = self.first_touch;
-        for (at, along) in placement.origin_mm.iter_mut().zip(self.direction) {
-            *at += depth_mm * along;
+        for i in 0..3 {
+            let [x, y, _] = placement.rotation[i];
+            placement.origin_mm[i] +=
+                depth_mm * self.direction[i] + slide_mm[0] * x + slide_mm[1] * y;
         }
         Object::rigid(Arc::clone(&self.shape), placement)
     }

@@ -13,6 +13,7 @@ pub mod plot;
 mod readings;
 pub mod report;
 mod sets;
+mod traction;
 
 use crate::metrics::Ground;
 use crate::{ExportError, read_text};
@@ -33,9 +34,9 @@ pub const QUICK_SAMPLES: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Task {
     /// Folder that holds the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final`,
-    /// `s1`.
+    /// `s1`, and of presses with friction `friction-graded` and `sliding-graded`.
     pub data: PathBuf,
-    /// Folder of the models, their index and atlas.
+    /// Folder of the models, their index and atlas, and the contact model, whose layers feel traction.
     pub models: PathBuf,
     /// Datasets of the reference's campaign on other meshes.
     pub fe: Vec<PathBuf>,
@@ -147,6 +148,8 @@ pub fn measure(
             footprint,
         )?);
     }
+    progress.stage("traction");
+    let traction = traction::measure(task, &index.models)?;
     models.extend(floor::rungs(&task.data, &sets, &canvas)?);
     progress.stage("finite elements");
     let mut ladder = Ladder {
@@ -158,6 +161,7 @@ pub fn measure(
         pareto_set: None,
         discretisation_error: None,
         readings: pairs.found(),
+        traction,
         rungs: models,
     };
     if let Some(reference) = reference {

@@ -2,7 +2,7 @@
 
 use crate::metrics::NAIL_BASE_MM;
 use papilla_engine::card::Spread;
-use papilla_engine::ladder::{Kind, Ladder, Percentiles, Readings, Rung, SetErrors};
+use papilla_engine::ladder::{Kind, Ladder, Percentiles, Readings, Rung, SetErrors, Traction};
 use std::fmt::Write;
 
 /// What is written by hand: what is measured and how.
@@ -40,8 +40,31 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(found) = &ladder.readings {
         readings(&mut text, found);
     }
+    if !ladder.traction.is_empty() {
+        traction(&mut text, &ladder.traction);
+    }
     zone(&mut text, stem);
     text
+}
+
+fn traction(text: &mut String, found: &[Traction]) {
+    text.push_str(
+        "## With traction along the skin\n\n\
+         Presses with friction .5, which no network learnt, of the teacher: straight in (`friction`), then dragged aside by .3 to 1.2 mm\n\
+         (`sliding`; a state on the way in counts too). Of SED, the network's alone and with what the session effect `shear_energy` adds\n\
+         ([how](../concepts/contact.md#friction)): pressure and traction are the finite elements'.\n\n\
+         | rung | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for Traction { model, set, samples, alone, felt, added_ms } in found {
+        let [alone, felt] = [alone, felt].map(|of| spread(Some(*of)));
+        let _ = writeln!(
+            text,
+            "| {model} | {set} | {samples} | {alone} | {felt} | {:.2} | {:.2} |",
+            added_ms.median, added_ms.p95
+        );
+    }
+    text.push('\n');
 }
 
 fn readings(text: &mut String, found: &Readings) {

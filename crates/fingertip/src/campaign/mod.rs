@@ -14,4 +14,4 @@ mod tests;
 pub use error::SpecError;
 pub use sampling::{HeldOut, Indentation, held_out, indentations, indentations_in};
 pub use slice::{Slice, SliceError};
-pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
+pub use spec::{CampaignSpec, Candidate, DepthRange, PoseRanges, SlideRange};

@@ -1,7 +1,8 @@
 //! What presses where and how deep, and which indentations are held out.
 
-use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges};
-use crate::scene::Pose;
+use super::spec::{CampaignSpec, Candidate, DepthRange, PoseRanges, SlideRange};
+use crate::scene::{Motion, PathPoint, Pose};
+use crate::simulation::drive::{Drive, DrivePoint};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::ops::Range;
@@ -23,6 +24,53 @@ pub struct Indentation {
     pub offset_mm: [f64; 2],
     /// Depths that are stored, mm from first touch, rising.
     pub depths_mm: Vec<f64>,
+    /// Where the indenter is in states that are stored after those, at the deepest of them: mm
+    /// along its own x and y from its way in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub slide_mm: Vec<[f64; 2]>,
+}
+
+impl Indentation {
+    /// The deepest state, mm.
+    #[must_use]
+    pub fn deepest_mm(&self) -> f64 {
+        self.depths_mm.last().copied().unwrap_or_default()
+    }
+
+    /// Depth (mm) and place (mm along the indenter's own x and y) of every stored state.
+    pub fn states(&self) -> impl Iterator<Item = (f64, [f64; 2])> + '_ {
+        let straight = self.depths_mm.iter().map(|d| (*d, [0.0; 2]));
+        straight.chain(self.slide_mm.iter().map(|s| (self.deepest_mm(), *s)))
+    }
+
+    /// Its motion as in a scene: the same way, with states as far apart as a list of depths has them
+    /// on average.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        let straight = Motion {
+            offset_mm: self.offset_mm,
+            ..Motion::to_depth(self.deepest_mm(), self.depths_mm.len().max(1), self.pose)
+        };
+        let Drive::Path(points) = self.drive() else { return straight };
+        let at =
+            |DrivePoint { time_s, depth_mm, shift_mm }| PathPoint { time_s, depth_mm, shift_mm };
+        Motion { depth_mm: None, path: Some(points.into_iter().map(at).collect()), ..straight }
+    }
+
+    /// How it is driven. One that slides takes a second from state to state: no effect of a campaign
+    /// asks how long.
+    #[must_use]
+    pub fn drive(&self) -> Drive {
+        if self.slide_mm.is_empty() {
+            return Drive::Depths(self.depths_mm.clone());
+        }
+        let at = |((depth_mm, shift_mm), second): ((f64, [f64; 2]), u32)| DrivePoint {
+            time_s: f64::from(second),
+            depth_mm,
+            shift_mm,
+        };
+        Drive::Path(self.states().zip(1..).map(at).collect())
+    }
 }
 
 impl CampaignSpec {
@@ -30,7 +78,9 @@ impl CampaignSpec {
     pub fn samples(&self) -> usize {
         let candidates = self.candidates();
         let states = |c: &Candidate| {
-            c.depths.or(self.depths).map_or(self.depths_mm.len(), |range| range.states)
+            let depths =
+                c.depths.or(self.depths).map_or(self.depths_mm.len(), |range| range.states);
+            depths + self.slide.map_or(0, |slide| slide.states)
         };
         turns(&candidates).take(self.presses).map(|(place, _)| states(&candidates[place])).sum()
     }
@@ -94,6 +144,12 @@ fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32
             (1..=states).map(|i| deepest * i as f64 / states as f64).collect()
         }
     };
+    let slide_mm =
+        spec.slide.map_or_else(Vec::new, |SlideRange { length_mm, direction_deg, states }| {
+            let (length, direction) = (within(6, length_mm), within(7, direction_deg).to_radians());
+            let at = |i| length * i as f64 / states as f64;
+            (1..=states).map(|i| [at(i) * direction.cos(), at(i) * direction.sin()]).collect()
+        });
     Indentation {
         id,
         candidate: place,
@@ -106,6 +162,7 @@ fn press(spec: &CampaignSpec, id: usize, place: usize, c: &Candidate, index: u32
         },
         offset_mm: [within(3, x), within(4, y)],
         depths_mm,
+        slide_mm,
     }
 }
 

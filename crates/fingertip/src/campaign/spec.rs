@@ -33,6 +33,18 @@ pub struct DepthRange {
     pub states: usize,
 }
 
+/// How far indenters slide along the skin once they are as deep as they go.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlideRange {
+    /// Range of the length, mm.
+    pub length_mm: [f64; 2],
+    /// Range of the direction, degrees from the indenter's own x toward its y.
+    pub direction_deg: [f64; 2],
+    /// States stored on the way, equally spaced.
+    pub states: usize,
+}
+
 /// One of the indenters of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -103,6 +115,9 @@ pub struct CampaignSpec {
     /// from the skin point that a flat plate in its pose would touch first.
     #[serde(default, skip_serializing_if = "is_default")]
     pub offset_mm: [[f64; 2]; 2],
+    /// How far indenters slide at their deepest; `None`: not at all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slide: Option<SlideRange>,
     /// Where the file was: pictures of indenters are relative to this folder.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -122,6 +137,8 @@ const SHARE_MAX: u32 = 10_000;
 const STATES_MAX: usize = 1000;
 /// Largest offset, mm: the finger is 25 mm long.
 const OFFSET_MAX_MM: f64 = 25.0;
+/// Longest slide, mm: the pad is some 12 mm wide.
+const SLIDE_MAX_MM: f64 = 10.0;
 
 impl CampaignSpec {
     /// Reads and checks a campaign file.
@@ -203,6 +220,7 @@ impl CampaignSpec {
             format!("is {:?}, it has to be a rising list of depths above 0", self.depths_mm),
         )?;
         self.validate_ranges("", Some(&self.pose), Some(&self.offset_mm), self.depths.as_ref())?;
+        self.validate_slide()?;
         require(
             self.indenter.is_some() == self.indenters.is_empty(),
             "indenter",
@@ -222,6 +240,29 @@ impl CampaignSpec {
     fn require(&self, ok: bool, field: &str, message: String) -> Result<(), SpecError> {
         let campaign = self.name.clone();
         if ok { Ok(()) } else { Err(SpecError::Value { campaign, field: field.into(), message }) }
+    }
+
+    fn validate_slide(&self) -> Result<(), SpecError> {
+        let Some(SlideRange { length_mm, direction_deg, states }) = self.slide else {
+            return Ok(());
+        };
+        let [low, high] = length_mm;
+        self.require(
+            0.0 < low && low <= high && high <= SLIDE_MAX_MM,
+            "slide.length_mm",
+            format!("is [{low}, {high}], it has to rise from above 0 to at most {SLIDE_MAX_MM}"),
+        )?;
+        let [low, high] = direction_deg;
+        self.require(
+            -360.0 <= low && low <= high && high <= 360.0,
+            "slide.direction_deg",
+            format!("is [{low}, {high}], it has to rise within -360 to 360"),
+        )?;
+        self.require(
+            (1..=STATES_MAX).contains(&states),
+            "slide.states",
+            format!("is {states}, it has to be 1 to {STATES_MAX}"),
+        )
     }
 
     fn validate_candidate(&self, i: usize, c: &Candidate) -> Result<(), SpecError> {

@@ -26,6 +26,7 @@ pub fn spec() -> CampaignSpec {
         indenters: Vec::new(),
         pose: PoseRanges { pitch_deg: [0.0, 45.0], roll_deg: [-30.0, 30.0], yaw_deg: [0.0, 0.0] },
         offset_mm: [[0.0; 2]; 2],
+        slide: None,
         folder: PathBuf::new(),
     }
 }

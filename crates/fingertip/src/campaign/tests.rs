@@ -4,6 +4,7 @@ use super::testing::{several, spec};
 use super::*;
 use crate::mesh::fingertip::Density;
 use crate::scene::Pose;
+use crate::simulation::drive::Drive;
 use papilla_sdf::{IndenterSpec, Plate};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -90,6 +91,35 @@ fn an_indenter_has_its_own_ranges() {
     assert_ne!(first("plate"), first("small plate"));
 }
 
+fn slide(length_mm: [f64; 2], direction_deg: [f64; 2], states: usize) -> Option<SlideRange> {
+    Some(SlideRange { length_mm, direction_deg, states })
+}
+
+#[test]
+fn an_indentation_slides_at_its_deepest() {
+    let sliding = CampaignSpec { slide: slide([0.5, 1.5], [-180.0, 180.0], 2), ..spec() };
+    sliding.validate().unwrap();
+    assert_eq!(sliding.samples(), 7 * 4);
+    let all = indentations(&sliding);
+    for press in &all {
+        let states: Vec<_> = press.states().collect();
+        assert_eq!(states[..2], [(0.25, [0.0; 2]), (0.5, [0.0; 2])]);
+        let [half, whole] = [states[2], states[3]];
+        assert!(states[2..].iter().all(|(depth_mm, _)| depth_mm.total_cmp(&0.5).is_eq()));
+        let length = |[x, y]: [f64; 2]| x.hypot(y);
+        assert!((0.5..1.5).contains(&length(whole.1)));
+        assert!((length(half.1) / length(whole.1) - 0.5).abs() < 1e-12);
+        let Drive::Path(points) = press.drive() else { panic!("a way that turns") };
+        assert_eq!((points.len(), points[3].shift_mm), (4, whole.1));
+        assert_eq!(press.motion().path.unwrap().len(), 4);
+    }
+    // Their ways in are those of the campaign that does not slide.
+    for (press, straight) in all.into_iter().zip(indentations(&spec())) {
+        assert_eq!(Indentation { slide_mm: Vec::new(), ..press }, straight);
+        assert!(matches!(straight.drive(), Drive::Depths(_)) && straight.motion().path.is_none());
+    }
+}
+
 #[test]
 fn the_split_is_by_press_and_follows_the_seed() {
     let spec = CampaignSpec { presses: 125, test_fraction: 0.2, ..spec() };
@@ -137,7 +167,7 @@ fn bad_depths() -> Option<DepthRange> {
 #[test]
 fn senseless_campaigns_are_refused_by_field() {
     type Spoil = fn(&mut CampaignSpec);
-    let cases: [(Spoil, &str); 16] = [
+    let cases: [(Spoil, &str); 19] = [
         (|s| s.effects.push("viscoelastic".to_string().try_into().unwrap()), "viscoelastic"),
         (|s| s.effects.push("friction".to_string().try_into().unwrap()), "friction.coefficient"),
         (|s| s.indenter = None, "indenter"),
@@ -163,6 +193,9 @@ fn senseless_campaigns_are_refused_by_field() {
             "indenter.edge_radius_mm",
         ),
         (|s| s.pose.roll_deg = [10.0, -10.0], "roll_deg"),
+        (|s| s.slide = slide([0.0, 1.0], [0.0, 0.0], 1), "slide.length_mm"),
+        (|s| s.slide = slide([0.5, 1.0], [0.0, 400.0], 1), "slide.direction_deg"),
+        (|s| s.slide = slide([0.5, 1.0], [0.0, 90.0], 0), "slide.states"),
     ];
     for (spoil, field) in cases {
         let mut bad = spec();

@@ -100,13 +100,13 @@ impl MaterialSet {
 /// that it holds (docs/reports/fit.md).
 fn people() -> [MaterialSpec; 3] {
     let prony = PronySpec {
-        share: vec![0.8, 0.0667, 0.0667],
+        share: vec![0.925, 0.025, 0.025],
         time_s: vec![0.004, 0.070, 1.4],
         moduli: Moduli::LongTerm,
     };
     let epidermis = MaterialSpec::elastic(0.6, 0.495);
-    let dermis = MaterialSpec::one_term(0.070, 9.0, 0.495);
-    let subcutaneous = MaterialSpec::one_term(0.008, 9.743, 0.495);
+    let dermis = MaterialSpec::one_term(0.027, 9.0, 0.495);
+    let subcutaneous = MaterialSpec::one_term(0.009451, 9.78, 0.495);
     [epidermis, dermis, subcutaneous]
         .map(|tissue| MaterialSpec { prony: Some(prony.clone()), ..tissue })
 }

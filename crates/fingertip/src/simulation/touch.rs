@@ -25,17 +25,26 @@ impl Approach {
     /// passes it.
     #[must_use]
     pub fn contact_with(&self, finger: &FingertipShape, drive: &Drive) -> Option<Contact> {
-        let depths_mm = match drive {
-            Drive::Depths(depths) => depths.clone(),
-            Drive::Forces(_) => vec![GRADED_DEPTH_MM],
-            Drive::Path(points) => vec![points.iter().map(|p| p.depth_mm).fold(0.0, f64::max)],
-        };
+        let (mut depths_mm, mut slides_mm) = (Vec::new(), Vec::new());
+        match drive {
+            Drive::Depths(depths) => depths_mm.clone_from(depths),
+            Drive::Forces(_) => depths_mm.push(GRADED_DEPTH_MM),
+            Drive::Path(points) => {
+                depths_mm.extend(points.iter().map(|p| p.depth_mm).filter(|d| *d > 0.0));
+                depths_mm.sort_by(f64::total_cmp);
+                depths_mm.dedup();
+                slides_mm.extend(
+                    points.iter().map(|p| p.shift_mm).filter(|s| s.iter().any(|v| *v != 0.0)),
+                );
+            }
+        }
         let coming = Coming {
             shape: &self.shape,
             rotation: rotation(self.pose),
             top_mm: self.top_mm,
             offset_mm: self.offset_mm,
             depths_mm,
+            slides_mm,
         };
         Contact::new(finger, &coming)
     }

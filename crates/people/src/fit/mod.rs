@@ -271,5 +271,5 @@ mod tests {
         assert!((found / HERTZ_MPA - 1.0).abs() < 0.02, "{found}");
     }
 
-    const HERTZ_MPA: f64 = 0.0719;
+    const HERTZ_MPA: f64 = 0.0651;
 }

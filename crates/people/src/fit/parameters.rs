@@ -87,8 +87,8 @@ pub fn values(at: &[f64]) -> Vec<f64> {
 }
 
 fn four_digits(v: f64) -> f64 {
-    let unit = 10f64.powf(v.abs().log10().floor() - 3.0);
-    (v / unit).round() * unit
+    // By decimal digits: a product with a power of ten would not be the nearest number to them.
+    format!("{v:.3e}").parse().unwrap_or(v)
 }
 
 /// The tissues with these values, nail and bone as ever.
@@ -120,5 +120,6 @@ mod tests {
     fn values_have_four_digits() {
         assert!((four_digits(0.012_345_6) / 0.012_35 - 1.0).abs() < 1e-12);
         assert!((four_digits(9.780_04) / 9.78 - 1.0).abs() < 1e-12);
+        assert_eq!(four_digits(0.027_000_000_000_000_003).to_string(), "0.027");
     }
 }

@@ -19,6 +19,8 @@ pub struct Contact {
     pub direction: [f64; 3],
     /// How deep it presses in the states that are stored, mm, rising.
     pub depths_mm: Vec<f64>,
+    /// Where it has slid to in states at the deepest of them, mm.
+    pub slides_mm: Vec<[f64; 3]>,
 }
 
 /// How an indenter comes to the finger.
@@ -34,6 +36,8 @@ pub struct Coming<'a> {
     pub offset_mm: [f64; 2],
     /// How deep it presses in the states that are stored, mm, rising.
     pub depths_mm: Vec<f64>,
+    /// Where it has slid to in states at the deepest of them, mm along its own x and y.
+    pub slides_mm: Vec<[f64; 2]>,
 }
 
 /// Step of the search for the first touch at its start and its end, mm.
@@ -60,12 +64,32 @@ impl Contact {
             first: plate,
             direction,
             depths_mm: coming.depths_mm.clone(),
+            slides_mm: (coming.slides_mm.iter())
+                .map(|[a, b]| std::array::from_fn(|i| a * x[i] + b * y[i]))
+                .collect(),
         };
         let limit = 2.0 * finger.length_mm;
         let first = least(finger, direction, |p| far.travel_mm(p, limit))?;
         let travel = far.travel_mm(first, limit);
         let origin_mm = std::array::from_fn(|i| start.origin_mm[i] + travel * direction[i]);
         travel.is_finite().then(|| Self { start: Placement { origin_mm, ..start }, first, ..far })
+    }
+
+    /// It slid aside, pressing straight there, to the deepest state alone.
+    fn aside(&self, by_mm: [f64; 3]) -> Self {
+        let origin_mm = std::array::from_fn(|i| self.start.origin_mm[i] + by_mm[i]);
+        Self {
+            start: Placement { origin_mm, ..self.start },
+            depths_mm: vec![self.deepest_mm()],
+            slides_mm: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// All of it as straight presses: on its way in, and one for each place that it slides to.
+    pub(super) fn straight(&self) -> impl Iterator<Item = Self> + '_ {
+        let straight = Self { slides_mm: Vec::new(), ..self.clone() };
+        std::iter::once(straight).chain(self.slides_mm.iter().map(|by| self.aside(*by)))
     }
 
     /// How deep it presses in the end, mm.

@@ -50,24 +50,8 @@ impl Spacing {
     /// For the skin that an indenter would touch on its way if nothing deformed.
     #[must_use]
     pub fn new(shape: &FingertipShape, contact: &Contact, closeness: Closeness) -> Self {
-        let deepest_mm = contact.deepest_mm();
-        let touch = |at| {
-            let travel = contact.travel_mm(at, deepest_mm);
-            (travel < deepest_mm).then(|| {
-                let moved = Placement {
-                    origin_mm: std::array::from_fn(|i| {
-                        contact.start.origin_mm[i] + travel * contact.direction[i]
-                    }),
-                    ..contact.start
-                };
-                let found = moved.distance(contact.shape.as_ref(), at);
-                let is_edge = contact.depths_mm.iter().any(|d| EDGE_TRAVEL.contains(&(travel / d)));
-                let across_edge =
-                    is_edge.then(|| along_skin(found.normal, shape.skin_normal(at))).flatten();
-                Touched { at, hessian: found.hessian, across_edge }
-            })
-        };
-        Self { touched: facing(shape, contact.direction).filter_map(touch).collect(), closeness }
+        let touched = contact.straight().flat_map(|straight| touched(shape, &straight)).collect();
+        Self { touched, closeness }
     }
 
     /// The same contact meshed more or less closely: where it touches is not looked for again.
@@ -92,6 +76,28 @@ impl Spacing {
         };
         self.touched.iter().map(spacing).fold(f64::INFINITY, f64::min)
     }
+}
+
+/// What a straight press touches.
+fn touched(shape: &FingertipShape, contact: &Contact) -> Vec<Touched> {
+    let deepest_mm = contact.deepest_mm();
+    let touch = |at| {
+        let travel = contact.travel_mm(at, deepest_mm);
+        (travel < deepest_mm).then(|| {
+            let moved = Placement {
+                origin_mm: std::array::from_fn(|i| {
+                    contact.start.origin_mm[i] + travel * contact.direction[i]
+                }),
+                ..contact.start
+            };
+            let found = moved.distance(contact.shape.as_ref(), at);
+            let is_edge = contact.depths_mm.iter().any(|d| EDGE_TRAVEL.contains(&(travel / d)));
+            let across_edge =
+                is_edge.then(|| along_skin(found.normal, shape.skin_normal(at))).flatten();
+            Touched { at, hessian: found.hessian, across_edge }
+        })
+    };
+    facing(shape, contact.direction).filter_map(touch).collect()
 }
 
 /// Unit vector of the part of `v` across the unit vector `normal`; `None` if there is none.

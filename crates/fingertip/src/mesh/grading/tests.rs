@@ -10,13 +10,24 @@ use std::path::Path;
 
 /// An indenter that comes to the default finger in a pose.
 fn contact(indenter: &str, angles_deg: [f64; 3], offset_mm: [f64; 2], depth_mm: f64) -> Contact {
+    sliding(indenter, angles_deg, offset_mm, depth_mm, Vec::new())
+}
+
+/// One that also slides to these places.
+fn sliding(
+    indenter: &str,
+    angles_deg: [f64; 3],
+    offset_mm: [f64; 2],
+    depth_mm: f64,
+    slides_mm: Vec<[f64; 2]>,
+) -> Contact {
     let spec: IndenterSpec = toml::from_str(indenter).unwrap();
     let shape = spec.build(Path::new("")).unwrap();
     let [pitch, roll, yaw] = angles_deg;
     let rotation = Placement::turned(pitch, roll, yaw, [0.0; 3]).rotation;
     let top_mm = spec.top_mm();
     let depths_mm = vec![depth_mm];
-    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm, depths_mm };
+    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm, depths_mm, slides_mm };
     Contact::new(&FingertipShape::default(), &coming).unwrap()
 }
 
@@ -43,6 +54,24 @@ const DOT: &str = "shape = 'dots'\ncount = [1, 1]\npitch_mm = 5.0\nbase_mm = 1.6
                    plate_mm = [20.0, 20.0]";
 const GRATING: &str = "shape = 'grating'\nridges = 6\nridge_mm = 2.0\ngroove_mm = 2.0\n\
                        height_mm = 1.5\nedge_radius_mm = 0.7\nlength_mm = 24.0";
+
+#[test]
+fn skin_is_as_close_where_an_indenter_slides_to() {
+    let by_mm = 3.0;
+    let straight = contact(BALL, [0.0; 3], [0.0; 2], 0.6);
+    let slid = sliding(BALL, [0.0; 3], [0.0; 2], 0.6, vec![[by_mm, 0.0]]);
+    let there = {
+        let mut first = straight.first;
+        first[0] += by_mm;
+        Contact { first: FingertipShape::default().on_skin(first), ..straight.clone() }
+    };
+    let farthest = |at: &Contact, of: &Contact| {
+        spacing_near(&mesh(Density::Coarse, of), at, 1.0).into_iter().fold(0.0, f64::max)
+    };
+    let [first, after, without] =
+        [(&straight, &slid), (&there, &slid), (&there, &straight)].map(|(at, of)| farthest(at, of));
+    assert!(after < 1.5 * first && without > 1.2 * after, "{first} {after} {without}");
+}
 
 /// Of every indenter, in poses at the limits of the campaigns, no element folds.
 #[test]
@@ -210,7 +239,14 @@ fn first_touch_is_that_of_the_smooth_skin() {
     let top_mm = spec.top_mm();
     // Along the cylinder's lowest line every point ties: the touch is at z = -h/2 and y = 0.
     let depths_mm = vec![1.0];
-    let coming = Coming { shape: &shape, rotation, top_mm, offset_mm: [0.0; 2], depths_mm };
+    let coming = Coming {
+        shape: &shape,
+        rotation,
+        top_mm,
+        offset_mm: [0.0; 2],
+        depths_mm,
+        slides_mm: Vec::new(),
+    };
     let found = Contact::new(&finger, &coming).unwrap();
     assert!(found.first[1].abs() < 1e-4, "{:?}", found.first);
     assert!((found.first[2] + 0.5 * finger.height_mm).abs() < 1e-9, "{:?}", found.first);
