@@ -9,7 +9,6 @@ mod index;
 mod ladder;
 mod operators;
 mod patterns;
-mod shear;
 
 use clap::{Parser, Subcommand};
 use papilla_engine::{Backend, Card, Model};
@@ -38,7 +37,7 @@ A new model, from the trainer's file to the service:
   model-export evaluate models/small.onnx data/broad-graded --card out/models/small.json --pictures docs/reports/pictures/small
   model-export index    models --default small
   model-export patterns models --dataset data/more-graded --dataset data/pressed-graded \
-      --dataset data/broad-graded
+      --dataset data/hard-graded --dataset data/broad-graded
   model-export table    models/*.json
 All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/reports
@@ -118,12 +117,6 @@ enum Command {
     /// each against the FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
-    /// Measure what traction along the skin adds to SED, against FE with friction.
-    ///
-    /// SED of a network that knows pressure alone, and with what layered skin makes of FE's traction at
-    /// the vertices: the effect `shear_energy` of sessions.
-    #[command(after_long_help = EXIT_CODES)]
-    Shear(shear::Options),
     /// Measure drives of arrays of pins: the formula of sessions, and its inversion.
     ///
     /// For each held-out indentation both find the drive whose SED comes closest to it; a second
@@ -151,7 +144,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Here(options) => here::run(options, json),
         Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
-        Command::Shear(options) => shear::run(options, json),
         Command::Actuators(options) => actuators::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

@@ -4,7 +4,6 @@ use super::print;
 use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
 use papilla_fingertip::forecast::Forecast;
 use papilla_fingertip::mesh::fingertip::Order;
-use papilla_fingertip::scene::Motion;
 use papilla_fingertip::simulation::Simulation;
 use serde::Serialize;
 use std::path::Path;

@@ -95,6 +95,19 @@ fn the_best_network_is_as_accurate_as_the_documents_say() {
     assert!(nail_base(best) <= 0.25 * nail_base(baseline(&ladder)));
 }
 
+/// Traction explains a good part of what networks of pressure alone miss, wherever it was measured.
+#[test]
+fn what_traction_adds_brings_every_network_closer() {
+    let found = ladder().traction;
+    let ours: Vec<_> =
+        found.iter().filter(|t| ["nano", "small", "large"].contains(&t.model.as_str())).collect();
+    let sets: std::collections::BTreeSet<_> = ours.iter().map(|t| t.set.as_str()).collect();
+    assert_eq!(sets.into_iter().collect::<Vec<_>>(), ["friction", "sliding"]);
+    for t in ours {
+        assert!(t.felt.median < 0.75 * t.alone.median && t.felt.p95 < t.alone.p95, "{t:?}");
+    }
+}
+
 #[test]
 fn no_model_answers_what_is_no_density_and_no_pressure_gives_none() {
     for row in ladder().rungs.iter().filter(|row| row.model.is_some()) {

@@ -53,24 +53,28 @@ pub(super) fn change(friction: &FrictionTrial, found: &Evaluation, by_penalty: b
     if worst == 0.0 { 0.0 } else { worst / scale }
 }
 
-/// Adds the heat of the step, traction times slip, and sets every point's place
-/// relative to the indenter, from which slip of the next step counts.
+/// Adds the heat of the step, the mean of traction `before` and after it times slip (the trapezoidal
+/// rule, as of the indenter's work), and sets every point's place relative to the indenter, from
+/// which slip of the next step counts.
 pub(super) fn anchor(
     problem: &Problem,
     loading: &Loading,
     fraction: f64,
     u: &[[f64; 3]],
+    before: &FrictionTrial,
     friction: &mut FrictionTrial,
 ) {
     let (Some(surface), Some(indenter)) = (&problem.contact, &loading.indenter) else { return };
     let offset = indenter.offset_mm(fraction);
     let FrictionTrial { points, heat_mj, .. } = friction;
-    for (point, (support, area)) in points.iter_mut().zip(surface.points(loading.contact()).iter())
+    for ((point, before), (support, area)) in
+        points.iter_mut().zip(&before.points).zip(surface.points(loading.contact()).iter())
     {
         let x = support.of(|n| std::array::from_fn(|i| problem.mesh.nodes[n][i] + u[n][i]));
         let place: [f64; 3] = std::array::from_fn(|i| x[i] - offset[i]);
-        let t = point.traction_mpa;
-        *heat_mj += area * (0..3).map(|i| t[i] * (place[i] - point.anchor_mm[i])).sum::<f64>();
+        let [from, to] = [before, &*point].map(|p| p.traction_mpa);
+        let slip = |i: usize| place[i] - point.anchor_mm[i];
+        *heat_mj += area * (0..3).map(|i| 0.5 * (from[i] + to[i]) * slip(i)).sum::<f64>();
         point.anchor_mm = place;
     }
 }

@@ -65,8 +65,9 @@ impl<'a> Solver<'a> {
                 points: vec![FrictionPoint::default(); contact_points],
                 heat_mj: 0.0,
             };
+            let at_rest = self.state.friction.clone();
             let State { u, friction, .. } = &mut self.state;
-            friction::anchor(problem, &self.loading, 0.0, u, friction);
+            friction::anchor(problem, &self.loading, 0.0, u, &at_rest, friction);
         }
         self.before = None;
         self.work = Work::default();
@@ -280,7 +281,8 @@ impl<'a> Solver<'a> {
             history::advance(problem, layout, &trial.u, dt_s, &mut trial.history);
         }
         friction::update(&mut trial.friction, &self.newton.current);
-        friction::anchor(problem, &self.loading, next, &trial.u, &mut trial.friction);
+        let before = &self.state.friction;
+        friction::anchor(problem, &self.loading, next, &trial.u, before, &mut trial.friction);
         fluid::advance(problem, self.state.fluid.as_ref(), &trial.u, &mut trial.fluid);
         self.before = Some(std::mem::replace(&mut self.state, trial));
         if let Some(indenter) = &self.loading.indenter {
