@@ -22,6 +22,11 @@ sealed partial class Run
             for (int k = 0; k < 3; k++) d2 += Math.Pow(atlas.SkinMm[3 * i + k] - sphere[k], 2);
             depthMm[i] = (float)(sphere[3] - Math.Sqrt(d2));
         }
+        if (step["velocity"] != null)
+        {
+            var velocity = step["velocity"].Select(v => (float)v).ToArray();
+            depthMm = depthMm.Concat(depthMm.SelectMany(_ => velocity)).ToArray();
+        }
         CheckTouch(step, expect, () => session.SendGaps(depthMm, (int?)step["finger"] ?? 0, NetOf(step)));
     }
 

@@ -154,7 +154,8 @@ class Run {
 
   void gaps(const Value& step) {
     const Value& ball = step["sphere"];
-    const auto depth_mm = at_vertices(ball, [&](double squared) { return ball[3].number - std::sqrt(squared); });
+    auto depth_mm = at_vertices(ball, [&](double squared) { return ball[3].number - std::sqrt(squared); });
+    append_velocity(step, depth_mm);
     PapillaNetForce room{};
     PapillaAnswer answer{};
     const auto finger = std::uint8_t(step["finger"].whole());

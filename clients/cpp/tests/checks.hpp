@@ -32,6 +32,13 @@ inline void control(const std::string& action) {
   must(answer.status == 200, "the control refuses " + action + ": " + answer.problem.message);
 }
 
+/// Behind the depths of a step of gaps, how fast the thing at each vertex moves, if the step says so.
+inline void append_velocity(const Value& step, std::vector<float>& depth_mm) {
+  if (!step.has("velocity")) return;
+  const std::size_t vertices = depth_mm.size();
+  for (std::size_t k = 0; k < 3 * vertices; ++k) depth_mm.push_back(float(step["velocity"][k % 3].number));
+}
+
 inline void sleep_ms(double ms) {
   std::this_thread::sleep_for(std::chrono::microseconds(static_cast<long long>(1000 * ms)));
 }

@@ -226,6 +226,7 @@ class Run {
       for (std::size_t i = 0; i < 3; ++i) squared += (p[i] - sphere[i].number) * (p[i] - sphere[i].number);
       depth_mm.push_back(float(sphere[3].number - std::sqrt(squared)));
     }
+    append_velocity(step, depth_mm);
     NetForce room;
     const auto finger = std::uint8_t(step["finger"].whole());
     check_touch(step["expect"], session().touch_gaps(depth_mm, finger, net_of(step, room), timeout_ms_), finger);

@@ -213,7 +213,8 @@ class Run:
     def gaps(self, step: Step) -> None:
         *centre, radius = step["sphere"]
         off = np.sqrt(((self.finger().positions_mm.astype(np.float64) - centre) ** 2).sum(axis=1))
-        sent = self.open_session().send_gaps((radius - off).astype(np.float32), **self.of_hand(step))
+        rows = np.concatenate([radius - off, np.tile(step.get("velocity", []), len(off))])
+        sent = self.open_session().send_gaps(rows.astype(np.float32), **self.of_hand(step))
         check_touch(step, sent.result(self.timeout_s))
 
     @staticmethod

@@ -25,6 +25,7 @@ namespace Papilla
         static readonly string[] OfVersion3 =
         {
             "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear",
+            "friction", "velocity", "traction",
         };
 
         /// <summary>A hello from its members on the wire, without type and version.</summary>

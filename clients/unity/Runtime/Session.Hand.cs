@@ -46,8 +46,8 @@ namespace Papilla
         }
 
         /// <summary>
-        /// Sends how deep the undeformed skin lies in things, mm, negative in air: at the vertices or as a map, as the hello says. The
-        /// frame's sequence.
+        /// Sends how deep the undeformed skin lies in things, mm, negative in air: at the vertices or as a map, as the hello says; with
+        /// its <c>velocity</c>, x y z mm/s of each vertex behind them. The frame's sequence.
         /// </summary>
         public uint SendGaps(float[] depthMm, int finger = 0, NetForce? net = null)
         {

@@ -271,8 +271,9 @@ class Runner {
   gaps(step) {
     const [x, y, z, radius] = step.sphere;
     const p = this.atlas.skin.positionsMm;
-    const depths = Float32Array.from({ length: this.atlas.vertexCount }, (_, i) => radius - Math.hypot(p[3 * i] - x, p[3 * i + 1] - y, p[3 * i + 2] - z));
-    return this.press(step, (hand, more) => hand.touchGaps(depths, more));
+    const depths = Array.from({ length: this.atlas.vertexCount }, (_, i) => radius - Math.hypot(p[3 * i] - x, p[3 * i + 1] - y, p[3 * i + 2] - z));
+    const velocities = step.velocity ? depths.flatMap(() => step.velocity) : [];
+    return this.press(step, (hand, more) => hand.touchGaps(Float32Array.from([...depths, ...velocities]), more));
   }
 
   /** @param {Step} step @param {(hand: Hand, more: any) => Promise<import('../src/hand.js').HandAnswer>} send */

@@ -20,6 +20,10 @@ use super::{ConformanceError, member, read};
 /// Modulus of the half-space, E / (1 - nu^2), MPa.
 const MODULUS_MPA: f64 = 0.1;
 
+/// Time between two frames that velocities are taken over, s. A client's frames come whenever they
+/// do: the script's things move so fast that all skin slips, whatever the time.
+const PASSED_S: f32 = 0.01;
+
 /// What a touch may be off: share of the value, and beside it, in its unit. In the order of the wire.
 const TOLERANCES: [(f64, f64); 15] = [
     (0.02, 2e-3),
@@ -50,6 +54,10 @@ pub struct ContactRecorder {
 struct Hand {
     objects: Vec<AnnouncedObject>,
     has_force: bool,
+    /// Of gaps.
+    friction: f64,
+    /// Whether a frame of gaps was solved: things move from it on.
+    has_frame: bool,
     solvers: Vec<Solver>,
 }
 
@@ -147,13 +155,19 @@ impl ContactRecorder {
                 },
                 person: Person { width: finger.width, stiffness: finger.stiffness },
                 stiffness: hello.stiffness == Some(true),
-                friction: hello.objects.iter().flatten().any(|o| o.friction.is_some()),
+                friction: hello.friction.is_some()
+                    || hello.objects.iter().flatten().any(|o| o.friction.is_some()),
             };
             Solver::new(Arc::clone(&self.model), settings).map_err(|error| error.to_string())
         };
         let solvers = fingers.iter().map(solver).collect::<Result<_, _>>()?;
-        let objects = hello.objects.unwrap_or_default();
-        Ok(Hand { objects, has_force: hello.force_target == Some(true), solvers })
+        Ok(Hand {
+            objects: hello.objects.unwrap_or_default(),
+            has_force: hello.force_target == Some(true),
+            friction: hello.friction.unwrap_or(0.0),
+            has_frame: false,
+            solvers,
+        })
     }
 
     /// The numbers of a touch and the pressure at the vertices.
@@ -165,13 +179,20 @@ impl ContactRecorder {
             return Err("'net' is due where the hello has force_target, and there alone".to_owned());
         }
         let mut out = Contact::new(self.model.vertices());
-        let (mut objects, mut depth_mm) = (Vec::new(), Vec::new());
+        let (mut objects, mut depth_mm, mut moved_mm) = (Vec::new(), Vec::new(), Vec::new());
         let scene = if step["do"] == "gaps" {
             let sphere: [f64; 4] = member(step, "sphere")?;
             depth_mm.extend(
                 self.atlas.patch(Patch::Skin).positions_mm.iter().map(|p| depth(*p, sphere)),
             );
-            Scene::Gaps(Gaps::rigid(&depth_mm))
+            let velocity: Option<[f32; 3]> = member(step, "velocity")?;
+            let passed_s = if hand.has_frame { PASSED_S } else { 0.0 };
+            moved_mm.extend(
+                velocity.iter().flat_map(|v| vec![v.map(|v| v * passed_s); depth_mm.len()]),
+            );
+            hand.has_frame = true;
+            let friction = hand.friction;
+            Scene::Gaps(Gaps { friction, moved_mm: &moved_mm, ..Gaps::rigid(&depth_mm) })
         } else {
             let poses: Vec<[f32; 7]> = member(step, "poses")?;
             for (pose, object) in poses.iter().zip(&hand.objects) {

@@ -330,6 +330,9 @@ func step_gaps(step, expect):
 		for k in 3:
 			d2 += pow(atlas.skin_mm[3 * i + k] - ball[k], 2)
 		depth_mm.append(ball[3] - sqrt(d2))
+	for i in atlas.vertex_count() if step.has("velocity") else 0:
+		for k in 3:
+			depth_mm.append(step.velocity[k])
 	check_touch(step, expect, session.send_gaps(depth_mm, int(step.get("finger", 0)), step.get("net")))
 
 

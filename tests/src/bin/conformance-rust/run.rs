@@ -133,7 +133,10 @@ impl Run {
             let (server, sphere) = (self.server.clone(), member(step, "sphere")?);
             let atlas = spawn_blocking(move || atlas(&server)).await??;
             let places = &atlas.patch(Patch::Skin).positions_mm;
-            let depths: Vec<f32> = places.iter().map(|p| depth(*p, sphere)).collect();
+            let mut depths: Vec<f32> = places.iter().map(|p| depth(*p, sphere)).collect();
+            if let Some(velocity) = member::<Option<[f32; 3]>>(step, "velocity")? {
+                depths.extend(places.iter().flat_map(|_| velocity));
+            }
             session.send_gaps(finger, &depths, net)?
         } else {
             let pose = |[x, y, z, a, b, c, d]: [f32; 7]| Pose {

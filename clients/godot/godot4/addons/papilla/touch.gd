@@ -3,7 +3,7 @@
 extends RefCounted
 
 const Compat = preload("compat.gd")
-const OF_HELLO = ["input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear"]
+const OF_HELLO = ["input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear", "friction", "velocity", "traction"]
 const ROW_LEN = 7
 
 

@@ -225,6 +225,7 @@ pub(super) mod tests {
             pose: papilla_fingertip::scene::Pose::default(),
             offset_mm: [0.0; 2],
             depths_mm: vec![1.0],
+            slide_mm: Vec::new(),
         };
         SceneRecord {
             press,
