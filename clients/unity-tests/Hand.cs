@@ -22,12 +22,15 @@ sealed partial class Run
             for (int k = 0; k < 3; k++) d2 += Math.Pow(atlas.SkinMm[3 * i + k] - sphere[k], 2);
             depthMm[i] = (float)(sphere[3] - Math.Sqrt(d2));
         }
-        if (step["velocity"] != null)
-        {
-            var velocity = step["velocity"].Select(v => (float)v).ToArray();
-            depthMm = depthMm.Concat(depthMm.SelectMany(_ => velocity)).ToArray();
-        }
-        CheckTouch(step, expect, () => session.SendGaps(depthMm, (int?)step["finger"] ?? 0, NetOf(step)));
+        CheckTouch(step, expect, () => session.SendGaps(WithVelocity(step, depthMm), (int?)step["finger"] ?? 0, NetOf(step)));
+    }
+
+    /// <summary>Behind depths, how fast the thing at each vertex moves, if the step says so.</summary>
+    internal static float[] WithVelocity(JObject step, float[] depthMm)
+    {
+        if (step["velocity"] == null) return depthMm;
+        var velocity = step["velocity"].Select(v => (float)v).ToArray();
+        return depthMm.Concat(depthMm.SelectMany(_ => velocity)).ToArray();
     }
 
     static NetForce? NetOf(JObject step)

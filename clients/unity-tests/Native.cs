@@ -142,7 +142,7 @@ sealed partial class Run : IDisposable
 
     float[] GapsOf(JObject step)
     {
-        return AtVertices(step["sphere"], d2 => (double)step["sphere"][3] - Math.Sqrt(d2));
+        return Conformance.WithVelocity(step, AtVertices(step["sphere"], d2 => (double)step["sphere"][3] - Math.Sqrt(d2)));
     }
 
     void Rasterise(JObject step, JObject expect)

@@ -10,15 +10,16 @@ use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{Scene, TissueTable};
 use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::drive::DrivePoint;
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use papilla_sdf::{Placement, SignedDistance};
 use std::path::Path;
 use std::sync::Arc;
 
 const FRICTION: f64 = 0.5;
-/// Equilibria of the finite elements, and frames of the contact solver, between two states: friction
-/// depends on the way, and steps are part of it.
-const STEPS: u32 = 4;
+/// Equilibria of the finite elements, and frames of the contact solver, for each step between two
+/// states: friction depends on the way, and steps are part of it.
+const STEPS: u32 = 2;
 const PA_PER_MPA: f64 = 1e6;
 
 /// A press of a depth, dragged along x and then along y, mm.
@@ -67,11 +68,15 @@ fn found(
     let mut solver = Solver::new(model.clone(), settings).unwrap();
     let mut out = Contact::new(model.vertices());
     let to = |ends: &[Placement]| {
-        for frame in 1..=STEPS {
-            let part = f64::from(frame) / f64::from(STEPS);
+        let way: [f64; 3] = std::array::from_fn(|i| ends[1].origin_mm[i] - ends[0].origin_mm[i]);
+        let way_mm = way.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let to = DrivePoint { depth_mm: way_mm, ..DrivePoint::default() };
+        let frames = STEPS * DrivePoint::default().steps_to(&to, FRICTION);
+        for frame in 1..=frames {
+            let part = f64::from(frame) / f64::from(frames);
             let mut place = ends[0];
             for i in 0..3 {
-                place.origin_mm[i] += part * (ends[1].origin_mm[i] - ends[0].origin_mm[i]);
+                place.origin_mm[i] += part * way[i];
             }
             let object = Object { friction: FRICTION, ..Object::rigid(shape.clone(), place) };
             solver.solve(&[object], &mut out).unwrap();

@@ -87,7 +87,10 @@ fn equilibria(setup: &Simulation) -> f64 {
     };
     let problem = &setup.body.problem;
     if problem.history_layout.is_none() && problem.fluid.is_none() {
-        return points.len() as f64;
+        let mut last = DrivePoint::default();
+        let steps =
+            |p: &DrivePoint| std::mem::replace(&mut last, *p).steps_to(p, setup.approach.friction);
+        return points.iter().map(steps).sum::<u32>().into();
     }
     if problem.fluid.is_some() {
         return flow_steps(points);

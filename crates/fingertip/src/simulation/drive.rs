@@ -86,6 +86,16 @@ pub struct DrivePoint {
 }
 
 impl DrivePoint {
+    /// Equilibria from here to another: one, and with friction one for each tenth of a millimetre.
+    #[must_use]
+    pub fn steps_to(&self, to: &Self, friction: f64) -> u32 {
+        let [x, y] = [0, 1].map(|k: usize| to.shift_mm[k] - self.shift_mm[k]);
+        let way_mm = (to.depth_mm - self.depth_mm).hypot(x.hypot(y));
+        // Less than rounding is no step.
+        let steps = (way_mm / RUBBED_STEP_MM - 1e-9).ceil().max(1.0) as u32;
+        if friction > 0.0 { steps } else { 1 }
+    }
+
     /// The point `i / n` of the way to `to`.
     #[must_use]
     pub fn towards(&self, to: &Self, i: usize, n: usize) -> Self {
@@ -122,6 +132,9 @@ pub(super) struct Course<'a> {
 pub(super) const FORCE_TRAVEL_MAX_MM: f64 = 6.0;
 /// How closely a prescribed force is met.
 const FORCE_TOLERANCE: f64 = 1e-4;
+/// Farthest from one equilibrium to the next on a path with friction, mm: which points stick depends
+/// on the way, and a long step takes ten times the iterations of a short one.
+const RUBBED_STEP_MM: f64 = 0.1;
 /// Equilibria tried for one prescribed force.
 const FORCE_TRIES_MAX: u32 = 60;
 
@@ -129,8 +142,8 @@ impl Body {
     /// Presses and calls `visit` with the solver at each stored equilibrium and
     /// its record. There are more equilibria than stored depths, for the work integral;
     /// `refinement` 2 halves their distance, and so on; of a path over time it is the number of
-    /// equilibria for each state that is reached by moving. The stored states do not depend on
-    /// it (those of a path to the error of time integration); forces ignore it.
+    /// equilibria for each [step](DrivePoint::steps_to) that is reached by moving. The stored states
+    /// do not depend on it (those of a path to the error of time integration); forces ignore it.
     ///
     /// # Errors
     /// [`SimulationError::Solve`] names the state that found no equilibrium; records
@@ -176,7 +189,9 @@ impl Body {
                 self.to_depths(solver, guided, depths, course, visit)
             }
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
-            Drive::Path(points) => self.along(solver, points, course.refinement, visit),
+            Drive::Path(points) => {
+                self.along(solver, points, (approach.friction, course.refinement), visit)
+            }
         }
     }
 
@@ -231,7 +246,7 @@ impl Body {
         &self,
         solver: &mut Solver<'_>,
         points: &[DrivePoint],
-        refinement: u32,
+        (friction, refinement): (f64, u32),
         visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
         let end = points.last().map_or(1.0, |p| p.time_s);
@@ -242,7 +257,7 @@ impl Body {
             let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
             // An indenter that rests does no work.
             let rests = *p == DrivePoint { time_s: p.time_s, ..from };
-            let parts = if rests { 1 } else { refinement as usize };
+            let parts = if rests { 1 } else { (from.steps_to(p, friction) * refinement) as usize };
             let mut effort = Effort::default();
             for i in 1..parts {
                 let between_s = from.towards(p, i, parts).time_s;
