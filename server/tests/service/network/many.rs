@@ -79,18 +79,28 @@ async fn clients_come_and_go_and_nothing_of_them_stays() {
     for n in 0..210 {
         come_and_go(address, n).await;
     }
-    let (fds, bytes) = settled().await;
-    for n in 0..reconnects() {
-        come_and_go(address, n).await;
+    let (mut came, mut is_flat) = (210, false);
+    let mut before = settled().await;
+    // A busy machine may have more of them at once than before, and keep room for them: what stays of
+    // clients makes it grow every time.
+    for _ in 0..4 {
+        if is_flat {
+            break;
+        }
+        for n in 0..reconnects() {
+            come_and_go(address, n).await;
+        }
+        came += reconnects();
+        let after = settled().await;
+        println!("{before:?} and {after:?} descriptors and bytes");
+        // A session takes 1.2 MB; one in a hundred that stayed would show.
+        is_flat = after.0 <= before.0 && after.1 - before.1 < 12e6;
+        before = after;
     }
-    let (fds_after, bytes_after) = settled().await;
-    println!("{fds} and {fds_after} descriptors, {bytes} and {bytes_after} bytes");
-    assert!(fds_after <= fds, "{fds} descriptors became {fds_after}");
-    // A session takes 1.2 MB; one in a hundred that stayed would show.
-    assert!(bytes_after - bytes < 12e6, "{bytes} bytes became {bytes_after}");
+    assert!(is_flat, "descriptors and bytes grew with every round to {before:?}");
     let opened = metric_at(address, "papilla_sessions_total").await;
     // A client that leaves before the answer to its handshake may never become a session.
-    let due = f64::from(210 + reconnects());
+    let due = f64::from(came);
     assert!((0.7 * due..due).contains(&opened), "{opened} sessions of {due} connections");
     let mut socket = Socket::connect(address).await.unwrap();
     socket.open(hello(&json!({}))).await;
