@@ -142,4 +142,12 @@ sealed partial class Run
         }
         return map;
     }
+
+    /// <summary>Behind depths, how fast the thing at each vertex moves, if the step says so.</summary>
+    internal static float[] WithVelocity(JObject step, float[] depthMm)
+    {
+        if (step["velocity"] == null) return depthMm;
+        var velocity = step["velocity"].Select(v => (float)v).ToArray();
+        return depthMm.Concat(depthMm.SelectMany(_ => velocity)).ToArray();
+    }
 }

@@ -25,14 +25,6 @@ sealed partial class Run
         CheckTouch(step, expect, () => session.SendGaps(WithVelocity(step, depthMm), (int?)step["finger"] ?? 0, NetOf(step)));
     }
 
-    /// <summary>Behind depths, how fast the thing at each vertex moves, if the step says so.</summary>
-    internal static float[] WithVelocity(JObject step, float[] depthMm)
-    {
-        if (step["velocity"] == null) return depthMm;
-        var velocity = step["velocity"].Select(v => (float)v).ToArray();
-        return depthMm.Concat(depthMm.SelectMany(_ => velocity)).ToArray();
-    }
-
     static NetForce? NetOf(JObject step)
     {
         if (step["net"] == null) return null;

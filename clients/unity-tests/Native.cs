@@ -38,6 +38,8 @@ sealed partial class Run : IDisposable
     readonly Dictionary<int, string> tiers = new Dictionary<int, string>();
     NativeModel model;
     NativeSession session;
+    // Things move between frames a hundredth of a second apart.
+    ulong frames;
 
     internal Run(string folder, string contact)
     {
@@ -60,7 +62,7 @@ sealed partial class Run : IDisposable
             // Whole maps alone are taken.
             case "frame": if (step["window"] == null) Check(expect, Of(() => session.Send(Pattern((JObject)step["pressure"], 1), (ulong?)step["client_time_us"] ?? 0))); break;
             case "touch": CheckTouch(step, expect, Of(() => session.SendPoses(PosesOf(step), 0, (int?)step["finger"] ?? 0, NetOf(step)), step)); break;
-            case "gaps": CheckTouch(step, expect, Of(() => session.SendGaps(GapsOf(step), 0, (int?)step["finger"] ?? 0, NetOf(step)), step)); break;
+            case "gaps": CheckTouch(step, expect, Of(() => session.SendGaps(GapsOf(step), 10000 * ++frames, (int?)step["finger"] ?? 0, NetOf(step)), step)); break;
             case "rasterise": Rasterise(step, expect); break;
             default: throw new Missed("no step " + step["do"]);
         }
@@ -142,7 +144,7 @@ sealed partial class Run : IDisposable
 
     float[] GapsOf(JObject step)
     {
-        return Conformance.WithVelocity(step, AtVertices(step["sphere"], d2 => (double)step["sphere"][3] - Math.Sqrt(d2)));
+        return WithVelocity(step, AtVertices(step["sphere"], d2 => (double)step["sphere"][3] - Math.Sqrt(d2)));
     }
 
     void Rasterise(JObject step, JObject expect)
