@@ -50,8 +50,8 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
 fn traction(text: &mut String, found: &[Traction]) {
     text.push_str(
         "## With traction along the skin\n\n\
-         Presses with friction .5, which no network learnt, of the teacher: straight in (`friction`), then dragged aside by .3 to 1.2 mm\n\
-         (`sliding`; a state on the way in counts too). Of SED, the network's alone and with what the session effect `shear_energy` adds\n\
+         Presses with friction .5, which no network learnt, of the teacher: straight in (`friction`), and dragged aside by up to 1.1 mm\n\
+         (`sliding`: three states of each way in, two aside). Of SED, the network's alone and with what the session effect `shear_energy` adds\n\
          ([how](../concepts/contact.md#friction)): pressure and traction are the finite elements'.\n\n\
          | rung | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
          |---|---|---|---|---|---|---|---|---|\n",
