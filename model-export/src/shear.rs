@@ -9,7 +9,7 @@ use crate::processor::thread_s;
 use ndarray::Axis;
 use papilla_contact::{InterfaceSkin, ShearEnergy};
 use papilla_engine::ladder::Traction;
-use papilla_engine::{MAP_LEN, Model};
+use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::{Patch, VertexSampler};
 use std::path::Path;
 use std::sync::Arc;
@@ -23,10 +23,8 @@ use std::sync::Arc;
 pub fn measure(
     models: &Models,
     dataset: &Dataset,
-    network: &dyn Model,
+    (name, network): (&str, &mut (dyn Session + '_)),
 ) -> Result<Traction, ExportError> {
-    let failed = ExportError::engine(dataset.folder());
-    let mut session = network.session().map_err(failed)?;
     let skin = Arc::new(dataset.maps.raster(Patch::Skin).clone());
     let sampler = VertexSampler::new(&dataset.atlas, &skin);
     let skin = InterfaceSkin::new(models.finger(), &dataset.atlas, skin);
@@ -47,7 +45,7 @@ pub fn measure(
             dataset.draw_pressure(indentation, &shard, state, &mut pressure_pa)?;
             dataset.draw_sed(indentation, &shard, state, &mut truth)?;
             let failed = |source| ExportError::Engine { path: path.clone(), source };
-            session.infer(&pressure_pa, &mut sed).map_err(failed)?;
+            network.infer(&pressure_pa, &mut sed).map_err(failed)?;
             let error = |sed: &[f32]| SampleMetrics::measure(sed, &truth, &dataset.ground);
             alone.extend(error(&sed).map(|metrics| metrics.relative_l2));
             let clock = thread_s();
@@ -61,7 +59,7 @@ pub fn measure(
             .ok_or_else(|| bad(dataset.folder(), "it holds no state whose SED is above zero"))
     };
     Ok(Traction {
-        model: network.info().name.clone(),
+        model: name.to_owned(),
         set: dataset.name().to_owned(),
         samples: added_ms.len(),
         alone: figure(&alone)?,

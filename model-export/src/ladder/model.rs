@@ -77,7 +77,7 @@ fn read_card(path: &Path) -> Result<Card, ExportError> {
     Card::from_json(&read_text(path)?).map_err(ExportError::engine(path))
 }
 
-fn session(model: &dyn Model, path: &Path) -> Result<Box<dyn Session>, ExportError> {
+pub(super) fn session(model: &dyn Model, path: &Path) -> Result<Box<dyn Session>, ExportError> {
     model.session().map_err(ExportError::engine(path))
 }
 

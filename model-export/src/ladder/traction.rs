@@ -1,6 +1,7 @@
 //! What traction along the skin is worth, of each model.
 
 use super::Task;
+use super::model::session;
 use crate::contact::Models;
 use crate::dataset::Dataset;
 use crate::{ExportError, read, shear};
@@ -29,7 +30,8 @@ pub(super) fn measure(task: &Task, models: &[String]) -> Result<Vec<Traction>, E
             let path = task.models.join(format!("{name}.onnx"));
             let model =
                 papilla_engine::load(&read(&path)?, None).map_err(ExportError::engine(&path))?;
-            found.push(shear::measure(&finger, &dataset, model.as_ref())?);
+            let mut session = session(model.as_ref(), &path)?;
+            found.push(shear::measure(&finger, &dataset, (name, session.as_mut()))?);
         }
     }
     Ok(found)
