@@ -9,7 +9,8 @@ use crate::metrics::{SampleMetrics, quantile};
 use crate::processor::thread_s;
 use crate::{ExportError, read};
 use papilla_contact::{
-    Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, Scene, Settings, Solver,
+    Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, PixelSpacing, Scene,
+    Settings, Solver,
 };
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::Patch;
@@ -39,20 +40,31 @@ pub enum Rung {
     Gaps,
     /// The same, told the object.
     SecondOrder,
+    /// The same, then on every second pixel.
+    CoarsePixels,
     /// The same, then on pixels.
     Pixels,
 }
 
 impl Rung {
     /// All of them, from fast and rough to slow and exact.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Springs,
         Self::HalfSpace,
         Self::SmallStrain,
         Self::Gaps,
         Self::SecondOrder,
+        Self::CoarsePixels,
         Self::Pixels,
     ];
+
+    const fn pixel_spacing(self) -> Option<PixelSpacing> {
+        match self {
+            Self::CoarsePixels => Some(PixelSpacing::Two),
+            Self::Pixels => Some(PixelSpacing::One),
+            _ => None,
+        }
+    }
 
     /// Name in tables.
     #[must_use]
@@ -63,6 +75,7 @@ impl Rung {
             Self::SmallStrain => "small strain",
             Self::Gaps => "second order, gaps",
             Self::SecondOrder => "second order",
+            Self::CoarsePixels => "second order, coarse pixels",
             Self::Pixels => "second order, pixels",
         }
     }
@@ -127,7 +140,9 @@ impl Models {
             Rung::Springs => (&self.finger, Method::Springs),
             Rung::HalfSpace => (&self.half_space, Method::SmallStrain),
             Rung::SmallStrain => (&self.finger, Method::SmallStrain),
-            Rung::Gaps | Rung::SecondOrder | Rung::Pixels => (&self.finger, Method::SecondOrder),
+            Rung::Gaps | Rung::SecondOrder | Rung::CoarsePixels | Rung::Pixels => {
+                (&self.finger, Method::SecondOrder)
+            }
         };
         Solver::new(Arc::clone(model), Settings { method, ..Settings::default() }).ok()
     }
@@ -149,12 +164,12 @@ pub fn measure(
     let Some(mut solver) = models.solver(rung) else {
         return Ok(figures.row(rung, dataset.name()));
     };
-    if rung == Rung::Pixels {
+    if let Some(spacing) = rung.pixel_spacing() {
         let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
         let Some(skin) = PixelSkin::new(&models.finger, &dataset.atlas, raster) else {
             return Ok(figures.row(rung, dataset.name()));
         };
-        figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger));
+        figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger, spacing));
     }
     let mut out = Contact::new(models.finger.vertices());
     let mut count = 0;

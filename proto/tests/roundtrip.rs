@@ -134,6 +134,7 @@ fn contact() -> impl Strategy<Value = Hello> {
         ContactMethod::SmallStrain,
         ContactMethod::SecondOrder,
         ContactMethod::Pixels,
+        ContactMethod::CoarsePixels,
     ];
     (
         prop::option::of(prop::sample::select(inputs)),

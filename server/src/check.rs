@@ -187,12 +187,18 @@ fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, S
     match contact {
         Ok(Some(contact)) => {
             let (us, on_pixels) = (contact.frame_us, contact.pixel_frame_us);
-            let pixels = match on_pixels {
-                Some(us) => format!("{us} us on pixels"),
+            let coarse_us = contact.coarse_pixel_frame_us;
+            let pixels = match on_pixels.zip(coarse_us) {
+                Some((us, coarse)) => format!("{us} us on pixels, {coarse} on every second one"),
                 None => "no pixels, since its model names no layers".to_owned(),
             };
+            let values = json!({
+                "frame_us": us,
+                "pixel_frame_us": on_pixels,
+                "coarse_pixel_frame_us": coarse_us,
+            });
             let detail = format!("of this finger, {us} us a frame, {pixels}");
-            report.good("contact", detail, json!({"frame_us": us, "pixel_frame_us": on_pixels}));
+            report.good("contact", detail, values);
         }
         Ok(None) => {
             report.good("contact", "no model; sessions send pressure".to_owned(), Value::Null);

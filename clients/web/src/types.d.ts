@@ -58,7 +58,7 @@ export interface HandHello {
   fingers?: { width?: number; stiffness?: number }[];
   input_layout?: 'map' | 'vertices';
   answer_layout?: 'map' | 'vertices';
-  method?: 'springs' | 'small_strain' | 'second_order' | 'pixels';
+  method?: 'springs' | 'small_strain' | 'second_order' | 'pixels' | 'coarse_pixels';
   force_target?: boolean;
   stiffness?: boolean;
   pressure?: 'map' | 'vertices';

@@ -62,6 +62,6 @@ pub use layer::Layer;
 pub use model::{Arrays, ContactModel, Header};
 pub use nearest::FRICTION_MAX;
 pub use objects::{Object, Scene};
-pub use pixels::{PixelContact, PixelMemory, PixelSkin};
+pub use pixels::{PixelContact, PixelMemory, PixelSkin, PixelSpacing};
 pub use shear_energy::{InterfaceSkin, ShearEnergy};
 pub use solver::{Anchor, Memory, Settings, Solver};

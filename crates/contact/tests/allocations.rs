@@ -3,7 +3,7 @@
 use papilla_atlas::{Atlas, Patch, PatchVertices, Raster};
 use papilla_contact::{
     Arrays, Contact, ContactModel, Gaps, Header, Layer, Method, NetForce, Object, PixelContact,
-    PixelSkin, Settings, Solver,
+    PixelSkin, PixelSpacing, Settings, Solver,
 };
 use papilla_sdf::{Placement, Sphere};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -61,7 +61,7 @@ fn model() -> (Arc<ContactModel>, PixelContact) {
     let model = Arc::new(ContactModel::new(header, arrays).expect("a model"));
     let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
     let skin = PixelSkin::new(&model, &atlas, raster).expect("layers");
-    let pixels = PixelContact::new(Arc::new(skin), &model);
+    let pixels = PixelContact::new(Arc::new(skin), &model, PixelSpacing::One);
     (model, pixels)
 }
 

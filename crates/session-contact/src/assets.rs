@@ -3,8 +3,8 @@
 use std::{sync::Arc, time::Instant};
 
 use papilla_contact::{
-    Contact, ContactModel, InterfaceSkin, ModelError, Object, PixelContact, PixelSkin, Settings,
-    ShearEnergy, Solver,
+    Contact, ContactModel, InterfaceSkin, ModelError, Object, PixelContact, PixelSkin,
+    PixelSpacing, Settings, ShearEnergy, Solver,
 };
 use papilla_proto::{
     MAP_LEN,
@@ -31,6 +31,8 @@ pub struct ContactAssets {
     pub frame_us: u64,
     /// The same on pixels.
     pub pixel_frame_us: Option<u64>,
+    /// The same on every second pixel.
+    pub coarse_pixel_frame_us: Option<u64>,
 }
 
 impl ContactAssets {
@@ -45,14 +47,31 @@ impl ContactAssets {
         let interface = InterfaceSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
         let shear_us = interface.as_ref().map(|of| shear_us(of, model.vertices()));
         let frame_us = frame_us(&model, None).unwrap_or(0);
-        let pixel_frame_us = pixels.as_ref().and_then(|skin| frame_us_on(skin, &model));
-        Ok(Self { model, pixels, interface, shear_us, frame_us, pixel_frame_us })
+        let on_pixels = |spacing| {
+            let pixels = PixelContact::new(Arc::clone(pixels.as_ref()?), &model, spacing);
+            self::frame_us(&model, Some(pixels))
+        };
+        let [pixel_frame_us, coarse_pixel_frame_us] =
+            [PixelSpacing::One, PixelSpacing::Two].map(on_pixels);
+        Ok(Self {
+            model,
+            pixels,
+            interface,
+            shear_us,
+            frame_us,
+            pixel_frame_us,
+            coarse_pixel_frame_us,
+        })
     }
 
     /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
     #[must_use]
     pub fn us_of(&self, hand: &Hand) -> Option<u64> {
-        let us = if hand.is_on_pixels { self.pixel_frame_us? } else { self.frame_us };
+        let us = match hand.pixels {
+            None => self.frame_us,
+            Some(PixelSpacing::One) => self.pixel_frame_us?,
+            Some(PixelSpacing::Two) => self.coarse_pixel_frame_us?,
+        };
         (!hand.form().takes_pressure()).then_some(us)
     }
 }
@@ -70,10 +89,6 @@ fn shear_us(of: &Arc<InterfaceSkin>, vertices: usize) -> u64 {
     }
     times.sort_unstable();
     times[times.len() / 2]
-}
-
-fn frame_us_on(skin: &Arc<PixelSkin>, model: &Arc<ContactModel>) -> Option<u64> {
-    frame_us(model, Some(PixelContact::new(Arc::clone(skin), model)))
 }
 
 /// A plate against the pad, half a millimetre and a bit deep.

@@ -37,11 +37,11 @@ mod tests;
 
 use std::sync::{Arc, Mutex};
 
-use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
+use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin, PixelSpacing};
 use papilla_proto::{
     ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem,
     atlas::{Atlas, Raster},
-    contact::{ContactMethod, Input, SampleLayout, TOUCH_LEN},
+    contact::{Input, SampleLayout, TOUCH_LEN},
     effects::{Section, SectionName},
 };
 
@@ -67,7 +67,7 @@ pub struct Skin<'a> {
 /// The fingers of one session.
 pub struct Hand {
     form: FrameForm,
-    is_on_pixels: bool,
+    pixels: Option<PixelSpacing>,
     fingers: Vec<Arc<Mutex<Finger>>>,
     sections: Vec<Section>,
 }
@@ -111,8 +111,7 @@ impl Hand {
         };
         let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
         let sections = sections(hello, input, vertices);
-        let is_on_pixels = hello.method == Some(ContactMethod::Pixels);
-        Ok(Self { form, is_on_pixels, fingers, sections })
+        Ok(Self { form, pixels: announced::pixel_spacing(hello), fingers, sections })
     }
 
     /// Which frames the session takes.

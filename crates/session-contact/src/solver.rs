@@ -25,24 +25,27 @@ impl FingerSolver {
         model: &Arc<ContactModel>,
         person: Person,
     ) -> Result<Self, Problem> {
-        let asked = hello.method.unwrap_or_default();
-        let method = match asked {
+        let method = match hello.method.unwrap_or_default() {
             ContactMethod::Springs => Method::Springs,
             ContactMethod::SmallStrain => Method::SmallStrain,
-            ContactMethod::SecondOrder | ContactMethod::Pixels => Method::SecondOrder,
+            ContactMethod::SecondOrder | ContactMethod::Pixels | ContactMethod::CoarsePixels => {
+                Method::SecondOrder
+            }
         };
         let stiffness = hello.stiffness == Some(true);
         let has_friction = announced::has_friction(hello);
         let settings = Settings { method, person, stiffness, friction: has_friction };
         let solver = Solver::new(Arc::clone(model), settings);
-        let pixels = match (asked, skin.pixels) {
-            (ContactMethod::Pixels, None) => {
+        let pixels = match (announced::pixel_spacing(hello), skin.pixels) {
+            (Some(_), None) => {
                 let message = "this service's contact model names no layers of the skin, which \
                                pixels need; make it again with `fe-datagen contact`, or leave \
                                'method' out";
                 return Err(unusable("method", message));
             }
-            (ContactMethod::Pixels, Some(skin)) => Some(PixelContact::new(Arc::clone(skin), model)),
+            (Some(spacing), Some(skin)) => {
+                Some(PixelContact::new(Arc::clone(skin), model, spacing))
+            }
             _ => None,
         };
         Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels, has_friction })

@@ -51,7 +51,8 @@ async fn poses_go_in_and_forces_come_out_without_a_network() {
 async fn on_pixels_a_session_feels_what_lies_between_vertices() {
     const BALL_MM: f32 = 2.0;
     let service = service().await;
-    assert!(service.json("/v1/tiers").await["pixels_us"].is_u64());
+    let listing = service.json("/v1/tiers").await;
+    assert!(listing["pixels_us"].is_u64() && listing["coarse_pixels_us"].is_u64());
     let objects = json!([{"shape": {"shape": "sphere", "radius_mm": BALL_MM}}]);
     let ball = Pose { origin_mm: [0.5, 0.5, 0.05 - BALL_MM], ..Pose::default() };
     let mut socket = service.socket().await;
@@ -62,21 +63,23 @@ async fn on_pixels_a_session_feels_what_lies_between_vertices() {
     assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, flags::NO_CONTACT);
     assert_eq!(missed.force_n[2].to_bits(), 0);
 
-    let mut hello = hello;
-    hello["method"] = json!("pixels");
-    socket.open(hello_3(&hello)).await;
-    socket.send(rows(2, 0, &[ball])).await;
-    let (header, felt, payload) = hear(&mut socket).await;
-    assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, 0);
-    // Hertz: 4/3 E* sqrt(R) d^1.5.
-    let due = 4.0 / 3.0 * MODULUS_MPA * BALL_MM.sqrt() * 0.05f32.powf(1.5);
-    assert!((felt.force_n[2] / due - 1.0).abs() < 0.2, "{felt:?} for {due}");
-    // The network is asked about the pixels' pressure, which is sent too.
-    let maps = floats_of(&payload[TOUCH_LEN..]);
-    let (pressure_pa, sed) = maps.split_at(MAP_LEN);
-    let most = |map: &[f32]| map.iter().copied().fold(0.0, f32::max);
-    assert!((most(pressure_pa) / felt.pressure_max_pa - 1.0).abs() < 1e-6, "{felt:?}");
-    assert!((most(sed) / (GAIN * felt.pressure_max_pa) - 1.0).abs() < 1e-3, "{}", most(sed));
+    for (sequence, method) in [(2, "pixels"), (3, "coarse_pixels")] {
+        let mut hello = hello.clone();
+        hello["method"] = json!(method);
+        socket.open(hello_3(&hello)).await;
+        socket.send(rows(sequence, 0, &[ball])).await;
+        let (header, felt, payload) = hear(&mut socket).await;
+        assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, 0);
+        // Hertz: 4/3 E* sqrt(R) d^1.5.
+        let due = 4.0 / 3.0 * MODULUS_MPA * BALL_MM.sqrt() * 0.05f32.powf(1.5);
+        assert!((felt.force_n[2] / due - 1.0).abs() < 0.2, "{method}: {felt:?} for {due}");
+        // The network is asked about the pixels' pressure, which is sent too.
+        let maps = floats_of(&payload[TOUCH_LEN..]);
+        let (pressure_pa, sed) = maps.split_at(MAP_LEN);
+        let most = |map: &[f32]| map.iter().copied().fold(0.0, f32::max);
+        assert!((most(pressure_pa) / felt.pressure_max_pa - 1.0).abs() < 1e-6, "{felt:?}");
+        assert!((most(sed) / (GAIN * felt.pressure_max_pa) - 1.0).abs() < 1e-3, "{}", most(sed));
+    }
 }
 
 /// Of gaps, or by a model without layers, it cannot be done: the session is refused, by member.

@@ -90,7 +90,7 @@ async fn fingers_that_moved_start_as_warm_as_they_were() {
     let shared = Shared::new();
     let one = contact::service_with(shared.configure()).await;
     let other = contact::service_with(shared.configure()).await;
-    for method in ["second_order", "pixels"] {
+    for method in ["second_order", "pixels", "coarse_pixels"] {
         let hello = contact::hello_3(&json!({
             "reconnect": true, "map": false, "pressure": "vertices", "stiffness": true,
             "fingers": [{}, {}], "method": method,

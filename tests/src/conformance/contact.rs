@@ -151,7 +151,9 @@ impl ContactRecorder {
                     ContactMethod::Springs => Method::Springs,
                     ContactMethod::SmallStrain => Method::SmallStrain,
                     ContactMethod::SecondOrder => Method::SecondOrder,
-                    ContactMethod::Pixels => return Err("no case is solved on pixels".to_owned()),
+                    ContactMethod::Pixels | ContactMethod::CoarsePixels => {
+                        return Err("no case is solved on pixels".to_owned());
+                    }
                 },
                 person: Person { width: finger.width, stiffness: finger.stiffness },
                 stiffness: hello.stiffness == Some(true),

@@ -12,7 +12,8 @@ use std::sync::Arc;
 type C32 = Complex<f32>;
 
 /// Lengths of windows: a transform of each is fast.
-const LENGTHS: [usize; 14] = [32, 40, 48, 56, 64, 72, 80, 96, 112, 128, 160, 192, 224, 288];
+const LENGTHS: [usize; 17] =
+    [16, 20, 24, 32, 40, 48, 56, 64, 72, 80, 96, 112, 128, 160, 192, 224, 288];
 
 /// Steps of the pixels' distance, as a share of it: a frame like the last one needs no new table.
 const PITCH_STEP: f64 = 2.5e-3;

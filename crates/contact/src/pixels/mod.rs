@@ -17,9 +17,9 @@
 //! measured along that normal, `d / (n . m)`: a pixel meets the side that is in its way, also where
 //! another one is nearer to where it was at rest. `p >= 0`, `gap >= 0`, `p gap = 0` on
 //! pixels; the vertices' forces are the pressure's sums over their hats, and both go in turn until
-//! forces settle. A map tells means over pixels of the pressure that is linear between them, so
-//! that a pixel which the contact's edge crosses has its part: point values are 15 % off where
-//! means are 9 (median over training presses, FE on graded meshes). Pixels of triangles at the
+//! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
+//! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part: point
+//! values are 15 % off where means are 9 (median over training presses, FE on graded meshes). Pixels of triangles at the
 //! skin's edge hold the pressure that vertices find by themselves: contact goes on beyond the
 //! map, where no pixel could carry it.
 
@@ -30,6 +30,7 @@ mod nearby;
 mod own_dents;
 mod skin;
 mod smooth;
+mod spacing;
 mod turns;
 mod window;
 
@@ -50,6 +51,7 @@ use window::Window;
 
 pub use memory::PixelMemory;
 pub use skin::PixelSkin;
+pub use spacing::PixelSpacing;
 
 /// Change of the vertices' displacement that ends what they find by themselves, reference mm: pixels
 /// only go on by its change from frame to frame.
@@ -150,10 +152,10 @@ fn require_slippery(view: View<'_>) -> Result<(), ContactError> {
 impl PixelContact {
     /// A finger that nothing touches.
     #[must_use]
-    pub fn new(skin: Arc<PixelSkin>, model: &ContactModel) -> Self {
+    pub fn new(skin: Arc<PixelSkin>, model: &ContactModel, spacing: PixelSpacing) -> Self {
         let pixels = skin.raster.pixel_count();
         Self {
-            window: Window::new(&skin, model),
+            window: Window::new(&skin, model, spacing),
             bounded: BoundedSolver::new(pixels),
             convolution: Convolution::new(Arc::clone(&skin.plans)),
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
@@ -317,6 +319,8 @@ impl PixelContact {
             held_pa[index as usize] = p * unit_pa;
             window.spread(skin, index as usize, p * unit_pa, map_pa);
         }
+        // Beside steep edges a cubic falls below zero.
+        map_pa.iter_mut().for_each(|p| *p = p.max(0.0));
         *peak_pa = map_pa.iter().copied().fold(0.0, f32::max);
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);

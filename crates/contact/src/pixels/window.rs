@@ -4,7 +4,7 @@ mod gaps;
 mod hats;
 mod vertices;
 
-use super::PixelSkin;
+use super::{PixelSkin, PixelSpacing};
 use crate::answer::Effort;
 use crate::kernels::Vectors;
 use crate::model::ContactModel;
@@ -15,7 +15,7 @@ use papilla_atlas::MAP_SIDE_PX;
 const NEAR_MM: f64 = 0.6;
 /// Of these, pixels nearer than this can come to touch, reference mm.
 const REACH_MM: f64 = 0.2;
-/// Pixels between the window and itself, where it repeats.
+/// Pixels of the map between the window and itself, where it repeats.
 const BETWEEN: usize = 24;
 const NONE: u32 = u32::MAX;
 
@@ -40,6 +40,11 @@ pub(super) struct Window {
     slot: Vec<u32>,
     first: [usize; 2],
     size: [usize; 2],
+    /// Pixels of the map from one that is solved for to the next, which those are, as bits, and what
+    /// a map shows of one.
+    step_px: usize,
+    solved_for: Vec<u64>,
+    shares: Vec<f32>,
     /// Pixels, as bits, that are looked at.
     looked_at: Vec<u64>,
     /// Vertices of the pixels' stencils, and where each stands among them.
@@ -67,9 +72,13 @@ pub(super) struct Window {
 }
 
 impl Window {
-    pub(super) fn new(skin: &PixelSkin, model: &ContactModel) -> Self {
+    pub(super) fn new(skin: &PixelSkin, model: &ContactModel, spacing: PixelSpacing) -> Self {
         let (pixels, vertices) = (skin.raster.pixel_count(), model.vertices());
         let tiles = model.compliance.side();
+        let mut solved_for = vec![0; pixels.div_ceil(64)];
+        for (entry, index) in skin.raster.indices().iter().enumerate() {
+            solved_for[entry / 64] |= u64::from(spacing.takes(*index)) << (entry % 64);
+        }
         let zeros = || vec![0.0f32; vertices];
         let vector = || std::array::from_fn(|_| zeros());
         Self {
@@ -86,6 +95,9 @@ impl Window {
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
             size: [0; 2],
+            step_px: spacing.px(),
+            solved_for,
+            shares: spacing.shares(),
             looked_at: vec![0; pixels.div_ceil(64)],
             ids: Vec::with_capacity(vertices),
             place: vec![NONE; vertices],
@@ -122,7 +134,7 @@ impl Window {
     }
 
     pub(super) fn size(&self) -> [usize; 2] {
-        self.size.map(|s| s + BETWEEN)
+        self.size.map(|s| s + BETWEEN.div_ceil(self.step_px))
     }
 
     /// Takes the pixels round `candidates`, distances (reference mm) and vertices, that things are
@@ -145,7 +157,7 @@ impl Window {
         for (slot, entry) in self.entries.iter().enumerate() {
             let index = skin.raster.indices()[*entry as usize] as usize;
             self.slot[index] = slot as u32;
-            let at = [index / MAP_SIDE_PX, index % MAP_SIDE_PX];
+            let at = [index / MAP_SIDE_PX, index % MAP_SIDE_PX].map(|i| i / self.step_px);
             for i in 0..2 {
                 (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
             }
@@ -154,9 +166,10 @@ impl Window {
         self.size = [high[0] - low[0], high[1] - low[1]];
         for entry in &self.entries {
             let index = skin.raster.indices()[*entry as usize] as usize;
+            let steps = [self.step_px * MAP_SIDE_PX, self.step_px];
             let side = |to: Option<usize>| to.and_then(|i| self.slot.get(i)).copied();
-            let [up, left] = [MAP_SIDE_PX, 1].map(|step| side(index.checked_sub(step)));
-            let [down, right] = [MAP_SIDE_PX, 1].map(|step| side(Some(index + step)));
+            let [up, left] = steps.map(|step| side(index.checked_sub(step)));
+            let [down, right] = steps.map(|step| side(Some(index + step)));
             self.beside.push([up, down, left, right].map(|slot| slot.unwrap_or(NONE)));
         }
         self.take_vertices(skin, model);
@@ -189,8 +202,8 @@ impl Window {
     /// that most follow from the one before.
     fn take_near(&mut self, skin: &PixelSkin, view: View<'_>, effort: &mut Effort) {
         let mut asked: Option<([f32; 3], f64)> = None;
-        for (word, bits) in self.looked_at.iter().enumerate() {
-            let mut bits = *bits;
+        for (word, (bits, solved_for)) in self.looked_at.iter().zip(&self.solved_for).enumerate() {
+            let mut bits = bits & solved_for;
             while bits != 0 {
                 let entry = 64 * word + bits.trailing_zeros() as usize;
                 bits &= bits - 1;
@@ -241,8 +254,8 @@ impl Window {
         self.cells.clear();
         for entry in &self.entries {
             let index = skin.raster.indices()[*entry as usize] as usize;
-            let row = (index / MAP_SIDE_PX - self.first[0]) % rows;
-            let column = (index % MAP_SIDE_PX - self.first[1]) % columns;
+            let row = (index / MAP_SIDE_PX / self.step_px - self.first[0]) % rows;
+            let column = (index % MAP_SIDE_PX / self.step_px - self.first[1]) % columns;
             self.cells.push((row * columns + column) as u32);
         }
     }
@@ -298,13 +311,14 @@ impl Window {
         sums.map(|sum| (sum / count).max(1e-3))
     }
 
-    /// Adds a pixel's pressure to the means over pixels of pressure that is linear between them.
+    /// Adds a pixel's pressure to the means over pixels of pressure that is a cubic between those that
+    /// are solved for.
     pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
-        const SHARE: [f32; 3] = [0.125, 0.75, 0.125];
         let mask = skin.raster.mask();
-        for (row, a) in SHARE.iter().enumerate() {
-            for (column, b) in SHARE.iter().enumerate() {
-                let to = (index + row * MAP_SIDE_PX + column).checked_sub(MAP_SIDE_PX + 1);
+        let first = (self.shares.len() / 2) * (MAP_SIDE_PX + 1);
+        for (row, a) in self.shares.iter().enumerate() {
+            for (column, b) in self.shares.iter().enumerate() {
+                let to = (index + row * MAP_SIDE_PX + column).checked_sub(first);
                 // What would leave the skin stays.
                 let to = to.filter(|to| mask.get(*to) == Some(&true)).unwrap_or(index);
                 map[to] += a * b * pressure;

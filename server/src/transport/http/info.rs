@@ -76,8 +76,9 @@ pub(crate) async fn tiers(State(app): Shared) -> Response {
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
-        r#"{{"contact_us":{},"pixels_us":{},"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
+        r#"{{"contact_us":{},"coarse_pixels_us":{},"pixels_us":{},"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
         json!(app.contact.as_ref().map(|contact| contact.frame_us)),
+        json!(app.contact.as_ref().and_then(|contact| contact.coarse_pixel_frame_us)),
         json!(app.contact.as_ref().and_then(|contact| contact.pixel_frame_us)),
         json!(catalogue.tiers[catalogue.default].name),
         json!(catalogue.judged_on),

@@ -102,7 +102,8 @@ impl Window {
     ) {
         for id in &self.ids {
             let [u, v] = skin.uv_px[*id as usize];
-            let [x, y] = [u - 0.5 - self.first[1] as f32, v - 0.5 - self.first[0] as f32];
+            let [x, y] = [u, v].map(|c| (c - 0.5) / self.step_px as f32);
+            let [x, y] = [x - self.first[1] as f32, y - self.first[0] as f32];
             let (left, top) = (x.floor(), y.floor());
             let at = |down: i32, right: i32| {
                 let row = (top as i32 + down).rem_euclid(rows as i32) as usize;
