@@ -33,9 +33,12 @@ class Step:
     name: str
     does: str
     command: str  # for bash, from the repository's root
+    # What it needs: these have to pass.
     after: tuple[str, ...] = ()
     # Fewest tests that have to be counted in the output; fewer is a failure.
     tests_min: int = 0
+    # These end before it, however they end, so that both do not wait for the same lock or core.
+    behind: tuple[str, ...] = ()
     # What is installed, in words, with what it took where it was measured.
     installs: str = ""
     limit_s: float = LIMIT_S
@@ -57,7 +60,7 @@ class Outcome:
 
 @dataclass
 class Run:
-    """A run of steps, in the order given where `after` leaves a choice."""
+    """A run of steps, in the order given where `after` and `behind` leave a choice."""
 
     steps: list[Step]
     root: Path
@@ -72,7 +75,7 @@ class Run:
         self.begun = time.monotonic()
 
     def go(self) -> list[Outcome]:
-        """Runs everything; a step whose predecessor did not pass is failed unrun."""
+        """Runs everything; a step that needs one which failed is failed unrun."""
         self.logs.mkdir(parents=True, exist_ok=True)
         lanes = [threading.Thread(target=self.lane) for _ in range(self.lanes)]
         for lane in lanes:
@@ -98,7 +101,7 @@ class Run:
         with self.lock:
             while self.waiting:
                 for step in self.waiting:
-                    if all(a in self.outcomes for a in step.after if a in names):
+                    if all(a in self.outcomes for a in step.after + step.behind if a in names):
                         self.waiting.remove(step)
                         return step
                 self.lock.wait()

@@ -30,7 +30,17 @@ def lints() -> dict[str, str]:
 # Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
 # Tests that solve for seconds: verification, hard cases, presses of whole fingers.
-SOLVES = ["every_quick_row", "every_hard_case", "simulation::tests"]
+SOLVES = [
+    "every_quick_row",
+    "every_hard_case",
+    "simulation::tests",
+    "friction_is_that_of_finite_elements",
+    "a_shipped_press_can_be_solved_again",
+    "a_plate_is_pressed_once",
+    "recorded_scenes_are_found_again",
+    "any_pose_of_any_shape_is_answered",
+    "no_element_folds",
+]
 # Debian's packages, by the program or file that shows that they are there.
 PACKAGES = {
     "ccx": "calculix-ccx",
@@ -168,7 +178,8 @@ def fast() -> list[Step]:
             "doc",
             "examples in the crates' documentation",
             f"cargo test --workspace --doc {FEATURES} -q -- --skip clients/rust/src/lib.rs",
-            after=("rust",),
+            after=("build",),
+            behind=("rust",),
             tests_min=17,
         ),
         Step(
@@ -216,10 +227,10 @@ def full() -> list[Step]:
         Step(
             "solves",
             "verification rows, hard cases and presses of whole fingers, in their short forms",
-            f"cargo test --workspace --lib --test stability --test verify {FEATURES} -q -- "
+            f"cargo test --workspace --lib --tests {FEATURES} -q -- "
             + " ".join(SOLVES),
             after=("build",),
-            tests_min=9,
+            tests_min=15,
         ),
         Step(
             "trainer",
@@ -243,14 +254,15 @@ def full() -> list[Step]:
             f"export ORT_DYLIB_PATH={onnxruntime()}\n"
             f"cargo test --workspace --test infer --test shipped --test library --test onnxruntime "
             f"{FEATURES},papilla-tests/ort -q",
-            after=("rust", "python"),
+            after=("build", "python"),
+            behind=("rust",),
             tests_min=23,
             missing=no_onnxruntime,
         ),
         Step("client-python", "the Python client", f"{client} python", ("build", "python"), 36),
         Step("client-cpp", "the C++ client", f"{client} cpp", ("build",), 33),
         Step("client-c", "the native library from C and C++", f"{client} c", ("build",), 20),
-        Step("client-rust", "the Rust client", f"{client} rust", ("doc", "packages"), 33),
+        Step("client-rust", "the Rust client", f"{client} rust", ("build", "packages"), 33, ("doc",)),
         Step("client-web", "the web client", f"{client} web", ("build", "node", "packages"), 36),
         Step("client-unity", "the C# client in Mono", f"{client} unity", ("build", "packages"), 80),
         Step("godot-generated", "the Godot 4 add-on is what its source makes", "clients/godot/generate --check"),
@@ -289,7 +301,8 @@ def full() -> list[Step]:
             "calculix",
             "the same presses in CalculiX",
             f"cargo test --workspace --test calculix {FEATURES} -q -- --ignored",
-            after=("doc", "packages"),
+            after=("build", "packages"),
+            behind=("doc",),
             tests_min=1,
         ),
         Step(
@@ -312,13 +325,13 @@ def long() -> list[Step]:
             # As a user builds it: without clippy as the compiler.
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS cargo build --release\n"
             '"$TARGET/release/papilla-server" check',
-            after=("doc",),
+            behind=("doc",),
         ),
         Step(
             "debian",
             "the Debian package, installed, started, upgraded and purged",
             "deploy/debian/test",
-            after=("release",),
+            behind=("release",),
             tests_min=32,
             missing=no_musl,
         ),
@@ -326,7 +339,7 @@ def long() -> list[Step]:
             "container",
             "the image FROM scratch, built without root, and a map rendered in it",
             "deploy/container/test",
-            after=("debian",),
+            behind=("debian",),
             tests_min=1,
             missing=no_buildah,
         ),
@@ -334,7 +347,7 @@ def long() -> list[Step]:
             "archive",
             "the release archive, made twice, unpacked and used",
             "deploy/release/test",
-            after=("container",),
+            behind=("container",),
             tests_min=5,
             missing=no_musl,
         ),
@@ -344,7 +357,7 @@ def long() -> list[Step]:
             f"{AS_ROOT} command -v haproxy /usr/sbin/haproxy || "
             "as_root apt-get install -y -qq --no-install-recommends haproxy || true\n"
             "tests/suite/environment kubernetes deploy/kubernetes/requirements.txt || true",
-            after=("release",),
+            behind=("release",),
             installs="apt: haproxy; pip: kubernetes-validate (142 MB)",
         ),
         Step(
@@ -367,21 +380,30 @@ def long() -> list[Step]:
             "tests marked long, every variant of every hard case among them",
             f"cargo test --workspace --all-targets {FEATURES} -q -- --ignored --skip started_by"
             " --skip calculix_agrees",
-            after=("doc",),
+            after=("build",),
+            behind=("doc",),
             tests_min=3,
         ),
-        Step("verify", "every verification row", '"$BIN/fe-datagen" verify', after=("rust-long",)),
+        Step(
+            "verify",
+            "every verification row",
+            '"$BIN/fe-datagen" verify',
+            after=("build",),
+            behind=("rust-long",),
+        ),
         Step(
             "stability-long",
             "hard cases on finer meshes",
             '"$BIN/fe-datagen" stability --long',
-            after=("verify",),
+            after=("build",),
+            behind=("verify",),
         ),
         Step(
             "calculix-long",
             "every simulation in CalculiX",
             '"$BIN/fe-datagen" cross-check',
-            after=("stability-long",),
+            after=("build", "packages"),
+            behind=("stability-long",),
         ),
         Step(
             "sanitizers",
@@ -395,7 +417,7 @@ def long() -> list[Step]:
             "client-crates",
             "the Rust client and what it is built on, compiled from their packages",
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS clients/packages-test crates",
-            after=("doc",),
+            behind=("doc",),
             tests_min=1,
         ),
         Step(
@@ -411,13 +433,14 @@ def long() -> list[Step]:
             "deny",
             "licences, sources, duplicates and advisories of all crates",
             "tests/suite/deny",
-            after=("doc",),
+            behind=("doc",),
         ),
         Step(
             "mutations",
             "the short form fails for each of twelve mutations",
             "tests/mutations/run",
-            after=("calculix-long",),
+            after=("build",),
+            behind=("calculix-long",),
             tests_min=12,
             limit_s=4 * LIMIT_S,
         ),
@@ -425,14 +448,15 @@ def long() -> list[Step]:
             "reconnects",
             "10 000 reconnects",
             f"PAPILLA_RECONNECTS=10000 cargo test --workspace --test service {FEATURES} -q -- clients_come",
-            after=("rust-long",),
+            after=("build",),
+            behind=("rust-long",),
             tests_min=1,
         ),
         Step(
             "fuzz",
             "every reader of outside bytes, ten minutes",
             "tests/fuzz/run",
-            after=("mutations",),
+            behind=("mutations",),
             missing=no_nightly,
         ),
     ]
