@@ -10,6 +10,7 @@
 //! | `client` | what every client must find, over HTTP and in a session |
 //! | `load` | the load generator against the service |
 //! | `persons` | fingers of other widths and stiffness, in sessions and in finite elements |
+//! | `poses` | random objects under the shipped finger, on pixels |
 //! | `moving` | sessions that go on elsewhere, of the Rust client and the load generator |
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
@@ -19,6 +20,7 @@ mod client;
 mod load;
 mod moving;
 mod persons;
+mod poses;
 mod scene;
 mod service;
 mod shipped;

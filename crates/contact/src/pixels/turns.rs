@@ -91,16 +91,24 @@ impl Turns {
 
     /// Moves `force_n` on; returns the change over the sum of forces.
     pub(super) fn take(&mut self, force_n: &mut Vectors) -> f32 {
-        let (mut change, mut size, mut along, mut square) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
+        let (mut change, mut size, mut was) = (0.0f32, 0.0f32, 0.0f32);
+        let (mut along, mut square) = (0.0f32, 0.0f32);
         let forces = force_n.iter().flatten().zip(self.found.iter().flatten());
         for ((force, found), residual) in forces.zip(self.residual.iter_mut().flatten()) {
             let now = found - force;
             let by = now - *residual;
             change += now.abs();
             size += found.abs();
+            was += force.abs();
             along += now * by;
             square += by * by;
             *residual = now;
+        }
+        if size == 0.0 && was > 0.0 {
+            // Skin was pushed out of all reach: half as far, and from there anew.
+            force_n.iter_mut().flatten().for_each(|force| *force *= 0.5);
+            self.rounds = 0;
+            return 1.0;
         }
         let share = if square > 0.0 { along / square } else { 0.0 };
         let share = if self.rounds == 0 { FIRST } else { share.clamp(-SHARE_MAX, SHARE_MAX) };

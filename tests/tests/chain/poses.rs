@@ -1,0 +1,151 @@
+//! Random objects in random places under the shipped finger, solved on pixels: what must hold for any
+//! frame.
+
+use std::sync::Arc;
+
+use papilla_contact::{
+    Contact, ContactModel, Object, PixelContact, PixelSkin, PixelSpacing, Settings, Solver,
+};
+use papilla_proto::{
+    atlas::{Atlas, Patch, Raster},
+    sdf::{
+        Cylinder, Dots, Grating, Placement, Plate, Punch, Ring, RoundedPlate, SignedDistance,
+        Sphere, Wedge,
+    },
+};
+
+use crate::shipped::{folder, text};
+
+/// Objects' tops are thrown so far round the pad's lowest point, mm.
+const AROUND_MM: f64 = 6.0;
+/// Deepest throw, mm; one in ten goes three times as deep.
+const DEPTH_MM: f64 = 2.0;
+/// Below this depth of a pixel, of places that are linear between vertices, contact is not missed, and
+/// above this distance there is none, mm.
+const CLEAR_MM: f64 = 0.05;
+/// Linearisations at vertices, 16 steps of 3 and 25, twice if a frame starts anew; rounds on pixels.
+const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25) + 8;
+
+/// A shape and how high its top is above its origin, mm.
+type Shape = (Arc<dyn SignedDistance>, f64);
+
+fn shapes() -> Vec<Shape> {
+    let plate = RoundedPlate::from(&Plate::default());
+    vec![
+        (Arc::new(plate), plate.half_mm[2]),
+        (Arc::new(Sphere { radius_mm: 4.0 }), 4.0),
+        (Arc::new(Sphere { radius_mm: 0.5 }), 0.5),
+        (Arc::new(Cylinder { radius_mm: 2.0, length_mm: 20.0, end_radius_mm: 0.5 }), 2.0),
+        (Arc::new(Wedge::default()), 0.0),
+        (Arc::new(Punch::default()), 0.0),
+        (Arc::new(Ring::default()), Ring::default().height_mm / 2.0),
+        (Arc::new(Grating::default()), 0.0),
+        (Arc::new(Dots::default()), 0.0),
+    ]
+}
+
+struct Pad {
+    model: Arc<ContactModel>,
+    skin: Arc<PixelSkin>,
+    places_mm: Vec<[f64; 3]>,
+}
+
+impl Pad {
+    fn shipped() -> Self {
+        let models = folder("models");
+        let atlas = Atlas::from_json(&text(&models.join("atlas.json"))).unwrap();
+        let file = std::fs::read(models.join("finger.contact")).unwrap();
+        let model = Arc::new(ContactModel::read(&file).unwrap());
+        let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
+        let skin_mm = &atlas.patch(Patch::Skin).positions_mm;
+        let place = |pixel: &papilla_proto::atlas::Pixel| {
+            std::array::from_fn(|i| {
+                let corners = pixel.vertices.iter().zip(pixel.weights);
+                corners.map(|(v, w)| f64::from(w * skin_mm[*v as usize][i])).sum()
+            })
+        };
+        let places_mm = raster.pixels().iter().map(place).collect();
+        let skin = Arc::new(PixelSkin::new(&model, &atlas, raster).unwrap());
+        Self { model, skin, places_mm }
+    }
+
+    /// Its top as deep below a random place of the pad, tilted and spun.
+    fn throw(&self, random: &mut fastrand::Rng, (shape, top_mm): &Shape) -> Object {
+        let lowest = self.model.lowest_mm();
+        let at = loop {
+            let at = self.places_mm[random.usize(..self.places_mm.len())];
+            if (at[0] - lowest[0]).hypot(at[1] - lowest[1]) < AROUND_MM {
+                break at;
+            }
+        };
+        let most = if random.u8(..10) == 0 { 3.0 * DEPTH_MM } else { DEPTH_MM };
+        let depth_mm = -0.5 + (most + 0.5) * random.f64();
+        let [pitch, roll, spin] = [60.0, 60.0, 360.0].map(|range| range * (random.f64() - 0.5));
+        let Placement { rotation, .. } = Placement::turned(pitch, roll, spin, [0.0; 3]);
+        let tip_mm = [0, 1, 2].map(|i| rotation[i][2] * top_mm);
+        let up = [0.0, 0.0, depth_mm];
+        let origin_mm = [0, 1, 2].map(|i| at[i] + up[i] - tip_mm[i]);
+        Object::rigid(shape.clone(), Placement { rotation, origin_mm })
+    }
+
+    /// Least distance of the undeformed skin's pixels, mm.
+    fn clearance_mm(&self, objects: &[Object]) -> f64 {
+        let of = |o: &Object| {
+            let one = |p: &[f64; 3]| o.placement.clearance_mm(o.shape.as_ref(), *p);
+            self.places_mm.iter().map(one).fold(f64::INFINITY, f64::min)
+        };
+        objects.iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// No missed contact, no pressure in air, no tension, bounded work, whatever comes.
+fn throw_at(poses: usize, spacing: PixelSpacing) {
+    let (pad, shapes) = (Pad::shipped(), shapes());
+    let mut solver = Solver::new(Arc::clone(&pad.model), Settings::default()).unwrap();
+    let mut pixels = PixelContact::new(Arc::clone(&pad.skin), &pad.model, spacing);
+    let mut out = Contact::new(pad.model.vertices());
+    let mut random = fastrand::Rng::with_seed(20);
+    let (mut touching, mut unsettled, mut outside) = (0, 0, 0);
+    let mut objects = Vec::new();
+    for pose in 0..poses {
+        if pose == 0 || random.u8(..3) == 0 {
+            objects.clear();
+            for _ in 0..1 + usize::from(random.u8(..8) == 0) {
+                let shape = &shapes[random.usize(..shapes.len())];
+                objects.push(pad.throw(&mut random, shape));
+            }
+        } else {
+            objects[0].placement.origin_mm[2] += 0.1 * (random.f64() - 0.5);
+        }
+        let placed: Vec<Placement> = objects.iter().map(|o| o.placement).collect();
+        solver.solve_on_pixels(&objects, &mut pixels, &mut out).unwrap();
+        let told = format!("pose {pose} of {placed:?}, {:?} {:?}", out.quality, out.effort);
+        assert!(pixels.map_pa().iter().all(|p| p.is_finite() && *p >= 0.0), "{told}");
+        assert!(out.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0), "{told}");
+        let numbers = [&out.force_n[..], &out.torque_n_mm, &out.centre_mm].concat();
+        assert!(numbers.iter().all(|v| v.is_finite()), "{told}");
+        assert!(out.effort.iterations <= ITERATIONS_MAX, "{told}");
+        let pressed = pixels.peak_pa() > 0.0;
+        let nearest_mm = pad.clearance_mm(&objects);
+        assert!(pressed || nearest_mm > -CLEAR_MM, "missed by {nearest_mm} mm, {told}");
+        assert!(!pressed || nearest_mm < CLEAR_MM, "pressure across {nearest_mm} mm, {told}");
+        touching += usize::from(pressed);
+        unsettled += usize::from(pressed && !out.quality.settled);
+        outside += usize::from(pressed && out.quality.out_of_range);
+    }
+    println!("{spacing:?}: {touching} of {poses} touch, {unsettled} unsettled, {outside} outside");
+    assert!(3 * touching > poses && 2 * unsettled < touching, "{touching} {unsettled}");
+}
+
+#[test]
+fn any_pose_is_answered_on_pixels() {
+    throw_at(150, PixelSpacing::One);
+    throw_at(150, PixelSpacing::Two);
+}
+
+#[test]
+#[ignore = "a minute"]
+fn ten_thousand_poses_are_answered_on_pixels() {
+    throw_at(10_000, PixelSpacing::One);
+    throw_at(10_000, PixelSpacing::Two);
+}
