@@ -186,17 +186,15 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
 fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, StartError>) {
     match contact {
         Ok(Some(contact)) => {
-            let (us, on_pixels) = (contact.frame_us, contact.pixel_frame_us);
-            let coarse_us = contact.coarse_pixel_frame_us;
-            let pixels = match on_pixels.zip(coarse_us) {
-                Some((us, coarse)) => format!("{us} us on pixels, {coarse} on every second one"),
-                None => "no pixels, since its model names no layers".to_owned(),
+            let us = contact.frame_us;
+            let on_pixels = [contact.pixel_frame_us, contact.coarse_pixel_frame_us];
+            let pixels = match on_pixels {
+                [Some(us), Some(coarse)] => format!("{us} us on pixels, {coarse} on every second"),
+                _ => "no pixels, since its model names no layers".to_owned(),
             };
-            let values = json!({
-                "frame_us": us,
-                "pixel_frame_us": on_pixels,
-                "coarse_pixel_frame_us": coarse_us,
-            });
+            let [all, coarse] = on_pixels;
+            let values =
+                json!({"frame_us": us, "pixel_frame_us": all, "coarse_pixel_frame_us": coarse});
             let detail = format!("of this finger, {us} us a frame, {pixels}");
             report.good("contact", detail, values);
         }
