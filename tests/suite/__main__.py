@@ -98,16 +98,17 @@ def main() -> int:
     begun = time.monotonic()
     surroundings = environment()
     logs = Path(surroundings["TARGET"]) / "test-logs"
-    outcomes = Run(suite, ROOT, logs, surroundings, chosen_options.lanes).go()
-    wall_s = time.monotonic() - begun
-    if chosen_options.json:
-        text = json.dumps(report.as_json(outcomes, wall_s), indent=1)
-        Path(chosen_options.json).write_text(text + "\n")
+    run = Run(suite, ROOT, logs, surroundings, chosen_options.lanes)
     if chosen_options.record:
         extents = [("./test --fast", "fast"), ("./test", "full"), ("./test --all", "all")]
         belongs = {s.name: of for of, name in reversed(extents) for s in steps.extent(name)}
         order = {step.name: belongs[step.name] for step in everything}
-        report.record(outcomes, ROOT, order)
+        run.note = lambda outcome: report.record(outcome, ROOT, order)
+    outcomes = run.go()
+    wall_s = time.monotonic() - begun
+    if chosen_options.json:
+        text = json.dumps(report.as_json(outcomes, wall_s), indent=1)
+        Path(chosen_options.json).write_text(text + "\n")
     print("\n" + report.summary(outcomes, wall_s), flush=True)
     return 1 if any(o.verdict == "failed" for o in outcomes) else 0
 

@@ -78,15 +78,14 @@ def entry(o: Outcome) -> dict:
     }
 
 
-def record(outcomes: list[Outcome], root: Path, belongs: dict[str, str]) -> None:
-    """Notes this run in the record and writes the page anew; other parts' rows stay."""
+def record(o: Outcome, root: Path, belongs: dict[str, str]) -> None:
+    """Notes a part that ended in the record and writes the page anew; other parts' rows stay."""
     path = root / RECORD
     rows = json.loads(path.read_text()) if path.exists() else {}
     git = ["git", "rev-parse", "--short", "HEAD"]
     commit = subprocess.run(git, cwd=root, capture_output=True, text=True, check=False).stdout.strip()
     when = datetime.now(timezone.utc).strftime("%Y-%m-%d")
-    for o in outcomes:
-        rows[o.step.name] = entry(o) | {"date": when, "commit": commit, "on": processor()}
+    rows[o.step.name] = entry(o) | {"date": when, "commit": commit, "on": processor()}
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps({n: rows[n] for n in belongs if n in rows}, indent=1) + "\n")
     lines = [row(rows[n], of) if n in rows else never(n, of) for n, of in belongs.items()]

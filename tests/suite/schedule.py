@@ -67,6 +67,8 @@ class Run:
     logs: Path
     environment: dict[str, str]
     lanes: int = 2
+    # What is told each outcome as soon as it is known, one at a time.
+    note: Callable[[Outcome], None] = lambda _: None
     outcomes: dict[str, Outcome] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -93,6 +95,7 @@ class Run:
                 outcome = Outcome(step, "failed", repr(error))
             with self.lock:
                 self.outcomes[step.name] = outcome
+                self.note(outcome)
                 self.lock.notify_all()
 
     def next_step(self) -> Step | None:

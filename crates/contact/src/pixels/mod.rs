@@ -225,10 +225,20 @@ impl PixelContact {
         }
         if change > UNSETTLED {
             out.quality.settled = false;
+            self.stand_in();
             self.turns.forget();
         }
         self.answer(model, person, out);
         Ok(())
+    }
+
+    /// Where no round found where skin that vertices pushed away touches, what they found stands.
+    fn stand_in(&mut self) {
+        let Self { skin, window, pressure, turns, .. } = self;
+        let n = window.len();
+        if pressure[..n].iter().all(|p| *p == 0.0) {
+            window.press_hats(skin, turns.found_without_pixels(), &mut pressure[..n]);
+        }
     }
 
     /// The pressure that the first round starts from: the last frame's, pressed on as vertices press
