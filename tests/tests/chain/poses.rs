@@ -106,13 +106,15 @@ fn throw_at(poses: usize, spacing: PixelSpacing) {
     let mut out = Contact::new(pad.model.vertices());
     let mut random = fastrand::Rng::with_seed(20);
     let (mut touching, mut unsettled, mut outside) = (0, 0, 0);
-    let mut objects = Vec::new();
+    // By shape, alone and no deeper than `DEPTH_MM`: poses, and those that did not settle.
+    let mut by_shape = vec![[0; 2]; shapes.len()];
+    let (mut objects, mut which) = (Vec::new(), 0);
     for pose in 0..poses {
         if pose == 0 || random.u8(..3) == 0 {
             objects.clear();
             for _ in 0..1 + usize::from(random.u8(..8) == 0) {
-                let shape = &shapes[random.usize(..shapes.len())];
-                objects.push(pad.throw(&mut random, shape));
+                which = random.usize(..shapes.len());
+                objects.push(pad.throw(&mut random, &shapes[which]));
             }
         } else {
             objects[0].placement.origin_mm[2] += 0.1 * (random.f64() - 0.5);
@@ -132,8 +134,13 @@ fn throw_at(poses: usize, spacing: PixelSpacing) {
         touching += usize::from(pressed);
         unsettled += usize::from(pressed && !out.quality.settled);
         outside += usize::from(pressed && out.quality.out_of_range);
+        if objects.len() == 1 && pressed && nearest_mm > -DEPTH_MM {
+            by_shape[which][0] += 1;
+            by_shape[which][1] += usize::from(!out.quality.settled);
+        }
     }
     println!("{spacing:?}: {touching} of {poses} touch, {unsettled} unsettled, {outside} outside");
+    println!("of each shape, and unsettled: {by_shape:?}");
     assert!(3 * touching > poses && 2 * unsettled < touching, "{touching} {unsettled}");
 }
 
