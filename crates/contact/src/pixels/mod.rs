@@ -203,6 +203,12 @@ impl PixelContact {
         }
         let unit_pa = unit_pa(person);
         solver.forces(turns.without_pixels());
+        let is_alone = turns.found_without_pixels().iter().flatten().all(|force| *force == 0.0);
+        if is_alone && !window.is_inside_at_rest(skin, view, &mut out.effort) {
+            // Skin is dented by the last frame alone.
+            self.reset();
+            return Ok(());
+        }
         let warm = turns.begin(&mut window.force_n);
         if warm {
             for (p, entry) in pressure.iter_mut().zip(&window.entries) {

@@ -231,6 +231,20 @@ impl Window {
         self.entries.extend(&self.held);
     }
 
+    /// Whether skin at rest lies in a thing at any of the pixels.
+    pub(super) fn is_inside_at_rest(
+        &self,
+        skin: &PixelSkin,
+        view: View<'_>,
+        effort: &mut Effort,
+    ) -> bool {
+        self.entries.iter().any(|entry| {
+            effort.distances += 1;
+            let nearest = view.nearest_at(skin.rest_mm[*entry as usize].map(f64::from));
+            nearest.is_some_and(|nearest| nearest.gap_mm < 0.0)
+        })
+    }
+
     /// Takes the vertices of the pixels' stencils, and of their triangles.
     fn take_vertices(&mut self, skin: &PixelSkin, model: &ContactModel) {
         self.moving.clear();

@@ -195,6 +195,11 @@ fn air_and_no_object_press_nothing() {
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], 0.3)], pixels, out).unwrap();
     solver.solve_on_pixels(&[ball(3.0, [0.0, 0.0], -0.1)], pixels, out).unwrap();
     assert!(pixels.map_pa().iter().all(|p| *p == 0.0) && force_n(out) == 0.0);
+    // Nor does a dot that has left, whatever the dent that it had made.
+    solver.solve_on_pixels(&[ball(0.5, [0.35, 0.35], 0.2)], pixels, out).unwrap();
+    assert!(force_n(out) > 0.0);
+    solver.solve_on_pixels(&[ball(0.5, [0.35, 0.35], -0.02)], pixels, out).unwrap();
+    assert!(pixels.map_pa().iter().all(|p| *p == 0.0) && force_n(out) == 0.0);
     let none: [Object; 0] = [];
     solver.solve_on_pixels(&none, pixels, out).unwrap();
     assert!(force_n(out) == 0.0);
