@@ -18,10 +18,10 @@
 //! another one is nearer to where it was at rest. `p >= 0`, `gap >= 0`, `p gap = 0` on
 //! pixels; the vertices' forces are the pressure's sums over their hats, and both go in turn until
 //! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
-//! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part: point
-//! values are 15 % off where means are 9 (median over training presses, FE on graded meshes). Pixels of triangles at the
-//! skin's edge hold the pressure that vertices find by themselves: contact goes on beyond the
-//! map, where no pixel could carry it.
+//! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
+//! point values are 15 % off where means are 9 (median over training presses, FE on graded
+//! meshes). Pixels of triangles at the skin's edge hold the pressure that vertices find by
+//! themselves: contact goes on beyond the map, where no pixel could carry it.
 
 mod convolution;
 
@@ -238,7 +238,7 @@ impl PixelContact {
         Ok(())
     }
 
-    /// Where no round found where skin that vertices pushed away touches, what they found stands.
+    /// What vertices found stands where their forces push skin out of reach in every round.
     fn stand_in(&mut self) {
         let Self { skin, window, pressure, turns, .. } = self;
         let n = window.len();
