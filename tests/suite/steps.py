@@ -44,8 +44,9 @@ def lints() -> dict[str, str]:
 
 # Turned on in the build that the tests share: traces, and the examples of docs/reference/clients/rust.md.
 FEATURES = "--features papilla-server/otlp,papilla-client/guide"
-# Tests that solve for seconds: verification, hard cases, presses of whole fingers.
-SOLVES = [
+# Tests that take five seconds and more: verification, hard cases, presses of whole fingers, the
+# cards of all models, random poses. `./test` runs them in a part of their own.
+SLOW = [
     "every_quick_row",
     "every_hard_case",
     "simulation::tests",
@@ -55,6 +56,14 @@ SOLVES = [
     "recorded_scenes_are_found_again",
     "any_pose_of_any_shape_is_answered",
     "no_element_folds",
+    "every_mesh_is_well_shaped",
+    "a_stopped_indentation_goes_on_to_the_same_bits",
+    "the_card_tells_the_truth",
+    "every_frame_is_accounted_for",
+    "any_pose_is_answered_on_pixels",
+    "any_move_is_answered",
+    "five_hundred_flipped_bits",
+    "a_slice_of_a_million_is_a_slice",
 ]
 def fast() -> list[Step]:
     """Rust alone."""
@@ -77,9 +86,9 @@ def fast() -> list[Step]:
         ),
         Step(
             "rust",
-            "unit, property, differential and end-to-end tests but for the longest solves",
+            "unit, property, differential and end-to-end tests of less than some seconds",
             f"cargo test --workspace --all-targets {FEATURES} -q -- "
-            + " ".join(f"--skip {name}" for name in SOLVES),
+            + " ".join(f"--skip {name}" for name in SLOW),
             after=("build",),
             tests_min=740,
         ),
@@ -135,12 +144,12 @@ def full() -> list[Step]:
     client = "clients/test"
     return [
         Step(
-            "solves",
-            "verification rows, hard cases and presses of whole fingers, in their short forms",
+            "slow",
+            "tests of seconds: verification rows, hard cases, presses of whole fingers, models' cards",
             f"cargo test --workspace --lib --tests {FEATURES} -q -- "
-            + " ".join(SOLVES),
+            + " ".join(SLOW),
             after=("build",),
-            tests_min=15,
+            tests_min=23,
         ),
         Step(
             "trainer",
@@ -335,7 +344,7 @@ def long() -> list[Step]:
             "a campaign on a Slurm cluster in namespaces: preemptions, a lost node, a full disk",
             f"{install_slurm()}\n{AS_ROOT} as_root env BIN=\"$BIN\" tests/slurm/run",
             after=("packages", "build"),
-            tests_min=15,
+            tests_min=23,
             installs="apt: slurm-wlm munge" if slurm_missing() else "",
             missing=no_slurm,
         ),
