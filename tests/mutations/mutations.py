@@ -37,7 +37,7 @@ MUTATIONS = [
         "crates/fem/src/mesh/recovery.rs",
         "let owner = element_on_side(mesh, region);",
         "let owner = element_on_side(mesh, Region(1 - region.0.min(1)));",
-        rust("--lib", "mesh::"),
+        rust("--test mesh", "recovery::"),
     ),
     Mutation(
         "contact that leaves half of its curvature out of the tangent",
@@ -51,7 +51,7 @@ MUTATIONS = [
         "crates/fem/src/contact/friction.rs",
         "if size <= s {",
         "if size <= 2.0 * s {",
-        rust("--test verify"),
+        rust("--lib", "contact::friction::"),
     ),
     Mutation(
         "a frame that came while another was rendered is lost",
