@@ -20,8 +20,9 @@
 //! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
 //! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
 //! point values are 15 % off where means are 9 (median over training presses, FE on graded
-//! meshes). Pixels of triangles at the skin's edge hold the pressure that vertices find by
-//! themselves: contact goes on beyond the map, where no pixel could carry it.
+//! meshes). Pixels at the skin's edge hold the pressure that vertices find by themselves: contact
+//! goes on beyond the map, where no pixel could carry it. In the two rows of triangles beside them
+//! pixels leave a gap for what their pressure has beside the vertices', less and less inward.
 
 mod convolution;
 
@@ -57,7 +58,7 @@ pub use spacing::PixelSpacing;
 /// only go on by its change from frame to frame.
 const AT_VERTICES_MM: f32 = 5e-4;
 /// Rounds of vertices and pixels at most.
-const ROUNDS_MAX: usize = 8;
+const ROUNDS_MAX: usize = 12;
 /// Change of the vertices' forces, of their sum, that ends them.
 const SETTLED: f32 = 0.01;
 /// The same, above which an answer is not settled.
@@ -89,6 +90,8 @@ pub struct PixelContact {
     /// By pixel of the window: gap, mm, and pressure, MPa.
     rest: Vec<f32>,
     pressure: Vec<f32>,
+    /// By pixel: pressure that vertices find by themselves, MPa.
+    of_vertices: Vec<f32>,
     /// By pixel of the map: what pixels hold, and its means over pixels, Pa.
     held_pa: Vec<f32>,
     map_pa: Vec<f32>,
@@ -161,6 +164,7 @@ impl PixelContact {
             amplitudes: model.second_order.as_ref().map(|s| s.amplitudes()),
             turns: Turns::new(model.vertices()),
             rest: vec![0.0; pixels],
+            of_vertices: vec![0.0; pixels],
             pressure: vec![0.0; pixels],
             held_pa: vec![0.0; MAP_LEN],
             map_pa: vec![0.0; MAP_LEN],
@@ -229,10 +233,14 @@ impl PixelContact {
                 break;
             }
         }
-        if change > UNSETTLED {
-            out.quality.settled = false;
+        // Pixels go by vertices' answer no further than a start.
+        out.quality.settled = change <= UNSETTLED;
+        if !out.quality.settled {
             self.stand_in();
-            self.turns.forget();
+            // From what came close the next frame goes on.
+            if change > JUMP {
+                self.turns.forget();
+            }
         }
         self.answer(model, person, out);
         Ok(())
@@ -249,24 +257,15 @@ impl PixelContact {
 
     /// The pressure that the first round starts from: the last frame's, pressed on as vertices press
     /// on by themselves, or theirs.
-    fn start(
-        skin: &PixelSkin,
-        window: &mut Window,
-        turns: &Turns,
-        [of_vertices, pressure]: [&mut [f32]; 2],
-        warm: bool,
-    ) {
+    fn start(&mut self, warm: bool) {
+        let Self { skin, window, turns, rest: last, pressure, of_vertices, .. } = self;
         let (n, m) = (window.len(), window.free());
         let first = if warm { m } else { 0 };
         window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+        window.press_hats(skin, turns.last(), last);
         pressure[first..n].copy_from_slice(&of_vertices[first..n]);
-        let pressed = |p: &&mut f32| **p > 0.0;
-        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
-            *p += of_vertices[i];
-        }
-        window.press_hats(skin, turns.last(), of_vertices);
-        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| pressed(p)) {
-            *p = (*p - of_vertices[i]).max(0.0);
+        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| **p > 0.0) {
+            *p = (*p + of_vertices[i] - last[i]).max(0.0);
         }
     }
 
@@ -279,20 +278,21 @@ impl PixelContact {
         start: Option<bool>,
         effort: &mut Effort,
     ) -> Result<f32, ContactError> {
-        let Self { skin, window, convolution, bounded, amplitudes, turns, rest, pressure, .. } =
-            self;
-        let n = window.len();
         let model = &solver.model;
-        let m = window.free();
+        let Self { skin, window, amplitudes, .. } = self;
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
         window.place(skin, model);
         window.measure_hats(skin, model);
         if let Some(warm) = start {
-            Self::start(skin, window, turns, [&mut *rest, &mut *pressure], warm);
+            self.start(warm);
+            let Self { skin, window, convolution, pressure, .. } = self;
             let pitch_mm = window.pitch_mm(pressure);
             convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
             window.number_cells(skin, [convolution.rows(), convolution.columns()]);
         }
+        let Self { skin, window, convolution, bounded, turns, .. } = self;
+        let Self { rest, pressure, of_vertices, .. } = self;
+        let (n, m) = (window.len(), window.free());
         let size = [convolution.rows(), convolution.columns()];
         window.press_forces(skin, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);
@@ -300,15 +300,16 @@ impl PixelContact {
         let grid = convolution.press_rows(&window.cells, &pressure[..n]);
         window.measure(skin, view, solver.person(), grid, effort)?;
         let gradient = &mut rest[..m];
-        window.gradient(&pressure[..m], gradient);
-        let give = &window.give[..m];
-        let norm = skin.surface.largest() as f32 + give.iter().copied().fold(0.0, f32::max);
+        window.gradient([&pressure[..m], &of_vertices[..m]], gradient);
+        let [give, ease] = [&window.give[..m], &window.ease[..m]];
+        let most = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
+        let norm = skin.surface.largest() as f32 + most(give) + most(ease);
         let (cells, beside) = (&window.cells[..m], &window.beside[..m]);
         let bends = convolution.bends();
-        let nearby = Nearby { convolution, cells, give, norm, beside, bends };
-        effort.products += bounded
-            .improve(nearby, gradient, &mut pressure[..m], VIOLATION_MM, PRODUCTS_MAX)
-            .products;
+        let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends };
+        let p = &mut pressure[..m];
+        effort.products +=
+            bounded.improve(nearby, gradient, p, VIOLATION_MM, PRODUCTS_MAX).products;
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
         Ok(turns.take(&mut window.force_n))

@@ -9,6 +9,8 @@ pub(super) struct Nearby<'a> {
     pub cells: &'a [u32],
     /// How far the object gives way at each pixel, mm/MPa.
     pub give: &'a [f32],
+    /// How far it leaves gaps near the skin's edge, mm/MPa.
+    pub ease: &'a [f32],
     pub norm: f32,
     pub beside: &'a [[u32; 4]],
     /// `1 / h^2` by the pixels' distances `h` down and along rows, and `k^2` by the wave number in
@@ -23,8 +25,9 @@ impl Operator for Nearby<'_> {
 
     fn times(&mut self, x: &[f32], y: &mut [f32]) {
         let grid = self.convolution.press_rows(self.cells, x);
-        for (((cell, give), x), y) in self.cells.iter().zip(self.give).zip(x).zip(y) {
-            *y = grid[*cell as usize] + give * x;
+        let gives = self.give.iter().zip(self.ease);
+        for (((cell, (give, ease)), x), y) in self.cells.iter().zip(gives).zip(x).zip(y) {
+            *y = grid[*cell as usize] + (give + ease) * x;
         }
     }
 

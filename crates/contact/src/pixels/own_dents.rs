@@ -37,7 +37,7 @@ impl OwnDents<'_> {
         &self,
         surface: &SurfaceCompliance,
         plans: &Arc<Plans>,
-        at_edge: &[bool],
+        rows_from_edge: &[u8],
     ) -> Vec<Correction> {
         let mut hats = vec![Vec::new(); self.uv_px.len()];
         for (entry, pixel) in self.raster.pixels().iter().enumerate() {
@@ -53,7 +53,7 @@ impl OwnDents<'_> {
         let none = Correction { vertices: [0; NEAR], weights: [0.0; NEAR] };
         let of = |vertex: usize| {
             let hat = &hats[vertex];
-            if at_edge[vertex] || hat.is_empty() {
+            if rows_from_edge[vertex] < 2 || hat.is_empty() {
                 return none;
             }
             self.correction(vertex, hat, &slot, surface, &mut convolution).unwrap_or(none)

@@ -5,8 +5,13 @@ use super::own_dents::{Correction, OwnDents};
 use super::smooth::{self, PixelStencil};
 use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
-use papilla_atlas::{Atlas, Raster};
+use papilla_atlas::{Atlas, Pixel, Raster};
 use std::sync::Arc;
+
+/// Rows of triangles from the skin's edge within which pixels hold the vertices' pressure, and those
+/// from which they know nothing of it.
+const HELD_ROWS: f32 = 2.0;
+const FREE_ROWS: u8 = 4;
 
 /// What pixels have to know of a skin; made once, for any number of fingers.
 #[derive(Debug)]
@@ -18,8 +23,8 @@ pub struct PixelSkin {
     pub(super) corrections: Vec<Correction>,
     /// By vertex: pixels of the triangles round it.
     pub(super) around: Vec<Vec<u32>>,
-    /// Whether a vertex is at the skin's edge.
-    pub(super) at_edge: Vec<bool>,
+    /// By pixel: gap for a pressure beside the vertices', mm/MPa; infinite where theirs is held.
+    pub(super) ease: Vec<f32>,
     pub(super) surface: SurfaceCompliance,
     pub(super) plans: Arc<Plans>,
     /// Places of the pixels at rest.
@@ -38,7 +43,15 @@ impl PixelSkin {
         let uv_px = atlas.patch(raster.patch()).uv_px.clone();
         let stencils = smooth::of_pixels(atlas, &raster);
         let surface = SurfaceCompliance::new(layers);
-        let at_edge = smooth::at_edge(atlas);
+        let rows = smooth::rows_from_edge(atlas, FREE_ROWS);
+        let largest = surface.largest() as f32;
+        let ease = |pixel: &Pixel| {
+            let corners = pixel.vertices.iter().zip(pixel.weights);
+            let row: f32 = corners.map(|(v, w)| w * f32::from(rows[*v as usize])).sum();
+            let part = (f32::from(FREE_ROWS) - row).max(0.0) / (row - HELD_ROWS + 1.0);
+            if row < HELD_ROWS { f32::INFINITY } else { largest * part.powi(2) }
+        };
+        let ease: Vec<f32> = raster.pixels().iter().map(ease).collect();
         let place = |stencil: &PixelStencil| {
             std::array::from_fn(|i| stencil.value(|v| model.positions_mm[v][i] as f32))
         };
@@ -49,17 +62,7 @@ impl PixelSkin {
         }
         let plans = Arc::new(Plans::new());
         let own = OwnDents { model, uv_px: &uv_px, raster: &raster, rest_mm: &rest_mm };
-        let corrections = own.corrections(&surface, &plans, &at_edge);
-        Some(Self {
-            raster,
-            uv_px,
-            stencils,
-            corrections,
-            around,
-            at_edge,
-            surface,
-            plans,
-            rest_mm,
-        })
+        let corrections = own.corrections(&surface, &plans, &rows);
+        Some(Self { raster, uv_px, stencils, corrections, around, ease, surface, plans, rest_mm })
     }
 }

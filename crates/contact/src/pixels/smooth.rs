@@ -56,21 +56,26 @@ pub(super) fn of_pixels(atlas: &Atlas, raster: &Raster) -> Vec<PixelStencil> {
     places.zip(raster.pixels()).map(stencil).collect()
 }
 
-/// Whether each vertex is at the skin's edge, on a side of one triangle alone, or next to one that is.
-pub(super) fn at_edge(atlas: &Atlas) -> Vec<bool> {
+/// Rows of triangles between each vertex and the skin's edge, up to `most`.
+pub(super) fn rows_from_edge(atlas: &Atlas, most: u8) -> Vec<u8> {
     let sides = |[a, b, c]: &[u32; 3]| [[*a, *b], [*b, *c], [*c, *a]];
     let all: std::collections::HashSet<[u32; 2]> =
         atlas.triangles().iter().flat_map(sides).collect();
-    let mut found = vec![false; atlas.vertex_count()];
+    let mut rows = vec![most; atlas.vertex_count()];
+    // A side of one triangle alone.
     for [a, b] in all.iter().filter(|[a, b]| !all.contains(&[*b, *a])) {
-        found[*a as usize] = true;
-        found[*b as usize] = true;
+        (rows[*a as usize], rows[*b as usize]) = (0, 0);
     }
-    let edge = found.clone();
-    for corners in atlas.triangles().iter().filter(|c| c.iter().any(|v| edge[*v as usize])) {
-        corners.iter().for_each(|corner| found[*corner as usize] = true);
+    for row in 1..most {
+        for corners in atlas.triangles() {
+            if corners.iter().any(|v| rows[*v as usize] == row - 1) {
+                for v in corners {
+                    rows[*v as usize] = rows[*v as usize].min(row);
+                }
+            }
+        }
     }
-    found
+    rows
 }
 
 /// The triangle's plane.

@@ -4,6 +4,10 @@ use super::JUMP;
 
 /// Farthest that a round goes beyond, or stays behind, what it found.
 const SHARE_MAX: f32 = 0.7;
+/// Rounds from which on they take only a part of what is left of the residual: flanks of narrow things
+/// push skin aside, which gives way up to ten times as far as pixels expect.
+const LATE: usize = 4;
+const TAKEN: f32 = 0.45;
 /// How far the first one stays behind: over long distances skin gives way as far as over short
 /// ones, so that a round overshoots by a half to all of its change.
 const FIRST: f32 = 0.4;
@@ -13,16 +17,18 @@ type Vectors = [Vec<f32>; 3];
 /// Forces that vertices and pixels hand to each other, N.
 ///
 /// A round answers forces `f` with `F(f)`. The next one starts from the secant's estimate of where
-/// `F(f) = f` (Anderson's method of depth one, J. ACM 12, 1965).
+/// `F(f) = f` (Anderson's method of depth one, J. ACM 12, 1965), late ones from less far: what settles
+/// at all has settled by then, or goes to and fro.
 #[derive(Debug)]
 pub(super) struct Turns {
     /// What vertices find by themselves, in this frame and in the last one.
     without: Vectors,
     last: Vectors,
-    /// `F(f)`, and of the round before it and `F(f) - f`.
+    /// `F(f)` and `F(f) - f`; `f` and `F(f)` of the round before.
     found: Vectors,
-    before: Vectors,
     residual: Vectors,
+    from: Vectors,
+    before: Vectors,
     rounds: usize,
     warm: bool,
 }
@@ -30,8 +36,8 @@ pub(super) struct Turns {
 impl Turns {
     pub(super) fn new(vertices: usize) -> Self {
         let zeros = || std::array::from_fn(|_| vec![0.0; vertices]);
-        let [without, last, found, before, residual] = std::array::from_fn(|_| zeros());
-        Self { without, last, found, before, residual, rounds: 0, warm: false }
+        let [without, last, found, residual, from, before] = std::array::from_fn(|_| zeros());
+        Self { without, last, found, residual, from, before, rounds: 0, warm: false }
     }
 
     /// To be filled with the forces that vertices find by themselves.
@@ -111,12 +117,17 @@ impl Turns {
             return 1.0;
         }
         let share = if square > 0.0 { along / square } else { 0.0 };
-        let share = if self.rounds == 0 { FIRST } else { share.clamp(-SHARE_MAX, SHARE_MAX) };
-        let both = self.found.iter().flatten().zip(self.before.iter_mut().flatten());
-        for (force, (found, before)) in force_n.iter_mut().flatten().zip(both) {
-            let last = if self.rounds == 0 { *force } else { *before };
-            *force = found + share * (last - found);
-            *before = *found;
+        let (share, taken) = match self.rounds {
+            0 => (0.0, 1.0 - FIRST),
+            rounds => (share.clamp(-SHARE_MAX, SHARE_MAX), if rounds < LATE { 1.0 } else { TAKEN }),
+        };
+        let both = self.from.iter_mut().flatten().zip(self.before.iter_mut().flatten());
+        let found = self.found.iter().flatten();
+        for ((force, found), (from, before)) in force_n.iter_mut().flatten().zip(found).zip(both) {
+            let start = *force + share * (*from - *force);
+            let end = found + share * (*before - found);
+            (*from, *before) = (*force, *found);
+            *force = start + taken * (end - start);
         }
         self.rounds += 1;
         if size > 0.0 { change / size } else { 0.0 }

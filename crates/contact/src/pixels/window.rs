@@ -36,6 +36,8 @@ pub(super) struct Window {
     gap_mm: Vec<f32>,
     /// How far the object gives way, mm/MPa.
     pub give: Vec<f32>,
+    /// Of the pixels that are solved for: gap for a pressure beside the vertices', mm/MPa.
+    pub ease: Vec<f32>,
     /// Slot of each pixel of the map.
     slot: Vec<u32>,
     first: [usize; 2],
@@ -92,6 +94,7 @@ impl Window {
             inward: vec![[0.0; 3]; pixels],
             gap_mm: vec![0.0; pixels],
             give: vec![0.0; pixels],
+            ease: vec![0.0; pixels],
             slot: vec![NONE; MAP_SIDE_PX * MAP_SIDE_PX],
             first: [0; 2],
             size: [0; 2],
@@ -222,9 +225,13 @@ impl Window {
                     gap_mm < REACH_MM
                 });
                 if is_near {
-                    let corners = skin.raster.pixels()[entry].vertices;
-                    let is_held = corners.iter().any(|v| skin.at_edge[*v as usize]);
-                    if is_held { &mut self.held } else { &mut self.entries }.push(entry as u32);
+                    let ease = skin.ease[entry];
+                    if ease.is_finite() {
+                        self.ease[self.entries.len()] = ease;
+                        self.entries.push(entry as u32);
+                    } else {
+                        self.held.push(entry as u32);
+                    }
                 }
             }
         }

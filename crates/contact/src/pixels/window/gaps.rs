@@ -60,12 +60,18 @@ impl Window {
         Ok(())
     }
 
-    /// Gaps of the pixels that are solved for, mm.
-    pub(in super::super) fn gradient(&self, pressure: &[f32], gradient: &mut [f32]) {
+    /// Gaps of the pixels that are solved for, mm; near the skin's edge with what their pressure has
+    /// beside the vertices'.
+    pub(in super::super) fn gradient(
+        &self,
+        [pressure, of_vertices]: [&[f32]; 2],
+        gradient: &mut [f32],
+    ) {
         for (slot, gradient) in gradient.iter_mut().enumerate() {
             let (gap, p) = (self.gap_mm[slot], pressure[slot]);
             let is_free = gap > FREE_MM && !(p > 0.0);
-            *gradient = if is_free { 1e3 } else { gap + self.give[slot] * p };
+            let eased = self.ease[slot] * (p - of_vertices[slot]);
+            *gradient = if is_free { 1e3 } else { gap + self.give[slot] * p + eased };
         }
     }
 }
