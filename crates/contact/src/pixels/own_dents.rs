@@ -6,7 +6,7 @@
 //! the force it goes on as the polynomial of second degree through what is round it.
 
 use super::convolution::{Convolution, Plans};
-use super::smooth::{Stencil, TERMS, solve};
+use super::smooth::{Stencil, TERMS, solve, square};
 use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{MAP_SIDE_PX, Raster};
@@ -26,6 +26,8 @@ pub(super) type Correction = Stencil<NEAR>;
 pub(super) struct OwnDents<'a> {
     pub model: &'a ContactModel,
     pub uv_px: &'a [[f32; 2]],
+    /// How far vertices are apart round each of them, px.
+    pub apart: &'a [[f32; 2]],
     pub raster: &'a Raster,
     /// Places of the pixels at rest.
     pub rest_mm: &'a [[f32; 3]],
@@ -84,7 +86,10 @@ impl OwnDents<'_> {
         };
         let pitch_mm = [MAP_SIDE_PX, 1].map(mean);
         let near = self.near(vertex)?;
-        let reach = near.iter().map(|(square, _)| square.sqrt()).fold(0.0, f32::max);
+        let away = |other: &u16, axis: usize| {
+            (self.uv_px[usize::from(*other)][axis] - self.uv_px[vertex][axis]).abs()
+        };
+        let reach = near.iter().flat_map(|(_, v)| [away(v, 0), away(v, 1)]).fold(0.0, f32::max);
         let side = 2 * (reach.ceil() as usize + BEYOND);
         convolution.open([side; 2], usize::MAX, pitch_mm, surface);
         // Square, as the plans of both ways are the same.
@@ -108,7 +113,7 @@ impl OwnDents<'_> {
         })
     }
 
-    /// A vertex and those round it, with the squares of their distances, px2; none if there are too
+    /// A vertex and those round it, with the squares of their distances, in how far vertices are apart; none if there are too
     /// few.
     fn near(&self, vertex: usize) -> Option<Vec<(f32, u16)>> {
         let at = self.uv_px[vertex];
@@ -116,7 +121,7 @@ impl OwnDents<'_> {
             .uv_px
             .iter()
             .enumerate()
-            .map(|(v, uv)| ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), v as u16))
+            .map(|(v, uv)| (square(*uv, at, self.apart[vertex]), v as u16))
             .collect();
         if order.len() < FAR {
             return None;
@@ -136,11 +141,11 @@ impl OwnDents<'_> {
         near: &[(f32, u16)],
         field: impl Fn(u16) -> f64,
     ) -> Option<Correction> {
-        let at = self.uv_px[vertex];
+        let (at, apart) = (self.uv_px[vertex], self.apart[vertex]);
         let reach = near.last()?.0.sqrt();
         let row = |(_, v): &(f32, u16)| {
             let uv = self.uv_px[usize::from(*v)];
-            let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / reach));
+            let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / (apart[a] * reach)));
             [1.0, x, y, x * x, x * y, y * y]
         };
         let rows: Vec<[f64; TERMS]> = near.iter().map(row).collect();

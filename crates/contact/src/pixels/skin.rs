@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Rows of triangles from the skin's edge within which pixels hold the vertices' pressure, and those
 /// from which they know nothing of it.
 const HELD_ROWS: f32 = 2.0;
-const FREE_ROWS: u8 = 4;
+const FREE_ROWS: u8 = 5;
 
 /// What pixels have to know of a skin; made once, for any number of fingers.
 #[derive(Debug)]
@@ -61,7 +61,9 @@ impl PixelSkin {
             pixel.vertices.iter().for_each(|corner| around[*corner as usize].push(entry as u32));
         }
         let plans = Arc::new(Plans::new());
-        let own = OwnDents { model, uv_px: &uv_px, raster: &raster, rest_mm: &rest_mm };
+        let apart = smooth::apart_px(atlas);
+        let own =
+            OwnDents { model, uv_px: &uv_px, apart: &apart, raster: &raster, rest_mm: &rest_mm };
         let corrections = own.corrections(&surface, &plans, &rows);
         Some(Self { raster, uv_px, stencils, corrections, around, ease, surface, plans, rest_mm })
     }

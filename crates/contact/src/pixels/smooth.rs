@@ -45,15 +45,42 @@ impl<const N: usize> Stencil<N> {
 /// A stencil for each pixel of the skin: the value at the pixel of the polynomial of second degree
 /// that is closest to the values at its neighbours, nearer ones counting more (moving least squares).
 pub(super) fn of_pixels(atlas: &Atlas, raster: &Raster) -> Vec<PixelStencil> {
-    let uv_px = &atlas.patch(Patch::Skin).uv_px;
+    let (uv_px, apart) = (&atlas.patch(Patch::Skin).uv_px, apart_px(atlas));
     let side = papilla_atlas::MAP_SIDE_PX;
     let places = raster.indices().iter().map(|i| (*i as usize % side, *i as usize / side));
     let mut order: Vec<(f32, u16)> = Vec::with_capacity(uv_px.len());
     let stencil = |((column, row), pixel): ((usize, usize), &papilla_atlas::Pixel)| {
         let at = [column as f32 + 0.5, row as f32 + 0.5];
-        least_squares(at, uv_px, &mut order).unwrap_or_else(|| plane(pixel))
+        let corners = || pixel.vertices.iter().zip(pixel.weights);
+        let apart = [0, 1].map(|a| corners().map(|(v, w)| w * apart[*v as usize][a]).sum());
+        least_squares(at, apart, uv_px, &mut order).unwrap_or_else(|| plane(pixel))
     };
     places.zip(raster.pixels()).map(stencil).collect()
+}
+
+/// How far vertices are apart round each of them, along the map's rows and down them, px: where the
+/// lattice is coarser one way than the other, distances count in these, so that neighbours stand on
+/// all sides.
+pub(super) fn apart_px(atlas: &Atlas) -> Vec<[f32; 2]> {
+    let uv_px = &atlas.patch(Patch::Skin).uv_px;
+    let (mut sums, mut counts) = (vec![[0.0f32; 2]; uv_px.len()], vec![0.0f32; uv_px.len()]);
+    for corners in atlas.triangles() {
+        let of = |axis: usize| corners.map(|v| uv_px[v as usize][axis]);
+        let extent = [0, 1].map(|axis| {
+            of(axis).iter().fold(0.0f32, |most, a| of(axis).iter().fold(most, |m, b| m.max(a - b)))
+        });
+        for vertex in corners {
+            (0..2).for_each(|axis| sums[*vertex as usize][axis] += extent[axis]);
+            counts[*vertex as usize] += 1.0;
+        }
+    }
+    let mean = |(sum, count): (&[f32; 2], &f32)| sum.map(|s| (s / count.max(1.0)).max(1e-3));
+    sums.iter().zip(&counts).map(mean).collect()
+}
+
+/// Square of the distance between two places of the map, in how far vertices are apart.
+pub(super) fn square(a: [f32; 2], b: [f32; 2], apart: [f32; 2]) -> f32 {
+    (0..2).map(|i| ((a[i] - b[i]) / apart[i]).powi(2)).sum()
 }
 
 /// Rows of triangles between each vertex and the skin's edge, up to `most`.
@@ -91,6 +118,7 @@ fn plane(pixel: &papilla_atlas::Pixel) -> PixelStencil {
 /// None if there are too few neighbours, or they lie to one side.
 fn least_squares<const N: usize>(
     at: [f32; 2],
+    apart: [f32; 2],
     uv_px: &[[f32; 2]],
     order: &mut Vec<(f32, u16)>,
 ) -> Option<Stencil<N>> {
@@ -98,24 +126,20 @@ fn least_squares<const N: usize>(
         return None;
     }
     order.clear();
-    order.extend(
-        uv_px
-            .iter()
-            .enumerate()
-            .map(|(vertex, uv)| ((uv[0] - at[0]).powi(2) + (uv[1] - at[1]).powi(2), vertex as u16)),
-    );
+    let places = uv_px.iter().enumerate();
+    order.extend(places.map(|(vertex, uv)| (square(*uv, at, apart), vertex as u16)));
     let by_place = |a: &(f32, u16), b: &(f32, u16)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
     let (near, next, _) = order.select_nth_unstable_by(N, by_place);
     near.sort_unstable_by(by_place);
     let reach = f64::from(next.0);
     let mut rows = [[0.0f64; TERMS]; N];
     let mut counts = [0.0f64; N];
-    for (i, (square, vertex)) in near.iter().enumerate() {
+    for (i, (away, vertex)) in near.iter().enumerate() {
         let uv = uv_px[usize::from(*vertex)];
-        let [x, y] = [0, 1].map(|a| f64::from(uv[a] - at[a]) / reach.sqrt());
+        let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / apart[a]) / reach.sqrt());
         rows[i] = [1.0, x, y, x * x, x * y, y * y];
         // Nothing at the first vertex that does not count, so that the value has no steps.
-        counts[i] = (1.0 - f64::from(*square) / reach).powi(2);
+        counts[i] = (1.0 - f64::from(*away) / reach).powi(2);
     }
     let mut normal = [[0.0f64; TERMS]; TERMS];
     for (row, count) in rows.iter().zip(counts) {
