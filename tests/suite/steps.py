@@ -374,7 +374,7 @@ def long() -> list[Step]:
         Step(
             "fuzz",
             "every reader of outside bytes, ten minutes",
-            "tests/fuzz/run",
+            "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS tests/fuzz/run",
             behind=("mutations",),
             missing=no_nightly,
         ),
