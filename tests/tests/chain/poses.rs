@@ -24,7 +24,7 @@ const DEPTH_MM: f64 = 2.0;
 /// above this distance there is none, mm.
 const CLEAR_MM: f64 = 0.05;
 /// Linearisations at vertices, 16 steps of 3 and 25, twice if a frame starts anew; rounds on pixels.
-const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25) + 12;
+const ITERATIONS_MAX: u32 = 2 * (16 * 3 + 25 + 12);
 
 /// A shape and how high its top is above its origin, mm.
 type Shape = (Arc<dyn SignedDistance>, f64);

@@ -221,18 +221,17 @@ impl PixelContact {
         }
         held_pa.fill(0.0);
         map_pa.fill(0.0);
-        let mut change = f32::INFINITY;
-        for round in 0..ROUNDS_MAX {
-            let start = (round == 0).then_some(warm);
-            change = self.round(solver, view, start, &mut out.effort)?;
-            if !change.is_finite() {
-                self.reset();
-                return Err(ContactError::Diverged);
-            }
-            if change <= SETTLED {
-                break;
-            }
+        let mut change = self.rounds(solver, view, warm, &mut out.effort);
+        if change.is_none() {
+            // What runs away starts once more, from what vertices find.
+            self.turns.forget();
+            self.turns.begin(&mut self.window.force_n);
+            change = self.rounds(solver, view, false, &mut out.effort);
         }
+        let Some(change) = change else {
+            self.reset();
+            return Err(ContactError::Diverged);
+        };
         // Pixels go by vertices' answer no further than a start.
         out.quality.settled = change <= UNSETTLED;
         if !out.quality.settled {
@@ -244,6 +243,25 @@ impl PixelContact {
         }
         self.answer(model, person, out);
         Ok(())
+    }
+
+    /// Rounds until forces settle; their last change over their sum, none if they run away.
+    fn rounds(
+        &mut self,
+        solver: &Solver,
+        view: View<'_>,
+        warm: bool,
+        effort: &mut Effort,
+    ) -> Option<f32> {
+        let mut change = f32::INFINITY;
+        for round in 0..ROUNDS_MAX {
+            let start = (round == 0).then_some(warm);
+            change = self.round(solver, view, start, effort).ok().filter(|c| c.is_finite())?;
+            if change <= SETTLED {
+                break;
+            }
+        }
+        Some(change)
     }
 
     /// What vertices found stands where their forces push skin out of reach in every round.

@@ -130,6 +130,7 @@ impl Turns {
             *force = start + taken * (end - start);
         }
         self.rounds += 1;
-        if size > 0.0 { change / size } else { 0.0 }
+        // NaN must not pass for nothing.
+        if size == 0.0 { 0.0 } else { change / size }
     }
 }
