@@ -28,9 +28,9 @@ pub(crate) fn frame(data: &[u8]) {
     assert_eq!(sequence, Some(header.sequence));
     let len = header.header_len();
     let mut canonical = data[..len].to_vec();
-    // The last byte of version 2 means nothing.
-    if let Some(last) = canonical.get_mut(47) {
-        *last = 0;
+    // The last byte of version 2 means nothing; in version 3 it is the finger.
+    if canonical[4] == 2 {
+        canonical[47] = 0;
     }
     assert_eq!(&header.encode()[..], &canonical[..]);
 

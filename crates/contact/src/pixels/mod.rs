@@ -311,6 +311,11 @@ impl PixelContact {
         let Self { skin, window, convolution, bounded, turns, .. } = self;
         let Self { rest, pressure, of_vertices, .. } = self;
         let (n, m) = (window.len(), window.free());
+        if start.is_none() {
+            // The vertices' force is held: their pressure on skin that grows would grow without end.
+            window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+            pressure[m..n].copy_from_slice(&of_vertices[m..n]);
+        }
         let size = [convolution.rows(), convolution.columns()];
         window.press_forces(skin, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);

@@ -124,6 +124,10 @@ impl Turns {
         let both = self.from.iter_mut().flatten().zip(self.before.iter_mut().flatten());
         let found = self.found.iter().flatten();
         for ((force, found), (from, before)) in force_n.iter_mut().flatten().zip(found).zip(both) {
+            if self.rounds == 0 {
+                // What ran away in another frame is of no account here.
+                (*from, *before) = (*force, *found);
+            }
             let start = *force + share * (*from - *force);
             let end = found + share * (*before - found);
             (*from, *before) = (*force, *found);
