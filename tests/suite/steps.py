@@ -344,7 +344,7 @@ def long() -> list[Step]:
             "a campaign on a Slurm cluster in namespaces: preemptions, a lost node, a full disk",
             f"{install_slurm()}\n{AS_ROOT} as_root env BIN=\"$BIN\" tests/slurm/run",
             after=("packages", "build"),
-            tests_min=23,
+            tests_min=15,
             installs="apt: slurm-wlm munge" if slurm_missing() else "",
             missing=no_slurm,
         ),

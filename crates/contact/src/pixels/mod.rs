@@ -21,7 +21,7 @@
 //! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
 //! point values are 15 % off where means are 9 (median over training presses, FE on graded
 //! meshes). Pixels at the skin's edge hold the pressure that vertices find by themselves: contact
-//! goes on beyond the map, where no pixel could carry it. In the two rows of triangles beside them
+//! goes on beyond the map, where no pixel could carry it. In the three rows of triangles beside them
 //! pixels leave a gap for what their pressure has beside the vertices', less and less inward.
 
 mod convolution;
@@ -273,16 +273,17 @@ impl PixelContact {
         }
     }
 
-    /// The pressure that the first round starts from: the last frame's, pressed on as vertices press
+    /// The pressure of free pixels that the first round starts from: the last frame's, pressed on as vertices press
     /// on by themselves, or theirs.
     fn start(&mut self, warm: bool) {
         let Self { skin, window, turns, rest: last, pressure, of_vertices, .. } = self;
-        let (n, m) = (window.len(), window.free());
-        let first = if warm { m } else { 0 };
-        window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+        let m = window.free();
+        if !warm {
+            pressure[..m].copy_from_slice(&of_vertices[..m]);
+            return;
+        }
         window.press_hats(skin, turns.last(), last);
-        pressure[first..n].copy_from_slice(&of_vertices[first..n]);
-        for (i, p) in pressure[..first].iter_mut().enumerate().filter(|(_, p)| **p > 0.0) {
+        for (i, p) in pressure[..m].iter_mut().enumerate().filter(|(_, p)| **p > 0.0) {
             *p = (*p + of_vertices[i] - last[i]).max(0.0);
         }
     }
@@ -297,10 +298,14 @@ impl PixelContact {
         effort: &mut Effort,
     ) -> Result<f32, ContactError> {
         let model = &solver.model;
-        let Self { skin, window, amplitudes, .. } = self;
+        let Self { skin, window, amplitudes, turns, pressure, of_vertices, .. } = self;
         window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
         window.place(skin, model);
         window.measure_hats(skin, model);
+        let (n, m) = (window.len(), window.free());
+        // The vertices' force is held: their pressure on skin that grows would grow without end.
+        window.press_hats(skin, turns.found_without_pixels(), of_vertices);
+        pressure[m..n].copy_from_slice(&of_vertices[m..n]);
         if let Some(warm) = start {
             self.start(warm);
             let Self { skin, window, convolution, pressure, .. } = self;
@@ -310,12 +315,6 @@ impl PixelContact {
         }
         let Self { skin, window, convolution, bounded, turns, .. } = self;
         let Self { rest, pressure, of_vertices, .. } = self;
-        let (n, m) = (window.len(), window.free());
-        if start.is_none() {
-            // The vertices' force is held: their pressure on skin that grows would grow without end.
-            window.press_hats(skin, turns.found_without_pixels(), of_vertices);
-            pressure[m..n].copy_from_slice(&of_vertices[m..n]);
-        }
         let size = [convolution.rows(), convolution.columns()];
         window.press_forces(skin, rest);
         let grid = convolution.press(&window.cells, &rest[..n]);

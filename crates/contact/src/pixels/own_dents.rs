@@ -6,7 +6,7 @@
 //! the force it goes on as the polynomial of second degree through what is round it.
 
 use super::convolution::{Convolution, Plans};
-use super::smooth::{Stencil, TERMS, solve, square};
+use super::smooth::{HELD_ROWS, Stencil, TERMS, solve, square};
 use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{MAP_SIDE_PX, Raster};
@@ -55,7 +55,7 @@ impl OwnDents<'_> {
         let none = Correction { vertices: [0; NEAR], weights: [0.0; NEAR] };
         let of = |vertex: usize| {
             let hat = &hats[vertex];
-            if rows_from_edge[vertex] < 2 || hat.is_empty() {
+            if rows_from_edge[vertex] < HELD_ROWS || hat.is_empty() {
                 return none;
             }
             self.correction(vertex, hat, &slot, surface, &mut convolution).unwrap_or(none)
@@ -113,8 +113,8 @@ impl OwnDents<'_> {
         })
     }
 
-    /// A vertex and those round it, with the squares of their distances, in how far vertices are apart; none if there are too
-    /// few.
+    /// A vertex and those round it, with the squares of their distances, in how far vertices are
+    /// apart; none if there are too few.
     fn near(&self, vertex: usize) -> Option<Vec<(f32, u16)>> {
         let at = self.uv_px[vertex];
         let mut order: Vec<(f32, u16)> = self

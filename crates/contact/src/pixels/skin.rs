@@ -2,15 +2,13 @@
 
 use super::convolution::Plans;
 use super::own_dents::{Correction, OwnDents};
-use super::smooth::{self, PixelStencil};
+use super::smooth::{self, HELD_ROWS, PixelStencil};
 use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{Atlas, Pixel, Raster};
 use std::sync::Arc;
 
-/// Rows of triangles from the skin's edge within which pixels hold the vertices' pressure, and those
-/// from which they know nothing of it.
-const HELD_ROWS: f32 = 2.0;
+/// Rows of triangles from the skin's edge from which pixels know nothing of the vertices' pressure.
 const FREE_ROWS: u8 = 5;
 
 /// What pixels have to know of a skin; made once, for any number of fingers.
@@ -48,8 +46,9 @@ impl PixelSkin {
         let ease = |pixel: &Pixel| {
             let corners = pixel.vertices.iter().zip(pixel.weights);
             let row: f32 = corners.map(|(v, w)| w * f32::from(rows[*v as usize])).sum();
-            let part = (f32::from(FREE_ROWS) - row).max(0.0) / (row - HELD_ROWS + 1.0);
-            if row < HELD_ROWS { f32::INFINITY } else { largest * part.powi(2) }
+            let [held, free] = [HELD_ROWS, FREE_ROWS].map(f32::from);
+            let part = (free - row).max(0.0) / (row - held + 1.0);
+            if row < held { f32::INFINITY } else { largest * part.powi(2) }
         };
         let ease: Vec<f32> = raster.pixels().iter().map(ease).collect();
         let place = |stencil: &PixelStencil| {

@@ -83,6 +83,10 @@ pub(super) fn square(a: [f32; 2], b: [f32; 2], apart: [f32; 2]) -> f32 {
     (0..2).map(|i| ((a[i] - b[i]) / apart[i]).powi(2)).sum()
 }
 
+/// Rows of triangles from the skin's edge within which pixels hold the vertices' pressure, and the
+/// mesh's own dents stay.
+pub(super) const HELD_ROWS: u8 = 2;
+
 /// Rows of triangles between each vertex and the skin's edge, up to `most`.
 pub(super) fn rows_from_edge(atlas: &Atlas, most: u8) -> Vec<u8> {
     let sides = |[a, b, c]: &[u32; 3]| [[*a, *b], [*b, *c], [*c, *a]];

@@ -270,12 +270,14 @@ fn what_gives_way_presses_less() {
         let object = Object { stiffness_mpa_per_mm, ..ball(3.0, [0.0, 0.0], 0.3) };
         solver.reset();
         pixels.reset();
-        solver.solve_on_pixels(&[object], pixels, out).unwrap();
+        // One frame settles to a hundredth of the force, on its own way; some go on from there.
+        for _ in 0..20 {
+            solver.solve_on_pixels(std::slice::from_ref(&object), pixels, out).unwrap();
+        }
         force_n(out)
     };
     let [soft, hard, rigid] = [0.1, 1e4, f64::INFINITY].map(&mut force);
-    // Both settle to a hundredth of the force, each on its way.
-    assert!((hard / rigid - 1.0).abs() < 5e-3, "{hard} {rigid}");
+    assert!((hard / rigid - 1.0).abs() < 2e-3, "{hard} {rigid}");
     // A bed of springs alone under a ball: F = s pi R d^2. In series, less than either.
     let bed = 0.1 * std::f64::consts::PI * 3.0 * 0.3f64.powi(2);
     assert!(soft < bed && soft < rigid && soft > 0.3 * bed, "{soft} {bed} {rigid}");
