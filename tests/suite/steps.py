@@ -358,7 +358,7 @@ def long() -> list[Step]:
             "mutations",
             "the short form fails for each of twelve mutations",
             "tests/mutations/run",
-            after=("build",),
+            after=("build", "python"),
             behind=("calculix-long",),
             tests_min=12,
             limit_s=4 * LIMIT_S,
