@@ -41,7 +41,7 @@ def varied(
     pair = torch.cat([pressure, sed], dim=1)
     pair = torch.cat([pair[::2], mirrored(pair[1::2])])
     if shift_px > 0:
-        far = reach_px(pair[:, :1], shift_px)[:, None]
+        far = reach_px(pair[:, :1], shift_px).cpu()[:, None]
         by = (torch.rand((len(pair), 2), generator=generator) * (2 * far + 1)).long() - far
         moved = [maps.roll(steps, (1, 2)) for maps, steps in zip(pair, by.tolist(), strict=True)]
         pair = torch.stack(moved)
