@@ -3,6 +3,7 @@
 mod actuators;
 mod check;
 mod contact;
+mod contact_maps;
 mod evaluate;
 mod here;
 mod index;
@@ -117,6 +118,12 @@ enum Command {
     /// each against the FE states of the datasets, with the processor time of a frame.
     #[command(after_long_help = EXIT_CODES)]
     Contact(contact::Options),
+    /// Write the pressure that contact on pixels makes of a dataset's indentations.
+    ///
+    /// A network that learns them beside FE's pressure (`papilla_trainer train --contact`) answers
+    /// with the same SED where contact's pressure is a little off.
+    #[command(name = "contact-maps", after_long_help = EXIT_CODES)]
+    ContactMaps(contact_maps::Options),
     /// Measure drives of arrays of pins: the formula of sessions, and its inversion.
     ///
     /// For each held-out indentation both find the drive whose SED comes closest to it; a second
@@ -144,6 +151,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Here(options) => here::run(options, json),
         Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
+        Command::ContactMaps(options) => contact_maps::run(options, json),
         Command::Actuators(options) => actuators::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }

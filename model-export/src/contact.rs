@@ -1,8 +1,10 @@
 //! The contact ladder: from where things are to pressure, force and SED, against FE, and what that
 //! takes.
 
+mod maps;
 mod placed;
 
+pub use self::maps::ContactMaps;
 use self::placed::Placed;
 use crate::dataset::{Dataset, Indentation, Shard};
 use crate::metrics::{SampleMetrics, quantile};
@@ -165,11 +167,10 @@ pub fn measure(
         return Ok(figures.row(rung, dataset.name()));
     };
     if let Some(spacing) = rung.pixel_spacing() {
-        let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
-        let Some(skin) = PixelSkin::new(&models.finger, &dataset.atlas, raster) else {
+        figures.pixels = pixel_contact(models, dataset, spacing);
+        if figures.pixels.is_none() {
             return Ok(figures.row(rung, dataset.name()));
-        };
-        figures.pixels = Some(PixelContact::new(Arc::new(skin), &models.finger, spacing));
+        }
     }
     let mut out = Contact::new(models.finger.vertices());
     let mut count = 0;
@@ -211,6 +212,17 @@ pub fn measure(
         }
     }
     Ok(figures.row(rung, dataset.name()))
+}
+
+/// Contact on the pixels of a dataset's maps; `None` if the model holds none of the finger's skin.
+fn pixel_contact(
+    models: &Models,
+    dataset: &Dataset,
+    spacing: PixelSpacing,
+) -> Option<PixelContact> {
+    let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
+    let skin = PixelSkin::new(&models.finger, &dataset.atlas, raster)?;
+    Some(PixelContact::new(Arc::new(skin), &models.finger, spacing))
 }
 
 /// Figures of all states.

@@ -29,13 +29,14 @@ mod convolution;
 mod memory;
 mod nearby;
 mod own_dents;
+mod rounds;
 mod skin;
 mod smooth;
 mod spacing;
 mod turns;
 mod window;
 
-use crate::answer::{Contact, Effort, Person};
+use crate::answer::{Contact, Person};
 use crate::bounded::BoundedSolver;
 use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
@@ -44,7 +45,6 @@ use crate::objects::{Object, View};
 use crate::second_order::Amplitudes;
 use crate::solver::Solver;
 use convolution::Convolution;
-use nearby::Nearby;
 use papilla_atlas::MAP_LEN;
 use std::sync::Arc;
 use turns::Turns;
@@ -57,20 +57,10 @@ pub use spacing::PixelSpacing;
 /// Change of the vertices' displacement that ends what they find by themselves, reference mm: pixels
 /// only go on by its change from frame to frame.
 const AT_VERTICES_MM: f32 = 5e-4;
-/// Rounds of vertices and pixels at most.
-const ROUNDS_MAX: usize = 12;
-/// Change of the vertices' forces, of their sum, that ends them.
-const SETTLED: f32 = 0.01;
-/// The same, above which an answer is not settled.
-const UNSETTLED: f32 = 0.03;
 /// Change of the forces without pixels, of their sum, up to which the last frame is a start.
 const JUMP: f32 = 0.5;
-/// Violation of a complementarity condition that is accepted, reference mm.
-const VIOLATION_MM: f32 = 1e-4;
-/// Most products with the compliance in a round.
-const PRODUCTS_MAX: u32 = 80;
 const PA_PER_MPA: f32 = 1e6;
-/// Pixels settle to a hundredth of the force: [`SETTLED`].
+/// Pixels settle to a hundredth of the force: [`rounds`].
 const PIXELS: Search = Search { tolerance: 0.01, tries_max: 12 };
 
 /// Pressure of a person for 1 MPa on the reference finger, Pa.
@@ -191,150 +181,6 @@ impl PixelContact {
         self.map_pa.fill(0.0);
         self.peak_pa = 0.0;
         self.turns.forget();
-    }
-
-    fn refine(
-        &mut self,
-        solver: &Solver,
-        view: View<'_>,
-        out: &mut Contact,
-    ) -> Result<(), ContactError> {
-        let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
-        let (model, person) = (&*solver.model, solver.person());
-        if !window.open(skin, model, solver.near(), view, &mut out.effort) {
-            self.reset();
-            return Ok(());
-        }
-        let unit_pa = unit_pa(person);
-        solver.forces(turns.without_pixels());
-        let is_alone = turns.found_without_pixels().iter().flatten().all(|force| *force == 0.0);
-        if is_alone && !window.is_inside_at_rest(skin, view, &mut out.effort) {
-            // Skin is dented by the last frame alone.
-            self.reset();
-            return Ok(());
-        }
-        let warm = turns.begin(&mut window.force_n);
-        if warm {
-            for (p, entry) in pressure.iter_mut().zip(&window.entries) {
-                *p = held_pa[skin.raster.indices()[*entry as usize] as usize] / unit_pa;
-            }
-        }
-        held_pa.fill(0.0);
-        map_pa.fill(0.0);
-        let mut change = self.rounds(solver, view, warm, &mut out.effort);
-        if change.is_none() {
-            // What runs away starts once more, from what vertices find.
-            self.turns.forget();
-            self.turns.begin(&mut self.window.force_n);
-            change = self.rounds(solver, view, false, &mut out.effort);
-        }
-        let Some(change) = change else {
-            self.reset();
-            return Err(ContactError::Diverged);
-        };
-        // Pixels go by vertices' answer no further than a start.
-        out.quality.settled = change <= UNSETTLED;
-        if !out.quality.settled {
-            self.stand_in();
-            // From what came close the next frame goes on.
-            if change > JUMP {
-                self.turns.forget();
-            }
-        }
-        self.answer(model, person, out);
-        Ok(())
-    }
-
-    /// Rounds until forces settle; their last change over their sum, none if they run away.
-    fn rounds(
-        &mut self,
-        solver: &Solver,
-        view: View<'_>,
-        warm: bool,
-        effort: &mut Effort,
-    ) -> Option<f32> {
-        let mut change = f32::INFINITY;
-        for round in 0..ROUNDS_MAX {
-            let start = (round == 0).then_some(warm);
-            change = self.round(solver, view, start, effort).ok().filter(|c| c.is_finite())?;
-            if change <= SETTLED {
-                break;
-            }
-        }
-        Some(change)
-    }
-
-    /// What vertices found stands where their forces push skin out of reach in every round.
-    fn stand_in(&mut self) {
-        let Self { skin, window, pressure, turns, .. } = self;
-        let n = window.len();
-        if pressure[..n].iter().all(|p| *p == 0.0) {
-            window.press_hats(skin, turns.found_without_pixels(), &mut pressure[..n]);
-        }
-    }
-
-    /// The pressure of free pixels that the first round starts from: the last frame's, pressed on as vertices press
-    /// on by themselves, or theirs.
-    fn start(&mut self, warm: bool) {
-        let Self { skin, window, turns, rest: last, pressure, of_vertices, .. } = self;
-        let m = window.free();
-        if !warm {
-            pressure[..m].copy_from_slice(&of_vertices[..m]);
-            return;
-        }
-        window.press_hats(skin, turns.last(), last);
-        for (i, p) in pressure[..m].iter_mut().enumerate().filter(|(_, p)| **p > 0.0) {
-            *p = (*p + of_vertices[i] - last[i]).max(0.0);
-        }
-    }
-
-    /// Vertices, then pixels; returns the change of the vertices' forces over their sum. The first
-    /// round starts from the last frame's pressure if `start` says so, else from the vertices'.
-    fn round(
-        &mut self,
-        solver: &Solver,
-        view: View<'_>,
-        start: Option<bool>,
-        effort: &mut Effort,
-    ) -> Result<f32, ContactError> {
-        let model = &solver.model;
-        let Self { skin, window, amplitudes, turns, pressure, of_vertices, .. } = self;
-        window.displace(skin, model, amplitudes.as_mut().filter(|_| solver.has_second_order()));
-        window.place(skin, model);
-        window.measure_hats(skin, model);
-        let (n, m) = (window.len(), window.free());
-        // The vertices' force is held: their pressure on skin that grows would grow without end.
-        window.press_hats(skin, turns.found_without_pixels(), of_vertices);
-        pressure[m..n].copy_from_slice(&of_vertices[m..n]);
-        if let Some(warm) = start {
-            self.start(warm);
-            let Self { skin, window, convolution, pressure, .. } = self;
-            let pitch_mm = window.pitch_mm(pressure);
-            convolution.open(window.size(), window.rows(), pitch_mm, &skin.surface);
-            window.number_cells(skin, [convolution.rows(), convolution.columns()]);
-        }
-        let Self { skin, window, convolution, bounded, turns, .. } = self;
-        let Self { rest, pressure, of_vertices, .. } = self;
-        let size = [convolution.rows(), convolution.columns()];
-        window.press_forces(skin, rest);
-        let grid = convolution.press(&window.cells, &rest[..n]);
-        window.own_dents(skin, grid, size);
-        let grid = convolution.press_rows(&window.cells, &pressure[..n]);
-        window.measure(skin, view, solver.person(), grid, effort)?;
-        let gradient = &mut rest[..m];
-        window.gradient([&pressure[..m], &of_vertices[..m]], gradient);
-        let [give, ease] = [&window.give[..m], &window.ease[..m]];
-        let most = |values: &[f32]| values.iter().copied().fold(0.0, f32::max);
-        let norm = skin.surface.largest() as f32 + most(give) + most(ease);
-        let (cells, beside) = (&window.cells[..m], &window.beside[..m]);
-        let bends = convolution.bends();
-        let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends };
-        let p = &mut pressure[..m];
-        effort.products +=
-            bounded.improve(nearby, gradient, p, VIOLATION_MM, PRODUCTS_MAX).products;
-        effort.iterations += 1;
-        window.sum_forces(skin, &pressure[..n], turns.found());
-        Ok(turns.take(&mut window.force_n))
     }
 
     fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {

@@ -1,0 +1,76 @@
+//! The pressure that contact on pixels makes of a dataset's indentations, for the trainer.
+
+use super::{Models, Placed, Rung, pixel_contact};
+use crate::ExportError;
+use crate::dataset::Dataset;
+use papilla_contact::{Contact, PixelSpacing};
+use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
+use papilla_output::{OutputError, npz::NpzBuilder};
+use std::path::Path;
+
+/// Maps of pressure, one for each state that settled within the range.
+#[derive(Debug, Default)]
+pub struct ContactMaps {
+    /// Indentation of each map.
+    pub press: Vec<i64>,
+    /// State of that indentation.
+    pub state: Vec<i64>,
+    /// Pressure, Pa; `[N, 224, 224]`, row by row.
+    pub pressure_pa: Vec<f32>,
+    /// States without a map: unsettled, out of range or never touched.
+    pub left_out: usize,
+}
+
+impl ContactMaps {
+    /// Solves every state of both splits on pixels, each from nothing.
+    ///
+    /// # Errors
+    /// [`ExportError`] of the dataset.
+    pub fn of(models: &Models, dataset: &Dataset) -> Result<Self, ExportError> {
+        let mut maps = Self::default();
+        let pixels = pixel_contact(models, dataset, PixelSpacing::One);
+        let (Some(mut solver), Some(mut pixels)) = (models.solver(Rung::Pixels), pixels) else {
+            return Ok(maps);
+        };
+        let mut out = Contact::new(models.finger.vertices());
+        for split in ["train", "test"] {
+            for indentation in dataset.indentations(split)? {
+                let shard = dataset.load(indentation)?;
+                let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
+                for state in 0..indentation.samples {
+                    let depth_mm = f64::from(shard.depth_mm[state]);
+                    let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slide_mm(state)));
+                    solver.reset();
+                    pixels.reset();
+                    let solved = object.is_some_and(|object| {
+                        solver.solve_on_pixels(&[object], &mut pixels, &mut out).is_ok()
+                    });
+                    if !solved || !out.quality.settled || out.quality.out_of_range {
+                        maps.left_out += 1;
+                        continue;
+                    }
+                    maps.press.push(indentation.id as i64);
+                    maps.state.push(state as i64);
+                    maps.pressure_pa.extend_from_slice(pixels.map_pa());
+                }
+            }
+        }
+        debug_assert_eq!(maps.pressure_pa.len(), maps.press.len() * MAP_LEN);
+        Ok(maps)
+    }
+
+    /// Writes `press` and `state` (i64 `[N]`), `pressure_pa` (f32 `[N, 224, 224]`) and the dataset's
+    /// `dataset_sha256` (u8 `[64]`, hexadecimal).
+    ///
+    /// # Errors
+    /// [`OutputError`] with the path.
+    pub fn write(&self, dataset: &Dataset, path: &Path) -> Result<(), OutputError> {
+        let count = self.press.len();
+        let mut npz = NpzBuilder::new();
+        npz.add_slice("dataset_sha256", &[dataset.sha256().len()], dataset.sha256().as_bytes())?;
+        npz.add_slice("press", &[count], &self.press)?;
+        npz.add_slice("state", &[count], &self.state)?;
+        npz.add_slice("pressure_pa", &[count, MAP_SIDE_PX, MAP_SIDE_PX], &self.pressure_pa)?;
+        npz.write(path).map(drop)
+    }
+}
