@@ -214,6 +214,14 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "(networks on maps; 0)",
     )
     add(
+        "--contact",
+        action="append",
+        default=[],
+        metavar="FILE.npz",
+        help="learn the same SED from this pressure too, which `model-export contact-maps` writes "
+        "(networks on maps; again for each dataset)",
+    )
+    add(
         "--train-presses",
         type=int,
         metavar="N",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import random
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,7 @@ class TrainConfig:
     base_rate: float = 0.05
     dropout: float = 0.0
     shift_px: int = 0
+    contact: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         if (self.operator is not None) != isinstance(self.spec, FaceSpec):
@@ -54,6 +55,8 @@ class TrainConfig:
             raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
         if self.shift_px and not isinstance(self.spec, MapSpec):
             raise UsageError("--shift-px is for networks on maps (map-...) alone")
+        if self.contact and not isinstance(self.spec, MapSpec):
+            raise UsageError("--contact is for networks on maps (map-...) alone")
         if not 0 <= self.shift_px <= LARGEST_SHIFT_PX:
             raise UsageError(
                 f"--shift-px must lie between 0 and {LARGEST_SHIFT_PX}, not {self.shift_px}: "

@@ -165,7 +165,7 @@ class Dataset:
 
     def _read_raster(self, patch: str) -> Raster:
         path = self.directory / "raster.npz"
-        arrays = _read_npz(path, path.name)
+        arrays = read_npz(path, path.name)
         try:
             pixel = arrays[f"{patch}_pixel"].astype(np.int64)
             vertex = arrays[f"{patch}_vertex"].astype(np.int64)
@@ -187,7 +187,7 @@ class Dataset:
 
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
         path = press.directory / press.file
-        arrays = _read_npz(path, press.file, sha256=press.sha256)
+        arrays = read_npz(path, press.file, sha256=press.sha256)
         columns = self.vertex_count
         if CELL_PLACE in arrays:
             columns = int(arrays[CELL_NODES].max()) + 1
@@ -238,7 +238,8 @@ def _read_manifest(path: Path) -> dict[str, Any]:
     return manifest
 
 
-def _read_npz(path: Path, name: str, sha256: str | None = None) -> dict[str, NDArray[Any]]:
+def read_npz(path: Path, name: str, sha256: str | None = None) -> dict[str, NDArray[Any]]:
+    """All arrays of an archive, whose SHA-256 is checked if one is given."""
     try:
         data = path.read_bytes()
     except OSError as error:

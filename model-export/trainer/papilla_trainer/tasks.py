@@ -12,6 +12,7 @@ from torch import Tensor, nn
 
 from papilla_trainer.atlas import Atlas
 from papilla_trainer.config import TrainConfig
+from papilla_trainer.contact_maps import with_contact
 from papilla_trainer.dataset import F32, Dataset, Maps
 from papilla_trainer.face_init import start_from_operator
 from papilla_trainer.face_layout import FaceLayout
@@ -64,7 +65,10 @@ def make_task(
     """Load the indentations named, and no others, and build the network."""
     spec = config.spec
     load = _loader(spec)
-    fit = load(dataset, fit_ids, device)
+    if config.contact:
+        fit = Samples.of(with_contact(dataset.load(fit_ids), dataset, config.contact), device)
+    else:
+        fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
     if isinstance(spec, FaceSpec):
         network = fresh_face_network(dataset, config, fit.inputs.cpu())

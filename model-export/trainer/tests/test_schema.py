@@ -45,7 +45,7 @@ def test_the_reader_asks_for_nothing_that_the_format_lacks(
     manifest: set[str] = set()
     press: set[str] = set()
     archives: set[str] = set()
-    read_manifest, read_npz = reader._read_manifest, reader._read_npz
+    read_manifest, read_npz = reader._read_manifest, reader.read_npz
 
     def noted_manifest(path: Path) -> dict[str, Any]:
         found = read_manifest(path)
@@ -56,7 +56,7 @@ def test_the_reader_asks_for_nothing_that_the_format_lacks(
         return Named(read_npz(path, name, sha256), archives)
 
     monkeypatch.setattr(reader, "_read_manifest", noted_manifest)
-    monkeypatch.setattr(reader, "_read_npz", noted_npz)
+    monkeypatch.setattr(reader, "read_npz", noted_npz)
     again = Dataset(tiny.directory)
     again.load(again.train_ids)
     again.load_vertices(again.test_ids)

@@ -1,0 +1,71 @@
+"""Samples whose pressure is the service's own contact's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_dataset import write_tiny_dataset
+
+from papilla_trainer.config import TrainConfig
+from papilla_trainer.contact_maps import with_contact
+from papilla_trainer.dataset import Dataset
+from papilla_trainer.errors import DatasetError, UsageError
+from papilla_trainer.joined import STRIDE, JoinedDataset
+from papilla_trainer.training import Trainer
+
+
+def write(path: Path, dataset: Dataset, press: list[int], state: list[int]) -> str:
+    """Pressure of 1 Pa, 2 Pa, ... all over."""
+    value = np.arange(1, len(press) + 1, dtype=np.float32)
+    np.savez(
+        path,
+        dataset_sha256=np.frombuffer(dataset.dataset_sha256.encode(), dtype=np.uint8),
+        press=np.array(press),
+        state=np.array(state),
+        pressure_pa=np.broadcast_to(value[:, None, None], (len(press), 224, 224)),
+    )
+    return str(path)
+
+
+def test_a_pressure_goes_with_the_sed_of_its_own_state(tmp_path: Path) -> None:
+    parts = [
+        Dataset(write_tiny_dataset(tmp_path / f"{seed}", presses=6, depths=3, seed=seed))
+        for seed in (1, 2)
+    ]
+    joined = JoinedDataset(parts)
+    first, last = parts[1].train_ids[0], parts[1].train_ids[-1]
+    held_out = parts[1].test_ids[0]
+    file = write(tmp_path / "c.npz", parts[1], [last, held_out, first], [2, 1, 0])
+    maps = joined.load(joined.train_ids)
+    found = with_contact(maps, joined, [file])
+    # The held-out press is not asked for, so it is not learnt.
+    assert len(found) == len(maps) + 2
+    assert found.press_id[-2:].tolist() == [STRIDE + last, STRIDE + first]
+    assert found.pressure_pa[-2:, 0, 0].tolist() == [1.0, 3.0]
+    truth = joined.load([STRIDE + last, STRIDE + first]).sed_j_per_m3
+    assert np.array_equal(found.sed_j_per_m3[-2:], truth[[2, 3]])
+    assert np.array_equal(found.pressure_pa[: len(maps)], maps.pressure_pa)
+
+
+def test_a_file_of_another_dataset_is_refused(tiny: Dataset, tmp_path: Path) -> None:
+    other = Dataset(write_tiny_dataset(tmp_path / "other", seed=9))
+    file = write(tmp_path / "c.npz", other, other.train_ids[:1], [0])
+    with pytest.raises(DatasetError, match="not trained on"):
+        with_contact(tiny.load(tiny.train_ids), tiny, [file])
+    with pytest.raises(DatasetError, match="No such file"):
+        with_contact(tiny.load(tiny.train_ids), tiny, [str(tmp_path / "none.npz")])
+    with pytest.raises(UsageError, match="--contact"):
+        TrainConfig(network="s1-base4", contact=[file])
+
+
+def test_a_run_learns_from_both_pressures(tiny: Dataset, tmp_path: Path) -> None:
+    file = write(tmp_path / "c.npz", tiny, tiny.train_ids[:1], [1])
+    config = TrainConfig(
+        network="map-c2-k3-r2", epochs=1, validation_presses=0, contact=[file], device="cpu"
+    )
+    trainer = Trainer(tiny, config, tmp_path / "run")
+    states = sum(tiny.presses[i].samples for i in tiny.train_ids)
+    assert len(trainer.fit_samples) == states + 1
+    assert trainer.fit().history[-1]["train_loss"] > 0.0
