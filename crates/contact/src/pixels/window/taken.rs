@@ -144,11 +144,7 @@ impl Window {
         self.moving.dedup();
     }
 
-    pub(in super::super) fn number_cells(
-        &mut self,
-        skin: &PixelSkin,
-        [rows, columns]: [usize; 2],
-    ) {
+    pub(in super::super) fn number_cells(&mut self, skin: &PixelSkin, [rows, columns]: [usize; 2]) {
         self.cells.clear();
         for entry in &self.entries {
             let index = skin.raster.indices()[*entry as usize] as usize;
