@@ -119,6 +119,8 @@ def metadata(
         training["loss"] = f"relative L2 squared + {config.far_weight} x that of the far field"
     if config.shift_px:
         training["shift_px"] = config.shift_px
+    if config.contact:
+        training["contact"] = [Path(file).name for file in config.contact]
     if config.operator is not None:
         training["start"] = "linear operator of the finger"
         training |= {"base_rate": config.base_rate, "dropout": config.dropout}
