@@ -3,33 +3,44 @@
 use super::print_json;
 use papilla_model_export::contact::{ContactMaps, Models};
 use papilla_model_export::dataset::Dataset;
+use papilla_progress::Progress;
+use serde_json::json;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// The contact model, a file of `fe-datagen contact`.
     model: PathBuf,
-    /// A dataset of the same finger.
-    dataset: PathBuf,
-    /// The file to write, `.npz`; the trainer reads it (`--contact`).
-    #[arg(long, value_name = "FILE")]
+    /// Datasets of the same finger.
+    #[arg(required = true)]
+    datasets: Vec<PathBuf>,
+    /// Folder to write a file to for each dataset, NAME.npz; the trainer reads them (`--contact`).
+    #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let Options { model, dataset: folder, out } = options;
-    let models = Models::read(model)?;
-    let dataset = Dataset::open(folder)?;
-    models.require_atlas(&dataset, folder)?;
-    let maps = ContactMaps::of(&models, &dataset)?;
-    maps.write(&dataset, out)?;
-    let (count, left_out) = (maps.press.len(), maps.left_out);
-    if json {
-        return print_json(&serde_json::json!({ "maps": count, "left_out": left_out, "out": out }));
+    let models = Models::read(&options.model)?;
+    let progress = Progress::new("datasets", options.datasets.len(), 0, json);
+    let mut written = Vec::new();
+    for folder in &options.datasets {
+        let dataset = Dataset::open(folder)?;
+        models.require_atlas(&dataset, folder)?;
+        let maps = ContactMaps::of(&models, &dataset)?;
+        let name = folder.canonicalize()?;
+        let name = name.file_name().unwrap_or_default().to_string_lossy();
+        let path = options.out.join(format!("{name}.npz"));
+        maps.write(&dataset, &path)?;
+        written.push((path, maps.press.len(), maps.left_out));
+        progress.inc();
     }
-    println!(
-        "{}: {count} maps; {left_out} states did not settle or lie out of range",
-        out.display()
-    );
+    drop(progress);
+    if json {
+        let line = |(out, maps, left_out): &(PathBuf, usize, usize)| json!({"out": out, "maps": maps, "left_out": left_out});
+        return print_json(&written.iter().map(line).collect::<Vec<_>>());
+    }
+    for (path, maps, left_out) in written {
+        println!("{}: {maps} maps; {left_out} states unsettled or out of range", path.display());
+    }
     Ok(())
 }
