@@ -8,7 +8,7 @@ use ndarray_npy::NpzReader;
 use papilla_engine::MAP_LEN;
 use papilla_model_export::contact::{ContactMaps, Models};
 use papilla_model_export::dataset::Dataset;
-use std::fs::File;
+use std::io::Cursor;
 use std::path::Path;
 
 #[test]
@@ -24,10 +24,8 @@ fn every_state_of_the_reference_has_a_pressure_close_to_its_own() {
     assert_eq!(maps.press.len() + maps.left_out, states);
     assert_eq!(maps.left_out, 0);
 
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("final.npz");
-    maps.write(&dataset, &path).unwrap();
-    let mut npz = NpzReader::new(File::open(&path).unwrap()).unwrap();
+    let bytes = maps.npz(&dataset).unwrap();
+    let mut npz = NpzReader::new(Cursor::new(bytes)).unwrap();
     let sha256: Array1<u8> = npz.by_name("dataset_sha256").unwrap();
     let press: Array1<i64> = npz.by_name("press").unwrap();
     let state: Array1<i64> = npz.by_name("state").unwrap();

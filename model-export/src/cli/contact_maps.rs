@@ -3,6 +3,7 @@
 use super::print_json;
 use papilla_model_export::contact::{ContactMaps, Models};
 use papilla_model_export::dataset::Dataset;
+use papilla_model_export::write;
 use papilla_progress::Progress;
 use serde_json::json;
 use std::path::PathBuf;
@@ -30,7 +31,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         let name = folder.canonicalize()?;
         let name = name.file_name().unwrap_or_default().to_string_lossy();
         let path = options.out.join(format!("{name}.npz"));
-        maps.write(&dataset, &path)?;
+        write(&path, &maps.npz(&dataset)?)?;
         written.push((path, maps.press.len(), maps.left_out));
         progress.inc();
     }

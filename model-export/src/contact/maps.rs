@@ -6,7 +6,6 @@ use crate::dataset::Dataset;
 use papilla_contact::{Contact, PixelSpacing};
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX};
 use papilla_output::{OutputError, npz::NpzBuilder};
-use std::path::Path;
 
 /// Maps of pressure, one for each state that settled within the range.
 #[derive(Debug, Default)]
@@ -59,18 +58,18 @@ impl ContactMaps {
         Ok(maps)
     }
 
-    /// Writes `press` and `state` (i64 `[N]`), `pressure_pa` (f32 `[N, 224, 224]`) and the dataset's
+    /// The archive: `press` and `state` (i64 `[N]`), `pressure_pa` (f32 `[N, 224, 224]`) and the dataset's
     /// `dataset_sha256` (u8 `[64]`, hexadecimal).
     ///
     /// # Errors
-    /// [`OutputError`] with the path.
-    pub fn write(&self, dataset: &Dataset, path: &Path) -> Result<(), OutputError> {
+    /// [`OutputError`] of an archive past the format's limits.
+    pub fn npz(&self, dataset: &Dataset) -> Result<Vec<u8>, OutputError> {
         let count = self.press.len();
         let mut npz = NpzBuilder::new();
         npz.add_slice("dataset_sha256", &[dataset.sha256().len()], dataset.sha256().as_bytes())?;
         npz.add_slice("press", &[count], &self.press)?;
         npz.add_slice("state", &[count], &self.state)?;
         npz.add_slice("pressure_pa", &[count, MAP_SIDE_PX, MAP_SIDE_PX], &self.pressure_pa)?;
-        npz.write(path).map(drop)
+        npz.finish()
     }
 }
