@@ -24,42 +24,44 @@ impl ContactMaps {
     /// Solves every state of both splits on pixels, each from nothing.
     ///
     /// # Errors
-    /// [`ExportError`] of the dataset.
+    /// [`ExportError`] of the dataset, or where the contact model knows no pixels of it.
     pub fn of(models: &Models, dataset: &Dataset) -> Result<Self, ExportError> {
         let mut maps = Self::default();
         let pixels = pixel_contact(models, dataset, PixelSpacing::One);
         let (Some(mut solver), Some(mut pixels)) = (models.solver(Rung::Pixels), pixels) else {
-            return Ok(maps);
+            let reason = "the contact model has no layers, or other vertices than this atlas; \
+                write it anew with `fe-datagen contact`";
+            let path = dataset.folder().join("atlas.json");
+            return Err(ExportError::Dataset { path, reason: reason.to_owned() });
         };
         let mut out = Contact::new(models.finger.vertices());
-        for split in ["train", "test"] {
-            for indentation in dataset.indentations(split)? {
-                let shard = dataset.load(indentation)?;
-                let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
-                for state in 0..indentation.samples {
-                    let depth_mm = f64::from(shard.depth_mm[state]);
-                    let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slide_mm(state)));
-                    solver.reset();
-                    pixels.reset();
-                    let solved = object.is_some_and(|object| {
-                        solver.solve_on_pixels(&[object], &mut pixels, &mut out).is_ok()
-                    });
-                    if !solved || !out.quality.settled || out.quality.out_of_range {
-                        maps.left_out += 1;
-                        continue;
-                    }
-                    maps.press.push(indentation.id as i64);
-                    maps.state.push(state as i64);
-                    maps.pressure_pa.extend_from_slice(pixels.map_pa());
+        let [train, test] = ["train", "test"].map(|split| dataset.indentations(split));
+        for indentation in train?.into_iter().chain(test?) {
+            let shard = dataset.load(indentation)?;
+            let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
+            for state in 0..indentation.samples {
+                let depth_mm = f64::from(shard.depth_mm[state]);
+                let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slide_mm(state)));
+                solver.reset();
+                pixels.reset();
+                let solved = object.is_some_and(|object| {
+                    solver.solve_on_pixels(&[object], &mut pixels, &mut out).is_ok()
+                });
+                if !solved || !out.quality.settled || out.quality.out_of_range {
+                    maps.left_out += 1;
+                    continue;
                 }
+                maps.press.push(indentation.id as i64);
+                maps.state.push(state as i64);
+                maps.pressure_pa.extend_from_slice(pixels.map_pa());
             }
         }
         debug_assert_eq!(maps.pressure_pa.len(), maps.press.len() * MAP_LEN);
         Ok(maps)
     }
 
-    /// The archive: `press` and `state` (i64 `[N]`), `pressure_pa` (f32 `[N, 224, 224]`) and the dataset's
-    /// `dataset_sha256` (u8 `[64]`, hexadecimal).
+    /// The archive: `press` and `state` (i64 `[N]`), `pressure_pa` (f32 `[N, 224, 224]`) and the
+    /// `dataset_sha256` of the dataset (u8 `[64]`, hexadecimal).
     ///
     /// # Errors
     /// [`OutputError`] of an archive past the format's limits.
