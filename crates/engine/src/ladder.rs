@@ -9,9 +9,12 @@ use papilla_proto::json;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// Name of the set of states on the finest mesh.
+pub const REFERENCE_SET: &str = "reference";
+
 /// Names of the held-out sets, in the order in which errors are looked up for a choice.
 pub const SET_NAMES: [&str; 5] =
-    ["heldout-presses", "heldout-shapes", "reference", "pressed", "s1"];
+    ["heldout-presses", "heldout-shapes", REFERENCE_SET, "pressed", "s1"];
 
 /// All rungs, measured on the same sets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -171,7 +174,7 @@ pub struct Rung {
     /// Greatest answer to a map of zeros over the greatest SED of its training data.
     #[serde(default)]
     pub zero_answer: Option<f64>,
-    /// Whether no other rung is both faster and more accurate on [`Ladder::pareto_set`].
+    /// Whether it is worth its time on [`Ladder::pareto_set`]: [`Ladder::mark_front`].
     pub pareto: bool,
 }
 
@@ -304,8 +307,9 @@ impl Ladder {
         self.rungs.iter().find(|rung| rung.model.as_deref() == Some(model))
     }
 
-    /// Marks the Pareto front over [`Rung::time_ms`] and the median relative L2 on
-    /// `pareto_set`. The reference has no error there, so it always is on it.
+    /// Marks the Pareto front over [`Rung::time_ms`] and the median relative L2 on `pareto_set`: what
+    /// nothing faster comes close to, as far as that set can [tell](Self::told_apart). The reference
+    /// has no error there.
     pub fn mark_front(&mut self) {
         let Some(set) = self.pareto_set.clone() else { return };
         let points: Vec<Option<(f64, f64)>> = self
@@ -313,20 +317,37 @@ impl Ladder {
             .iter()
             .map(|rung| Some((rung.time_ms()?, rung.relative_l2(&set)?)))
             .collect();
-        for (rung, on_front) in self.rungs.iter_mut().zip(front(&points)) {
+        let on_front = front(&points, self.told_apart(&set));
+        for (rung, on_front) in self.rungs.iter_mut().zip(on_front) {
             rung.pareto = on_front;
         }
     }
+
+    /// The difference of two errors below which a set says nothing: the reference's own error.
+    #[must_use]
+    pub fn told_apart(&self, set: &str) -> f64 {
+        let own = self.discretisation_error.as_ref().filter(|_| set == REFERENCE_SET);
+        own.map_or(0.0, |own| own.sed_relative_l2)
+    }
 }
 
-/// Which points (time, error) no other point beats in one and equals at least in the other.
+/// Which points (time, error) are worth their time: their error lies by more than `apart` below that
+/// of every faster one that is, too.
 #[must_use]
-pub fn front(points: &[Option<(f64, f64)>]) -> Vec<bool> {
-    let beats = |(time, error): (f64, f64), (t, e): (f64, f64)| {
-        t <= time && e <= error && (t < time || e < error)
-    };
-    let stands = |point| !points.iter().flatten().any(|other| beats(point, *other));
-    points.iter().map(|point| point.is_some_and(stands)).collect()
+pub fn front(points: &[Option<(f64, f64)>], apart: f64) -> Vec<bool> {
+    let mut by_time: Vec<usize> = (0..points.len()).filter(|i| points[*i].is_some()).collect();
+    by_time.sort_by(|a, b| {
+        let [a, b] = [points[*a], points[*b]].map(|point| point.unwrap_or_default());
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    let mut least = f64::INFINITY;
+    let mut on_front = vec![false; points.len()];
+    for i in by_time {
+        if let Some((_, error)) = points[i].filter(|(_, error)| error + apart < least) {
+            (least, on_front[i]) = (error, true);
+        }
+    }
+    on_front
 }
 
 #[cfg(test)]

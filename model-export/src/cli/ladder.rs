@@ -47,7 +47,9 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     let ladder = match &options.from {
         Some(path) => {
             let refused = |source| ExportError::Engine { path: path.clone(), source };
-            Ladder::from_json(&read_text(path)?).map_err(refused)?
+            let mut ladder = Ladder::from_json(&read_text(path)?).map_err(refused)?;
+            ladder.mark_front();
+            ladder
         }
         None => {
             let shown = Shown(papilla_progress::Progress::new("samples", 0, 0, json));

@@ -93,9 +93,14 @@ fn sentence(text: &str) -> String {
 }
 
 fn costs(text: &mut String, ladder: &Ladder) {
-    text.push_str("## Time and size\n\nIn bold: nothing else is both faster and more accurate");
+    text.push_str("## Time and size\n\nIn bold: nothing faster comes as close");
     if let Some(set) = &ladder.pareto_set {
-        let _ = write!(text, " (relative L2 on {set})");
+        let _ = write!(text, " (relative L2 on {set}");
+        let apart = ladder.told_apart(set);
+        if apart > 0.0 {
+            let _ = write!(text, ", to {:.1} %, its own error", 100.0 * apart);
+        }
+        text.push(')');
     }
     text.push_str(
         ".\n\n| rung | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\

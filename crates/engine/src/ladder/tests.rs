@@ -63,6 +63,38 @@ fn the_front_is_what_nothing_beats() {
 }
 
 #[test]
+fn what_the_reference_cannot_tell_apart_is_not_worth_more_time() {
+    let mut rungs =
+        [("a", 1.0, 0.5), ("b", 2.0, 0.45), ("c", 3.0, 0.41), ("d", 3.0, 0.39), ("e", 4.0, 0.35)]
+            .map(|(name, ms, error)| rung(name, ms, error))
+            .to_vec();
+    for rung in &mut rungs {
+        rung.errors = [("reference".to_owned(), rung.errors.remove("s1").unwrap())].into();
+    }
+    let own = Discretisation { sed_relative_l2: 0.1, how: String::new() };
+    let mut ladder = Ladder {
+        format: 1,
+        pareto_set: Some("reference".into()),
+        discretisation_error: Some(own),
+        rungs,
+        ..Ladder::default()
+    };
+    let mut marked = || {
+        ladder.mark_front();
+        let marked = ladder.rungs.iter().filter(|rung| rung.pareto);
+        let names = marked.map(|rung| rung.name.clone()).collect::<String>();
+        // On another set every difference counts.
+        ladder.pareto_set = Some("s1".into());
+        for rung in &mut ladder.rungs {
+            rung.errors.extend(rung.errors.get("reference").cloned().map(|e| ("s1".to_owned(), e)));
+        }
+        names
+    };
+    assert_eq!(marked(), "ad");
+    assert_eq!(marked(), "abde");
+}
+
+#[test]
 fn a_rung_has_a_time_in_each_engine_it_was_measured_in() {
     let mut rung = rung("both", 4.0, 0.1);
     let in_each = |rung: &Rung| [Backend::Tract, Backend::Ort].map(|b| rung.time_ms_in(b));

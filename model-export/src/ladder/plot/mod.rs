@@ -65,9 +65,12 @@ fn points(ladder: &Ladder, set: &str) -> Vec<Point> {
         Some((rung.time_ms()?, error?)).filter(|(t, e)| *t > 0.0 && *e > 0.0 && e.is_finite())
     };
     let places: Vec<Option<(f64, f64)>> = ladder.rungs.iter().map(place).collect();
-    let on_front = front(&places);
+    // Drawn at its own error, the reference would be too close to others.
+    let is_marked = ladder.pareto_set.as_deref() == Some(set);
+    let on_front = front(&places, ladder.told_apart(set));
     let all = ladder.rungs.iter().zip(places).zip(on_front);
     all.filter_map(|((rung, place), on_front)| {
+        let on_front = if is_marked { rung.pareto } else { on_front };
         let (time_ms, error) = place?;
         rung.errors.contains_key(set).then(|| Point {
             name: rung.name.clone(),
