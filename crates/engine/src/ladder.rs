@@ -312,15 +312,27 @@ impl Ladder {
     /// has no error there.
     pub fn mark_front(&mut self) {
         let Some(set) = self.pareto_set.clone() else { return };
-        let points: Vec<Option<(f64, f64)>> = self
-            .rungs
-            .iter()
-            .map(|rung| Some((rung.time_ms()?, rung.relative_l2(&set)?)))
-            .collect();
-        let on_front = front(&points, self.told_apart(&set));
+        let on_front = self.front(&set);
         for (rung, on_front) in self.rungs.iter_mut().zip(on_front) {
             rung.pareto = on_front;
         }
+    }
+
+    /// Which rungs are worth their time on a set: their error lies by more than the set can
+    /// [tell](Self::told_apart) below that of every faster one that is, too.
+    #[must_use]
+    pub fn front(&self, set: &str) -> Vec<bool> {
+        let place = |(i, rung): (usize, &Rung)| Some((i, rung.time_ms()?, rung.relative_l2(set)?));
+        let mut by_time: Vec<_> = self.rungs.iter().enumerate().filter_map(place).collect();
+        by_time.sort_by(|(_, t, e), (_, time, error)| t.total_cmp(time).then(e.total_cmp(error)));
+        let (apart, mut least) = (self.told_apart(set), f64::INFINITY);
+        let mut on_front = vec![false; self.rungs.len()];
+        for (i, _, error) in by_time {
+            if error + apart < least {
+                (least, on_front[i]) = (error, true);
+            }
+        }
+        on_front
     }
 
     /// The difference of two errors below which a set says nothing: the reference's own error.
@@ -329,25 +341,6 @@ impl Ladder {
         let own = self.discretisation_error.as_ref().filter(|_| set == REFERENCE_SET);
         own.map_or(0.0, |own| own.sed_relative_l2)
     }
-}
-
-/// Which points (time, error) are worth their time: their error lies by more than `apart` below that
-/// of every faster one that is, too.
-#[must_use]
-pub fn front(points: &[Option<(f64, f64)>], apart: f64) -> Vec<bool> {
-    let mut by_time: Vec<usize> = (0..points.len()).filter(|i| points[*i].is_some()).collect();
-    by_time.sort_by(|a, b| {
-        let [a, b] = [points[*a], points[*b]].map(|point| point.unwrap_or_default());
-        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
-    });
-    let mut least = f64::INFINITY;
-    let mut on_front = vec![false; points.len()];
-    for i in by_time {
-        if let Some((_, error)) = points[i].filter(|(_, error)| error + apart < least) {
-            (least, on_front[i]) = (error, true);
-        }
-    }
-    on_front
 }
 
 #[cfg(test)]

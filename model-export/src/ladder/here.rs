@@ -5,7 +5,7 @@
 
 use super::{Progress, Timing, machine, model};
 use crate::{ExportError, read, read_text};
-use papilla_engine::ladder::{Ladder, LatencyByEngine, Percentiles, Rung};
+use papilla_engine::ladder::{Ladder, LatencyByEngine, Percentiles, REFERENCE_SET, Rung};
 use papilla_engine::{EngineError, MAP_LEN, MAP_SIDE_PX};
 use std::fmt::Write;
 use std::path::Path;
@@ -79,7 +79,7 @@ pub fn by_engine(ladder: &Ladder) -> Ladder {
 /// The page. `stem` is the name of the picture without `.svg`.
 #[must_use]
 pub fn markdown(ladder: &Ladder, stem: &str) -> String {
-    let set = ladder.pareto_set.as_deref().unwrap_or("reference");
+    let set = ladder.pareto_set.as_deref().unwrap_or(REFERENCE_SET);
     let mut text = format!(
         "# Error against time on this machine\n\nWritten by `model-export here`. Measured on {}. One map \
          after another: p50 and p99\nof the quietest of {} rounds. Errors: the shipped ladder's, median \

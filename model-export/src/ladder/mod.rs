@@ -19,7 +19,7 @@ use crate::metrics::Ground;
 use crate::{ExportError, read_text};
 use papilla_engine::MODEL_FORMAT;
 use papilla_engine::card::Index;
-use papilla_engine::ladder::{Ladder, SET_NAMES};
+use papilla_engine::ladder::{Ladder, REFERENCE_SET, SET_NAMES};
 use papilla_proto::atlas::{Atlas, Patch, Raster};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -132,7 +132,7 @@ pub fn measure(
         .map_err(|source| ExportError::Engine { path: index_path, source })?;
     let samples: usize = sets.iter().map(|set| set.states.len()).sum();
     progress.total((index.models.len() * samples) as u64);
-    let reference = sets.iter().find(|set| set.name == "reference" && !set.states.is_empty());
+    let reference = sets.iter().find(|set| set.name == REFERENCE_SET && !set.states.is_empty());
     let mut pairs = readings::Pairs::read(fe::NEXT_FINEST, &task.fe, reference, &canvas)?;
     let mut models = Vec::with_capacity(index.models.len());
     for name in &index.models {
@@ -171,7 +171,7 @@ pub fn measure(
         ladder.discretisation_error = fe::reference_error(&ladder.rungs, reference.name);
     }
     // FE can only be held against the reference, so the reference comes first here.
-    let order = ["reference", "heldout-presses", "heldout-shapes", "pressed", "s1"];
+    let order = [REFERENCE_SET, "heldout-presses", "heldout-shapes", "pressed", "s1"];
     let measured =
         |name: &&str| ladder.sets.iter().any(|set| set.name == **name && set.samples > 0);
     ladder.pareto_set = order.iter().find(|name| measured(name)).map(|name| (*name).to_owned());

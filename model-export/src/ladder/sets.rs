@@ -4,7 +4,10 @@ use super::Canvas;
 use crate::ExportError;
 use crate::dataset::{Dataset, Indentation};
 use crate::evaluate::require_same_atlas;
-use papilla_engine::{MAP_LEN, ladder::Set};
+use papilla_engine::{
+    MAP_LEN,
+    ladder::{REFERENCE_SET, Set},
+};
 use papilla_proto::atlas::{Patch, Raster};
 use std::path::Path;
 
@@ -98,7 +101,7 @@ pub(super) struct Source {
 }
 
 const REFERENCE: Source = Source {
-    name: "reference",
+    name: REFERENCE_SET,
     folder: "final",
     about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
     split: None,

@@ -141,13 +141,12 @@ def make_deterministic(seed: int, threads: int | None) -> int:
     """Fix seeds, thread count and algorithms; returns the threads in use.
 
     The same seed on the same kind of CPU with as many threads gives the same weights, bit for bit.
-    An operation that has no deterministic form on CUDA warns there.
     """
     # cuBLAS reads this when it first starts; without it a deterministic CUDA run is refused.
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     count = threads or available_cpus()
     torch.set_num_threads(count)
-    torch.use_deterministic_algorithms(True, warn_only=torch.cuda.is_available())
+    torch.use_deterministic_algorithms(True)
     # Filling fresh buffers guards against reading uninitialised memory, which nothing here does.
     torch.utils.deterministic.fill_uninitialized_memory = False
     torch.backends.cudnn.benchmark = False

@@ -5,7 +5,7 @@ mod zone;
 
 use super::report;
 use labels::Labels;
-use papilla_engine::ladder::{Kind, Ladder, Rung, front};
+use papilla_engine::ladder::{Kind, Ladder, REFERENCE_SET, Rung};
 use plotters::coord::Shift;
 use plotters::coord::combinators::LogCoord;
 use plotters::element::DashedPathElement;
@@ -52,7 +52,7 @@ fn panels(ladder: &Ladder) -> Vec<&str> {
     let measured = |set: &&papilla_engine::ladder::Set| set.samples > 0;
     let names: Vec<&str> =
         ladder.sets.iter().filter(measured).map(|set| set.name.as_str()).collect();
-    let wanted = ["reference", "heldout-presses"];
+    let wanted = [REFERENCE_SET, "heldout-presses"];
     let found: Vec<&str> = wanted.into_iter().filter(|name| names.contains(name)).collect();
     if found.is_empty() { names.into_iter().take(1).collect() } else { found }
 }
@@ -65,12 +65,8 @@ fn points(ladder: &Ladder, set: &str) -> Vec<Point> {
         Some((rung.time_ms()?, error?)).filter(|(t, e)| *t > 0.0 && *e > 0.0 && e.is_finite())
     };
     let places: Vec<Option<(f64, f64)>> = ladder.rungs.iter().map(place).collect();
-    // Drawn at its own error, the reference would be too close to others.
-    let is_marked = ladder.pareto_set.as_deref() == Some(set);
-    let on_front = front(&places, ladder.told_apart(set));
-    let all = ladder.rungs.iter().zip(places).zip(on_front);
+    let all = ladder.rungs.iter().zip(places).zip(ladder.front(set));
     all.filter_map(|((rung, place), on_front)| {
-        let on_front = if is_marked { rung.pareto } else { on_front };
         let (time_ms, error) = place?;
         rung.errors.contains_key(set).then(|| Point {
             name: rung.name.clone(),
@@ -139,12 +135,12 @@ fn range(values: impl Iterator<Item = f64>, low: f64, high: f64) -> Span {
 
 fn panel(area: &Area<'_>, ladder: &Ladder, set: &str) -> Drawn {
     let points = points(ladder, set);
-    let floor = ladder.discretisation_error.as_ref().filter(|_| set == "reference");
+    let floor = ladder.discretisation_error.as_ref().filter(|_| set == REFERENCE_SET);
     let floor = floor.map(|d| d.sed_relative_l2).filter(|floor| *floor > 0.0);
     let times = range(points.iter().map(|p| p.time_ms), 2.0, 6.0);
     let errors = range(points.iter().map(|p| p.error).chain(floor), 1.6, 1.6);
     let title = match set {
-        "reference" => "SED, median relative L2 error against the finest mesh".to_owned(),
+        REFERENCE_SET => "SED, median relative L2 error against the finest mesh".to_owned(),
         _ => format!("SED, median relative L2 error on {set}"),
     };
     let mut chart = ChartBuilder::on(area)
