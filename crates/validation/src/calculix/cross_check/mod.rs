@@ -92,6 +92,16 @@ pub const CASES: &[Case] = &[
         shows: "The bar on that finger, medium: some ten minutes of CalculiX.",
         run: finger::bar,
     },
+    Case {
+        name: "finger-ball-fine",
+        shows: "The ball on the reference's mesh: six minutes.",
+        run: finger::ball_fine,
+    },
+    Case {
+        name: "finger-bar-fine",
+        shows: "The bar on that mesh: half an hour of CalculiX.",
+        run: finger::bar_fine,
+    },
 ];
 
 /// Runs the cases that `wanted` accepts, with decks and results in `folder`;
