@@ -1,11 +1,17 @@
 //! Maps of a shard's values: drawn from the atlas' vertices, or read off the cells of its mesh.
+//!
+//! SED is read in the middle of a pixel. Pressure is the mean over a pixel: ridges and edges of
+//! contact are thinner than one, and the mean keeps the force.
+
+mod finder;
+mod points;
 
 use super::{Cells, DatasetError};
+use finder::Finder;
 use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, AtlasError, Patch, Raster};
 use papilla_output::OutputError;
 use papilla_output::npz::NpzArrays;
-use std::collections::HashMap;
 use std::path::Path;
 
 /// Where the pixels of both patches lie among vertices and, in a dataset of meshes that
@@ -19,8 +25,9 @@ pub struct Maps {
 #[derive(Debug)]
 struct Pixels {
     raster: Raster,
-    /// Side, row and column of each pixel of the raster; empty where all values are at vertices.
-    place: Vec<(u32, [f64; 2])>,
+    /// Side and points of each pixel of the raster, of whose values its own is the mean; empty
+    /// where all values are at vertices.
+    points: Vec<(u32, Vec<[f64; 2]>)>,
 }
 
 impl Maps {
@@ -33,7 +40,7 @@ impl Maps {
         let path = folder.join("raster.npz");
         if !path.exists() {
             let at_vertices =
-                |patch| Pixels { raster: Raster::new(atlas, patch), place: Vec::new() };
+                |patch| Pixels { raster: Raster::new(atlas, patch), points: Vec::new() };
             let [skin, interface] = Patch::ALL.map(at_vertices);
             return Ok(Self { skin, interface });
         }
@@ -42,17 +49,21 @@ impl Maps {
         let mut pixels = |patch: Patch| -> Result<Pixels, DatasetError> {
             let raster = Raster::new(atlas, patch);
             let name = |part: &str| format!("{}_{part}", patch.name());
-            let mut place = Vec::new();
+            let mut points = Vec::new();
             if npz.has(&name("side"))? {
                 let sides = npz.get::<u32, Ix1>(&name("side"))?;
                 let rows = npz.get::<f32, Ix2>(&name("place"))?;
                 let at = rows.outer_iter().map(|p| [f64::from(p[0]), f64::from(p[1])]);
-                place = sides.iter().copied().zip(at).collect();
+                let place: Vec<(u32, [f64; 2])> = sides.iter().copied().zip(at).collect();
                 if place.len() != raster.pixel_count() {
                     return Err(OutputError::malformed(&path, &"places are not the pixels'").into());
                 }
+                points = match patch {
+                    Patch::Skin => points::within(&raster, &place),
+                    Patch::Interface => place.iter().map(|&(s, at)| (s, vec![at])).collect(),
+                };
             }
-            Ok(Pixels { raster, place })
+            Ok(Pixels { raster, points })
         };
         Ok(Self { skin: pixels(Patch::Skin)?, interface: pixels(Patch::Interface)? })
     }
@@ -79,33 +90,51 @@ impl Maps {
         patch: Patch,
         cells: Option<&Cells>,
     ) -> Result<MapReader<'_>, DatasetError> {
-        let Pixels { raster, place } = self.of_patch(patch);
-        let Some(cells) = cells else { return Ok(MapReader { raster, nodes: Vec::new() }) };
+        let Pixels { raster, points } = self.of_patch(patch);
+        let mut reader = MapReader { raster, ends: Vec::new(), terms: Vec::new() };
+        let Some(cells) = cells else { return Ok(reader) };
         let functions = match patch {
             Patch::Skin => hats,
             Patch::Interface => quadratics,
         };
-        let found = Finder::new(cells);
         let lost = || OutputError::malformed("raster.npz".as_ref(), &"a pixel lies in no cell");
-        let node = |&(side, at): &(u32, [f64; 2])| {
-            let (cell, [r, s]) = found.cell(side, at).ok_or_else(lost)?;
-            let (r, s) = (functions(r), functions(s));
-            let weights = std::array::from_fn(|n| (r[n / 3] * s[n % 3]) as f32);
-            Ok((cells.nodes[cell], weights))
-        };
-        if place.len() != raster.pixel_count() {
+        if points.len() != raster.pixel_count() {
             return Err(lost().into());
         }
-        let nodes = place.iter().map(node).collect::<Result<_, OutputError>>()?;
-        Ok(MapReader { raster, nodes })
+        let mut found = Finder::new(cells);
+        // Of a pixel: its cells, and what its value is of the values at their nodes.
+        let mut within: Vec<(usize, [f64; 9])> = Vec::new();
+        for (side, points) in points {
+            within.clear();
+            for &at in points {
+                let (cell, [r, s]) = found.cell(*side, at).ok_or_else(lost)?;
+                let (r, s) = (functions(r), functions(s));
+                if within.iter().all(|(known, _)| *known != cell) {
+                    within.push((cell, [0.0; 9]));
+                }
+                for (_, weights) in within.iter_mut().filter(|(known, _)| *known == cell) {
+                    for (n, weight) in weights.iter_mut().enumerate() {
+                        *weight += r[n / 3] * s[n % 3] / points.len() as f64;
+                    }
+                }
+            }
+            let term = |&(cell, weights): &(usize, [f64; 9])| {
+                (cells.nodes[cell], weights.map(|weight| weight as f32))
+            };
+            reader.terms.extend(within.iter().map(term));
+            reader.ends.push(reader.terms.len());
+        }
+        Ok(reader)
     }
 }
 
 /// Draws maps of one patch from the values of one shard.
 pub struct MapReader<'a> {
     raster: &'a Raster,
-    /// Nodes and weights of each pixel; empty where values are at the atlas' vertices.
-    nodes: Vec<([u32; 9], [f32; 9])>,
+    /// Where the terms of each pixel end; empty where values are at the atlas' vertices.
+    ends: Vec<usize>,
+    /// Nodes of a cell, and their weights.
+    terms: Vec<([u32; 9], [f32; 9])>,
 }
 
 impl MapReader<'_> {
@@ -124,50 +153,21 @@ impl MapReader<'_> {
     /// # Panics
     /// If there are fewer values than nodes of the cells.
     pub fn draw(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
-        if self.nodes.is_empty() {
+        if self.ends.is_empty() {
             return self.raster.rasterise(values, map);
         }
         map.fill(0.0);
-        for (&at, (nodes, weights)) in self.raster.indices().iter().zip(&self.nodes) {
-            let sum: f32 = nodes.iter().zip(weights).map(|(n, w)| w * values[*n as usize]).sum();
+        let mut begin = 0;
+        for (&at, &end) in self.raster.indices().iter().zip(&self.ends) {
+            let sum: f32 = self.terms[begin..end]
+                .iter()
+                .flat_map(|(nodes, weights)| nodes.iter().zip(weights))
+                .map(|(n, w)| w * values[*n as usize])
+                .sum();
             map[at as usize] = sum.max(0.0);
+            begin = end;
         }
         Ok(())
-    }
-}
-
-/// Finds the cell of a place: cells begin at multiples of their sizes.
-struct Finder {
-    sizes: Vec<[u32; 2]>,
-    cells: HashMap<[u32; 5], usize>,
-}
-
-impl Finder {
-    fn new(cells: &Cells) -> Self {
-        let mut sizes: Vec<[u32; 2]> = cells.place.iter().map(|p| [p[3], p[4]]).collect();
-        sizes.sort_unstable();
-        sizes.dedup();
-        Self { sizes, cells: cells.place.iter().enumerate().map(|(n, p)| (*p, n)).collect() }
-    }
-
-    /// A cell, and where along its rows and columns, -1 to 1.
-    fn cell(&self, side: u32, [row, column]: [f64; 2]) -> Option<(usize, [f64; 2])> {
-        // A place on the last row or column belongs to the cell before it.
-        const BEFORE: f64 = 1e-3;
-        for back in [[0.0, 0.0], [BEFORE, 0.0], [0.0, BEFORE], [BEFORE, BEFORE]] {
-            let at = [row - back[0], column - back[1]];
-            for &size in &self.sizes {
-                let first = [0, 1].map(|k| (at[k].max(0.0) as u32) / size[k] * size[k]);
-                if let Some(&n) = self.cells.get(&[side, first[0], first[1], size[0], size[1]]) {
-                    let within = [row, column];
-                    let xi = [0, 1].map(|k| {
-                        2.0 * (within[k] - f64::from(first[k])) / f64::from(size[k]) - 1.0
-                    });
-                    return Some((n, xi));
-                }
-            }
-        }
-        None
     }
 }
 
@@ -186,20 +186,6 @@ fn hats(x: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::two_cells;
-
-    #[test]
-    fn a_place_is_found_in_its_cell() {
-        let cells = two_cells();
-        let found = Finder::new(&cells);
-        assert_eq!(found.cell(1, [0.0, 64.0]), Some((0, [-1.0, 0.0])));
-        assert_eq!(found.cell(1, [32.0, 160.0]), Some((1, [-0.5, -0.5])));
-        // The far corner belongs to the last cell.
-        assert_eq!(found.cell(1, [128.0, 200.0]), Some((1, [1.0, 0.125])));
-        assert_eq!(found.cell(1, [128.0, 256.0]), Some((1, [1.0, 1.0])));
-        assert_eq!(found.cell(0, [0.0, 0.0]), None);
-        assert_eq!(found.cell(1, [0.0, 300.0]), None);
-    }
 
     /// Of a field that is a quadratic of the place, SED is read exactly; of one that is linear, pressure.
     #[test]

@@ -183,7 +183,7 @@ class Dataset:
                 f"{path}: patch '{patch}' names vertex {int(vertex.max())}, but the manifest "
                 f"says {self.vertex_count} vertices"
             )
-        return Raster(pixel, vertex, weight, _lattice(arrays, patch, path, pixel.size))
+        return Raster(pixel, vertex, weight, _lattices(arrays, patch, path, pixel))
 
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
         path = press.directory / press.file
@@ -253,23 +253,30 @@ def read_npz(path: Path, name: str, sha256: str | None = None) -> dict[str, NDAr
         raise DatasetError(f"{path}: not a readable .npz ({error})") from error
 
 
-def _lattice(arrays: dict[str, Any], patch: str, path: Path, pixels: int) -> Lattice | None:
+def _lattices(
+    arrays: dict[str, Any], patch: str, path: Path, pixel: NDArray[np.int64]
+) -> tuple[Lattice, ...]:
+    """Of the skin the points of each pixel, of the interface its middle."""
     if f"{patch}_side" not in arrays:
-        return None
+        return ()
     side, place = arrays[f"{patch}_side"].astype(np.int64), arrays[f"{patch}_place"]
-    if side.shape != (pixels,) or place.shape != (pixels, 2):
+    if side.shape != pixel.shape or place.shape != (*pixel.shape, 2):
         raise DatasetError(f"{path}: the places of patch '{patch}' are not its pixels'")
-    return Lattice(side, place.astype(np.float64))
+    middle = Lattice(side, place.astype(np.float64))
+    return middle.within(pixel) if patch == "skin" else (middle,)
 
 
 def _maps(raster: Raster, functions: Functions, shard: dict[str, NDArray[Any]], name: str) -> F32:
     """``[D, 224, 224]`` of a shard's array, whatever its values belong to."""
     if CELL_PLACE not in shard:
         return raster.rasterise(shard[name])
-    if raster.lattice is None:
+    if not raster.lattices:
         raise DatasetError("raster.npz does not say where pixels lie among cells")
-    nodes, weights = raster.lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
-    return raster.scattered((shard[name][:, nodes] * weights).sum(axis=2).clip(min=0.0))
+    values = np.zeros((len(shard[name]), len(raster.pixel)))
+    for lattice in raster.lattices:
+        nodes, weights = lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
+        values += (shard[name][:, nodes] * weights).sum(axis=2)
+    return raster.scattered((values / len(raster.lattices)).clip(min=0.0).astype(np.float32))
 
 
 def _positive(manifest: dict[str, Any], key: str) -> float:

@@ -3,6 +3,9 @@
 Cells are rectangles of one lattice on the skin, halved where a contact asked for it, each with nine
 nodes. Where a pixel lies on the lattice is fixed (``raster.npz``), so a cell is found without a
 search.
+
+SED is read in the middle of a pixel. Pressure is the mean over a pixel: ridges and edges of contact
+are thinner than one, and the mean keeps the force.
 """
 
 from __future__ import annotations
@@ -20,6 +23,10 @@ CELL_PLACE, CELL_NODES = "cell_place", "cell_nodes"
 
 F64 = NDArray[np.float64]
 Functions = Callable[[F64], F64]
+
+# Points along a pixel over which pressure is a mean, and pixels across a map.
+POINTS = 4
+SIDE_PX = 224
 
 # A place on the last row or column belongs to the cell before it.
 _BEFORE = 1e-3
@@ -55,19 +62,45 @@ class Lattice:
         weights = (row[:, :, None] * column[:, None, :]).reshape(len(xi), 9)
         return nodes[cell].astype(np.int64), weights.astype(np.float32)
 
+    def within(self, pixel: NDArray[np.int64]) -> tuple[Lattice, ...]:
+        """Where the points of the pixels lie, POINTS by POINTS of them; ``pixel``: ``[N]``.
+
+        Between a pixel's middle and its neighbours' a place is linear. Where there is no neighbour,
+        or it lies on another side, points stay at the middle.
+        """
+        at = np.full((SIDE_PX + 2) ** 2, -1)
+        row, column = pixel // SIDE_PX + 1, pixel % SIDE_PX + 1
+        own = row * (SIDE_PX + 2) + column
+        at[own] = np.arange(len(pixel))
+
+        def step(away: int) -> F64:
+            """Along the lattice to the pixel that lies so far away."""
+            there = at[own + away]
+            same = (there >= 0) & (self.side[there] == self.side)
+            return np.where(same[:, None], self.place[there] - self.place, 0.0)
+
+        up, down, left, right = (step(k) for k in (-SIDE_PX - 2, SIDE_PX + 2, -1, 1))
+        offsets = (np.arange(POINTS) + 0.5) / POINTS - 0.5
+        rows = [(down if y > 0.0 else up) * abs(y) for y in offsets]
+        columns = [(right if x > 0.0 else left) * abs(x) for x in offsets]
+        return tuple(Lattice(self.side, self.place + y + x) for y in rows for x in columns)
+
     def _cells(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
         """The cell of each pixel, -1 where none is: cells begin at multiples of their sizes."""
         found = np.full(len(self.side), -1)
         for back in ((0.0, 0.0), (_BEFORE, 0.0), (0.0, _BEFORE), (_BEFORE, _BEFORE)):
-            at = np.maximum(self.place - back, 0.0).astype(np.int64)
             for size in np.unique(place[:, 3:5], axis=0):
+                left = np.flatnonzero(found < 0)
+                if not left.size:
+                    return found
+                at = np.maximum(self.place[left] - back, 0.0).astype(np.int64)
                 index = np.flatnonzero((place[:, 3:5] == size).all(axis=1))
                 own = _key(place[index, 0], place[index, 1:3])
                 order = np.argsort(own)
-                wanted = _key(self.side, at // size * size)
+                wanted = _key(self.side[left], at // size * size)
                 near = np.searchsorted(own[order], wanted).clip(max=len(own) - 1)
-                hit = (own[order][near] == wanted) & (found < 0)
-                found[hit] = index[order][near][hit]
+                hit = own[order][near] == wanted
+                found[left[hit]] = index[order][near[hit]]
         return found
 
 

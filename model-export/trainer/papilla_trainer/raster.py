@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from papilla_trainer.lattice import Lattice
+from papilla_trainer.lattice import SIDE_PX, Lattice
 
-SIDE_PX = 224
 MAP_LEN = SIDE_PX * SIDE_PX
 
 F32 = NDArray[np.float32]
@@ -17,12 +16,16 @@ F32 = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Raster:
-    """Sparse linear map from the vertex values of one patch to pixels."""
+    """Sparse linear map from the vertex values of one patch to pixels.
+
+    ``lattices``: where the points lie over which a pixel's value is a mean, if values belong to the
+    nodes of cells.
+    """
 
     pixel: NDArray[np.int64]
     vertex: NDArray[np.int64]
     weight: F32
-    lattice: Lattice | None = None
+    lattices: tuple[Lattice, ...] = ()
 
     def rasterise(self, values: F32) -> F32:
         """``[D, V]`` vertex values to ``[D, 224, 224]`` pixels; 0 outside the patch.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from papilla_trainer.errors import DatasetError
-from papilla_trainer.lattice import Lattice, hats, quadratics
+from papilla_trainer.lattice import SIDE_PX, Lattice, hats, quadratics
 
 # Two cells of side 1 beside each other, the second halved along its rows.
 PLACE = np.array([[1, 0, 0, 8, 8], [1, 0, 8, 4, 8], [1, 4, 8, 4, 8]])
@@ -41,6 +41,23 @@ def test_pressure_is_linear_between_neighbouring_nodes() -> None:
     # Half of the way along rows, a quarter along columns.
     assert np.allclose((peak[found] * weights).sum(axis=1), [0.125, 0.0, 0.0])
     assert np.allclose(weights.sum(axis=1), 1.0)
+
+
+def test_points_fill_a_pixel_and_stay_on_the_lattice() -> None:
+    """The numbers of ``papilla_dataset``'s test: both read pressure at the same points."""
+    row, column = np.divmod(np.arange(SIDE_PX**2), SIDE_PX)
+    inside = np.flatnonzero((row >= 20) & (row < 204) & (column >= 20) & (column < 204))
+    place = np.stack([8.0 * row[inside], 4.0 * column[inside]], axis=1)
+    side = np.ones(len(inside), dtype=np.int64)
+    at = np.stack([lattice.place for lattice in Lattice(side, place).within(inside)])
+    middle = int(np.searchsorted(inside, 100 * SIDE_PX + 90))
+    assert at.shape == (16, len(inside), 2)
+    assert at[[0, 15], middle].tolist() == [[797.0, 358.5], [803.0, 361.5]]
+    assert (at[[0, 15], 0] - place[0]).tolist() == [[0.0, 0.0], [3.0, 1.5]]
+
+    right = (column[inside] > 90).astype(np.int64)
+    at = np.stack([lattice.place for lattice in Lattice(right, place / [8, 4]).within(inside)])
+    assert at[:4, middle, 1].tolist() == [89.625, 89.875, 90.0, 90.0]
 
 
 def test_a_pixel_beyond_all_cells_is_an_error() -> None:

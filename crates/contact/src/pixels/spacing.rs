@@ -13,7 +13,7 @@ pub enum PixelSpacing {
 }
 
 /// Keys' parameter, the slope of a step's overshoot: 0 does not overshoot, -0.5 is exact for
-/// parabolas. Between, maps of training indentations are closest to FE.
+/// parabolas. Between, maps of training indentations were closest to FE's pressure in pixels' middles.
 const KEYS: f64 = -0.3;
 /// Points of a pixel at which the cubic is read for its mean.
 const READ: i32 = 64;
