@@ -109,13 +109,13 @@ impl Maps {
             for &at in points {
                 let (cell, [r, s]) = found.cell(*side, at).ok_or_else(lost)?;
                 let (r, s) = (functions(r), functions(s));
-                if within.iter().all(|(known, _)| *known != cell) {
+                let known = within.iter().position(|(known, _)| *known == cell);
+                let entry = known.unwrap_or(within.len());
+                if known.is_none() {
                     within.push((cell, [0.0; 9]));
                 }
-                for (_, weights) in within.iter_mut().filter(|(known, _)| *known == cell) {
-                    for (n, weight) in weights.iter_mut().enumerate() {
-                        *weight += r[n / 3] * s[n % 3] / points.len() as f64;
-                    }
+                for (n, weight) in within[entry].1.iter_mut().enumerate() {
+                    *weight += r[n / 3] * s[n % 3] / points.len() as f64;
                 }
             }
             let term = |&(cell, weights): &(usize, [f64; 9])| {
