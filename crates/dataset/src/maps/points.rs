@@ -44,15 +44,21 @@ mod tests {
     use crate::testing::atlas;
     use papilla_atlas::Patch;
 
+    /// A flat skin whose pixels lie on these sides of a lattice, by column, so far apart.
+    fn placed(side: impl Fn(u32) -> u32, apart: [f64; 2]) -> (Raster, Vec<(u32, [f64; 2])>) {
+        let raster = Raster::new(&atlas(2), Patch::Skin);
+        let place = |&i: &u32| {
+            let [row, column] = [i / 224, i % 224];
+            (side(column), [apart[0] * f64::from(row), apart[1] * f64::from(column)])
+        };
+        let places = raster.indices().iter().map(place).collect();
+        (raster, places)
+    }
+
     /// Points of a pixel amid others lie in its own square; of one at the rim, on the inner side alone.
     #[test]
     fn points_fill_a_pixel_and_stay_on_the_lattice() {
-        let raster = Raster::new(&atlas(2), Patch::Skin);
-        let place: Vec<(u32, [f64; 2])> = raster
-            .indices()
-            .iter()
-            .map(|&i| (1, [8.0 * f64::from(i / 224), 4.0 * f64::from(i % 224)]))
-            .collect();
+        let (raster, place) = placed(|_| 1, [8.0, 4.0]);
         let points = within(&raster, &place);
         let middle = raster.indices().binary_search(&(100 * 224 + 90)).unwrap();
         let (side, at) = &points[middle];
@@ -67,12 +73,7 @@ mod tests {
 
     #[test]
     fn another_side_of_the_lattice_is_no_neighbour() {
-        let raster = Raster::new(&atlas(2), Patch::Skin);
-        let place: Vec<(u32, [f64; 2])> = raster
-            .indices()
-            .iter()
-            .map(|&i| (u32::from(i % 224 > 90), [f64::from(i / 224), f64::from(i % 224)]))
-            .collect();
+        let (raster, place) = placed(|column| u32::from(column > 90), [1.0; 2]);
         let middle = raster.indices().binary_search(&(100 * 224 + 90)).unwrap();
         let columns: Vec<f64> = within(&raster, &place)[middle].1.iter().map(|p| p[1]).collect();
         assert_eq!(columns[..4], [89.625, 89.875, 90.0, 90.0]);
