@@ -110,10 +110,17 @@ impl Raster {
     /// What the pixel at `row`, `column` shows; `None` outside the patch or the image.
     #[must_use]
     pub fn at(&self, row: usize, column: usize) -> Option<&Pixel> {
+        self.entry(row, column).map(|entry| &self.pixels[entry])
+    }
+
+    /// Where the pixel at `row`, `column` stands in [`Raster::pixels`]; `None` as of [`Raster::at`].
+    #[must_use]
+    pub fn entry(&self, row: usize, column: usize) -> Option<usize> {
         if row >= MAP_SIDE_PX || column >= MAP_SIDE_PX {
             return None;
         }
-        self.pixels.get(self.entry_of_index[row * MAP_SIDE_PX + column] as usize)
+        let entry = self.entry_of_index[row * MAP_SIDE_PX + column];
+        (entry != OUTSIDE).then_some(entry as usize)
     }
 
     /// Draws a field: linear in each triangle, 0 outside the patch.

@@ -22,12 +22,15 @@ pub struct Maps {
     interface: Pixels,
 }
 
+/// A side of the lattice, and row and column there.
+type Place = (u32, [f64; 2]);
+
 #[derive(Debug)]
 struct Pixels {
     raster: Raster,
-    /// Side and points of each pixel of the raster, of whose values its own is the mean; empty
-    /// where all values are at vertices.
-    points: Vec<(u32, Vec<[f64; 2]>)>,
+    /// Points of which a pixel's value is the mean, as many for each pixel of the raster, one after
+    /// the other; empty where all values are at vertices.
+    points: Vec<Place>,
 }
 
 impl Maps {
@@ -54,13 +57,13 @@ impl Maps {
                 let sides = npz.get::<u32, Ix1>(&name("side"))?;
                 let rows = npz.get::<f32, Ix2>(&name("place"))?;
                 let at = rows.outer_iter().map(|p| [f64::from(p[0]), f64::from(p[1])]);
-                let place: Vec<(u32, [f64; 2])> = sides.iter().copied().zip(at).collect();
-                if place.len() != raster.pixel_count() {
+                let places: Vec<Place> = sides.iter().copied().zip(at).collect();
+                if places.len() != raster.pixel_count() {
                     return Err(OutputError::malformed(&path, &"places are not the pixels'").into());
                 }
                 points = match patch {
-                    Patch::Skin => points::within(&raster, &place),
-                    Patch::Interface => place.iter().map(|&(s, at)| (s, vec![at])).collect(),
+                    Patch::Skin => points::within(&raster, &places),
+                    Patch::Interface => places,
                 };
             }
             Ok(Pixels { raster, points })
@@ -98,16 +101,17 @@ impl Maps {
             Patch::Interface => quadratics,
         };
         let lost = || OutputError::malformed("raster.npz".as_ref(), &"a pixel lies in no cell");
-        if points.len() != raster.pixel_count() {
+        let each = points.len() / raster.pixel_count().max(1);
+        if each == 0 {
             return Err(lost().into());
         }
         let mut found = Finder::new(cells);
         // Of a pixel: its cells, and what its value is of the values at their nodes.
         let mut within: Vec<(usize, [f64; 9])> = Vec::new();
-        for (side, points) in points {
+        for points in points.chunks_exact(each) {
             within.clear();
-            for &at in points {
-                let (cell, [r, s]) = found.cell(*side, at).ok_or_else(lost)?;
+            for &(side, at) in points {
+                let (cell, [r, s]) = found.cell(side, at).ok_or_else(lost)?;
                 let (r, s) = (functions(r), functions(s));
                 let known = within.iter().position(|(known, _)| *known == cell);
                 let entry = known.unwrap_or(within.len());
@@ -115,7 +119,7 @@ impl Maps {
                     within.push((cell, [0.0; 9]));
                 }
                 for (n, weight) in within[entry].1.iter_mut().enumerate() {
-                    *weight += r[n / 3] * s[n % 3] / points.len() as f64;
+                    *weight += r[n / 3] * s[n % 3] / each as f64;
                 }
             }
             let term = |&(cell, weights): &(usize, [f64; 9])| {

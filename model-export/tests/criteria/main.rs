@@ -76,7 +76,8 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure_but_two_
 }
 
 /// What was asked for is missed but for the reference's 95th percentile and unseen shapes: 6 % in the
-/// median and 12 % at the 95th percentile, 10 % on unseen shapes. These limits hold what was reached (docs/concepts/networks.md), so that none is lost.
+/// median and 12 % at the 95th percentile, 10 % on unseen shapes. These limits hold what was reached
+/// (docs/concepts/networks.md), so that none is lost.
 #[test]
 fn the_best_network_is_as_accurate_as_the_documents_say() {
     let ladder = ladder();
@@ -89,7 +90,7 @@ fn the_best_network_is_as_accurate_as_the_documents_say() {
         ("the reference, 95th percentile", reference.p95, 0.092),
         ("held-out simulations, median", indentations.relative_l2.median, 0.085),
         ("held-out simulations, 95th percentile", indentations.relative_l2.p95, 0.135),
-        ("shapes that no training saw, median", shapes.relative_l2.median, 0.1),
+        ("shapes that no training saw, median", shapes.relative_l2.median, 0.096),
         ("far field, median", far_field.median, 0.125),
     ] {
         assert!(value <= limit, "{}: {what} is {value}, {limit} was reached", best.name);

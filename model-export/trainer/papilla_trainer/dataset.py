@@ -183,7 +183,7 @@ class Dataset:
                 f"{path}: patch '{patch}' names vertex {int(vertex.max())}, but the manifest "
                 f"says {self.vertex_count} vertices"
             )
-        return Raster(pixel, vertex, weight, _lattices(arrays, patch, path, pixel))
+        return Raster(pixel, vertex, weight, _lattice(arrays, patch, path, pixel))
 
     def _read_shard(self, press: Press) -> dict[str, NDArray[Any]]:
         path = press.directory / press.file
@@ -253,30 +253,29 @@ def read_npz(path: Path, name: str, sha256: str | None = None) -> dict[str, NDAr
         raise DatasetError(f"{path}: not a readable .npz ({error})") from error
 
 
-def _lattices(
+def _lattice(
     arrays: dict[str, Any], patch: str, path: Path, pixel: NDArray[np.int64]
-) -> tuple[Lattice, ...]:
+) -> Lattice | None:
     """Of the skin the points of each pixel, of the interface its middle."""
     if f"{patch}_side" not in arrays:
-        return ()
+        return None
     side, place = arrays[f"{patch}_side"].astype(np.int64), arrays[f"{patch}_place"]
     if side.shape != pixel.shape or place.shape != (*pixel.shape, 2):
         raise DatasetError(f"{path}: the places of patch '{patch}' are not its pixels'")
     middle = Lattice(side, place.astype(np.float64))
-    return middle.within(pixel) if patch == "skin" else (middle,)
+    return middle.within(pixel) if patch == "skin" else middle
 
 
 def _maps(raster: Raster, functions: Functions, shard: dict[str, NDArray[Any]], name: str) -> F32:
     """``[D, 224, 224]`` of a shard's array, whatever its values belong to."""
     if CELL_PLACE not in shard:
         return raster.rasterise(shard[name])
-    if not raster.lattices:
+    if raster.lattice is None:
         raise DatasetError("raster.npz does not say where pixels lie among cells")
-    values = np.zeros((len(shard[name]), len(raster.pixel)))
-    for lattice in raster.lattices:
-        nodes, weights = lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
-        values += (shard[name][:, nodes] * weights).sum(axis=2)
-    return raster.scattered((values / len(raster.lattices)).clip(min=0.0).astype(np.float32))
+    nodes, weights = raster.lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
+    points = (shard[name][:, nodes] * weights).sum(axis=2)
+    points = points.reshape(len(points), -1, len(raster.pixel))
+    return raster.scattered(points.mean(axis=1, dtype=np.float64).clip(min=0.0).astype(np.float32))
 
 
 def _positive(manifest: dict[str, Any], key: str) -> float:

@@ -44,7 +44,7 @@ def hats(x: F64) -> F64:
 
 @dataclass(frozen=True)
 class Lattice:
-    """Where N pixels lie: ``side`` ``[N]`` of the half cube, ``place`` ``[N, 2]`` row, column."""
+    """Where N points lie: ``side`` ``[N]`` of the half cube, ``place`` ``[N, 2]`` row, column."""
 
     side: NDArray[np.int64]
     place: F64
@@ -52,7 +52,7 @@ class Lattice:
     def read(
         self, place: NDArray[Any], nodes: NDArray[Any], functions: Functions
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-        """``[N, 9]`` nodes and weights of pixels, from cells ``[L, 5]``, their nodes ``[L, 9]``."""
+        """``[N, 9]`` nodes and weights of points, from cells ``[L, 5]``, their nodes ``[L, 9]``."""
         cell = self._cells(place.astype(np.int64))
         if (cell < 0).any():
             raise DatasetError(f"{int((cell < 0).sum())} pixels lie in no cell")
@@ -62,9 +62,10 @@ class Lattice:
         weights = (row[:, :, None] * column[:, None, :]).reshape(len(xi), 9)
         return nodes[cell].astype(np.int64), weights.astype(np.float32)
 
-    def within(self, pixel: NDArray[np.int64]) -> tuple[Lattice, ...]:
-        """Where the points of the pixels lie, POINTS by POINTS of them; ``pixel``: ``[N]``.
+    def within(self, pixel: NDArray[np.int64]) -> Lattice:
+        """POINTS by POINTS points of each pixel, the first of all, then the second of all.
 
+        This is of the middles of ``pixel``, ``[N]``.
         Between a pixel's middle and its neighbours' a place is linear. Where there is no neighbour,
         or it lies on another side, points stay at the middle.
         """
@@ -83,10 +84,11 @@ class Lattice:
         offsets = (np.arange(POINTS) + 0.5) / POINTS - 0.5
         rows = [(down if y > 0.0 else up) * abs(y) for y in offsets]
         columns = [(right if x > 0.0 else left) * abs(x) for x in offsets]
-        return tuple(Lattice(self.side, self.place + y + x) for y in rows for x in columns)
+        places = [self.place + y + x for y in rows for x in columns]
+        return Lattice(np.tile(self.side, len(places)), np.concatenate(places))
 
     def _cells(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The cell of each pixel, -1 where none is: cells begin at multiples of their sizes."""
+        """The cell of each point, -1 where none is: cells begin at multiples of their sizes."""
         found = np.full(len(self.side), -1)
         for back in ((0.0, 0.0), (_BEFORE, 0.0), (0.0, _BEFORE), (_BEFORE, _BEFORE)):
             for size in np.unique(place[:, 3:5], axis=0):

@@ -18,14 +18,14 @@ F32 = NDArray[np.float32]
 class Raster:
     """Sparse linear map from the vertex values of one patch to pixels.
 
-    ``lattices``: where the points lie over which a pixel's value is a mean, if values belong to the
-    nodes of cells.
+    ``lattice``: where the points lie over which a pixel's value is a mean, as many for each, if
+    values belong to the nodes of cells.
     """
 
     pixel: NDArray[np.int64]
     vertex: NDArray[np.int64]
     weight: F32
-    lattices: tuple[Lattice, ...] = ()
+    lattice: Lattice | None = None
 
     def rasterise(self, values: F32) -> F32:
         """``[D, V]`` vertex values to ``[D, 224, 224]`` pixels; 0 outside the patch.

@@ -49,14 +49,14 @@ def test_points_fill_a_pixel_and_stay_on_the_lattice() -> None:
     inside = np.flatnonzero((row >= 20) & (row < 204) & (column >= 20) & (column < 204))
     place = np.stack([8.0 * row[inside], 4.0 * column[inside]], axis=1)
     side = np.ones(len(inside), dtype=np.int64)
-    at = np.stack([lattice.place for lattice in Lattice(side, place).within(inside)])
+    at = Lattice(side, place).within(inside).place.reshape(-1, len(inside), 2)
     middle = int(np.searchsorted(inside, 100 * SIDE_PX + 90))
     assert at.shape == (16, len(inside), 2)
     assert at[[0, 15], middle].tolist() == [[797.0, 358.5], [803.0, 361.5]]
     assert (at[[0, 15], 0] - place[0]).tolist() == [[0.0, 0.0], [3.0, 1.5]]
 
     right = (column[inside] > 90).astype(np.int64)
-    at = np.stack([lattice.place for lattice in Lattice(right, place / [8, 4]).within(inside)])
+    at = Lattice(right, place / [8, 4]).within(inside).place.reshape(-1, len(inside), 2)
     assert at[:4, middle, 1].tolist() == [89.625, 89.875, 90.0, 90.0]
 
 

@@ -23,8 +23,7 @@ impl<'a> Finder<'a> {
 
     /// A cell, and where along its rows and columns, -1 to 1.
     pub(super) fn cell(&mut self, side: u32, at: [f64; 2]) -> Option<(usize, [f64; 2])> {
-        let last = self.places.get(self.last).filter(|place| holds(place, side, at));
-        if last.is_none() {
+        if !self.places.get(self.last).is_some_and(|place| holds(place, side, at)) {
             self.last = self.search(side, at)?;
         }
         let [_, row, column, rows, columns] = self.places[self.last];
