@@ -1,6 +1,6 @@
 //! The surface-pressure study's image pairs: 224 x 224 gray PNG of pressure and SED.
 
-use super::{Dataset, DatasetError, MapReader, Maps, Split};
+use super::{Dataset, DatasetError, IndentationEntry, Maps, Split};
 use papilla_atlas::{MAP_LEN, Patch};
 use papilla_output::map_image::{Bits, MapScale, MapView, Quantity};
 use papilla_output::{OutputError, atomic};
@@ -36,7 +36,7 @@ pub struct ImagesReport {
     pub dataset_sha256: String,
     /// Hash of the atlas.
     pub atlas_hash: String,
-    /// Scale of all pressure images: white is the dataset's maximum.
+    /// Scale of all pressure images: white is the greatest value or pixel of the dataset.
     pub pressure_scale: MapScale,
     /// Scale of all SED images (dermis side).
     pub sed_scale: MapScale,
@@ -61,8 +61,7 @@ impl<'a> Painter<'a> {
         Self {
             mask,
             quantity,
-            // A dataset of zeros has no maximum to normalise by.
-            white: if max > 0.0 { max } else { 1.0 },
+            white: max,
             mm_per_px: f64::from(dataset.atlas().mm_per_px()),
             pixels: vec![0.0; MAP_LEN],
         }
@@ -74,29 +73,67 @@ impl<'a> Painter<'a> {
             pixels: &self.pixels,
             mask: self.mask,
             mm_per_px: self.mm_per_px,
-            white: self.white,
+            // A dataset of zeros has no maximum to normalise by.
+            white: if self.white > 0.0 { self.white } else { 1.0 },
         }
     }
 
-    fn write(
-        &mut self,
-        reader: &MapReader<'_>,
-        values: &[f32],
-        bits: Bits,
-        path: &Path,
-    ) -> Result<(), DatasetError> {
-        reader
-            .draw(values, &mut self.pixels)
-            .map_err(|source| DatasetError::Atlas { path: path.to_path_buf(), source })?;
+    fn greatest(&self) -> f64 {
+        self.pixels.iter().fold(0.0, |most, &pixel| f64::from(pixel).max(most))
+    }
+
+    fn write(&self, bits: Bits, path: &Path) -> Result<(), DatasetError> {
         // Not synced one by one: index.json, written last, says all are there.
         let bytes = self.view().encode_gray(bits)?;
         Ok(std::fs::write(path, bytes).map_err(OutputError::io("write", path))?)
     }
 }
 
+/// The maps of a dataset, drawn one sample after the other.
+struct Drawing<'a> {
+    dataset: &'a Dataset,
+    maps: &'a Maps,
+    /// Of pressure and SED.
+    painters: [Painter<'a>; 2],
+}
+
+impl Drawing<'_> {
+    /// Draws both maps of each sample, and has them looked at: its press, its depth in mm.
+    fn each(
+        &mut self,
+        mut look: impl FnMut(&IndentationEntry, f32, &mut [Painter<'_>]) -> Result<(), DatasetError>,
+    ) -> Result<(), DatasetError> {
+        for press in &self.dataset.manifest().presses {
+            let shard = self.dataset.shard(press)?;
+            let quantities =
+                [(Patch::Skin, &shard.pressure_pa), (Patch::Interface, &shard.sed_dermis_j_per_m3)];
+            let mut readers = Vec::with_capacity(2);
+            for (patch, values) in quantities {
+                readers.push((self.maps.reader(patch, shard.cells.as_ref())?, values));
+            }
+            for sample in 0..shard.len() {
+                for ((reader, values), painter) in readers.iter().zip(&mut self.painters) {
+                    let values = values.row(sample).to_vec();
+                    reader.draw(&values, &mut painter.pixels).map_err(|source| {
+                        DatasetError::Atlas {
+                            path: self.dataset.folder().join(&press.file),
+                            source,
+                        }
+                    })?;
+                }
+                look(press, shard.depth_mm[sample], &mut self.painters)?;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Writes `press-00000-depth-0.25mm-pressure.png` and `...-sed.png` for every
-/// sample of the dataset in `folder` into `out`, gray, normalised by the
-/// dataset's maximum, and last `index.json` with the scales and splits.
+/// sample of the dataset in `folder` into `out`, gray, and last `index.json` with the scales and
+/// splits.
+///
+/// White is the dataset's maximum, or the greatest pixel: the quadratic that SED is read on may
+/// exceed the values at its nodes.
 ///
 /// # Errors
 /// [`DatasetError`] when the dataset is damaged or `out` is not writable.
@@ -110,39 +147,119 @@ pub fn images(
     atomic::create_folder(out)?;
     let maps = Maps::read(folder, dataset.atlas())?;
     let [skin, interface] = Patch::ALL.map(|patch| maps.raster(patch).mask());
-    let mut pressure = Painter::new(&dataset, skin, Quantity::Pressure, manifest.pressure_max_pa);
-    let mut sed = Painter::new(&dataset, interface, Quantity::Sed, manifest.sed_max_j_per_m3);
-    let mut samples = Vec::new();
-    for press in &manifest.presses {
-        let shard = dataset.shard(press)?;
-        let on_skin = maps.reader(Patch::Skin, shard.cells.as_ref())?;
-        let below = maps.reader(Patch::Interface, shard.cells.as_ref())?;
-        for sample in 0..shard.len() {
-            let depth_mm = shard.depth_mm[sample];
-            let name =
-                |q: Quantity| format!("press-{:05}-depth-{depth_mm}mm-{}.png", press.id, q.name());
-            let entry = ImageEntry {
-                press: press.id,
-                depth_mm,
-                split: press.split,
-                pressure: name(Quantity::Pressure),
-                sed: name(Quantity::Sed),
-            };
-            let values = shard.pressure_pa.row(sample).to_vec();
-            pressure.write(&on_skin, &values, options.bits, &out.join(&entry.pressure))?;
-            let values = shard.sed_dermis_j_per_m3.row(sample).to_vec();
-            sed.write(&below, &values, options.bits, &out.join(&entry.sed))?;
-            samples.push(entry);
+    let mut drawing = Drawing {
+        dataset: &dataset,
+        maps: &maps,
+        painters: [
+            Painter::new(&dataset, skin, Quantity::Pressure, manifest.pressure_max_pa),
+            Painter::new(&dataset, interface, Quantity::Sed, manifest.sed_max_j_per_m3),
+        ],
+    };
+    drawing.each(|_, _, painters| {
+        for painter in painters {
+            painter.white = painter.white.max(painter.greatest());
         }
-    }
+        Ok(())
+    })?;
+    let mut samples = Vec::new();
+    drawing.each(|press, depth_mm, painters| {
+        let name =
+            |q: Quantity| format!("press-{:05}-depth-{depth_mm}mm-{}.png", press.id, q.name());
+        let entry = ImageEntry {
+            press: press.id,
+            depth_mm,
+            split: press.split,
+            pressure: name(Quantity::Pressure),
+            sed: name(Quantity::Sed),
+        };
+        for (painter, file) in painters.iter().zip([&entry.pressure, &entry.sed]) {
+            painter.write(options.bits, &out.join(file))?;
+        }
+        samples.push(entry);
+        Ok(())
+    })?;
+    let [pressure_scale, sed_scale] =
+        drawing.painters.each_ref().map(|p| p.view().scale(options.bits));
     let report = ImagesReport {
         dataset_sha256: manifest.dataset_sha256.clone(),
         atlas_hash: manifest.atlas_hash.clone(),
-        pressure_scale: pressure.view().scale(options.bits),
-        sed_scale: sed.view().scale(options.bits),
+        pressure_scale,
+        sed_scale,
         samples,
         folder: out.to_path_buf(),
     };
     atomic::write_json(&out.join("index.json"), &report)?;
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{atlas, record, two_cells};
+    use crate::{Manifest, Sample, TriangleOnLattice, encode, sha256_hex, write_atlas};
+    use papilla_atlas::Atlas;
+    use std::sync::Arc;
+
+    /// Two cells that cover the whole atlas.
+    fn lattice(atlas: &Atlas) -> Vec<TriangleOnLattice> {
+        let uv = |v: u32| atlas.patch(Patch::Skin).uv_px[v as usize].map(f64::from);
+        let place = |v: u32| [(uv(v)[1] - 20.0) / 184.0 * 128.0, (uv(v)[0] - 20.0) / 184.0 * 256.0];
+        let on = |t: &[u32; 3]| TriangleOnLattice { side: 1, place: t.map(place) };
+        atlas.triangles().iter().map(on).collect()
+    }
+
+    /// A dataset of one sample: SED in MPa at the nodes of two cells.
+    fn dataset(folder: &Path, sed_dermis_mpa: Vec<f64>) {
+        let (atlas, cells) = (atlas(6), two_cells());
+        let count = cells.node_count();
+        let sample = Sample { cells: Some(Arc::new(cells)), sed_dermis_mpa, ..record(0.5, count) };
+        let shard = encode(&[sample], atlas.vertex_count()).unwrap().unwrap();
+        std::fs::write(folder.join("press.npz"), &shard.bytes).unwrap();
+        write_atlas(folder, &atlas, Some(&lattice(&atlas))).unwrap();
+        let press = IndentationEntry {
+            id: 0,
+            file: "press.npz".into(),
+            sha256: sha256_hex(&shard.bytes),
+            split: Split::Train,
+            samples: 1,
+            indenter: "plate".into(),
+            shape: "plate".into(),
+            pose: crate::Pose { pitch_deg: 0.0, roll_deg: 0.0, yaw_deg: 0.0 },
+            offset_mm: [0.0; 2],
+            checks: shard.checks.clone(),
+        };
+        let manifest = Manifest {
+            format: crate::FORMAT,
+            atlas_hash: atlas.hash().to_string(),
+            campaign: serde_json::Value::Null,
+            seed: 0,
+            software: String::new(),
+            units: crate::Units::default(),
+            effects: Vec::new(),
+            vertex_count: atlas.vertex_count(),
+            pressure_max_pa: shard.pressure_max_pa,
+            sed_max_j_per_m3: shard.sed_max_j_per_m3,
+            check_columns: crate::CHECK_COLUMNS.map(String::from).to_vec(),
+            dataset_sha256: crate::dataset_sha256([press.sha256.as_str()]),
+            presses: vec![press],
+            failed: Vec::new(),
+            dropped: Vec::new(),
+            splits: crate::Splits { train: vec![0], test: Vec::new() },
+        };
+        atomic::write_json(&folder.join("manifest.json"), &manifest).unwrap();
+    }
+
+    #[test]
+    fn white_is_the_greatest_pixel_where_a_quadratic_exceeds_its_nodes() {
+        let folder = tempfile::tempdir().unwrap();
+        // 0, 1, 1 at the first cell's nodes: its quadratic's greatest value is 9/8, in between.
+        let row = [0.0, 1e-3, 1e-3, 1e-3, 1e-3];
+        dataset(folder.path(), [row; 3].concat());
+        let out = folder.path().join("images");
+        let report = images(folder.path(), &out, &ImageOptions { bits: Bits::Sixteen }).unwrap();
+        let white = report.sed_scale.white;
+        assert!((white / 1125.0 - 1.0).abs() < 1e-3, "{white}");
+        let png = image::open(out.join(&report.samples[0].sed)).unwrap().to_luma16();
+        assert_eq!(png.pixels().map(|p| p.0[0]).max(), Some(u16::MAX));
+    }
 }

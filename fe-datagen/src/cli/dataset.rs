@@ -36,7 +36,7 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// 224 x 224 gray PNG pairs, normalised by the dataset's maximum.
+    /// 224 x 224 gray PNG pairs, white at the dataset's greatest pixel or value.
     Images {
         /// The dataset's folder.
         folder: PathBuf,
