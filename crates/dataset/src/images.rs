@@ -226,7 +226,7 @@ mod tests {
             shape: "plate".into(),
             pose: crate::Pose { pitch_deg: 0.0, roll_deg: 0.0, yaw_deg: 0.0 },
             offset_mm: [0.0; 2],
-            checks: shard.checks.clone(),
+            checks: shard.checks,
         };
         let manifest = Manifest {
             format: crate::FORMAT,
