@@ -6,7 +6,7 @@ mod placed;
 
 pub use self::maps::ContactMaps;
 use self::placed::Placed;
-use crate::dataset::{Dataset, Indentation, Shard};
+use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile};
 use crate::processor::thread_s;
 use crate::{ExportError, read};
@@ -14,6 +14,7 @@ use papilla_contact::{
     Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, PixelSpacing, Scene,
     Settings, Solver,
 };
+use papilla_dataset::{IndentationEntry, Shard, Split};
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::Patch;
 use serde::Serialize;
@@ -134,7 +135,7 @@ impl Models {
     /// [`ExportError::Contact`], with the dataset's path.
     pub fn require_atlas(&self, dataset: &Dataset, path: &Path) -> Result<(), ExportError> {
         let refused = |source| ExportError::Contact { path: path.to_owned(), source };
-        self.finger.require_atlas(dataset.atlas.hash()).map_err(refused)
+        self.finger.require_atlas(dataset.atlas().hash()).map_err(refused)
     }
 
     fn solver(&self, rung: Rung) -> Option<Solver> {
@@ -174,8 +175,8 @@ pub fn measure(
     }
     let mut out = Contact::new(models.finger.vertices());
     let mut count = 0;
-    for indentation in dataset.indentations("test")? {
-        let shard = dataset.load(indentation)?;
+    for indentation in dataset.indentations(Split::Test)? {
+        let shard = dataset.shard(indentation)?;
         let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
         for state in 0..indentation.samples {
             count += 1;
@@ -183,7 +184,7 @@ pub fn measure(
                 continue;
             }
             let Some(placed) = &placed else { continue };
-            let object = placed.at(f64::from(shard.depth_mm[state]), shard.slide_mm(state));
+            let object = placed.at(f64::from(shard.depth_mm[state]), shard.slid_mm(state));
             solver.reset();
             figures.pixels.iter_mut().for_each(PixelContact::reset);
             let cold = figures.frame(rung, &mut solver, &object, dataset, &mut out);
@@ -221,7 +222,7 @@ fn pixel_contact(
     spacing: PixelSpacing,
 ) -> Option<PixelContact> {
     let raster = Arc::new(dataset.maps.raster(Patch::Skin).clone());
-    let skin = PixelSkin::new(&models.finger, &dataset.atlas, raster)?;
+    let skin = PixelSkin::new(&models.finger, dataset.atlas(), raster)?;
     Some(PixelContact::new(Arc::new(skin), &models.finger, spacing))
 }
 
@@ -252,7 +253,7 @@ impl Figures {
     ) -> f64 {
         let objects = std::slice::from_ref(object);
         let scene = if rung == Rung::Gaps {
-            let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
+            let skin = &dataset.atlas().patch(Patch::Skin).positions_mm;
             let depth = |p: &[f32; 3]| {
                 -object.placement.distance(object.shape.as_ref(), p.map(f64::from)).gap_mm as f32
             };
@@ -292,7 +293,7 @@ impl Figures {
     fn compare(
         &mut self,
         dataset: &Dataset,
-        indentation: &Indentation,
+        indentation: &IndentationEntry,
         shard: &Shard,
         state: usize,
         out: &Contact,
@@ -314,10 +315,8 @@ impl Figures {
         }
         let norm = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
         self.pressure.push((miss / size).sqrt());
-        if let Some(force_n) = &shard.force_n {
-            let due = norm([0, 1, 2].map(|i| f64::from(force_n[[state, i]])));
-            self.force.push((norm(out.force_n) / due - 1.0).abs());
-        }
+        let due = norm([0, 1, 2].map(|i| f64::from(shard.force_n[[state, i]])));
+        self.force.push((norm(out.force_n) / due - 1.0).abs());
         self.told[0] += usize::from(!out.quality.settled);
         self.told[1] += usize::from(out.quality.out_of_range);
         self.told[2] += 1;

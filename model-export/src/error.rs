@@ -1,6 +1,8 @@
 //! What can go wrong between a model and its card.
 
+use papilla_dataset::{DatasetError, Split};
 use papilla_engine::EngineError;
+use papilla_output::OutputError;
 use papilla_proto::atlas::AtlasError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -51,9 +53,12 @@ pub enum ExportError {
         /// What is wrong with it.
         reason: String,
     },
-    /// A file of the dataset is not what its contract says.
+    /// The dataset cannot be read or trusted.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// A file of the dataset lacks what it is wanted for.
     #[error("{path}: {reason}")]
-    Dataset {
+    DatasetFile {
         /// The file.
         path: PathBuf,
         /// What is wrong with it.
@@ -109,7 +114,7 @@ pub enum ExportError {
         /// The manifest.
         path: PathBuf,
         /// The split.
-        split: String,
+        split: Split,
     },
     /// A truth without energy, or with what is no energy density.
     #[error("{path}: sample {sample} has no usable SED: {reason}")]
@@ -145,7 +150,9 @@ impl ExportError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Io { .. } | Self::Picture { .. } => 3,
+            Self::Io { .. }
+            | Self::Picture { .. }
+            | Self::Dataset(DatasetError::Output(OutputError::Io { .. })) => 3,
             _ => 1,
         }
     }

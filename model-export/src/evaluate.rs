@@ -1,9 +1,10 @@
 //! Runs a model over a split of a dataset in the engine that will serve it.
 
 use crate::ExportError;
-use crate::dataset::{Dataset, Indentation, Shard};
+use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::reference::relative_difference;
+use papilla_dataset::{IndentationEntry, Shard, Split};
 use papilla_engine::card::{Card, Latency, Metrics};
 use papilla_engine::{MAP_LEN, MODEL_FORMAT, Model, ModelInfo, Session};
 use serde::Serialize;
@@ -60,7 +61,7 @@ impl Maps {
     fn draw(
         &mut self,
         dataset: &Dataset,
-        indentation: &Indentation,
+        indentation: &IndentationEntry,
         shard: &Shard,
         index: usize,
     ) -> Result<(), ExportError> {
@@ -138,11 +139,11 @@ pub fn run(
     subject: &Subject<'_>,
     other: Option<&dyn Model>,
     dataset: &Dataset,
-    split: &str,
+    split: Split,
     mut step: impl FnMut(),
 ) -> Result<Evaluation, ExportError> {
     let info = subject.model.info();
-    require_atlas("the dataset", dataset.atlas.hash(), info)?;
+    require_atlas("the dataset", dataset.atlas().hash(), info)?;
     let mut bench = Bench::new(subject.model, subject.path)?;
     let mut second = other.map(|model| Bench::new(model, subject.path)).transpose()?;
     let mut difference = None;
@@ -150,7 +151,7 @@ pub fn run(
     let mut maps = Maps::default();
     for indentation in dataset.indentations(split)? {
         let path = dataset.shard_path(indentation);
-        let shard = dataset.load(indentation)?;
+        let shard = dataset.shard(indentation)?;
         for index in 0..indentation.samples {
             maps.draw(dataset, indentation, &shard, index)?;
             let infer_ms = bench.infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;
@@ -174,9 +175,9 @@ pub fn run(
                 indentation: indentation.id,
                 index,
                 depth_mm: shard.depth_mm[index],
-                pitch_deg: indentation.pitch_deg,
-                roll_deg: indentation.roll_deg,
-                yaw_deg: indentation.yaw_deg,
+                pitch_deg: indentation.pose.pitch_deg,
+                roll_deg: indentation.pose.roll_deg,
+                yaw_deg: indentation.pose.yaw_deg,
                 metrics,
                 infer_ms,
             });
@@ -184,8 +185,8 @@ pub fn run(
         }
     }
     let figures: Vec<SampleMetrics> = samples.iter().map(|sample| sample.metrics).collect();
-    let empty = || ExportError::EmptySplit { path: subject.path.into(), split: split.to_owned() };
-    let metrics = summarise(split, &figures).ok_or_else(empty)?;
+    let empty = || ExportError::EmptySplit { path: subject.path.into(), split };
+    let metrics = summarise(&split.to_string(), &figures).ok_or_else(empty)?;
     Ok(Evaluation {
         metrics: Metrics { dataset_sha256: Some(dataset.sha256().to_owned()), ..metrics },
         latency_ms: bench.latency(info),
@@ -204,7 +205,7 @@ pub fn run(
 pub fn maps_of(
     subject: &Subject<'_>,
     dataset: &Dataset,
-    split: &str,
+    split: Split,
     sample: &Sample,
 ) -> Result<Maps, ExportError> {
     let mut maps = Maps::default();
@@ -213,7 +214,7 @@ pub fn maps_of(
         .into_iter()
         .filter(|indentation| indentation.id == sample.indentation)
     {
-        let shard = dataset.load(indentation)?;
+        let shard = dataset.shard(indentation)?;
         maps.draw(dataset, indentation, &shard, sample.index)?;
         Bench::new(subject.model, subject.path)?
             .infer(&maps.pressure_pa, &mut maps.predicted_j_per_m3)?;

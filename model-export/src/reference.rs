@@ -1,11 +1,10 @@
 //! Holds the serving engine against another engine on the same model.
 
-use crate::dataset::read_array;
 use crate::{ExportError, read};
-use ndarray::Array3;
-use ndarray_npy::{NpzReader, ReadNpzError};
+use ndarray::{Array3, Ix3};
 use papilla_engine::{MAP_LEN, MAP_SIDE_PX, Session};
-use std::io::Cursor;
+use papilla_output::OutputError;
+use papilla_output::npz::NpzArrays;
 use std::path::Path;
 
 /// Difference allowed between two engines, relative to a map's maximum: what rounding
@@ -28,11 +27,12 @@ impl Recorded {
     /// [`ExportError::Io`], [`ExportError::Reference`].
     pub fn read(path: &Path) -> Result<Self, ExportError> {
         let bad = |reason: String| ExportError::Reference { path: path.to_owned(), reason };
-        let unreadable = |error: ReadNpzError| bad(format!("unreadable: {error}"));
-        let mut npz = NpzReader::new(Cursor::new(read(path)?)).map_err(unreadable)?;
+        let unreadable = |error: OutputError| bad(format!("unreadable: {error}"));
+        let bytes = read(path)?;
+        let mut npz = NpzArrays::new(path, &bytes).map_err(unreadable)?;
         let recorded = Self {
-            pressure_pa: read_array(&mut npz, "pressure_pa").map_err(unreadable)?,
-            sed_j_per_m3: read_array(&mut npz, "sed_j_per_m3").map_err(unreadable)?,
+            pressure_pa: npz.get::<f32, Ix3>("pressure_pa").map_err(unreadable)?,
+            sed_j_per_m3: npz.get::<f32, Ix3>("sed_j_per_m3").map_err(unreadable)?,
         };
         let (n, rows, columns) = recorded.pressure_pa.dim();
         if n == 0

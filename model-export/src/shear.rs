@@ -3,11 +3,12 @@
 
 use crate::ExportError;
 use crate::contact::Models;
-use crate::dataset::{Dataset, Indentation, Shard};
+use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, spread};
 use crate::processor::thread_s;
 use ndarray::Axis;
 use papilla_contact::{InterfaceSkin, ShearEnergy};
+use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::ladder::Traction;
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::{Patch, VertexSampler};
@@ -26,18 +27,18 @@ pub fn measure(
     (name, network): (&str, &mut (dyn Session + '_)),
 ) -> Result<Traction, ExportError> {
     let skin = Arc::new(dataset.maps.raster(Patch::Skin).clone());
-    let sampler = VertexSampler::new(&dataset.atlas, &skin);
-    let skin = InterfaceSkin::new(models.finger(), &dataset.atlas, skin);
+    let sampler = VertexSampler::new(dataset.atlas(), &skin);
+    let skin = InterfaceSkin::new(models.finger(), dataset.atlas(), skin);
     let bad = |path: &Path, reason: &str| {
         let (path, reason) = (path.to_owned(), reason.to_owned());
-        ExportError::Dataset { path, reason }
+        ExportError::DatasetFile { path, reason }
     };
     let skin = skin.ok_or_else(|| bad(Path::new(""), "the contact model names no layers"))?;
     let mut energy = ShearEnergy::new(Arc::new(skin));
     let [mut alone, mut felt, mut added_ms] = [(); 3].map(|()| Vec::new());
     let [mut pressure_pa, mut sed, mut truth] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
     for indentation in dataset.every_indentation() {
-        let shard = dataset.load(indentation)?;
+        let shard = dataset.shard(indentation)?;
         let path = dataset.shard_path(indentation);
         for state in 0..indentation.samples {
             let shear_pa = traction(dataset, indentation, &shard, state, &sampler)?
@@ -71,7 +72,7 @@ pub fn measure(
 /// Traction along the skin at the vertices, Pa; none if the shard holds none.
 fn traction(
     dataset: &Dataset,
-    indentation: &Indentation,
+    indentation: &IndentationEntry,
     shard: &Shard,
     state: usize,
     sampler: &VertexSampler,

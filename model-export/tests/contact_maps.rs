@@ -5,6 +5,7 @@
 
 use ndarray::{Array1, Array3, s};
 use ndarray_npy::NpzReader;
+use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::MAP_LEN;
 use papilla_model_export::contact::{ContactMaps, Models};
 use papilla_model_export::dataset::Dataset;
@@ -18,7 +19,7 @@ fn every_state_of_the_reference_has_a_pressure_close_to_its_own() {
     let dataset = Dataset::open(&root.join("data/final")).unwrap();
     models.require_atlas(&dataset, &root.join("data/final")).unwrap();
     let maps = ContactMaps::of(&models, &dataset).unwrap();
-    let indentations = [dataset.indentations("train"), dataset.indentations("test")];
+    let indentations = [dataset.indentations(Split::Train), dataset.indentations(Split::Test)];
     let indentations: Vec<_> = indentations.into_iter().flat_map(Result::unwrap).collect();
     let states: usize = indentations.iter().map(|indentation| indentation.samples).sum();
     assert_eq!(maps.press.len() + maps.left_out, states);
@@ -33,11 +34,9 @@ fn every_state_of_the_reference_has_a_pressure_close_to_its_own() {
     assert_eq!(sha256.as_slice().unwrap(), dataset.sha256().as_bytes());
     let mut truth = vec![0.0; MAP_LEN];
     for row in 0..press.len() {
-        let named = |i: &&&papilla_model_export::dataset::Indentation| {
-            i64::try_from(i.id) == Ok(press[row])
-        };
+        let named = |i: &&&IndentationEntry| i64::try_from(i.id) == Ok(press[row]);
         let indentation = indentations.iter().find(named).unwrap();
-        let shard = dataset.load(indentation).unwrap();
+        let shard = dataset.shard(indentation).unwrap();
         let state = usize::try_from(state[row]).unwrap();
         dataset.draw_pressure(indentation, &shard, state, &mut truth).unwrap();
         let found = pressure_pa.slice(s![row, .., ..]);

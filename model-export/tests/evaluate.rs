@@ -6,7 +6,7 @@
 
 mod bench;
 
-use bench::{Bench, DEPTHS, TINY, read_card, replaced};
+use bench::{Bench, DEPTHS, FILES, TINY, read_card, replaced};
 use papilla_engine::card::Index;
 use serde_json::Value;
 use std::fs;
@@ -105,17 +105,17 @@ fn what_does_not_belong_together_is_refused() {
     assert!(stderr.contains("atlas"), "{stderr}");
 
     // A damaged shard, an indentation in both splits, a path that leads outside.
-    let shard = bench.path("data/shards/1.npz");
+    let shard = bench.path("data").join(FILES[1]);
     let mut bytes = fs::read(&shard).unwrap();
     bytes[40] ^= 1;
     fs::write(&shard, bytes).unwrap();
     let stderr = bench.refused(1, &["evaluate", "models/tiny.onnx", "data"]);
-    assert!(stderr.contains("shards/1.npz") && stderr.contains("hash"), "{stderr}");
+    assert!(stderr.contains(FILES[1]) && stderr.contains("sha256"), "{stderr}");
     for (old, new, word) in [
-        ("\"train\":[0]", "\"train\":[0,1]", "both splits"),
-        ("shards/1.npz", "../1.npz", "no path inside"),
-        ("\"format\":1", "\"format\":3", "format 3"),
-        (trained.as_str(), &"1".repeat(64), "does not follow"),
+        ("\"train\":[0]", "\"train\":[0,1]", "list of splits"),
+        (FILES[1], "../1.npz", "outside the dataset"),
+        ("\"format\":2", "\"format\":3", "format 3"),
+        (trained.as_str(), &"1".repeat(64), "dataset_sha256"),
     ] {
         assert!(manifest.contains(old), "{old}");
         fs::write(bench.path("data/manifest.json"), manifest.replace(old, new)).unwrap();

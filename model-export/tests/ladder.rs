@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::Bench;
+use bench::{Bench, FILES};
 use papilla_engine::Ladder;
 use papilla_engine::ladder::{Kind, Rung};
 use serde_json::json;
@@ -172,6 +172,6 @@ fn fe_folders_that_break_their_contract_are_refused() {
     bench.refused(3, &["ladder", "--data", "sets", "--fe", "fe/none"]);
     fs::write(bench.path("fe/medium/progress/press-00001.json"), "{").unwrap();
     assert!(bench.refused(1, &COMMAND).contains("not the record of an indentation"));
-    fs::write(bench.path("fe/medium/shards/1.npz"), "no").unwrap();
-    assert!(bench.refused(1, &COMMAND).contains("shards/1.npz"));
+    fs::write(bench.path("fe/medium").join(FILES[1]), "no").unwrap();
+    assert!(bench.refused(1, &COMMAND).contains(FILES[1]));
 }

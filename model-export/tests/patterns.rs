@@ -65,7 +65,7 @@ fn shipped_networks_tell_odd_maps_from_held_out_presses() {
     let dataset = Dataset::open(&root().join("data/heldout")).unwrap();
     let mut indentations = Vec::new();
     for indentation in dataset.every_indentation() {
-        let shard = dataset.load(indentation).unwrap();
+        let shard = dataset.shard(indentation).unwrap();
         for index in 0..indentation.samples {
             let mut map = vec![0.0; MAP_LEN];
             dataset.draw_pressure(indentation, &shard, index, &mut map).unwrap();

@@ -195,8 +195,8 @@ pub fn images(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{atlas, record, two_cells};
-    use crate::{Manifest, Sample, TriangleOnLattice, encode, sha256_hex, write_atlas};
+    use crate::testing::{atlas, entry, manifest, record, two_cells};
+    use crate::{Sample, TriangleOnLattice, encode, write_atlas};
     use papilla_atlas::Atlas;
     use std::sync::Arc;
 
@@ -214,38 +214,12 @@ mod tests {
         let count = cells.node_count();
         let sample = Sample { cells: Some(Arc::new(cells)), sed_dermis_mpa, ..record(0.5, count) };
         let shard = encode(&[sample], atlas.vertex_count()).unwrap().unwrap();
-        std::fs::write(folder.join("press.npz"), &shard.bytes).unwrap();
+        let press = entry(0, Split::Train, 1, &shard.bytes);
+        let most = [shard.pressure_max_pa, shard.sed_max_j_per_m3];
+        atomic::create_folder(&folder.join("shards")).unwrap();
+        std::fs::write(folder.join(&press.file), &shard.bytes).unwrap();
         write_atlas(folder, &atlas, Some(&lattice(&atlas))).unwrap();
-        let press = IndentationEntry {
-            id: 0,
-            file: "press.npz".into(),
-            sha256: sha256_hex(&shard.bytes),
-            split: Split::Train,
-            samples: 1,
-            indenter: "plate".into(),
-            shape: "plate".into(),
-            pose: crate::Pose { pitch_deg: 0.0, roll_deg: 0.0, yaw_deg: 0.0 },
-            offset_mm: [0.0; 2],
-            checks: shard.checks,
-        };
-        let manifest = Manifest {
-            format: crate::FORMAT,
-            atlas_hash: atlas.hash().to_string(),
-            campaign: serde_json::Value::Null,
-            seed: 0,
-            software: String::new(),
-            units: crate::Units::default(),
-            effects: Vec::new(),
-            vertex_count: atlas.vertex_count(),
-            pressure_max_pa: shard.pressure_max_pa,
-            sed_max_j_per_m3: shard.sed_max_j_per_m3,
-            check_columns: crate::CHECK_COLUMNS.map(String::from).to_vec(),
-            dataset_sha256: crate::dataset_sha256([press.sha256.as_str()]),
-            presses: vec![press],
-            failed: Vec::new(),
-            dropped: Vec::new(),
-            splits: crate::Splits { train: vec![0], test: Vec::new() },
-        };
+        let manifest = manifest(&atlas, vec![press], most);
         atomic::write_json(&folder.join("manifest.json"), &manifest).unwrap();
     }
 

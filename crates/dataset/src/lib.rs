@@ -43,7 +43,7 @@ pub use limits::{
 };
 pub use manifest::{
     DroppedSample, FORMAT, FORMATS, FailedIndentation, IndentationEntry, Manifest, Split, Splits,
-    Units, dataset_sha256, sha256_hex,
+    Units, UnknownSplit, dataset_sha256, sha256_hex,
 };
 pub use maps::{MapReader, Maps};
 pub use reader::{Dataset, VerifyReport, verify};

@@ -4,7 +4,9 @@ use crate::record::{Checks, Pose};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+use std::fmt;
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 /// Format number of manifests written here.
 pub const FORMAT: u32 = 2;
@@ -78,6 +80,29 @@ pub enum Split {
     Train,
     /// Held out.
     Test,
+}
+
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Train => "train",
+            Self::Test => "test",
+        })
+    }
+}
+
+/// There is no such split.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("no split '{0}'; there are 'train' and 'test'")]
+pub struct UnknownSplit(String);
+
+impl FromStr for Split {
+    type Err = UnknownSplit;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSplit> {
+        let named = |split: &Self| split.to_string() == name;
+        [Self::Train, Self::Test].into_iter().find(named).ok_or_else(|| UnknownSplit(name.into()))
+    }
 }
 
 /// Ids of the indentations of each split, rising.

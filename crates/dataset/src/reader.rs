@@ -2,7 +2,8 @@
 
 use super::shard::{Shard, raster_npz};
 use super::{
-    DatasetError, FORMAT, FORMATS, IndentationEntry, Manifest, dataset_sha256, sha256_hex,
+    DatasetError, FORMAT, FORMATS, IndentationEntry, Manifest, Split, Splits, dataset_sha256,
+    sha256_hex,
 };
 use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, Patch};
@@ -31,7 +32,8 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError`] when a file is absent or damaged, of an unknown format,
-    /// without any indentation, or when the atlas is another one than the manifest's.
+    /// without any indentation, when hash or splits do not follow from the indentations, or the atlas
+    /// is another one than the manifest's.
     pub fn open(folder: &Path) -> Result<Self, DatasetError> {
         let path = folder.join("manifest.json");
         // The format first: another one may have other fields.
@@ -43,6 +45,7 @@ impl Dataset {
         if manifest.presses.is_empty() {
             return Err(DatasetError::Empty { path });
         }
+        check_identity(&path, &manifest)?;
         let atlas = read_atlas(&folder.join("atlas.json"), &manifest)?;
         Ok(Self { folder: folder.to_path_buf(), manifest, atlas })
     }
@@ -62,23 +65,52 @@ impl Dataset {
         &self.folder
     }
 
-    /// Reads the shard of an indentation and checks its hash.
+    /// The indentations of a split, by rising id.
+    pub fn of_split(&self, split: Split) -> impl Iterator<Item = &IndentationEntry> {
+        self.manifest.presses.iter().filter(move |press| press.split == split)
+    }
+
+    /// Where the shard of an indentation lies.
+    pub fn shard_path(&self, press: &IndentationEntry) -> PathBuf {
+        self.folder.join(&press.file)
+    }
+
+    /// Reads the shard of an indentation, checks its hash and that its maps are finite.
     ///
     /// # Errors
     /// [`DatasetError`] when it is absent, altered or damaged.
     pub fn shard(&self, press: &IndentationEntry) -> Result<Shard, DatasetError> {
-        let name = Path::new(&press.file);
-        let path = self.folder.join(name);
-        if !name.components().all(|c| matches!(c, Component::Normal(_))) {
-            let message = format!("the manifest names a file outside the dataset: {}", press.file);
-            return Err(OutputError::malformed(&self.folder.join("manifest.json"), &message).into());
-        }
+        let path = self.shard_path(press);
         let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
         expect(&path, "sha256", sha256_hex(&bytes), &press.sha256)?;
         let shard = Shard::decode(&path, &bytes, self.manifest.vertex_count)?;
         expect(&path, "number of samples", shard.len().to_string(), &press.samples.to_string())?;
+        let maps = shard.pressure_pa.iter().chain(&shard.sed_dermis_j_per_m3);
+        if let Some(value) = maps.chain(&shard.sed_epidermis_j_per_m3).find(|v| !v.is_finite()) {
+            return Err(OutputError::malformed(&path, &format!("a map holds {value}")).into());
+        }
         Ok(shard)
     }
+}
+
+/// Hash and splits follow from the indentations; shards lie inside the dataset's folder.
+fn check_identity(path: &Path, manifest: &Manifest) -> Result<(), DatasetError> {
+    let refused = |message: String| Err(OutputError::malformed(path, &message).into());
+    let presses = &manifest.presses;
+    // A manifest must not make a program read files elsewhere.
+    let inside =
+        |file: &str| Path::new(file).components().all(|c| matches!(c, Component::Normal(_)));
+    if let Some(press) = presses.iter().find(|p| !inside(&p.file)) {
+        return refused(format!("it names a file outside the dataset: {}", press.file));
+    }
+    if let Some(pair) = presses.windows(2).find(|pair| pair[0].id >= pair[1].id) {
+        return refused(format!("indentation {} is listed after {}", pair[1].id, pair[0].id));
+    }
+    let of = |split| presses.iter().filter(|p| p.split == split).map(|p| p.id).collect();
+    let splits = Splits { train: of(Split::Train), test: of(Split::Test) };
+    expect(path, "list of splits", format!("{splits:?}"), &format!("{:?}", manifest.splits))?;
+    let hash = dataset_sha256(presses.iter().map(|p| p.sha256.as_str()));
+    expect(path, "dataset_sha256", hash, &manifest.dataset_sha256)
 }
 
 fn read_atlas(path: &Path, manifest: &Manifest) -> Result<Atlas, DatasetError> {
@@ -116,9 +148,8 @@ pub struct VerifyReport {
     pub dataset_sha256: String,
 }
 
-/// Checks every hash of the dataset in `folder`, that all values are finite
-/// and not negative, that no value exceeds the manifest's maxima, that the
-/// splits agree with the indentations and that `raster.npz` belongs to the atlas.
+/// Checks every hash of the dataset in `folder`, that all values are finite and not negative, that
+/// no value exceeds the manifest's maxima and that `raster.npz` belongs to the atlas.
 ///
 /// # Errors
 /// The first thing that is wrong, with the file it was found in.
@@ -131,15 +162,6 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, DatasetError> {
         verify_values(&folder.join(&press.file), manifest, &shard)?;
         samples += shard.len();
     }
-    let path = folder.join("manifest.json");
-    let hash = dataset_sha256(manifest.presses.iter().map(|p| p.sha256.as_str()));
-    expect(&path, "dataset_sha256", hash, &manifest.dataset_sha256)?;
-    let ids = |split| -> Vec<usize> {
-        manifest.presses.iter().filter(|p| p.split == split).map(|p| p.id).collect()
-    };
-    let found = (ids(super::Split::Train), ids(super::Split::Test));
-    let listed = (&manifest.splits.train, &manifest.splits.test);
-    expect(&path, "list of splits", format!("{found:?}"), &format!("{listed:?}"))?;
     verify_raster(&folder.join("raster.npz"), &dataset.atlas)?;
     Ok(VerifyReport {
         shards: manifest.presses.len(),

@@ -34,8 +34,7 @@ struct Replay {
 /// [`DatasetError`] when the dataset is damaged or `path` is not writable.
 pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, DatasetError> {
     let dataset = Dataset::open(folder)?;
-    let held_out: Vec<&IndentationEntry> =
-        dataset.manifest().presses.iter().filter(|p| p.split == Split::Test).collect();
+    let held_out: Vec<&IndentationEntry> = dataset.of_split(Split::Test).collect();
     let count = count.min(held_out.len());
     let maps = Maps::read(folder, dataset.atlas())?;
     let mut presses = Vec::with_capacity(count);

@@ -231,6 +231,12 @@ impl Shard {
         Ok(shard)
     }
 
+    /// Where the indenter has slid to in a sample, mm along its own x and y.
+    pub fn slid_mm(&self, sample: usize) -> [f64; 2] {
+        let at = |s: &Array2<f32>| [0, 1].map(|k: usize| f64::from(s[[sample, k]]));
+        self.slide_mm.as_ref().map_or([0.0; 2], at)
+    }
+
     /// Samples D.
     pub fn len(&self) -> usize {
         self.depth_mm.len()

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "for tests")]
 
 use crate::record::{Cells, Checks, Pose, Sample};
+use crate::{CHECK_COLUMNS, FORMAT, IndentationEntry, Manifest, Split, Splits, Units};
+use crate::{dataset_sha256, sha256_hex, shard_file};
 use papilla_atlas::{Atlas, PatchVertices};
 
 /// Two cells beside each other.
@@ -49,6 +51,47 @@ pub fn posed_record(pose: Pose, depth_mm: f64, vertex_count: usize) -> Sample {
             newton_iterations: 5,
             ..Checks::default()
         },
+    }
+}
+
+/// What a manifest says of a flat plate's indentation whose shard has these bytes.
+#[must_use]
+pub fn entry(id: usize, split: Split, samples: usize, shard: &[u8]) -> IndentationEntry {
+    IndentationEntry {
+        id,
+        file: shard_file(id),
+        sha256: sha256_hex(shard),
+        split,
+        samples,
+        indenter: "plate".into(),
+        shape: "plate".into(),
+        pose: Pose { pitch_deg: 10.0, roll_deg: -5.0, yaw_deg: 0.0 },
+        offset_mm: [0.0; 2],
+        checks: Checks::default(),
+    }
+}
+
+/// A manifest of these, whose greatest pressure (Pa) and SED (J/m3) are `most`.
+#[must_use]
+pub fn manifest(atlas: &Atlas, presses: Vec<IndentationEntry>, most: [f64; 2]) -> Manifest {
+    let of = |split| presses.iter().filter(|p| p.split == split).map(|p| p.id).collect();
+    Manifest {
+        format: FORMAT,
+        atlas_hash: atlas.hash().to_owned(),
+        campaign: serde_json::Value::Null,
+        seed: 0,
+        software: "tests".into(),
+        units: Units::default(),
+        effects: vec!["layers".into()],
+        vertex_count: atlas.vertex_count(),
+        pressure_max_pa: most[0],
+        sed_max_j_per_m3: most[1],
+        check_columns: CHECK_COLUMNS.map(String::from).to_vec(),
+        failed: Vec::new(),
+        dropped: Vec::new(),
+        splits: Splits { train: of(Split::Train), test: of(Split::Test) },
+        dataset_sha256: dataset_sha256(presses.iter().map(|p| p.sha256.as_str())),
+        presses,
     }
 }
 

@@ -12,6 +12,7 @@ use crate::picture::{Picture, sheet};
 use crate::{ExportError, evaluate};
 use image::RgbImage;
 use papilla_actuators::{Array, HalfSpace, Inverse, Pin};
+use papilla_dataset::Split;
 use papilla_engine::{EngineError, Model, Session};
 use papilla_proto::MAP_LEN;
 use papilla_proto::atlas::Patch;
@@ -154,15 +155,15 @@ pub fn measure(
 ) -> Result<(Table, RgbImage), ExportError> {
     let Networks { served, judge } = networks;
     for model in [served, judge] {
-        evaluate::require_atlas(dataset.name(), dataset.atlas.hash(), model.info())?;
+        evaluate::require_atlas(dataset.name(), dataset.atlas().hash(), model.info())?;
     }
     let pins = grid(dataset, pitch_mm, served.info().pressure_max_pa);
     let [skin, interface] = [Patch::Skin, Patch::Interface].map(|patch| dataset.maps.raster(patch));
     let refused = |reason: String| ExportError::Pins { pitch_mm, reason };
-    let array = Array::new(&dataset.atlas, [skin, interface], &pins, HalfSpace::SHIPPED)
+    let array = Array::new(dataset.atlas(), [skin, interface], &pins, HalfSpace::SHIPPED)
         .map_err(|error| refused(error.to_string()))?;
     let shared = Shared::default();
-    let finger = Finger { atlas: &dataset.atlas, skin, interface, shared: &shared };
+    let finger = Finger { atlas: dataset.atlas(), skin, interface, shared: &shared };
     let formula = Formula::new(finger, &pins).map_err(|problem| refused(problem.message))?;
     let mut work = Work {
         dataset,
@@ -182,8 +183,8 @@ pub fn measure(
     };
     let mut states = Vec::new();
     let mut count = 0;
-    for indentation in dataset.indentations("test")? {
-        let shard = dataset.load(indentation)?;
+    for indentation in dataset.indentations(Split::Test)? {
+        let shard = dataset.shard(indentation)?;
         for index in 0..indentation.samples {
             count += 1;
             if (count - 1) % every.max(1) == 0 {

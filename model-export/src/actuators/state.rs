@@ -2,10 +2,11 @@
 
 use super::{State, Way};
 use crate::ExportError;
-use crate::dataset::{Dataset, Indentation, Shard};
+use crate::dataset::Dataset;
 use crate::metrics::SampleMetrics;
 use crate::processor::thread_s;
 use papilla_actuators::{Inverse, Pin};
+use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::Session;
 use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Layout, Place};
 use papilla_proto::{HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, Problem};
@@ -93,7 +94,7 @@ impl Work<'_> {
     /// Takes a state of the dataset.
     pub(super) fn state(
         &mut self,
-        indentation: &Indentation,
+        indentation: &IndentationEntry,
         shard: &Shard,
         index: usize,
     ) -> Result<State, ExportError> {

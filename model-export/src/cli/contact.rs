@@ -39,7 +39,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         models.require_atlas(&dataset, folder)?;
         if let Some(network) = &network {
             let what = folder.display().to_string();
-            evaluate::require_atlas(&what, dataset.atlas.hash(), network.info())?;
+            evaluate::require_atlas(&what, dataset.atlas().hash(), network.info())?;
         }
         for rung in Rung::ALL {
             let session = session.as_deref_mut();

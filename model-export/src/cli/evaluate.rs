@@ -1,6 +1,7 @@
 //! `model-export evaluate`.
 
 use super::{load_card, load_model, print_json};
+use papilla_dataset::Split;
 use papilla_engine::card::{Card, Latency, Spread};
 use papilla_engine::{Backend, Model, ModelInfo};
 use papilla_model_export::dataset::Dataset;
@@ -19,8 +20,8 @@ pub(crate) struct Options {
     /// Folder of the dataset, as `fe-datagen generate` writes it.
     dataset: PathBuf,
     /// Which indentations: `test` (held out) or `train`.
-    #[arg(long, default_value = "test", value_name = "SPLIT")]
-    split: String,
+    #[arg(long, default_value_t = Split::Test, value_name = "SPLIT")]
+    split: Split,
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
     /// trained on (of several, one of them) and the split `test`.
     #[arg(long, value_name = "FILE")]
@@ -82,7 +83,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 
 /// A card tells of indentations that the training never saw.
 fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> anyhow::Result<()> {
-    if options.split != "test" {
+    if options.split != Split::Test {
         anyhow::bail!("a card tells of held-out presses: --card needs --split test");
     }
     let trained = info.datasets();
@@ -139,9 +140,9 @@ fn measure(
     json: bool,
 ) -> anyhow::Result<Evaluation> {
     let count: usize =
-        dataset.indentations(&options.split)?.iter().map(|indentation| indentation.samples).sum();
+        dataset.indentations(options.split)?.iter().map(|indentation| indentation.samples).sum();
     let progress = Progress::new("samples", count, 0, json);
-    Ok(evaluate::run(subject, other, dataset, &options.split, || progress.inc())?)
+    Ok(evaluate::run(subject, other, dataset, options.split, || progress.inc())?)
 }
 
 fn draw_pictures(
@@ -153,7 +154,7 @@ fn draw_pictures(
     let Some(folder) = &options.pictures else { return Ok(Vec::new()) };
     let mut paths = Vec::new();
     for (word, sample) in evaluation.landmarks() {
-        let maps = evaluate::maps_of(subject, dataset, &options.split, sample)?;
+        let maps = evaluate::maps_of(subject, dataset, options.split, sample)?;
         let name = &subject.model.info().name;
         let heading = format!("{name}, {word} of {}", evaluation.samples.len());
         let path = folder.join(format!("{name}-{word}.png"));

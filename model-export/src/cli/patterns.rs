@@ -78,7 +78,7 @@ fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, InputStatistics)
     let mut pressure_pa = vec![0.0; MAP_LEN];
     let mut greatest = InputStatistics::default();
     for indentation in indentations {
-        let shard = dataset.load(indentation)?;
+        let shard = dataset.shard(indentation)?;
         for index in 0..indentation.samples {
             dataset.draw_pressure(indentation, &shard, index, &mut pressure_pa)?;
             greatest = greatest.max(InputStatistics::of(&pressure_pa));

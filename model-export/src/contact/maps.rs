@@ -4,6 +4,7 @@ use super::{Models, Placed, Rung, pixel_contact};
 use crate::ExportError;
 use crate::dataset::Dataset;
 use papilla_contact::{Contact, PixelSpacing};
+use papilla_dataset::Split;
 use papilla_engine::MAP_SIDE_PX;
 use papilla_output::{OutputError, npz::NpzBuilder};
 
@@ -32,16 +33,16 @@ impl ContactMaps {
             let reason = "the contact model has no layers, or other vertices than this atlas; \
                 write it anew with `fe-datagen contact`";
             let path = dataset.folder().join("atlas.json");
-            return Err(ExportError::Dataset { path, reason: reason.to_owned() });
+            return Err(ExportError::DatasetFile { path, reason: reason.to_owned() });
         };
         let mut out = Contact::new(models.finger.vertices());
-        let [train, test] = ["train", "test"].map(|split| dataset.indentations(split));
+        let [train, test] = [Split::Train, Split::Test].map(|split| dataset.indentations(split));
         for indentation in train?.into_iter().chain(test?) {
-            let shard = dataset.load(indentation)?;
+            let shard = dataset.shard(indentation)?;
             let placed = Placed::at_first_touch(dataset, indentation, &shard)?;
             for state in 0..indentation.samples {
                 let depth_mm = f64::from(shard.depth_mm[state]);
-                let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slide_mm(state)));
+                let object = placed.as_ref().map(|p| p.at(depth_mm, shard.slid_mm(state)));
                 solver.reset();
                 pixels.reset();
                 let solved = object.is_some_and(|object| {

@@ -1,8 +1,9 @@
 //! Where an indenter of a dataset stands, in the finger's frame.
 
 use crate::ExportError;
-use crate::dataset::{Dataset, Indentation, Shard};
+use crate::dataset::Dataset;
 use papilla_contact::Object;
+use papilla_dataset::{IndentationEntry, Shard};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
@@ -22,18 +23,18 @@ impl Placed {
     /// lattice by its nodes. `None` if it passes the finger.
     pub(super) fn at_first_touch(
         dataset: &Dataset,
-        indentation: &Indentation,
+        indentation: &IndentationEntry,
         shard: &Shard,
     ) -> Result<Option<Self>, ExportError> {
         let path = dataset.shard_path(indentation);
-        let bad = |reason: String| ExportError::Dataset { path: path.clone(), reason };
+        let bad = |reason: String| ExportError::DatasetFile { path: path.clone(), reason };
         let Some(spec) = dataset.indenter(indentation) else {
             return Err(bad("the manifest does not say what pressed".into()));
         };
-        let Indentation { pitch_deg, roll_deg, yaw_deg, offset_mm, .. } = *indentation;
+        let papilla_dataset::Pose { pitch_deg, roll_deg, yaw_deg } = indentation.pose;
         let pose = Pose { pitch_deg, roll_deg, yaw_deg };
         let straight = Approach::straight(spec, pose).map_err(|error| bad(error.to_string()))?;
-        let approach = Approach { offset_mm, ..straight };
+        let approach = Approach { offset_mm: indentation.offset_mm, ..straight };
         let touch = if shard.cells.is_some() {
             let contact = approach.contact_with(&FingertipShape::default(), &Drive::Depths(vec![]));
             contact.map(|contact| (contact.start, contact.direction))
@@ -66,7 +67,7 @@ fn on_vertices(
     let mut placement = Placement::turned(pose.pitch_deg, pose.roll_deg, pose.yaw_deg, [0.0; 3]);
     let axis = |k: usize| [0, 1, 2].map(|i| placement.rotation[i][k]);
     let (x, y, normal) = (axis(0), axis(1), axis(2));
-    let skin = &dataset.atlas.patch(Patch::Skin).positions_mm;
+    let skin = &dataset.atlas().patch(Patch::Skin).positions_mm;
     let points: Vec<[f64; 3]> = skin.iter().map(|p| p.map(f64::from)).collect();
     let along = |p: &[f64; 3]| (0..3).map(|i| p[i] * normal[i]).sum::<f64>();
     let least = points.iter().map(along).fold(f64::INFINITY, f64::min);

@@ -89,7 +89,7 @@ fn seconds(folder: &Path, dataset: &Dataset) -> Result<Vec<f64>, ExportError> {
         }
         let record: Record = serde_json::from_str(&read_text(&path)?).map_err(|error| {
             let reason = format!("not the record of an indentation: {error}");
-            ExportError::Dataset { path: path.clone(), reason }
+            ExportError::DatasetFile { path: path.clone(), reason }
         })?;
         seconds.extend(record.processor_s.map(|s| s / indentation.samples.max(1) as f64));
     }

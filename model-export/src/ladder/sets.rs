@@ -2,8 +2,9 @@
 
 use super::Canvas;
 use crate::ExportError;
-use crate::dataset::{Dataset, Indentation};
+use crate::dataset::Dataset;
 use crate::evaluate::require_same_atlas;
+use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::{
     MAP_LEN,
     ladder::{REFERENCE_SET, Set},
@@ -68,7 +69,7 @@ impl SampleSet {
         canvas: &Canvas,
     ) -> Result<Self, ExportError> {
         let what = folder.display().to_string();
-        require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
+        require_same_atlas(&what, dataset.atlas().hash(), &canvas.atlas_hash)?;
         REFERENCE.taken_of(dataset)
     }
 
@@ -97,7 +98,7 @@ pub(super) struct Source {
     name: &'static str,
     folder: &'static str,
     about: &'static str,
-    split: Option<&'static str>,
+    split: Option<Split>,
 }
 
 const REFERENCE: Source = Source {
@@ -112,7 +113,7 @@ const SOURCES: [Source; 5] = [
         name: "heldout-presses",
         folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
-        split: Some("test"),
+        split: Some(Split::Test),
     },
     Source {
         name: "heldout-shapes",
@@ -125,14 +126,14 @@ const SOURCES: [Source; 5] = [
         name: "pressed",
         folder: "pressed-graded",
         about: "presses that no training saw: a plate to 7 N, a key, gratings, Braille",
-        split: Some("test"),
+        split: Some(Split::Test),
     },
     Source {
         name: "s1",
         folder: "s1",
         about: "held-out presses of the published campaign, a plate alone, on the even lattice: \
                 its SED is 20 to 40 % off the reference's",
-        split: Some("test"),
+        split: Some(Split::Test),
     },
 ];
 
@@ -147,7 +148,7 @@ const LEARNT: Source = Source {
     name: "training",
     folder: "",
     about: "what networks learnt from",
-    split: Some("train"),
+    split: Some(Split::Train),
 };
 
 /// Reads the sets whose datasets are in `data`; the others come out empty and say why.
@@ -168,7 +169,7 @@ impl Source {
         }
         let dataset = Dataset::open(&folder)?;
         let what = folder.display().to_string();
-        require_same_atlas(&what, dataset.atlas.hash(), &canvas.atlas_hash)?;
+        require_same_atlas(&what, dataset.atlas().hash(), &canvas.atlas_hash)?;
         self.taken_of(&dataset)
     }
 
@@ -195,10 +196,10 @@ impl Source {
     fn take(
         &self,
         dataset: &Dataset,
-        indentation: &Indentation,
+        indentation: &IndentationEntry,
         states: &mut Vec<State>,
     ) -> Result<(), ExportError> {
-        let shard = dataset.load(indentation)?;
+        let shard = dataset.shard(indentation)?;
         let [mut on_skin, mut below] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
         let shown = |patch, map: &[f32]| {
             dataset.maps.raster(patch).indices().iter().map(|&pixel| map[pixel as usize]).collect()

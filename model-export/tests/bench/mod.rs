@@ -6,11 +6,12 @@
 #![allow(dead_code, reason = "each test program uses a part")]
 
 use ndarray::{Array1, Array2, Array3, Axis, s};
-use ndarray_npy::{NpzReader, NpzWriter};
+use ndarray_npy::NpzWriter;
+use papilla_dataset::testing::{entry, manifest};
+use papilla_dataset::{CHECK_COLUMNS, Manifest, Shard, Split};
 use papilla_engine::{Card, MAP_LEN, MAP_SIDE_PX, load};
 use papilla_proto::atlas::{Atlas, PatchVertices};
-use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
+use serde_json::json;
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ pub(crate) const TINY: &[u8] = include_bytes!("../../../crates/engine/tests/asse
 /// The patch: one vertex on the centre of each pixel of these rows and columns.
 pub(crate) const FIRST: [usize; 2] = [80, 90];
 pub(crate) const SIDE: usize = 60;
+pub(crate) const FILES: [&str; 2] = ["shards/press-00000.npz", "shards/press-00001.npz"];
 pub(crate) const DEPTHS: [f32; 3] = [0.5, 1.0, 1.5];
 
 pub(crate) struct Bench {
@@ -33,9 +35,11 @@ impl Bench {
         let atlas = atlas();
         let onnx = replaced(TINY, &"ab".repeat(32), atlas.hash());
         let shards = [0.9f32, 1.0].map(|force| shard(&onnx, force));
-        let hashes: Vec<String> = shards.iter().map(|bytes| sha256_hex(bytes)).collect();
-        let dataset = sha256_hex(hashes.concat().as_bytes());
-        let onnx = replaced(&onnx, &"cd".repeat(32), &dataset);
+        let presses = [Split::Train, Split::Test].into_iter().zip(&shards).enumerate();
+        let presses =
+            presses.map(|(id, (split, bytes))| entry(id, split, DEPTHS.len(), bytes)).collect();
+        let manifest = manifest(&atlas, presses, [4e4, 2500.0]);
+        let onnx = replaced(&onnx, &"cd".repeat(32), &manifest.dataset_sha256);
         fs::create_dir_all(bench.path("data/shards")).unwrap();
         fs::create_dir_all(bench.path("models")).unwrap();
         fs::write(bench.path("models/tiny.onnx"), &onnx).unwrap();
@@ -43,20 +47,10 @@ impl Bench {
             let path = bench.path(folder).join("atlas.json");
             fs::write(path, atlas.to_json().unwrap()).unwrap();
         }
-        for (id, bytes) in shards.iter().enumerate() {
-            fs::write(bench.path("data/shards").join(format!("{id}.npz")), bytes).unwrap();
+        for (press, bytes) in manifest.presses.iter().zip(&shards) {
+            fs::write(bench.path("data").join(&press.file), bytes).unwrap();
         }
-        let indentations: Vec<Value> = (0..2)
-            .map(|id| {
-                json!({"id": id, "file": format!("shards/{id}.npz"), "sha256": hashes[id],
-                    "split": if id == 0 {"train"} else {"test"}, "samples": DEPTHS.len(),
-                    "pitch_deg": 10.0, "roll_deg": -5.0, "yaw_deg": 0.0, "checks": {}})
-            })
-            .collect();
-        let manifest = json!({"format": 1, "atlas_hash": atlas.hash(), "effects": ["layers"],
-            "vertex_count": SIDE * SIDE, "pressure_max_pa": 4e4, "sed_max_j_per_m3": 2500.0,
-            "presses": indentations, "splits": {"train": [0], "test": [1]}, "dataset_sha256": dataset});
-        fs::write(bench.path("data/manifest.json"), manifest.to_string()).unwrap();
+        bench.write_manifest("data", &manifest);
         bench.write_reference(&onnx, 1.0);
         bench
     }
@@ -76,7 +70,7 @@ impl Bench {
     /// Copies a dataset.
     pub(crate) fn copy(&self, from: &str, to: &str) {
         fs::create_dir_all(self.path(to).join("shards")).unwrap();
-        for file in ["manifest.json", "atlas.json", "shards/0.npz", "shards/1.npz"] {
+        for file in ["manifest.json", "atlas.json", FILES[0], FILES[1]] {
             fs::copy(self.path(from).join(file), self.path(to).join(file)).unwrap();
         }
     }
@@ -84,10 +78,9 @@ impl Bench {
     /// As if this density and order had been solved and found this many times the SED.
     pub(crate) fn resolve(&self, folder: &str, [density, order]: [&str; 2], scale: f32) {
         self.rewrite(folder, DEPTHS.len(), scale);
-        let path = self.path(folder).join("manifest.json");
-        let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        manifest["campaign"] = json!({"name": "final", "density": density, "order": order});
-        fs::write(path, manifest.to_string()).unwrap();
+        let mut manifest = self.manifest(folder);
+        manifest.campaign = json!({"name": "final", "density": density, "order": order});
+        self.write_manifest(folder, &manifest);
     }
 
     /// As if no press had reached its deepest state.
@@ -97,28 +90,28 @@ impl Bench {
 
     /// The first `depths` of each indentation, SED times `scale`, and the hashes that follow.
     fn rewrite(&self, folder: &str, depths: usize, scale: f32) {
-        let path = self.path(folder).join("manifest.json");
-        let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        let mut hashes = String::new();
-        for id in 0..2 {
-            let file = self.path(folder).join(format!("shards/{id}.npz"));
-            let mut npz = NpzReader::new(Cursor::new(fs::read(&file).unwrap())).unwrap();
-            let pressure: Array2<f32> = npz.by_name("pressure_pa.npy").unwrap();
-            let sed: Array2<f32> = npz.by_name("sed_dermis_j_per_m3.npy").unwrap();
+        let mut old = self.manifest(folder);
+        for press in &mut old.presses {
+            let file = self.path(folder).join(&press.file);
+            let bytes = fs::read(&file).unwrap();
+            let shard = Shard::decode(&file, &bytes, SIDE * SIDE).unwrap();
             let first = s![..depths, ..];
-            let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
-            npz.add_array("pressure_pa", &pressure.slice(first)).unwrap();
-            npz.add_array("sed_dermis_j_per_m3", &(scale * &sed.slice(first))).unwrap();
-            npz.add_array("depth_mm", &Array1::from(DEPTHS[..depths].to_vec())).unwrap();
-            let bytes = npz.finish().unwrap().into_inner();
-            let hash = sha256_hex(&bytes);
+            let sed = scale * &shard.sed_dermis_j_per_m3.slice(first);
+            let bytes = archive(&shard.pressure_pa.slice(first).to_owned(), &sed);
+            *press = entry(press.id, press.split, depths, &bytes);
             fs::write(file, bytes).unwrap();
-            manifest["presses"][id]["sha256"] = json!(hash);
-            manifest["presses"][id]["samples"] = json!(depths);
-            hashes += &hash;
         }
-        manifest["dataset_sha256"] = json!(sha256_hex(hashes.as_bytes()));
-        fs::write(path, manifest.to_string()).unwrap();
+        let manifest = manifest(&atlas(), old.presses, [4e4, 2500.0]);
+        self.write_manifest(folder, &Manifest { campaign: old.campaign, ..manifest });
+    }
+
+    fn manifest(&self, folder: &str) -> Manifest {
+        serde_json::from_slice(&fs::read(self.path(folder).join("manifest.json")).unwrap()).unwrap()
+    }
+
+    fn write_manifest(&self, folder: &str, manifest: &Manifest) {
+        let path = self.path(folder).join("manifest.json");
+        fs::write(path, serde_json::to_string(manifest).unwrap()).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
@@ -200,15 +193,20 @@ pub(crate) fn shard(onnx: &[u8], force: f32) -> Vec<u8> {
         }
     }
     assert!(sed.lanes(Axis(1)).into_iter().all(|row| row.iter().any(|v| *v > 1.0)));
-    let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
-    npz.add_array("pressure_pa", &pressure).unwrap();
-    npz.add_array("sed_dermis_j_per_m3", &sed).unwrap();
-    npz.add_array("depth_mm", &Array1::from(DEPTHS.to_vec())).unwrap();
-    npz.finish().unwrap().into_inner()
+    archive(&pressure, &sed)
 }
 
-pub(crate) fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+/// A shard of the first depths. In full precision, which no shard of a campaign has.
+fn archive(pressure_pa: &Array2<f32>, sed_j_per_m3: &Array2<f32>) -> Vec<u8> {
+    let d = pressure_pa.nrows();
+    let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
+    npz.add_array("pressure_pa", pressure_pa).unwrap();
+    npz.add_array("sed_dermis_j_per_m3", sed_j_per_m3).unwrap();
+    npz.add_array("sed_epidermis_j_per_m3", sed_j_per_m3).unwrap();
+    npz.add_array("depth_mm", &Array1::from(DEPTHS[..d].to_vec())).unwrap();
+    npz.add_array("force_n", &Array2::<f32>::zeros((d, 3))).unwrap();
+    npz.add_array("checks", &Array2::<f64>::zeros((d, CHECK_COLUMNS.len()))).unwrap();
+    npz.finish().unwrap().into_inner()
 }
 
 /// The file with one text in it replaced by another of the same length.

@@ -1,5 +1,6 @@
 //! What the frames hold: FE simulations.
 
+use papilla_dataset::Split;
 use std::path::Path;
 
 use papilla_model_export::dataset::Dataset;
@@ -36,11 +37,11 @@ impl Content {
     ///
     /// # Errors
     /// [`LoadError::Dataset`] if the dataset is damaged.
-    pub fn from_dataset(folder: &Path, split: &str, count: usize) -> Result<Self, LoadError> {
+    pub fn from_dataset(folder: &Path, split: Split, count: usize) -> Result<Self, LoadError> {
         let dataset = Dataset::open(folder)?;
         let mut maps_pa = Vec::new();
         for indentation in dataset.indentations(split)? {
-            let shard = dataset.load(indentation)?;
+            let shard = dataset.shard(indentation)?;
             for state in 0..shard.depth_mm.len().min(count - maps_pa.len()) {
                 let mut map_pa = vec![0.0; MAP_LEN];
                 dataset.draw_pressure(indentation, &shard, state, &mut map_pa)?;
@@ -48,7 +49,7 @@ impl Content {
             }
         }
         let source = format!("split {split} of {}", folder.display());
-        Ok(Self { source, atlas_hash: dataset.atlas.hash().to_owned(), maps_pa })
+        Ok(Self { source, atlas_hash: dataset.atlas().hash().to_owned(), maps_pa })
     }
 
     /// The first `count` states that the service at `server` ships.

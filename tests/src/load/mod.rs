@@ -153,7 +153,7 @@ impl Target {
             (encoded, "a ball that goes down and up".to_owned(), atlas_hash)
         } else {
             let content = match &options.dataset {
-                Some(folder) => Content::from_dataset(folder, &options.split, options.maps.get())?,
+                Some(folder) => Content::from_dataset(folder, options.split, options.maps.get())?,
                 None => Content::from_server(&options.server, options.maps.get()).await?,
             };
             let encoded = Encoded::new(&content, options.sample_type)?;

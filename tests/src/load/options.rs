@@ -1,5 +1,6 @@
 //! What the load generator can be told.
 
+use papilla_dataset::Split;
 use std::{
     num::{NonZeroU32, NonZeroUsize},
     path::PathBuf,
@@ -162,8 +163,8 @@ pub struct Options {
     pub dataset: Option<PathBuf>,
 
     /// Split of the dataset.
-    #[arg(long, default_value = "test", value_name = "SPLIT")]
-    pub split: String,
+    #[arg(long, default_value_t = Split::Test, value_name = "SPLIT")]
+    pub split: Split,
 
     /// Most maps to take turns.
     #[arg(long, default_value = "64", value_name = "N")]
