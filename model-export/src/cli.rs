@@ -38,7 +38,7 @@ A new model, from the trainer's file to the service:
   model-export evaluate models/small.onnx data/broad-graded --card out/models/small.json --pictures docs/reports/pictures/small
   model-export index    models --default small
   model-export patterns models --dataset data/more-graded --dataset data/pressed-graded \
-      --dataset data/hard-graded --dataset data/broad-graded
+      --dataset data/hard-graded --dataset data/proximal-graded --dataset data/broad-graded
   model-export table    models/*.json
 All models and the solver itself, error against time:
   model-export ladder   --data data --models models --fe out/rungs --out docs/reports

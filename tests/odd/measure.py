@@ -16,7 +16,7 @@ from papilla_trainer.dataset import Dataset
 SIDE_PX = 224
 DATA = Path("data")
 # Fitted to; only looked at.
-TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded"), ("heldout-graded", "final", "heldout")
+TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded", "proximal-graded"), ("heldout-graded", "final", "heldout")
 # Room beyond the greatest of the training, as proto/src/input_statistics.rs has it.
 HEADROOM = np.array([1.05, 1.05, 2.0])
 WORDS = ("rougher", "heavier", "rougher for its load")

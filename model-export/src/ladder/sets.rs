@@ -137,7 +137,8 @@ const SOURCES: [Source; 5] = [
     },
 ];
 
-/// What the networks on maps learnt from.
+/// Of what networks learnt, presses like those they are judged by: a mean with the hardest ones, too,
+/// would be a worse one.
 pub(super) const TRAINING: [Source; 3] = [
     Source { folder: "more-graded", ..LEARNT },
     Source { folder: "broad-graded", ..LEARNT },
