@@ -20,10 +20,9 @@
 //! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
 //! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
 //! point values are 15 % off where means are 9 (median over training presses, FE on graded
-//! meshes). Where contact goes on beyond the map, which no pixel could carry, pixels at the skin's edge
-//! hold the pressure that vertices find by themselves. Those in the three rows of triangles beside them
-//! leave a gap for what their pressure has beside the vertices', less and less inward. Both are the
-//! weaker, the less the vertices at the edge [press](PixelSkin::goes_on).
+//! meshes). Pixels at the skin's edge hold the pressure that vertices find by themselves: contact
+//! goes on beyond the map, where no pixel could carry it. In the three rows of triangles beside them
+//! pixels leave a gap for what their pressure has beside the vertices', less and less inward.
 
 mod convolution;
 

@@ -27,13 +27,12 @@ impl PixelContact {
     ) -> Result<(), ContactError> {
         let Self { skin, window, pressure, map_pa, held_pa, turns, .. } = self;
         let (model, person) = (&*solver.model, solver.person());
-        solver.forces(turns.without_pixels());
-        let goes_on = skin.goes_on(turns.found_without_pixels());
-        if !window.open(skin, model, solver.near(), (view, goes_on), &mut out.effort) {
+        if !window.open(skin, model, solver.near(), view, &mut out.effort) {
             self.reset();
             return Ok(());
         }
         let unit_pa = unit_pa(person);
+        solver.forces(turns.without_pixels());
         let is_alone = turns.found_without_pixels().iter().flatten().all(|force| *force == 0.0);
         if is_alone && !window.is_inside_at_rest(skin, view, &mut out.effort) {
             // Skin is dented by the last frame alone.

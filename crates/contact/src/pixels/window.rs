@@ -20,8 +20,6 @@ pub(super) struct Window {
     /// Entries of the raster, the held ones last, and their cells in the grid.
     pub entries: Vec<u32>,
     held: Vec<u32>,
-    /// [`PixelSkin::goes_on`].
-    goes_on: f32,
     pub cells: Vec<u32>,
     /// Slots of the pixels above, below, before and after each.
     pub beside: Vec<[u32; 4]>,
@@ -83,7 +81,6 @@ impl Window {
         Self {
             entries: Vec::with_capacity(pixels),
             held: Vec::with_capacity(pixels),
-            goes_on: 0.0,
             cells: Vec::with_capacity(pixels),
             beside: Vec::with_capacity(pixels),
             at_mm: vec![[0.0; 3]; pixels],

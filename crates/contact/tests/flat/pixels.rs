@@ -221,34 +221,6 @@ fn the_skins_edge_is_no_edge_of_a_punch() {
     assert!(pixels.peak_pa() < 1.3 * peak_pa, "{} {peak_pa}", pixels.peak_pa());
 }
 
-/// Contact that ends before the skin does is solved for to its end: Hertz' pressure, a row and a half
-/// of triangles from the edge.
-#[test]
-fn contact_that_ends_near_the_skins_edge_is_solved_for() {
-    let Plane { solver, pixels, out, .. } = &mut plane();
-    let at = [3.0, 0.0];
-    solver.solve_on_pixels(&[ball(3.0, at, 0.3)], pixels, out).unwrap();
-    assert!(out.quality.settled);
-    let off = miss(pixels.map_pa(), 3.0, at, 0.3);
-    assert!(off < 0.06, "{off}");
-}
-
-/// On its way over the edge of the skin, 20 um a step, a ball's force and greatest pressure leap nowhere.
-#[test]
-fn contact_goes_over_the_skins_edge_without_a_leap() {
-    let Plane { solver, pixels, out, .. } = &mut plane();
-    let mut last: Option<[f64; 2]> = None;
-    for step in 0..60 {
-        let scene = [ball(3.0, [3.0 + 0.02 * f64::from(step), 0.0], 0.3)];
-        solver.solve_on_pixels(&scene, pixels, out).unwrap();
-        let now = [force_n(out), f64::from(pixels.peak_pa())];
-        let last = last.replace(now).unwrap_or(now);
-        for ((now, last), bound) in now.into_iter().zip(last).zip([0.05, 0.15]) {
-            assert!((now / last - 1.0).abs() < bound, "step {step}: {last} to {now}");
-        }
-    }
-}
-
 fn force_n(out: &Contact) -> f64 {
     out.force_n.map(f64::abs).iter().sum()
 }

@@ -8,27 +8,22 @@ use crate::pixels::PixelSkin;
 const BEYOND_MAX: f32 = 3.0;
 
 impl Window {
-    /// Areas of the vertices' hats. Those at the skin's edge reach beyond the map: as far as contact
-    /// goes on there, pixels stand for what lies beyond, too.
+    /// Areas of the vertices' hats. Those at the skin's edge reach beyond the map: pixels there stand
+    /// for what lies beyond, too.
     pub(in super::super) fn measure_hats(&mut self, skin: &PixelSkin, model: &ContactModel) {
         self.sum_hats(skin);
-        if self.goes_on == 0.0 {
-            return;
-        }
-        for slot in 0..self.entries.len() {
-            if !skin.is_at_edge(self.entries[slot] as usize) {
-                continue;
-            }
+        for slot in self.free()..self.entries.len() {
             let pixel = &skin.raster.pixels()[self.entries[slot] as usize];
             let beyond = |vertex: &u32| {
                 let vertex = *vertex as usize;
                 (model.areas_mm2[vertex] / self.hat_mm2[vertex]).clamp(1.0, BEYOND_MAX)
             };
             let corners = pixel.vertices.iter().zip(pixel.weights);
-            let beyond = corners.map(|(v, w)| w * beyond(v)).sum::<f32>();
-            self.area_mm2[slot] *= 1.0 + self.goes_on * (beyond - 1.0);
+            self.area_mm2[slot] *= corners.map(|(v, w)| w * beyond(v)).sum::<f32>();
         }
-        self.sum_hats(skin);
+        if !self.held.is_empty() {
+            self.sum_hats(skin);
+        }
     }
 
     fn sum_hats(&mut self, skin: &PixelSkin) {

@@ -14,19 +14,18 @@ const REACH_MM: f64 = 0.2;
 
 impl Window {
     /// Takes the pixels round `candidates`, distances (reference mm) and vertices, that things are
-    /// near; false if there are none. `goes_on`: [`PixelSkin::goes_on`].
+    /// near; false if there are none.
     pub(in super::super) fn open(
         &mut self,
         skin: &PixelSkin,
         model: &ContactModel,
         candidates: &[(f64, u32)],
-        (view, goes_on): (View<'_>, f32),
+        view: View<'_>,
         effort: &mut Effort,
     ) -> bool {
         self.close(skin);
-        self.goes_on = goes_on;
         self.look_at(skin, candidates);
-        self.take_near(skin, (view, goes_on), effort);
+        self.take_near(skin, view, effort);
         if self.entries.is_empty() {
             return false;
         }
@@ -77,12 +76,7 @@ impl Window {
 
     /// Takes those of them that things are near. A distance changes no faster than a place, so
     /// that most follow from the one before.
-    fn take_near(
-        &mut self,
-        skin: &PixelSkin,
-        (view, goes_on): (View<'_>, f32),
-        effort: &mut Effort,
-    ) {
+    fn take_near(&mut self, skin: &PixelSkin, view: View<'_>, effort: &mut Effort) {
         let mut asked: Option<([f32; 3], f64)> = None;
         for (word, (bits, solved_for)) in self.looked_at.iter().zip(&self.solved_for).enumerate() {
             let mut bits = bits & solved_for;
@@ -104,7 +98,8 @@ impl Window {
                     gap_mm < REACH_MM
                 });
                 if is_near {
-                    if let Some(ease) = skin.eased(entry, goes_on) {
+                    let ease = skin.ease[entry];
+                    if ease.is_finite() {
                         self.ease[self.entries.len()] = ease;
                         self.entries.push(entry as u32);
                     } else {
