@@ -112,7 +112,7 @@ impl Dataset {
     /// [`ExportError::EmptySplit`] if there are none.
     pub fn indentations(&self, split: Split) -> Result<Vec<&IndentationEntry>, ExportError> {
         let found: Vec<_> = self.files.of_split(split).collect();
-        if found.is_empty() {
+        if found.iter().all(|indentation| indentation.samples == 0) {
             let path = self.folder().join("manifest.json");
             return Err(ExportError::EmptySplit { path, split });
         }
@@ -142,7 +142,7 @@ impl Dataset {
     /// Draws the pressure of a sample of an indentation on the skin, Pa; 224 x 224.
     ///
     /// # Errors
-    /// [`ExportError::Dataset`] where a pixel lies in no cell, [`ExportError::Atlas`].
+    /// [`ExportError::DatasetFile`] where a pixel lies in no cell, [`ExportError::Atlas`].
     pub fn draw_pressure(
         &self,
         indentation: &IndentationEntry,
@@ -181,8 +181,10 @@ impl Dataset {
         values: &[f32],
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        let reader = self.maps.reader(patch, shard.cells.as_ref())?;
         let path = || self.shard_path(indentation);
+        let reader = self.maps.reader(patch, shard.cells.as_ref()).map_err(|error| {
+            ExportError::DatasetFile { path: path(), reason: error.to_string() }
+        })?;
         let refused = |source| ExportError::Atlas { path: path(), source };
         reader.draw(values, map).map_err(refused)
     }

@@ -115,10 +115,7 @@ impl Drawing<'_> {
                 for ((reader, values), painter) in readers.iter().zip(&mut self.painters) {
                     let values = values.row(sample).to_vec();
                     reader.draw(&values, &mut painter.pixels).map_err(|source| {
-                        DatasetError::Atlas {
-                            path: self.dataset.folder().join(&press.file),
-                            source,
-                        }
+                        DatasetError::Atlas { path: self.dataset.shard_path(press), source }
                     })?;
                 }
                 look(press, shard.depth_mm[sample], &mut self.painters)?;

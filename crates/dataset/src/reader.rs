@@ -159,7 +159,7 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, DatasetError> {
     let mut samples = 0;
     for press in &manifest.presses {
         let shard = dataset.shard(press)?;
-        verify_values(&folder.join(&press.file), manifest, &shard)?;
+        verify_values(&dataset.shard_path(press), manifest, &shard)?;
         samples += shard.len();
     }
     verify_raster(&folder.join("raster.npz"), &dataset.atlas)?;

@@ -47,7 +47,7 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
         let drawn = |patch, values: &ndarray::Array2<f32>| {
             let reader = maps.reader(patch, shard.cells.as_ref())?;
             shown(&reader, maps.raster(patch), &values.row(sample).to_vec())
-                .map_err(|source| DatasetError::Atlas { path: folder.join(&press.file), source })
+                .map_err(|source| DatasetError::Atlas { path: dataset.shard_path(press), source })
         };
         presses.push(ReplayPress {
             name: format!(
