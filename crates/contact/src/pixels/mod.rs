@@ -27,6 +27,7 @@
 mod convolution;
 
 mod memory;
+mod mirror;
 mod nearby;
 mod own_dents;
 mod rounds;
