@@ -209,22 +209,34 @@ impl Window {
     /// Adds the pressure of a pixel, and of its image, to the means over pixels of pressure that is
     /// a cubic between those that are solved for.
     pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
-        let mask = skin.raster.mask();
-        let [row, column] = [index / MAP_SIDE_PX, index % MAP_SIDE_PX];
         let image = self.image_row(skin, index).map(|row| row * self.step_px);
-        let half = self.shares.len() / 2;
-        let near = image.filter(|image| *image <= row + 2 * half);
-        for from in [Some(row), near].into_iter().flatten() {
-            for (down, a) in self.shares.iter().enumerate() {
-                for (right, b) in self.shares.iter().enumerate() {
-                    let at = [from + down, column + right].map(|i| i.checked_sub(half));
-                    let to = at[0].zip(at[1]).map(|(r, c)| r * MAP_SIDE_PX + c);
-                    let on_skin = to.filter(|to| mask.get(*to) == Some(&true));
-                    // What would leave the skin stays, but over the mirror, where the image's enters.
-                    let stays = from == row && (image.is_none() || down <= half);
-                    if let Some(to) = on_skin.or(stays.then_some(index)) {
-                        map[to] += a * b * pressure;
-                    }
+        let near = image.filter(|row| *row < index / MAP_SIDE_PX + self.shares.len());
+        let Some(row) = near else {
+            // What would leave the skin stays.
+            return self.share(skin, index, Some(index), pressure, map);
+        };
+        // Over the mirror it leaves, and the image's enters.
+        self.share(skin, index, None, pressure, map);
+        self.share(skin, row * MAP_SIDE_PX + index % MAP_SIDE_PX, None, pressure, map);
+    }
+
+    /// Adds what a pixel at `index`, which may lie beyond the map, gives to those round it.
+    fn share(
+        &self,
+        skin: &PixelSkin,
+        index: usize,
+        beyond: Option<usize>,
+        pressure: f32,
+        map: &mut [f32],
+    ) {
+        let mask = skin.raster.mask();
+        let first = (self.shares.len() / 2) * (MAP_SIDE_PX + 1);
+        for (row, a) in self.shares.iter().enumerate() {
+            for (column, b) in self.shares.iter().enumerate() {
+                let to = (index + row * MAP_SIDE_PX + column).checked_sub(first);
+                let to = to.filter(|to| mask.get(*to) == Some(&true));
+                if let Some(to) = to.or(beyond) {
+                    map[to] += a * b * pressure;
                 }
             }
         }
