@@ -44,7 +44,7 @@ impl PixelSkin {
         let stencils = smooth::of_pixels(atlas, &raster);
         let surface = SurfaceCompliance::new(layers);
         let mirror = Mirror::new(model, atlas, &raster);
-        let rows = smooth::rows_from_edge(atlas, &mirror, FREE_ROWS);
+        let rows = smooth::rows_from_edge(atlas, |vertex| mirror.holds(vertex), FREE_ROWS);
         let largest = surface.largest() as f32;
         let ease = |pixel: &Pixel| {
             let corners = pixel.vertices.iter().zip(pixel.weights);

@@ -1,6 +1,5 @@
 //! Values between vertices, smoother than the triangles' planes.
 
-use super::mirror::Mirror;
 use papilla_atlas::{Atlas, Patch, Raster};
 
 /// Vertices that a pixel's value is of.
@@ -96,13 +95,13 @@ pub(super) fn edge_sides(atlas: &Atlas) -> Vec<[u32; 2]> {
     all.iter().filter(|[a, b]| !all.contains(&[*b, *a])).copied().collect()
 }
 
-/// Rows of triangles between each vertex and the skin's edge, up to `most`; where skin goes on as
-/// in a mirror there is no edge.
-pub(super) fn rows_from_edge(atlas: &Atlas, mirror: &Mirror, most: u8) -> Vec<u8> {
+/// Rows of triangles between each vertex and the skin's edge, up to `most`; a side whose ends both
+/// `goes_on` names is no edge.
+pub(super) fn rows_from_edge(atlas: &Atlas, goes_on: impl Fn(usize) -> bool, most: u8) -> Vec<u8> {
     let mut rows = vec![most; atlas.vertex_count()];
     for side in edge_sides(atlas) {
         let ends = side.map(|vertex| vertex as usize);
-        if !ends.into_iter().all(|vertex| mirror.holds(vertex)) {
+        if !ends.into_iter().all(&goes_on) {
             ends.into_iter().for_each(|vertex| rows[vertex] = 0);
         }
     }
