@@ -3,9 +3,7 @@
 mod friction;
 mod gaps;
 mod memory;
-mod mirror;
 mod pixels;
-mod plane;
 mod support;
 
 use papilla_contact::{
