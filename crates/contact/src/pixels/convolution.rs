@@ -15,8 +15,20 @@ type C32 = Complex<f32>;
 const LENGTHS: [usize; 17] =
     [16, 20, 24, 32, 40, 48, 56, 64, 72, 80, 96, 112, 128, 160, 192, 224, 288];
 
+/// Longest of them.
+pub(super) const LENGTH_MAX: usize = LENGTHS[LENGTHS.len() - 1];
+
 /// Steps of the pixels' distance, as a share of it: a frame like the last one needs no new table.
 const PITCH_STEP: f64 = 2.5e-3;
+
+/// Where pressure stands in a window.
+#[derive(Clone, Copy)]
+pub(super) struct Cells<'a> {
+    /// Of each pressure.
+    pub own: &'a [u32],
+    /// Which pressure stands once more, behind a mirror, and where.
+    pub images: &'a [[u32; 2]],
+}
 
 /// Transforms along a window of one length.
 struct Plan {
@@ -89,8 +101,7 @@ impl fmt::Debug for Convolution {
 
 impl Convolution {
     pub(super) fn new(plans: Arc<Plans>) -> Self {
-        let longest = LENGTHS[LENGTHS.len() - 1];
-        let half = longest * (longest / 2 + 1);
+        let half = LENGTH_MAX * (LENGTH_MAX / 2 + 1);
         let zero = C32::new(0.0, 0.0);
         Self {
             scratch: vec![zero; plans.scratch_len()],
@@ -99,7 +110,7 @@ impl Convolution {
             columns: 0,
             pressed: 0,
             steps: [0; 2],
-            grid: vec![0.0; longest * longest],
+            grid: vec![0.0; LENGTH_MAX * LENGTH_MAX],
             spectrum: vec![zero; half],
             turned: vec![zero; half],
             compliance: vec![0.0; half],
@@ -115,8 +126,7 @@ impl Convolution {
         [across_mm, along_mm]: [f64; 2],
         surface: &SurfaceCompliance,
     ) {
-        let longest = LENGTHS[LENGTHS.len() - 1];
-        let fitting = |least| LENGTHS.into_iter().find(|l| *l >= least).unwrap_or(longest);
+        let fitting = |least| LENGTHS.into_iter().find(|l| *l >= least).unwrap_or(LENGTH_MAX);
         let steps = [across_mm, along_mm].map(|mm| (mm.ln() / PITCH_STEP).round() as i32);
         let window = (fitting(rows), fitting(columns), steps);
         self.pressed = pressed.min(window.0);
@@ -167,25 +177,30 @@ impl Convolution {
     }
 
     /// Displacement of the window (mm) under pressure (MPa) on some of its cells, none elsewhere.
-    pub(super) fn press(&mut self, cells: &[u32], pressure: &[f32]) -> &[f32] {
+    pub(super) fn press(&mut self, cells: Cells<'_>, pressure: &[f32]) -> &[f32] {
         self.fill(cells, pressure);
         self.apply(self.rows);
         self.grid()
     }
 
     /// The same of the rows that pressure stands in; the others tell nothing.
-    pub(super) fn press_rows(&mut self, cells: &[u32], pressure: &[f32]) -> &[f32] {
+    pub(super) fn press_rows(&mut self, cells: Cells<'_>, pressure: &[f32]) -> &[f32] {
         self.fill(cells, pressure);
         self.apply(self.pressed);
         self.grid()
     }
 
-    fn fill(&mut self, cells: &[u32], pressure: &[f32]) {
+    fn fill(&mut self, cells: Cells<'_>, pressure: &[f32]) {
         let filled = self.pressed * self.columns;
         let grid = &mut self.grid()[..filled];
         grid.fill(0.0);
-        for (cell, p) in cells.iter().zip(pressure) {
+        for (cell, p) in cells.own.iter().zip(pressure) {
             grid[*cell as usize] = *p;
+        }
+        for [i, cell] in cells.images {
+            if let Some(p) = pressure.get(*i as usize) {
+                grid[*cell as usize] = *p;
+            }
         }
     }
 

@@ -20,13 +20,17 @@
 //! forces settle. A map tells means over pixels of pressure that is a cubic between those that are
 //! [solved for](PixelSpacing), so that a pixel which the contact's edge crosses has its part:
 //! point values are 15 % off where means are 9 (median over training presses, FE on graded
-//! meshes). Pixels at the skin's edge hold the pressure that vertices find by themselves: contact
+//! meshes).
+//!
+//! Where the map ends at the finger's base plane, skin goes on behind it [as in a mirror](mirror).
+//! Pixels at the skin's other edges hold the pressure that vertices find by themselves: contact
 //! goes on beyond the map, where no pixel could carry it. In the three rows of triangles beside them
 //! pixels leave a gap for what their pressure has beside the vertices', less and less inward.
 
 mod convolution;
 
 mod memory;
+mod mirror;
 mod nearby;
 mod own_dents;
 mod rounds;

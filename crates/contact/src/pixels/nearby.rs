@@ -1,12 +1,12 @@
 //! How the pixels of a window move each other.
 
-use super::convolution::Convolution;
+use super::convolution::{Cells, Convolution};
 use crate::bounded::Operator;
 
 /// Compliance between the pixels of a window.
 pub(super) struct Nearby<'a> {
     pub convolution: &'a mut Convolution,
-    pub cells: &'a [u32],
+    pub cells: Cells<'a>,
     /// How far the object gives way at each pixel, mm/MPa.
     pub give: &'a [f32],
     /// How far it leaves gaps near the skin's edge, mm/MPa.
@@ -26,7 +26,7 @@ impl Operator for Nearby<'_> {
     fn times(&mut self, x: &[f32], y: &mut [f32]) {
         let grid = self.convolution.press_rows(self.cells, x);
         let gives = self.give.iter().zip(self.ease);
-        for (((cell, (give, ease)), x), y) in self.cells.iter().zip(gives).zip(x).zip(y) {
+        for (((cell, (give, ease)), x), y) in self.cells.own.iter().zip(gives).zip(x).zip(y) {
             *y = grid[*cell as usize] + (give + ease) * x;
         }
     }

@@ -4,23 +4,47 @@
 //! moves layered skin, and its neighbours too little. The difference `C - K` of the two
 //! compliances, of which only what is far away is the finger's, is smooth but for that. Near
 //! the force it goes on as the polynomial of second degree through what is round it.
+//!
+//! An even load moves the mesh's skin by what is right: there dents only add up. So a correction
+//! makes no volume; what it takes away near the force it gives back on some more vertices. A dot
+//! finds the layers' dent, a plate the mesh's stiffness: also where the finger's layers are not `K`'s.
 
-use super::convolution::{Convolution, Plans};
+use super::convolution::{Cells, Convolution, Plans};
+use super::mirror::Mirror;
 use super::smooth::{HELD_ROWS, Stencil, TERMS, solve, square};
 use crate::layers::SurfaceCompliance;
 use crate::model::ContactModel;
 use papilla_atlas::{MAP_SIDE_PX, Raster};
+use std::cmp::Ordering;
 use std::sync::Arc;
 
-/// Vertices whose displacement is corrected: the one that is pressed and those round it.
+/// Vertices that dent otherwise: the one that is pressed and those round it.
 const NEAR: usize = 9;
+/// Vertices on which the volume of that is made up for.
+const EVEN: usize = 20;
 /// Vertices up to the end of the ring from which the polynomial comes.
 const FAR: usize = 36;
 /// Pixels of the window beyond the ring.
 const BEYOND: usize = 12;
 
 /// By force along the normal of a vertex: what its neighbours move more along theirs, mm/N.
-pub(super) type Correction = Stencil<NEAR>;
+pub(super) type Correction = Stencil<EVEN>;
+
+/// A vertex, or its image behind the skin's mirror, near one that is pressed.
+struct Near {
+    /// Square of the distance, in how far vertices are apart.
+    away: f32,
+    vertex: u16,
+    is_image: bool,
+    uv_px: [f32; 2],
+}
+
+impl Near {
+    fn order(&self, other: &Self) -> Ordering {
+        let by_vertex = self.vertex.cmp(&other.vertex).then(self.is_image.cmp(&other.is_image));
+        self.away.total_cmp(&other.away).then(by_vertex)
+    }
+}
 
 /// What corrections are made of.
 pub(super) struct OwnDents<'a> {
@@ -28,6 +52,7 @@ pub(super) struct OwnDents<'a> {
     pub uv_px: &'a [[f32; 2]],
     /// How far vertices are apart round each of them, px.
     pub apart: &'a [[f32; 2]],
+    pub mirror: &'a Mirror,
     pub raster: &'a Raster,
     /// Places of the pixels at rest.
     pub rest_mm: &'a [[f32; 3]],
@@ -52,7 +77,7 @@ impl OwnDents<'_> {
             slot[*index as usize] = Some(entry);
         }
         let mut convolution = Convolution::new(Arc::clone(plans));
-        let none = Correction { vertices: [0; NEAR], weights: [0.0; NEAR] };
+        let none = Correction { vertices: [0; EVEN], weights: [0.0; EVEN] };
         let of = |vertex: usize| {
             let hat = &hats[vertex];
             if rows_from_edge[vertex] < HELD_ROWS || hat.is_empty() {
@@ -86,84 +111,87 @@ impl OwnDents<'_> {
         };
         let pitch_mm = [MAP_SIDE_PX, 1].map(mean);
         let near = self.near(vertex)?;
-        let away = |other: &u16, axis: usize| {
-            (self.uv_px[usize::from(*other)][axis] - self.uv_px[vertex][axis]).abs()
-        };
-        let reach = near.iter().flat_map(|(_, v)| [away(v, 0), away(v, 1)]).fold(0.0, f32::max);
+        let away = |place: &Near, axis: usize| (place.uv_px[axis] - self.uv_px[vertex][axis]).abs();
+        let reach = near.iter().flat_map(|n| [away(n, 0), away(n, 1)]).fold(0.0, f32::max);
         let side = 2 * (reach.ceil() as usize + BEYOND);
         convolution.open([side; 2], usize::MAX, pitch_mm, surface);
         // Square, as the plans of both ways are the same.
         let side = convolution.columns();
         let first = self.uv_px[vertex].map(|c| c.floor() as i64 - side as i64 / 2);
-        let cell = |(entry, _): &(usize, f32)| {
-            let index = self.raster.indices()[*entry] as i64;
-            let [row, column] = [index / MAP_SIDE_PX as i64, index % MAP_SIDE_PX as i64];
-            let row = (row - first[1]).clamp(0, side as i64 - 1);
-            let column = (column - first[0]).clamp(0, side as i64 - 1);
-            (row * side as i64 + column) as u32
+        let last = side as i64 - 1;
+        let at = |row: i64, column: i64| {
+            let column = (column - first[0]).clamp(0, last);
+            ((row - first[1]) * side as i64 + column) as u32
         };
-        let cells: Vec<u32> = hat.iter().map(cell).collect();
+        let (mut cells, mut images) = (Vec::new(), Vec::new());
+        for (i, (entry, _)) in hat.iter().enumerate() {
+            let index = self.raster.indices()[*entry] as usize;
+            let [row, column] = [index / MAP_SIDE_PX, index % MAP_SIDE_PX];
+            cells.push(at((row as i64).clamp(first[1], first[1] + last), column as i64));
+            let image = self.mirror.image_row(row, column).map(|row| row as i64);
+            if let Some(row) = image.filter(|row| *row <= first[1] + last) {
+                images.push([i as u32, at(row, column as i64)]);
+            }
+        }
         let force_n = total * pitch_mm[0] * pitch_mm[1];
         let pressure: Vec<f32> =
             hat.iter().map(|(_, w)| (f64::from(*w) / force_n) as f32).collect();
-        let grid = convolution.press(&cells, &pressure);
+        let grid = convolution.press(Cells { own: &cells, images: &images }, &pressure);
         self.go_on(vertex, &near, |other| {
             let own = read(grid, side, first, self.uv_px[usize::from(other)]);
             self.compliance(usize::from(other), vertex) - own
         })
     }
 
-    /// A vertex and those round it, with the squares of their distances, in how far vertices are
-    /// apart; none if there are too few.
-    fn near(&self, vertex: usize) -> Option<Vec<(f32, u16)>> {
+    /// A vertex and those round it, and their images, the nearest first; none if there are too few.
+    fn near(&self, vertex: usize) -> Option<Vec<Near>> {
         let at = self.uv_px[vertex];
-        let mut order: Vec<(f32, u16)> = self
-            .uv_px
-            .iter()
-            .enumerate()
-            .map(|(v, uv)| (square(*uv, at, self.apart[vertex]), v as u16))
-            .collect();
+        let place = |other: usize, uv_px: [f32; 2], is_image: bool| {
+            let away = square(uv_px, at, self.apart[vertex]);
+            Near { away, vertex: other as u16, is_image, uv_px }
+        };
+        let own = self.uv_px.iter().enumerate().map(|(v, uv)| place(v, *uv, false));
+        let image = |v: usize| Some(place(v, self.mirror.image_px(v, self.uv_px[v])?, true));
+        let mut order: Vec<Near> = own.chain((0..self.uv_px.len()).filter_map(image)).collect();
         if order.len() < FAR {
             return None;
         }
-        let by_place = |a: &(f32, u16), b: &(f32, u16)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-        order.select_nth_unstable_by(FAR - 1, by_place);
+        order.select_nth_unstable_by(FAR - 1, Near::order);
         order.truncate(FAR);
-        order.sort_unstable_by(by_place);
+        order.sort_unstable_by(Near::order);
         Some(order)
     }
 
-    /// What a field that is smooth round a vertex, but not at it, differs from its own continuation
-    /// by at the vertex and its neighbours.
+    /// What a field that is smooth round a vertex and its image, but not at them, differs from its
+    /// own continuation by at the vertex and its neighbours; in all as much volume as nothing.
     fn go_on(
         &self,
         vertex: usize,
-        near: &[(f32, u16)],
+        near: &[Near],
         field: impl Fn(u16) -> f64,
     ) -> Option<Correction> {
         let (at, apart) = (self.uv_px[vertex], self.apart[vertex]);
-        let reach = near.last()?.0.sqrt();
-        let row = |(_, v): &(f32, u16)| {
-            let uv = self.uv_px[usize::from(*v)];
-            let [x, y] = [0, 1].map(|a| f64::from((uv[a] - at[a]) / (apart[a] * reach)));
+        let reach = near.last()?.away.sqrt();
+        let row = |place: &Near| {
+            let [x, y] = [0, 1].map(|a| f64::from((place.uv_px[a] - at[a]) / (apart[a] * reach)));
             [1.0, x, y, x * x, x * y, y * y]
         };
         let rows: Vec<[f64; TERMS]> = near.iter().map(row).collect();
-        let values: Vec<f64> = near.iter().map(|(_, v)| field(*v)).collect();
-        let (mut normal, mut side) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
-        for (row, due) in rows.iter().zip(&values).skip(NEAR) {
-            for a in 0..TERMS {
-                side[a] += row[a] * due;
-                for b in 0..TERMS {
-                    normal[a][b] += row[a] * row[b];
-                }
-            }
-        }
-        let polynomial = solve(normal, side)?;
+        let values: Vec<f64> = near.iter().map(|place| field(place.vertex)).collect();
+        let polynomial = through_ring(near, &rows, &values)?;
         let goes_on = |i: usize| (0..TERMS).map(|a| polynomial[a] * rows[i][a]).sum::<f64>();
+        let off = |i: usize| if i < NEAR { goes_on(i) - values[i] } else { 0.0 };
+        // Of an image nothing is corrected: the skin is the finger's.
+        let area_mm2 = |i: usize| {
+            let area_mm2 = f64::from(self.model.areas_mm2[usize::from(near[i].vertex)]);
+            if near[i].is_image { 0.0 } else { area_mm2 }
+        };
+        let volume: f64 = (0..NEAR).map(|i| area_mm2(i) * off(i)).sum();
+        let even = volume / (0..EVEN).map(area_mm2).sum::<f64>();
+        let weight = |i: usize| if near[i].is_image { 0.0 } else { off(i) - even };
         Some(Correction {
-            vertices: std::array::from_fn(|i| near[i].1),
-            weights: std::array::from_fn(|i| (goes_on(i) - values[i]) as f32),
+            vertices: std::array::from_fn(|i| near[i].vertex),
+            weights: std::array::from_fn(|i| weight(i) as f32),
         })
     }
 
@@ -174,6 +202,28 @@ impl OwnDents<'_> {
         let along = |a: usize| (0..3).map(|b| n[a] * pair[3 * a + b] * m[b]).sum::<f32>();
         f64::from((0..3).map(along).sum::<f32>())
     }
+}
+
+/// The polynomial through what is round a vertex, and round its image.
+fn through_ring(near: &[Near], rows: &[[f64; TERMS]], values: &[f64]) -> Option<[f64; TERMS]> {
+    // The image's neighbours are the neighbours' images.
+    let dents_image = |place: &Near| {
+        let is_image_of = |d: &Near| d.vertex == place.vertex && d.is_image != place.is_image;
+        near[..NEAR].iter().any(is_image_of)
+    };
+    let (mut normal, mut side) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+    for (i, row) in rows.iter().enumerate().skip(NEAR) {
+        if dents_image(&near[i]) {
+            continue;
+        }
+        for a in 0..TERMS {
+            side[a] += row[a] * values[i];
+            for b in 0..TERMS {
+                normal[a][b] += row[a] * row[b];
+            }
+        }
+    }
+    solve(normal, side)
 }
 
 /// Displacement at a place of the map, of a square window that begins at `first`, mm.

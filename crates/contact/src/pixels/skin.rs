@@ -1,6 +1,7 @@
 //! What pixels have to know of a skin.
 
 use super::convolution::Plans;
+use super::mirror::Mirror;
 use super::own_dents::{Correction, OwnDents};
 use super::smooth::{self, HELD_ROWS, PixelStencil};
 use crate::layers::SurfaceCompliance;
@@ -23,6 +24,7 @@ pub struct PixelSkin {
     pub(super) around: Vec<Vec<u32>>,
     /// By pixel: gap for a pressure beside the vertices', mm/MPa; infinite where theirs is held.
     pub(super) ease: Vec<f32>,
+    pub(super) mirror: Mirror,
     pub(super) surface: SurfaceCompliance,
     pub(super) plans: Arc<Plans>,
     /// Places of the pixels at rest.
@@ -41,7 +43,8 @@ impl PixelSkin {
         let uv_px = atlas.patch(raster.patch()).uv_px.clone();
         let stencils = smooth::of_pixels(atlas, &raster);
         let surface = SurfaceCompliance::new(layers);
-        let rows = smooth::rows_from_edge(atlas, FREE_ROWS);
+        let mirror = Mirror::new(model, atlas, &raster);
+        let rows = smooth::rows_from_edge(atlas, |vertex| mirror.holds(vertex), FREE_ROWS);
         let largest = surface.largest() as f32;
         let ease = |pixel: &Pixel| {
             let corners = pixel.vertices.iter().zip(pixel.weights);
@@ -61,9 +64,26 @@ impl PixelSkin {
         }
         let plans = Arc::new(Plans::new());
         let apart = smooth::apart_px(atlas);
-        let own =
-            OwnDents { model, uv_px: &uv_px, apart: &apart, raster: &raster, rest_mm: &rest_mm };
+        let own = OwnDents {
+            model,
+            uv_px: &uv_px,
+            apart: &apart,
+            mirror: &mirror,
+            raster: &raster,
+            rest_mm: &rest_mm,
+        };
         let corrections = own.corrections(&surface, &plans, &rows);
-        Some(Self { raster, uv_px, stencils, corrections, around, ease, surface, plans, rest_mm })
+        Some(Self {
+            raster,
+            uv_px,
+            stencils,
+            corrections,
+            around,
+            ease,
+            mirror,
+            surface,
+            plans,
+            rest_mm,
+        })
     }
 }

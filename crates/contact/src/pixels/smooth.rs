@@ -87,15 +87,23 @@ pub(super) fn square(a: [f32; 2], b: [f32; 2], apart: [f32; 2]) -> f32 {
 /// mesh's own dents stay.
 pub(super) const HELD_ROWS: u8 = 2;
 
-/// Rows of triangles between each vertex and the skin's edge, up to `most`.
-pub(super) fn rows_from_edge(atlas: &Atlas, most: u8) -> Vec<u8> {
+/// Sides of one triangle alone: the skin's edge.
+pub(super) fn edge_sides(atlas: &Atlas) -> Vec<[u32; 2]> {
     let sides = |[a, b, c]: &[u32; 3]| [[*a, *b], [*b, *c], [*c, *a]];
     let all: std::collections::HashSet<[u32; 2]> =
         atlas.triangles().iter().flat_map(sides).collect();
+    all.iter().filter(|[a, b]| !all.contains(&[*b, *a])).copied().collect()
+}
+
+/// Rows of triangles between each vertex and the skin's edge, up to `most`; a side whose ends both
+/// `goes_on` names is no edge.
+pub(super) fn rows_from_edge(atlas: &Atlas, goes_on: impl Fn(usize) -> bool, most: u8) -> Vec<u8> {
     let mut rows = vec![most; atlas.vertex_count()];
-    // A side of one triangle alone.
-    for [a, b] in all.iter().filter(|[a, b]| !all.contains(&[*b, *a])) {
-        (rows[*a as usize], rows[*b as usize]) = (0, 0);
+    for side in edge_sides(atlas) {
+        let ends = side.map(|vertex| vertex as usize);
+        if !ends.into_iter().all(&goes_on) {
+            ends.into_iter().for_each(|vertex| rows[vertex] = 0);
+        }
     }
     for row in 1..most {
         for corners in atlas.triangles() {

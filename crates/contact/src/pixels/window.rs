@@ -5,6 +5,7 @@ mod hats;
 mod taken;
 mod vertices;
 
+use super::convolution::Cells;
 use super::{PixelSkin, PixelSpacing};
 use crate::kernels::Vectors;
 use crate::model::ContactModel;
@@ -20,7 +21,12 @@ pub(super) struct Window {
     /// Entries of the raster, the held ones last, and their cells in the grid.
     pub entries: Vec<u32>,
     held: Vec<u32>,
-    pub cells: Vec<u32>,
+    cells: Vec<u32>,
+    /// Row in which images end; 0 where no pixel is near the mirror.
+    images_end: usize,
+    /// Slots of the pixels that have an image behind the skin's [`Mirror`](super::mirror::Mirror),
+    /// and the images' cells.
+    images: Vec<[u32; 2]>,
     /// Slots of the pixels above, below, before and after each.
     pub beside: Vec<[u32; 4]>,
     pub at_mm: Vec<[f32; 3]>,
@@ -82,6 +88,8 @@ impl Window {
             entries: Vec::with_capacity(pixels),
             held: Vec::with_capacity(pixels),
             cells: Vec::with_capacity(pixels),
+            images_end: 0,
+            images: Vec::with_capacity(pixels),
             beside: Vec::with_capacity(pixels),
             at_mm: vec![[0.0; 3]; pixels],
             normal: vec![[0.0; 3]; pixels],
@@ -126,7 +134,19 @@ impl Window {
         self.entries.len() - self.held.len()
     }
 
-    /// Rows that pixels stand in.
+    /// Row behind the skin's mirror in which the image of a pixel stands, in rows of those that are solved
+    /// for: the mirror stands where they end.
+    fn image_row(&self, skin: &PixelSkin, index: usize) -> Option<usize> {
+        let image = skin.mirror.image_row(index / MAP_SIDE_PX, index % MAP_SIDE_PX)?;
+        Some(image / self.step_px)
+    }
+
+    /// Cells of the window's first pixels and of their images.
+    pub(super) fn cells(&self, count: usize) -> Cells<'_> {
+        Cells { own: &self.cells[..count], images: &self.images }
+    }
+
+    /// Rows that pixels and their images stand in.
     pub(super) fn rows(&self) -> usize {
         self.size[0]
     }
@@ -186,17 +206,38 @@ impl Window {
         sums.map(|sum| (sum / count).max(1e-3))
     }
 
-    /// Adds a pixel's pressure to the means over pixels of pressure that is a cubic between those that
-    /// are solved for.
+    /// Adds the pressure of a pixel, and of its image, to the means over pixels of pressure that is
+    /// a cubic between those that are solved for.
     pub(super) fn spread(&self, skin: &PixelSkin, index: usize, pressure: f32, map: &mut [f32]) {
+        let image = self.image_row(skin, index).map(|row| row * self.step_px);
+        let near = image.filter(|row| *row < index / MAP_SIDE_PX + self.shares.len());
+        let Some(row) = near else {
+            // What would leave the skin stays.
+            return self.share(skin, index, Some(index), pressure, map);
+        };
+        // Over the mirror it leaves, and the image's enters.
+        self.share(skin, index, None, pressure, map);
+        self.share(skin, row * MAP_SIDE_PX + index % MAP_SIDE_PX, None, pressure, map);
+    }
+
+    /// Adds what a pixel at `index`, which may lie beyond the map, gives to those round it.
+    fn share(
+        &self,
+        skin: &PixelSkin,
+        index: usize,
+        beyond: Option<usize>,
+        pressure: f32,
+        map: &mut [f32],
+    ) {
         let mask = skin.raster.mask();
         let first = (self.shares.len() / 2) * (MAP_SIDE_PX + 1);
         for (row, a) in self.shares.iter().enumerate() {
             for (column, b) in self.shares.iter().enumerate() {
                 let to = (index + row * MAP_SIDE_PX + column).checked_sub(first);
-                // What would leave the skin stays.
-                let to = to.filter(|to| mask.get(*to) == Some(&true)).unwrap_or(index);
-                map[to] += a * b * pressure;
+                let to = to.filter(|to| mask.get(*to) == Some(&true));
+                if let Some(to) = to.or(beyond) {
+                    map[to] += a * b * pressure;
+                }
             }
         }
     }

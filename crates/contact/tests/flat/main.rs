@@ -3,7 +3,9 @@
 mod friction;
 mod gaps;
 mod memory;
+mod mirror;
 mod pixels;
+mod plane;
 mod support;
 
 use papilla_contact::{

@@ -1,10 +1,11 @@
 //! Which pixels and vertices a frame takes.
 
-use super::{NONE, Window};
+use super::{BETWEEN, NONE, Window};
 use crate::answer::Effort;
 use crate::model::ContactModel;
 use crate::objects::View;
 use crate::pixels::PixelSkin;
+use crate::pixels::convolution::LENGTH_MAX;
 use papilla_atlas::MAP_SIDE_PX;
 
 /// Pixels round vertices nearer than this are looked at, reference mm.
@@ -29,17 +30,7 @@ impl Window {
         if self.entries.is_empty() {
             return false;
         }
-        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-        for (slot, entry) in self.entries.iter().enumerate() {
-            let index = skin.raster.indices()[*entry as usize] as usize;
-            self.slot[index] = slot as u32;
-            let at = [index / MAP_SIDE_PX, index % MAP_SIDE_PX].map(|i| i / self.step_px);
-            for i in 0..2 {
-                (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
-            }
-        }
-        self.first = low;
-        self.size = [high[0] - low[0], high[1] - low[1]];
+        self.measure_extent(skin);
         for entry in &self.entries {
             let index = skin.raster.indices()[*entry as usize] as usize;
             let steps = [self.step_px * MAP_SIDE_PX, self.step_px];
@@ -50,6 +41,29 @@ impl Window {
         }
         self.take_vertices(skin, model);
         true
+    }
+
+    /// Rows and columns of the pixels, and of their images if one of them is near the mirror: all or
+    /// none, as what is cut off would be missed by the pixels and not by the vertices.
+    fn measure_extent(&mut self, skin: &PixelSkin) {
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        let (mut nearest, mut last) = (usize::MAX, 0);
+        for (slot, entry) in self.entries.iter().enumerate() {
+            let index = skin.raster.indices()[*entry as usize] as usize;
+            self.slot[index] = slot as u32;
+            let at = [index / MAP_SIDE_PX, index % MAP_SIDE_PX].map(|i| i / self.step_px);
+            for i in 0..2 {
+                (low[i], high[i]) = (low[i].min(at[i]), high[i].max(at[i] + 1));
+            }
+            if let Some(row) = self.image_row(skin, index) {
+                (nearest, last) = (nearest.min(row - at[0]), last.max(row + 1));
+            }
+        }
+        let gap = BETWEEN.div_ceil(self.step_px);
+        let is_near = nearest < 2 * BETWEEN / self.step_px;
+        self.images_end = if is_near { last.min(low[0] + LENGTH_MAX - gap) } else { 0 };
+        self.first = low;
+        self.size = [high[0].max(self.images_end) - low[0], high[1] - low[1]];
     }
 
     /// Forgets the last window.
@@ -146,11 +160,19 @@ impl Window {
 
     pub(in super::super) fn number_cells(&mut self, skin: &PixelSkin, [rows, columns]: [usize; 2]) {
         self.cells.clear();
-        for entry in &self.entries {
+        self.images.clear();
+        for (slot, entry) in self.entries.iter().enumerate() {
             let index = skin.raster.indices()[*entry as usize] as usize;
-            let row = (index / MAP_SIDE_PX / self.step_px - self.first[0]) % rows;
-            let column = (index % MAP_SIDE_PX / self.step_px - self.first[1]) % columns;
-            self.cells.push((row * columns + column) as u32);
+            let [row, column] =
+                [index / MAP_SIDE_PX, index % MAP_SIDE_PX].map(|i| i / self.step_px);
+            let cell = |row: usize| {
+                let [row, column] = [row - self.first[0], column - self.first[1]];
+                (row % rows * columns + column % columns) as u32
+            };
+            self.cells.push(cell(row));
+            if let Some(row) = self.image_row(skin, index).filter(|row| *row < self.images_end) {
+                self.images.push([slot as u32, cell(row)]);
+            }
         }
     }
 }
