@@ -9,6 +9,10 @@ use super::stepping::Solver;
 use super::{Effort, StepError, mixed};
 use crate::element::Dilatation;
 
+/// Newton iterations beside a guess at most: where more are needed it is beside no equilibrium, and
+/// tangents on the way are indefinite.
+const NEWTON_MAX: u32 = 20;
+
 /// Where an equilibrium may be.
 #[derive(Clone, Debug)]
 pub struct Guess {
@@ -57,7 +61,11 @@ impl Solver<'_> {
             trial.independent.clear();
             mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
         }
-        self.augmented(target, &mut trial)?;
+        let newton_max = self.newton.options.newton_max;
+        self.newton.options.newton_max = newton_max.min(NEWTON_MAX);
+        let found = self.augmented(target, &mut trial);
+        self.newton.options.newton_max = newton_max;
+        found?;
         self.accept(target, trial);
         Ok(())
     }

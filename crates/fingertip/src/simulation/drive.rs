@@ -3,7 +3,7 @@
 use super::body::{Body, SimulationError};
 use super::guide::Guided;
 use super::record::IncrementRecord;
-use super::way::Way;
+use super::way::{self, Way};
 use crate::indenter::IndenterError;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
@@ -217,7 +217,13 @@ impl Body {
         Course { refinement, energy_vs_work_max, from }: Course<'_>,
         visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
-        let way = Way { depths_mm, refinement, graded: self.graded, energy_vs_work_max };
+        let steps = match &guided {
+            Some(_) => way::guided_steps(depths_mm),
+            None => vec![1; depths_mm.len()],
+        };
+        let stops_mm = way::stops_mm(depths_mm, &steps);
+        let way = Way { depths_mm: &stops_mm, refinement, graded: self.graded, energy_vs_work_max };
+        let mut stops = 0..stops_mm.len();
         let behind = match from {
             Some((behind, snapshot)) => {
                 solver.resume(snapshot)?;
@@ -225,19 +231,24 @@ impl Body {
             }
             None => 0,
         };
-        for i in 0..behind {
-            guided = guided.and_then(|g| way.lead(g, i));
+        for stop in stops.by_ref().take(steps[..behind].iter().sum::<u32>() as usize) {
+            guided = guided.and_then(|g| way.lead(g, stop));
         }
-        for (i, &depth_mm) in depths_mm.iter().enumerate().skip(behind) {
+        for (&depth_mm, &steps) in depths_mm.iter().zip(&steps).skip(behind) {
             let clock = Instant::now();
-            guided = guided.and_then(|g| way.lead(g, i));
-            let report = match &guided {
-                Some(guided) => way.to_state_after(guided, solver, i)?,
-                None => way.to_state(solver, i)?,
-            };
-            let mut record = self.record(solver, depth_mm, &report)?;
+            let mut spent = StepReport::default();
+            for stop in stops.by_ref().take(steps as usize) {
+                let report = way.beside(&mut guided, solver, stop)?;
+                spent = StepReport {
+                    effort: spent.effort.plus(&report.effort),
+                    mending: spent.mending.plus(&report.mending),
+                    guiding: spent.guiding.plus(&report.guiding),
+                    ..report
+                };
+            }
+            let mut record = self.record(solver, depth_mm, &spent)?;
             record.seconds = clock.elapsed().as_secs_f64();
-            visit(solver, &record, &report)?;
+            visit(solver, &record, &spent)?;
         }
         Ok(())
     }

@@ -333,3 +333,25 @@ fn a_level_plate_deep_in_the_finger_crushes_no_element() {
     simulation.run(&mut |_, record, _| j_min.push(record.checks.j_min)).unwrap();
     assert!(j_min.len() == 2 && j_min.iter().all(|j| *j > 0.3), "{j_min:?}");
 }
+
+/// A bar pressed into the tip's side, far from rest at once: the body goes beside its guide by way of
+/// one equilibrium between. Straight there it found none, after 40 indefinite tangents.
+#[test]
+#[ignore = "long: ./test --all"]
+fn a_body_far_from_rest_stays_beside_its_guide() {
+    let text = "effects = [\"finite_strain\", \"layers\"]\n[geometry]\nkind = \"fingertip\"\n\
+                density = \"medium\"\norder = \"graded\"\n[indenter]\nshape = \"cylinder\"\n\
+                radius_mm = 6.0\nlength_mm = 30.0\n[motion]\ndepth_mm = 2.2\nincrements = 1\n\
+                pitch_deg = 37.9\nroll_deg = -5.7\nyaw_deg = -76.2\noffset_mm = [1.76, -1.86]\n";
+    let simulation =
+        Simulation::new(&Scene::parse(Path::new("bar.toml"), text.into()).unwrap()).unwrap();
+    let mut own = Vec::new();
+    simulation
+        .run(&mut |_, _, report| {
+            let guided = report.guiding.steps;
+            own.push((report.effort.steps - guided, report.effort.cuts));
+            assert!(guided > 2 && report.effort.indefinite_factorizations < 10, "{report:?}");
+        })
+        .unwrap();
+    assert_eq!(own, [(2, 0)]);
+}
