@@ -9,9 +9,9 @@ use super::stepping::Solver;
 use super::{Effort, StepError, mixed};
 use crate::element::Dilatation;
 
-/// Newton iterations beside a guess at most: where more are needed it is beside no equilibrium, and
-/// tangents on the way are indefinite.
-const NEWTON_MAX: u32 = 20;
+/// Indefinite tangents on the way from a guess at most: beside a stable equilibrium there are none,
+/// and each costs three factorizations.
+const INDEFINITE_MAX: u32 = 5;
 
 /// Where an equilibrium may be.
 #[derive(Clone, Debug)]
@@ -61,10 +61,9 @@ impl Solver<'_> {
             trial.independent.clear();
             mixed::dilatations(self.newton.problem, &trial.u, &mut trial.independent);
         }
-        let newton_max = self.newton.options.newton_max;
-        self.newton.options.newton_max = newton_max.min(NEWTON_MAX);
+        self.newton.indefinite_end = self.newton.effort.indefinite_factorizations + INDEFINITE_MAX;
         let found = self.augmented(target, &mut trial);
-        self.newton.options.newton_max = newton_max;
+        self.newton.indefinite_end = u32::MAX;
         found?;
         self.accept(target, trial);
         Ok(())

@@ -111,6 +111,12 @@ pub enum StepError {
         /// Relative residual reached.
         residual: f64,
     },
+    /// Tangent after tangent is indefinite: the start is beside no stable equilibrium.
+    #[error("tangents stay indefinite at relative residual {residual:.3e}")]
+    Indefinite {
+        /// Relative residual where it was given up.
+        residual: f64,
+    },
     /// The line search found no acceptable step.
     #[error("line search failed at relative residual {residual:.3e}")]
     LineSearch {

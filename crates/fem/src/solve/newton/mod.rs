@@ -73,6 +73,8 @@ pub(super) struct Newton<'a> {
     /// Forces below this are rounding of a body at rest, N.
     pub rounding_force_n: f64,
     pub effort: Effort,
+    /// A search ends where more indefinite factorizations than this have been counted.
+    pub indefinite_end: u32,
     held: Held,
     tangent: SymmetricMatrix,
     /// Renew the factor at the next linear solve.
@@ -107,6 +109,7 @@ impl<'a> Newton<'a> {
             penalty: 0.0,
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
+            indefinite_end: u32::MAX,
             held: Held::Memory(memory),
             tangent: problem.system.zeros(),
             stale: true,
@@ -176,6 +179,9 @@ impl<'a> Newton<'a> {
             }
             previous = norm;
             self.solve_step(fixed.loading, forcing, mixed);
+            if self.effort.indefinite_factorizations > self.indefinite_end {
+                return Err(StepError::Indefinite { residual: norm / reference });
+            }
             match self.line_search(fixed, u, independent) {
                 // Energy differences drown in rounding, and so does what is left of the residual.
                 Err(StepError::LineSearch { .. }) if norm <= self.rounding_n(u) => return Ok(()),
