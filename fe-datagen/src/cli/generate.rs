@@ -30,9 +30,10 @@ use std::time::Duration;
 /// Run a campaign of indentations, one per core, into a dataset.
 ///
 /// Can be killed at any moment and started again: every indentation is one shard,
-/// written whole or not at all, and the bytes depend on the campaign alone. With --slice,
-/// or as a task of a Slurm job array (SLURM_ARRAY_TASK_ID), solves its part only; any
-/// number of them may share the folder, and `dataset merge` makes the dataset.
+/// written whole or not at all, and the bytes depend on the campaign alone. A campaign
+/// that asks for more `presses` than before takes over those that are solved. With
+/// --slice, or as a task of a Slurm job array (SLURM_ARRAY_TASK_ID), solves its part only;
+/// any number of them may share the folder, and `dataset merge` makes the dataset.
 #[derive(clap::Args)]
 #[command(
     after_help = "USR1 and TERM: store where each indentation stands at its next depth, and leave with exit code\n\

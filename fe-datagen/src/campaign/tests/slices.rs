@@ -42,6 +42,19 @@ fn slices_at_once_make_the_bytes_of_a_serial_run() {
     assert!(files(folder.path()) == serial());
 }
 
+/// More presses than at first: those that are solved are taken over.
+#[test]
+fn a_campaign_is_gone_on_with_after_more_presses_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let fewer = CampaignSpec { presses: 4, test_fraction: 0.5, ..spec() };
+    part(&fewer, folder.path(), &slice(1, 1), Trouble::None).unwrap();
+    merge(&fewer, folder.path()).unwrap();
+    assert!(files(folder.path()) != serial());
+    let (report, _) = go(folder.path(), 1, Trouble::None).unwrap();
+    assert_eq!((report.solved, report.reused), (spec().presses - 4, 4));
+    assert!(files(folder.path()) == serial());
+}
+
 #[test]
 fn a_merge_with_holes_names_them_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
