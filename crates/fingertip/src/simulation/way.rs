@@ -14,8 +14,8 @@ const GUIDED: f64 = 2.0;
 const STEP_MAX_MM: f64 = 0.75;
 
 /// The same beside a guide, which goes there by shorter steps. Farther from its last equilibrium a
-/// body may find none, or one in which an element is crushed (a bar of 6 mm, pitched by 38 degrees,
-/// from rest to 2.2 mm: 8 minutes and J = .12; by way of 1.1 mm 71 s and J = .71).
+/// body may find none (a bar of 6 mm, pitched by 38 degrees, from rest to 2.2 mm: 40 indefinite
+/// tangents, 4 minutes, and no equilibrium; by way of 1.1 mm 71 s in all).
 const GUIDED_STEP_MAX_MM: f64 = 1.1;
 
 /// Least part of the guide's way that is tried at once where the whole leads to no equilibrium.
@@ -91,9 +91,12 @@ impl Way<'_> {
         let mut effort = guided.effort;
         let (mut gone, mut part) = (0.0, 1.0);
         let mut report = loop {
-            let depth_mm = from_mm + (gone + part) * (to_mm - from_mm);
+            let arrives = gone + part >= 1.0;
+            // The guide's own depth to the last bit, by which its course is found.
+            let depth_mm =
+                if arrives { to_mm } else { from_mm + (gone + part) * (to_mm - from_mm) };
             match solver.advance_from(self.fraction(depth_mm), guided.guess(solver, part)) {
-                Ok(mut report) if gone + part >= 1.0 => {
+                Ok(mut report) if arrives => {
                     // Not if the body had equilibria where the guide had none.
                     solver.take_course(&guided.solver);
                     let times = if part < 1.0 { 1.0 } else { GUIDED };
