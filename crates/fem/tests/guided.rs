@@ -7,8 +7,9 @@ use papilla_fem::element::ElementKind;
 use papilla_fem::solve::{Guess, Options, Solver};
 use papilla_fem::testing::squeezed_block;
 
-/// From a displacement nearby or a turned one, the equilibrium is that of the path; from elements
-/// inside out there is none, and the body stays as it was.
+/// From a displacement nearby, the equilibrium is that of the path. From a turned one, where tangent
+/// after tangent is indefinite, and from elements inside out the search is given up, and the body
+/// stays as it was.
 #[test]
 fn a_guess_leads_to_the_equilibrium_of_the_path() {
     let (problem, loading, _) = squeezed_block(ElementKind::Hex8, 3, 0.48).unwrap();
@@ -23,7 +24,7 @@ fn a_guess_leads_to_the_equilibrium_of_the_path() {
     let mut folded = due.clone();
     folded.reverse();
     let inverted: Vec<_> = due.iter().map(|u| u.map(|v| -1e3 * v)).collect();
-    for (guess, leads) in [(near, true), (folded, true), (inverted, false)] {
+    for (guess, leads) in [(near, true), (folded, false), (inverted, false)] {
         let mut solver = Solver::new(&problem, tight).unwrap();
         solver.start(loading.clone());
         let guess = Guess { displacement_mm: guess, dilatation: Vec::new() };
