@@ -143,7 +143,7 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
             assert!((1..=10).contains(&late), "{late} late frames");
             return;
         }
-        // One that is in time, by the clock of a machine that stood still, is no reason to leave.
+        // Where `slow` is in time, as it may be on a fast machine, there is no reason to leave.
         late += u32::from(header.status == FrameStatus::Late);
     }
     panic!("{late} late frames, and none by another tier");
