@@ -123,8 +123,8 @@ async fn a_damaged_ladder_is_named() {
     }
 }
 
-/// `slow` takes some hundred milliseconds, whatever its shipped time says: a calibration that was
-/// skipped may begin with it, and no more than ten frames are late before it is left.
+/// `slow` takes 48 ms on a busy machine, however quick its shipped time says it is: a calibration
+/// that was skipped may begin with it, and no more than ten frames are late before it is left.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_budget_is_kept_although_the_calibration_was_skipped() {
     let mut ladder = ladder();
@@ -132,7 +132,7 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
     ladder["rungs"][1] = rung("slow", Some("slow"), 1.0, 0.1);
     let service = with(&ladder, 0).await.unwrap();
     let mut socket = service.socket().await;
-    let ready = socket.open(hello_2(&json!({"budget_us": 20_000}))).await;
+    let ready = socket.open(hello_2(&json!({"budget_us": 5_000}))).await;
     assert_eq!((&ready["tier"], &ready["tier_names"]), (&json!("slow"), &json!(["quick", "slow"])));
     let mut late = 0;
     for sequence in 1..100 {
@@ -143,8 +143,8 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
             assert!((1..=10).contains(&late), "{late} late frames");
             return;
         }
-        // Where `slow` is in time, as it may be on a fast machine, there is no reason to leave.
-        late += u32::from(header.status == FrameStatus::Late);
+        assert_eq!(header.status, FrameStatus::Late, "by tier {tier}");
+        late += 1;
     }
     panic!("{late} late frames, and none by another tier");
 }
