@@ -273,7 +273,7 @@ def _maps(raster: Raster, functions: Functions, shard: dict[str, NDArray[Any]], 
     if raster.lattice is None:
         raise DatasetError("raster.npz does not say where pixels lie among cells")
     nodes, weights = raster.lattice.read(shard[CELL_PLACE], shard[CELL_NODES], functions)
-    points = (shard[name][:, nodes] * weights).sum(axis=2)
+    points = np.einsum("dnk,nk->dn", shard[name][:, nodes], weights)
     points = points.reshape(len(points), -1, len(raster.pixel))
     return raster.scattered(points.mean(axis=1, dtype=np.float64).clip(min=0.0).astype(np.float32))
 

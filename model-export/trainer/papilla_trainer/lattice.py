@@ -2,7 +2,7 @@
 
 Cells are rectangles of one lattice on the skin, halved where a contact asked for it, each with nine
 nodes. Where a pixel lies on the lattice is fixed (``raster.npz``), so a cell is found without a
-search.
+search: it is written into each of its squares.
 
 SED is read in the middle of a pixel. Pressure is the mean over a pixel: ridges and edges of contact
 are thinner than one, and the mean keeps the force.
@@ -30,6 +30,9 @@ SIDE_PX = 224
 
 # A place on the last row or column belongs to the cell before it.
 _BEFORE = 1e-3
+
+# Squares of the lattice for which memory is taken (shipped fingers have 2 million).
+_SQUARES_MAX = 1 << 27
 
 
 def quadratics(x: F64) -> F64:
@@ -88,24 +91,20 @@ class Lattice:
         return Lattice(np.tile(self.side, len(places)), np.concatenate(places))
 
     def _cells(self, place: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The cell of each point, -1 where none is: cells begin at multiples of their sizes."""
-        found = np.full(len(self.side), -1)
-        for back in ((0.0, 0.0), (_BEFORE, 0.0), (0.0, _BEFORE), (_BEFORE, _BEFORE)):
-            for size in np.unique(place[:, 3:5], axis=0):
-                left = np.flatnonzero(found < 0)
-                if not left.size:
-                    return found
-                at = np.maximum(self.place[left] - back, 0.0).astype(np.int64)
-                index = np.flatnonzero((place[:, 3:5] == size).all(axis=1))
-                own = _key(place[index, 0], place[index, 1:3])
-                order = np.argsort(own)
-                wanted = _key(self.side[left], at // size * size)
-                near = np.searchsorted(own[order], wanted).clip(max=len(own) - 1)
-                hit = own[order][near] == wanted
-                found[left[hit]] = index[order][near[hit]]
-        return found
-
-
-def _key(side: NDArray[np.int64], first: NDArray[np.int64]) -> NDArray[np.int64]:
-    """One number for a side, a row and a column (of at most 2^16 each)."""
-    return (side * 65536 + first[:, 0]) * 65536 + first[:, 1]
+        """The cell of each point, -1 where none is."""
+        end = place[:, 1:3] + place[:, 3:5]
+        sides = 1 + max(int(place[:, 0].max()), int(self.side.max()))
+        # Places at the end of the last cells are asked for too.
+        rows, columns = 1 + np.maximum(end.max(axis=0), self.place.max(axis=0).astype(np.int64))
+        if sides * rows * columns > _SQUARES_MAX:
+            raise DatasetError(f"cells lie on {sides} sides of {rows} by {columns} squares")
+        cell_of = np.full((sides, rows, columns), -1, dtype=np.int32)
+        for cell, (side, row, column, height, width) in enumerate(place.tolist()):
+            cell_of[side, row : row + height, column : column + width] = cell
+        at = self.place.astype(np.int64)
+        found = cell_of[self.side, at[:, 0], at[:, 1]]
+        for back in ((_BEFORE, 0.0), (0.0, _BEFORE), (_BEFORE, _BEFORE)):
+            left = np.flatnonzero(found < 0)
+            at = np.maximum(self.place[left] - back, 0.0).astype(np.int64)
+            found[left] = cell_of[self.side[left], at[:, 0], at[:, 1]]
+        return found.astype(np.int64)

@@ -43,6 +43,15 @@ def test_pressure_is_linear_between_neighbouring_nodes() -> None:
     assert np.allclose(weights.sum(axis=1), 1.0)
 
 
+def test_a_cell_far_from_the_finger_is_refused_before_memory_is_taken() -> None:
+    nodes, _ = _cells()
+    astray = PLACE.copy()
+    astray[2, 1:3] = 65_000
+    lattice = Lattice(np.ones(1, dtype=np.int64), np.array([[1.0, 1.0]]))
+    with pytest.raises(DatasetError, match="65005 by 65009 squares"):
+        lattice.read(astray, nodes, hats)
+
+
 def test_points_fill_a_pixel_and_stay_on_the_lattice() -> None:
     """The numbers of ``papilla_dataset``'s test: both read pressure at the same points."""
     row, column = np.divmod(np.arange(SIDE_PX**2), SIDE_PX)
