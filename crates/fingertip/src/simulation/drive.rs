@@ -3,7 +3,7 @@
 use super::body::{Body, SimulationError};
 use super::guide::Guided;
 use super::record::IncrementRecord;
-use super::way::{self, Way};
+use super::way::{Stops, Way};
 use crate::indenter::IndenterError;
 use crate::scene::Pose;
 use papilla_fem::contact::ContactRule;
@@ -217,13 +217,12 @@ impl Body {
         Course { refinement, energy_vs_work_max, from }: Course<'_>,
         visit: Watch<'_>,
     ) -> Result<(), SimulationError> {
-        let steps = match &guided {
-            Some(_) => way::guided_steps(depths_mm),
-            None => vec![1; depths_mm.len()],
+        let stops = match &guided {
+            Some(_) => Stops::guided(depths_mm),
+            None => Stops::stored(depths_mm),
         };
-        let stops_mm = way::stops_mm(depths_mm, &steps);
-        let way = Way { depths_mm: &stops_mm, refinement, graded: self.graded, energy_vs_work_max };
-        let mut stops = 0..stops_mm.len();
+        let graded = self.graded;
+        let way = Way { depths_mm: &stops.depths_mm, refinement, graded, energy_vs_work_max };
         let behind = match from {
             Some((behind, snapshot)) => {
                 solver.resume(snapshot)?;
@@ -231,13 +230,13 @@ impl Body {
             }
             None => 0,
         };
-        for stop in stops.by_ref().take(steps[..behind].iter().sum::<u32>() as usize) {
+        for stop in stops.between(0, behind) {
             guided = guided.and_then(|g| way.lead(g, stop));
         }
-        for (&depth_mm, &steps) in depths_mm.iter().zip(&steps).skip(behind) {
+        for (i, &depth_mm) in depths_mm.iter().enumerate().skip(behind) {
             let clock = Instant::now();
             let mut spent = StepReport::default();
-            for stop in stops.by_ref().take(steps as usize) {
+            for stop in stops.between(i, i + 1) {
                 let report = way.beside(&mut guided, solver, stop)?;
                 spent = StepReport {
                     effort: spent.effort.plus(&report.effort),

@@ -3,6 +3,7 @@
 use super::body::SimulationError;
 use super::guide::Guided;
 use papilla_fem::solve::{Effort, Mark, Solver, StepReport};
+use std::ops::Range;
 
 /// How much more of the work may be missed before it is mended where the force has the course of
 /// a guide: the coarse mesh errs most at first touch, and what it misses there does not grow.
@@ -35,11 +36,10 @@ impl Way<'_> {
         let depth_mm = self.depths_mm[i];
         let at = |source| SimulationError::Solve { depth_mm, source };
         let mut effort = Effort::default();
-        let mark = |solver: &Solver<'_>| self.energy_vs_work_max.map(|_| solver.mark());
-        let mut known: Vec<_> = mark(solver).into_iter().collect();
+        let mut known: Vec<_> = self.mark(solver).into_iter().collect();
         for between in path_mm(self.depths_mm, i, self.refinement, self.graded) {
             effort = effort.plus(&solver.advance_to(self.fraction(between)).map_err(at)?.effort);
-            known.extend(mark(solver));
+            known.extend(self.mark(solver));
         }
         let mut report = solver.advance_to(self.fraction(depth_mm)).map_err(at)?;
         report.effort = report.effort.plus(&effort);
@@ -86,8 +86,7 @@ impl Way<'_> {
     ) -> Result<StepReport, SimulationError> {
         let to_mm = self.depths_mm[i];
         let from_mm = if i == 0 { 0.0 } else { self.depths_mm[i - 1] };
-        let mark = |solver: &Solver<'_>| self.energy_vs_work_max.map(|_| solver.mark());
-        let mut known: Vec<_> = mark(solver).into_iter().collect();
+        let mut known: Vec<_> = self.mark(solver).into_iter().collect();
         let mut effort = guided.effort;
         let (mut gone, mut part) = (0.0, 1.0);
         let mut report = loop {
@@ -106,7 +105,7 @@ impl Way<'_> {
                 Ok(report) => {
                     gone += part;
                     effort = effort.plus(&report.effort);
-                    known.extend(mark(solver));
+                    known.extend(self.mark(solver));
                 }
                 Err(spent) => {
                     part *= 0.5;
@@ -127,6 +126,11 @@ impl Way<'_> {
         depth_mm / self.depths_mm.last().copied().unwrap_or(1.0)
     }
 
+    /// Where the body is, to mend work by; `None` if work is not mended.
+    fn mark(&self, solver: &Solver<'_>) -> Option<Mark> {
+        self.energy_vs_work_max.map(|_| solver.mark())
+    }
+
     fn mend(&self, solver: &mut Solver<'_>, known: Vec<Mark>, times: f64, report: &mut StepReport) {
         if let Some(limit) = self.energy_vs_work_max {
             report.mending = solver.mend_work(known, times * limit);
@@ -135,20 +139,40 @@ impl Way<'_> {
     }
 }
 
-/// In how many steps a body goes to each stored depth beside its guide.
-pub(super) fn guided_steps(depths_mm: &[f64]) -> Vec<u32> {
-    let before = std::iter::once(&0.0).chain(depths_mm);
-    let steps = |way_mm: f64| (way_mm / GUIDED_STEP_MAX_MM - 1e-9).ceil().max(1.0) as u32;
-    depths_mm.iter().zip(before).map(|(to, from)| steps(to - from)).collect()
+/// Depths at which a body stops on its way, the stored ones among them.
+pub(super) struct Stops {
+    /// Rising, mm.
+    pub depths_mm: Vec<f64>,
+    /// Stops up to each stored depth, itself included.
+    ends: Vec<usize>,
 }
 
-/// Depths at the ends of so many equal steps to each stored depth, mm.
-pub(super) fn stops_mm(depths_mm: &[f64], steps: &[u32]) -> Vec<f64> {
-    let before = std::iter::once(&0.0).chain(depths_mm);
-    let between = |((&to, &from), &n): ((&f64, &f64), &u32)| {
-        (1..n).map(move |k| from + f64::from(k) / f64::from(n) * (to - from)).chain([to])
-    };
-    depths_mm.iter().zip(before).zip(steps).flat_map(between).collect()
+impl Stops {
+    /// The stored depths alone, to which a body goes by itself.
+    pub(super) fn stored(depths_mm: &[f64]) -> Self {
+        Self { depths_mm: depths_mm.to_vec(), ends: (1..=depths_mm.len()).collect() }
+    }
+
+    /// Beside a guide: equal steps to each stored depth, none longer than [`GUIDED_STEP_MAX_MM`].
+    pub(super) fn guided(depths_mm: &[f64]) -> Self {
+        let mut stops = Self { depths_mm: Vec::new(), ends: Vec::new() };
+        let mut from = 0.0;
+        for &to in depths_mm {
+            let steps = ((to - from) / GUIDED_STEP_MAX_MM - 1e-9).ceil().max(1.0) as u32;
+            let between = (1..steps).map(|k| from + f64::from(k) / f64::from(steps) * (to - from));
+            stops.depths_mm.extend(between.chain([to]));
+            stops.ends.push(stops.depths_mm.len());
+            from = to;
+        }
+        stops
+    }
+
+    /// Stops from one stored depth, exclusive, to another, inclusive; stored depths are counted
+    /// from 1, and 0 is first touch.
+    pub(super) fn between(&self, from: usize, to: usize) -> Range<usize> {
+        let end = |stored: usize| stored.checked_sub(1).map_or(0, |i| self.ends[i]);
+        end(from)..end(to)
+    }
 }
 
 /// Depths between depth `i` and the one before it at which to find
@@ -194,13 +218,12 @@ mod tests {
                 }
             }
         }
-        let depths_mm = [1.0, 2.0, 4.4, 5.5];
-        let steps = guided_steps(&depths_mm);
-        assert_eq!(steps, [1, 1, 3, 1]);
-        let stops_mm = stops_mm(&depths_mm, &steps);
-        assert_eq!(stops_mm.len(), 6);
-        assert!(stops_mm.windows(2).all(|w| w[0] < w[1] && w[1] - w[0] < 1.1 + 1e-9));
-        assert!((stops_mm[3] - 3.6).abs() < 1e-12, "{stops_mm:?}");
+        let stops = Stops::guided(&[1.0, 2.0, 4.4, 5.5]);
+        let steps = [0, 1, 2, 3].map(|i| stops.between(i, i + 1).len());
+        assert_eq!((steps, stops.between(0, 4)), ([1, 1, 3, 1], 0..6));
+        assert!(stops.depths_mm.windows(2).all(|w| w[0] < w[1] && w[1] - w[0] < 1.1 + 1e-9));
+        assert!((stops.depths_mm[3] - 3.6).abs() < 1e-12, "{:?}", stops.depths_mm);
+        assert_eq!(Stops::stored(&[1.0, 4.4]).between(1, 2), 1..2);
         // A short step stays one.
         assert!(path_mm(&[0.75, 1.5], 1, 1, true).is_empty());
         assert_eq!(path_mm(&[0.75, 1.5], 1, 2, true).len(), 1);
