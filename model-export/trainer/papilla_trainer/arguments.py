@@ -53,6 +53,11 @@ Input `pressure_pa` and output `sed_j_per_m3` are float32 [1, 1, 224, 224] in ph
 scaling, the clamp at zero and the interface mask are inside the graph, and the file carries its
 atlas hash, effects, scales, training settings and held-out metrics as metadata."""
 
+_MEAN = """\
+Writes the mean of several runs' networks as one model: what each errs by itself partly cancels, for
+the time of all of them. The runs must have learnt the datasets given; the test indentations give
+the metrics."""
+
 _CHECK = """\
 Checks an exported model: legal ONNX with strict shape inference, plain operators, the interface
 and metadata that the engine expects, finite and non-negative output that is zero outside the
@@ -126,10 +131,22 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
     export.add_argument("--name", help="name of the model (default: the file's stem)")
     _weights_argument(export)
 
+    mean = command("mean", "write the mean of several runs as ONNX", _MEAN)
+    mean.add_argument("run_dirs", type=Path, nargs="+", metavar="RUN_DIR", help="of `train`")
+    _model_arguments(mean)
+
     check = command("check", "check an exported model", _CHECK)
     check.add_argument("model", type=Path, metavar="FILE.onnx")
     _dataset_argument(check)
-    check.add_argument("--run", dest="run_dir", type=Path, metavar="RUN_DIR")
+    check.add_argument(
+        "--run",
+        dest="run_dirs",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="RUN_DIR",
+        help="that it was exported from (again for each of a mean)",
+    )
     check.add_argument("--reference", type=Path, metavar="FILE.npz")
     check.add_argument("--samples", type=int, default=8, help="held-out samples (default 8)")
 
@@ -145,10 +162,14 @@ def make_parser(commands_to_run: dict[str, Command]) -> argparse.ArgumentParser:
     return parser
 
 
-def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
+def _model_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
     parser.add_argument("--onnx", type=Path, required=True, metavar="FILE")
     parser.add_argument("--name", help="name of the model (default: the file's stem)")
+
+
+def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
+    _model_arguments(parser)
     parser.add_argument("--rank", type=int, default=64, help="of the global part, even (64)")
     parser.add_argument(
         "--near", type=int, default=16, help="vertices of the stencil (16; 0: none)"

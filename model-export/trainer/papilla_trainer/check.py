@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import onnx
 import onnxruntime
+from torch import nn
 
 from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.dataset import Dataset
@@ -17,6 +18,7 @@ from papilla_trainer.errors import CheckError
 from papilla_trainer.evaluation import chosen_epoch, predict, served_model, spread
 from papilla_trainer.export import INPUT, OPSET, OUTPUT
 from papilla_trainer.files import write_atomic
+from papilla_trainer.mean import mean_model
 from papilla_trainer.metrics import F32
 from papilla_trainer.raster import SIDE_PX
 
@@ -76,9 +78,9 @@ class CheckReport:
 
 
 def check_model(
-    path: Path, dataset: Dataset, run_dir: Path | None, reference: Path | None, samples: int = 8
+    path: Path, dataset: Dataset, run_dirs: list[Path], reference: Path | None, samples: int = 8
 ) -> CheckReport:
-    """All checks; with ``run_dir`` also the comparison of ONNX Runtime with PyTorch."""
+    """All checks; with the runs that it is of also the comparison of ONNX Runtime with PyTorch."""
     try:
         data = path.read_bytes()
         model = onnx.load_from_string(data)
@@ -95,8 +97,8 @@ def check_model(
     _check_output(output, dataset, report)
     zero = session.run([OUTPUT], {INPUT: np.zeros_like(pressure[:1, None])})[0]
     report.zero_gives_zero = not zero.any()
-    if run_dir is not None:
-        _compare(run_dir, model, pressure, output, report)
+    if run_dirs:
+        _compare(run_dirs, model, pressure, output, report)
     if reference is not None and not report.failures:
         write_reference(reference, pressure, output)
         report.reference = str(reference)
@@ -168,16 +170,12 @@ def _check_output(output: F32, dataset: Dataset, report: CheckReport) -> None:
 
 
 def _compare(
-    run_dir: Path, model: onnx.ModelProto, pressure: F32, output: F32, report: CheckReport
+    run_dirs: list[Path], model: onnx.ModelProto, pressure: F32, output: F32, report: CheckReport
 ) -> None:
-    checkpoint = Checkpoint.load(run_dir)
-    training = {entry.key: entry.value for entry in model.metadata_props}["papilla.training"]
-    exported = json.loads(training)["epoch_chosen"]
-    matching = [w for w in ("best", "last") if chosen_epoch(checkpoint, w) == exported]
-    if not matching:
-        report.failures.append(f"epoch {exported} was exported, {run_dir} no longer holds it")
+    trained = _trained(run_dirs, model, report)
+    if trained is None:
         return
-    expected = predict(served_model(checkpoint, matching[0]), pressure)
+    expected = predict(trained, pressure)
     peaks = expected.max(axis=(1, 2))
     if not (peaks > 0).any():
         report.failures.append("the network answers zero on all held-out samples: train longer")
@@ -191,5 +189,21 @@ def _compare(
     report.require(
         difference <= TOLERANCE,
         f"ONNX Runtime and PyTorch differ by {difference:.1e} of the maximum "
-        f"(allowed {TOLERANCE:.0e}): was the model exported from another run than {run_dir}?",
+        f"(allowed {TOLERANCE:.0e}): was the model exported from another run than "
+        f"{' and '.join(map(str, run_dirs))}?",
     )
+
+
+def _trained(run_dirs: list[Path], model: onnx.ModelProto, report: CheckReport) -> nn.Module | None:
+    """The network of the weights that were exported; notes a failure where they are gone."""
+    props = {entry.key: entry.value for entry in model.metadata_props}
+    training = json.loads(props["papilla.training"])
+    if "mean_of" in training:
+        return mean_model(run_dirs)
+    checkpoint = Checkpoint.load(run_dirs[0])
+    exported = training["epoch_chosen"]
+    matching = [w for w in ("best", "last") if chosen_epoch(checkpoint, w) == exported]
+    if not matching:
+        report.failures.append(f"epoch {exported} was exported, {run_dirs[0]} no longer holds it")
+        return None
+    return served_model(checkpoint, matching[0])

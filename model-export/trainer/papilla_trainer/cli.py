@@ -1,4 +1,4 @@
-"""The command line: train, curve, evaluate, export, check, operator, half-space."""
+"""The command line: train, curve, evaluate, export, mean, check, operator, half-space."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     report = check_model(
         options.model,
         open_datasets(options.dataset),
-        options.run_dir,
+        options.run_dirs,
         options.reference,
         options.samples,
     )
@@ -138,6 +138,15 @@ def _check(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return vars(report), "\n".join(lines)
 
 
+def _mean(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    from papilla_trainer.joined import open_datasets
+    from papilla_trainer.mean import write_mean
+
+    datasets = open_datasets(options.dataset)
+    result = write_mean(options.run_dirs, datasets, options.onnx, options.name)
+    return result, _written_text(result)
+
+
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.joined import open_datasets
     from papilla_trainer.untrained import write_operator
@@ -151,7 +160,7 @@ def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
         options.onnx,
         options.name,
     )
-    return result, _untrained_text(result)
+    return result, _written_text(result)
 
 
 def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -166,7 +175,7 @@ def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     result = write_half_space(
         body, open_datasets(options.dataset), options.rank, options.near, options.onnx, options.name
     )
-    return result, _untrained_text(result)
+    return result, _written_text(result)
 
 
 def _require_rank(options: argparse.Namespace) -> None:
@@ -174,7 +183,7 @@ def _require_rank(options: argparse.Namespace) -> None:
         raise UsageError("--rank must be even and positive, --near not negative")
 
 
-def _untrained_text(result: dict[str, Any]) -> str:
+def _written_text(result: dict[str, Any]) -> str:
     from papilla_trainer.report import metrics_table
 
     table = _table(result["metrics"], metrics_table)
@@ -186,6 +195,7 @@ _COMMANDS: dict[str, Command] = {
     "curve": _curve,
     "evaluate": _evaluate,
     "export": _export,
+    "mean": _mean,
     "check": _check,
     "operator": _operator,
     "half-space": _half_space,

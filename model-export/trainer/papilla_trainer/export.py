@@ -96,7 +96,13 @@ def metadata(
     checkpoint: Checkpoint, metrics: dict[str, Any], name: str, weights: str
 ) -> dict[str, str]:
     """The ``metadata_props`` that engine and server read; every value is a string."""
-    served = checkpoint.served
+    network = TrainConfig(**checkpoint.config).spec.as_json()
+    training = training_record(checkpoint, weights)
+    return properties(checkpoint.served, name, network, training, metrics)
+
+
+def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
+    """How a run was trained."""
     config = TrainConfig(**checkpoint.config)
     training: dict[str, Any] = {
         "seed": config.seed,
@@ -124,7 +130,7 @@ def metadata(
     if config.operator is not None:
         training["start"] = "linear operator of the finger"
         training |= {"base_rate": config.base_rate, "dropout": config.dropout}
-    return properties(served, name, config.spec.as_json(), training, metrics)
+    return training
 
 
 def properties(

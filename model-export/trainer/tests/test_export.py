@@ -83,7 +83,7 @@ def test_export_is_reproducible_and_holds_no_path(
 def test_check_passes_and_writes_the_reference(
     model: Path, tiny: Dataset, run_dir: Path, tmp_path: Path
 ) -> None:
-    report = check_model(model, tiny, run_dir, tmp_path / "reference.npz")
+    report = check_model(model, tiny, [run_dir], tmp_path / "reference.npz")
     assert report.failures == []
     assert report.torch_difference_max is not None
     with np.load(tmp_path / "reference.npz") as arrays:
@@ -99,19 +99,19 @@ def test_check_finds_what_is_wrong(
     properties = {entry.key: entry.value for entry in graph.metadata_props}
     onnx.helper.set_model_props(graph, {**properties, "papilla.atlas_hash": "0" * 64})
     onnx.save(graph, str(tmp_path / "atlas.onnx"))
-    assert "atlas_hash" in check_model(tmp_path / "atlas.onnx", tiny, None, None).failures[0]
+    assert "atlas_hash" in check_model(tmp_path / "atlas.onnx", tiny, [], None).failures[0]
 
     graph = onnx.load(str(model))
     head = next(t for t in graph.graph.initializer if t.name.endswith("head.bias"))
     head.CopyFrom(onnx.numpy_helper.from_array(onnx.numpy_helper.to_array(head) + 0.5, head.name))
     onnx.save(graph, str(tmp_path / "weights.onnx"))
-    assert check_model(tmp_path / "weights.onnx", tiny, None, None).failures == []
-    assert "differ" in check_model(tmp_path / "weights.onnx", tiny, run_dir, None).failures[0]
+    assert check_model(tmp_path / "weights.onnx", tiny, [], None).failures == []
+    assert "differ" in check_model(tmp_path / "weights.onnx", tiny, [run_dir], None).failures[0]
 
     graph = onnx.load(str(model))
     graph.graph.node[-1].op_type = "Div"
     onnx.save(graph, str(tmp_path / "operator.onnx"))
-    assert "Div" in check_model(tmp_path / "operator.onnx", tiny, None, None).failures[0]
+    assert "Div" in check_model(tmp_path / "operator.onnx", tiny, [], None).failures[0]
 
 
 def test_metrics_of_other_weights_are_not_exported(

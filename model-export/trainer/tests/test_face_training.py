@@ -84,7 +84,7 @@ def test_only_training_presses_are_loaded(
 
 def test_the_exported_graph_is_the_network(tiny: Dataset, run_dir: Path, tmp_path: Path) -> None:
     model = export_run(run_dir, tmp_path / "face.onnx")
-    report = check_model(model, tiny, run_dir, None)
+    report = check_model(model, tiny, [run_dir], None)
     assert report.failures == []
     assert report.zero_gives_zero is True
     assert export_run(run_dir, tmp_path / "again" / "face.onnx").read_bytes() == model.read_bytes()
@@ -163,7 +163,7 @@ def test_large_constants_are_stored_small_and_lose_nothing(
     assert kinds == {onnx.TensorProto.FLOAT16, onnx.TensorProto.INT16}
     assert any("stencil" in i.name for i in stored)
     assert small.stat().st_size < plain.stat().st_size
-    assert check_model(small, tiny, run_dir, None).failures == []
+    assert check_model(small, tiny, [run_dir], None).failures == []
     pressure = tiny.load(tiny.test_ids).pressure_pa[0][None, None]
     answers = [
         onnxruntime.InferenceSession(str(path)).run(None, {"pressure_pa": pressure})[0]

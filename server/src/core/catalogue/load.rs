@@ -48,20 +48,15 @@ fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
 /// on; the name of that set.
 pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
     for tier in tiers.iter() {
-        if let Some(ms) = shipped_ms(ladder, tier) {
-            // A tier that goes on over a reload shares its times, which it has learnt here.
-            if Arc::strong_count(&tier.latency) == 1 {
-                tier.latency.expect(milliseconds(ms));
-            }
-        }
+        // A tier that goes on over a reload shares its times, which it has learnt here.
+        let ms = shipped_ms(ladder, tier).filter(|_| Arc::strong_count(&tier.latency) == 1);
+        ms.into_iter().for_each(|ms| tier.latency.expect(milliseconds(ms)));
     }
     let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
     let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
     let set = SET_NAMES.into_iter().find(complete)?;
     for tier in tiers.iter_mut() {
-        if let Some(error) = error(tier, set) {
-            tier.relative_l2_median = error;
-        }
+        tier.relative_l2_median = error(tier, set).unwrap_or(tier.relative_l2_median);
     }
     let ms = |tier: &Tier| shipped_ms(ladder, tier);
     let beats = |better: &Tier, tier: &Tier| {
@@ -70,9 +65,14 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
             && better.relative_l2_median < tier.relative_l2_median
             && better.renders(&tier.effects)
     };
-    let beaten: Vec<bool> =
-        tiers.iter().map(|tier| tiers.iter().any(|better| beats(better, tier))).collect();
-    tiers.iter_mut().zip(beaten).for_each(|(tier, beaten)| tier.for_comparison = beaten);
+    // FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
+    let knows_contact = |tier: &Tier| tier.card["training"].get("contact").is_some();
+    let any_knows = tiers.iter().any(knows_contact);
+    let is_narrow = |t: &Tier| any_knows && t.kind == Kind::Network && !knows_contact(t);
+    let wide = || tiers.iter().filter(|tier| !is_narrow(tier));
+    let unasked = |tier: &Tier| is_narrow(tier) || wide().any(|better| beats(better, tier));
+    let unasked: Vec<bool> = tiers.iter().map(unasked).collect();
+    tiers.iter_mut().zip(unasked).for_each(|(tier, unasked)| tier.for_comparison = unasked);
     Some(set.to_owned())
 }
 

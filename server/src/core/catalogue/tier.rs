@@ -34,7 +34,7 @@ pub(crate) struct Tier {
     pub(crate) relative_l2_median: f64,
     /// 95th percentile of that error on the card's own split.
     pub(crate) relative_l2_p95: f64,
-    /// Another tier is more accurate and no slower: no budget picks this one.
+    /// No budget picks it: another tier is better and no slower, or it learnt FE's pressure alone.
     pub(crate) for_comparison: bool,
     /// How long it takes here.
     pub(crate) latency: Arc<Latency>,

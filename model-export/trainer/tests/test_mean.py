@@ -1,0 +1,58 @@
+"""The mean of two runs as one model."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.cli import main
+from papilla_trainer.config import TrainConfig
+from papilla_trainer.dataset import Dataset
+from papilla_trainer.evaluation import predict, served_model
+from papilla_trainer.training import Trainer
+
+
+@pytest.fixture(scope="module")
+def runs(
+    tiny: Dataset, run_dir: Path, config: TrainConfig, tmp_path_factory: pytest.TempPathFactory
+) -> list[Path]:
+    other = tmp_path_factory.mktemp("other")
+    Trainer(tiny, replace(config, network="map-c2-k3-r4", seed=3), other).fit()
+    return [run_dir, other]
+
+
+def test_a_mean_lies_half_way_between_its_networks(
+    runs: list[Path], tiny: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, data = tmp_path / "mean.onnx", ["--dataset", str(tiny.directory), "--json"]
+    folders = [str(run) for run in runs]
+    assert main(["mean", *folders, "--onnx", str(made), *data]) == 0
+    assert json.loads(capsys.readouterr().out)["metrics"]["samples"] > 0
+    pressure = tiny.load(tiny.test_ids).pressure_pa
+    first, second = (predict(served_model(Checkpoint.load(run)), pressure) for run in runs)
+    assert np.abs(first - second).max() > 0.01 * first.max()
+    session = onnxruntime.InferenceSession(str(made), providers=["CPUExecutionProvider"])
+    for p, expected in zip(pressure, (first + second) / 2, strict=True):
+        (output,) = session.run(["sed_j_per_m3"], {"pressure_pa": p[None, None]})
+        assert np.abs(output[0, 0] - expected).max() <= 1e-5 * expected.max()
+    props = {entry.key: entry.value for entry in onnx.load(str(made)).metadata_props}
+    assert json.loads(props["papilla.network"])["kind"] == "mean"
+    assert [run["seed"] for run in json.loads(props["papilla.training"])["mean_of"]] == [7, 3]
+    both = [argument for folder in folders for argument in ("--run", folder)]
+    assert main(["check", str(made), *both, *data]) == 0
+    assert main(["check", str(made), *both[:2], *data]) == 1
+
+
+def test_a_mean_is_of_several_runs_of_the_same_dataset(
+    runs: list[Path], shipped: Dataset, tiny: Dataset, tmp_path: Path
+) -> None:
+    made = ["--onnx", str(tmp_path / "mean.onnx"), "--dataset"]
+    assert main(["mean", str(runs[0]), *made, str(tiny.directory)]) == 4
+    assert main(["mean", *map(str, runs), *made, str(shipped.directory)]) == 4
