@@ -67,25 +67,33 @@ fn a_model_of_a_millisecond_beats_the_published_network_in_every_figure_but_the_
     assert!(lost.iter().any(|(_, (lost, count))| all_but_peak(lost) && *count > 10), "{lost:?}");
 }
 
-/// What was asked for is missed but for the reference's 95th percentile and unseen shapes: 6 % in the
-/// median and 12 % at the 95th percentile, 10 % on unseen shapes. These limits hold what was reached
+/// What was asked for, 6 % in the median and 12 % at the 95th percentile, `large-maps` misses narrowly
+/// on held-out simulations (6.06 and 12.03 %) and in the reference's median (6.8 %); 10 % on unseen
+/// shapes is met. These limits hold what it and `large`, the best from poses, reached
 /// (docs/concepts/networks.md), so that none is lost.
 #[test]
-fn the_best_network_is_as_accurate_as_the_documents_say() {
+fn the_best_networks_are_as_accurate_as_the_documents_say() {
     let ladder = ladder();
     let best = best(&ladder);
-    let (indentations, shapes) = (errors(best, PRESSES), errors(best, SHAPES));
-    let reference = errors(best, "reference").relative_l2;
-    let far_field = indentations.far_field_relative_l2.unwrap();
-    for (what, value, limit) in [
-        ("the reference, median", reference.median, 0.076),
-        ("the reference, 95th percentile", reference.p95, 0.095),
-        ("held-out simulations, median", indentations.relative_l2.median, 0.092),
-        ("held-out simulations, 95th percentile", indentations.relative_l2.p95, 0.135),
-        ("shapes that no training saw, median", shapes.relative_l2.median, 0.1),
-        ("far field, median", far_field.median, 0.125),
+    assert_eq!(best.name, "large-maps");
+    let large = ladder.rungs.iter().find(|row| row.name == "large").unwrap();
+    for (row, limits) in [
+        (best, [0.07, 0.1, 0.063, 0.122, 0.075, 0.115]),
+        (large, [0.076, 0.095, 0.092, 0.135, 0.1, 0.125]),
     ] {
-        assert!(value <= limit, "{}: {what} is {value}, {limit} was reached", best.name);
+        let (indentations, shapes) = (errors(row, PRESSES), errors(row, SHAPES));
+        let reference = errors(row, "reference").relative_l2;
+        let reached = [
+            ("the reference, median", reference.median),
+            ("the reference, 95th percentile", reference.p95),
+            ("held-out simulations, median", indentations.relative_l2.median),
+            ("held-out simulations, 95th percentile", indentations.relative_l2.p95),
+            ("shapes that no training saw, median", shapes.relative_l2.median),
+            ("far field, median", indentations.far_field_relative_l2.unwrap().median),
+        ];
+        for ((what, value), limit) in reached.into_iter().zip(limits) {
+            assert!(value <= limit, "{}: {what} is {value}, {limit} was reached", row.name);
+        }
     }
     let nail_base = |row| errors(row, PRESSES).nail_base_error.map(|s: Spread| s.median).unwrap();
     assert!(nail_base(best) <= 0.25 * nail_base(baseline(&ladder)));
@@ -115,8 +123,10 @@ fn no_model_answers_what_is_no_density_and_no_pressure_gives_none() {
 #[test]
 fn every_trained_model_names_its_seed_and_its_time() {
     for row in ladder().rungs.iter().filter(|row| row.kind.is_network()) {
-        let training = &card(row.model.as_deref().unwrap())["training"];
-        assert!(training["seed"].is_u64() && training["seconds"].is_number(), "{}", row.name);
+        let training = card(row.model.as_deref().unwrap())["training"].take();
+        let runs = training["mean_of"].as_array().cloned().unwrap_or_else(|| vec![training]);
+        let is_named = |run: &Value| run["seed"].is_u64() && run["seconds"].is_number();
+        assert!(runs.iter().all(is_named), "{}", row.name);
     }
 }
 

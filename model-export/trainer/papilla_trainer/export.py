@@ -68,10 +68,24 @@ def to_onnx(model: nn.Module) -> onnx.ModelProto:
             do_constant_folding=True,
         )
     graph = onnx.load_from_string(buffer.getvalue())
+    _name_copies_alike(graph)
     _store_small(graph)
     graph.producer_name = "papilla_trainer"
     graph.producer_version = __version__
     return graph
+
+
+def _name_copies_alike(model: onnx.ModelProto) -> None:
+    """Constants that several networks of a mean have in common stand there once, by one name."""
+    copies = {n.output[0]: n.input[0] for n in model.graph.node if n.op_type == "Identity"}
+    nodes = [node for node in model.graph.node if node.op_type != "Identity"]
+    for node in nodes:
+        for place, name in enumerate(node.input):
+            while name in copies:
+                name = copies[name]
+            node.input[place] = name
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
 
 
 def _store_small(model: onnx.ModelProto) -> None:
