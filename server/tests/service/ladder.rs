@@ -152,25 +152,30 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
 /// `quick` is the more accurate of FE's pressure, the only one that it learnt.
 #[tokio::test(flavor = "multi_thread")]
 async fn a_network_that_learnt_no_pressure_of_contact_is_taken_by_name_alone() {
-    let models = model_folder();
-    let path = models.path().join("slow.json");
-    let mut card: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
-    card["training"]["contact"] = json!(["presses.npz"]);
-    write(models.path(), "slow.json", card.to_string().as_bytes());
     let mut ladder = ladder();
     // As fast, it would make `slow` one for comparison if it were for everybody.
     ladder["rungs"][1] = rung("slow", Some("slow"), 4.0, 0.02);
-    write(models.path(), "ladder.json", ladder.to_string().as_bytes());
-    let service = Service::on(models, |config: &mut Config| config.calibration_ms = 0);
-    let service = service.await.unwrap();
-    let tiers = service.json("/v1/tiers").await;
-    let flags = [0, 1].map(|tier| tiers["tiers"][tier]["for_comparison"].clone());
-    assert_eq!(flags, [json!(true), json!(false)]);
-    for (asked, answered) in
-        [(json!({"budget_us": 60_000_000}), "slow"), (json!({"tier": "quick"}), "quick")]
-    {
-        let mut socket = service.socket().await;
-        assert_eq!(socket.open(hello(&asked)).await["tier"], answered);
+    for ladder in [Some(ladder), None] {
+        let models = model_folder();
+        let path = models.path().join("slow.json");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut card: Value = serde_json::from_str(&text).unwrap();
+        card["training"]["contact"] = json!(["presses.npz"]);
+        write(models.path(), "slow.json", card.to_string().as_bytes());
+        if let Some(ladder) = &ladder {
+            write(models.path(), "ladder.json", ladder.to_string().as_bytes());
+        }
+        let service = Service::on(models, |config: &mut Config| config.calibration_ms = 0);
+        let service = service.await.unwrap();
+        let tiers = service.json("/v1/tiers").await;
+        let flags = [0, 1].map(|tier| tiers["tiers"][tier]["for_comparison"].clone());
+        assert_eq!(flags, [json!(true), json!(false)], "{ladder:?}");
+        for (asked, answered) in
+            [(json!({"budget_us": 60_000_000}), "slow"), (json!({"tier": "quick"}), "quick")]
+        {
+            let mut socket = service.socket().await;
+            assert_eq!(socket.open(hello(&asked)).await["tier"], answered);
+        }
     }
 }
 

@@ -45,8 +45,14 @@ fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
 }
 
 /// Gives the tiers the shipped times, and the errors of the first set that all were measured
-/// on; the name of that set.
-pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
+/// on, and marks those that no budget picks; the name of that set.
+pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<String> {
+    // FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
+    let knows_contact = |tier: &Tier| tier.card["training"].get("contact").is_some();
+    let any_knows = tiers.iter().any(knows_contact);
+    let is_narrow = |t: &Tier| any_knows && t.kind == Kind::Network && !knows_contact(t);
+    tiers.iter_mut().for_each(|tier| tier.for_comparison = is_narrow(tier));
+    let ladder = ladder?;
     for tier in tiers.iter() {
         // A tier that goes on over a reload shares its times, which it has learnt here.
         let ms = shipped_ms(ladder, tier).filter(|_| Arc::strong_count(&tier.latency) == 1);
@@ -60,19 +66,13 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: &Ladder) -> Option<String> {
     }
     let ms = |tier: &Tier| shipped_ms(ladder, tier);
     let beats = |better: &Tier, tier: &Tier| {
-        let is_as_fast = ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b);
-        is_as_fast
+        ms(better).zip(ms(tier)).is_some_and(|(a, b)| a <= MARGIN * b)
             && better.relative_l2_median < tier.relative_l2_median
             && better.renders(&tier.effects)
     };
-    // FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
-    let knows_contact = |tier: &Tier| tier.card["training"].get("contact").is_some();
-    let any_knows = tiers.iter().any(knows_contact);
-    let is_narrow = |t: &Tier| any_knows && t.kind == Kind::Network && !knows_contact(t);
-    let wide = || tiers.iter().filter(|tier| !is_narrow(tier));
-    let unasked = |tier: &Tier| is_narrow(tier) || wide().any(|better| beats(better, tier));
-    let unasked: Vec<bool> = tiers.iter().map(unasked).collect();
-    tiers.iter_mut().zip(unasked).for_each(|(tier, unasked)| tier.for_comparison = unasked);
+    let wide = || tiers.iter().filter(|tier| !tier.for_comparison);
+    let beaten: Vec<_> = tiers.iter().map(|tier| wide().any(|t| beats(t, tier))).collect();
+    tiers.iter_mut().zip(beaten).for_each(|(tier, beaten)| tier.for_comparison |= beaten);
     Some(set.to_owned())
 }
 

@@ -187,7 +187,7 @@ impl Catalogue {
         };
         let states = golden::States { replay: &replay, skin: &skin, interface: &interface };
         loading.hold_to_golden_answers(states, &mut tiers, assets)?;
-        let judged_on = ladder.as_ref().and_then(|ladder| judge(&mut tiers, ladder));
+        let judged_on = judge(&mut tiers, ladder.as_ref());
         let ladder_json = serde_json::to_string(&ladder).map_err(|e| bad("ladder.json", &e))?;
         let overhead = Overhead::default();
         Ok(Self {
