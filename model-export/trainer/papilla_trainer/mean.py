@@ -36,6 +36,14 @@ def mean_model(run_dirs: list[Path]) -> nn.Module:
     return MeanModel([served_model(Checkpoint.load(run)) for run in run_dirs]).eval()
 
 
+def mean_record(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """How a mean was trained. It knows contact's pressure if all of its runs do."""
+    record: dict[str, Any] = {"mean_of": runs}
+    if all("contact" in run for run in runs):
+        record["contact"] = runs[0]["contact"]
+    return record
+
+
 def write_mean(
     run_dirs: list[Path], dataset: Dataset, out: Path, name: str | None
 ) -> dict[str, Any]:
@@ -55,7 +63,7 @@ def write_mean(
         "kind": "mean",
         "of": [TrainConfig(**checkpoint.config).spec.as_json() for checkpoint in checkpoints],
     }
-    training = {"mean_of": [training_record(checkpoint, "best") for checkpoint in checkpoints]}
+    training = mean_record([training_record(checkpoint, "best") for checkpoint in checkpoints])
     props = properties(checkpoints[0].served, name or out.stem, network, training, metrics)
     write_model(to_onnx(model), props, out)
     return {"model": str(out), "bytes": out.stat().st_size, "metrics": metrics}

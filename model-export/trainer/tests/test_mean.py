@@ -16,6 +16,7 @@ from papilla_trainer.cli import main
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.evaluation import predict, served_model
+from papilla_trainer.mean import mean_record
 from papilla_trainer.training import Trainer
 
 
@@ -56,3 +57,9 @@ def test_a_mean_is_of_several_runs_of_the_same_dataset(
     made = ["--onnx", str(tmp_path / "mean.onnx"), "--dataset"]
     assert main(["mean", str(runs[0]), *made, str(tiny.directory)]) == 4
     assert main(["mean", *map(str, runs), *made, str(shipped.directory)]) == 4
+
+
+def test_a_mean_knows_the_pressure_of_contact_if_all_of_its_networks_do() -> None:
+    knows, other = {"seed": 1, "contact": ["a.npz"]}, {"seed": 2}
+    assert mean_record([knows, knows])["contact"] == ["a.npz"]
+    assert "contact" not in mean_record([knows, other])
