@@ -198,9 +198,10 @@ def _trained(run_dirs: list[Path], model: onnx.ModelProto, report: CheckReport) 
     """The network of the weights that were exported; notes a failure where they are gone."""
     props = {entry.key: entry.value for entry in model.metadata_props}
     training = json.loads(props["papilla.training"])
+    checkpoints = [Checkpoint.load(run) for run in run_dirs]
     if "mean_of" in training:
-        return mean_model(run_dirs)
-    checkpoint = Checkpoint.load(run_dirs[0])
+        return mean_model(checkpoints)
+    checkpoint = checkpoints[0]
     exported = training["epoch_chosen"]
     matching = [w for w in ("best", "last") if chosen_epoch(checkpoint, w) == exported]
     if not matching:

@@ -31,9 +31,9 @@ class MeanModel(nn.Module):
         return total * (1.0 / len(self.models))
 
 
-def mean_model(run_dirs: list[Path]) -> nn.Module:
+def mean_model(checkpoints: list[Checkpoint]) -> nn.Module:
     """The model as it is exported, on the CPU."""
-    return MeanModel([served_model(Checkpoint.load(run)) for run in run_dirs]).eval()
+    return MeanModel([served_model(checkpoint) for checkpoint in checkpoints]).eval()
 
 
 def mean_record(runs: list[dict[str, Any]]) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def write_mean(
     for run, checkpoint in zip(run_dirs, checkpoints, strict=True):
         if checkpoint.served.dataset_sha256 != dataset.dataset_sha256:
             raise RunError(f"{run} was trained on another dataset than {dataset.directory}")
-    model = mean_model(run_dirs)
+    model = mean_model(checkpoints)
     metrics, _ = measure(model, dataset)
     network = {
         "kind": "mean",

@@ -44,8 +44,7 @@ fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
     ladder.rung_of(&tier.name)?.time_ms_in(tier.model.backend())
 }
 
-/// Gives the tiers the shipped times, and the errors of the first set that all were measured
-/// on, and marks those that no budget picks; the name of that set.
+/// Gives tiers the shipped times and errors, marks what no budget picks; the set they are judged on.
 pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<String> {
     // FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
     let knows_contact = |tier: &Tier| tier.card["training"].get("contact").is_some();
@@ -55,8 +54,9 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
     let ladder = ladder?;
     for tier in tiers.iter() {
         // A tier that goes on over a reload shares its times, which it has learnt here.
-        let ms = shipped_ms(ladder, tier).filter(|_| Arc::strong_count(&tier.latency) == 1);
-        ms.into_iter().for_each(|ms| tier.latency.expect(milliseconds(ms)));
+        if let (Some(ms), 1) = (shipped_ms(ladder, tier), Arc::strong_count(&tier.latency)) {
+            tier.latency.expect(milliseconds(ms));
+        }
     }
     let error = |tier: &Tier, set: &str| ladder.rung_of(&tier.name)?.relative_l2(set);
     let complete = |set: &&str| tiers.iter().all(|tier| error(tier, set).is_some());
