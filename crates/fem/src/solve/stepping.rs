@@ -144,7 +144,7 @@ impl<'a> Solver<'a> {
         };
         let (indenter, from) = (indenter.clone(), start.state.fraction);
         let doubtful = |work: &Work| {
-            work.doubtful(&indenter, from).filter(|d| d.relative > relative).map(|d| d.middle)
+            work.doubtful(&indenter, from).filter(|d| d.relative > relative).map(|d| d.fraction)
         };
         if doubtful(&self.work).is_none() {
             return Effort::default();
@@ -153,18 +153,21 @@ impl<'a> Solver<'a> {
         let mut known: Vec<State> = known.into_iter().map(|m| m.state).collect();
         known.push(end.state.clone());
         for _ in 0..PROBES_MAX {
-            let Some(middle) = doubtful(&self.work) else { break };
-            let right = known.partition_point(|s| s.fraction < middle);
+            let Some(fraction) = doubtful(&self.work) else { break };
+            let right = known.partition_point(|s| s.fraction < fraction);
             self.before = Some(known[right - 1].clone());
             self.state = known[right].clone();
-            if let Err(cause) = self.try_step(middle) {
-                tracing::debug!(middle, %cause, "no equilibrium to mend the work with");
+            if let Err(cause) = self.try_step(fraction) {
+                tracing::debug!(fraction, %cause, "no equilibrium to mend the work with");
                 break;
             }
             known.insert(right, self.state.clone());
         }
         (self.state, self.before, self.newton.current) = (end.state, end.before, current);
-        self.newton.effort.since(&first)
+        let left = self.work.doubtful(&indenter, from).map_or(f64::NAN, |d| d.relative);
+        let effort = self.newton.effort.since(&first);
+        tracing::debug!(from, left, iterations = effort.newton_iterations, "work mended");
+        effort
     }
 
     fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {

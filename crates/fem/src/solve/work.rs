@@ -26,13 +26,16 @@ struct Found {
     /// Force along the travel, N.
     force_n: f64,
     stored_mj: f64,
+    /// Whether force and energy are another body's, scaled to this one's.
+    is_scaled: bool,
 }
 
 /// A part of a straight path whose energy and work part the most.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Doubtful {
-    /// Load fraction of its middle.
-    pub middle: f64,
+    /// Load fraction at which an equilibrium mends it: that of an end which is another body's,
+    /// else its middle.
+    pub fraction: f64,
     /// What energy and work of the whole path part by, over the work.
     pub relative: f64,
 }
@@ -51,8 +54,7 @@ impl Work {
                 self.straight.push(Found::default());
             }
             let force_n = (0..3).map(|i| force[i] * direction[i]).sum();
-            let at = self.straight.partition_point(|f| f.fraction < fraction);
-            self.straight.insert(at, Found { fraction, force_n, stored_mj });
+            self.insert(Found { fraction, force_n, stored_mj, is_scaled: false });
             return;
         }
         let offset = indenter.offset_mm(fraction);
@@ -61,6 +63,41 @@ impl Work {
             (0..3).map(|i| 0.5 * (before[i] + force[i]) * (offset[i] - from[i])).sum::<f64>();
         self.largest_mj = self.largest_mj.max(self.sum_mj.abs());
         self.last = (offset, force);
+    }
+
+    /// Puts an equilibrium of a straight path in its place. Where another body's stood, those beside
+    /// it are scaled by what it was off, linearly to nothing at this body's next equilibria.
+    fn insert(&mut self, own: Found) {
+        let at = self.straight.partition_point(|f| f.fraction < own.fraction);
+        let Some(scaled) = self.straight.get(at).filter(|f| f.fraction <= own.fraction).copied()
+        else {
+            self.straight.insert(at, own);
+            return;
+        };
+        self.straight[at] = own;
+        let off = [own.force_n / scaled.force_n, own.stored_mj / scaled.stored_mj];
+        if !off.iter().all(|o| o.is_finite()) {
+            return;
+        }
+        let correct = |f: &mut Found, part: f64| {
+            f.force_n *= 1.0 + part * (off[0] - 1.0);
+            f.stored_mj *= 1.0 + part * (off[1] - 1.0);
+        };
+        let (left, right) = self.straight.split_at_mut(at);
+        let first = left.iter().rposition(|f| !f.is_scaled).unwrap_or(0);
+        let from = left[first].fraction;
+        for f in &mut left[first + 1..] {
+            // At rest nothing is known to be right.
+            let part = if first == 0 { 1.0 } else { (f.fraction - from) / (own.fraction - from) };
+            correct(f, part);
+        }
+        let right = &mut right[1..];
+        let last = right.iter().position(|f| !f.is_scaled).unwrap_or(0);
+        for k in 0..last {
+            let part =
+                (right[last].fraction - right[k].fraction) / (right[last].fraction - own.fraction);
+            correct(&mut right[k], part);
+        }
     }
 
     /// Work, mJ. On a straight path the force history is integrated with powers of the way that
@@ -101,7 +138,7 @@ impl Work {
                     near + part * (end[k] - near)
                 });
                 let (force_n, stored_mj) = (force * g.force_n, stored * g.stored_mj);
-                Found { fraction: g.fraction, force_n, stored_mj }
+                Found { fraction: g.fraction, force_n, stored_mj, is_scaled: true }
             })
             .collect::<Vec<_>>();
         self.straight.splice(at..at, between);
@@ -120,8 +157,10 @@ impl Work {
         let (a, b) = (0..work.len())
             .filter(|&i| self.straight[i].fraction >= from)
             .max_by(|&i, &j| miss(i).total_cmp(&miss(j)))
-            .map(|i| (self.straight[i].fraction, self.straight[i + 1].fraction))?;
-        Some(Doubtful { middle: 0.5 * (a + b), relative: ((stored - total) / total).abs() })
+            .map(|i| (self.straight[i], self.straight[i + 1]))?;
+        let middle = 0.5 * (a.fraction + b.fraction);
+        let fraction = [b, a].iter().find(|f| f.is_scaled).map_or(middle, |f| f.fraction);
+        Some(Doubtful { fraction, relative: ((stored - total) / total).abs() })
     }
 
     fn pieces(&self) -> Vec<f64> {
@@ -222,7 +261,7 @@ mod tests {
         let before = work.doubtful(&straight, 0.0).unwrap();
         assert!(before.relative > 5e-3, "{before:?}");
         for _ in 0..6 {
-            let x = work.doubtful(&straight, 0.0).unwrap().middle;
+            let x = work.doubtful(&straight, 0.0).unwrap().fraction;
             work.add(&straight, x, [0.0, 0.0, force(x)], energy(x));
         }
         let after = work.doubtful(&straight, 0.0).unwrap();
@@ -256,6 +295,37 @@ mod tests {
         let (found, due) = (own.total_mj(&straight), due.total_mj(&straight));
         assert!((found / due - 1.0).abs() < 1e-12, "{found} {due}");
         assert_eq!(own.straight.len(), way.len() + 1);
+    }
+
+    /// A guide that errs most at first touch: what stands in its place is this body's own, so that
+    /// energy and work meet after a few equilibria.
+    #[test]
+    fn a_guides_course_that_is_off_is_mended_where_the_guide_was() {
+        let force = |x: f64| x.powf(1.5) * (1.2 * x).exp();
+        let n = 4000;
+        let energy = |x: f64| {
+            let h = x / f64::from(n);
+            (0..n).map(|i| force((f64::from(i) + 0.5) * h) * h).sum::<f64>()
+        };
+        let off = |x: f64| 1.0 + 0.3 * (-8.0 * x).exp();
+        let ball = Arc::new(Sphere { radius_mm: 1.0 });
+        let start = Placement::turned(0.0, 0.0, 0.0, [0.0; 3]);
+        let straight = MovingIndenter::straight(ball, start, [0.0, 0.0, 1.0]);
+        let mut guide = Work::default();
+        for x in [0.03, 0.08, 0.16, 0.25] {
+            guide.add(&straight, x, [0.0, 0.0, off(x) * force(x)], off(x) * energy(x));
+        }
+        let mut own = Work::default();
+        own.add(&straight, 0.25, [0.0, 0.0, force(0.25)], energy(0.25));
+        own.take_course(&guide);
+        let relative = |own: &Work| own.doubtful(&straight, 0.0).unwrap().relative;
+        let before = relative(&own);
+        for _ in 0..3 {
+            let x = own.doubtful(&straight, 0.0).unwrap().fraction;
+            own.add(&straight, x, [0.0, 0.0, force(x)], energy(x));
+        }
+        assert!(relative(&own) < 0.1 * before, "{before} {}", relative(&own));
+        assert!(own.straight.len() <= 6, "{}", own.straight.len());
     }
 
     #[test]
