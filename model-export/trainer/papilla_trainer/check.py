@@ -200,7 +200,7 @@ def _trained(run_dirs: list[Path], model: onnx.ModelProto, report: CheckReport) 
     training = json.loads(props["papilla.training"])
     checkpoints = [Checkpoint.load(run) for run in run_dirs]
     if "mean_of" in training:
-        return mean_model(checkpoints)
+        return mean_model(checkpoints, training.get("finer", {}).get("factor", 1.0))
     checkpoint = checkpoints[0]
     exported = training["epoch_chosen"]
     matching = [w for w in ("best", "last") if chosen_epoch(checkpoint, w) == exported]

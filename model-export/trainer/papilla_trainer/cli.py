@@ -143,8 +143,10 @@ def _mean(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from papilla_trainer.mean import write_mean
 
     datasets = open_datasets(options.dataset)
-    result = write_mean(options.run_dirs, datasets, options.onnx, options.name)
-    return result, _written_text(result)
+    finer = options.finer and open_datasets([options.finer])
+    result = write_mean(options.run_dirs, datasets, finer, options.onnx, options.name)
+    factor = f"multiplied by {result['factor']:.4f}\n" if finer else ""
+    return result, factor + _written_text(result)
 
 
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:

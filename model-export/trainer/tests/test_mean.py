@@ -16,7 +16,7 @@ from papilla_trainer.cli import main
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.evaluation import predict, served_model
-from papilla_trainer.mean import mean_record
+from papilla_trainer.mean import MeanModel, fitted_factor, mean_record
 from papilla_trainer.training import Trainer
 
 
@@ -49,6 +49,23 @@ def test_a_mean_lies_half_way_between_its_networks(
     both = [argument for folder in folders for argument in ("--run", folder)]
     assert main(["check", str(made), *both, *data]) == 0
     assert main(["check", str(made), *both[:2], *data]) == 1
+
+
+def test_a_finer_mesh_puts_a_mean_right_by_one_factor(
+    runs: list[Path], tiny: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, folder = tmp_path / "mean.onnx", str(tiny.directory)
+    folders, data = [str(run) for run in runs], ["--dataset", folder]
+    assert main(["mean", *folders, "--onnx", str(made), *data, "--finer", folder, "--json"]) == 0
+    factor = json.loads(capsys.readouterr().out)["factor"]
+    models = [served_model(Checkpoint.load(run)) for run in runs]
+    assert fitted_factor(MeanModel(models, factor).eval(), tiny) == pytest.approx(1.0, rel=1e-5)
+    assert fitted_factor(MeanModel(models, 0.5).eval(), tiny) == pytest.approx(2 * factor)
+    props = {entry.key: entry.value for entry in onnx.load(str(made)).metadata_props}
+    finer = json.loads(props["papilla.training"])["finer"]
+    assert finer == {"dataset_sha256": tiny.dataset_sha256, "factor": factor}
+    both = [argument for run in folders for argument in ("--run", run)]
+    assert main(["check", str(made), *both, *data]) == 0
 
 
 def test_a_mean_is_of_several_runs_of_the_same_dataset(
