@@ -145,8 +145,20 @@ def _mean(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     datasets = open_datasets(options.dataset)
     finer = options.finer and open_datasets([options.finer])
     result = write_mean(options.run_dirs, datasets, finer, options.onnx, options.name)
-    factor = f"multiplied by {result['factor']:.4f}\n" if finer else ""
-    return result, factor + _written_text(result)
+    return result, _finer_text(result.get("finer")) + _written_text(result)
+
+
+def _finer_text(found: dict[str, Any] | None) -> str:
+    if found is None:
+        return ""
+    plain, corrected = (
+        f"{100 * of['median']:.2f} / {100 * of['p95']:.2f} %"
+        for of in (found["relative_l2_plain"], found["relative_l2_corrected"])
+    )
+    return (
+        f"multiplied by {found['factor']:.4f}: {plain} (median / p95) off {found['samples']} "
+        f"samples of the finer mesh, {corrected} each with the factor of the others\n"
+    )
 
 
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:

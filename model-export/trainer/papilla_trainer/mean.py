@@ -6,6 +6,7 @@ finer one tell by which factor its SED is off for the same pressure, and the mea
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,31 +43,57 @@ def mean_model(checkpoints: list[Checkpoint], factor: float = 1.0) -> nn.Module:
     return MeanModel([served_model(checkpoint) for checkpoint in checkpoints], factor).eval()
 
 
-def fitted_factor(model: nn.Module, finer: Dataset) -> float:
-    """What brings a model's answers closest to the SED of all samples of a finer mesh.
+@dataclass(frozen=True)
+class Correction:
+    """What brings a model's answers closest to the SED of a finer mesh, and what that is worth."""
 
-    The median over samples of ``p . t / p . p``, so that no single one decides.
+    dataset_sha256: str
+    factor: float
+    samples: int
+    relative_l2_plain: dict[str, float]
+    relative_l2_corrected: dict[str, float]
+    """Of each sample with the factor of the others."""
+
+
+def correction(model: nn.Module, finer: Dataset) -> Correction:
+    """From all samples of a finer mesh; of one sample the factor is ``p . t / p . p``.
+
+    The median of them decides, so that no single one does.
     """
     maps = finer.load(finer.train_ids + finer.test_ids)
     inside = finer.interface.mask() > 0
-    factors = []
+    pairs = []
     for pressure, truth in zip(maps.pressure_pa, maps.sed_j_per_m3, strict=True):
         t = truth[inside].astype(np.float64)
         p = predict(model, pressure[None])[0][inside].astype(np.float64)
         if t.any() and p.any():
-            factors.append(float(p @ t) / float(p @ p))
-    if not factors:
-        raise DatasetError(f"{finer.directory}: no sample has both SED and an answer of the mean")
-    return float(np.median(factors))
+            pairs.append((p, t))
+    if len(pairs) < 2:
+        raise DatasetError(f"{finer.directory}: fewer than two samples with SED: nothing to fit")
+    factors = np.array([(p @ t) / (p @ p) for p, t in pairs])
+    others = [float(np.median(np.delete(factors, i))) for i in range(len(pairs))]
+
+    def spread(by: list[float]) -> dict[str, float]:
+        errors = [
+            np.linalg.norm(f * p - t) / np.linalg.norm(t)
+            for f, (p, t) in zip(by, pairs, strict=True)
+        ]
+        return {"median": float(np.median(errors)), "p95": float(np.percentile(errors, 95.0))}
+
+    return Correction(
+        dataset_sha256=finer.dataset_sha256,
+        factor=float(np.median(factors)),
+        samples=len(pairs),
+        relative_l2_plain=spread([1.0] * len(pairs)),
+        relative_l2_corrected=spread(others),
+    )
 
 
-def mean_record(
-    runs: list[dict[str, Any]], finer: Dataset | None = None, factor: float = 1.0
-) -> dict[str, Any]:
+def mean_record(runs: list[dict[str, Any]], finer: Correction | None = None) -> dict[str, Any]:
     """How a mean was trained. It knows contact's pressure if all of its runs do."""
     record: dict[str, Any] = {"mean_of": runs}
     if finer is not None:
-        record["finer"] = {"dataset_sha256": finer.dataset_sha256, "factor": factor}
+        record["finer"] = asdict(finer)
     if all("contact" in run for run in runs):
         record["contact"] = runs[0]["contact"]
     return record
@@ -77,7 +104,7 @@ def write_mean(
 ) -> dict[str, Any]:
     """Write the mean of the runs' networks to ``out``; returns its test errors.
 
-    All of them must have learnt ``dataset``; ``finer`` puts the mean right, see `fitted_factor`.
+    All of them must have learnt ``dataset``; ``finer`` puts the mean right, see `correction`.
     """
     if len(run_dirs) < 2:
         raise RunError("a mean is of two runs or more: use `export` for one")
@@ -87,15 +114,16 @@ def write_mean(
             raise RunError(f"{run} was trained on another dataset than {dataset.directory}")
     if finer is not None and finer.atlas_hash != dataset.atlas_hash:
         raise DatasetError(f"{finer.directory}: of another atlas than {dataset.directory}")
-    factor = 1.0 if finer is None else fitted_factor(mean_model(checkpoints), finer)
-    model = mean_model(checkpoints, factor)
+    found = finer and correction(mean_model(checkpoints), finer)
+    model = mean_model(checkpoints, found.factor if found else 1.0)
     metrics, _ = measure(model, dataset)
     network = {
         "kind": "mean",
         "of": [TrainConfig(**checkpoint.config).spec.as_json() for checkpoint in checkpoints],
     }
     runs = [training_record(checkpoint, "best") for checkpoint in checkpoints]
-    training = mean_record(runs, finer, factor)
+    training = mean_record(runs, found)
     props = properties(checkpoints[0].served, name or out.stem, network, training, metrics)
     write_model(to_onnx(model), props, out)
-    return {"model": str(out), "bytes": out.stat().st_size, "factor": factor, "metrics": metrics}
+    result = {"model": str(out), "bytes": out.stat().st_size, "metrics": metrics}
+    return {**result, "finer": training["finer"]} if found else result

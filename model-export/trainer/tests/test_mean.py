@@ -16,7 +16,7 @@ from papilla_trainer.cli import main
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.evaluation import predict, served_model
-from papilla_trainer.mean import MeanModel, fitted_factor, mean_record
+from papilla_trainer.mean import MeanModel, correction, mean_record
 from papilla_trainer.training import Trainer
 
 
@@ -57,13 +57,18 @@ def test_a_finer_mesh_puts_a_mean_right_by_one_factor(
     made, folder = tmp_path / "mean.onnx", str(tiny.directory)
     folders, data = [str(run) for run in runs], ["--dataset", folder]
     assert main(["mean", *folders, "--onnx", str(made), *data, "--finer", folder, "--json"]) == 0
-    factor = json.loads(capsys.readouterr().out)["factor"]
-    models = [served_model(Checkpoint.load(run)) for run in runs]
-    assert fitted_factor(MeanModel(models, factor).eval(), tiny) == pytest.approx(1.0, rel=1e-5)
-    assert fitted_factor(MeanModel(models, 0.5).eval(), tiny) == pytest.approx(2 * factor)
+    found = json.loads(capsys.readouterr().out)["finer"]
+    factor, models = found["factor"], [served_model(Checkpoint.load(run)) for run in runs]
+    right = correction(MeanModel(models, factor).eval(), tiny)
+    assert right.factor == pytest.approx(1.0, rel=1e-5)
+    half = correction(MeanModel(models, 0.5).eval(), tiny)
+    assert half.factor == pytest.approx(2 * factor)
+    # Whatever the mean is multiplied by before, it ends at the same answers.
+    assert half.relative_l2_corrected == pytest.approx(found["relative_l2_corrected"])
+    assert right.relative_l2_plain["median"] < half.relative_l2_plain["median"]
     props = {entry.key: entry.value for entry in onnx.load(str(made)).metadata_props}
-    finer = json.loads(props["papilla.training"])["finer"]
-    assert finer == {"dataset_sha256": tiny.dataset_sha256, "factor": factor}
+    assert json.loads(props["papilla.training"])["finer"] == found
+    assert found["dataset_sha256"] == tiny.dataset_sha256
     both = [argument for run in folders for argument in ("--run", run)]
     assert main(["check", str(made), *both, *data]) == 0
 
