@@ -164,10 +164,7 @@ impl<'a> Solver<'a> {
             known.insert(right, self.state.clone());
         }
         (self.state, self.before, self.newton.current) = (end.state, end.before, current);
-        let left = self.work.doubtful(&indenter, from).map_or(f64::NAN, |d| d.relative);
-        let effort = self.newton.effort.since(&first);
-        tracing::debug!(from, left, iterations = effort.newton_iterations, "work mended");
-        effort
+        self.newton.effort.since(&first)
     }
 
     fn steps_to(&mut self, target: f64) -> Result<(), SolveError> {
