@@ -19,6 +19,7 @@ from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import DatasetError, RunError
 from papilla_trainer.evaluation import measure, predict, served_model
 from papilla_trainer.export import properties, to_onnx, training_record, write_model
+from papilla_trainer.metrics import relative_l2
 
 
 class MeanModel(nn.Module):
@@ -74,10 +75,7 @@ def correction(model: nn.Module, finer: Dataset) -> Correction:
     others = [float(np.median(np.delete(factors, i))) for i in range(len(pairs))]
 
     def spread(by: list[float]) -> dict[str, float]:
-        errors = [
-            np.linalg.norm(f * p - t) / np.linalg.norm(t)
-            for f, (p, t) in zip(by, pairs, strict=True)
-        ]
+        errors = [relative_l2(f * p, t) for f, (p, t) in zip(by, pairs, strict=True)]
         return {"median": float(np.median(errors)), "p95": float(np.percentile(errors, 95.0))}
 
     return Correction(

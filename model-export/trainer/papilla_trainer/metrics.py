@@ -24,6 +24,11 @@ _SSIM_C2 = 0.03**2
 METRICS = ("relative_l2", "far_field_relative_l2", "peak_error", "total_energy_error", "ssim")
 
 
+def relative_l2(prediction: F64, truth: F64) -> float:
+    """Norm of the error over the norm of the truth."""
+    return float(np.linalg.norm(prediction - truth) / np.linalg.norm(truth))
+
+
 def sample_metrics(prediction: F32, truth: F32, mask: F32) -> dict[str, float] | None:
     """All metrics of one ``[H, W]`` map; ``None`` where the truth is zero everywhere.
 
@@ -37,7 +42,7 @@ def sample_metrics(prediction: F32, truth: F32, mask: F32) -> dict[str, float] |
     far = t < FAR_FIELD_FRACTION * peak
     far_norm = float(np.linalg.norm(t[far]))
     return {
-        "relative_l2": float(np.linalg.norm(p - t) / np.linalg.norm(t)),
+        "relative_l2": relative_l2(p, t),
         "far_field_relative_l2": (
             float(np.linalg.norm((p - t)[far]) / far_norm) if far_norm > 0.0 else float("nan")
         ),
