@@ -27,7 +27,7 @@ def rust(targets: str, name_filter: str = "") -> str:
 MUTATIONS = [
     Mutation(
         "a sign in the tangent of the neo-Hookean law",
-        "crates/fem/src/material/neo_hookean.rs",
+        "crates/solid/src/neo_hookean.rs",
         "+ c29 * g[b][a]",
         "- c29 * g[b][a]",
         rust("--test verify"),

@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use papilla_fem::element::{Elastic, ElementKind, Materials};
-//! use papilla_fem::material::{NeoHookean, moduli};
+//! use papilla_solid::{NeoHookean, moduli};
 //! use papilla_fem::mesh::{block::even, lattice::lattice, supports::hold};
 //! use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 //! use papilla_sdf::{Placement, Sphere};
@@ -55,8 +55,6 @@ pub mod biphasic;
 pub mod contact;
 pub mod element;
 pub mod linear;
-pub mod material;
 pub mod mesh;
 pub mod solve;
-pub mod tensor;
 pub mod testing;

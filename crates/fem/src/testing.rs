@@ -1,12 +1,12 @@
 //! A problem and kinds of elements that tests of this crate and of others share.
 
 use crate::element::{Elastic, ElementKind, Materials};
-use crate::material::{NeoHookean, moduli};
 use crate::mesh::block::even;
 use crate::mesh::lattice::{REGION, intervals, lattice};
 use crate::mesh::supports::hold;
 use crate::solve::{Loading, MovingIndenter, Problem, ProblemError};
 use papilla_sdf::{Placement, RoundedPlate};
+use papilla_solid::{NeoHookean, moduli};
 use std::sync::Arc;
 
 /// Elements that a lattice is made of.

@@ -4,7 +4,7 @@ mod biphasic;
 
 pub use biphasic::{BiphasicError, BiphasicSpec, HolmesMowSpec};
 
-use papilla_fem::material::{Ogden, OgdenTerm, Prony, PronyTerm, moduli};
+use papilla_solid::{Ogden, OgdenTerm, Prony, PronyTerm, moduli};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -351,7 +351,7 @@ mod tests {
     fn the_published_sets_are_skin_and_fat() {
         let (skin, _) = OgdenSpec::skin().law().unwrap();
         let (fat, _) = OgdenSpec::subcutaneous().law().unwrap();
-        use papilla_fem::material::Isochoric as _;
+        use papilla_solid::Isochoric as _;
         assert!((skin.shear_modulus_mpa() - 64.5e-3).abs() < 1e-4);
         assert!((fat.shear_modulus_mpa() - 6.19e-3).abs() < 1e-5);
         assert!((PronySpec::skin().series().unwrap().0.long_term_share() - 0.5209).abs() < 1e-12);

@@ -1,8 +1,8 @@
 //! Contact area, and how pressure is spread over it.
 
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::norm;
 use papilla_fingertip::simulation::body::Body;
+use papilla_solid::tensor::norm;
 use serde::{Deserialize, Serialize};
 
 /// What is read of a contact.
@@ -103,9 +103,9 @@ impl Moments {
 mod tests {
     use super::*;
     use papilla_fem::solve::Options;
-    use papilla_fem::tensor::UNIT;
     use papilla_fingertip::scene::Scene;
     use papilla_fingertip::simulation::Simulation;
+    use papilla_solid::tensor::UNIT;
 
     /// A block that a larger plate squeezes touches it with its whole face, which has grown as its
     /// volume stayed.

@@ -6,11 +6,11 @@ use papilla_fem::mesh::probe::Probe;
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::mesh::sample::{Deformed, Sample};
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::{Kinematics, Mat3, eigen, trace};
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_solid::tensor::{Kinematics, Mat3, eigen, trace};
 use serde::{Deserialize, Serialize};
 
 /// Distances from the middle of the indenter at which receptors are read, mm.

@@ -3,7 +3,6 @@
 
 use crate::processor;
 use papilla_fem::solve::{Effort, Options};
-use papilla_fem::tensor::norm;
 use papilla_fingertip::forecast::census;
 use papilla_fingertip::scene::effects::EFFECTS;
 use papilla_fingertip::scene::{EffectName, Scene, SceneError};
@@ -11,6 +10,7 @@ use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
+use papilla_solid::tensor::norm;
 use serde::Serialize;
 
 /// The last stored state of one solve, and its price.

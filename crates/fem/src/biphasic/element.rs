@@ -3,7 +3,7 @@
 use super::Permeability;
 use crate::element::geometry::{ElementGeometry, displacement_gradient};
 use crate::element::{ElementKind, Inverted};
-use crate::tensor::{Kinematics, Mat3, UNIT, trace};
+use papilla_solid::tensor::{Kinematics, Mat3, UNIT, trace};
 
 /// Most corners of an element.
 pub(super) const CORNERS_MAX: usize = 8;

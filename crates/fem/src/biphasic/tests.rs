@@ -3,9 +3,9 @@
 use super::*;
 use crate::element::{BlockGeometry, Elastic, ElementKind, Materials};
 use crate::linear::{SymbolicSystem, SymmetricMatrix};
-use crate::material::{LinearElastic, NeoHookean};
 use crate::mesh::Mesh;
 use crate::mesh::lattice::cube;
+use papilla_solid::{LinearElastic, NeoHookean};
 
 struct Setting {
     mesh: Mesh,

@@ -1,7 +1,7 @@
 //! What an element needs of its undeformed shape, computed once per mesh.
 
 use super::reference::ElementKind;
-use crate::tensor::Mat3;
+use papilla_solid::tensor::Mat3;
 
 /// Why an element's undeformed shape was refused.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -162,7 +162,7 @@ pub fn jacobian(
     if reference_gradients.iter().all(|d| d[2] == 0.0) {
         j[2][2] = 1.0;
     }
-    let c = crate::tensor::cofactor(&j);
+    let c = papilla_solid::tensor::cofactor(&j);
     let determinant = j[0][0] * c[0][0] + j[0][1] * c[0][1] + j[0][2] * c[0][2];
     (std::array::from_fn(|k| std::array::from_fn(|i| c[i][k] / determinant)), determinant)
 }

@@ -12,7 +12,7 @@
 //! that step entered times `K` (Magisano, Leonetti & Garcea 2017: mixed integration points).
 
 use super::geometry::{ElementGeometry, displacement_gradient};
-use crate::tensor::{Kinematics, UNIT, double_dot, trace};
+use papilla_solid::tensor::{Kinematics, UNIT, double_dot, trace};
 
 /// Coefficients of `theta - 1` in the dilatation basis of an element.
 pub type Dilatation = [f64; 4];
@@ -58,7 +58,7 @@ mod tests {
     use crate::element::{
         BlockGeometry, ConstitutiveModel, Elastic, ElementKind, HistoryVariables,
     };
-    use crate::material::{LinearElastic, NeoHookean};
+    use papilla_solid::{LinearElastic, NeoHookean};
     use std::sync::Arc;
 
     const H: f64 = 1e-6;

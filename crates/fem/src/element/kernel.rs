@@ -12,8 +12,8 @@
 
 use super::geometry::{ElementGeometry, displacement_gradient};
 use super::independent::{Dilatation, IndependentDilatation};
-use crate::material::Isochoric;
-use crate::tensor::{Kinematics, Mat3, UNIT, cofactor_derivative, trace};
+use papilla_solid::Isochoric;
+use papilla_solid::tensor::{Kinematics, Mat3, UNIT, cofactor_derivative, trace};
 
 /// Where an element turned inside out.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -153,7 +153,7 @@ fn point_tangent<L: Isochoric>(
     k: &Kinematics,
     pressure: f64,
     weight: f64,
-) -> crate::tensor::Tensor4 {
+) -> papilla_solid::tensor::Tensor4 {
     let mut a = law.tangent(k);
     let d = if L::FINITE { cofactor_derivative(&k.f) } else { [[[[0.0; 3]; 3]; 3]; 3] };
     for i in 0..3 {
@@ -210,7 +210,11 @@ fn volumetric_stiffness(
 /// Columns are ordered by component first, so that the innermost loops run over nodes and
 /// fill vector registers; [`by_nodes`] puts them right in the end.
 #[inline(always)]
-fn add_point_stiffness(stiffness: &mut [f64], a4: &crate::tensor::Tensor4, gradients: &[[f64; 3]]) {
+fn add_point_stiffness(
+    stiffness: &mut [f64],
+    a4: &papilla_solid::tensor::Tensor4,
+    gradients: &[[f64; 3]],
+) {
     match gradients.len() {
         // The number of nodes as a constant: loops without remainders.
         8 => add_stiffness_of(8, stiffness, a4, gradients),
@@ -223,7 +227,7 @@ fn add_point_stiffness(stiffness: &mut [f64], a4: &crate::tensor::Tensor4, gradi
 fn add_stiffness_of(
     n: usize,
     stiffness: &mut [f64],
-    a4: &crate::tensor::Tensor4,
+    a4: &papilla_solid::tensor::Tensor4,
     gradients: &[[f64; 3]],
 ) {
     let mut g = [[0.0; NODES_MAX]; 3];

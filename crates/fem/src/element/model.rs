@@ -7,8 +7,8 @@
 use super::geometry::ElementGeometry;
 use super::independent::IndependentDilatation;
 use super::kernel::{ElementState, Inverted, Points, evaluate};
-use crate::material::{Isochoric, LinearElastic, NeoHookean, Ogden, Prony, Relaxing, prony};
-use crate::tensor::{Kinematics, Mat3};
+use papilla_solid::tensor::{Kinematics, Mat3};
+use papilla_solid::{Isochoric, LinearElastic, NeoHookean, Ogden, Prony, Relaxing, prony};
 use std::sync::Arc;
 
 /// History variables of one element over a time step.
@@ -142,7 +142,7 @@ macro_rules! constitutive_model_of {
             fn viscoelastic(
                 self,
                 bulk_mpa: f64,
-                prony: $crate::material::Prony,
+                prony: papilla_solid::Prony,
             ) -> ::std::sync::Arc<dyn $crate::element::ConstitutiveModel> {
                 ::std::sync::Arc::new($crate::element::Viscoelastic { law: self, bulk_mpa, prony })
             }

@@ -1,4 +1,4 @@
-//! Small symmetric eigenproblems; [`crate::tensor::eigen`] has the 3 x 3 one of the hot path.
+//! Small symmetric eigenproblems; [`papilla_solid::tensor::eigen`] has the 3 x 3 one of the hot path.
 
 /// Eigenvalues and eigenvectors (rows) of a symmetric matrix by Jacobi's rotations.
 pub(crate) fn eigen<const N: usize>(mut a: [[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {

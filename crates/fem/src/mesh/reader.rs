@@ -1,7 +1,7 @@
 //! Nodal values of a surface read anywhere on it, with the shape functions of its faces.
 
 use super::{Mesh, Surface};
-use crate::tensor::norm;
+use papilla_solid::tensor::norm;
 
 /// For each of some points the face of a surface that is nearest, and the shape functions there.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use super::{Mesh, Region};
 use crate::element::geometry::{BlockGeometry, displacement_gradient, jacobian};
 use crate::element::{HistoryVariables, Inverted, Materials, extrapolate};
-use crate::tensor::{Kinematics, Mat3};
+use papilla_solid::tensor::{Kinematics, Mat3};
 
 /// A deformed body, as far as fields at a point need it.
 #[derive(Clone, Copy)]

@@ -5,7 +5,7 @@ use super::history_layout::HistoryLayout;
 use super::problem::Problem;
 use crate::element::HistoryVariables;
 use crate::element::geometry::displacement_gradient;
-use crate::tensor::Kinematics;
+use papilla_solid::tensor::Kinematics;
 
 /// Deformation at the quadrature points of the elements that have history variables.
 fn visit_points(

@@ -1,8 +1,8 @@
 //! What acts on a body: dead forces, prescribed displacements, a moving indenter.
 
 use crate::contact::ContactRule;
-use crate::tensor::norm;
 use papilla_sdf::{Distance, Placement, SignedDistance};
+use papilla_solid::tensor::norm;
 use std::sync::Arc;
 
 /// An indenter that moves along a path without turning.

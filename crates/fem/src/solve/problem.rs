@@ -7,7 +7,7 @@ use crate::element::geometry::displacement_gradient;
 use crate::element::{BlockGeometry, Materials, ShapeError};
 use crate::linear::{SymbolicError, SymbolicSystem, SymmetricMatrix};
 use crate::mesh::{Block, Mesh};
-use crate::tensor::Kinematics;
+use papilla_solid::tensor::Kinematics;
 
 /// A body ready to be loaded. Shared by every indentation of a campaign.
 pub struct Problem {

@@ -2,11 +2,11 @@
 
 use papilla_fem::biphasic::{FluidSpec, Permeability};
 use papilla_fem::element::{Elastic, ElementKind, Materials};
-use papilla_fem::material::{LinearElastic, moduli};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::lattice;
 use papilla_fem::mesh::supports::hold;
 use papilla_fem::solve::{Loading, Options, Problem, Solver};
+use papilla_solid::{LinearElastic, moduli};
 
 /// Young's modulus of every body, MPa.
 const YOUNG_MPA: f64 = 0.7;

@@ -8,9 +8,9 @@
 
 use papilla_fem::biphasic::{FluidSpec, HolmesMow, Permeability};
 use papilla_fem::element::{Elastic, Materials};
-use papilla_fem::material::{NeoHookean, moduli};
 use papilla_fem::mesh::supports::hold;
 use papilla_fem::solve::{Loading, Problem};
+use papilla_solid::{NeoHookean, moduli};
 
 use crate::bodies::{march, rectangle};
 

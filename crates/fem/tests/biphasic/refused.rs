@@ -3,11 +3,11 @@
 use crate::bodies::rectangle;
 use papilla_fem::biphasic::{FluidError, FluidSpec, Permeability, PermeabilityError};
 use papilla_fem::element::{Elastic, ElementKind, Materials, Region};
-use papilla_fem::material::LinearElastic;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::cube;
 use papilla_fem::mesh::supports::hold;
 use papilla_fem::solve::{Problem, ProblemError};
+use papilla_solid::LinearElastic;
 
 fn with(mesh: Mesh, permeability: Option<f64>, drained: Option<&str>) -> Result<(), FluidError> {
     let fixed = hold(&mesh, &[("y_min", [true; 3])]);

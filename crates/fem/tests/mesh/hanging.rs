@@ -1,11 +1,11 @@
 //! Nodes that follow the edge of a coarser neighbour.
 
 use papilla_fem::element::{Elastic, ElementKind, Materials};
-use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::block::even;
 use papilla_fem::mesh::lattice::lattice;
 use papilla_fem::mesh::{HangingNode, Mesh};
 use papilla_fem::solve::{Loading, Options, Problem, Solver};
+use papilla_solid::NeoHookean;
 
 /// A large cube beside two half its size along y, joined at x = 1.
 fn joined() -> Mesh {

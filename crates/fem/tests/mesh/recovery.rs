@@ -1,14 +1,14 @@
 //! Strain energy density on either side of an interface.
 
 use papilla_fem::element::{BlockGeometry, ConstitutiveModel, Elastic, ElementKind, Materials};
-use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::FaceKind;
 use papilla_fem::mesh::block::{BlockLattice, build, even};
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::mesh::{Mesh, Region, Surface};
-use papilla_fem::tensor::Kinematics;
 use papilla_fem::testing::LATTICE_KINDS;
+use papilla_solid::NeoHookean;
+use papilla_solid::tensor::Kinematics;
 use std::sync::Arc;
 
 /// Poisson's ratio 0.45.

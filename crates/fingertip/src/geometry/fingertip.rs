@@ -132,7 +132,7 @@ impl FingertipShape {
         let (y, x) = (p[1] / (0.5 * self.width_mm), p[0] - self.cap_length_mm);
         if x < 0.0 {
             let d = [x / self.cap_length_mm, y, p[2] / (0.5 * self.height_mm)];
-            let size = papilla_fem::tensor::norm(d);
+            let size = papilla_solid::tensor::norm(d);
             SurfaceParameter::Cap(d.map(|v| v / size))
         } else {
             let b = if p[2] < 0.0 { self.palmar_half_height(p[0]) } else { 0.5 * self.height_mm };
@@ -176,7 +176,7 @@ impl FingertipShape {
             b[i] -= h;
             self.skin_level(a) - self.skin_level(b)
         });
-        let length = papilla_fem::tensor::norm(g);
+        let length = papilla_solid::tensor::norm(g);
         for v in &mut g {
             *v /= length;
         }
@@ -338,7 +338,7 @@ mod tests {
         for s in flat {
             let (bone, marrow) = (shape.bone(s), shape.marrow(s));
             let gap: [f64; 3] = std::array::from_fn(|i| bone[i] - marrow[i]);
-            assert!((papilla_fem::tensor::norm(gap) - 0.75).abs() < 1e-12, "{s:?}");
+            assert!((papilla_solid::tensor::norm(gap) - 0.75).abs() < 1e-12, "{s:?}");
         }
     }
 

@@ -5,7 +5,7 @@ use crate::tissue::{NoTissue, Tissue};
 use papilla_fem::element::{HistoryVariables, Inverted};
 use papilla_fem::mesh::recovery::SedRecovery;
 use papilla_fem::solve::Problem;
-use papilla_fem::tensor::{Mat3, trace};
+use papilla_solid::tensor::{Mat3, trace};
 
 /// Numbers of strain at a vertex: five deviatoric, one volumetric.
 pub const COMPONENTS: usize = 6;
@@ -161,8 +161,8 @@ impl SampleMap {
 mod tests {
     use super::*;
     use papilla_fem::element::{ConstitutiveModel, Elastic};
-    use papilla_fem::material::LinearElastic;
-    use papilla_fem::tensor::Kinematics;
+    use papilla_solid::LinearElastic;
+    use papilla_solid::tensor::Kinematics;
     use proptest::prelude::*;
 
     proptest! {

@@ -54,7 +54,7 @@ fn columns(
 }
 
 fn length(v: [f64; 3]) -> f64 {
-    papilla_fem::tensor::norm(v)
+    papilla_solid::tensor::norm(v)
 }
 
 fn determinant(c: &[[f64; 3]; 3]) -> f64 {

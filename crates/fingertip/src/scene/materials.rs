@@ -2,7 +2,7 @@
 
 use crate::materials::{MaterialError, MaterialSpec, Moduli, OgdenSpec, PronySpec};
 use crate::tissue::Tissue;
-use papilla_fem::material::Isochoric as _;
+use papilla_solid::Isochoric as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

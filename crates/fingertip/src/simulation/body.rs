@@ -19,8 +19,8 @@ use papilla_fem::mesh::sample::Deformed;
 use papilla_fem::solve::{
     Materials, Options, Problem, ProblemError, SnapshotError, SolveError, Solver, StepReport,
 };
-use papilla_fem::tensor::{norm, product};
 use papilla_sdf::Placement;
+use papilla_solid::tensor::{norm, product};
 use std::path::PathBuf;
 
 /// Why a body could not be set up or pressed.

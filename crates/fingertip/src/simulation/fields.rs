@@ -4,7 +4,7 @@ use super::body::Body;
 use papilla_fem::element::HistoryVariables;
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::Kinematics;
+use papilla_solid::tensor::Kinematics;
 
 /// Pa per MPa, and J/m3 per mJ/mm3.
 pub const PA_PER_MPA: f64 = 1e6;

@@ -8,7 +8,7 @@
 use super::body::{Body, SimulationError};
 use papilla_fem::mesh::Surface;
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::norm;
+use papilla_solid::tensor::norm;
 use std::collections::BTreeMap;
 
 /// Most of the contact force's normal part that may act along the skin. It is 0 in the limit of

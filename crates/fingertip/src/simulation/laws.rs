@@ -5,8 +5,8 @@ use crate::scene::effects::{Law, Plan};
 use crate::scene::{TissueError, TissueTable};
 use crate::tissue::Tissue;
 use papilla_fem::element::{ConstitutiveModel, Elastic, ModelOf, Viscoelastic};
-use papilla_fem::material::{Isochoric as _, LinearElastic, NeoHookean, Prony};
 use papilla_fem::solve::Materials;
+use papilla_solid::{Isochoric as _, LinearElastic, NeoHookean, Prony};
 use std::sync::Arc;
 
 /// The laws that `plan` asks for. A tissue of which the body has no element has

@@ -3,7 +3,7 @@
 use super::body::Body;
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::Kinematics;
+use papilla_solid::tensor::Kinematics;
 
 impl Body {
     /// True (Cauchy) shear traction of the indenter on the skin at `nodes`, MPa per
@@ -118,7 +118,7 @@ mod tests {
         let pressure = solver.pressure_mpa(surface);
         let slack = 5e-3 * 0.4 * pressure.iter().copied().fold(0.0, f64::max);
         for (&n, s) in nodes.iter().zip(&shear) {
-            let size = papilla_fem::tensor::norm(*s);
+            let size = papilla_solid::tensor::norm(*s);
             assert!(size <= 0.4 * pressure[n as usize] + slack, "{size}");
         }
     }

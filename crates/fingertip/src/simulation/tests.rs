@@ -11,8 +11,8 @@ use crate::mesh::fingertip::{Density, Order, Parts};
 use crate::scene::{Plan, Pose, Scene, TissueTable};
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Options, Solver, StepReport};
-use papilla_fem::tensor::norm;
 use papilla_sdf::IndenterSpec;
+use papilla_solid::tensor::norm;
 use std::path::Path;
 
 const BONE: Parts = Parts { bone: true, nail: false };

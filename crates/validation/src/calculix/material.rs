@@ -2,10 +2,10 @@
 
 use super::ExportError;
 use papilla_fem::element::{ConstitutiveModel, Elastic};
-use papilla_fem::material::{LinearElastic, NeoHookean, Ogden, OgdenTerm};
-use papilla_fem::tensor::eigen::symmetric;
 use papilla_fingertip::materials::{MaterialError, MaterialSpec};
 use papilla_fingertip::scene::effects::{Law, Plan};
+use papilla_solid::tensor::eigen::symmetric;
+use papilla_solid::{LinearElastic, NeoHookean, Ogden, OgdenTerm};
 use std::fmt::Write;
 use std::sync::Arc;
 
@@ -218,8 +218,8 @@ fn principal(v: &[f64; 6]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use papilla_fem::tensor::Kinematics;
     use papilla_fingertip::scene::TissueTable;
+    use papilla_solid::tensor::Kinematics;
     use proptest::prelude::*;
 
     fn ogden() -> MaterialCard {

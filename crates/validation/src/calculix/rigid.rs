@@ -10,8 +10,8 @@
 
 use super::ExportError;
 use papilla_fem::element::reference::HEX27_LATTICE;
-use papilla_fem::tensor::norm;
 use papilla_sdf::Placement;
+use papilla_solid::tensor::norm;
 
 /// A rigid shape in its own frame, pressing towards +z. Lengths in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,6 @@ use ndarray::Ix2;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::solve::{Options, Solver, StepReport};
-use papilla_fem::tensor::norm;
 use papilla_fingertip::scene::{Geometry, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
@@ -16,6 +15,7 @@ use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_output::OutputError;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
+use papilla_solid::tensor::norm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

@@ -4,10 +4,10 @@ use super::lab::solve;
 use super::{Line, Suite};
 use crate::verify::relaxation::{BULK_MPA, HEIGHT_MM, MU_MPA, column};
 use crate::verify::{CaseError, Check};
-use papilla_fem::material::{Prony, PronyTerm};
 use papilla_fem::solve::{Loading, MovingIndenter, Options};
 use papilla_fingertip::materials::{Moduli, PronySpec};
 use papilla_sdf::{Placement, RoundedPlate};
+use papilla_solid::{Prony, PronyTerm};
 use std::sync::Arc;
 
 const DEPTH_MM: f64 = 0.01;

@@ -5,13 +5,13 @@ use super::{Hardness, Line, Suite};
 use crate::verify::bodies::{everywhere, internal_force};
 use crate::verify::{CaseError, Check};
 use papilla_fem::element::{Elastic, ElementKind};
-use papilla_fem::material::{Isochoric, Ogden};
 use papilla_fem::mesh::block::even;
 use papilla_fem::mesh::lattice::lattice;
 use papilla_fem::mesh::supports::{hold, prescribe};
 use papilla_fem::solve::{Loading, Options, Problem};
-use papilla_fem::tensor::Kinematics;
 use papilla_fingertip::materials::OgdenSpec;
+use papilla_solid::tensor::Kinematics;
+use papilla_solid::{Isochoric, Ogden};
 
 pub(super) fn run(suite: &Suite) -> Result<Vec<Line>, CaseError> {
     let single = |mu_mpa: &[f64], alpha: &[f64]| OgdenSpec {

@@ -2,9 +2,9 @@
 
 use super::{Line, Suite};
 use crate::verify::{CaseError, Check};
-use papilla_fem::material::{Isochoric, NeoHookean, Ogden, OgdenTerm};
-use papilla_fem::tensor::{Kinematics, Mat3, Tensor4, product};
 use papilla_fingertip::materials::OgdenSpec;
+use papilla_solid::tensor::{Kinematics, Mat3, Tensor4, product};
+use papilla_solid::{Isochoric, NeoHookean, Ogden, OgdenTerm};
 
 const GAPS: [f64; 12] =
     [0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6];

@@ -3,15 +3,15 @@
 use super::CaseError;
 use papilla_fem::element::geometry::displacement_gradient;
 use papilla_fem::element::{ConstitutiveModel, Elastic, ElementKind, HistoryVariables, Inverted};
-use papilla_fem::material::NeoHookean;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::{graded, lattice, part};
 use papilla_fem::mesh::supports::{hold, merge};
 use papilla_fem::solve::evaluate::{Evaluation, Trial, evaluate_body};
 use papilla_fem::solve::{Loading, Materials, Options, Problem, Solver, StepError, StepReport};
-use papilla_fem::tensor::{Kinematics, Mat3};
 use papilla_fingertip::materials::{ElasticConstants, MaterialError};
 use papilla_fingertip::tissue::Tissue;
+use papilla_solid::NeoHookean;
+use papilla_solid::tensor::{Kinematics, Mat3};
 use std::sync::Arc;
 
 /// The same constitutive model for every tissue.

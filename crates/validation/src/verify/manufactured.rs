@@ -9,7 +9,7 @@ use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::lattice::{REGION, cube};
 use papilla_fem::mesh::supports::{hold_boundary, prescribe};
 use papilla_fem::solve::{Loading, Problem};
-use papilla_fem::tensor::{Kinematics, Mat3};
+use papilla_solid::tensor::{Kinematics, Mat3};
 
 const SOURCE: &str = "theory: order of interpolation, of the dilatation if that is lower";
 

@@ -6,7 +6,7 @@ use papilla_fem::element::{ElementKind, HistoryVariables};
 use papilla_fem::mesh::lattice::{REGION, cube, intervals};
 use papilla_fem::mesh::supports::{hold_boundary, prescribe};
 use papilla_fem::solve::{Loading, Problem};
-use papilla_fem::tensor::{Kinematics, Mat3};
+use papilla_solid::tensor::{Kinematics, Mat3};
 
 const SOURCE: &str = "exact (Irons & Razzaque 1972)";
 

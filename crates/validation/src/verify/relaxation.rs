@@ -4,7 +4,6 @@ use super::bodies::solve;
 use super::{CaseError, Check, Context};
 use crate::verify::bodies::everywhere;
 use papilla_fem::element::{ElementKind, Viscoelastic};
-use papilla_fem::material::{LinearElastic, Prony, PronyTerm};
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::block::even;
 use papilla_fem::mesh::lattice::lattice;
@@ -12,6 +11,7 @@ use papilla_fem::mesh::supports::hold;
 use papilla_fem::solve::{Loading, MovingIndenter, Options, Problem, Solver};
 use papilla_fingertip::materials::PronySpec;
 use papilla_sdf::{Placement, RoundedPlate};
+use papilla_solid::{LinearElastic, Prony, PronyTerm};
 use std::sync::Arc;
 
 const RELAXATION: &str = "closed form: K + 4/3 mu G(t), convolved with the ramp";

@@ -2,7 +2,6 @@
 
 use super::{CaseError, Check, Context};
 use papilla_fem::solve::Options;
-use papilla_fem::tensor::norm;
 use papilla_fingertip::geometry::fingertip::FingertipShape;
 use papilla_fingertip::mesh::fingertip::{Density, Order, Parts};
 use papilla_fingertip::scene::{Plan, Pose, TissueTable};
@@ -10,6 +9,7 @@ use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::laws::solids;
 use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_solid::tensor::norm;
 
 /// Depths on the coarse mesh, mm; the last is judged.
 const DEPTHS_MM: [f64; 3] = [0.25, 0.5, 1.0];

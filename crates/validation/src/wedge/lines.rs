@@ -3,11 +3,11 @@
 use super::WedgeError;
 use papilla_fem::mesh::probe::{Probe, line};
 use papilla_fem::solve::Solver;
-use papilla_fem::tensor::Kinematics;
 use papilla_fingertip::geometry::section::SectionShape;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::tissue::Tissue;
+use papilla_solid::tensor::Kinematics;
 
 /// Depths of figures 2(b) and 3, mm: the two sides of the dermis and its middle.
 pub const DEPTHS_MM: [f64; 3] = [0.2, 0.7, 1.2];

@@ -45,7 +45,7 @@ fn direction(d: [f64; 3]) -> String {
 pub(super) fn free_modes(mesh: &Mesh, nodes: &[usize], fixed: &[bool]) -> Vec<FreeMode> {
     let centre = middle(mesh, nodes);
     let arm = |n: usize| -> [f64; 3] { std::array::from_fn(|i| mesh.nodes[n][i] - centre[i]) };
-    let size = nodes.iter().map(|&n| crate::tensor::norm(arm(n))).fold(0.0, f64::max);
+    let size = nodes.iter().map(|&n| papilla_solid::tensor::norm(arm(n))).fold(0.0, f64::max);
     let scale = if size > 0.0 { size } else { 1.0 };
     let mut gram = [[0.0; 6]; 6];
     let mut count = 0.0;
@@ -74,7 +74,7 @@ pub(super) fn free_modes(mesh: &Mesh, nodes: &[usize], fixed: &[bool]) -> Vec<Fr
 
 /// The motion of translation `t` and rotation `w` about `centre`.
 fn mode(t: [f64; 3], w: [f64; 3], centre: [f64; 3]) -> FreeMode {
-    let norm = crate::tensor::norm;
+    let norm = papilla_solid::tensor::norm;
     let (slide, turn) = (norm(t), norm(w));
     if turn <= 1e-9 * slide {
         return FreeMode::Slide(t.map(|v| v / slide));

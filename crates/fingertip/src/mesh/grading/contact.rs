@@ -1,8 +1,8 @@
 //! Where an indenter first touches the undeformed finger, whatever its mesh.
 
 use crate::geometry::fingertip::{FingertipShape, SurfaceParameter};
-use papilla_fem::tensor::norm;
 use papilla_sdf::{Placement, SignedDistance};
+use papilla_solid::tensor::norm;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 

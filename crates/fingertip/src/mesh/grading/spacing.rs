@@ -6,8 +6,8 @@
 
 use super::contact::{Contact, facing};
 use crate::geometry::fingertip::FingertipShape;
-use papilla_fem::tensor::norm;
 use papilla_sdf::Placement;
+use papilla_solid::tensor::norm;
 
 /// How close nodes are, at one density.
 #[derive(Clone, Copy, Debug, PartialEq)]

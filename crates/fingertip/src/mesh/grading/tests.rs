@@ -3,8 +3,8 @@ use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_guide};
 use papilla_fem::element::BlockGeometry;
 use papilla_fem::mesh::{HangingNode, Mesh};
-use papilla_fem::tensor::norm;
 use papilla_sdf::{IndenterSpec, Placement};
+use papilla_solid::tensor::norm;
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -3,8 +3,8 @@
 use crate::calculix::ElementTypes;
 use papilla_fem::element::ElementKind;
 use papilla_fem::mesh::{Block, FaceKind, Mesh, Surface};
-use papilla_fem::tensor::norm;
 use papilla_fingertip::tissue::Tissue;
+use papilla_solid::tensor::norm;
 use std::collections::HashSet;
 
 /// A face between two tissues, seen from the first one's element.

@@ -11,9 +11,9 @@ use papilla_fem::mesh::lattice::REGION;
 use papilla_fem::mesh::supports::{hold, prescribe};
 use papilla_fem::mesh::{Block, HangingNode, Mesh};
 use papilla_fem::solve::{Loading, Options, Problem, Solver};
-use papilla_fem::tensor::Kinematics;
 use papilla_fingertip::simulation::record::relative_l2;
 use papilla_fingertip::tissue::Tissue;
+use papilla_solid::tensor::Kinematics;
 use std::collections::{BTreeMap, HashSet};
 
 type Address = [u32; 3];

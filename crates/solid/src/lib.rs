@@ -1,5 +1,6 @@
-//! Material laws: energy, stress and tangent as formulas on the type.
+//! Laws of soft solids: energy, stress and tangent as formulas on the type.
 //!
+//! A law sees the displacement gradient `H` at a point ([`tensor::Kinematics`]), never a node.
 //! Energies are per unit undeformed volume, in MPa = mJ/mm3. Every law is an
 //! isochoric part, a function of `F / J^(1/3)`, plus the volumetric part
 //! `K/2 (J - 1)^2`, which the mean-dilatation element integrates itself.
@@ -11,6 +12,7 @@ mod linear;
 mod neo_hookean;
 mod ogden;
 pub mod prony;
+pub mod tensor;
 
 pub use linear::LinearElastic;
 pub use neo_hookean::NeoHookean;

@@ -99,6 +99,7 @@ impl Kinematics {
 }
 
 /// `3 ((1 + x)^(2/3) - 1) - 2 x`, without cancellation near `x = 0`.
+#[inline]
 fn volumetric_remainder(x: f64) -> f64 {
     if x.abs() < 1e-2 {
         // Binomial series of 3 (1 + x)^(2/3); the first term left out is below 1e-18.
@@ -131,6 +132,7 @@ pub fn cofactor(m: &Mat3) -> Mat3 {
 
 /// `a b`.
 #[must_use]
+#[inline]
 pub fn product(a: &Mat3, b: &Mat3) -> Mat3 {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }

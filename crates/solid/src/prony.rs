@@ -297,7 +297,7 @@ pub fn stored<L: Isochoric>(law: &L, prony: &Prony, k: &Kinematics, history: His
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::NeoHookean;
+    use crate::NeoHookean;
 
     const LAW: NeoHookean = NeoHookean { mu_mpa: 0.02 };
 

@@ -285,7 +285,7 @@ fn exp_remainder(z: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::NeoHookean;
+    use crate::NeoHookean;
 
     fn skin() -> Ogden {
         let term = |alpha, mu_mpa| OgdenTerm { mu_mpa, alpha };
