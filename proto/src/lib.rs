@@ -77,6 +77,11 @@ pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};
 pub use window::Window;
 
+/// Name of a model's input, `[1, 1, 224, 224]` float32, Pa.
+pub const INPUT_NAME: &str = "pressure_pa";
+/// Name of a model's output, `[1, 1, 224, 224]` float32, J/m3.
+pub const OUTPUT_NAME: &str = "sed_j_per_m3";
+
 /// Versions of the session protocol and of the binary frame that are spoken. The second adds to
 /// the first: windows, timings in every answer, run-time effects. The third adds to that: objects
 /// and gaps in place of pressure, forces, several fingers.

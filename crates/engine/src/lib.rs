@@ -53,16 +53,12 @@ pub use choice::{Choice, processor_time};
 pub use error::EngineError;
 pub use info::ModelInfo;
 pub use ladder::Ladder;
-pub use papilla_proto::{MAP_LEN, MAP_SIDE_PX};
+pub use papilla_proto::{INPUT_NAME, MAP_LEN, MAP_SIDE_PX, OUTPUT_NAME};
 pub use profile::{Operator, profile};
 use tract_onnx::pb::ModelProto;
 
 /// Version of the metadata contract that this engine reads (`papilla.format`).
 pub const MODEL_FORMAT: u32 = 1;
-/// Name of the model's input, `[1, 1, 224, 224]` float32, Pa.
-pub const INPUT_NAME: &str = "pressure_pa";
-/// Name of the model's output, `[1, 1, 224, 224]` float32, J/m3.
-pub const OUTPUT_NAME: &str = "sed_j_per_m3";
 
 /// A loaded model. Shared between threads; each thread makes its own [`Session`].
 pub trait Model: Send + Sync {

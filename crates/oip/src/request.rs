@@ -6,23 +6,19 @@
 mod numbers;
 mod parameters;
 
-use axum::http::HeaderMap;
 use bytes::Bytes;
-use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
-use papilla_proto::{ErrorCode, Problem, error::shortened, json};
+use papilla_proto::{ErrorCode, INPUT_NAME, OUTPUT_NAME, Problem, error::shortened, json};
 use serde::Deserialize;
 
 use self::{
     numbers::{First, Numbers, Shape},
     parameters::Parameters,
 };
-use super::{DATATYPE, SHAPE};
+use crate::{DATATYPE, HEAD_LEN, SHAPE};
 
-/// Length of the JSON before the tensors' bytes; its presence says that there are any.
-const HEAD_LEN: &str = "inference-header-content-length";
-
+/// The JSON.
 #[derive(Deserialize)]
-struct Request {
+struct Head {
     id: Option<String>,
     #[serde(default)]
     parameters: Parameters,
@@ -48,44 +44,63 @@ struct OutputTensor {
     parameters: Parameters,
 }
 
-/// How the client wants its answer.
+/// A map to infer, and how the client wants its answer.
 #[derive(Debug, PartialEq)]
-pub(super) struct Wish {
+pub struct Request {
     /// Sent back as it is.
-    pub(super) id: Option<String>,
-    /// As bytes behind the JSON, or as numbers in it.
-    pub(super) is_binary_wanted: bool,
+    pub id: Option<String>,
+    /// Whether the answer's numbers come as bytes behind the JSON, or as numbers in it.
+    pub is_binary_wanted: bool,
     /// Time the map may spend in the server, us.
-    pub(super) timeout_us: Option<u64>,
+    pub timeout_us: Option<u64>,
+    /// f32 samples, little-endian, Pa.
+    pub pressure_pa: Bytes,
 }
 
-/// The length of the JSON part of a body that goes on with bytes; None: all of it is JSON.
+/// The length of the JSON part of a body that goes on with bytes, from the header [`HEAD_LEN`];
+/// None: all of it is JSON.
 ///
 /// # Errors
 /// The header is no number, or greater than the body.
-pub(super) fn head_len(headers: &HeaderMap, body_len: usize) -> Result<Option<usize>, Problem> {
-    let Some(value) = headers.get(HEAD_LEN) else { return Ok(None) };
-    let length = value.to_str().ok().and_then(|text| text.parse().ok());
-    match length.filter(|length| *length <= body_len) {
+pub fn head_len(header: Option<&[u8]>, body_len: usize) -> Result<Option<usize>, Problem> {
+    let Some(value) = header else { return Ok(None) };
+    let value = String::from_utf8_lossy(value);
+    match value.parse().ok().filter(|length| *length <= body_len) {
         Some(length) => Ok(Some(length)),
         None => {
+            let value = shortened(&value);
             let message = format!("{value:?} is not the length of a part of {body_len} bytes");
             Err(Problem::new(ErrorCode::WrongLength, message).at(HEAD_LEN))
         }
     }
 }
 
-/// Reads the request; the map comes back as f32 samples, little-endian.
-///
-/// # Errors
-/// It is not what the protocol and the model's metadata ask for; the field at fault is named.
-pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Problem> {
-    let (head, blob) =
-        (body.slice(..head_len.unwrap_or(body.len())), head_len.map(|n| body.slice(n..)));
-    let request: Request = json::read_bounded(&head)?;
-    refuse_sequences(&request.parameters)?;
-    let is_binary_wanted = wants_binary(&request)?;
-    let input = match request.inputs {
+impl Request {
+    /// Reads a body whose JSON is `head_len` bytes long, or all of it.
+    ///
+    /// # Errors
+    /// It is not what the protocol and the model's metadata ask for; the field at fault is named.
+    pub fn read(body: &Bytes, head_len: Option<usize>) -> Result<Self, Problem> {
+        let (head, blob) = match head_len {
+            Some(length) if length > body.len() => {
+                let message = format!("{length} bytes of JSON are due, {} are there", body.len());
+                return Err(Problem::new(ErrorCode::WrongLength, message).at(HEAD_LEN));
+            }
+            Some(length) => (body.slice(..length), Some(body.slice(length..))),
+            None => (body.clone(), None),
+        };
+        let head: Head = json::read_bounded(&head)?;
+        refuse_sequences(&head.parameters)?;
+        let is_binary_wanted = wants_binary(&head)?;
+        let timeout_us = head.parameters.timeout.whole_number("timeout")?.filter(|us| *us > 0);
+        let pressure_pa = samples(head.inputs, blob)?;
+        Ok(Self { id: head.id, is_binary_wanted, timeout_us, pressure_pa })
+    }
+}
+
+/// The samples of the one input: numbers of the JSON, or the bytes behind it.
+fn samples(inputs: First<InputTensor>, blob: Option<Bytes>) -> Result<Bytes, Problem> {
+    let input = match inputs {
         First { first: Some(input), count: 1 } => input,
         First { count, .. } => {
             let message = format!("{count} inputs; the model has one, {INPUT_NAME}");
@@ -94,22 +109,20 @@ pub(super) fn read(body: &Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes
     };
     check_input(&input)?;
     let binary_len = input.parameters.binary_data_size.whole_number("binary_data_size")?;
-    let payload = match (input.data, binary_len, blob) {
-        (Some(numbers), None, None) => numbers.into_bytes()?,
-        (Some(numbers), None, Some(blob)) if blob.is_empty() => numbers.into_bytes()?,
-        (None, Some(length), Some(blob)) if length == blob.len() as u64 => blob,
+    match (input.data, binary_len, blob) {
+        (Some(numbers), None, None) => numbers.into_bytes(),
+        (Some(numbers), None, Some(blob)) if blob.is_empty() => numbers.into_bytes(),
+        (None, Some(length), Some(blob)) if length == blob.len() as u64 => Ok(blob),
         (None, Some(length), blob) => {
             let found = blob.map_or(0, |blob| blob.len());
             let message = format!("binary_data_size is {length}, {found} bytes follow the JSON");
-            return Err(Problem::new(ErrorCode::WrongLength, message).at("binary_data_size"));
+            Err(Problem::new(ErrorCode::WrongLength, message).at("binary_data_size"))
         }
         _ => {
             let message = "an input has either data or binary_data_size and bytes behind the JSON";
-            return Err(Problem::new(ErrorCode::WrongType, message).at("inputs"));
+            Err(Problem::new(ErrorCode::WrongType, message).at("inputs"))
         }
-    };
-    let timeout_us = request.parameters.timeout.whole_number("timeout")?.filter(|us| *us > 0);
-    Ok((Wish { id: request.id, is_binary_wanted, timeout_us }, payload))
+    }
 }
 
 /// Every request is rendered for itself.
@@ -147,10 +160,10 @@ fn check_input(input: &InputTensor) -> Result<(), Problem> {
 }
 
 /// Whether the output is to come as bytes: as it says itself, or else as the request says.
-fn wants_binary(request: &Request) -> Result<bool, Problem> {
-    let of_all = request.parameters.binary_data_output.boolean("binary_data_output")?;
+fn wants_binary(head: &Head) -> Result<bool, Problem> {
+    let of_all = head.parameters.binary_data_output.boolean("binary_data_output")?;
     let of_all = of_all.unwrap_or(false);
-    let output = match &request.outputs {
+    let output = match &head.outputs {
         First { count: 0, .. } => return Ok(of_all),
         First { first: Some(output), count: 1 } => output,
         First { count, .. } => {

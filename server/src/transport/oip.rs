@@ -1,46 +1,35 @@
 //! The Open Inference Protocol, version 2, over HTTP: existing clients work unmodified.
 //!
-//! <https://github.com/open-inference/open-inference-protocol>; the one extension is
-//! `binary_tensor_data`. Every tier is a model of version 1 with one input, `pressure_pa`, and
-//! one output, `sed_j_per_m3`, both FP32 `[1, 1, 224, 224]`.
-
-mod request;
-mod response;
+//! `papilla-oip` reads requests and writes answers. Every tier is a model of version 1.
 
 use std::time::{Duration, Instant};
 
 use axum::{
     body::Body,
     extract::State,
-    http::{HeaderMap, Uri},
+    http::{HeaderMap, HeaderValue, Uri},
     response::Response,
 };
 use bytes::Bytes;
 use papilla_codec::{Input, Output};
-use papilla_engine::{INPUT_NAME, OUTPUT_NAME};
 use papilla_metrics::Transport;
-use papilla_proto::{ErrorCode, MAP_SIDE_PX, Problem, SampleType, error::shortened};
+use papilla_oip::{DATATYPE, HEAD_LEN, Request, SHAPE, VERSION, head_len};
+use papilla_proto::{ErrorCode, INPUT_NAME, OUTPUT_NAME, Problem, SampleType, error::shortened};
 use serde_json::json;
 use tokio::task::spawn_blocking;
 
-use self::{request::Wish, response::Tensor};
 use crate::{
     core::scheduler::{Job, JobOptions},
     problem,
     transport::{
         answer::{
-            Shared, body, json_answer,
+            self, Shared, body, json_answer,
             refusal::OipProblem,
             render::{Rendered, count, through_pool},
         },
         app::App,
     },
 };
-
-/// The only version of every model.
-const VERSION: &str = "1";
-const DATATYPE: &str = "FP32";
-const SHAPE: [usize; 4] = [1, 1, MAP_SIDE_PX, MAP_SIDE_PX];
 
 type Answer = Result<Response, OipProblem>;
 
@@ -130,12 +119,12 @@ async fn answer(
     let tier = named(app, uri)?;
     // Held until the answer is written: it bounds the work below as well.
     let _place = app.admit_request()?;
-    let head_len = request::head_len(headers, body.len())?;
-    let (wish, payload) = read(body, head_len).await?;
-    let deadline = wish.timeout_us.map(|us| received + Duration::from_micros(us));
+    let head_len = head_len(headers.get(HEAD_LEN).map(HeaderValue::as_bytes), body.len())?;
+    let mut request = read(body, head_len).await?;
+    let deadline = request.timeout_us.map(|us| received + Duration::from_micros(us));
     let job = Job {
         tier,
-        payload,
+        payload: std::mem::take(&mut request.pressure_pa),
         input: Input::Samples { sample_type: SampleType::F32, scale: 1.0 },
         output: Output::Samples(SampleType::F32),
         received,
@@ -145,43 +134,38 @@ async fn answer(
     let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip).await?;
     let catalogue = app.catalogue();
     let name = catalogue.tiers[tier].name.clone();
-    let tensor = Tensor { model: name.clone(), wish, sed: bytes.freeze() };
-    let mut response = if tensor.wish.is_binary_wanted {
-        tensor.binary()?
-    } else {
-        // Fifty thousand numbers in digits: not for a thread that moves bytes.
-        let text = spawn_blocking(move || tensor.json()).await;
-        text.map_err(|error| problem::internal("the answer was not written", &error))??
-    };
+    let mut response = encode(name.clone(), request, bytes.freeze()).await?;
     timings.label(response.headers_mut(), &name);
     Ok(response)
 }
 
-/// Reads the request; long JSON elsewhere than on a thread that moves bytes.
-async fn read(body: Bytes, head_len: Option<usize>) -> Result<(Wish, Bytes), Problem> {
-    const SHORT: usize = 4096;
-    if head_len.unwrap_or(body.len()) <= SHORT {
-        return request::read(&body, head_len);
-    }
-    spawn_blocking(move || request::read(&body, head_len))
-        .await
-        .map_err(|error| problem::internal("the request was not read", &error))?
+async fn encode(model: String, request: Request, sed_j_per_m3: Bytes) -> Result<Response, Problem> {
+    let failed =
+        |error: &dyn std::fmt::Display| problem::internal("the answer was not written", error);
+    let is_binary = request.is_binary_wanted;
+    let encode = move || papilla_oip::Answer { model: &model, request, sed_j_per_m3 }.encode();
+    let encoded = if is_binary {
+        encode()
+    } else {
+        // Fifty thousand numbers in digits: not for a thread that moves bytes.
+        spawn_blocking(encode).await.map_err(|error| failed(&error))?
+    };
+    let body = encoded.map_err(|error| failed(&error))?;
+    let Some(head_len) = body.head_len else {
+        return Ok(answer::answer("application/json", body.bytes));
+    };
+    let mut response = answer::answer("application/octet-stream", body.bytes);
+    response.headers_mut().insert(HEAD_LEN, HeaderValue::from(head_len));
+    Ok(response)
 }
 
-/// For [`crate::fuzz`].
-#[cfg(any(test, fuzzing))]
-pub(crate) mod fuzz {
-    use axum::http::HeaderValue;
-
-    use super::{Bytes, HeaderMap, Problem, request};
-
-    /// Reads a request as [`super::infer`] does; the bytes of its map.
-    pub(crate) fn read(body: &Bytes, head_len: Option<HeaderValue>) -> Result<Bytes, Problem> {
-        let mut headers = HeaderMap::new();
-        if let Some(value) = head_len {
-            headers.insert("inference-header-content-length", value);
-        }
-        let head_len = request::head_len(&headers, body.len())?;
-        request::read(body, head_len).map(|(_, payload)| payload)
+/// Reads the request; long JSON elsewhere than on a thread that moves bytes.
+async fn read(body: Bytes, head_len: Option<usize>) -> Result<Request, Problem> {
+    const SHORT: usize = 4096;
+    if head_len.unwrap_or(body.len()) <= SHORT {
+        return Request::read(&body, head_len);
     }
+    spawn_blocking(move || Request::read(&body, head_len))
+        .await
+        .map_err(|error| problem::internal("the request was not read", &error))?
 }
