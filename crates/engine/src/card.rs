@@ -139,6 +139,12 @@ impl Card {
         crate::info::datasets(&self.dataset_sha256, &self.training)
     }
 
+    /// Whether it learnt the pressure that the service's own contact makes, beside FE's.
+    #[must_use]
+    pub fn knows_contact(&self) -> bool {
+        self.training.get("contact").is_some()
+    }
+
     fn require_format(&self) -> Result<(), EngineError> {
         if self.format == MODEL_FORMAT {
             return Ok(());

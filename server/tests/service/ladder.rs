@@ -153,7 +153,7 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_network_that_learnt_no_pressure_of_contact_is_taken_by_name_alone() {
     let mut ladder = ladder();
-    // As fast, it would make `slow` one for comparison if it were for everybody.
+    // As fast, it would outdo `slow` if it were for everybody.
     ladder["rungs"][1] = rung("slow", Some("slow"), 4.0, 0.02);
     for ladder in [Some(ladder), None] {
         let models = model_folder();
@@ -168,8 +168,8 @@ async fn a_network_that_learnt_no_pressure_of_contact_is_taken_by_name_alone() {
         let service = Service::on(models, |config: &mut Config| config.calibration_ms = 0);
         let service = service.await.unwrap();
         let tiers = service.json("/v1/tiers").await;
-        let flags = [0, 1].map(|tier| tiers["tiers"][tier]["for_comparison"].clone());
-        assert_eq!(flags, [json!(true), json!(false)], "{ladder:?}");
+        let why = [0, 1].map(|tier| tiers["tiers"][tier]["named_only"].clone());
+        assert_eq!(why, [json!("fe_pressure"), Value::Null], "{ladder:?}");
         for (asked, answered) in
             [(json!({"budget_us": 60_000_000}), "slow"), (json!({"tier": "quick"}), "quick")]
         {
@@ -180,14 +180,14 @@ async fn a_network_that_learnt_no_pressure_of_contact_is_taken_by_name_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_tier_that_is_worse_and_slower_is_for_comparison_alone() {
+async fn a_tier_that_is_worse_and_slower_is_taken_by_name_alone() {
     let mut ladder = ladder();
     ladder["rungs"][1]["latency_ms"]["tract"]["p50"] = json!(3.7);
     let service = with(&ladder, 0).await.unwrap();
     let tiers = service.json("/v1/tiers").await;
     // `slow` errs by 2 % in 3.7 ms, which is no tenth less than the 4 ms in which `quick` errs by 1 %.
-    let flags = [0, 1].map(|tier| tiers["tiers"][tier]["for_comparison"].clone());
-    assert_eq!(flags, [json!(false), json!(true)]);
+    let why = [0, 1].map(|tier| tiers["tiers"][tier]["named_only"].clone());
+    assert_eq!(why, [Value::Null, json!("outdone")]);
     for budget_us in [1, 4_300, 60_000_000] {
         let mut socket = service.socket().await;
         let ready = socket.open(hello(&json!({"budget_us": budget_us}))).await;

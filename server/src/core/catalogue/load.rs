@@ -10,7 +10,7 @@ use papilla_engine::{
 use papilla_proto::atlas::Atlas;
 use serde_json::Value;
 
-use super::{Tier, assets::Assets, golden};
+use super::{NamedOnly, Tier, assets::Assets, golden};
 use crate::{
     StartError,
     config::Config,
@@ -46,11 +46,11 @@ fn shipped_ms(ladder: &Ladder, tier: &Tier) -> Option<f64> {
 
 /// Gives tiers the shipped times and errors, marks what no budget picks; the set they are judged on.
 pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<String> {
-    // FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
-    let knows_contact = |tier: &Tier| tier.card["training"].get("contact").is_some();
-    let any_knows = tiers.iter().any(knows_contact);
-    let is_narrow = |t: &Tier| any_knows && t.kind == Kind::Network && !knows_contact(t);
-    tiers.iter_mut().for_each(|tier| tier.for_comparison = is_narrow(tier));
+    let is_choice = tiers.iter().any(|tier| tier.knows_contact);
+    for tier in tiers.iter_mut() {
+        let is_narrow = is_choice && tier.kind == Kind::Network && !tier.knows_contact;
+        tier.named_only = is_narrow.then_some(NamedOnly::FePressure);
+    }
     let ladder = ladder?;
     for tier in tiers.iter() {
         // A tier that goes on over a reload shares its times, which it has learnt here.
@@ -70,9 +70,11 @@ pub(super) fn judge(tiers: &mut [Tier], ladder: Option<&Ladder>) -> Option<Strin
             && better.relative_l2_median < tier.relative_l2_median
             && better.renders(&tier.effects)
     };
-    let wide = || tiers.iter().filter(|tier| !tier.for_comparison);
-    let beaten: Vec<_> = tiers.iter().map(|tier| wide().any(|t| beats(t, tier))).collect();
-    tiers.iter_mut().zip(beaten).for_each(|(tier, beaten)| tier.for_comparison |= beaten);
+    let wide = || tiers.iter().filter(|tier| tier.named_only.is_none());
+    let outdone: Vec<_> = tiers.iter().map(|tier| wide().any(|t| beats(t, tier))).collect();
+    for (tier, outdone) in tiers.iter_mut().zip(outdone) {
+        tier.named_only = tier.named_only.or(outdone.then_some(NamedOnly::Outdone));
+    }
     Some(set.to_owned())
 }
 
@@ -193,9 +195,10 @@ pub(super) fn load_tier(
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         relative_l2_median: card.metrics.relative_l2.median,
         relative_l2_p95: card.metrics.relative_l2.p95,
+        knows_contact: card.knows_contact(),
         card: shipped,
         latency,
-        for_comparison: false,
+        named_only: None,
         retired: false,
         model,
     })

@@ -28,7 +28,10 @@ use self::{
     load::{ReadCard, judge, load_ladder, load_tier, text},
     replay::Replay,
 };
-pub(crate) use self::{load::Loading, tier::Tier};
+pub(crate) use self::{
+    load::Loading,
+    tier::{NamedOnly, Tier},
+};
 use crate::{
     StartError,
     core::{cache::Cache, latency::Overhead},
@@ -315,13 +318,13 @@ impl Catalogue {
             .or_else(|| fitting().min_by_key(|&place| self.predicted_latency_us(place)))
     }
 
-    /// The tiers that a budget may pick: they render these effects, and are not there for
-    /// comparison alone, unless no other renders them.
+    /// The tiers that a budget may pick: they render these effects, and are not taken by
+    /// name alone, unless no other renders them.
     pub(crate) fn for_budgets(&self, effects: &[String]) -> impl Iterator<Item = usize> {
         let fitting = move || self.offered().filter(move |(_, tier)| tier.renders(effects));
-        let is_choice = fitting().any(|(_, tier)| !tier.for_comparison);
+        let is_choice = fitting().any(|(_, tier)| tier.named_only.is_none());
         fitting()
-            .filter(move |(_, tier)| !(is_choice && tier.for_comparison))
+            .filter(move |(_, tier)| !(is_choice && tier.named_only.is_some()))
             .map(|(place, _)| place)
     }
 }

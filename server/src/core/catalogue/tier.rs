@@ -4,6 +4,7 @@ use std::sync::{Arc, atomic::AtomicUsize};
 
 use papilla_engine::{Model, Session, ladder::Kind};
 use papilla_proto::InputStatistics;
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::{
@@ -34,14 +35,26 @@ pub(crate) struct Tier {
     pub(crate) relative_l2_median: f64,
     /// 95th percentile of that error on the card's own split.
     pub(crate) relative_l2_p95: f64,
-    /// No budget picks it: another tier is better and no slower, or it learnt FE's pressure alone.
-    pub(crate) for_comparison: bool,
+    /// Whether it learnt the pressure that contact makes, beside FE's.
+    pub(crate) knows_contact: bool,
+    /// Why no budget picks it; None: budgets do.
+    pub(crate) named_only: Option<NamedOnly>,
     /// How long it takes here.
     pub(crate) latency: Arc<Latency>,
     /// Sessions that render with it now.
     pub(crate) sessions: Arc<AtomicUsize>,
     /// A reload found it gone: sessions that have it go on, nobody else gets it.
     pub(crate) retired: bool,
+}
+
+/// Why a tier is taken by name alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum NamedOnly {
+    /// Another tier is more accurate and no slower.
+    Outdone,
+    /// It learnt FE's pressure alone: of contact's, which most sessions bring, it makes worse SED.
+    FePressure,
 }
 
 impl Tier {

@@ -102,7 +102,7 @@ fn tier(catalogue: &Catalogue, index: usize) -> Value {
         "pattern_max": tier.input_statistics_max,
         "sed_max_j_per_m3": tier.sed_max_j_per_m3,
         "relative_l2_median": tier.relative_l2_median,
-        "for_comparison": tier.for_comparison,
+        "named_only": tier.named_only,
         "predicted_latency_us": catalogue.predicted_latency_us(index),
         "calibrated_us": tier.latency.calibrated_us(),
         "sessions": tier.sessions.load(Ordering::Relaxed),
