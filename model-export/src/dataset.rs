@@ -9,7 +9,51 @@ use papilla_proto::{
     sdf::IndenterSpec,
 };
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+/// Which indentations of a dataset are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Those of a split.
+    Split(Split),
+    /// All of them: where none was learnt, a split says nothing.
+    All,
+}
+
+impl From<Split> for Part {
+    fn from(split: Split) -> Self {
+        Self::Split(split)
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Split(split) => split.fmt(f),
+            Self::All => f.write_str("all"),
+        }
+    }
+}
+
+/// There is no such part.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("no part '{0}'; there are 'train', 'test' and 'all'")]
+pub struct UnknownPart(String);
+
+impl FromStr for Part {
+    type Err = UnknownPart;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPart> {
+        if name == "all" {
+            return Ok(Self::All);
+        }
+        name.parse().map(Self::Split).map_err(|_| UnknownPart(name.to_owned()))
+    }
+}
 
 /// What a campaign says of its mesh and indenters.
 #[derive(Debug, Default, Deserialize)]
@@ -106,15 +150,22 @@ impl Dataset {
         &self.files.manifest().effects
     }
 
-    /// The indentations of a split, by rising id.
+    /// The indentations of a part, by rising id.
     ///
     /// # Errors
-    /// [`ExportError::EmptySplit`] if there are none.
-    pub fn indentations(&self, split: Split) -> Result<Vec<&IndentationEntry>, ExportError> {
-        let found: Vec<_> = self.files.of_split(split).collect();
+    /// [`ExportError::EmptyPart`] if there are none.
+    pub fn indentations(
+        &self,
+        part: impl Into<Part>,
+    ) -> Result<Vec<&IndentationEntry>, ExportError> {
+        let part = part.into();
+        let found: Vec<_> = match part {
+            Part::Split(split) => self.files.of_split(split).collect(),
+            Part::All => self.every_indentation(),
+        };
         if found.iter().all(|indentation| indentation.samples == 0) {
             let path = self.folder().join("manifest.json");
-            return Err(ExportError::EmptySplit { path, split });
+            return Err(ExportError::EmptyPart { path, part });
         }
         Ok(found)
     }

@@ -1,6 +1,7 @@
 //! What can go wrong between a model and its card.
 
-use papilla_dataset::{DatasetError, Split};
+use crate::dataset::Part;
+use papilla_dataset::DatasetError;
 use papilla_engine::EngineError;
 use papilla_output::OutputError;
 use papilla_proto::atlas::AtlasError;
@@ -108,13 +109,13 @@ pub enum ExportError {
         /// What was allowed.
         tolerance: f64,
     },
-    /// A split without samples.
-    #[error("{path}: the split '{split}' is empty")]
-    EmptySplit {
+    /// A part without samples.
+    #[error("{path}: '{part}' holds no sample")]
+    EmptyPart {
         /// The manifest.
         path: PathBuf,
-        /// The split.
-        split: Split,
+        /// The part.
+        part: Part,
     },
     /// A truth without energy, or with what is no energy density.
     #[error("{path}: sample {sample} has no usable SED: {reason}")]

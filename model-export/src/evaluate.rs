@@ -1,10 +1,14 @@
-//! Runs a model over a split of a dataset in the engine that will serve it.
+//! Runs a model over a part of a dataset in the engine that will serve it.
+
+mod by_indenter;
+
+pub use by_indenter::ByIndenter;
 
 use crate::ExportError;
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, Part};
 use crate::metrics::{SampleMetrics, quantile, summarise};
 use crate::reference::relative_difference;
-use papilla_dataset::{IndentationEntry, Shard, Split};
+use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::card::{Card, Latency, Metrics};
 use papilla_engine::{MAP_LEN, MODEL_FORMAT, Model, ModelInfo, Session};
 use serde::Serialize;
@@ -14,7 +18,7 @@ use std::time::{Duration, Instant};
 /// Inferences before the clock counts: caches fill, pages are touched.
 const WARM_UP: usize = 3;
 
-/// One sample of the split and how well the model met it.
+/// One sample of the part and how well the model met it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Sample {
     /// Id of the indentation.
@@ -22,13 +26,15 @@ pub struct Sample {
     pub indentation: usize,
     /// Index within the indentation.
     pub index: usize,
-    /// Depth of the plate, mm.
+    /// Name of the indenter in the campaign.
+    pub indenter: String,
+    /// Depth, mm.
     pub depth_mm: f32,
-    /// Pitch of the plate, degrees.
+    /// Pitch of the indenter, degrees.
     pub pitch_deg: f64,
-    /// Roll of the plate, degrees.
+    /// Roll of the indenter, degrees.
     pub roll_deg: f64,
-    /// Yaw of the plate, degrees.
+    /// Yaw of the indenter, degrees.
     pub yaw_deg: f64,
     /// The figures.
     #[serde(flatten)]
@@ -70,7 +76,7 @@ impl Maps {
     }
 }
 
-/// A model measured on a split.
+/// A model measured on a part.
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
     /// Median and spread of the figures.
@@ -81,7 +87,7 @@ pub struct Evaluation {
     pub other_engine_difference_max: Option<f64>,
     /// Time of one inference in the second engine, if one was given.
     pub other_engine_latency_ms: Option<Latency>,
-    /// Every sample, in the order of the split.
+    /// Every sample, in the order of the part.
     pub samples: Vec<Sample>,
 }
 
@@ -91,7 +97,7 @@ impl Evaluation {
     pub fn landmarks(&self) -> [(&'static str, &Sample); 3] {
         let mut order: Vec<&Sample> = self.samples.iter().collect();
         order.sort_by(|a, b| a.metrics.relative_l2.total_cmp(&b.metrics.relative_l2));
-        // `run` refuses empty splits, so there is a first sample.
+        // `run` refuses empty parts, so there is a first sample.
         let last = order.len() - 1;
         [("best", order[0]), ("median", order[last / 2]), ("worst", order[last])]
     }
@@ -127,7 +133,7 @@ pub struct Subject<'a> {
     pub model: &'a dyn Model,
 }
 
-/// Measures `subject` on every sample of `split`.
+/// Measures `subject` on every sample of `part`.
 ///
 /// With `other`, the same model in a second engine, both answer every sample and the
 /// greatest difference is kept. `step` is called after each sample.
@@ -139,7 +145,7 @@ pub fn run(
     subject: &Subject<'_>,
     other: Option<&dyn Model>,
     dataset: &Dataset,
-    split: Split,
+    part: Part,
     mut step: impl FnMut(),
 ) -> Result<Evaluation, ExportError> {
     let info = subject.model.info();
@@ -149,7 +155,7 @@ pub fn run(
     let mut difference = None;
     let mut samples = Vec::new();
     let mut maps = Maps::default();
-    for indentation in dataset.indentations(split)? {
+    for indentation in dataset.indentations(part)? {
         let path = dataset.shard_path(indentation);
         let shard = dataset.shard(indentation)?;
         for index in 0..indentation.samples {
@@ -174,6 +180,7 @@ pub fn run(
             samples.push(Sample {
                 indentation: indentation.id,
                 index,
+                indenter: indentation.indenter.clone(),
                 depth_mm: shard.depth_mm[index],
                 pitch_deg: indentation.pose.pitch_deg,
                 roll_deg: indentation.pose.roll_deg,
@@ -185,8 +192,8 @@ pub fn run(
         }
     }
     let figures: Vec<SampleMetrics> = samples.iter().map(|sample| sample.metrics).collect();
-    let empty = || ExportError::EmptySplit { path: subject.path.into(), split };
-    let metrics = summarise(&split.to_string(), &figures).ok_or_else(empty)?;
+    let empty = || ExportError::EmptyPart { path: dataset.folder().into(), part };
+    let metrics = summarise(&part.to_string(), &figures).ok_or_else(empty)?;
     Ok(Evaluation {
         metrics: Metrics { dataset_sha256: Some(dataset.sha256().to_owned()), ..metrics },
         latency_ms: bench.latency(info),
@@ -205,12 +212,11 @@ pub fn run(
 pub fn maps_of(
     subject: &Subject<'_>,
     dataset: &Dataset,
-    split: Split,
     sample: &Sample,
 ) -> Result<Maps, ExportError> {
     let mut maps = Maps::default();
     for indentation in dataset
-        .indentations(split)?
+        .indentations(Part::All)?
         .into_iter()
         .filter(|indentation| indentation.id == sample.indentation)
     {

@@ -8,7 +8,7 @@ mod bench;
 
 use bench::{Bench, DEPTHS, FILES, TINY, read_card, replaced};
 use papilla_engine::card::Index;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::fs;
 
 #[test]
@@ -70,6 +70,15 @@ fn json_holds_every_sample() {
         assert!((sample["depth_mm"].as_f64().unwrap() - f64::from(depth)).abs() < 1e-6);
         assert!((sample["relative_l2"].as_f64().unwrap() - 0.25).abs() < 1e-5);
     }
+    // The tiny model answers a quarter too much.
+    let by_indenter = report["by_indenter"].as_array().unwrap();
+    assert_eq!((by_indenter.len(), &by_indenter[0]["samples"]), (1, &json!(DEPTHS.len())));
+    let factor = by_indenter[0]["closest_factor"].as_f64().unwrap();
+    assert!((factor - 0.8).abs() < 1e-5, "{factor}");
+    let text = bench.done(&["--json", "evaluate", "models/tiny.onnx", "data", "--split", "all"]);
+    let all: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(all["card"]["metrics"]["split"], "all");
+    assert_eq!(all["samples"].as_array().unwrap().len(), 2 * DEPTHS.len());
     let info: Value =
         serde_json::from_str(&bench.done(&["check", "models/tiny.onnx", "--json"])).unwrap();
     assert_eq!(info["name"], "tiny");

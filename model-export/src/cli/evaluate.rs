@@ -4,8 +4,8 @@ use super::{load_card, load_model, print_json};
 use papilla_dataset::Split;
 use papilla_engine::card::{Card, Latency, Spread};
 use papilla_engine::{Backend, Model, ModelInfo};
-use papilla_model_export::dataset::Dataset;
-use papilla_model_export::evaluate::{self, Evaluation, Subject};
+use papilla_model_export::dataset::{Dataset, Part};
+use papilla_model_export::evaluate::{self, ByIndenter, Evaluation, Subject};
 use papilla_model_export::reference::{Recorded, TOLERANCE};
 use papilla_model_export::{ExportError, picture, write};
 use papilla_progress::Progress;
@@ -19,9 +19,9 @@ pub(crate) struct Options {
     model: PathBuf,
     /// Folder of the dataset, as `fe-datagen generate` writes it.
     dataset: PathBuf,
-    /// Which indentations: `test` (held out) or `train`.
-    #[arg(long, default_value_t = Split::Test, value_name = "SPLIT")]
-    split: Split,
+    /// Which indentations: `test` (held out), `train` or `all`.
+    #[arg(long, default_value_t = Part::Split(Split::Test), value_name = "SPLIT")]
+    split: Part,
     /// Write the card here, such as models/NAME.json. Needs the dataset that the model was
     /// trained on (of several, one of them) and the split `test`.
     #[arg(long, value_name = "FILE")]
@@ -71,6 +71,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
             "card": card,
             "other_engine_latency_ms": evaluation.other_engine_latency_ms,
             "pictures": pictures,
+            "by_indenter": evaluation.by_indenter(),
             "samples": evaluation.samples,
         }));
     }
@@ -83,7 +84,7 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
 
 /// A card tells of indentations that the training never saw.
 fn require_held_out(options: &Options, info: &ModelInfo, dataset: &Dataset) -> anyhow::Result<()> {
-    if options.split != Split::Test {
+    if options.split != Part::Split(Split::Test) {
         anyhow::bail!("a card tells of held-out presses: --card needs --split test");
     }
     let trained = info.datasets();
@@ -154,7 +155,7 @@ fn draw_pictures(
     let Some(folder) = &options.pictures else { return Ok(Vec::new()) };
     let mut paths = Vec::new();
     for (word, sample) in evaluation.landmarks() {
-        let maps = evaluate::maps_of(subject, dataset, options.split, sample)?;
+        let maps = evaluate::maps_of(subject, dataset, sample)?;
         let name = &subject.model.info().name;
         let heading = format!("{name}, {word} of {}", evaluation.samples.len());
         let path = folder.join(format!("{name}-{word}.png"));
@@ -195,6 +196,11 @@ fn describe(card: &Card, evaluation: &Evaluation) -> String {
     lines.extend(evaluation.other_engine_latency_ms.as_ref().map(latency));
     if let Some(difference) = card.onnxruntime_difference_max {
         lines.push(format!("{:<24}{difference:>10.1e} of the maximum", "from ONNX Runtime"));
+    }
+    let by_indenter = evaluation.by_indenter();
+    if by_indenter.len() > 1 {
+        lines.extend([String::new(), ByIndenter::HEAD.to_owned()]);
+        lines.extend(by_indenter.iter().map(ByIndenter::to_string));
     }
     lines.push(String::new());
     lines.join("\n")

@@ -12,6 +12,7 @@
 //! | nail-base error | relative L2 over the [nail-base zone](NAIL_BASE_MM) |
 //! | total-energy error | `abs(sum p - sum t) / sum t` (pixels have equal area) |
 //! | SSIM | [`ssim`] of `p / max t` and `t / max t` |
+//! | closest factor | `sum p t / sum p^2` |
 
 mod ssim;
 
@@ -86,6 +87,8 @@ pub struct SampleMetrics {
     pub total_energy_error: f64,
     /// Structural similarity; 1 is equal.
     pub ssim: f64,
+    /// The factor that brings the prediction closest in relative L2; none if it is zero everywhere.
+    pub closest_factor: Option<f64>,
 }
 
 impl SampleMetrics {
@@ -120,6 +123,7 @@ impl SampleMetrics {
             nail_base_error: nail_base.relative_l2(),
             total_energy_error: (all.predicted - all.truth).abs() / all.truth,
             ssim: ssim(predicted, truth, &ground.mask, peak_true),
+            closest_factor: all.closest_factor(),
         })
     }
 }
@@ -135,6 +139,8 @@ fn rise(greatest: &mut Option<(usize, f32)>, place: usize, value: f32) {
 struct Sums {
     error_squared: f64,
     truth_squared: f64,
+    predicted_squared: f64,
+    product: f64,
     predicted: f64,
     truth: f64,
 }
@@ -144,12 +150,18 @@ impl Sums {
         let (p, t) = (f64::from(p), f64::from(t));
         self.error_squared += (p - t).powi(2);
         self.truth_squared += t * t;
+        self.predicted_squared += p * p;
+        self.product += p * t;
         self.predicted += p;
         self.truth += t;
     }
 
     fn relative_l2(&self) -> Option<f64> {
         (self.truth_squared > 0.0).then(|| (self.error_squared / self.truth_squared).sqrt())
+    }
+
+    fn closest_factor(&self) -> Option<f64> {
+        (self.predicted_squared > 0.0).then(|| self.product / self.predicted_squared)
     }
 }
 

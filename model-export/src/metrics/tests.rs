@@ -177,6 +177,7 @@ fn summaries_take_the_bad_end_of_each_figure() {
                 nail_base_error: (i >= 50).then_some(x),
                 total_energy_error: 3.0 * x,
                 ssim: 1.0 - x,
+                closest_factor: Some(1.0),
             }
         })
         .collect();
