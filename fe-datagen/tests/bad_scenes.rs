@@ -170,3 +170,45 @@ fn a_good_scene_is_explained_without_being_solved() {
     assert!(said["forecast"]["seconds"]["total"].as_f64().unwrap() > 0.0);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is written");
 }
+
+/// The sharp bar would fail, the ball would not: the campaign is explained, and says so.
+#[test]
+fn a_campaign_says_before_it_is_solved_what_would_fail() {
+    let indenter = |name: &str, shape: &str| {
+        format!("[[indenters]]\nname = \"{name}\"\nindenter = {{ {shape} }}\n")
+    };
+    let campaign = |indenters: &[String]| {
+        let head = "name = \"two\"\nseed = 1\npresses = 2\ntest_fraction = 0.5\n\
+                    density = \"coarse\"\norder = \"graded\"\ndepths_mm = [0.3]\n\
+                    effects = [\"finite_strain\", \"layers\"]\n[pose]\npitch_deg = [0.0, 1.0]\n\
+                    roll_deg = [0.0, 1.0]\nyaw_deg = [0.0, 0.0]\n";
+        format!("{head}{}", indenters.concat())
+    };
+    let sharp = indenter(
+        "sharp",
+        "shape = \"cylinder\", radius_mm = 0.005, length_mm = 8.0, end_radius_mm = 0.002",
+    );
+    let ball = indenter("ball", "shape = \"sphere\", radius_mm = 6.0");
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("two.toml");
+    std::fs::write(&file, campaign(&[sharp.clone(), ball])).unwrap();
+    let output = run(folder.path(), &["explain", "two.toml", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(said["indenters"].as_array().unwrap().len(), 1);
+    assert_eq!(
+        (&said["refused"][0]["press"], &said["refused"][0]["indenter"]),
+        (&0.into(), &"sharp".into())
+    );
+    assert!(
+        said["refused"][0]["reason"].as_str().unwrap().contains("finer than the mesh"),
+        "{said}"
+    );
+    let output = run(folder.path(), &["explain", "two.toml"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("will fail: indentation 0 (sharp)"), "{text}");
+
+    std::fs::write(&file, campaign(&[sharp])).unwrap();
+    let output = run(folder.path(), &["explain", "two.toml"]);
+    assert!(!output.status.success(), "nothing of it can be solved");
+}

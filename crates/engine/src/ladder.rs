@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 pub const REFERENCE_SET: &str = "reference";
 
 /// Names of the held-out sets, in the order in which errors are looked up for a choice.
-pub const SET_NAMES: [&str; 5] =
-    ["heldout-presses", "heldout-shapes", REFERENCE_SET, "pressed", "s1"];
+pub const SET_NAMES: [&str; 6] =
+    ["heldout-presses", "heldout-shapes", REFERENCE_SET, "reference-anew", "pressed", "s1"];
 
 /// All rungs, measured on the same sets.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

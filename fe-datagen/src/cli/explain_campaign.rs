@@ -1,10 +1,10 @@
 //! `explain` of a campaign: what a task of a cluster has to ask for.
 
 use super::print;
-use papilla_fingertip::campaign::{CampaignSpec, Indentation, indentations};
+use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation, indentations};
 use papilla_fingertip::forecast::Forecast;
 use papilla_fingertip::mesh::fingertip::Order;
-use papilla_fingertip::simulation::Simulation;
+use papilla_fingertip::simulation::{Simulation, body::SimulationError};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
@@ -34,6 +34,16 @@ struct CampaignCost {
     seconds_max: f64,
     core_hours: f64,
     indenters: Vec<IndenterCost>,
+    /// Those that would fail, of the deepest of each indenter down to the first that would not.
+    refused: Vec<Refused>,
+}
+
+/// An indentation that would fail before anything is solved.
+#[derive(Serialize)]
+struct Refused {
+    press: usize,
+    indenter: String,
+    reason: String,
 }
 
 /// Whether a file is a campaign's rather than a scene's.
@@ -45,25 +55,27 @@ pub(super) fn is_campaign(file: &Path) -> bool {
 pub(super) fn run(file: &Path, json: bool) -> anyhow::Result<()> {
     let spec = CampaignSpec::read(file)?;
     let planned = indentations(&spec);
-    let mut indenters = Vec::new();
+    let (mut indenters, mut refused, mut first_error) = (Vec::new(), Vec::new(), None);
     for (k, candidate) in spec.candidates().iter().enumerate() {
-        let own: Vec<&Indentation> = planned.iter().filter(|p| p.candidate == k).collect();
-        let deepest = own.iter().max_by(|a, b| a.deepest_mm().total_cmp(&b.deepest_mm()));
-        let Some(press) = deepest else { continue };
-        let mut scene = spec.scene(candidate);
-        scene.motion = press.motion();
-        let clock = Instant::now();
-        let setup = Simulation::new(&scene)?;
-        let setup_s = clock.elapsed().as_secs_f64();
-        let forecast = Forecast::new(&scene, &setup);
-        let own_mesh_s = if spec.order == Order::Graded { setup_s } else { 0.0 };
-        indenters.push(IndenterCost {
-            indenter: candidate.name.clone(),
-            presses: own.len(),
-            unknowns: forecast.census.unknowns,
-            memory_bytes: forecast.memory_bytes + forecast.memory_indefinite_bytes,
-            seconds: forecast.seconds.total + own_mesh_s,
-        });
+        let mut own: Vec<&Indentation> = planned.iter().filter(|p| p.candidate == k).collect();
+        own.sort_by(|a, b| b.deepest_mm().total_cmp(&a.deepest_mm()));
+        // The deepest that the mesh can resolve.
+        for press in &own {
+            match cost(&spec, candidate, press) {
+                Ok(cost) => {
+                    indenters.push(IndenterCost { presses: own.len(), ..cost });
+                    break;
+                }
+                Err(error) => {
+                    let (indenter, reason) = (candidate.name.clone(), error.to_string());
+                    refused.push(Refused { press: press.id, indenter, reason });
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+    }
+    if let (true, Some(error)) = (indenters.is_empty(), first_error) {
+        return Err(error.into());
     }
     let total_s: f64 = indenters.iter().map(|i| i.presses as f64 * i.seconds).sum();
     let cost = CampaignCost {
@@ -75,8 +87,31 @@ pub(super) fn run(file: &Path, json: bool) -> anyhow::Result<()> {
         seconds_max: indenters.iter().map(|i| i.seconds).fold(0.0, f64::max),
         core_hours: total_s / 3600.0,
         indenters,
+        refused,
     };
     print(&cost, json, || human(&cost))
+}
+
+/// What an indentation costs.
+fn cost(
+    spec: &CampaignSpec,
+    candidate: &Candidate,
+    press: &Indentation,
+) -> Result<IndenterCost, SimulationError> {
+    let mut scene = spec.scene(candidate);
+    scene.motion = press.motion();
+    let clock = Instant::now();
+    let setup = Simulation::new(&scene)?;
+    let setup_s = clock.elapsed().as_secs_f64();
+    let forecast = Forecast::new(&scene, &setup);
+    let own_mesh_s = if spec.order == Order::Graded { setup_s } else { 0.0 };
+    Ok(IndenterCost {
+        indenter: candidate.name.clone(),
+        presses: 1,
+        unknowns: forecast.census.unknowns,
+        memory_bytes: forecast.memory_bytes + forecast.memory_indefinite_bytes,
+        seconds: forecast.seconds.total + own_mesh_s,
+    })
 }
 
 fn human(c: &CampaignCost) -> String {
@@ -94,6 +129,9 @@ fn human(c: &CampaignCost) -> String {
             mib(i.memory_bytes),
             i.seconds
         );
+    }
+    for Refused { press, indenter, reason } in &c.refused {
+        text += &format!("  will fail: indentation {press} ({indenter}): {reason}\n");
     }
     text += &format!(
         "an indentation takes {:.0} MiB at most and about {:.1} s of one core; all {:.1} core hours",

@@ -13,7 +13,8 @@ const STEM: &str = "accuracy-vs-time";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// Folder of the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final` and `s1`;
+    /// Folder of the datasets `broad-graded`, `heldout-graded`, `pressed-graded`, `final`, `final-anew`
+    /// and `s1-graded`;
     /// those that are not there are reported as not measured. `friction-graded` and
     /// `sliding-graded` say what traction is worth.
     #[arg(long, default_value = "data", value_name = "FOLDER")]
