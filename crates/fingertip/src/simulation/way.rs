@@ -10,9 +10,9 @@ use std::ops::Range;
 const GUIDED: f64 = 2.0;
 
 /// Farthest from one equilibrium to the next, mm. A longer step, deep in a finger, starts so far
-/// from equilibrium that the tangent is indefinite on the way (a ring, .64 to 1.28 mm
-/// in one step: none found in 8 minutes; in two, 33 iterations), and may end in a state of the same
-/// force in which an element is crushed (a level plate, 1.9 to 3.8 mm at once: J = .02 for .47).
+/// from equilibrium that the tangent is indefinite on the way (a ring, .64 to 1.28 mm in one step:
+/// no equilibrium in 8 minutes; in two, 33 iterations), and may end in a state of the same force in
+/// which an element is crushed (a level plate, 1.9 to 3.8 mm in one step: J = .02 for .47).
 const STEP_MAX_MM: f64 = 0.5;
 
 /// The same beside a guide, which goes there by shorter steps. Farther from its last equilibrium a
