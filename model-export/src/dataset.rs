@@ -3,57 +3,14 @@
 
 use crate::ExportError;
 use crate::metrics::Ground;
-use papilla_dataset::{IndentationEntry, Maps, Shard, Split};
+use crate::part::Part;
+use papilla_dataset::{IndentationEntry, Maps, Shard};
 use papilla_proto::{
     atlas::{Atlas, Patch},
     sdf::IndenterSpec,
 };
 use serde::Deserialize;
-use std::{
-    fmt,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
-
-/// Which indentations of a dataset are taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Those of a split.
-    Split(Split),
-    /// All of them: where none was learnt, a split says nothing.
-    All,
-}
-
-impl From<Split> for Part {
-    fn from(split: Split) -> Self {
-        Self::Split(split)
-    }
-}
-
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Split(split) => split.fmt(f),
-            Self::All => f.write_str("all"),
-        }
-    }
-}
-
-/// There is no such part.
-#[derive(Clone, Debug, thiserror::Error)]
-#[error("no part '{0}'; there are 'train', 'test' and 'all'")]
-pub struct UnknownPart(String);
-
-impl FromStr for Part {
-    type Err = UnknownPart;
-
-    fn from_str(name: &str) -> Result<Self, UnknownPart> {
-        if name == "all" {
-            return Ok(Self::All);
-        }
-        name.parse().map(Self::Split).map_err(|_| UnknownPart(name.to_owned()))
-    }
-}
+use std::path::{Path, PathBuf};
 
 /// What a campaign says of its mesh and indenters.
 #[derive(Debug, Default, Deserialize)]

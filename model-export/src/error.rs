@@ -1,6 +1,6 @@
 //! What can go wrong between a model and its card.
 
-use crate::dataset::Part;
+use crate::part::Part;
 use papilla_dataset::DatasetError;
 use papilla_engine::EngineError;
 use papilla_output::OutputError;

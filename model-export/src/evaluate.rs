@@ -5,8 +5,9 @@ mod by_indenter;
 pub use by_indenter::ByIndenter;
 
 use crate::ExportError;
-use crate::dataset::{Dataset, Part};
+use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, quantile, summarise};
+use crate::part::Part;
 use crate::reference::relative_difference;
 use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::card::{Card, Latency, Metrics};

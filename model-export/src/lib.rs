@@ -31,6 +31,7 @@ pub mod evaluate;
 pub mod ladder;
 pub mod metrics;
 pub mod operators;
+pub mod part;
 pub mod picture;
 mod processor;
 pub mod reference;
