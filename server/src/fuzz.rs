@@ -4,14 +4,12 @@
 //! other build has this module.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
-use papilla_proto::Problem;
+#[path = "../../tests/fuzz/refusal.rs"]
+mod refusal;
+
+use refusal::is_typed;
 
 use crate::transport::negotiate::{self, Query};
-
-/// A refusal tells a client what to do: a code of its own making and words.
-fn is_typed(problem: &Problem) -> bool {
-    (400..500).contains(&problem.code.http_status()) && problem.message.len() > 10
-}
 
 /// The head of `POST /v1/sed`: query, content type and accept, a line each; then the body, whose
 /// first bytes may tell its type.

@@ -4,17 +4,17 @@
 //! other build has this module.
 
 use bytes::BytesMut;
-use papilla_proto::{MAP_LEN, Problem, SampleType};
+use papilla_proto::{MAP_LEN, SampleType};
+
+#[path = "../../../tests/fuzz/refusal.rs"]
+mod refusal;
+
+use refusal::is_typed;
 
 use crate::{Input, Map, Output, Quantity, decode, encode};
 
 /// Full white of the images, Pa.
 const WHITE_PA: f32 = 30_000.0;
-
-/// A refusal tells a client what to do: a code of its own making and words.
-fn is_typed(problem: &Problem) -> bool {
-    (400..500).contains(&problem.code.http_status()) && problem.message.len() > 10
-}
 
 /// A body decodes into a whole map that encodes and decodes to itself within `error` of each
 /// sample, or it is refused.
