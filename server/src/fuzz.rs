@@ -4,6 +4,7 @@
 //! other build has this module.
 
 use axum::http::{HeaderMap, HeaderName, HeaderValue};
+
 #[path = "../../tests/fuzz/refusal.rs"]
 mod refusal;
 
