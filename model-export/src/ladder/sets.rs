@@ -4,6 +4,7 @@ use super::Canvas;
 use crate::ExportError;
 use crate::dataset::Dataset;
 use crate::evaluate::require_same_atlas;
+use crate::part::Part;
 use papilla_dataset::{IndentationEntry, Split};
 use papilla_engine::{
     MAP_LEN,
@@ -98,14 +99,14 @@ pub(super) struct Source {
     name: &'static str,
     folder: &'static str,
     about: &'static str,
-    split: Option<Split>,
+    part: Part,
 }
 
 const REFERENCE: Source = Source {
     name: REFERENCE_SET,
     folder: "final",
     about: "presses on the finest mesh, of shapes, poses and a seed by which nothing was chosen",
-    split: None,
+    part: Part::All,
 };
 
 const SOURCES: [Source; 6] = [
@@ -113,33 +114,33 @@ const SOURCES: [Source; 6] = [
         name: "heldout-presses",
         folder: "broad-graded",
         about: "presses that no training saw, of the shapes and depths it saw",
-        split: Some(Split::Test),
+        part: Part::Split(Split::Test),
     },
     Source {
         name: "heldout-shapes",
         folder: "heldout-graded",
         about: "shapes that no training saw",
-        split: None,
+        part: Part::All,
     },
     REFERENCE,
     Source {
         name: "reference-anew",
         folder: "final-anew",
         about: "the same shapes on the finest mesh in other poses, solved when everything was decided",
-        split: None,
+        part: Part::All,
     },
     Source {
         name: "pressed",
         folder: "pressed-graded",
         about: "presses that no training saw: a plate to 7 N, a key, gratings, Braille",
-        split: Some(Split::Test),
+        part: Part::Split(Split::Test),
     },
     Source {
         name: "s1",
         folder: "s1-graded",
         about: "presses of the published campaign that no training saw, a plate alone, by the \
                 teacher",
-        split: Some(Split::Test),
+        part: Part::Split(Split::Test),
     },
 ];
 
@@ -155,7 +156,7 @@ const LEARNT: Source = Source {
     name: "training",
     folder: "",
     about: "what networks learnt from",
-    split: Some(Split::Train),
+    part: Part::Split(Split::Train),
 };
 
 /// Reads the sets whose datasets are in `data`; the others come out empty and say why.
@@ -187,11 +188,7 @@ impl Source {
             dataset_sha256: Some(dataset.sha256().to_owned()),
             states: Vec::new(),
         };
-        let indentations = match self.split {
-            Some(split) => dataset.indentations(split)?,
-            None => dataset.every_indentation(),
-        };
-        for indentation in indentations {
+        for indentation in dataset.indentations(self.part)? {
             self.take(dataset, indentation, &mut set.states)?;
         }
         if set.states.is_empty() {

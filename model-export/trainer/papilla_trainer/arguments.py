@@ -250,6 +250,12 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="fit to N of the training indentations only, drawn by the seed",
     )
+    add(
+        "--dataset-samples",
+        type=int,
+        metavar="N",
+        help="of each dataset see N samples an epoch at most, drawn anew each time (all)",
+    )
     add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
 

@@ -44,7 +44,7 @@ def _train(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
     )
     dataset = open_datasets(options.dataset)
     trainer = Trainer(dataset, config, options.out, resume=options.resume)
-    with _Bar(trainer.state.epoch, config.epochs, len(trainer.fit_samples)) as bar:
+    with _Bar(trainer.state.epoch, config.epochs, trainer.epoch_samples) as bar:
         try:
             state = trainer.fit(bar.listen)
         finally:

@@ -41,6 +41,7 @@ class TrainConfig:
     far_weight: float = 0.2
     operator: str | None = None
     train_presses: int | None = None
+    dataset_samples: int | None = None
     base_rate: float = 0.05
     dropout: float = 0.0
     shift_px: int = 0
@@ -68,6 +69,8 @@ class TrainConfig:
             raise UsageError(f"--loss {self.loss} --far-weight {self.far_weight}: not a loss")
         if self.train_presses is not None and self.train_presses < 2:
             raise UsageError("--train-presses must be at least 2")
+        if self.dataset_samples is not None and self.dataset_samples < 1:
+            raise UsageError(f"--dataset-samples must be at least 1, not {self.dataset_samples}")
         for name, least in (("epochs", 1), ("batch", 1), ("seed", 0)):
             if getattr(self, name) < least:
                 raise UsageError(f"--{name} must be at least {least}, not {getattr(self, name)}")

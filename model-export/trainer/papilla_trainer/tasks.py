@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from papilla_trainer.atlas import Atlas
@@ -17,6 +18,7 @@ from papilla_trainer.dataset import F32, Dataset, Maps
 from papilla_trainer.face_init import start_from_operator
 from papilla_trainer.face_layout import FaceLayout
 from papilla_trainer.face_network import FaceNet, FaceSpec
+from papilla_trainer.joined import STRIDE
 from papilla_trainer.linear_operator import Operator
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.map_network import MapNet, MapSpec
@@ -28,18 +30,20 @@ from papilla_trainer.vertex_served import MapFrame
 class Samples:
     """On the device: maps ``[N, 1, 224, 224]`` or values ``[N, V]``, in Pa and J/m3.
 
-    The U-Net's are divided by the dataset's maxima, as in its paper.
+    The U-Net's are divided by the dataset's maxima, as in its paper. ``source`` ``[N]``, on the
+    CPU, says which dataset each is of; with contact's pressure it counts as another.
     """
 
     inputs: Tensor
     targets: Tensor
+    source: Tensor
 
     @staticmethod
     def of(maps: Maps, device: torch.device, units: tuple[float, float] = (1.0, 1.0)) -> Samples:
         """Maps in units of so many Pa and J/m3."""
         inputs = torch.from_numpy(maps.pressure_pa).unsqueeze(1).mul_(1 / units[0])
         targets = torch.from_numpy(maps.sed_j_per_m3).unsqueeze(1).mul_(1 / units[1])
-        return Samples(inputs.to(device), targets.to(device))
+        return Samples(inputs.to(device), targets.to(device), source_of(maps.press_id))
 
     def __len__(self) -> int:
         return self.inputs.shape[0]
@@ -66,7 +70,9 @@ def make_task(
     spec = config.spec
     load = _loader(spec)
     if config.contact:
-        fit = Samples.of(with_contact(dataset.load(fit_ids), dataset, config.contact), device)
+        maps = dataset.load(fit_ids)
+        fit = Samples.of(with_contact(maps, dataset, config.contact), device)
+        fit.source[len(maps) :] += len(dataset.hashes)
     else:
         fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
@@ -154,4 +160,14 @@ def _load_maps(dataset: Dataset, ids: list[int], device: torch.device) -> Sample
 
 def _load_vertices(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
     pressure, sed = dataset.load_vertices(ids)
-    return Samples(torch.from_numpy(pressure).to(device), torch.from_numpy(sed).to(device))
+    press_id = np.repeat(ids, [dataset.presses[i].samples for i in ids])
+    return Samples(
+        torch.from_numpy(pressure).to(device),
+        torch.from_numpy(sed).to(device),
+        source_of(press_id),
+    )
+
+
+def source_of(press_id: NDArray[np.int64]) -> Tensor:
+    """``[N]``: the dataset, of those joined, that each press is of."""
+    return torch.from_numpy(press_id // STRIDE)

@@ -17,6 +17,7 @@ from papilla_trainer.augment import varied
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
 from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
 from papilla_trainer.dataset import Dataset, fewer, validation_split
+from papilla_trainer.draw import draw, drawn
 from papilla_trainer.errors import RunError, TrainerError
 from papilla_trainer.face_network import FaceNet
 from papilla_trainer.map_network import MapNet
@@ -60,6 +61,7 @@ class Trainer:
         task = make_task(dataset, config, fit_ids, validation_ids, self.device)
         self.network, self.loss = task.network, task.loss
         self.fit_samples, self.validation = task.fit, task.validation
+        self.epoch_samples = drawn(task.fit.source, config.dataset_samples)
         self.on_vertices = isinstance(self.network, FaceNet)
         self.on_pixels = isinstance(self.network, MapNet)
         self.rates = _rates(self.network, config.base_rate)
@@ -98,7 +100,7 @@ class Trainer:
                 "validation_loss": validation_loss,
                 "learning_rate": rate,
                 "seconds": seconds,
-                "samples_per_s": len(self.fit_samples) / seconds,
+                "samples_per_s": self.epoch_samples / seconds,
             }
             self._finish_epoch(line)
             listener(Progress(epoch=line))
@@ -123,7 +125,7 @@ class Trainer:
             self.optimizer.step()
             total += loss.item() * len(chosen)
             listener(Progress(samples=len(chosen)))
-        mean = total / len(self.fit_samples)
+        mean = total / self.epoch_samples
         if not math.isfinite(mean):
             raise TrainerError(
                 f"training diverged in epoch {epoch} (loss {mean}); the checkpoint before it is "
@@ -132,7 +134,7 @@ class Trainer:
         return mean
 
     def _batches(self, generator: torch.Generator) -> tuple[Tensor, ...]:
-        order = torch.randperm(len(self.fit_samples), generator=generator)
+        order = draw(self.fit_samples.source, self.config.dataset_samples, generator)
         return order.to(self.device).split(self.config.batch)
 
     def _forward(self, inputs: Tensor) -> Tensor:

@@ -15,6 +15,7 @@ from papilla_trainer.checkpoint import Checkpoint
 from papilla_trainer.cli import main
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.dataset import Dataset
+from papilla_trainer.draw import draw, drawn
 from papilla_trainer.errors import RunError
 from papilla_trainer.training import Trainer
 
@@ -132,3 +133,18 @@ def test_smoke_on_the_shipped_dataset(
     small = dataclasses.replace(config, network="s1-base4", epochs=4, threads=2)
     history = Trainer(shipped, small, tmp_path / "run").fit().history
     assert history[-1]["train_loss"] < history[0]["train_loss"]
+
+
+def test_of_a_large_dataset_an_epoch_sees_a_part_and_of_a_small_one_all() -> None:
+    source = torch.tensor([0] * 50 + [1] * 3)
+    assert drawn(source, None) == 53
+    assert drawn(source, 5) == 8
+    generator = torch.Generator().manual_seed(1)
+    assert sorted(draw(source, None, generator).tolist()) == list(range(53))
+    seen: set[int] = set()
+    for _ in range(100):
+        chosen = draw(source, 5, generator).tolist()
+        assert len(chosen) == len(set(chosen)) == 8
+        assert {50, 51, 52} <= set(chosen)
+        seen |= set(chosen)
+    assert len(seen) == 53
