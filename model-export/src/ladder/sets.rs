@@ -191,9 +191,6 @@ impl Source {
         for indentation in dataset.indentations(self.part)? {
             self.take(dataset, indentation, &mut set.states)?;
         }
-        if set.states.is_empty() {
-            set.about = format!("not measured: '{}' has no such state", self.folder);
-        }
         Ok(set)
     }
 

@@ -254,7 +254,8 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "--dataset-samples",
         type=int,
         metavar="N",
-        help="of each dataset see N samples an epoch at most, drawn anew each time (all)",
+        help="of each dataset see N samples an epoch at most, drawn anew each time, and N with "
+        "contact's pressure (all)",
     )
     add("--threads", type=int, metavar="N", help="CPU threads (default: all that are allowed)")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, ... (auto)")
