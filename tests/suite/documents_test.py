@@ -68,17 +68,13 @@ class Crates(unittest.TestCase):
 
 
 class Sizes(unittest.TestCase):
-    def faults(self, found: dict[str, int]) -> list[str]:
-        return [fault.split(" has ")[0] for fault in crates.too_large(["a", "b"], found)]
-
-    def test_a_crate_a_file_and_the_median_may_be_as_large_as_their_limits(self) -> None:
-        files = {f"a/src/{n}.rs": crates.MEDIAN_MAX for n in range(crates.CRATE_MAX // crates.MEDIAN_MAX)}
-        self.assertEqual(self.faults(files | {"b/page.css": crates.FILE_MAX}), [])
+    def test_the_largest_are_named(self) -> None:
         # Tests beside `src` are programs of their own.
-        self.assertEqual(self.faults(files | {"a/tests/more.rs": 1}), [])
-        self.assertEqual(self.faults(files | {"a/src/more.rs": 1}), ["a/src"])
-        self.assertEqual(self.faults(files | {"b/page.css": crates.FILE_MAX + 1}), ["b/page.css"])
-        self.assertEqual(len(self.faults({"a/src/x.rs": crates.MEDIAN_MAX + 1})), 1)
+        found = {"a/src/x.rs": 7, "a/src/y.rs": 2, "b/src/z.rs": 8, "b/tests/t.rs": 5, "b/page.css": 9}
+        said = crates.largest(["a", "b"], found)
+        self.assertEqual(
+            said, "largest crate a (9 lines in src), largest file b/page.css (9 lines), median Rust file 5 lines of 4"
+        )
 
 
 if __name__ == "__main__":
