@@ -9,6 +9,8 @@ from pathlib import Path
 PACKAGES = {
     "ccx": "calculix-ccx",
     "chromium": "chromium",
+    "cmake": "cmake",
+    "pkg-config": "pkg-config",
     "godot3-server": "godot3-server",
     "mcs": "mono-mcs",
     "mono": "mono-runtime",
