@@ -6,6 +6,7 @@ from pathlib import Path
 
 import crates
 import documents
+import figures
 
 
 class Links(unittest.TestCase):
@@ -49,6 +50,23 @@ class Plots(unittest.TestCase):
             (50, "middle", "within"), (90, "end", "within too"), (80, "start", "beyond"), (10, "middle", "beyond it"),
         ])
         self.assertEqual([fault.split("'")[1] for fault in documents.cut_off(svg)], ["beyond", "beyond it"])
+
+
+class Figures(unittest.TestCase):
+    def test_a_stale_figure_is_named_and_renewed(self) -> None:
+        page = "off by <!-- =a.b -->7 %<!-- / -->, <!-- =c -->1<!-- / -->, <!-- =d -->2<!-- / -->"
+        new, wrong = figures.filled(page, {"a.b": "8 %", "c": "1"})
+        self.assertIn("<!-- =a.b -->8 %<!-- / -->", new)
+        self.assertEqual(["a.b" in wrong[0], "no source has 'd'" in wrong[1], len(wrong)], [True, True, 2])
+
+    def test_errors_are_rounded_to_what_they_are_worth(self) -> None:
+        self.assertEqual([figures.percent(e) for e in (0.0748, 0.0996, 0.4839)], ["7.5 %", "10 %", "48 %"])
+
+    def test_the_report_of_contact_is_read(self) -> None:
+        row = "| second order, pixels | final | 5.3 / 15.1 | 1.4 / 2.4 | 6.8 / 11.8 | 5770 / 13621 | 1117 / 3127 | | |"
+        found = figures.of_contact(row)
+        self.assertEqual(found["contact.pixels.reference.sed.p95"], "12 %")
+        self.assertEqual(found["contact.pixels.reference.us"], "1117")
 
 
 class Crates(unittest.TestCase):

@@ -71,11 +71,12 @@ def fast() -> list[Step]:
         Step("format", "rustfmt", "cargo fmt --all --check"),
         Step(
             "documents",
-            "links, lines and words of the documents; the crates' picture and sizes",
+            "links, lines and figures of the documents; the crates' picture",
             "python3 tests/suite/documents_test.py\n"
             "python3 tests/suite/documents.py\n"
+            "python3 tests/suite/figures.py\n"
             "python3 tests/suite/crates.py",
-            tests_min=10,
+            tests_min=13,
         ),
         Step(
             "build",

@@ -1,0 +1,138 @@
+#!/usr/bin/env python3
+"""Fills measured figures into hand-written pages, so that a figure has one source.
+
+    tests/suite/figures.py [--write | --list]
+
+A page marks a figure with two comments, which a reader does not see:
+
+    `small` errs by <!-- =small.reference -->7.5 %<!-- / -->.
+
+Between the comments stands what the key's source says: models/ladder.json for networks, the first
+table of docs/reports/contact.md for contact. Without an option exit code 1 names every figure that
+is stale and every key that no source has. --write renews them, --list prints all keys with values.
+
+Keys of networks and of finite-element rows: NAME.SET is the median relative L2 of strain energy
+density (SED), NAME.SET.p95 its 95th percentile, NAME.SET.far the error away from the contact, NAME.SET.peak
+that of the greatest SED, NAME.ms the time of a map on one core, NAME.s that of a state. Sets:
+reference, reference-anew, broad, unseen, pressed, s1. Keys of contact: contact.METHOD.SET.QUANTITY
+and the same with .p95; quantities are pressure, force, sed, us (processor time of a warm frame).
+
+Errors are rounded to what they are worth: one decimal below 10 %, none above.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+MARK = re.compile(r"(<!-- =([\w.-]+) -->)([^<]*)(<!-- / -->)")
+SETS = {
+    "reference": "reference",
+    "reference-anew": "reference-anew",
+    "heldout-presses": "broad",
+    "heldout-shapes": "unseen",
+    "pressed": "pressed",
+    "s1": "s1",
+}
+METHODS = {
+    "springs": "springs",
+    "small strain": "small_strain",
+    "second order": "second_order",
+    "second order, coarse pixels": "coarse_pixels",
+    "second order, pixels": "pixels",
+    "second order, gaps": "gaps",
+}
+CONTACT_SETS = {"final": "reference", "broad": "broad", "heldout": "unseen"}
+
+
+def percent(value: float) -> str:
+    """An error in percent, rounded to what it is worth."""
+    return f"{100 * value:.1f} %" if 100 * value < 9.95 else f"{100 * value:.0f} %"
+
+
+def milliseconds(value: float) -> str:
+    """A time, to two figures."""
+    return f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+
+
+def of_ladder(text: str) -> dict[str, str]:
+    """Figures of the ladder."""
+    found = {}
+    for rung in json.loads(text)["rungs"]:
+        for name, errors in rung["errors"].items():
+            error = errors["relative_l2"]
+            found[f"{rung['name']}.{SETS[name]}"] = percent(error["median"])
+            found[f"{rung['name']}.{SETS[name]}.p95"] = percent(error["p95"])
+            found[f"{rung['name']}.{SETS[name]}.far"] = percent(errors["far_field_relative_l2"]["median"])
+            found[f"{rung['name']}.{SETS[name]}.peak"] = percent(errors["peak_error"]["median"])
+        if latency := (rung["latency_ms"] or {}).get("tract"):
+            found[f"{rung['name']}.ms"] = milliseconds(latency["p50"])
+        if seconds := rung["seconds"]:
+            found[f"{rung['name']}.s"] = f"{seconds['p50']:.0f}"
+    return found
+
+
+def of_contact(text: str) -> dict[str, str]:
+    """Figures of the contact report."""
+    found = {}
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("| ").split("|")]
+        if len(cells) < 7 or cells[0] not in METHODS or cells[1] not in CONTACT_SETS:
+            continue
+        key = f"contact.{METHODS[cells[0]]}.{CONTACT_SETS[cells[1]]}"
+        for quantity, cell in [("pressure", 2), ("force", 3), ("sed", 4), ("us", 6)]:
+            median, p95 = (float(part) for part in cells[cell].split("/"))
+            show = (lambda us: f"{us:.0f}") if quantity == "us" else (lambda error: percent(error / 100))
+            found[f"{key}.{quantity}"], found[f"{key}.{quantity}.p95"] = show(median), show(p95)
+    return found
+
+
+def figures() -> dict[str, str]:
+    """All figures, by key."""
+    ladder = (ROOT / "models/ladder.json").read_text()
+    return of_ladder(ladder) | of_contact((ROOT / "docs/reports/contact.md").read_text())
+
+
+def filled(text: str, known: dict[str, str]) -> tuple[str, list[str]]:
+    """The text with its figures renewed, and a line for each that was stale or has no source."""
+    wrong = []
+
+    def renew(mark: re.Match[str]) -> str:
+        value = known.get(mark[2])
+        if value is None:
+            wrong.append(f"no source has '{mark[2]}' (--list)")
+            return mark[0]
+        if value != mark[3]:
+            wrong.append(f"{mark[2]} is {value}, the page says {mark[3] or 'nothing'}")
+        return mark[1] + value + mark[4]
+
+    return MARK.sub(renew, text), wrong
+
+
+def main() -> int:
+    known = figures()
+    if "--list" in sys.argv[1:]:
+        print("\n".join(f"{key:45} {value}" for key, value in sorted(known.items())))
+        return 0
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    count, faults = 0, []
+    for name in sorted(filter(None, listed.split("\0"))):
+        path = ROOT / name
+        text = path.read_text() if path.exists() else ""
+        new, wrong = filled(text, known)
+        count += len(MARK.findall(text))
+        if "--write" in sys.argv[1:] and new != text:
+            path.write_text(new)
+            wrong = [fault for fault in wrong if fault.startswith("no source")]
+        faults += [f"{name}: {fault}" for fault in wrong]
+    print("\n".join(faults + [f"{count} figures, {len(faults)} faults"]))
+    if faults:
+        print("renew them: tests/suite/figures.py --write")
+    return int(bool(faults))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
