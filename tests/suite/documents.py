@@ -86,9 +86,9 @@ def broken_links(path: Path, text: str) -> Iterator[str]:
 
 
 def long_lines(text: str) -> Iterator[str]:
-    """A line for each line of prose that is too long; a link may be as long as its address."""
+    """A line for each line of prose that is too long, without addresses of links and comments."""
     for number, line in prose(text):
-        shown = re.sub(r"\]\([^)]*\)", "]", line)
+        shown = re.sub(r"\]\([^)]*\)|<!--.*?-->", "]", line)
         if not line.lstrip().startswith(("|", "![")) and len(shown) > LINE_MAX:
             yield f"{number}: {len(shown)} columns, {LINE_MAX} are the most"
 
