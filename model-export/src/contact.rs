@@ -14,9 +14,10 @@ use papilla_contact::{
     Contact, ContactModel, Gaps, Method, Object, PixelContact, PixelSkin, PixelSpacing, Scene,
     Settings, Solver,
 };
-use papilla_dataset::{IndentationEntry, Shard, Split};
+use papilla_dataset::{IndentationEntry, Shard, Split, sha256_hex};
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::Patch;
+use papilla_proto::contact::{ContactErrors, ContactMethod, MethodError, MethodErrors, Spread};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -69,6 +70,18 @@ impl Rung {
         }
     }
 
+    /// The method of a session; none that a session may name.
+    const fn method(self) -> Option<ContactMethod> {
+        match self {
+            Self::Springs => Some(ContactMethod::Springs),
+            Self::SmallStrain => Some(ContactMethod::SmallStrain),
+            Self::SecondOrder => Some(ContactMethod::SecondOrder),
+            Self::CoarsePixels => Some(ContactMethod::CoarsePixels),
+            Self::Pixels => Some(ContactMethod::Pixels),
+            Self::HalfSpace | Self::Gaps => None,
+        }
+    }
+
     /// Name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -105,6 +118,27 @@ pub struct Row {
     pub side_step: [f64; 2],
     /// Answers told to be unsettled, and out of range, of all.
     pub told: [usize; 3],
+}
+
+/// What the methods of sessions err, for `contact.json`: the rows in their order, by method.
+#[must_use]
+pub fn errors_of(model: &[u8], network: Option<String>, rows: &[Row]) -> ContactErrors {
+    let spread = |[median, p95]: [f64; 2]| Spread { median, p95 };
+    let error = |row: &Row| MethodError {
+        set: row.set.clone(),
+        states: row.told[2] as u32,
+        pressure_relative_l2: spread(row.pressure),
+        force_relative: spread(row.force),
+        sed_relative_l2: row.sed.map(spread),
+    };
+    let of = |rung: Rung| rows.iter().filter(move |row| row.rung == rung.name()).map(error);
+    let method =
+        |rung: Rung| Some(MethodErrors { name: rung.method()?, errors: of(rung).collect() });
+    ContactErrors {
+        contact_sha256: sha256_hex(model),
+        network,
+        methods: Rung::ALL.into_iter().filter_map(method).collect(),
+    }
 }
 
 /// The two models that rungs are of.

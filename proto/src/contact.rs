@@ -14,8 +14,12 @@
 //! vector, the net force along it, N (0: none is asked), and three to be ignored. An answer to
 //! objects or gaps begins with a [`Touch`].
 
+mod method;
+
 use papilla_sdf::AnnouncedShape;
 use serde::{Deserialize, Serialize};
+
+pub use method::{ContactErrors, ContactMethod, MethodError, MethodErrors, Spread};
 
 /// Numbers of a pose, or of a net force.
 pub const ROW: usize = 7;
@@ -50,23 +54,6 @@ pub enum SampleLayout {
     Map,
     /// Vertices of the atlas.
     Vertices,
-}
-
-/// How pressure is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ContactMethod {
-    /// A spring for each vertex: the baseline.
-    Springs,
-    /// The finger's compliance at small strain.
-    SmallStrain,
-    /// The same with the second order of finite strain.
-    #[default]
-    SecondOrder,
-    /// The same, then on pixels of the map: what lies between vertices is felt. Of objects alone.
-    Pixels,
-    /// The same on every second pixel: in half the time, less accurate.
-    CoarsePixels,
 }
 
 /// An object that a hello announces.

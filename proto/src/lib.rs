@@ -71,7 +71,7 @@ pub use map::{
 };
 pub use message::{
     ClientMessage, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,
-    SEALED_MAGIC, ServerMessage, SessionError,
+    SEALED_MAGIC, ServerMessage, SessionError, Warning,
 };
 pub use sample::{SampleError, SampleType};
 pub use summary::{SUMMARY_LEN, Summary};

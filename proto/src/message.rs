@@ -9,7 +9,7 @@ pub use self::moving::{Reconnect, ReconnectReason, Resumption, SEALED_MAGIC};
 use self::tagged::WithoutType;
 use crate::{
     ErrorCode, Problem, RuntimeEffect, SampleType,
-    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout},
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, MethodError, SampleLayout},
     effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
     json::{self, JsonError},
     spikes::{PlacedUnit, Spikes},
@@ -169,7 +169,8 @@ pub struct Hello {
     /// The fingers; none: one, the reference finger.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<Vec<AnnouncedFinger>>,
-    /// How pressure is found of objects or gaps.
+    /// How pressure is found of objects or gaps; none: by the most accurate method that can
+    /// serve the hello, which [`Ready::method`] names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub method: Option<ContactMethod>,
     /// Whether each frame holds a net force to be met.
@@ -367,6 +368,27 @@ pub struct Ready {
     /// Time of the contact solve that is expected, us; within `predicted_latency_us`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_us: Option<u64>,
+    /// How pressure is found; none where frames are pressure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub method: Option<ContactMethod>,
+    /// What that method errs against finite elements; none if nobody measured it with this finger.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_error: Option<MethodError>,
+    /// What of the hello is met, but perhaps not as it was meant; clients show each once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<Warning>,
+}
+
+/// A member of the hello that is met, but perhaps not as it was meant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Warning {
+    /// The member, dotted.
+    pub member: String,
+    /// The value that raises the question, where it is a number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// What it means here, and what may have been meant or can be done.
+    pub question: String,
 }
 
 /// Something was refused; says whether the session goes on.

@@ -4,13 +4,13 @@
 #![allow(clippy::unwrap_used)]
 
 use papilla_proto::contact::{
-    AnnouncedFinger, AnnouncedObject, ContactMethod, Input, SampleLayout,
+    AnnouncedFinger, AnnouncedObject, ContactMethod, Input, MethodError, SampleLayout, Spread,
 };
 use papilla_proto::sdf::{AnnouncedShape, Mesh, Sphere};
 use papilla_proto::spikes::{PlacedUnit, UnitClass};
 use papilla_proto::{
     ClientMessage, Hello, Ready, Resumption, RuntimeEffect, SUMMARY_LEN, SampleType, ServerMessage,
-    Summary,
+    Summary, Warning,
     effects::{
         Actuator, ActuatorInput, Afferents, ContactWindow, Drive, Layout, Moduli, OutOfRange,
         Place, PronyTerm, Relaxation, Section, SectionName, Tissue,
@@ -203,6 +203,25 @@ proptest! {
             vertices: Some(offset),
             fingers: numbers.2,
             contact_us: Some(numbers.1),
+            method: numbers.3.map(|_| ContactMethod::Pixels),
+            expected_error: numbers.2.map(|states| {
+                let spread = Spread { median: scales.0.into(), p95: scales.1.into() };
+                MethodError {
+                    set: names[0].clone(),
+                    states,
+                    pressure_relative_l2: spread,
+                    force_relative: spread,
+                    sed_relative_l2: numbers.4.map(|_| spread),
+                }
+            }),
+            warnings: names[..numbers.4.map_or(0, |_| 2)]
+                .iter()
+                .map(|name| Warning {
+                    member: name.clone(),
+                    value: numbers.2.map(f64::from),
+                    question: names[0].clone(),
+                })
+                .collect(),
         });
         let text = serde_json::to_string(&message).unwrap();
         prop_assert_eq!(serde_json::from_str::<ServerMessage>(&text).unwrap(), message);

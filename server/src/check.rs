@@ -2,6 +2,7 @@
 
 use std::{fmt, net::TcpListener, time::Instant};
 
+use papilla_proto::contact::ContactMethod;
 use papilla_session_contact::ContactAssets;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -186,16 +187,15 @@ fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {
 fn look_at_contact(report: &mut Report, contact: Result<Option<ContactAssets>, StartError>) {
     match contact {
         Ok(Some(contact)) => {
-            let us = contact.frame_us;
-            let on_pixels = [contact.pixel_frame_us, contact.coarse_pixel_frame_us];
-            let pixels = match on_pixels {
-                [Some(us), Some(coarse)] => format!("{us} us on pixels, {coarse} on every second"),
-                _ => "no pixels, since its model names no layers".to_owned(),
+            let us = |&(method, us): &(ContactMethod, u64)| format!("{us} us by {method}");
+            let frames: Vec<String> = contact.frame_us.iter().map(us).collect();
+            let pixels = match contact.pixels {
+                Some(_) => "",
+                None => "; no pixels, since its model names no layers",
             };
-            let [all, coarse] = on_pixels;
-            let values =
-                json!({"frame_us": us, "pixel_frame_us": all, "coarse_pixel_frame_us": coarse});
-            let detail = format!("of this finger, {us} us a frame, {pixels}");
+            let measured = if contact.errors.is_some() { "" } else { "; errors not measured" };
+            let values = json!({"frame_us": contact.frame_us, "errors": contact.errors});
+            let detail = format!("of this finger, {} a frame{pixels}{measured}", frames.join(", "));
             report.good("contact", detail, values);
         }
         Ok(None) => {

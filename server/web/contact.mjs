@@ -47,10 +47,8 @@ export function readTouch(v) {
 
 /** Which indenter the server knows of. */
 export class Contact {
-  /** @param {string} method how pressure is found, as in a hello */
-  constructor(press, method) {
+  constructor(press) {
     this.press = press;
-    this.method = method;
     this.announcedAtMs = -Infinity;
     this.announced = '';
   }
@@ -60,7 +58,7 @@ export class Contact {
     const shape = shapeOf(this.press);
     this.announced = JSON.stringify(shape);
     this.announcedAtMs = nowMs;
-    return { input: 'objects', objects: [{ shape }], pressure: 'map', method: this.method };
+    return { input: 'objects', objects: [{ shape }], pressure: 'map' };
   }
 
   /** Whether the indenter is another than the announced one. */

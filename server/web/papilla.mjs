@@ -27,8 +27,7 @@ class Page {
     this.mode = 'press';
     this.press = new Press(atlas);
     /** Null where the server has no contact model: pressure is then this page's estimate. */
-    const { contact_us: contactUs, pixels_us: pixelsUs } = listing;
-    this.contact = contactUs === null ? null : new Contact(this.press, pixelsUs === null ? 'second_order' : 'pixels');
+    this.contact = listing.methods === null ? null : new Contact(this.press);
     document.body.toggleAttribute('data-contact', this.contact !== null);
     this.unsent = true;
     this.stream = byId('stream');

@@ -171,6 +171,11 @@ const char *papilla_session_error_field(const PapillaSession *session);
 /* Opens a session, or an open one anew. hello: the protocol's hello of version 3, as JSON; without
  * its members budget_us, stale_after_us and pressure_scale_pa. */
 PapillaStatus papilla_session_open(PapillaSession *session, const PapillaModel *model, const char *hello);
+/* How the open session finds pressure, as "pixels": the hello's method, or else the most accurate one
+ * that can serve it. Empty where frames are pressure. Valid until the next open. */
+const char *papilla_session_method(const PapillaSession *session);
+/* What the open session cannot do as one might expect, a line each; empty if there is nothing. */
+const char *papilla_session_warning(const PapillaSession *session);
 
 /* A frame. finger: its number, from 0. time_us: the program's clock; effects that change with time
  * go by it. net: a force to be met, or NULL.

@@ -8,8 +8,12 @@ use std::{
 
 use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_engine::{Card, EngineError, card::Index};
-use papilla_proto::atlas::{Atlas, AtlasError, Patch, Raster};
+use papilla_proto::{
+    atlas::{Atlas, AtlasError, Patch, Raster},
+    contact::ContactErrors,
+};
 use papilla_render::SkinPixels;
+use papilla_session_contact::{AssetsError, contact_errors};
 use papilla_session_effects as effects;
 
 use crate::Status;
@@ -63,6 +67,14 @@ pub enum LoadError {
         /// Why.
         source: papilla_contact::ModelError,
     },
+    /// What the contact model's methods err cannot be read.
+    #[error("{}: {source}", .file.display())]
+    Errors {
+        /// The file.
+        file: PathBuf,
+        /// Why.
+        source: AssetsError,
+    },
 }
 
 impl LoadError {
@@ -72,7 +84,10 @@ impl LoadError {
         match self {
             Self::File { .. } => Status::NoFile,
             Self::Unknown { .. } => Status::UnknownTier,
-            Self::Engine { .. } | Self::Atlas { .. } | Self::Contact { .. } => Status::BadModel,
+            Self::Engine { .. }
+            | Self::Atlas { .. }
+            | Self::Contact { .. }
+            | Self::Errors { .. } => Status::BadModel,
         }
     }
 }
@@ -87,6 +102,7 @@ pub struct Model {
     pub(crate) network: Arc<dyn papilla_engine::Model>,
     pub(crate) card: Card,
     pub(crate) contact: Option<Arc<ContactModel>>,
+    pub(crate) contact_errors: Option<ContactErrors>,
     pub(crate) pixel_skin: Option<Arc<PixelSkin>>,
     pub(crate) interface_skin: Option<Arc<InterfaceSkin>>,
 }
@@ -142,6 +158,8 @@ impl Model {
             .and_then(|atlas| atlas.require_hash(&network.info().atlas_hash).map(|()| atlas))
             .map_err(|source| LoadError::Atlas { file, source })?;
         let contact = contact.map(|file| read_contact(file, &atlas)).transpose()?;
+        let (contact, contact_errors) = contact.unzip();
+        let contact_errors = contact_errors.flatten();
         let [skin, interface] = [Patch::Skin, Patch::Interface].map(|p| Raster::new(&atlas, p));
         let pixels = SkinPixels::from(&skin);
         let shared = effects::Shared::default();
@@ -159,6 +177,7 @@ impl Model {
             network,
             card,
             contact,
+            contact_errors,
             pixel_skin,
             interface_skin,
         })
@@ -173,10 +192,21 @@ impl Model {
     }
 }
 
-fn read_contact(file: &Path, atlas: &Atlas) -> Result<Arc<ContactModel>, LoadError> {
+/// A contact model, and what methods err with it if a file beside it tells that.
+fn read_contact(
+    file: &Path,
+    atlas: &Atlas,
+) -> Result<(Arc<ContactModel>, Option<ContactErrors>), LoadError> {
     let (file, bytes) = read(file.to_owned())?;
+    let beside = file.with_file_name("contact.json");
     let model = ContactModel::read(&bytes)
         .and_then(|model| model.require_atlas(atlas.hash()).map(|()| model))
         .map_err(|source| LoadError::Contact { file, source })?;
-    Ok(Arc::new(model))
+    let errors = if beside.exists() {
+        let (file, json) = read(beside)?;
+        contact_errors(&json, &bytes).map_err(|source| LoadError::Errors { file, source })?
+    } else {
+        None
+    };
+    Ok((Arc::new(model), errors))
 }

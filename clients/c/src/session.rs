@@ -6,7 +6,7 @@ use bytes::BytesMut;
 use papilla_engine::EngineError;
 use papilla_proto::{
     ErrorCode, FrameKind, MAP_LEN, MapSummary, PressureRange, Problem, SampleType, Window,
-    contact::{Pose, ROW},
+    contact::{ContactMethod, Pose, ROW},
     effects::OutOfRange,
 };
 use papilla_render::Maps;
@@ -74,6 +74,7 @@ impl Session {
             model: contact.as_ref(),
             pixels: pixel_skin.as_ref(),
             interface: model.interface_skin.as_ref(),
+            errors: model.contact_errors.as_ref(),
         };
         let hand = Hand::of(&hello, of_hand)?;
         let finger = effects::Finger { atlas, skin, interface, shared };
@@ -108,6 +109,19 @@ impl Session {
             layout,
             hand,
         })
+    }
+
+    /// How pressure is found, as in a hello; empty where frames are pressure.
+    #[must_use]
+    pub fn method(&self) -> &'static str {
+        self.hand.method().map_or("", ContactMethod::as_str)
+    }
+
+    /// What the hello cannot have as one might expect, a line each.
+    #[must_use]
+    pub fn warnings(&self) -> String {
+        let lines = self.hand.warnings().iter().map(|warning| warning.question.as_str());
+        lines.collect::<Vec<_>>().join("\n")
     }
 
     /// Renders pressure, Pa: a map of 224 x 224, or as many values as the skin has vertices if the

@@ -52,13 +52,23 @@ export type Shape =
   | { shape: 'mesh'; vertices_mm: [number, number, number][]; triangles: [number, number, number][] }
   | ({ shape: string } & Record<string, unknown>);
 
+/** How pressure is found, from fast and rough to slow and accurate. */
+export type ContactMethod = 'springs' | 'small_strain' | 'second_order' | 'coarse_pixels' | 'pixels';
+
+/** Median and 95th percentile. */
+export interface Spread {
+  median: number;
+  p95: number;
+}
+
 /** What a hand asks for; answers are f32. */
 export interface HandHello {
   objects?: { shape: Shape; stiffness_mpa_per_mm?: number; friction?: number }[];
   fingers?: { width?: number; stiffness?: number }[];
   input_layout?: 'map' | 'vertices';
   answer_layout?: 'map' | 'vertices';
-  method?: 'springs' | 'small_strain' | 'second_order' | 'pixels' | 'coarse_pixels';
+  /** Left out: the most accurate that can serve, which `ready.method` names. */
+  method?: ContactMethod;
   force_target?: boolean;
   stiffness?: boolean;
   pressure?: 'map' | 'vertices';
@@ -133,6 +143,18 @@ export interface Ready {
   vertices?: number;
   fingers?: number;
   contact_us?: number;
+  /** How pressure is found; missing where frames are pressure. */
+  method?: ContactMethod;
+  /** What that method errs against finite elements; missing where nobody measured it. */
+  expected_error?: {
+    set: string;
+    states: number;
+    pressure_relative_l2: Spread;
+    force_relative: Spread;
+    sed_relative_l2?: Spread;
+  };
+  /** What of the hello is met, but perhaps not as it was meant. */
+  warnings?: { member: string; value?: number; question: string }[];
 }
 
 /** A refusal, of a hello or of a frame (then with its `sequence`). */

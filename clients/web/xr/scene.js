@@ -108,8 +108,8 @@ function inWords({ name, touched, deepestMm, forceN, sedMax, flags }) {
 
 async function start() {
   const atlas = await Atlas.load();
-  const { contact_us } = await (await fetch('/v1/tiers')).json();
-  const isSolved = contact_us !== null;
+  const { methods } = await (await fetch('/v1/tiers')).json();
+  const isSolved = methods !== null;
   const fingers = FINGERS.slice(0, isSolved ? FINGERS.length : 1).map((name) => new Finger(atlas, name));
   const [finger] = fingers;
   // The first finger, larger, its pad towards the viewer and its tip up.

@@ -1,12 +1,9 @@
 //! What a hello announces: objects and fingers.
 
-use papilla_contact::{FRICTION_MAX, Object, Person, PixelSpacing};
+use papilla_contact::{FRICTION_MAX, Object, Person};
 use papilla_proto::{
     Hello, Problem, SampleType,
-    contact::{
-        AnnouncedFinger, AnnouncedObject, ContactMethod, FINGERS_MAX, Input, OBJECTS_MAX,
-        SampleLayout,
-    },
+    contact::{AnnouncedFinger, AnnouncedObject, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
     sdf::Placement,
 };
 
@@ -34,17 +31,8 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
     if input == Input::Objects && hello.input_layout.is_some() {
         return Err(unusable("input_layout", "objects have no layout: each has one pose"));
     }
-    if input == Input::Gaps && pixel_spacing(hello).is_some() {
-        let message = "pixels are of input 'objects': gaps say nothing of what is between them";
-        return Err(unusable("method", message));
-    }
     check_friction_of_gaps(hello, input)?;
     check_traction(hello, input)?;
-    let at_vertices = [ContactMethod::SmallStrain, ContactMethod::SecondOrder];
-    if has_friction(hello) && !at_vertices.contains(&hello.method.unwrap_or_default()) {
-        let message = "friction and 'shear' are of the methods 'small_strain' and 'second_order'";
-        return Err(unusable("method", message));
-    }
     let exact = match input {
         Input::Pressure => true,
         Input::Objects => hello.sample_type == SampleType::F32,
@@ -55,15 +43,6 @@ pub(crate) fn check_members(hello: &Hello, input: Input) -> Result<(), Problem> 
         return Err(unusable("sample_type", message));
     }
     Ok(())
-}
-
-/// Which pixels are solved for; none: vertices alone.
-pub(crate) fn pixel_spacing(hello: &Hello) -> Option<PixelSpacing> {
-    match hello.method.unwrap_or_default() {
-        ContactMethod::Springs | ContactMethod::SmallStrain | ContactMethod::SecondOrder => None,
-        ContactMethod::Pixels => Some(PixelSpacing::One),
-        ContactMethod::CoarsePixels => Some(PixelSpacing::Two),
-    }
 }
 
 /// Whether what gaps tell of rubs, and how it moves.

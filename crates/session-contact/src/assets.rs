@@ -3,16 +3,19 @@
 use std::{sync::Arc, time::Instant};
 
 use papilla_contact::{
-    Contact, ContactModel, InterfaceSkin, ModelError, Object, PixelContact, PixelSkin,
-    PixelSpacing, Settings, ShearEnergy, Solver,
+    Contact, ContactModel, InterfaceSkin, Method, ModelError, Object, PixelContact, PixelSkin,
+    Settings, ShearEnergy, Solver,
 };
 use papilla_proto::{
     MAP_LEN,
     atlas::{Atlas, Raster},
+    contact::{ContactErrors, ContactMethod},
+    json::{self, JsonError},
     sdf::{Placement, RoundedPlate},
 };
+use sha2::{Digest, Sha256};
 
-use super::Hand;
+use super::{Hand, method::Chosen};
 
 /// Frames that are timed, of which the median counts.
 const FRAMES: u32 = 15;
@@ -27,53 +30,85 @@ pub struct ContactAssets {
     pub interface: Option<Arc<InterfaceSkin>>,
     /// Time that `shear_energy` adds to a frame, us.
     pub shear_us: Option<u64>,
-    /// Time of a warm frame under a plate that moves by 10 um, us.
-    pub frame_us: u64,
-    /// The same on pixels.
-    pub pixel_frame_us: Option<u64>,
-    /// The same on every second pixel.
-    pub coarse_pixel_frame_us: Option<u64>,
+    /// Time of a warm frame under a plate that moves by 10 um, us, by each method that this model
+    /// can serve.
+    pub frame_us: Vec<(ContactMethod, u64)>,
+    /// What methods err with this model; none if nobody measured it.
+    pub errors: Option<ContactErrors>,
+}
+
+/// Why a contact model cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetsError {
+    /// The model is no good.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// What methods err with it cannot be read.
+    #[error(
+        "contact.json beside it: {0}; make it again with `model-export contact --write`, or take it away"
+    )]
+    Errors(JsonError),
 }
 
 impl ContactAssets {
-    /// Reads a file's bytes, which have to be of this atlas' finger, and times the solver.
+    /// Reads a file's bytes, which have to be of this atlas' finger, and times every method.
+    /// `errors` is the file `contact.json` beside it, if there is one; of another model it is
+    /// passed over.
     ///
     /// # Errors
-    /// [`ModelError`] for what is no model, one that is damaged, or one of another finger.
-    pub fn read(bytes: &[u8], atlas: &Atlas, raster: &Arc<Raster>) -> Result<Self, ModelError> {
+    /// [`AssetsError`] for what is no model, one that is damaged, or one of another finger, and for
+    /// a damaged `contact.json`.
+    pub fn read(
+        bytes: &[u8],
+        errors: Option<&[u8]>,
+        atlas: &Atlas,
+        raster: &Arc<Raster>,
+    ) -> Result<Self, AssetsError> {
         let model = Arc::new(ContactModel::read(bytes)?);
         model.require_atlas(atlas.hash())?;
         let pixels = PixelSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
         let interface = InterfaceSkin::new(&model, atlas, Arc::clone(raster)).map(Arc::new);
         let shear_us = interface.as_ref().map(|of| shear_us(of, model.vertices()));
-        let frame_us = frame_us(&model, None).unwrap_or(0);
-        let on_pixels = |spacing| {
-            let pixels = PixelContact::new(Arc::clone(pixels.as_ref()?), &model, spacing);
-            self::frame_us(&model, Some(pixels))
+        let errors = errors.map(|json| contact_errors(json, bytes)).transpose()?.flatten();
+        let time = |method: ContactMethod| {
+            let chosen = Chosen { method, warning: None };
+            let spacing = chosen.pixel_spacing();
+            let on_pixels = |spacing| {
+                pixels.as_ref().map(|skin| PixelContact::new(Arc::clone(skin), &model, spacing))
+            };
+            let pixels = spacing.map(on_pixels);
+            // Without layers there are no pixels to be timed.
+            let us = match pixels {
+                Some(None) => None,
+                pixels => self::frame_us(&model, chosen.at_vertices(), pixels.flatten()),
+            };
+            us.map(|us| (method, us))
         };
-        let [pixel_frame_us, coarse_pixel_frame_us] =
-            [PixelSpacing::One, PixelSpacing::Two].map(on_pixels);
-        Ok(Self {
-            model,
-            pixels,
-            interface,
-            shear_us,
-            frame_us,
-            pixel_frame_us,
-            coarse_pixel_frame_us,
-        })
+        let frame_us = ContactMethod::ALL.into_iter().filter_map(time).collect();
+        Ok(Self { model, pixels, interface, shear_us, frame_us, errors })
+    }
+
+    /// Time that a frame is expected to take by this method, us; none if it cannot serve.
+    #[must_use]
+    pub fn us_by(&self, method: ContactMethod) -> Option<u64> {
+        self.frame_us.iter().find(|(of, _)| *of == method).map(|(_, us)| *us)
     }
 
     /// Time that a frame of this hand is expected to take, us; none if nothing is solved.
     #[must_use]
     pub fn us_of(&self, hand: &Hand) -> Option<u64> {
-        let us = match hand.pixels {
-            None => self.frame_us,
-            Some(PixelSpacing::One) => self.pixel_frame_us?,
-            Some(PixelSpacing::Two) => self.coarse_pixel_frame_us?,
-        };
-        (!hand.form().takes_pressure()).then_some(us)
+        hand.method().and_then(|method| self.us_by(method))
     }
+}
+
+/// What `contact.json` says, if it is of the contact model with these bytes.
+///
+/// # Errors
+/// It cannot be read.
+pub fn contact_errors(json: &[u8], model: &[u8]) -> Result<Option<ContactErrors>, AssetsError> {
+    let errors: ContactErrors = json::read(json).map_err(AssetsError::Errors)?;
+    let hash: String = Sha256::digest(model).iter().map(|b| format!("{b:02x}")).collect();
+    Ok((errors.contact_sha256 == hash).then_some(errors))
 }
 
 /// What traction takes to be felt; the time does not depend on the values.
@@ -92,10 +127,15 @@ fn shear_us(of: &Arc<InterfaceSkin>, vertices: usize) -> u64 {
 }
 
 /// A plate against the pad, half a millimetre and a bit deep.
-fn frame_us(model: &Arc<ContactModel>, mut pixels: Option<PixelContact>) -> Option<u64> {
+fn frame_us(
+    model: &Arc<ContactModel>,
+    method: Method,
+    mut pixels: Option<PixelContact>,
+) -> Option<u64> {
     let lowest = model.lowest_mm();
     let plate = Arc::new(RoundedPlate { half_mm: [10.0, 10.0, 3.0], edge_radius_mm: 1.0 });
-    let mut solver = Solver::new(Arc::clone(model), Settings::default()).ok()?;
+    let mut solver =
+        Solver::new(Arc::clone(model), Settings { method, ..Settings::default() }).ok()?;
     let mut out = Contact::new(model.vertices());
     let mut times = Vec::new();
     for frame in 0..FRAMES {

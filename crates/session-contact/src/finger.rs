@@ -18,6 +18,7 @@ use papilla_session_state::{Reader, StateError, Writer};
 use super::{
     FrameForm, Skin, announced,
     gaps::GapReader,
+    method::Chosen,
     solver::{FingerSolver, of_contact},
     unusable,
 };
@@ -77,13 +78,14 @@ impl Finger {
         hello: &Hello,
         form: FrameForm,
         skin: Skin<'_>,
-        model: Option<&Arc<ContactModel>>,
+        solved: Option<(&Chosen, &Arc<ContactModel>)>,
         objects: Vec<Object>,
         person: Person,
     ) -> Result<Self, Problem> {
         let vertices = skin.atlas.vertex_count();
         let solver =
-            model.map(|model| FingerSolver::new(hello, skin, model, person)).transpose()?;
+            solved.map(|(chosen, model)| FingerSolver::new(hello, skin, model, chosen, person));
+        let solver = solver.transpose()?;
         let of_map = form.layout == SampleLayout::Map;
         let samples = match form.input {
             Input::Objects => 0,

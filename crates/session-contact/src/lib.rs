@@ -15,7 +15,8 @@
 //!
 //! // A service without a contact model takes pressure alone.
 //! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
-//! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None, interface: None };
+//! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None, interface: None,
+//!     errors: None };
 //! let hello = Hello { version: 3, ..Hello::default() };
 //! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
 //! let objects = Hello { input: Some(Input::Objects), ..hello };
@@ -29,6 +30,7 @@ mod assets;
 mod finger;
 mod frame;
 mod gaps;
+mod method;
 mod solver;
 mod warm_start;
 
@@ -37,17 +39,19 @@ mod tests;
 
 use std::sync::{Arc, Mutex};
 
-use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin, PixelSpacing};
+use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem,
+    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem, Warning,
     atlas::{Atlas, Raster},
-    contact::{Input, SampleLayout, TOUCH_LEN},
+    contact::{ContactErrors, ContactMethod, Input, SampleLayout, TOUCH_LEN},
     effects::{Section, SectionName},
 };
 
-pub use assets::ContactAssets;
+pub use assets::{AssetsError, ContactAssets, contact_errors};
 pub use finger::{Finger, Frame, Taken};
 pub use frame::FrameForm;
+
+use self::method::Chosen;
 
 /// The skin that things press on.
 #[derive(Clone, Copy)]
@@ -62,14 +66,17 @@ pub struct Skin<'a> {
     pub pixels: Option<&'a Arc<PixelSkin>>,
     /// What traction along the skin needs to be felt; none likewise.
     pub interface: Option<&'a Arc<InterfaceSkin>>,
+    /// What methods err with that model; none if nobody measured it.
+    pub errors: Option<&'a ContactErrors>,
 }
 
 /// The fingers of one session.
 pub struct Hand {
     form: FrameForm,
-    pixels: Option<PixelSpacing>,
+    method: Option<ContactMethod>,
     fingers: Vec<Arc<Mutex<Finger>>>,
     sections: Vec<Section>,
+    warnings: Vec<Warning>,
 }
 
 /// A refusal of what was announced or sent.
@@ -88,6 +95,7 @@ impl Hand {
     pub fn of(hello: &Hello, skin: Skin<'_>) -> Result<Self, Problem> {
         let input = hello.input.unwrap_or_default();
         announced::check_members(hello, input)?;
+        let chosen = Chosen::of(hello, input, skin)?;
         let persons = announced::persons(hello)?;
         let vertices = skin.atlas.vertex_count();
         let objects = announced::objects(hello, input)?;
@@ -106,12 +114,27 @@ impl Hand {
             model.require_atlas(skin.atlas.hash()).map_err(|e| unusable("input", e.to_string()))?;
         }
         let finger = |person| {
-            let finger = Finger::new(hello, form, skin, model, objects.clone(), person)?;
+            let solved = chosen.as_ref().zip(model);
+            let finger = Finger::new(hello, form, skin, solved, objects.clone(), person)?;
             Ok(Arc::new(Mutex::new(finger)))
         };
         let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
         let sections = sections(hello, input, vertices);
-        Ok(Self { form, pixels: announced::pixel_spacing(hello), fingers, sections })
+        let warnings = chosen.iter().filter_map(|chosen| chosen.warning.clone()).collect();
+        let method = chosen.map(|chosen| chosen.method);
+        Ok(Self { form, method, fingers, sections, warnings })
+    }
+
+    /// How pressure is found; none where frames are pressure.
+    #[must_use]
+    pub fn method(&self) -> Option<ContactMethod> {
+        self.method
+    }
+
+    /// What of the hello is met, but perhaps not as it was meant.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
     }
 
     /// Which frames the session takes.

@@ -3,13 +3,12 @@
 use std::sync::Arc;
 
 use papilla_contact::{
-    Contact, ContactError, ContactModel, Method, NetForce, Person, PixelContact, Scene, Settings,
-    Solver,
+    Contact, ContactError, ContactModel, NetForce, Person, PixelContact, Scene, Settings, Solver,
 };
-use papilla_proto::{ErrorCode, Hello, Problem, contact::ContactMethod};
+use papilla_proto::{ErrorCode, Hello, Problem};
 use papilla_session_state::{Reader, StateError, Writer};
 
-use super::{Skin, announced, unusable, warm_start};
+use super::{Skin, announced, method::Chosen, unusable, warm_start};
 
 /// Contact of one finger by the method of its hello.
 pub(crate) struct FingerSolver {
@@ -23,31 +22,19 @@ impl FingerSolver {
         hello: &Hello,
         skin: Skin<'_>,
         model: &Arc<ContactModel>,
+        chosen: &Chosen,
         person: Person,
     ) -> Result<Self, Problem> {
-        let method = match hello.method.unwrap_or_default() {
-            ContactMethod::Springs => Method::Springs,
-            ContactMethod::SmallStrain => Method::SmallStrain,
-            ContactMethod::SecondOrder | ContactMethod::Pixels | ContactMethod::CoarsePixels => {
-                Method::SecondOrder
-            }
-        };
         let stiffness = hello.stiffness == Some(true);
         let has_friction = announced::has_friction(hello);
+        let method = chosen.at_vertices();
         let settings = Settings { method, person, stiffness, friction: has_friction };
         let solver = Solver::new(Arc::clone(model), settings);
-        let pixels = match (announced::pixel_spacing(hello), skin.pixels) {
-            (Some(_), None) => {
-                let message = "this service's contact model names no layers of the skin, which \
-                               pixels need; make it again with `fe-datagen contact`, or leave \
-                               'method' out";
-                return Err(unusable("method", message));
-            }
-            (Some(spacing), Some(skin)) => {
-                Some(PixelContact::new(Arc::clone(skin), model, spacing))
-            }
-            _ => None,
-        };
+        // Pixels are chosen only where there is skin for them.
+        let pixels = chosen
+            .pixel_spacing()
+            .zip(skin.pixels)
+            .map(|(spacing, skin)| PixelContact::new(Arc::clone(skin), model, spacing));
         Ok(Self { solver: solver.map_err(|error| of_contact(&error))?, pixels, has_friction })
     }
 

@@ -2,7 +2,10 @@ use papilla_contact::{Arrays, Header, InterfaceSkin, Layer};
 use papilla_proto::{
     FrameHeader, FrameKind, SampleType,
     atlas::{Patch, PatchVertices},
-    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, POSE_LEN, Pose, ROW, Touch},
+    contact::{
+        AnnouncedFinger, AnnouncedObject, ContactErrors, ContactMethod, MethodError, MethodErrors,
+        POSE_LEN, Pose, ROW, Spread, Touch,
+    },
     flags,
     sdf::{AnnouncedShape, Mesh, Sphere},
 };
@@ -66,7 +69,7 @@ impl Plane {
     fn hand(&self, hello: &Hello) -> Result<Hand, Problem> {
         let Self { atlas, raster, model, pixels, interface } = self;
         let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
-        Hand::of(hello, Skin { atlas, raster, model, pixels, interface })
+        Hand::of(hello, Skin { atlas, raster, model, pixels, interface, errors: None })
     }
 }
 
@@ -141,11 +144,12 @@ fn on_pixels_a_dot_between_vertices_presses_and_a_finger_goes_on_elsewhere() {
         let origin_mm = [0.5, 0.5, depth_mm - 2.0];
         Pose { origin_mm, ..Pose::default() }.encode()
     };
-    let at_vertices = plane.hand(&hello).expect("a hand");
+    let by_vertices = Hello { method: Some(ContactMethod::SecondOrder), ..hello.clone() };
+    let at_vertices = plane.hand(&by_vertices).expect("a hand");
     let (missed, taken) = touch(&at_vertices, 0, &dot(0.05)).expect("an answer");
     assert_eq!((missed.force_n[2].to_bits(), taken.flags), (0, flags::NO_CONTACT));
 
-    let hello = Hello { method: Some(ContactMethod::Pixels), ..hello };
+    // Pixels are the default.
     let hand = plane.hand(&hello).expect("a hand");
     let (felt, taken) = touch(&hand, 0, &dot(0.05)).expect("an answer");
     // Hertz: 4/3 E* sqrt(R) d^1.5.
@@ -167,8 +171,11 @@ fn a_net_force_is_met_by_poses_and_by_gaps() {
     let plane = Plane::new();
     let hello = Hello { force_target: Some(true), ..objects() };
     let row = Pose { origin_mm: [0.0, 0.0, 1.0], quaternion: [0.05, 0.0, 0.0, 0.0] }.encode();
-    let (found, _) =
-        touch(&plane.hand(&hello).expect("a hand"), 0, &[pose(-1.0), row].concat()).expect("met");
+    let payload = [pose(-1.0), row].concat();
+    let (on_pixels, _) = touch(&plane.hand(&hello).expect("a hand"), 0, &payload).expect("met");
+    assert!((on_pixels.force_n[2] / 0.05 - 1.0).abs() < 0.01, "{on_pixels:?}");
+    let hello = Hello { method: Some(ContactMethod::SecondOrder), ..hello };
+    let (found, _) = touch(&plane.hand(&hello).expect("a hand"), 0, &payload).expect("met");
     assert!((found.force_n[2] / 0.05 - 1.0).abs() < 3e-3 && found.travel_mm > 1.0, "{found:?}");
     let hello = Hello {
         input: Some(Input::Gaps),
@@ -250,9 +257,10 @@ fn what_has_no_friction_remembers_none() {
         hand.fingers()[0].lock().expect("no panic").save(&mut state);
         state.finish().len()
     };
-    let slippery = Hello { objects: rough(0.0).objects, ..objects() };
-    assert_eq!(len(&slippery), len(&objects()));
-    assert!(len(&rough(0.5)) > len(&objects()));
+    let by_vertices = Hello { method: Some(ContactMethod::SecondOrder), ..objects() };
+    let slippery = Hello { objects: rough(0.0).objects, ..by_vertices.clone() };
+    assert_eq!(len(&slippery), len(&by_vertices));
+    assert!(len(&rough(0.5)) > len(&by_vertices));
 }
 
 #[test]
@@ -282,6 +290,64 @@ fn each_finger_has_its_own_state_and_factors() {
     assert!((other.force_n[2] / first.force_n[2] - 2.0).abs() < 1e-3, "{first:?} {other:?}");
     // What the network is asked about is the same.
     assert!((one.peak_pa / two.peak_pa - 1.0).abs() < 1e-3, "{one:?} {two:?}");
+}
+
+/// A hello that names no method gets the most accurate one that can serve it, and is told where that
+/// is not the most accurate one there is, with what it errs.
+#[test]
+fn without_a_name_the_most_accurate_method_serves() {
+    let plane = Plane::new();
+    let spread = |median| Spread { median, p95: 2.0 * median };
+    let errors = |name, median| MethodErrors {
+        name,
+        errors: vec![MethodError {
+            set: "held-out".to_owned(),
+            states: 40,
+            pressure_relative_l2: spread(median),
+            force_relative: spread(0.02),
+            sed_relative_l2: Some(spread(2.0 * median)),
+        }],
+    };
+    let errors = ContactErrors {
+        contact_sha256: String::new(),
+        network: None,
+        methods: vec![errors(ContactMethod::SecondOrder, 0.3), errors(ContactMethod::Pixels, 0.08)],
+    };
+    let Plane { atlas, raster, model, pixels, interface } = &plane;
+    let (model, interface) = (Some(model), Some(interface));
+    let with = |hello: &Hello, has_layers: bool, errors| {
+        let pixels = has_layers.then_some(pixels);
+        let skin = Skin { atlas, raster, model, pixels, interface, errors };
+        let hand = Hand::of(hello, skin).expect("a hand");
+        let told = hand.warnings().iter().map(|warning| {
+            assert_eq!(warning.member, "method");
+            warning.question.clone()
+        });
+        (hand.method(), told.collect::<Vec<String>>())
+    };
+    assert_eq!(with(&objects(), true, None), (Some(ContactMethod::Pixels), Vec::new()));
+    let gaps = Hello { input: Some(Input::Gaps), objects: None, ..objects() };
+    let slippery = Hello { shear: None, ..rough(0.0) };
+    for (hello, has_layers, why) in [
+        (&rough(0.5), true, "friction"),
+        (&Hello { shear: None, ..rough(0.5) }, true, "friction"),
+        (&Hello { shear: Some(true), ..objects() }, true, "friction"),
+        (&gaps, true, "gaps"),
+        (&slippery, false, "layers"),
+    ] {
+        let (method, warnings) = with(hello, has_layers, Some(&errors));
+        assert_eq!((method, warnings.len()), (Some(ContactMethod::SecondOrder), 1), "{why}");
+        for said in [why, "second_order", "60 % of SED, 30 % of pressure", "16 % of SED"] {
+            assert!(warnings[0].contains(said), "{said}: {}", warnings[0]);
+        }
+        let (_, unmeasured) = with(hello, has_layers, None);
+        assert!(unmeasured[0].contains("nobody measured"), "{unmeasured:?}");
+        // Who names a method knows what it is.
+        let named = Hello { method: Some(ContactMethod::SecondOrder), ..hello.clone() };
+        assert_eq!(with(&named, has_layers, None), (Some(ContactMethod::SecondOrder), Vec::new()));
+    }
+    let sent = Hello { version: 3, ..Hello::default() };
+    assert_eq!(with(&sent, true, None), (None, Vec::new()));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{load_model, print_json};
 use papilla_engine::Backend;
-use papilla_model_export::contact::{Models, Row, Rung, measure};
+use papilla_model_export::contact::{Models, Row, Rung, errors_of, measure};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::{ExportError, evaluate};
 use papilla_progress::Progress;
@@ -21,6 +21,10 @@ pub(crate) struct Options {
     /// Take one state of so many.
     #[arg(long, default_value_t = 1, value_name = "N")]
     every: usize,
+    /// File to write what the methods err to, which the service tells its clients: contact.json
+    /// beside the contact model. The first dataset is the one of which `ready` tells.
+    #[arg(long, value_name = "FILE")]
+    write: Option<PathBuf>,
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
@@ -48,6 +52,13 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         }
     }
     drop(progress);
+    if let Some(path) = &options.write {
+        let network = network.as_ref().map(|network| network.info().name.clone());
+        let errors = errors_of(&papilla_model_export::read(&options.model)?, network, &rows);
+        let mut text = serde_json::to_vec_pretty(&errors)?;
+        text.push(b'\n');
+        papilla_model_export::write(path, &text)?;
+    }
     if json {
         return print_json(&rows);
     }

@@ -4,7 +4,7 @@
 mod load;
 mod remeasure;
 
-use std::{borrow::Cow, sync::Arc, thread};
+use std::{borrow::Cow, io, path::Path, sync::Arc, thread};
 
 use papilla_engine::{Backend, Choice};
 use papilla_metrics::Metrics;
@@ -18,7 +18,7 @@ use crate::{
     core::{
         catalogue::{
             Catalogue, Loading, Step,
-            assets::{Assets, CONTACT},
+            assets::{Assets, CONTACT, CONTACT_ERRORS},
             calibrate, golden,
         },
         reload,
@@ -160,8 +160,21 @@ pub(crate) fn load_contact(
             None => return Ok(None),
         },
     };
-    let contact = ContactAssets::read(&bytes, &catalogue.atlas, &catalogue.skin);
+    let beside = match &config.contact {
+        Some(file) => read_beside(file).map_err(|error| bad(error.to_string()))?.map(Cow::Owned),
+        None => assets.get(CONTACT_ERRORS).map(Cow::Borrowed),
+    };
+    let contact = ContactAssets::read(&bytes, beside.as_deref(), &catalogue.atlas, &catalogue.skin);
     contact.map(Some).map_err(|error| bad(error.to_string()))
+}
+
+/// What methods err, as a file beside the contact model tells it; none without such a file.
+fn read_beside(contact: &Path) -> io::Result<Option<Vec<u8>>> {
+    match std::fs::read(contact.with_file_name(CONTACT_ERRORS)) {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(error),
+    }
 }
 
 /// Measures the tiers; the service is open meanwhile, and what disturbs the measurement does not

@@ -4,13 +4,13 @@
 use std::{path::Path, sync::Arc};
 
 use papilla_contact::{
-    Arrays, Contact, ContactModel, Gaps, Header, Method, NetForce, Object, Person, Scene, Settings,
-    Solver,
+    Arrays, Contact, ContactModel, Gaps, Header, Layer, Method, NetForce, Object, Person,
+    PixelContact, PixelSkin, PixelSpacing, Scene, Settings, Solver,
 };
 use papilla_proto::{
     Hello,
-    atlas::{Atlas, Patch},
-    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Pose},
+    atlas::{Atlas, Patch, Raster},
+    contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, Pose},
     sdf::Placement,
 };
 use serde_json::{Value, json};
@@ -19,6 +19,9 @@ use super::{ConformanceError, member, read};
 
 /// Modulus of the half-space, E / (1 - nu^2), MPa.
 const MODULUS_MPA: f64 = 0.1;
+
+/// Thickness of the layers of the skin, mm: alike and deep, they are a half-space. Pixels need layers.
+const LAYERS_MM: [f64; 2] = [0.2, 98.8];
 
 /// Time between two frames that velocities are taken over, s. A client's frames come whenever they
 /// do: the script's things move so fast that all skin slips, whatever the time.
@@ -49,11 +52,14 @@ pub struct ContactRecorder {
     header: Header,
     arrays: Arrays,
     model: Arc<ContactModel>,
+    pixels: Arc<PixelSkin>,
 }
 
 struct Hand {
     objects: Vec<AnnouncedObject>,
     has_force: bool,
+    /// Of each finger, where the method is on pixels.
+    pixels: Vec<PixelContact>,
     /// Of gaps.
     friction: f64,
     /// Whether a frame of gaps was solved: things move from it on.
@@ -78,6 +84,7 @@ impl ContactRecorder {
             triangles: atlas.triangles().len(),
             share_max: 1.0,
             depth_max_mm: 2.0,
+            layers: LAYERS_MM.map(layer).to_vec(),
             ..Header::current()
         };
         let triangles = atlas.triangles().as_flattened().to_vec();
@@ -85,7 +92,9 @@ impl ContactRecorder {
         let arrays = Arrays::half_space(positions, normals, areas, triangles, MODULUS_MPA);
         // As the service reads it.
         let model = Arc::new(ContactModel::read(&arrays.to_bytes(&header)?)?);
-        Ok(Self { atlas, header, arrays, model })
+        let raster = Arc::new(Raster::new(&atlas, Patch::Skin));
+        let pixels = PixelSkin::new(&model, &atlas, raster).ok_or(ConformanceError::Layers)?;
+        Ok(Self { atlas, header, arrays, model, pixels: Arc::new(pixels) })
     }
 
     /// The contact model that the service is to be started with.
@@ -124,6 +133,12 @@ impl ContactRecorder {
                 let mut hello = step["hello"].clone();
                 hello["version"] = json!(3);
                 let hello: Hello = serde_json::from_value(hello).map_err(|e| e.to_string())?;
+                // What the script asks of ready stays; how pressure is found is written.
+                if hello.input.is_some_and(|input| input != Input::Pressure) {
+                    let has_friction = hello.has_traction() || hello.shear == Some(true);
+                    let method = method(&hello, has_friction);
+                    step["expect"]["ready"]["method"] = json!(method);
+                }
                 *hand = Some(self.hand(hello)?);
             }
             Some("touch" | "gaps") => {
@@ -144,28 +159,40 @@ impl ContactRecorder {
     }
 
     fn hand(&self, hello: Hello) -> Result<Hand, String> {
+        let has_friction = hello.shear == Some(true)
+            || hello.friction.is_some()
+            || hello.objects.iter().flatten().any(|o| o.friction.is_some());
+        let method = method(&hello, has_friction);
+        let spacing = match method {
+            ContactMethod::Pixels => Some(PixelSpacing::One),
+            ContactMethod::CoarsePixels => Some(PixelSpacing::Two),
+            ContactMethod::Springs | ContactMethod::SmallStrain | ContactMethod::SecondOrder => {
+                None
+            }
+        };
         let fingers = hello.fingers.unwrap_or_else(|| vec![AnnouncedFinger::default()]);
         let solver = |finger: &AnnouncedFinger| {
             let settings = Settings {
-                method: match hello.method.unwrap_or_default() {
+                method: match method {
                     ContactMethod::Springs => Method::Springs,
                     ContactMethod::SmallStrain => Method::SmallStrain,
-                    ContactMethod::SecondOrder => Method::SecondOrder,
-                    ContactMethod::Pixels | ContactMethod::CoarsePixels => {
-                        return Err("no case is solved on pixels".to_owned());
-                    }
+                    ContactMethod::SecondOrder
+                    | ContactMethod::Pixels
+                    | ContactMethod::CoarsePixels => Method::SecondOrder,
                 },
                 person: Person { width: finger.width, stiffness: finger.stiffness },
                 stiffness: hello.stiffness == Some(true),
-                friction: hello.friction.is_some()
-                    || hello.objects.iter().flatten().any(|o| o.friction.is_some()),
+                friction: has_friction,
             };
             Solver::new(Arc::clone(&self.model), settings).map_err(|error| error.to_string())
         };
         let solvers = fingers.iter().map(solver).collect::<Result<_, _>>()?;
+        let on_pixels = |spacing| PixelContact::new(Arc::clone(&self.pixels), &self.model, spacing);
+        let pixels = spacing.map(|spacing| fingers.iter().map(|_| on_pixels(spacing)).collect());
         Ok(Hand {
             objects: hello.objects.unwrap_or_default(),
             has_force: hello.force_target == Some(true),
+            pixels: pixels.unwrap_or_default(),
             friction: hello.friction.unwrap_or(0.0),
             has_frame: false,
             solvers,
@@ -175,7 +202,8 @@ impl ContactRecorder {
     /// The numbers of a touch and the pressure at the vertices.
     fn touch(&self, step: &Value, hand: &mut Hand) -> Result<([f64; 15], Vec<f32>), String> {
         let finger: Option<usize> = member(step, "finger")?;
-        let solver = hand.solvers.get_mut(finger.unwrap_or(0)).ok_or("no such finger")?;
+        let finger = finger.unwrap_or(0);
+        let solver = hand.solvers.get_mut(finger).ok_or("no such finger")?;
         let net: Option<[f64; 4]> = member(step, "net")?;
         if net.is_some() != hand.has_force {
             return Err("'net' is due where the hello has force_target, and there alone".to_owned());
@@ -202,16 +230,23 @@ impl ContactRecorder {
             }
             Scene::Objects(&objects)
         };
-        let solved = match net {
-            Some([x, y, z, force_n]) => {
-                solver.solve_for_force(scene, NetForce { direction: [x, y, z], force_n }, &mut out)
+        let net = net.map(|[x, y, z, force_n]| NetForce { direction: [x, y, z], force_n });
+        let pixels = hand.pixels.get_mut(finger);
+        let solved = match (net, pixels) {
+            (Some(net), Some(pixels)) => {
+                solver.solve_for_force_on_pixels(&objects, net, pixels, &mut out)
             }
-            None => solver.solve(scene, &mut out).map(|()| 0.0),
+            (None, Some(pixels)) => {
+                solver.solve_on_pixels(&objects, pixels, &mut out).map(|()| 0.0)
+            }
+            (Some(net), None) => solver.solve_for_force(scene, net, &mut out),
+            (None, None) => solver.solve(scene, &mut out).map(|()| 0.0),
         };
         let travel_mm = solved.map_err(|error| error.to_string())?;
         let ([fx, fy, fz], [tx, ty, tz], [cx, cy, cz]) =
             (out.force_n, out.torque_n_mm, out.centre_mm);
-        let most = out.pressure_pa.iter().copied().fold(0.0, f32::max);
+        let at_vertices = || out.pressure_pa.iter().copied().fold(0.0, f32::max);
+        let most = hand.pixels.get(finger).map_or_else(at_vertices, PixelContact::peak_pa);
         let stiffness = out.stiffness_n_per_mm.unwrap_or(0.0);
         let (area, left) = (out.area_mm2, out.penetration_mm);
         let share = f64::from(out.quality.share);
@@ -234,6 +269,22 @@ impl ContactRecorder {
         ];
         Ok((numbers, out.pressure_pa))
     }
+}
+
+/// The method that a session of this hello has: the one that it names, or else pixels where they can
+/// serve it.
+fn method(hello: &Hello, has_friction: bool) -> ContactMethod {
+    let is_for_pixels = hello.input == Some(Input::Objects) && !has_friction;
+    hello.method.unwrap_or(if is_for_pixels {
+        ContactMethod::Pixels
+    } else {
+        ContactMethod::SecondOrder
+    })
+}
+
+/// A layer of a skin that is the half-space.
+fn layer(thickness_mm: f64) -> Layer {
+    Layer { young_mpa: 0.75 * MODULUS_MPA, poisson: 0.5 - 1e-6, thickness_mm }
 }
 
 /// How deep a place of the skin lies in a ball (x, y, z, radius), in f64 and rounded to f32.

@@ -53,6 +53,9 @@ pub enum ConformanceError {
     /// The contact model cannot be made.
     #[error(transparent)]
     Contact(#[from] papilla_contact::ModelError),
+    /// Pixels cannot be made of the contact model's layers.
+    #[error("the contact model of the script has no layers, which pixels need")]
+    Layers,
     /// A step is not of the format.
     #[error("case {case}, step {step}: {reason}")]
     Step {

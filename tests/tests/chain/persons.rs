@@ -67,7 +67,14 @@ fn hand() -> (Hand, [f32; 3]) {
         ..Hello::default()
     };
     let raster = Arc::new(Raster::new(atlas, Patch::Skin));
-    let skin = Skin { atlas, raster: &raster, model: Some(&model), pixels: None, interface: None };
+    let skin = Skin {
+        atlas,
+        raster: &raster,
+        model: Some(&model),
+        pixels: None,
+        interface: None,
+        errors: None,
+    };
     (Hand::of(&hello, skin).unwrap(), model.lowest_mm().map(|v| v as f32))
 }
 

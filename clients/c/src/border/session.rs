@@ -1,6 +1,9 @@
 //! Functions of a session.
 
-use std::{ffi::c_char, mem::MaybeUninit};
+use std::{
+    ffi::{CString, c_char},
+    mem::MaybeUninit,
+};
 
 use papilla_proto::contact::{OBJECTS_MAX, Pose};
 
@@ -15,6 +18,10 @@ use crate::{Problem, Session, Status, session::NetForce};
 #[derive(Debug, Default)]
 pub(crate) struct PapillaSession {
     session: Option<Session>,
+    /// How the open session finds pressure; empty if it finds none.
+    method: CString,
+    /// What its program is to be told; empty if nothing.
+    warning: CString,
     error: LastError,
 }
 
@@ -84,6 +91,30 @@ pub(crate) unsafe extern "C" fn papilla_session_error_field(
     unsafe { session.as_ref() }.map_or(c"".as_ptr(), |session| session.error.field())
 }
 
+/// How an open session finds pressure, as `pixels`; empty if it is not open, or is sent pressure.
+///
+/// # Safety
+/// `session` is null or of `papilla_session_new`.
+#[unsafe(no_mangle)]
+pub(crate) unsafe extern "C" fn papilla_session_method(
+    session: *const PapillaSession,
+) -> *const c_char {
+    // SAFETY: as the caller promises.
+    unsafe { session.as_ref() }.map_or(c"".as_ptr(), |session| session.method.as_ptr())
+}
+
+/// What an open session cannot do as one might expect, a line each; empty if there is nothing.
+///
+/// # Safety
+/// `session` is null or of `papilla_session_new`.
+#[unsafe(no_mangle)]
+pub(crate) unsafe extern "C" fn papilla_session_warning(
+    session: *const PapillaSession,
+) -> *const c_char {
+    // SAFETY: as the caller promises.
+    unsafe { session.as_ref() }.map_or(c"".as_ptr(), |session| session.warning.as_ptr())
+}
+
 /// Opens a session, or opens it anew; after a failure it is as it was.
 ///
 /// # Safety
@@ -98,7 +129,11 @@ pub(crate) unsafe extern "C" fn papilla_session_open(
         // SAFETY: as the caller promises.
         let (model, hello) = unsafe { (model.as_ref(), handle::due_text("hello", hello)?) };
         let model = model.ok_or_else(|| Failure::new(Status::BadPointer, "model is null"))?;
-        handle.session = Some(Session::open(model.loaded()?, hello)?);
+        let session = Session::open(model.loaded()?, hello)?;
+        // Neither holds a zero: they are our own words.
+        handle.method = CString::new(session.method()).unwrap_or_default();
+        handle.warning = CString::new(session.warnings()).unwrap_or_default();
+        handle.session = Some(session);
         Ok(())
     };
     // SAFETY: as the caller promises.

@@ -9,6 +9,8 @@ use crate::{StartError, config::Config};
 
 /// The contact model's file among the others.
 pub(crate) const CONTACT: &str = "finger.contact";
+/// What methods err with it.
+pub(crate) const CONTACT_ERRORS: &str = "contact.json";
 
 /// The shipped models, cards, atlas, replay and contact model, as they were when the binary was built.
 const MODELS: &[(&str, &[u8])] = include!(concat!(env!("OUT_DIR"), "/models.rs"));

@@ -8,7 +8,8 @@ use axum::{
     response::Response,
 };
 use papilla_metrics::Metrics;
-use papilla_proto::Problem;
+use papilla_proto::{Problem, contact::ContactMethod};
+use papilla_session_contact::ContactAssets;
 use serde::Serialize;
 use serde_json::{Value, json};
 use tokio::{sync::Semaphore, task::spawn_blocking};
@@ -76,17 +77,24 @@ pub(crate) async fn tiers(State(app): Shared) -> Response {
     let tiers: Vec<Value> = catalogue.offered().map(|(index, _)| tier(&catalogue, index)).collect();
     // The ladder is long and never changes: its JSON is put in as it is.
     let text = format!(
-        r#"{{"contact_us":{},"coarse_pixels_us":{},"pixels_us":{},"default":{},"judged_on":{},"ladder":{},"overhead_us":{},"tiers":{}}}"#,
-        json!(app.contact.as_ref().map(|contact| contact.frame_us)),
-        json!(app.contact.as_ref().and_then(|contact| contact.coarse_pixel_frame_us)),
-        json!(app.contact.as_ref().and_then(|contact| contact.pixel_frame_us)),
+        r#"{{"default":{},"judged_on":{},"ladder":{},"methods":{},"overhead_us":{},"tiers":{}}}"#,
         json!(catalogue.tiers[catalogue.default].name),
         json!(catalogue.judged_on),
         catalogue.ladder_json,
+        json!(app.contact.as_ref().map(methods)),
         catalogue.overhead.us(),
         json!(tiers),
     );
     answer("application/json", text)
+}
+
+/// What each method of contact takes and errs.
+fn methods(contact: &ContactAssets) -> Vec<Value> {
+    let method = |&(method, us): &(ContactMethod, u64)| {
+        let errors = contact.errors.as_ref().map_or(&[][..], |errors| errors.all_of(method));
+        json!({"name": method, "contact_us": us, "errors": errors})
+    };
+    contact.frame_us.iter().map(method).collect()
 }
 
 fn tier(catalogue: &Catalogue, index: usize) -> Value {

@@ -173,6 +173,7 @@ fn hand(
         model: contact.map(|contact| &contact.model),
         pixels: contact.and_then(|contact| contact.pixels.as_ref()),
         interface: contact.and_then(|contact| contact.interface.as_ref()),
+        errors: contact.and_then(|contact| contact.errors.as_ref()),
     };
     Ok((Hand::of(hello, skin)?, places))
 }
@@ -311,6 +312,8 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         hand.sections().iter().copied().chain(moved).collect()
     };
     let fingers = terms.hand.as_ref().map(|hand| hand.fingers().len() as u32);
+    let method = terms.hand.as_ref().and_then(Hand::method);
+    let errors = app.contact.as_ref().and_then(|contact| contact.errors.as_ref());
     Ready {
         version: terms.version,
         session: number,
@@ -338,5 +341,8 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         vertices: fingers.map(|_| catalogue.atlas.vertex_count() as u32),
         fingers,
         contact_us,
+        method,
+        expected_error: errors.zip(method).and_then(|(errors, of)| errors.of(of)).cloned(),
+        warnings: terms.hand.as_ref().map_or_else(Vec::new, |hand| hand.warnings().to_vec()),
     }
 }

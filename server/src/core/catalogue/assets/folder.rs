@@ -13,7 +13,7 @@ use std::{
 use papilla_engine::card::Index;
 
 use super::{
-    CONTACT, Files,
+    CONTACT, CONTACT_ERRORS, Files,
     detached::{STRANDED_MAX, Unfinished, detached},
 };
 use crate::StartError;
@@ -26,7 +26,8 @@ const FOLDER_BYTES_MAX: u64 = 1 << 30;
 const WAIT_MAX: Duration = Duration::from_secs(20);
 
 /// The files of every service; an index names the models beside them.
-const BASE: [&str; 5] = ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT];
+const BASE: [&str; 6] =
+    ["index.json", "atlas.json", "replay.json", "ladder.json", CONTACT, CONTACT_ERRORS];
 
 /// The files of `folder` that a service is made of: [`BASE`] and those of the models that its index
 /// names. Strangers that cannot be read are named in the log. None: it was to stop.
