@@ -28,6 +28,7 @@
 //!     depths_mm = [0.25, 0.5]
 //!     test_fraction = 0.5
 //!     density = "coarse"
+//!     order = "linear"
 //!     effects = ["finite_strain", "layers"]
 //!     indenter = { shape = "sphere" }
 //!     pose = { pitch_deg = [0.0, 30.0], roll_deg = [0.0, 0.0], yaw_deg = [0.0, 0.0] }

@@ -12,7 +12,7 @@ const FINGER: &str = "effects = [\"finite_strain\", \"layers\"]
 [geometry]
 kind = \"fingertip\"
 density = \"coarse\"
-
+order = \"linear\"
 [motion]
 depth_mm = 1.0
 ";
@@ -71,7 +71,13 @@ fn contradictory_effects() {
     let text = FINGER.replace("\"finite_strain\", \"layers\"", "\"layers\",\n  \"hyperelastic\"");
     assert_refused(&text, 2, &["'hyperelastic'", "needs 'finite_strain'"]);
     let text = FINGER.replace("\"layers\"", "\"friction\"");
-    assert_refused(&text, 1, &["'friction'", "friction.coefficient is 0", "give a coefficient"]);
+    assert_refused(
+        &text,
+        1,
+        &[
+            "effect 'friction': friction.coefficient is 0; leave the effect out or give a coefficient",
+        ],
+    );
 }
 
 #[test]
@@ -118,6 +124,64 @@ fn a_cortex_that_fills_the_bone() {
     let text = format!("{FINGER}\n[geometry.shape]\nbone_cortex_mm = 3.0\n")
         .replace("\"layers\"", "\"elastic_bone\"");
     assert_refused(&text, 11, &["geometry.shape.bone_cortex_mm = 3", "make the cortex thinner"]);
+}
+
+#[test]
+fn a_finger_too_thin_for_its_bone() {
+    let with = |shape: &str| format!("{FINGER}\n[geometry.shape]\n{shape}\n");
+    assert_refused(
+        &with("width_mm = 12.0"),
+        11,
+        &["geometry.shape.width_mm = 12", "folds the elements", "at least 1"],
+    );
+    // One of two is to blame.
+    let two = with("epidermis_mm = 0.25\nwidth_mm = 12.0");
+    assert_refused(&two, 12, &["geometry.shape.width_mm = 12"]);
+}
+
+/// What is not there, or is no file, is said once, with a cure.
+#[test]
+fn a_file_that_cannot_be_read_is_named_once() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("folder")).unwrap();
+    std::fs::write(folder.path().join("empty.toml"), "").unwrap();
+    for (arguments, words) in [
+        (&["solve", "none.toml", "--out", "out"][..], &["none.toml", "No such file"][..]),
+        (&["explain", "none.toml"], &["none.toml", "No such file"]),
+        (&["generate", "none.toml", "--out", "out"], &["none.toml", "No such file"]),
+        (&["effects", "folder"], &["folder", "Is a directory"]),
+        (&["explain", "empty.toml"], &["empty.toml", "missing field `geometry`"]),
+        (&["generate", "empty.toml", "--out", "out"], &["empty.toml", "missing field `name`"]),
+        (&["dataset", "verify", "none"], &["none/manifest.json", "No such file", "check the path"]),
+        (&["dataset", "stats", "empty.toml"], &["empty.toml/manifest.json", "Not a directory"]),
+        (&["contact", "none", "--out", "out"], &["none/manifest.json", "No such file"]),
+        (&["solve", "good.toml", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+    ] {
+        std::fs::write(folder.path().join("good.toml"), BLOCK).unwrap();
+        let output = run(folder.path(), arguments);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
+        for word in words {
+            assert_eq!(
+                error.matches(word).count(),
+                1,
+                "{arguments:?}: {error}should say {word} once"
+            );
+        }
+        assert!(!folder.path().join("out").exists(), "{arguments:?} left a folder");
+    }
+}
+
+#[test]
+fn a_depth_has_no_time_to_be_taken_in() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.toml"), FINGER).unwrap();
+    let output = run(folder.path(), &["effects", "bad.toml", "--seconds", "0.1,1"]);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    for word in ["error: bad.toml:7:", "motion.path", "path = [{ time_s = 1.0, depth_mm = 1.0 }]"] {
+        assert!(error.contains(word), "{error}should say {word}");
+    }
 }
 
 #[test]

@@ -31,7 +31,7 @@ fn scene(mesh: &str, effects: &str, indenter: &str, depth_mm: f64, drags: &[[f64
     let drags: String = drags.iter().enumerate().map(drag).collect();
     let text = format!(
         "effects = [{effects}]\n{indenter}\nfriction.coefficient = {FRICTION}\n\
-         [geometry]\nkind = \"fingertip\"\ndensity = \"{mesh}\"\n\
+         [geometry]\nkind = \"fingertip\"\ndensity = \"{mesh}\"\norder = \"linear\"\n\
          [motion]\npath = [{{ time_s = 1.0, depth_mm = {depth_mm} }}{drags}]"
     );
     Scene::parse(Path::new("scene.toml"), text).unwrap()

@@ -14,6 +14,7 @@ presses = 2
 depths_mm = [0.05, 0.08, 0.11, 0.14]
 test_fraction = 0.5
 density = "coarse"
+order = "linear"
 effects = ["finite_strain", "layers"]
 indenter = { shape = "plate" }
 pose = { pitch_deg = [0.0, 30.0], roll_deg = [-15.0, 15.0], yaw_deg = [0.0, 0.0] }

@@ -4,7 +4,7 @@
 use crate::ExportError;
 use crate::metrics::Ground;
 use crate::part::Part;
-use papilla_dataset::{IndentationEntry, Maps, Shard};
+use papilla_dataset::{Field, IndentationEntry, Maps, Shard};
 use papilla_proto::{
     atlas::{Atlas, Patch},
     sdf::IndenterSpec,
@@ -150,7 +150,7 @@ impl Dataset {
     /// Draws the pressure of a sample of an indentation on the skin, Pa; 224 x 224.
     ///
     /// # Errors
-    /// [`ExportError::DatasetFile`] where a pixel lies in no cell, [`ExportError::Atlas`].
+    /// [`ExportError::DatasetFile`] where a pixel lies in no cell.
     pub fn draw_pressure(
         &self,
         indentation: &IndentationEntry,
@@ -158,7 +158,7 @@ impl Dataset {
         sample: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(indentation, Patch::Skin, shard, &shard.pressure_pa.row(sample).to_vec(), map)
+        self.draw(indentation, Field::Pressure, shard, sample, map)
     }
 
     /// Draws its SED on the interface, J/m3.
@@ -172,28 +172,20 @@ impl Dataset {
         sample: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        self.draw(
-            indentation,
-            Patch::Interface,
-            shard,
-            &shard.sed_dermis_j_per_m3.row(sample).to_vec(),
-            map,
-        )
+        self.draw(indentation, Field::SedDermis, shard, sample, map)
     }
 
     pub(crate) fn draw(
         &self,
         indentation: &IndentationEntry,
-        patch: Patch,
+        field: Field,
         shard: &Shard,
-        values: &[f32],
+        sample: usize,
         map: &mut [f32],
     ) -> Result<(), ExportError> {
-        let path = || self.shard_path(indentation);
-        let reader = self.maps.reader(patch, shard.cells.as_ref()).map_err(|error| {
-            ExportError::DatasetFile { path: path(), reason: error.to_string() }
-        })?;
-        let refused = |source| ExportError::Atlas { path: path(), source };
-        reader.draw(values, map).map_err(refused)
+        self.maps.of(shard).draw(field, sample, map).map_err(|error| {
+            let path = self.shard_path(indentation);
+            ExportError::DatasetFile { path, reason: error.to_string() }
+        })
     }
 }

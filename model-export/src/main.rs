@@ -13,12 +13,12 @@ fn main() -> ExitCode {
             let code = error
                 .downcast_ref::<papilla_model_export::ExportError>()
                 .map_or(1, papilla_model_export::ExportError::exit_code);
+            let said = papilla_output::told(error.as_ref());
             if arguments.json {
-                let report =
-                    serde_json::json!({"error": {"message": error.to_string(), "exit_code": code}});
+                let report = serde_json::json!({"error": {"message": said, "exit_code": code}});
                 println!("{report}");
             } else {
-                eprintln!("error: {error}");
+                eprintln!("error: {said}");
             }
             ExitCode::from(code)
         }

@@ -6,9 +6,8 @@ use crate::contact::Models;
 use crate::dataset::Dataset;
 use crate::metrics::{SampleMetrics, spread};
 use crate::processor::thread_s;
-use ndarray::Axis;
 use papilla_contact::{InterfaceSkin, ShearEnergy};
-use papilla_dataset::{IndentationEntry, Shard};
+use papilla_dataset::{Field, IndentationEntry, Shard};
 use papilla_engine::ladder::Traction;
 use papilla_engine::{MAP_LEN, Session};
 use papilla_proto::atlas::{Patch, VertexSampler};
@@ -77,22 +76,18 @@ fn traction(
     state: usize,
     sampler: &VertexSampler,
 ) -> Result<Option<Vec<[f32; 3]>>, ExportError> {
-    let Some(shear_pa) = &shard.shear_pa else { return Ok(None) };
-    let of_state = shear_pa.index_axis(Axis(0), state);
+    if shard.shear_pa.is_none() {
+        return Ok(None);
+    }
     let path = dataset.shard_path(indentation);
     let refused = |source| ExportError::Atlas { path: path.clone(), source };
     let mut found = vec![[0.0; 3]; sampler.vertex_count()];
     let mut map = vec![0.0; MAP_LEN];
     let mut vertices = vec![0.0; found.len()];
     for axis in 0..3 {
-        let values = of_state.index_axis(Axis(1), axis);
-        // Maps are never negative, so that each sign is drawn by itself.
-        for sign in [1.0f32, -1.0] {
-            let part: Vec<f32> = values.iter().map(|v| (sign * v).max(0.0)).collect();
-            dataset.draw(indentation, Patch::Skin, shard, &part, &mut map)?;
-            sampler.sample(&map, &mut vertices).map_err(refused)?;
-            found.iter_mut().zip(&vertices).for_each(|(q, v)| q[axis] += sign * v);
-        }
+        dataset.draw(indentation, Field::Shear(axis), shard, state, &mut map)?;
+        sampler.sample(&map, &mut vertices).map_err(refused)?;
+        found.iter_mut().zip(&vertices).for_each(|(q, v)| q[axis] = *v);
     }
     Ok(Some(found))
 }

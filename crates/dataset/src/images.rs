@@ -1,6 +1,6 @@
 //! The surface-pressure study's image pairs: 224 x 224 gray PNG of pressure and SED.
 
-use super::{Dataset, DatasetError, IndentationEntry, Maps, Split};
+use super::{Dataset, DatasetError, Field, IndentationEntry, Maps, Split};
 use papilla_atlas::{MAP_LEN, Patch};
 use papilla_output::map_image::{Bits, MapScale, MapView, Quantity};
 use papilla_output::{OutputError, atomic};
@@ -105,18 +105,11 @@ impl Drawing<'_> {
     ) -> Result<(), DatasetError> {
         for press in &self.dataset.manifest().presses {
             let shard = self.dataset.shard(press)?;
-            let quantities =
-                [(Patch::Skin, &shard.pressure_pa), (Patch::Interface, &shard.sed_dermis_j_per_m3)];
-            let mut readers = Vec::with_capacity(2);
-            for (patch, values) in quantities {
-                readers.push((self.maps.reader(patch, shard.cells.as_ref())?, values));
-            }
+            let maps = self.maps.of(&shard);
             for sample in 0..shard.len() {
-                for ((reader, values), painter) in readers.iter().zip(&mut self.painters) {
-                    let values = values.row(sample).to_vec();
-                    reader.draw(&values, &mut painter.pixels).map_err(|source| {
-                        DatasetError::Atlas { path: self.dataset.shard_path(press), source }
-                    })?;
+                let fields = [Field::Pressure, Field::SedDermis];
+                for (field, painter) in fields.into_iter().zip(&mut self.painters) {
+                    maps.draw(field, sample, &mut painter.pixels)?;
                 }
                 look(press, shard.depth_mm[sample], &mut self.painters)?;
             }

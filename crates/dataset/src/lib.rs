@@ -45,7 +45,7 @@ pub use manifest::{
     DroppedSample, FORMAT, FORMATS, FailedIndentation, IndentationEntry, Manifest, Split, Splits,
     Units, UnknownSplit, dataset_sha256, sha256_hex,
 };
-pub use maps::{MapReader, Maps};
+pub use maps::{Field, Maps, ShardMaps};
 pub use reader::{Dataset, VerifyReport, verify};
 pub use record::{Cells, Checks, Pose, Sample};
 pub use replay::replay;

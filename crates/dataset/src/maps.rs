@@ -2,14 +2,20 @@
 //!
 //! SED is read in the middle of a pixel. Pressure is the mean over a pixel: ridges and edges of
 //! contact are thinner than one, and the mean keeps the force.
+//!
+//! Everything that shows a state of finite elements as a map draws it here: `fe-datagen solve`,
+//! pictures and replays of datasets, the evaluation of models.
 
 mod finder;
 mod points;
+mod states;
 
-use super::{Cells, DatasetError};
+pub use states::{Field, ShardMaps};
+
+use super::{Cells, DatasetError, Shard, TriangleOnLattice};
 use finder::Finder;
 use ndarray::{Ix1, Ix2};
-use papilla_atlas::{Atlas, AtlasError, Patch, Raster};
+use papilla_atlas::{Atlas, Patch, Raster};
 use papilla_output::OutputError;
 use papilla_output::npz::NpzArrays;
 use std::path::Path;
@@ -33,7 +39,48 @@ struct Pixels {
     points: Vec<Place>,
 }
 
+impl Pixels {
+    /// `places`: the middle of each pixel on the lattice; empty where values are at vertices.
+    fn new(raster: Raster, places: Vec<Place>) -> Self {
+        let points = match raster.patch() {
+            Patch::Skin => points::within(&raster, &places),
+            Patch::Interface => places,
+        };
+        Self { raster, points }
+    }
+}
+
+/// Where on the lattice the middle of each pixel of a raster lies: its side, row and column. Of 32
+/// bits, as `raster.npz` holds them.
+pub(super) fn places<'a>(
+    raster: &'a Raster,
+    lattice: &'a [TriangleOnLattice],
+) -> impl Iterator<Item = (u32, [f32; 2])> + 'a {
+    raster.pixels().iter().map(|pixel| {
+        let TriangleOnLattice { side, place } = lattice[pixel.triangle as usize];
+        let corners = place.into_iter().zip(pixel.weights);
+        let sum = |k: usize| corners.clone().map(|(c, w)| c[k] * f64::from(w)).sum::<f64>();
+        (side, [sum(0) as f32, sum(1) as f32])
+    })
+}
+
 impl Maps {
+    /// For maps of states that are known at the vertices of this atlas, or at nodes of cells on the
+    /// lattice that its triangles lie on.
+    ///
+    /// # Panics
+    /// If `lattice` has fewer entries than the atlas has triangles.
+    #[must_use]
+    pub fn new(atlas: &Atlas, lattice: Option<&[TriangleOnLattice]>) -> Self {
+        let [skin, interface] = Patch::ALL.map(|patch| {
+            let raster = Raster::new(atlas, patch);
+            let wide = |(side, at): (u32, [f32; 2])| (side, at.map(f64::from));
+            let on = lattice.map(|lattice| places(&raster, lattice).map(wide).collect());
+            Pixels::new(raster, on.unwrap_or_default())
+        });
+        Self { skin, interface }
+    }
+
     /// For the maps of the dataset in `folder`, which is of this atlas. One without a `raster.npz` has
     /// all its values at vertices.
     ///
@@ -42,31 +89,24 @@ impl Maps {
     pub fn read(folder: &Path, atlas: &Atlas) -> Result<Self, DatasetError> {
         let path = folder.join("raster.npz");
         if !path.exists() {
-            let at_vertices =
-                |patch| Pixels { raster: Raster::new(atlas, patch), points: Vec::new() };
-            let [skin, interface] = Patch::ALL.map(at_vertices);
-            return Ok(Self { skin, interface });
+            return Ok(Self::new(atlas, None));
         }
         let bytes = std::fs::read(&path).map_err(OutputError::io("read", &path))?;
         let mut npz = NpzArrays::new(&path, &bytes)?;
         let mut pixels = |patch: Patch| -> Result<Pixels, DatasetError> {
             let raster = Raster::new(atlas, patch);
             let name = |part: &str| format!("{}_{part}", patch.name());
-            let mut points = Vec::new();
+            let mut middles = Vec::new();
             if npz.has(&name("side"))? {
                 let sides = npz.get::<u32, Ix1>(&name("side"))?;
                 let rows = npz.get::<f32, Ix2>(&name("place"))?;
                 let at = rows.outer_iter().map(|p| [f64::from(p[0]), f64::from(p[1])]);
-                let places: Vec<Place> = sides.iter().copied().zip(at).collect();
-                if places.len() != raster.pixel_count() {
+                middles = sides.iter().copied().zip(at).collect();
+                if middles.len() != raster.pixel_count() {
                     return Err(OutputError::malformed(&path, &"places are not the pixels'").into());
                 }
-                points = match patch {
-                    Patch::Skin => points::within(&raster, &places),
-                    Patch::Interface => places,
-                };
             }
-            Ok(Pixels { raster, points })
+            Ok(Pixels::new(raster, middles))
         };
         Ok(Self { skin: pixels(Patch::Skin)?, interface: pixels(Patch::Interface)? })
     }
@@ -84,15 +124,14 @@ impl Maps {
         }
     }
 
+    /// Maps of a shard's states.
+    #[must_use]
+    pub const fn of<'a>(&'a self, shard: &'a Shard) -> ShardMaps<'a> {
+        ShardMaps::new(self, shard)
+    }
+
     /// How maps of a patch are drawn from the values of a shard with these cells.
-    ///
-    /// # Errors
-    /// [`DatasetError::Output`] where a pixel lies in no cell.
-    pub fn reader(
-        &self,
-        patch: Patch,
-        cells: Option<&Cells>,
-    ) -> Result<MapReader<'_>, DatasetError> {
+    fn reader(&self, patch: Patch, cells: Option<&Cells>) -> Result<MapReader<'_>, DatasetError> {
         let Pixels { raster, points } = self.of_patch(patch);
         let mut reader = MapReader { raster, ends: Vec::new(), terms: Vec::new() };
         let Some(cells) = cells else { return Ok(reader) };
@@ -133,7 +172,7 @@ impl Maps {
 }
 
 /// Draws maps of one patch from the values of one shard.
-pub struct MapReader<'a> {
+struct MapReader<'a> {
     raster: &'a Raster,
     /// Where the terms of each pixel end; empty where values are at the atlas' vertices.
     ends: Vec<usize>,
@@ -142,23 +181,13 @@ pub struct MapReader<'a> {
 }
 
 impl MapReader<'_> {
-    /// True inside the patch.
-    #[must_use]
-    pub fn mask(&self) -> &[bool] {
-        self.raster.mask()
-    }
-
-    /// Overwrites a map of 224 x 224; 0 outside the patch. Where a quadratic overshoots, never
-    /// negative.
-    ///
-    /// # Errors
-    /// [`AtlasError::BufferLength`] if there are not as many values as vertices.
-    ///
-    /// # Panics
-    /// If there are fewer values than nodes of the cells.
-    pub fn draw(&self, values: &[f32], map: &mut [f32]) -> Result<(), AtlasError> {
+    /// Overwrites a map; 0 outside the patch. Where a quadratic overshoots, never negative.
+    fn draw(&self, values: &[f32], map: &mut [f32]) -> Result<(), DatasetError> {
         if self.ends.is_empty() {
-            return self.raster.rasterise(values, map);
+            return self
+                .raster
+                .rasterise(values, map)
+                .map_err(|error| OutputError::malformed("a state".as_ref(), &error).into());
         }
         map.fill(0.0);
         let mut begin = 0;

@@ -1,8 +1,8 @@
 //! A few held-out indentations for the service's page, next to their FE truth.
 
-use super::{Dataset, DatasetError, IndentationEntry, MapReader, Maps, Split};
+use super::{Dataset, DatasetError, Field, IndentationEntry, Maps, ShardMaps, Split};
 use crate::record::Pose;
-use papilla_atlas::{AtlasError, MAP_LEN, Patch, Raster};
+use papilla_atlas::{MAP_LEN, Raster};
 use papilla_output::{OutputError, atomic};
 use serde::Serialize;
 use std::path::Path;
@@ -44,11 +44,8 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
         // Deepest first, then shallower ones.
         let sample = shard.len() - 1 - (2 * k) % shard.len();
         let depth_mm = shard.depth_mm[sample];
-        let drawn = |patch, values: &ndarray::Array2<f32>| {
-            let reader = maps.reader(patch, shard.cells.as_ref())?;
-            shown(&reader, maps.raster(patch), &values.row(sample).to_vec())
-                .map_err(|source| DatasetError::Atlas { path: dataset.shard_path(press), source })
-        };
+        let of_shard = maps.of(&shard);
+        let drawn = |field: Field| shown(&of_shard, maps.raster(field.patch()), field, sample);
         presses.push(ReplayPress {
             name: format!(
                 "{}: {depth_mm:.2} mm, pitch {:.0}°, roll {:.0}°",
@@ -56,8 +53,8 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
             ),
             pose: press.pose,
             depth_mm,
-            pressure_pa: drawn(Patch::Skin, &shard.pressure_pa)?,
-            sed_j_per_m3: drawn(Patch::Interface, &shard.sed_dermis_j_per_m3)?,
+            pressure_pa: drawn(Field::Pressure)?,
+            sed_j_per_m3: drawn(Field::SedDermis)?,
         });
     }
     let names = presses.iter().map(|p| p.name.clone()).collect();
@@ -74,9 +71,14 @@ pub fn replay(folder: &Path, count: usize, path: &Path) -> Result<Vec<String>, D
 }
 
 /// Values at the pixels of a patch, to the four digits that a map of 16 bits has.
-fn shown(reader: &MapReader<'_>, raster: &Raster, values: &[f32]) -> Result<Vec<f32>, AtlasError> {
+fn shown(
+    maps: &ShardMaps<'_>,
+    raster: &Raster,
+    field: Field,
+    sample: usize,
+) -> Result<Vec<f32>, DatasetError> {
     let mut map = vec![0.0; MAP_LEN];
-    reader.draw(values, &mut map)?;
+    maps.draw(field, sample, &mut map)?;
     let short = |&pixel: &u32| match map[pixel as usize] {
         0.0 => 0.0,
         value => {

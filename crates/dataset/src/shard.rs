@@ -1,11 +1,12 @@
 //! Shards: the vertex values of one indentation in one archive.
 
 use super::{DatasetError, fault, worst_checks};
+use crate::maps::places;
 use crate::record::{Cells, Checks, Sample};
-use ndarray::{Array1, Array2, Array3, Ix1, Ix2, Ix3};
-use papilla_atlas::{Atlas, Patch, Pixel, Raster};
-use papilla_output::atomic;
+use ndarray::{Array, Array1, Array2, Array3, Dimension, Ix1, Ix2, Ix3, StrideShape};
+use papilla_atlas::{Atlas, Patch, Raster};
 use papilla_output::npz::{NpzArrays, NpzBuilder};
+use papilla_output::{OutputError, atomic};
 use std::path::Path;
 
 /// Pascal per megapascal, and J/m3 per mJ/mm3.
@@ -116,46 +117,14 @@ pub fn encode(
     let Some(checks) = worst_checks(kept.iter().map(|r| &r.checks)) else {
         return Ok(Err(dropped));
     };
-    let field = |values: fn(&Sample) -> &[f64]| -> Vec<f32> {
-        kept.iter().flat_map(|r| values(r)).map(|v| stored((v * PA_PER_MPA) as f32)).collect()
-    };
-    let max = |values: &[f32]| f64::from(values.iter().copied().fold(0.0, f32::max));
-    let pressure = field(|r| &r.pressure_mpa);
-    let dermis = field(|r| &r.sed_dermis_mpa);
-    let cells = kept.first().and_then(|r| r.cells.as_deref());
-    let (d, v) = (kept.len(), cells.map_or(vertex_count, Cells::node_count));
-    let depth: Vec<f32> = kept.iter().map(|r| r.depth_mm as f32).collect();
-    let force: Vec<f32> = kept.iter().flat_map(|r| r.force_n).map(|f| f as f32).collect();
-    let check_rows: Vec<f64> = kept.iter().flat_map(|r| check_row(&r.checks)).collect();
-    let mut npz = NpzBuilder::new();
-    npz.add_slice("pressure_pa", &[d, v], &pressure)?;
-    npz.add_slice("sed_dermis_j_per_m3", &[d, v], &dermis)?;
-    npz.add_slice("sed_epidermis_j_per_m3", &[d, v], &field(|r| &r.sed_epidermis_mpa))?;
-    npz.add_slice("depth_mm", &[d], &depth)?;
-    npz.add_slice("force_n", &[d, 3], &force)?;
-    npz.add_slice("checks", &[d, CHECK_COLUMNS.len()], &check_rows)?;
-    if let Some(cells) = cells {
-        let (places, nodes) = (cells.place.as_flattened(), cells.nodes.as_flattened());
-        npz.add_slice("cell_place", &[cells.place.len(), 5], places)?;
-        npz.add_slice("cell_nodes", &[cells.nodes.len(), 9], nodes)?;
-    }
-    if kept.iter().any(|r| !r.shear_mpa.is_empty()) {
-        npz.add_slice("shear_pa", &[d, v, 3], &field(|r| r.shear_mpa.as_flattened()))?;
-    }
-    if kept.iter().any(|r| r.slide_mm.iter().any(|s| *s != 0.0)) {
-        let slide: Vec<f32> = kept.iter().flat_map(|r| r.slide_mm).map(|s| s as f32).collect();
-        npz.add_slice("slide_mm", &[d, 2], &slide)?;
-    }
-    if kept.iter().any(|r| r.outside_calibration > 0.0) {
-        let share: Vec<f32> = kept.iter().map(|r| r.outside_calibration as f32).collect();
-        npz.add_slice("outside_calibration", &[d], &share)?;
-    }
+    let shard = Shard::of(&kept, vertex_count)?;
+    let max = |values: &Array2<f32>| f64::from(values.iter().copied().fold(0.0, f32::max));
     Ok(Ok(Encoded {
-        bytes: npz.finish()?,
-        samples: d,
+        bytes: shard.to_npz()?,
+        samples: shard.len(),
         checks,
-        pressure_max_pa: max(&pressure),
-        sed_max_j_per_m3: max(&dermis),
+        pressure_max_pa: max(&shard.pressure_pa),
+        sed_max_j_per_m3: max(&shard.sed_dermis_j_per_m3),
         dropped,
     }))
 }
@@ -172,6 +141,68 @@ fn read_cells(path: &Path, npz: &mut NpzArrays<'_>) -> Result<Cells, DatasetErro
 }
 
 impl Shard {
+    /// What a dataset holds of these states: its units and its digits. Values are at the nodes of the
+    /// first one's cells, or else at the `vertex_count` vertices of an atlas.
+    ///
+    /// # Errors
+    /// [`DatasetError::Output`] where a state has another number of values.
+    pub fn of(states: &[&Sample], vertex_count: usize) -> Result<Self, DatasetError> {
+        let cells = states.first().and_then(|r| r.cells.as_deref());
+        let (d, v) = (states.len(), cells.map_or(vertex_count, Cells::node_count));
+        let field = |values: fn(&Sample) -> &[f64]| -> Vec<f32> {
+            states.iter().flat_map(|r| values(r)).map(|v| stored((v * PA_PER_MPA) as f32)).collect()
+        };
+        let by_vertex = |values| shaped((d, v), values);
+        let narrow = |values: Vec<f64>| values.into_iter().map(|x| x as f32).collect::<Vec<f32>>();
+        let force = states.iter().flat_map(|r| r.force_n).collect();
+        let slide = states.iter().flat_map(|r| r.slide_mm).collect();
+        let share = states.iter().map(|r| r.outside_calibration).collect();
+        let checks = states.iter().flat_map(|r| check_row(&r.checks)).collect();
+        let rubs = states.iter().any(|r| !r.shear_mpa.is_empty());
+        let slides = states.iter().any(|r| r.slide_mm.iter().any(|s| *s != 0.0));
+        let flagged = states.iter().any(|r| r.outside_calibration > 0.0);
+        Ok(Self {
+            cells: cells.cloned(),
+            pressure_pa: by_vertex(field(|r| &r.pressure_mpa))?,
+            sed_dermis_j_per_m3: by_vertex(field(|r| &r.sed_dermis_mpa))?,
+            sed_epidermis_j_per_m3: by_vertex(field(|r| &r.sed_epidermis_mpa))?,
+            depth_mm: states.iter().map(|r| r.depth_mm as f32).collect(),
+            slide_mm: slides.then(|| shaped((d, 2), narrow(slide))).transpose()?,
+            force_n: shaped((d, 3), narrow(force))?,
+            checks: shaped((d, CHECK_COLUMNS.len()), checks)?,
+            shear_pa: rubs
+                .then(|| shaped((d, v, 3), field(|r| r.shear_mpa.as_flattened())))
+                .transpose()?,
+            outside_calibration: flagged.then(|| narrow(share).into()),
+        })
+    }
+
+    /// The archive that [`Self::decode`] reads.
+    fn to_npz(&self) -> Result<Vec<u8>, DatasetError> {
+        let mut npz = NpzBuilder::new();
+        npz.add("pressure_pa", &self.pressure_pa)?;
+        npz.add("sed_dermis_j_per_m3", &self.sed_dermis_j_per_m3)?;
+        npz.add("sed_epidermis_j_per_m3", &self.sed_epidermis_j_per_m3)?;
+        npz.add("depth_mm", &self.depth_mm)?;
+        npz.add("force_n", &self.force_n)?;
+        npz.add("checks", &self.checks)?;
+        if let Some(cells) = &self.cells {
+            let (places, nodes) = (cells.place.as_flattened(), cells.nodes.as_flattened());
+            npz.add_slice("cell_place", &[cells.place.len(), 5], places)?;
+            npz.add_slice("cell_nodes", &[cells.nodes.len(), 9], nodes)?;
+        }
+        if let Some(shear) = &self.shear_pa {
+            npz.add("shear_pa", shear)?;
+        }
+        if let Some(slide) = &self.slide_mm {
+            npz.add("slide_mm", slide)?;
+        }
+        if let Some(share) = &self.outside_calibration {
+            npz.add("outside_calibration", share)?;
+        }
+        Ok(npz.finish()?)
+    }
+
     /// Decodes an archive; `path` is only for messages.
     ///
     /// # Errors
@@ -248,6 +279,19 @@ impl Shard {
     }
 }
 
+fn shaped<T, D: Dimension>(
+    shape: impl Into<StrideShape<D>>,
+    values: Vec<T>,
+) -> Result<Array<T, D>, DatasetError> {
+    let found = values.len();
+    let shape = shape.into();
+    let expected = shape.size();
+    Array::from_shape_vec(shape, values).map_err(|_| {
+        let what = "the values of a dataset's states".into();
+        OutputError::Length { what, found, expected }.into()
+    })
+}
+
 /// Where the corners of a triangle of the atlas lie on the lattice of [`Cells`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleOnLattice {
@@ -277,16 +321,9 @@ pub fn raster_npz(
         npz.add_slice(&format!("{name}_vertex"), &[n, 3], &vertices)?;
         npz.add_slice(&format!("{name}_weight"), &[n, 3], &weights)?;
         let Some(lattice) = lattice else { continue };
-        let of = |p: &Pixel| lattice[p.triangle as usize];
-        let place = |p: &Pixel| -> [f32; 2] {
-            let corners = of(p).place.into_iter().zip(p.weights);
-            let sum = |k: usize| corners.clone().map(|(c, w)| c[k] * f64::from(w)).sum::<f64>();
-            [sum(0) as f32, sum(1) as f32]
-        };
-        let sides: Vec<u32> = raster.pixels().iter().map(|p| of(p).side).collect();
-        let places: Vec<f32> = raster.pixels().iter().flat_map(place).collect();
+        let (sides, places): (Vec<u32>, Vec<[f32; 2]>) = places(&raster, lattice).unzip();
         npz.add_slice(&format!("{name}_side"), &[n], &sides)?;
-        npz.add_slice(&format!("{name}_place"), &[n, 2], &places)?;
+        npz.add_slice(&format!("{name}_place"), &[n, 2], places.as_flattened())?;
     }
     Ok(npz.finish()?)
 }
@@ -329,6 +366,20 @@ mod tests {
         assert!((shard.pressure_pa[[1, 3]] / due - 1.0).abs() <= 0.5f32.powi(11));
         assert_eq!(shard.checks[[0, 4]].to_bits(), records[0].checks.j_min.to_bits());
         assert!(Shard::decode(Path::new("x"), &encoded.bytes, 5).is_err());
+    }
+
+    /// Of linear and graded meshes, with friction and a slide: what is decoded and written again is the
+    /// file, so that datasets stay what they are.
+    #[test]
+    fn shipped_shards_are_written_as_they_are_read() {
+        for name in ["heldout", "heldout-graded", "friction-graded", "sliding-graded"] {
+            let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data").join(name);
+            let dataset = crate::Dataset::open(&data).unwrap();
+            let press = &dataset.manifest().presses[0];
+            let bytes = std::fs::read(dataset.shard_path(press)).unwrap();
+            let shard = dataset.shard(press).unwrap();
+            assert!(shard.to_npz().unwrap() == bytes, "{name}");
+        }
     }
 
     #[test]

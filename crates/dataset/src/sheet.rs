@@ -1,7 +1,7 @@
 //! A contact sheet: pressure and SED of many indentations on one picture.
 
-use super::{Dataset, DatasetError, MapReader, Maps};
-use papilla_atlas::{MAP_LEN, Patch};
+use super::{Dataset, DatasetError, Field, Maps};
+use papilla_atlas::MAP_LEN;
 use papilla_output::atomic;
 use papilla_output::canvas::{BLACK, Canvas, TEXT_HEIGHT_PX};
 use papilla_output::map_image::{MapView, Quantity, white_of};
@@ -43,8 +43,7 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
     for (row, &index) in rows.iter().enumerate() {
         let press = &presses[index];
         let shard = dataset.shard(press)?;
-        let reader = |patch| maps.reader(patch, shard.cells.as_ref());
-        let readers = [reader(Patch::Skin)?, reader(Patch::Interface)?];
+        let of_shard = maps.of(&shard);
         let y = HEAD_PX + row * row_px;
         let lines = [
             format!("press {}", press.id),
@@ -59,40 +58,29 @@ pub fn contact_sheet(dataset: &Dataset, path: &Path) -> Result<(), DatasetError>
         for (pair, sample) in spread(pairs, shard.len()).into_iter().enumerate() {
             let x = LABEL_PX + pair * 2 * (CELL_PX + GAP_PX);
             let depth_mm = shard.depth_mm[sample];
-            let fields = [
-                (Quantity::Pressure, shard.pressure_pa.row(sample).to_vec()),
-                (Quantity::Sed, shard.sed_dermis_j_per_m3.row(sample).to_vec()),
-            ];
-            for (i, (quantity, values)) in fields.iter().enumerate() {
+            let fields = [(Quantity::Pressure, Field::Pressure), (Quantity::Sed, Field::SedDermis)];
+            for (i, (quantity, field)) in fields.into_iter().enumerate() {
                 let corner = (x + i * (CELL_PX + GAP_PX), y);
                 let before = if i == 0 { format!("{depth_mm} mm ") } else { String::new() };
-                cell(&mut canvas, dataset, &readers[i], *quantity, values, corner, &before)?;
+                let mut pixels = vec![0.0; MAP_LEN];
+                of_shard.draw(field, sample, &mut pixels)?;
+                let view = MapView {
+                    quantity,
+                    pixels: &pixels,
+                    mask: maps.raster(field.patch()).mask(),
+                    mm_per_px: f64::from(dataset.atlas().mm_per_px()),
+                    white: white_of(&pixels),
+                };
+                cell(&mut canvas, &view, corner, &before);
             }
         }
     }
     Ok(atomic::write(path, &canvas.encode_png()?)?)
 }
 
-fn cell(
-    canvas: &mut Canvas,
-    dataset: &Dataset,
-    reader: &MapReader<'_>,
-    quantity: Quantity,
-    values: &[f32],
-    (x, y): (usize, usize),
-    before: &str,
-) -> Result<(), DatasetError> {
-    let mut pixels = vec![0.0; MAP_LEN];
-    reader.draw(values, &mut pixels).map_err(|source| DatasetError::Atlas {
-        path: dataset.folder().join("atlas.json"),
-        source,
-    })?;
-    let (mask, mm_per_px) = (reader.mask(), f64::from(dataset.atlas().mm_per_px()));
-    let white = white_of(&pixels);
-    let view = MapView { quantity, pixels: &pixels, mask, mm_per_px, white };
-    canvas.text((x, y), &format!("{before}{}", quantity.label(white)), BLACK);
+fn cell(canvas: &mut Canvas, view: &MapView<'_>, (x, y): (usize, usize), before: &str) {
+    canvas.text((x, y), &format!("{before}{}", view.quantity.label(view.white)), BLACK);
     view.draw(canvas, (x, y + TEXT_HEIGHT_PX + 2), CELL_PX);
-    Ok(())
 }
 
 #[cfg(test)]

@@ -16,6 +16,7 @@
 //!     [geometry]
 //!     kind = "fingertip"
 //!     density = "coarse"
+//!     order = "linear"
 //!     [indenter]
 //!     shape = "sphere"
 //!     radius_mm = 5.0

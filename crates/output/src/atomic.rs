@@ -102,12 +102,15 @@ pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, Outpu
     serde_json::from_slice(&bytes).map_err(|e| OutputError::malformed(path, &e))
 }
 
-/// Creates a folder and its parents.
+/// Creates a folder and its parents, and finds out that files can be made there: whoever works for
+/// hours on what goes into it wants to know before.
 ///
 /// # Errors
 /// [`OutputError::Io`] when the system refuses.
 pub fn create_folder(path: &Path) -> Result<(), OutputError> {
-    std::fs::create_dir_all(path).map_err(OutputError::io("create the folder", path))
+    std::fs::create_dir_all(path).map_err(OutputError::io("create the folder", path))?;
+    let probe = tempfile::Builder::new().prefix(PARTIAL_PREFIX).tempfile_in(path);
+    probe.map(drop).map_err(OutputError::io("make a file in", path))
 }
 
 /// Removes what a killed run left half-written in `folder`.

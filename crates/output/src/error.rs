@@ -1,14 +1,13 @@
 //! What can go wrong when a file is written or read.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A file could not be written or read, or its content does not fit.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The operating system refused.
-    #[error(
-        "cannot {action} {path}: {source} (check that the path exists, is writable and the disk has room)"
-    )]
+    #[error("cannot {action} {path}: {source}{}", cure(source))]
     Io {
         /// What was tried: `read`, `write`, `create the folder`, ...
         action: &'static str,
@@ -55,6 +54,35 @@ pub enum OutputError {
     },
 }
 
+/// What to do about the system's words.
+fn cure(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::NotFound => ": check the path",
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            ": take a folder that you may write to, or change its rights"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => ": make room, or take another disk",
+        ErrorKind::IsADirectory => ": a file is due, not a folder",
+        ErrorKind::NotADirectory | ErrorKind::AlreadyExists => ": a folder is due, not a file",
+        _ => "",
+    }
+}
+
+/// What an error says, with its causes: each once, also where an error's own words tell of it.
+#[must_use]
+pub fn told(error: &(dyn std::error::Error + 'static)) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let words = error.to_string();
+        if !text.contains(&words) {
+            text += &format!(": {words}");
+        }
+        cause = error.source();
+    }
+    text
+}
+
 impl OutputError {
     /// Wraps an I/O error with what was tried and where.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
@@ -65,5 +93,23 @@ impl OutputError {
     /// Says that the file at `path` has the wrong content.
     pub fn malformed(path: &Path, message: &dyn std::fmt::Display) -> Self {
         Self::Malformed { path: path.to_path_buf(), message: message.to_string() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("the campaign fails")]
+    struct Outer(#[from] OutputError);
+
+    #[test]
+    fn every_cause_is_told_once() {
+        let missing = std::io::Error::other("no such thing");
+        let file = OutputError::io("read", Path::new("a.json"))(missing);
+        let own = file.to_string();
+        assert_eq!(told(&file), own);
+        assert_eq!(told(&Outer::from(file)), format!("the campaign fails: {own}"));
     }
 }

@@ -23,4 +23,4 @@ pub mod plot;
 pub mod png_file;
 pub mod vtu;
 
-pub use error::OutputError;
+pub use error::{OutputError, told};

@@ -1,6 +1,7 @@
 //! What each effect of a scene changes and what it costs: the scene solved with each
 //! effect switched off, or on, in turn.
 
+use crate::finger_maps::{FingerMaps, MapError};
 use crate::processor;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::census;
@@ -9,9 +10,20 @@ use papilla_fingertip::scene::{EffectName, Scene, SceneError};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
-use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
+use papilla_fingertip::simulation::record::relative_l2;
 use papilla_solid::tensor::norm;
 use serde::Serialize;
+
+/// Why a study cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum EffectStudyError {
+    /// The scene itself cannot be solved.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Its states have no maps.
+    #[error(transparent)]
+    Maps(#[from] MapError),
+}
 
 /// The last stored state of one solve, and its price.
 #[derive(Clone, Debug, Serialize)]
@@ -30,19 +42,22 @@ pub struct Solved {
     pub pressure_pa_max: f64,
     /// Greatest SED on the dermis side of the interface, J/m3.
     pub sed_j_per_m3_max: f64,
+    /// Pressure and SED: the pixels of their maps, or values at the skin's nodes of a body without
+    /// an atlas.
     #[serde(skip)]
-    last: IncrementRecord,
+    fields: [Vec<f64>; 2],
 }
 
 /// What switching an effect does to the last state, relative to the scene as
 /// it stands.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Change {
-    /// Relative L2 difference of SED over the interface's vertices.
+    /// Relative L2 difference of SED over the pixels of its map; of a body without an atlas over the
+    /// interface's nodes.
     pub sed_l2: f64,
     /// Change of the greatest SED over the greatest SED.
     pub sed_peak: f64,
-    /// Relative L2 difference of pressure over the skin's vertices.
+    /// The same of pressure.
     pub pressure_l2: f64,
     /// Change of the greatest pressure over the greatest pressure.
     pub pressure_peak: f64,
@@ -58,7 +73,7 @@ pub enum Outcome {
     Solved {
         /// The variant.
         state: Box<Solved>,
-        /// Against the scene as it stands; absent where the body's vertices differ.
+        /// Against the scene as it stands; absent where the body's nodes differ.
         change: Option<Change>,
     },
     /// The scene cannot be without it, or have it.
@@ -96,28 +111,29 @@ pub struct Study {
 /// # Errors
 /// [`SceneError`] for one without a path.
 pub fn taken_in(scene: &Scene, seconds: f64) -> Result<Scene, SceneError> {
-    let mut scene = scene.clone();
-    let Some(path) = &mut scene.motion.path else {
-        let rule = "to be taken in other times needs motion.path";
-        return Err(SceneError::Fields { field: "motion", rule });
+    let mut taken = scene.clone();
+    let Some(path) = &mut taken.motion.path else {
+        let rule = "a depth or force has no time to be taken in: give motion.path in its place, such as \
+                    path = [{ time_s = 1.0, depth_mm = 1.0 }]";
+        return Err(SceneError::Fields { field: "motion", rule }.at(scene));
     };
     let end_s = path.last().map_or(1.0, |p| p.time_s);
     path.iter_mut().for_each(|p| p.time_s *= seconds / end_s);
-    scene.validate()?;
-    Ok(scene)
+    taken.validate()?;
+    Ok(taken)
 }
 
 /// Solves `scene` and its variants, those of the effects `only` or of all if that is empty; `visit`
 /// is told of each before.
 ///
 /// # Errors
-/// [`SimulationError`] if the scene itself cannot be solved; variants report theirs in
+/// [`EffectStudyError`] if the scene itself cannot be solved; variants report theirs in
 /// [`Outcome`].
 pub fn run(
     scene: &Scene,
     only: &[EffectName],
     visit: &mut dyn FnMut(&str),
-) -> Result<Study, SimulationError> {
+) -> Result<Study, EffectStudyError> {
     visit("as it stands");
     let base = solve(scene)?;
     let mut switched = Vec::new();
@@ -171,9 +187,10 @@ fn switch(scene: &Scene, effect: &'static str, named: bool) -> (Scene, Vec<&'sta
     (Scene { effects, ..scene.clone() }, along)
 }
 
-fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
+fn solve(scene: &Scene) -> Result<Solved, EffectStudyError> {
     let begun_s = processor::thread_s();
-    let setup = Simulation::new(scene)?;
+    let mut setup = Simulation::new(scene)?;
+    let maps = FingerMaps::new(&mut setup.body)?;
     let mut solver = setup.body.solver(Options::default())?;
     let ready_s = processor::thread_s();
     let (mut effort, mut last) = (Effort::default(), None);
@@ -183,6 +200,10 @@ fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
     })?;
     let solve_s = processor::thread_s() - ready_s;
     let last = last.ok_or(SimulationError::Empty)?;
+    let fields = match &maps {
+        Some(maps) => maps.pressure_and_sed(&last)?,
+        None => [last.pressure_mpa.clone(), last.sed_dermis_mpa.clone()],
+    };
     Ok(Solved {
         unknowns: census(scene, &setup).unknowns,
         setup_s: ready_s - begun_s,
@@ -191,7 +212,7 @@ fn solve(scene: &Scene) -> Result<Solved, SimulationError> {
         force_n: norm(last.force_n),
         pressure_pa_max: PA_PER_MPA * max(&last.pressure_mpa),
         sed_j_per_m3_max: PA_PER_MPA * max(&last.sed_dermis_mpa),
-        last,
+        fields,
     })
 }
 
@@ -200,13 +221,12 @@ fn max(values: &[f64]) -> f64 {
 }
 
 fn change(base: &Solved, other: &Solved) -> Option<Change> {
-    let (a, b) = (&base.last, &other.last);
-    let same = a.pressure_mpa.len() == b.pressure_mpa.len()
-        && a.sed_dermis_mpa.len() == b.sed_dermis_mpa.len();
+    let ([pressure_a, sed_a], [pressure_b, sed_b]) = (&base.fields, &other.fields);
+    let same = pressure_a.len() == pressure_b.len() && sed_a.len() == sed_b.len();
     same.then(|| Change {
-        sed_l2: relative_l2(&b.sed_dermis_mpa, &a.sed_dermis_mpa),
+        sed_l2: relative_l2(sed_b, sed_a),
         sed_peak: other.sed_j_per_m3_max / base.sed_j_per_m3_max - 1.0,
-        pressure_l2: relative_l2(&b.pressure_mpa, &a.pressure_mpa),
+        pressure_l2: relative_l2(pressure_b, pressure_a),
         pressure_peak: other.pressure_pa_max / base.pressure_pa_max - 1.0,
         force: other.force_n / base.force_n - 1.0,
     })

@@ -20,6 +20,7 @@ pub mod acceptance;
 pub mod calculix;
 pub mod convergence;
 pub mod effect_study;
+pub mod finger_maps;
 pub mod part;
 pub mod processor;
 pub mod stability;

@@ -250,6 +250,26 @@ fn the_poses_of_s1_are_those_of_the_shipped_dataset() {
     assert_eq!(shipped.manifest().campaign, campaign, "as this program would write it");
 }
 
+/// What a campaign's file means stays what its shipped dataset was solved from, mesh and all.
+#[test]
+fn shipped_datasets_are_of_their_campaigns() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut seen = 0;
+    for file in std::fs::read_dir(root.join("campaigns")).unwrap() {
+        let file = file.unwrap().path();
+        let data = root.join("data").join(file.file_stem().unwrap());
+        if !data.join("manifest.json").exists() {
+            continue;
+        }
+        let spec = CampaignSpec::read(&file).unwrap();
+        let shipped = Dataset::open(&data).unwrap();
+        let campaign = serde_json::to_value(&spec).unwrap();
+        assert_eq!(shipped.manifest().campaign, campaign, "{}", file.display());
+        seen += 1;
+    }
+    assert!(seen >= 15, "{seen} campaigns");
+}
+
 #[test]
 fn the_manifest_names_the_indenter_of_every_press() {
     let folder = tempfile::tempdir().unwrap();

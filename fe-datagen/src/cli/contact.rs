@@ -1,8 +1,9 @@
 //! `contact`: what the real-time contact solver has to know of the finger.
 
 use anyhow::Context;
+use papilla_atlas::{MAP_LEN, Patch, VertexSampler};
 use papilla_contact::{Arrays, Header, Layer};
-use papilla_dataset::{Dataset, Split};
+use papilla_dataset::{Dataset, Field, Maps, Shard, Split};
 use papilla_fingertip::geometry::fingertip::{FingertipShape, SurfaceParameter};
 use papilla_fingertip::influence::{self, Compliance, Load, SecondOrder};
 use papilla_fingertip::mesh::fingertip::{Density, Order};
@@ -39,23 +40,38 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
+/// A state that loads are taken from: the force on the finger, N, and pressure at the vertices, Pa.
+struct Pressed {
+    force_n: [f64; 3],
+    pressure_pa: Vec<f32>,
+}
+
+/// What is read of the datasets, before anything is computed.
+#[derive(Default)]
+struct Presses {
+    states: Vec<Pressed>,
+    datasets: Vec<String>,
+    depth_max_mm: f32,
+}
+
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (density, order, materials) = (Density::Medium, Order::Linear, TissueTable::default());
     let rest = influence::body(density, order, &materials)?;
+    let (atlas, _) = rest.atlas().context("the finger has no atlas")??;
+    let mut presses = Presses::default();
+    for folder in &args.datasets {
+        let dataset = Dataset::open(folder)?;
+        dataset.atlas().require_hash(atlas.hash()).with_context(|| folder.display().to_string())?;
+        presses.read(&dataset)?;
+    }
+    atomic::create_folder(&args.out)?;
     let vertices = rest.patch.as_ref().map_or(0, |p| p.patch.skin.len());
     let progress = Progress::new("forces", 3 * vertices, 0, false);
     let compliance = influence::compliance(&rest, &mut |done| progress.set_position(done))?;
     drop(progress);
-    let (atlas, _) = rest.atlas().context("the finger has no atlas")??;
-    let skin = atlas.patch(papilla_atlas::Patch::Skin);
-    let (mut loads, mut datasets, mut depth_max_mm) = (Vec::new(), Vec::new(), 0.0f32);
-    for folder in &args.datasets {
-        let dataset = Dataset::open(folder)?;
-        dataset.atlas().require_hash(atlas.hash()).with_context(|| folder.display().to_string())?;
-        let deepest = loads_of(&dataset, &compliance, &mut loads)?;
-        depth_max_mm = depth_max_mm.max(deepest);
-        datasets.push(dataset.manifest().dataset_sha256.clone());
-    }
+    let skin = atlas.patch(Patch::Skin);
+    let mut loads = presses.loads(&compliance);
+    let Presses { datasets, depth_max_mm, .. } = presses;
     add_mirrored(&skin.positions_mm, &mut loads);
     let body = Body::usual(density)?;
     let pairs = args.modes * (args.modes + 1) / 2;
@@ -84,7 +100,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let arrays = arrays(&compliance, second, &skin.positions_mm, atlas.triangles());
     let bytes = arrays.to_bytes(&header)?;
-    atomic::create_folder(&args.out)?;
     let path = args.out.join("finger.contact");
     atomic::write(&path, &bytes)?;
     println!(
@@ -111,32 +126,59 @@ fn layers_below_pad(shape: &FingertipShape, tissues: &TissueTable) -> anyhow::Re
     Ok(tissue.into_iter().zip(bounds.windows(2)).map(layer).collect())
 }
 
-/// Forces of the deepest and of a middle state of each training indentation: pressure times
-/// undeformed area along the recorded force, as large as that. Returns the largest depth, mm.
-fn loads_of(
-    dataset: &Dataset,
-    compliance: &Compliance,
-    loads: &mut Vec<Load>,
-) -> anyhow::Result<f32> {
-    let mut deepest = 0.0f32;
-    for press in dataset.manifest().presses.iter().filter(|p| p.split == Split::Train) {
-        let shard = dataset.shard(press)?;
-        let last = shard.len() - 1;
-        deepest = deepest.max(shard.depth_mm.iter().copied().fold(0.0, f32::max));
-        for state in [last / 2, last] {
-            let force: [f64; 3] = std::array::from_fn(|i| f64::from(shard.force_n[[state, i]]));
-            let size = force.iter().map(|f| f * f).sum::<f64>().sqrt();
-            let pressure = shard.pressure_pa.row(state);
-            let weights = pressure.iter().zip(&compliance.area_mm2).map(|(p, a)| f64::from(p * a));
+impl Presses {
+    /// Adds the deepest and a middle state of each training indentation.
+    fn read(&mut self, dataset: &Dataset) -> anyhow::Result<()> {
+        let maps = Maps::read(dataset.folder(), dataset.atlas())?;
+        let sampler = VertexSampler::new(dataset.atlas(), maps.raster(Patch::Skin));
+        for press in dataset.of_split(Split::Train) {
+            let shard = dataset.shard(press)?;
+            let depths = shard.depth_mm.iter().copied();
+            self.depth_max_mm = depths.fold(self.depth_max_mm, f32::max);
+            let last = shard.len() - 1;
+            for state in [last / 2, last] {
+                let pressure_pa = at_vertices(&shard, state, &maps, &sampler)?;
+                let force_n = std::array::from_fn(|i| f64::from(shard.force_n[[state, i]]));
+                self.states.push(Pressed { force_n, pressure_pa });
+            }
+        }
+        self.datasets.push(dataset.manifest().dataset_sha256.clone());
+        Ok(())
+    }
+
+    /// Their forces: pressure times undeformed area along the recorded force, as large as that.
+    fn loads(&self, compliance: &Compliance) -> Vec<Load> {
+        let mut loads = Vec::new();
+        for Pressed { force_n, pressure_pa } in &self.states {
+            let size = force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+            let areas_mm2 = &compliance.area_mm2;
+            let weights = pressure_pa.iter().zip(areas_mm2).map(|(p, a)| f64::from(p * a));
             let total: f64 = weights.clone().sum();
             if !(size > 0.0 && total > 0.0) {
                 continue;
             }
             let pressed = weights.enumerate().filter(|(_, w)| *w > 0.0);
-            loads.push(pressed.map(|(v, w)| (v as u32, force.map(|f| f * w / total))).collect());
+            loads.push(pressed.map(|(v, w)| (v as u32, force_n.map(|f| f * w / total))).collect());
         }
+        loads
     }
-    Ok(deepest)
+}
+
+/// Pressure of a state at the atlas' vertices, Pa: as stored there, or read off the map.
+fn at_vertices(
+    shard: &Shard,
+    state: usize,
+    maps: &Maps,
+    sampler: &VertexSampler,
+) -> anyhow::Result<Vec<f32>> {
+    if shard.cells.is_none() {
+        return Ok(shard.pressure_pa.row(state).to_vec());
+    }
+    let mut map = vec![0.0; MAP_LEN];
+    maps.of(shard).draw(Field::Pressure, state, &mut map)?;
+    let mut values = vec![0.0; sampler.vertex_count()];
+    sampler.sample(&map, &mut values)?;
+    Ok(values)
 }
 
 /// The finger is its own mirror image in y: so are its loads.

@@ -1,9 +1,9 @@
 //! `explain`: what a scene is going to simulate and cost, before it runs.
 
 use super::{explain_campaign, print};
-use papilla_fingertip::forecast::Forecast;
+use papilla_fingertip::forecast::{Forecast, SedError, better};
 use papilla_fingertip::scene::effects::{EFFECTS, Effect};
-use papilla_fingertip::scene::{Output, Plan, Scene};
+use papilla_fingertip::scene::{Geometry, Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::drive::Drive;
 use serde::Serialize;
@@ -24,6 +24,9 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// How a scene asks for what [`better`] gives.
+pub(super) const BETTER: &str = "with density = \"medium\", order = \"graded\" (the defaults)";
 
 /// An effect that is simulated.
 #[derive(Serialize)]
@@ -60,6 +63,34 @@ struct Explanation {
     /// Mesh, pattern and symbolic factorization, measured; a solve does them too.
     setup_s: f64,
     forecast: Forecast,
+    /// Error of SED at the interface on this mesh, relative L2, and where it was measured; absent for
+    /// what is no fingertip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sed_error: Option<(SedError, &'static str)>,
+    /// The mesh to take instead; absent if this one's SED is good.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    better_mesh: Option<BetterMesh>,
+}
+
+/// A mesh on which SED is known to be good, and what the scene costs there.
+#[derive(Serialize)]
+struct BetterMesh {
+    geometry: Geometry,
+    sed_error: Option<(SedError, &'static str)>,
+    /// On one core.
+    seconds: f64,
+}
+
+impl BetterMesh {
+    /// `None` if the scene's mesh is good, or the scene cannot be meshed so.
+    fn of(scene: &Scene) -> Option<Self> {
+        let geometry = better(&scene.geometry)?;
+        let other = Scene { geometry: geometry.clone(), ..scene.clone() };
+        other.validate().ok()?;
+        let setup = Simulation::new(&other).ok()?;
+        let seconds = Forecast::new(&other, &setup).seconds.total;
+        Some(Self { sed_error: SedError::of(&geometry), geometry, seconds })
+    }
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
@@ -97,6 +128,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         plan: setup.plan,
         setup_s,
         forecast,
+        sed_error: SedError::of(&scene.geometry),
+        better_mesh: BetterMesh::of(&scene),
     };
     print(&explanation, args.json, || human(&explanation))?;
     Ok(ExitCode::SUCCESS)
@@ -188,5 +221,12 @@ fn human(e: &Explanation) -> String {
          solves {:.1}), after {:.1} of set-up",
         s.total, s.assembly, s.factorization, s.linear_solves, e.setup_s
     );
+    if let Some((error, source)) = e.sed_error {
+        text += &format!("\nerror of SED   {} ({source})", error.words());
+    }
+    if let Some(better) = &e.better_mesh {
+        let words = better.sed_error.map_or_else(String::new, |(error, _)| error.words());
+        text += &format!("\n               {BETTER}: {words}, in about {:.1} s", better.seconds);
+    }
     text
 }

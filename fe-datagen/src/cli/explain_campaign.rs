@@ -1,8 +1,9 @@
 //! `explain` of a campaign: what a task of a cluster has to ask for.
 
+use super::explain::BETTER;
 use super::print;
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation, indentations};
-use papilla_fingertip::forecast::Forecast;
+use papilla_fingertip::forecast::{Forecast, SedError};
 use papilla_fingertip::mesh::fingertip::Order;
 use papilla_fingertip::simulation::{Simulation, body::SimulationError};
 use serde::Serialize;
@@ -34,6 +35,8 @@ struct CampaignCost {
     seconds_max: f64,
     core_hours: f64,
     indenters: Vec<IndenterCost>,
+    /// Error of SED at the interface on the campaign's mesh, relative L2, and where it was measured.
+    sed_error: Option<(SedError, &'static str)>,
     /// Those that would fail, of the deepest of each indenter down to the first that would not.
     refused: Vec<Refused>,
 }
@@ -86,6 +89,7 @@ pub(super) fn run(file: &Path, json: bool) -> anyhow::Result<()> {
         seconds_mean: total_s / planned.len().max(1) as f64,
         seconds_max: indenters.iter().map(|i| i.seconds).fold(0.0, f64::max),
         core_hours: total_s / 3600.0,
+        sed_error: spec.candidates().first().and_then(|c| SedError::of(&spec.scene(c).geometry)),
         indenters,
         refused,
     };
@@ -139,5 +143,11 @@ fn human(c: &CampaignCost) -> String {
         c.seconds_mean,
         c.core_hours
     );
+    if let Some((error, source)) = c.sed_error {
+        text += &format!("\nerror of SED: {} ({source})", error.words());
+        if !error.is_small() {
+            text += &format!("; {BETTER} it is small");
+        }
+    }
     text
 }

@@ -9,17 +9,17 @@ use crate::campaign::{
     SliceReport,
 };
 use anyhow::Context as _;
-use papilla_dataset::{BALANCE_RELATIVE_MAX, Cells, Sample, TriangleOnLattice};
+use papilla_dataset::{BALANCE_RELATIVE_MAX, Sample};
 use papilla_fem::solve::{Options, Solver, StepReport};
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation};
 use papilla_fingertip::indenter::IndenterError;
-use papilla_fingertip::mesh::fingertip::{Leaf, Order, Vertices};
+use papilla_fingertip::mesh::fingertip::Order;
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::Approach;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_validation::acceptance;
+use papilla_validation::{acceptance, finger_maps};
 use serde::Serialize;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -107,22 +107,11 @@ impl IndentationSolver for OwnMesh<'_> {
         scene.motion = indentation.motion();
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
         let no_patch = || PressError::Failed("a fingertip has a patch".into());
-        let cells = Arc::new(cells(&body.read_at_nodes().ok_or_else(no_patch)?));
+        let cells = finger_maps::read_at_cells(&mut body).ok_or_else(no_patch)?;
         let mut solver = body.solver(Options::default())?;
         let found = pressed(&body, &mut solver, &approach, indentation, checkpoints)?;
         let on_cells = |sample| Sample { cells: Some(Arc::clone(&cells)), ..sample };
         Ok(found.into_iter().map(on_cells).collect())
-    }
-}
-
-fn cells(vertices: &Vertices) -> Cells {
-    let place = |(leaf, _): &(Leaf, [u32; 9])| {
-        let ([row, column], [rows, columns]) = (leaf.first, leaf.size);
-        [leaf.side as u32, row, column, rows, columns]
-    };
-    Cells {
-        place: vertices.cells.iter().map(place).collect(),
-        nodes: vertices.cells.iter().map(|(_, nodes)| *nodes).collect(),
     }
 }
 
@@ -180,12 +169,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..RunOptions::default()
     };
     let solved = if spec.order == Order::Graded {
-        let vertices = body.patch.as_ref().and_then(|p| p.patch.vertices.as_ref());
-        let corners = vertices.map_or(&[][..], |v| &v.corners).iter();
-        let on = |&(side, place): &_| TriangleOnLattice { side: side as u32, place };
-        let lattice: Vec<TriangleOnLattice> = corners.map(on).collect();
+        let lattice = finger_maps::lattice(&body);
         let solver = || Ok(OwnMesh { spec: &spec, candidates: &candidates });
-        campaign::solve(&spec, (&atlas, Some(&lattice)), solver, &args.out, &options)?
+        campaign::solve(&spec, (&atlas, lattice.as_deref()), solver, &args.out, &options)?
     } else {
         let mut approaches = Vec::new();
         for candidate in &candidates {

@@ -89,7 +89,7 @@ pub fn run() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", papilla_output::told(error.as_ref()));
             ExitCode::FAILURE
         }
     }

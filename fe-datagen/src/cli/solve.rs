@@ -1,27 +1,27 @@
 //! `solve`: one scene, with everything that can be looked at.
 
+mod maps;
+mod press;
+
+use super::explain::BETTER;
+use super::signals::{self, INTERRUPTED};
 use super::{CHECKS_FAILED, print};
-use crate::body_file::write_vtu;
-use anyhow::Context as _;
-use ndarray::Array2;
-use papilla_atlas::{Atlas, MAP_LEN, MAP_SIDE_PX, Patch, Raster};
-use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::contact::ContactRule;
-use papilla_fem::solve::{Effort, Options, Solver, StepReport};
+use papilla_fem::solve::{Effort, Options};
+use papilla_fingertip::forecast::{SedError, better};
 use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
-use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
-use papilla_fingertip::simulation::record::{Checks, IncrementRecord};
-use papilla_output::map_image::{MapView, Quantity, white_of};
-use papilla_output::npz::NpzBuilder;
-use papilla_output::{atomic, vtu};
-use papilla_progress::Progress;
-use papilla_validation::acceptance::fault;
+use papilla_fingertip::simulation::record::Checks;
+use papilla_output::atomic;
+use papilla_validation::acceptance;
+use papilla_validation::finger_maps::FingerMaps;
+use press::{LAST_STATE, Pressed, press};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Solve one scene and write everything that can be looked at.
@@ -29,9 +29,14 @@ use std::time::Instant;
 /// Writes summary.json and what the scene's `outputs` name, by default all: a .vtu
 /// series for ParaView (series.pvd) and, for a fingertip, pressure.png and sed.png
 /// (16-bit gray, with -color twins) of the deepest state and maps.npz of all stored
-/// states; for a section pressure.svg, sed.svg and lines.npz along the skin.
+/// states; for a section pressure.svg, sed.svg and lines.npz along the skin. Maps are
+/// those that a dataset holds of the same states.
 #[derive(clap::Args)]
-#[command(after_help = "Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press")]
+#[command(
+    after_help = "Ctrl-C (or TERM) ends the solve within an iteration: the states that are done are written,\n\
+                  the exit code is 130. A second Ctrl-C leaves at once.\n\
+                  Example: fe-datagen solve scenes/flat-press.toml --out out/flat-press"
+)]
 pub(super) struct Args {
     /// Scene file (see scenes/ and docs/reference/scenes.md).
     scene: PathBuf,
@@ -42,9 +47,6 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
 }
-
-/// Field of the last equilibrium before a solve was given up.
-const LAST_STATE: &str = "last-state.vtu";
 
 /// One stored equilibrium in `summary.json`.
 #[derive(Serialize)]
@@ -88,25 +90,34 @@ struct Summary {
     setup_s: f64,
     solve_s: f64,
     effort: Effort,
+    /// Error of SED at the interface on this mesh, relative L2, and where it was measured; absent for
+    /// what is no fingertip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sed_error: Option<(SedError, &'static str)>,
+    /// True if it was told to end before its last state.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    stopped: bool,
     increments: Vec<Increment>,
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let stop = signals::interrupt()?;
     let scene = Scene::read(&args.scene)?;
     let clock = Instant::now();
-    let setup = Simulation::new(&scene)?;
-    let body = &setup.body;
+    let mut setup = Simulation::new(&scene)?;
+    let maps = FingerMaps::new(&mut setup.body)?;
     let mapped = scene.writes(Output::Maps) || scene.writes(Output::Pictures);
-    let atlas = if mapped { body.atlas().transpose()?.map(|(atlas, _)| atlas) } else { None };
+    let body = &setup.body;
     let mut solver = body.solver(Options::default())?;
+    solver.stop_when(Some(Arc::clone(&stop)));
     let setup_s = clock.elapsed().as_secs_f64();
     atomic::create_folder(&args.out)?;
     let clock = Instant::now();
-    let (pressed, solved) =
-        press(&setup, &mut solver, scene.writes(Output::Fields).then_some(&args.out), args.json)?;
+    let fields = scene.writes(Output::Fields).then_some(&args.out);
+    let (pressed, solved) = press(&setup, &mut solver, &stop, fields, args.json)?;
     let records: Vec<_> = pressed.iter().map(|p| p.record.clone()).collect();
-    if let Some(atlas) = &atlas {
-        write_maps(&args.out, &scene, atlas, &records)?;
+    if let (Some(maps), true) = (&maps, mapped) {
+        maps::write(&args.out, &scene, maps, &records)?;
     } else if body.plane {
         super::lines::write(&args.out, &scene, &setup, &records)?;
     }
@@ -115,14 +126,19 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         unknowns: body.problem.system.dofs.count,
         elements: body.problem.mesh.element_count(),
         factor_entries: body.problem.system.factor_entries(),
-        atlas_hash: atlas.as_ref().map(|a| a.hash().to_owned()),
+        atlas_hash: maps.as_ref().filter(|_| mapped).map(|m| m.atlas.hash().to_owned()),
         setup_s,
         solve_s: clock.elapsed().as_secs_f64(),
         effort: pressed.iter().fold(Effort::default(), |sum, p| sum.plus(&p.report.effort)),
-        increments: pressed.iter().map(increment).collect(),
+        sed_error: SedError::of(&scene.geometry),
+        stopped: matches!(solved, Err(SimulationError::Halted)),
+        increments: pressed.iter().map(|p| increment(p, maps.as_ref())).collect(),
         scene,
     };
     atomic::write_json(&args.out.join("summary.json"), &summary)?;
+    if summary.stopped {
+        return stopped(&summary, setup.drive.len(), args);
+    }
     if solved.is_err() && summary.scene.writes(Output::Fields) {
         eprintln!("{} shows the last equilibrium", args.out.join(LAST_STATE).display());
     }
@@ -132,59 +148,20 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if clean { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })
 }
 
-/// A stored equilibrium.
-struct Pressed {
-    record: IncrementRecord,
-    report: StepReport,
-    /// Greatest pressure on the contact surface, MPa.
-    pressure_mpa_max: f64,
+/// Says what is kept of a solve that was told to end.
+fn stopped(summary: &Summary, states: usize, args: &Args) -> anyhow::Result<ExitCode> {
+    let kept = summary.increments.len();
+    if kept > 0 {
+        print(summary, args.json, || human(summary, &args.out))?;
+    }
+    let out = args.out.display();
+    eprintln!("stopped: {kept} of {states} states are done and written to {out}");
+    Ok(ExitCode::from(INTERRUPTED))
 }
 
-/// Presses and writes the fields of every stored equilibrium into `out`, if given; those
-/// before an error are kept.
-fn press(
-    setup: &Simulation,
-    solver: &mut Solver<'_>,
-    out: Option<&PathBuf>,
-    quiet: bool,
-) -> anyhow::Result<(Vec<Pressed>, Result<(), SimulationError>)> {
-    let Simulation { body, approach, drive, .. } = setup;
-    let progress = Progress::new("states", drive.len(), 0, quiet);
-    let (mut written, mut worst) = (Ok(()), 0.0f64);
-    let file = |state: usize| format!("state-{state:03}.vtu");
-    let keep =
-        &mut |state: usize, s: &Solver<'_>, record: &IncrementRecord, report: &StepReport| {
-            if let (Some(out), true) = (out, written.is_ok()) {
-                written = write_vtu(&out.join(file(state)), body, s);
-            }
-            progress.set_position(state + 1);
-            progress.set_message(format!("{:.3} mm deep", record.depth_mm));
-            worst = if state == 0 { 0.0 } else { worst }.max(record.checks.energy_vs_work);
-            if state + 1 == drive.len() && worst > BALANCE_RELATIVE_MAX {
-                progress.set_position(0);
-                progress.set_message("energy and work part: taken again in smaller steps");
-            }
-            let surface = &body.problem.mesh.surfaces[&body.contact];
-            let pressure_mpa_max = s.pressure_mpa(surface).into_iter().fold(0.0, f64::max);
-            Pressed { record: record.clone(), report: *report, pressure_mpa_max }
-        };
-    let Balanced { kept: pressed, pressed: solved, .. } =
-        body.press_balanced(solver, approach, drive, BALANCE_RELATIVE_MAX, keep);
-    drop(progress);
-    if let (Err(_), Some(out), true) = (&solved, out, written.is_ok()) {
-        written = write_vtu(&out.join(LAST_STATE), body, solver);
-    }
-    written?;
-    let place = |r: &IncrementRecord| if drive.is_timed() { r.time_s } else { r.depth_mm };
-    let series: Vec<_> =
-        pressed.iter().enumerate().map(|(i, p)| (place(&p.record), file(i))).collect();
-    if let Some(out) = out {
-        vtu::write_pvd(&out.join("series.pvd"), &series)?;
-    }
-    Ok((pressed, solved))
-}
-
-fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Increment {
+fn increment(pressed: &Pressed, maps: Option<&FingerMaps>) -> Increment {
+    let Pressed { record, report, pressure_mpa_max } = pressed;
+    let own = || acceptance::fault(record, record.pressure_mpa.len());
     let max = |v: &[f64]| {
         let largest = PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
         (!v.is_empty()).then_some(largest)
@@ -203,81 +180,8 @@ fn increment(Pressed { record, report, pressure_mpa_max }: &Pressed) -> Incremen
         condition_at_least: Some(report.condition_at_least).filter(|c| c.is_finite()),
         effort: report.effort,
         seconds: record.seconds,
-        fault: fault(record, record.pressure_mpa.len()),
+        fault: maps.map_or_else(own, |maps| maps.fault(record)),
     }
-}
-
-/// Images of the deepest state and arrays of all.
-fn write_maps(
-    folder: &Path,
-    scene: &Scene,
-    atlas: &Atlas,
-    records: &[IncrementRecord],
-) -> anyhow::Result<()> {
-    let Some(deepest) = records.last() else { return Ok(()) };
-    let scaled = |v: &[f64]| -> Vec<f32> { v.iter().map(|x| (x * PA_PER_MPA) as f32).collect() };
-    let fields = [
-        (Quantity::Pressure, Patch::Skin, "pressure", &deepest.pressure_mpa),
-        (Quantity::Sed, Patch::Interface, "sed", &deepest.sed_dermis_mpa),
-    ];
-    let mut npz = NpzBuilder::new();
-    for (quantity, patch, stem, values) in fields {
-        let raster = Raster::new(atlas, patch);
-        let mut pixels = vec![0.0; MAP_LEN];
-        raster.rasterise(&scaled(values), &mut pixels)?;
-        let view = MapView {
-            quantity,
-            pixels: &pixels,
-            mask: raster.mask(),
-            mm_per_px: f64::from(atlas.mm_per_px()),
-            white: white_of(&pixels),
-        };
-        if scene.writes(Output::Pictures) {
-            view.write(folder, stem)?;
-        }
-        npz.add_slice(&format!("{stem}_map"), &[MAP_SIDE_PX, MAP_SIDE_PX], &pixels)?;
-    }
-    if !scene.writes(Output::Maps) {
-        return Ok(());
-    }
-    let columns = deepest.pressure_mpa.len();
-    let all = |get: fn(&IncrementRecord) -> &Vec<f64>| {
-        let flat: Vec<f32> = records.iter().flat_map(|r| scaled(get(r))).collect();
-        Array2::from_shape_vec((records.len(), columns), flat).context("one value a vertex")
-    };
-    npz.add("pressure_pa", &all(|r| &r.pressure_mpa)?)?;
-    npz.add("sed_dermis_j_per_m3", &all(|r| &r.sed_dermis_mpa)?)?;
-    npz.add("sed_epidermis_j_per_m3", &all(|r| &r.sed_epidermis_mpa)?)?;
-    if !deepest.shear_mpa.is_empty() {
-        write_shear(&mut npz, atlas, records)?;
-    }
-    let depths: Vec<f32> = records.iter().map(|r| r.depth_mm as f32).collect();
-    npz.add_slice("depth_mm", &[depths.len()], &depths)?;
-    npz.write(&folder.join("maps.npz"))?;
-    atomic::write(&folder.join("atlas.json"), atlas.to_json()?.as_bytes())?;
-    Ok(())
-}
-
-/// Shear traction of all states at the vertices, and of the deepest as three maps.
-fn write_shear(
-    npz: &mut NpzBuilder,
-    atlas: &Atlas,
-    records: &[IncrementRecord],
-) -> anyhow::Result<()> {
-    let pa = |v: &f64| (v * PA_PER_MPA) as f32;
-    let shear =
-        |r: &IncrementRecord| -> Vec<f32> { r.shear_mpa.as_flattened().iter().map(pa).collect() };
-    let all: Vec<f32> = records.iter().flat_map(shear).collect();
-    npz.add_slice("shear_pa", &[records.len(), atlas.vertex_count(), 3], &all)?;
-    let raster = Raster::new(atlas, Patch::Skin);
-    let mut maps = vec![0.0; 3 * MAP_LEN];
-    let deepest = records.last().map(shear).unwrap_or_default();
-    for (i, map) in maps.chunks_exact_mut(MAP_LEN).enumerate() {
-        let component: Vec<f32> = deepest.iter().skip(i).step_by(3).copied().collect();
-        raster.rasterise(&component, map)?;
-    }
-    npz.add_slice("shear_map", &[3, MAP_SIDE_PX, MAP_SIDE_PX], &maps)?;
-    Ok(())
 }
 
 fn human(s: &Summary, out: &Path) -> String {
@@ -314,6 +218,13 @@ fn human(s: &Summary, out: &Path) -> String {
             let percent = 100.0 * i.outside_calibration;
             text += &format!("         {percent:.2} % of the volume beyond calibrated stretches\n");
         }
+    }
+    if let Some((error, source)) = s.sed_error {
+        text += &format!("error of SED on this mesh: {} ({source})", error.words());
+        if better(&s.scene.geometry).is_some() {
+            text += &format!("; {BETTER} it is small: `fe-datagen explain` says at which price");
+        }
+        text += "\n";
     }
     text + &format!("written to {}", out.display())
 }

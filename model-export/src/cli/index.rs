@@ -18,7 +18,14 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
-    let atlas = load_atlas(&options.folder.join("atlas.json"))?;
+    let path = options.folder.join("atlas.json");
+    if !path.exists() {
+        bail!(
+            "{} is not there: copy the atlas.json of the dataset that the models were trained on",
+            path.display()
+        );
+    }
+    let atlas = load_atlas(&path)?;
     let mut models = names(&options.folder)?;
     // From small to large: the order in which they are offered.
     models.sort_by_key(|(bytes, name)| (*bytes, name.clone()));

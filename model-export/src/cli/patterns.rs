@@ -30,9 +30,17 @@ struct Row {
 }
 
 pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
+    let index = options.folder.join("index.json");
+    if !index.exists() {
+        let folder = options.folder.display();
+        bail!(
+            "{} is not there: `model-export index {folder} --default NAME` writes it",
+            index.display()
+        );
+    }
+    let index = Index::from_json(&read_text(&index)?)?;
     let seen =
         options.datasets.iter().map(|path| look(path, json)).collect::<Result<Vec<_>, _>>()?;
-    let index = Index::from_json(&read_text(&options.folder.join("index.json"))?)?;
     let mut rows = Vec::new();
     for name in &index.models {
         let path = options.folder.join(format!("{name}.json"));

@@ -24,6 +24,7 @@ pub(crate) const SCENE: &str = r#"
 [geometry]
 kind = "fingertip"
 density = "coarse"
+order = "linear"
 
 [motion]
 depth_mm = 0.4

@@ -151,8 +151,10 @@ fn a_shipped_press_can_be_solved_again() {
     let dataset = dataset();
     let indentation = held_out(&dataset)[0];
     let shard = dataset.shard(indentation).unwrap();
-    // The campaign's mesh and plate are those of this scene; the pose is the indentation's.
+    // The campaign's plate is this scene's; mesh and pose are the indentation's.
     let mut scene = Scene::read(&folder("scenes").join("flat-press.toml")).unwrap();
+    scene.geometry =
+        toml::from_str("kind = \"fingertip\"\ndensity = \"medium\"\norder = \"linear\"").unwrap();
     scene.motion.pitch_deg = indentation.pose.pitch_deg;
     scene.motion.roll_deg = indentation.pose.roll_deg;
     scene.motion.yaw_deg = indentation.pose.yaw_deg;

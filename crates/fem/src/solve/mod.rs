@@ -151,6 +151,9 @@ pub enum StepError {
     /// Energy or force is not a finite number.
     #[error("energy or force is not finite")]
     NotFinite,
+    /// See [`Solver::stop_when`].
+    #[error("stopped from outside")]
+    Stopped,
 }
 
 /// Why a solve was given up.
@@ -175,6 +178,12 @@ pub enum SolveError {
         reached: f64,
         /// Steps done.
         steps: u32,
+    },
+    /// Whoever watches the solve wants no more of it, see [`Solver::stop_when`].
+    #[error("stopped from outside at load fraction {reached:.6}")]
+    Stopped {
+        /// Last load fraction in equilibrium.
+        reached: f64,
     },
     /// The factor does not fit in memory.
     #[error(transparent)]

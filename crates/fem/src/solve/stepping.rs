@@ -11,6 +11,8 @@ use super::work::Work;
 use super::{Options, SolveError, StepError, fluid, friction, mixed};
 use crate::contact::{FrictionPoint, FrictionTrial};
 use crate::element::HistoryVariables;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Solves one loading of a [`Problem`]; re-usable for the next.
 pub struct Solver<'a> {
@@ -42,6 +44,18 @@ impl<'a> Solver<'a> {
         };
         solver.start(Loading::default());
         Ok(solver)
+    }
+
+    /// From now on every search for an equilibrium ends with [`SolveError::Stopped`] once `stop` is
+    /// true, within an iteration of Newton's method.
+    pub fn stop_when(&mut self, stop: Option<Arc<AtomicBool>>) {
+        self.newton.stop = stop;
+    }
+
+    /// What [`Self::stop_when`] was told.
+    #[must_use]
+    pub fn stops_when(&self) -> Option<Arc<AtomicBool>> {
+        self.newton.stop.clone()
     }
 
     /// Puts the body at rest and takes a new loading.
@@ -106,6 +120,9 @@ impl<'a> Solver<'a> {
         let found = self.steps_to(target);
         let report = self.report(&first);
         let StepReport { load_fraction, j_min, condition_at_least, effort, .. } = report;
+        if let Err(error @ SolveError::Stopped { .. }) = found {
+            return Err(error);
+        }
         if let Err(error) = found {
             let [block, element] = report.j_min_at;
             tracing::warn!(
@@ -184,6 +201,7 @@ impl<'a> Solver<'a> {
                     self.newton.effort.steps += 1;
                     step = self.within_time_step(1.5 * step);
                 }
+                Err(StepError::Stopped) => return Err(SolveError::Stopped { reached }),
                 Err(cause) => {
                     cuts += 1;
                     self.newton.effort.cuts += 1;

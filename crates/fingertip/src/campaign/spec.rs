@@ -89,10 +89,12 @@ pub struct CampaignSpec {
     pub depths: Option<DepthRange>,
     /// Share of the indentations that is held out, 0 to less than 1.
     pub test_fraction: f64,
-    /// Density of the mesh.
+    /// Density of the mesh; medium if not given.
+    #[serde(default)]
     pub density: Density,
-    /// Elements and layout of the mesh, as in a scene's geometry.
-    #[serde(default, skip_serializing_if = "is_default")]
+    /// Elements and layout of the mesh, as in a scene's geometry: graded if a campaign's file does not
+    /// say. Manifests do not name it where it is linear.
+    #[serde(default, skip_serializing_if = "Order::is_linear")]
     pub order: Order,
     /// Effects, as in a scene.
     #[serde(default = "usual")]

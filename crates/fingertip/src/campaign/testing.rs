@@ -18,7 +18,7 @@ pub fn spec() -> CampaignSpec {
         depths: None,
         test_fraction: 0.3,
         density: Density::Coarse,
-        order: Order::default(),
+        order: Order::Linear,
         effects: usual(),
         materials: TissueTable::default(),
         friction: Friction::default(),

@@ -10,10 +10,12 @@
 mod assembly;
 mod census;
 mod machine;
+mod sed_error;
 mod work;
 
 pub use census::census;
 pub use machine::Machine;
+pub use sed_error::{SedError, better};
 pub use work::Work;
 
 use crate::scene::{Census, Scene};

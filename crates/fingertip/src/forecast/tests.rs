@@ -5,7 +5,7 @@ use papilla_fem::solve::{Options, Solver, StepReport};
 use std::path::Path;
 
 /// A coarse finger pressed so that every effect which it can have is possible.
-const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n\
+const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"linear\"\n\
     [friction]\ncoefficient = 0.3\n[motion]\n\
     path = [{ time_s = 0.1, depth_mm = 0.05 }]\n";
 
@@ -17,7 +17,7 @@ fn finger(effects: &[&str]) -> Scene {
     let named: Vec<_> = effects.iter().map(|e| format!("\"{e}\"")).collect();
     let mut text = format!("effects = [{}]\n{FINGER}", named.join(", "));
     if effects.contains(&"biphasic") {
-        text = text.replace("\"coarse\"", "\"coarse\"\norder = \"quadratic\"") + WATER;
+        text = text.replace("linear", "quadratic") + WATER;
     }
     Scene::parse(Path::new("finger.toml"), text).unwrap()
 }

@@ -7,6 +7,8 @@
 //! come last. Soft tissue has the same nodes and elements, in the same order,
 //! whatever else is solid.
 
+mod blame;
+
 use super::extrude::Cells;
 use super::grading::{Closeness, Contact, Spacing};
 use super::half_cube::{Grid, GridSize, MEDIUM};
@@ -21,16 +23,19 @@ use papilla_fem::mesh::Mesh;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub(crate) use blame::blame;
+
 pub use super::leaves::Leaf;
 pub use super::patch::{Patch, Vertices};
 
 /// Named mesh densities.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Density {
     /// About 12 thousand unknowns: for tests and a first look.
     Coarse,
     /// About 54 thousand unknowns: the campaigns' density.
+    #[default]
     Medium,
     /// About 185 thousand unknowns: the reference.
     Fine,
@@ -41,16 +46,22 @@ pub enum Density {
 #[serde(rename_all = "snake_case")]
 pub enum Order {
     /// `Hex8` with mean dilatation.
-    #[default]
     Linear,
     /// `Hex27` on the same nodes: a quarter of the cells on the skin.
     Quadratic,
     /// `Hex27` in layers that are thin beside the interface, cells split where the indenter
     /// touches: for SED that a finer mesh changes less.
+    #[default]
     Graded,
 }
 
 impl Order {
+    /// Whether it is [`Order::Linear`].
+    #[must_use]
+    pub const fn is_linear(&self) -> bool {
+        matches!(self, Self::Linear)
+    }
+
     /// Lattice intervals along an edge of an element.
     const fn step(self) -> u32 {
         match self {

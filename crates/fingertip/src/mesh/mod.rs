@@ -8,7 +8,6 @@ mod leaves;
 mod mirror;
 mod nail;
 mod patch;
-#[cfg(test)]
 mod quality;
 mod refined;
 pub mod section;

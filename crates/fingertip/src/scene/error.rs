@@ -50,7 +50,7 @@ pub enum SceneError {
         rule: &'static str,
     },
     /// An effect that the scene cannot have.
-    #[error("effect '{effect}' {why}")]
+    #[error("effect '{effect}': {why}")]
     Effect {
         /// The effect.
         effect: &'static str,
@@ -106,6 +106,13 @@ impl SceneError {
             Self::Located(e) => e.error.field(),
             _ => None,
         }
+    }
+
+    /// The same with the line of `scene` that is to blame, if there is one.
+    #[must_use]
+    pub fn at(self, scene: &super::Scene) -> Self {
+        let place = self.field().and_then(|field| scene.place(&field));
+        self.with(place)
     }
 
     /// The same with a place.

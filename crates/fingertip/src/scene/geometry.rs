@@ -16,9 +16,10 @@ use std::path::PathBuf;
 pub enum Geometry {
     /// The fingertip.
     Fingertip {
-        /// Mesh density.
+        /// Mesh density; medium if not given.
+        #[serde(default)]
         density: Density,
-        /// Element order.
+        /// Elements and layout of the mesh; graded if not given.
         #[serde(default)]
         order: Order,
         /// Dimensions that differ from the default.
@@ -28,9 +29,10 @@ pub enum Geometry {
     /// The fingertip's cross-section, for the effect `plane_strain`. Forces and
     /// energies are per mm of length.
     Section {
-        /// Mesh density.
+        /// Mesh density; medium if not given.
+        #[serde(default)]
         density: Density,
-        /// Element order: `Quad4` or `Quad9`.
+        /// Element order: `Quad4` or `Quad9`, the default.
         #[serde(default = "quadratic")]
         order: Order,
         /// Half of it, for symmetric indentations, or the whole.
@@ -48,8 +50,8 @@ pub enum Geometry {
         elements: [usize; 2],
         /// Layers from the pressed side.
         layers: Vec<Layer>,
-        /// Element order.
-        #[serde(default)]
+        /// Element order: `Hex8`, the default, or `Hex27`.
+        #[serde(default = "linear")]
         order: Order,
     },
     /// A Gmsh 4.1 file with physical groups: volumes named by tissue, surfaces
@@ -66,6 +68,10 @@ pub enum Geometry {
 
 fn quadratic() -> Order {
     Order::Quadratic
+}
+
+fn linear() -> Order {
+    Order::Linear
 }
 
 /// One layer of a block.

@@ -156,7 +156,7 @@ fn what_is_no_scene_names_line_and_cure() {
         (finger("fingertip", "foot"), 2, &["geometry.kind", "`block`"]),
         (finger("depth_mm", "depth"), 5, &["motion.depth", "did you mean `depth_mm`"]),
         (finger("density", "dense"), 3, &["geometry.dense", "`density`"]),
-        (finger("density = \"coarse\"", ""), 1, &["missing field `density`", "add it"]),
+        (BLOCK.replace("elements = [4, 4]\n", ""), 1, &["missing field `elements`", "add it"]),
         (finger("= 1.0", "= \"1 mm\""), 5, &["motion.depth_mm", "bare number"]),
         (finger("= 1.0", "= 1.0 mm"), 5, &["expected"]),
         (

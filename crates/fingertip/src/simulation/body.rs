@@ -99,7 +99,7 @@ pub enum SimulationError {
         reached_n: f64,
     },
     /// Whoever watches the indentation wants no more of it now.
-    #[error("stopped at a stored state, to be gone on with")]
+    #[error("stopped from outside, to be gone on with from its last stored state")]
     Halted,
     /// The indentation cannot go on from what was stored of it.
     #[error(transparent)]
@@ -136,6 +136,14 @@ impl SimulationError {
             }
             Self::Located(e) => e.error.field(),
             _ => None,
+        }
+    }
+
+    /// Why there is no equilibrium at a depth.
+    pub(super) fn at_depth(depth_mm: f64, source: SolveError) -> Self {
+        match source {
+            SolveError::Stopped { .. } => Self::Halted,
+            source => Self::Solve { depth_mm, source },
         }
     }
 

@@ -11,6 +11,7 @@ use papilla_fem::solve::{Effort, Loading, Snapshot, Solver, StepReport};
 use papilla_sdf::{IndenterSpec, Plate, RoundedPlate, SignedDistance};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// A rigid indenter in its pose, about to touch.
@@ -185,7 +186,7 @@ impl Body {
         });
         match drive {
             Drive::Depths(depths) => {
-                let guided = self.guided(approach, drive)?;
+                let guided = self.guided(approach, drive, solver.stops_when())?;
                 self.to_depths(solver, guided, depths, course, visit)
             }
             Drive::Forces(forces) => self.to_forces(solver, forces, visit),
@@ -201,12 +202,13 @@ impl Body {
         &self,
         approach: &Approach,
         drive: &Drive,
+        stop: Option<Arc<AtomicBool>>,
     ) -> Result<Option<Guided<'_>>, SimulationError> {
         let depends = approach.friction > 0.0
             || self.problem.history_layout.is_some()
             || self.problem.fluid.is_some();
         let Some(guide) = self.guide.as_ref().filter(|_| !depends) else { return Ok(None) };
-        Guided::new(guide, guide.body.indenter(approach, drive)?).map(Some)
+        Guided::new(guide, guide.body.indenter(approach, drive)?, stop).map(Some)
     }
 
     fn to_depths(
@@ -264,7 +266,7 @@ impl Body {
         for p in points {
             let clock = Instant::now();
             solver.turn();
-            let at = |source| SimulationError::Solve { depth_mm: p.depth_mm, source };
+            let at = |source| SimulationError::at_depth(p.depth_mm, source);
             // An indenter that rests does no work.
             let rests = *p == DrivePoint { time_s: p.time_s, ..from };
             let parts = if rests { 1 } else { (from.steps_to(p, friction) * refinement) as usize };
@@ -312,7 +314,7 @@ impl Body {
                 let mark = solver.mark();
                 let report = solver
                     .advance_to(next)
-                    .map_err(|source| SimulationError::Solve { depth_mm, source })?;
+                    .map_err(|source| SimulationError::at_depth(depth_mm, source))?;
                 effort = effort.plus(&report.effort);
                 let force = solver.force_along_path_n();
                 if (force - wanted).abs() <= FORCE_TOLERANCE * wanted {

@@ -3,11 +3,19 @@
 use super::body::{Body, Guide, SimulationError};
 use super::laws::solids;
 use crate::geometry::fingertip::FingertipShape;
-use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, build, build_guide};
+use crate::mesh::fingertip::{Density, FingertipMesh, Order, Parts, blame, build, build_guide};
 use crate::mesh::grading::Contact;
 use crate::scene::{Plan, TissueTable};
 use papilla_fem::mesh::Mesh;
-use papilla_fem::solve::Materials;
+use papilla_fem::solve::{Materials, ProblemError};
+
+/// An element that is inside out is the fault of the finger's dimensions.
+fn of_shape(error: SimulationError, shape: &FingertipShape, parts: Parts) -> SimulationError {
+    match error {
+        SimulationError::Problem(ProblemError::Shape { .. }) => blame(shape, parts).into(),
+        error => error,
+    }
+}
 
 impl Body {
     /// Meshes a fingertip and holds what carries it.
@@ -38,7 +46,8 @@ impl Body {
         let body = |mesh: FingertipMesh, materials, guide| {
             let FingertipMesh { mesh, patch, .. } = mesh;
             let fixed = Self::held(&mesh, parts);
-            let body = Self::with_patch(mesh, materials, fixed, patch, false)?;
+            let body = Self::with_patch(mesh, materials, fixed, patch, false)
+                .map_err(|error| of_shape(error, shape, parts))?;
             let (graded, first_touch) = (order == Order::Graded, contact.cloned());
             Ok::<_, SimulationError>(Self { graded, first_touch, guide, ..body })
         };
@@ -66,8 +75,8 @@ impl Body {
         fixed
     }
 
-    /// The default finger with the surface-pressure study's analysis: neo-Hookean layers, rigid
-    /// bone and nail.
+    /// The default finger on an even mesh with the surface-pressure study's analysis: neo-Hookean
+    /// layers, rigid bone and nail.
     ///
     /// # Errors
     /// [`SimulationError`] if it cannot be set up.
@@ -75,6 +84,6 @@ impl Body {
         let plan = Plan::usual();
         let materials = solids(&TissueTable::default(), &plan)?;
         let shape = FingertipShape::default();
-        Self::fingertip(&shape, materials, density, Order::default(), plan.parts, None)
+        Self::fingertip(&shape, materials, density, Order::Linear, plan.parts, None)
     }
 }

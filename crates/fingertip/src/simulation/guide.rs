@@ -7,6 +7,8 @@
 use super::body::{Guide, SimulationError};
 use crate::mesh::Transfer;
 use papilla_fem::solve::{Effort, Guess, Loading, MovingIndenter, Options, Solver};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// A guide on its way.
 pub(super) struct Guided<'a> {
@@ -20,8 +22,13 @@ pub(super) struct Guided<'a> {
 
 impl<'a> Guided<'a> {
     /// About to press.
-    pub(super) fn new(guide: &'a Guide, indenter: MovingIndenter) -> Result<Self, SimulationError> {
+    pub(super) fn new(
+        guide: &'a Guide,
+        indenter: MovingIndenter,
+        stop: Option<Arc<AtomicBool>>,
+    ) -> Result<Self, SimulationError> {
         let mut solver = guide.body.solver(Options::default())?;
+        solver.stop_when(stop);
         solver.start(Loading { indenter: Some(indenter), ..Loading::default() });
         let transfer = &guide.transfer;
         let at_rest = on_own_mesh(&solver, transfer);

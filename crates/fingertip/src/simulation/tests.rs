@@ -251,18 +251,18 @@ fn a_coarse_path_is_taken_again_in_smaller_steps() {
 
 #[test]
 fn what_only_meshing_finds_names_its_line_too() {
-    const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n[motion]\n\
-                          depth_mm = 1.0\nincrements = 4\n";
+    const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"linear\"\n\
+                          [motion]\ndepth_mm = 1.0\nincrements = 4\n";
     let cases = [
         (
             format!(
                 "effects = [\"elastic_bone\"]\n{FINGER}[geometry.shape]\nbone_cortex_mm = 3.0\n"
             ),
-            9,
+            10,
         ),
         (
             FINGER.replace(
-                "kind = \"fingertip\"\ndensity = \"coarse\"",
+                "kind = \"fingertip\"\ndensity = \"coarse\"\norder = \"linear\"",
                 "kind = \"mesh\"\nfile = \"none.msh\"\nfixed = []\ncontact = \"skin\"",
             ),
             3,

@@ -35,7 +35,7 @@ impl Way<'_> {
     /// Goes from the depth before to that of number `i`.
     fn to_state(&self, solver: &mut Solver<'_>, i: usize) -> Result<StepReport, SimulationError> {
         let depth_mm = self.depths_mm[i];
-        let at = |source| SimulationError::Solve { depth_mm, source };
+        let at = |source| SimulationError::at_depth(depth_mm, source);
         let mut effort = Effort::default();
         let mut known: Vec<_> = self.mark(solver).into_iter().collect();
         for between in path_mm(self.depths_mm, i, self.refinement, self.graded) {

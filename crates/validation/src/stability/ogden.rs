@@ -257,6 +257,7 @@ fn people(suite: &Suite) -> Result<Vec<Line>, CaseError> {
             [geometry]
             kind = \"fingertip\"
             density = \"coarse\"
+            order = \"linear\"
             [indenter]
             shape = \"plate\"
             size_mm = [30.0, 30.0]

@@ -4,7 +4,7 @@ use super::lab::scene;
 use super::{Line, Suite};
 use crate::verify::CaseError;
 
-const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\n";
+const FINGER: &str = "[geometry]\nkind = \"fingertip\"\ndensity = \"coarse\"\norder = \"linear\"\n";
 
 pub(super) fn run(_: &Suite) -> Result<Vec<Line>, CaseError> {
     let with = |rest: &str| format!("{FINGER}[motion]\ndepth_mm = 1.0\n{rest}");

@@ -17,6 +17,8 @@ use crate::biphasic::Flow;
 use crate::contact::{ContactRule, FrictionTrial};
 use crate::element::{Dilatation, HistoryVariables};
 use crate::linear::{CgWorkspace, DofMap, FactorMemory, NumericFactor, SymmetricMatrix};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// What stays fixed while an equilibrium is sought.
@@ -75,6 +77,8 @@ pub(super) struct Newton<'a> {
     pub effort: Effort,
     /// A search ends where more indefinite factorizations than this have been counted.
     pub indefinite_end: u32,
+    /// A search ends once this is true.
+    pub stop: Option<Arc<AtomicBool>>,
     held: Held,
     tangent: SymmetricMatrix,
     /// Renew the factor at the next linear solve.
@@ -110,6 +114,7 @@ impl<'a> Newton<'a> {
             rounding_force_n: 1e-13 * force_scale_n(problem),
             effort: Effort::default(),
             indefinite_end: u32::MAX,
+            stop: None,
             held: Held::Memory(memory),
             tangent: problem.system.zeros(),
             stale: true,
@@ -236,6 +241,9 @@ impl<'a> Newton<'a> {
         independent: &[Dilatation],
         with_tangent: bool,
     ) -> Result<(), StepError> {
+        if self.stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            return Err(StepError::Stopped);
+        }
         let clock = Instant::now();
         let trial = fixed.trial(u, independent, self.penalty);
         let tangent = with_tangent.then_some(&mut self.tangent);

@@ -59,9 +59,31 @@ pub enum FingertipShapeError {
          denser or the nail rigid"
     )]
     NailTooSmall,
+    /// Elements between skin and bone turn inside out.
+    #[error(
+        "geometry.shape.{field} = {value} folds the elements between skin and bone: with the other \
+         dimensions as they are it has to be at {} {}",
+        if *least { "least" } else { "most" }, rounded(*limit, *least)
+    )]
+    Folds {
+        /// Field name in the scene.
+        field: String,
+        /// Its value.
+        value: f64,
+        /// The nearest value that is known to do.
+        limit: f64,
+        /// Whether it has to be at least that, or at most.
+        least: bool,
+    },
     /// Lengths contradict each other.
     #[error("geometry.shape: {0}")]
     Inconsistent(&'static str),
+}
+
+/// To two digits behind the point, on the side that is allowed.
+fn rounded(limit: f64, least: bool) -> f64 {
+    let hundredths = 100.0 * limit;
+    (if least { hundredths.ceil() } else { hundredths.floor() }) / 100.0
 }
 
 impl FingertipShapeError {
@@ -72,6 +94,7 @@ impl FingertipShapeError {
             Self::NotPositive { field, .. } | Self::TooSmall { field, .. } => *field,
             Self::CortexTooThick { .. } => "bone_cortex_mm",
             Self::NailTooSmall => "nail_mm",
+            Self::Folds { field, .. } => field.as_str(),
             Self::BoneTooClose { .. } => return "geometry.shape".into(),
             Self::Inconsistent(rule) => rule.split(' ').find(|w| w.contains('_')).unwrap_or(""),
         };

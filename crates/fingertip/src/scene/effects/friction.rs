@@ -11,7 +11,7 @@ pub(super) const EFFECT: Effect = Effect {
         if scene.friction.coefficient > 0.0 {
             Ok(())
         } else {
-            Err("friction.coefficient is 0: leave the effect out or give a coefficient")
+            Err("friction.coefficient is 0; leave the effect out or give a coefficient")
         }
     },
     state: |c| c.friction_states,

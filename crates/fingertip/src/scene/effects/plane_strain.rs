@@ -33,7 +33,7 @@ fn fits(scene: &Scene) -> Result<(), &'static str> {
         );
     }
     if half && (motion.pitch_deg != 0.0 || moves.iter().any(|m| m.0)) {
-        return Err("of half a section needs a press along its axis of symmetry: give \
+        return Err("half a section needs a press along its axis of symmetry: give \
                     geometry.extent = \"whole\", or leave out pitch_deg, offset_mm and shift_mm");
     }
     Ok(())
