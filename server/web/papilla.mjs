@@ -278,7 +278,9 @@ class Page {
       const { presses } = this.replay;
       byId('replay-press').replaceChildren(...presses.map((press, n) => new Option(press.name, String(n))));
       this.meters.listPresses(presses.map((press) => press.name));
-      if (presses.length === 0) throw new Error('this server ships no FE presses to replay');
+      if (presses.length === 0) {
+        throw new Error('this server has no FE states to replay: fe-datagen dataset replay DATASET --out MODELS makes its replay.json');
+      }
     } catch (error) {
       notify(error.message);
     }

@@ -64,6 +64,8 @@ SLOW = [
     "any_move_is_answered",
     "five_hundred_flipped_bits",
     "a_slice_of_a_million_is_a_slice",
+    "a_scene_and_a_dataset_show_a_state_alike",
+    "an_interrupted_solve_keeps_the_states_that_are_done",
 ]
 def fast() -> list[Step]:
     """Rust alone."""
@@ -216,6 +218,12 @@ def full() -> list[Step]:
             "the clients' pages as written",
             "clients/docs-test",
             ("client-rust", "client-python", "client-cpp", "client-c"),
+        ),
+        Step(
+            "guides",
+            "the guides' commands as written, on the smoke campaign",
+            "tests/guides/run",
+            after=("build", "python"),
         ),
         Step(
             "calculix",

@@ -51,8 +51,14 @@ fn find(catalogue: &Catalogue, uri: &Uri) -> Result<usize, Problem> {
     let asked = uri.path().split('/').nth(3).unwrap_or_default();
     let found = asked.parse().ok().filter(|id: &usize| *id < states.len());
     found.ok_or_else(|| {
-        let asked = shortened(asked);
-        let message = format!("no press '{asked}'; there are {}, counted from 0", states.len());
+        let message = if states.is_empty() {
+            "this service has no press to replay: `fe-datagen dataset replay DATASET --out MODELS` \
+             makes the replay.json of its folder of models"
+                .into()
+        } else {
+            let asked = shortened(asked);
+            format!("no press '{asked}'; there are {}, counted from 0", states.len())
+        };
         Problem::new(ErrorCode::NotFound, message)
     })
 }
