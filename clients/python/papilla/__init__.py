@@ -6,9 +6,11 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 - `sed(pressure_pa)`: one map over HTTP
 - `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
 - `SpikeTrains`: when the touch units of a finger fire, as files
+- `frames`: poses of engines and robots to the finger's frame, forces back
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
 """
 
+from . import frames
 from .aio import AsyncSession
 from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
@@ -37,6 +39,7 @@ __all__ = [
     "Summary",
     "Touch",
     "Unreachable",
+    "frames",
     "indentation",
     "post",
     "sed",

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import frames
 from .answer import Answer
 from .atlas import Atlas, Contact
 from .errors import Refused
@@ -121,6 +122,22 @@ def check_touch(step: Step, answer: Answer) -> None:
     must(not answer.out_of_range and not answer.unsettled, f"{answer}")
 
 
+CONVENTIONS = {
+    "right_handed": frames.METRES,
+    "openxr": frames.OPENXR,
+    "godot": frames.GODOT,
+    "unity": frames.UNITY,
+    "unreal": frames.UNREAL,
+}
+
+
+def check_poses(what: str, found: NDArray[np.float32], due: NDArray[np.float32]) -> None:
+    """Places within a micrometre, quaternions up to their sign."""
+    for place, pose in zip(found, due, strict=True):
+        must(np.allclose(place[:3], pose[:3], atol=2e-3), f"{what}: the object is at {place[:3]}, not {pose[:3]}")
+        must(abs(place[3:] @ pose[3:]) > 1 - 1e-6, f"{what}: the object's turn is {place[3:]}, not {pose[3:]}")
+
+
 class Run:
     """One case."""
 
@@ -208,7 +225,22 @@ class Run:
 
     def touch(self, step: Step) -> None:
         poses = np.array(step["poses"], np.float32)
-        check_touch(step, self.open_session().send_poses(poses, **self.of_hand(step)).result(self.timeout_s))
+        if "engines" not in step:
+            return check_touch(step, self.open_session().send_poses(poses, **self.of_hand(step)).result(self.timeout_s))
+        for name, said in step["engines"].items():
+            convention = CONVENTIONS[name]
+            placed = frames.from_poses(said["finger"], said["objects"], convention)
+            check_poses(name, placed, poses)
+            if "joints" in said:
+                up = {"godot": (0.0, 0.0, -1.0)}.get(name)
+                finger = frames.finger_of_joints(**said["joints"], convention=convention, up=up)
+                check_poses(f"{name}, of joints", frames.from_poses(finger, said["objects"], convention), poses)
+            answer = self.open_session().send_poses(placed, **self.of_hand(step)).result(self.timeout_s)
+            check_touch(step, answer)
+            assert answer.touch is not None
+            felt, due = frames.felt(said["finger"], answer.touch, convention), step["expect"]["engines"][name]
+            for member in due:
+                check_list(f"{name}: {member}", getattr(felt, member), due[member])
 
     def gaps(self, step: Step) -> None:
         *centre, radius = step["sphere"]
