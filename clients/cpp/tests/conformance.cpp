@@ -215,7 +215,60 @@ class Run {
     }
     NetForce room;
     const auto finger = std::uint8_t(step["finger"].whole());
+    if (step.has("engines")) return placed(step, poses);
     check_touch(step["expect"], session().touch(poses, finger, net_of(step, room), timeout_ms_), finger);
+  }
+
+  /// The objects where each engine says that they are.
+  void placed(const Value& step, const std::vector<Pose>& due) {
+    struct Engine {
+      const char* name;
+      frames::Convention convention;
+      std::optional<frames::Three> up;
+    };
+    const Engine engines[] = {{"right_handed", frames::metres, {}}, {"openxr", frames::openxr, {}}, {"unity", frames::unity, {}},
+                              {"unreal", frames::unreal, {}}, {"godot", frames::openxr, frames::Three{0.0, 0.0, -1.0}}};
+    must(step["engines"].members.size() == std::size(engines), "another number of engines");
+    for (const auto& [name, convention, up] : engines) {
+      const Value& said = step["engines"][name];
+      const auto place = [](const Value& seven) {
+        frames::Place read;
+        for (std::size_t i = 0; i < 3; ++i) read.at[i] = seven[i].number;
+        for (std::size_t i = 0; i < 4; ++i) read.turn[i] = seven[3 + i].number;
+        return read;
+      };
+      const frames::Place finger = place(said["finger"]);
+      std::vector<Pose> poses;
+      for (std::size_t k = 0; k < due.size(); ++k) {
+        const frames::Place object = place(said["objects"][k]);
+        poses.push_back(check_pose(name, frames::to_finger(convention, finger, object), due[k]));
+        if (!said.has("joints")) continue;
+        const Value& joints = said["joints"];
+        const auto tracked = frames::finger_of_joints(convention, place(joints["distal"]), place(joints["tip"]),
+                                                      joints["inside_mm"].number, up ? &*up : nullptr);
+        must(tracked.has_value(), std::string(name) + ": no finger of joints");
+        check_pose(name, frames::to_finger(convention, *tracked, object), due[k]);
+      }
+      const Answer& answer = session().touch(poses, 0, nullptr, timeout_ms_);
+      check_touch(step["expect"], answer, 0);
+      const auto felt = frames::felt(convention, finger, answer.touch);
+      const Value& wanted = step["expect"]["engines"][name];
+      check_list("force_n", felt->force_n, wanted["force_n"]);
+      check_list("torque_n_m", felt->torque_n_m, wanted["torque_n_m"]);
+      check_list("centre", felt->centre, wanted["centre"]);
+    }
+  }
+
+  /// A pose that is the one due: its place within some micrometres, its quaternion up to the sign.
+  static Pose check_pose(const std::string& engine, const std::optional<Pose>& found, const Pose& due) {
+    must(found.has_value(), engine + ": no pose");
+    double dot = 0.0;
+    for (std::size_t i = 0; i < 4; ++i) dot += found->quaternion[i] * due.quaternion[i];
+    for (std::size_t i = 0; i < 3; ++i) {
+      must(std::abs(found->origin_mm[i] - due.origin_mm[i]) < 2e-3, engine + ": the object is elsewhere");
+    }
+    must(std::abs(dot) > 1.0 - 1e-6, engine + ": the object is turned otherwise");
+    return *found;
   }
 
   void gaps(const Value& step) {

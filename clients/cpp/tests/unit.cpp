@@ -109,6 +109,28 @@ static void fingers() {
   CHECK(superseded.size() == 3 && superseded[1] + superseded[2] == 4);
 }
 
+// What is no place is refused; what is drawn is what is felt.
+static void places() {
+  using namespace papilla::frames;
+  const Place finger{{0.0, 1.0, 0.0}, {0.0, 0.0, 0.0, 2.0}}, ball{{0.002, 0.992, -0.01125}, {0.0, 0.0, 0.0, 0.5}};
+  const std::optional<papilla::Pose> pose = to_finger(unity, finger, ball);
+  CHECK(pose && std::abs(pose->origin_mm[0] - 11.25F) < 1e-4F && std::abs(pose->origin_mm[1] - 2.0F) < 1e-4F &&
+        std::abs(pose->origin_mm[2] + 8.0F) < 1e-4F && pose->quaternion[3] == 1.0F);
+  const Place nowhere{{0.0, NAN, 0.0}, {0.0, 0.0, 0.0, 1.0}}, zero{{}, {0.0, 0.0, 0.0, 0.0}};
+  for (const Place& wrong : {nowhere, zero}) {
+    CHECK(!to_finger(unity, wrong, ball) && !to_finger(unity, ball, wrong) && !felt(unity, wrong, {}));
+    CHECK(!finger_of_joints(openxr, wrong, ball) && !finger_of_joints(openxr, ball, wrong));
+  }
+  CHECK(!to_finger(unity, finger, ball, 0.0) && !finger_of_joints(openxr, ball, ball));
+  const Three mm{11.25, 2.0, -6.5};
+  for (const Convention& each : {metres, openxr, unity, unreal}) {
+    const Three back = vertex_mm(each, vertex_drawn(each, mm));
+    CHECK(std::abs(back[0] - mm[0]) + std::abs(back[1] - mm[1]) + std::abs(back[2] - mm[2]) < 1e-9);
+    const std::optional<papilla::Pose> there = to_finger(each, {}, {vertex_drawn(each, mm), {0.0, 0.0, 0.0, 1.0}});
+    CHECK(there && std::abs(there->origin_mm[2] + 6.5F) < 1e-4F && std::abs(there->origin_mm[1] - 2.0F) < 1e-4F);
+  }
+}
+
 static void proofs() {
   // RFC 6455, 1.3.
   const auto digest = papilla::detail::sha1("dGhlIHNhbXBsZSBub25jZQ==258EAFA5-E914-47DA-95CA-C5AB0DC85B11");
@@ -147,6 +169,7 @@ int main() {
   json();
   messages();
   fingers();
+  places();
   proofs();
   silence();
   std::printf(failures ? "%d checks failed\n" : "all checks passed\n", failures);

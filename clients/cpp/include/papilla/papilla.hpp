@@ -8,5 +8,6 @@
 
 #include "atlas.hpp"
 #include "core.hpp"
+#include "frames.hpp"
 #include "http.hpp"
 #include "session.hpp"

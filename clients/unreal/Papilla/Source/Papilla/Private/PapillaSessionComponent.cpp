@@ -1,5 +1,7 @@
 #include "PapillaSessionComponent.h"
 
+#include "PapillaFrames.h"
+
 #include "HttpModule.h"
 #include "IWebSocket.h"
 #include "Interfaces/IHttpRequest.h"
@@ -305,15 +307,20 @@ int32 UPapillaSessionComponent::SendContacts(const TArray<FPapillaContact>& Cont
     return SendWindow(Drawn.GetData(), {});
 }
 
-int32 UPapillaSessionComponent::SendPoses(const TArray<FTransform>& Objects, int32 Finger)
+int32 UPapillaSessionComponent::SendPoses(const FTransform& FingerInWorld, const TArray<FTransform>& ObjectsInWorld, int32 Finger, double WorldScale)
 {
     if (!Core) return 0;
     Poses.clear();
-    for (const FTransform& Object : Objects)
+    const papilla::frames::Place Hand = PapillaFrames::ToPlace(FingerInWorld);
+    for (const FTransform& Object : ObjectsInWorld)
     {
-        const FVector At = Object.GetLocation();
-        const FQuat Turn = Object.GetRotation();
-        Poses.push_back({{float(At.X), float(At.Y), float(At.Z)}, {float(Turn.X), float(Turn.Y), float(Turn.Z), float(Turn.W)}});
+        const std::optional<papilla::Pose> Pose = papilla::frames::to_finger(papilla::frames::unreal, Hand, PapillaFrames::ToPlace(Object), WorldScale);
+        if (!Pose)
+        {
+            UE_LOG(LogTemp, Warning, TEXT("Papilla: a transform is not finite or WorldScale not above 0; leave the frame out while the hand is not tracked"));
+            return 0;
+        }
+        Poses.push_back(*Pose);
     }
     const uint32 Sequence = Core->send_poses(Poses.data(), Poses.size(), NowUs(), static_cast<uint8>(Finger));
     Pump();

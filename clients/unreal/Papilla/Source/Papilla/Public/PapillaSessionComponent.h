@@ -110,11 +110,13 @@ public:
     int32 SendContacts(const TArray<FPapillaContact>& Contacts);
 
     /**
-     * Sends where the objects of the hello are in a finger's frame, mm. That frame is right-handed: from Unreal's, mirror y
-     * (location y, and x and z of the rotation, change sign). Returns the frame's sequence.
+     * Sends where the objects of the hello are, all in the world, cm. The finger's x points to its tip, its z out of the
+     * nail; its origin is the foremost point of the skin (UPapillaFrames::FingerOfJoints makes it of a tracked hand).
+     * WorldScale: how many times as large as life all is drawn. Returns the frame's sequence; 0, and a warning, where a
+     * transform is no place.
      */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
-    int32 SendPoses(const TArray<FTransform>& Objects, int32 Finger = 0);
+    int32 SendPoses(const FTransform& FingerInWorld, const TArray<FTransform>& ObjectsInWorld, int32 Finger = 0, double WorldScale = 1.0);
 
     /** Sends how deep the undeformed skin lies in things, mm, negative in air: at the atlas' vertices, or 224 x 224. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
