@@ -90,6 +90,7 @@ sealed partial class Run
             t.PenetrationMm, t.StiffnessNPerMm, t.TravelMm, t.PressureMaxPa, t.Share,
         };
         All("touch", expect, found);
+        CheckFelt(step, t);
         if (expect["pressure_sum"] != null) Near("pressure", got.PressurePa.Sum(v => (double)v), (double)expect["pressure_sum"][0], (double)expect["pressure_sum"][1]);
         if (got.NoContact != expect["flags"].Any(f => (string)f == "no_contact")) throw new Missed("no contact is " + got.NoContact);
         if (got.OutOfRange || got.Unsettled) throw new Missed("out of range or unsettled");

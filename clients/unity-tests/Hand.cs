@@ -8,7 +8,7 @@ sealed partial class Run
 {
     void Touch(JObject step, JObject expect)
     {
-        var poses = step["poses"].Select(row => row.Select(v => (float)v).ToArray()).Select(v => new Pose(v[0], v[1], v[2], v[3], v[4], v[5], v[6])).ToArray();
+        var poses = PosesOf(step);
         CheckTouch(step, expect, () => session.SendPoses(poses, (int?)step["finger"] ?? 0, NetOf(step)));
     }
 

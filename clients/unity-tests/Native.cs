@@ -117,11 +117,6 @@ sealed partial class Run : IDisposable
         }
     }
 
-    static Pose[] PosesOf(JObject step)
-    {
-        return step["poses"].Select(row => row.Select(v => (float)v).ToArray()).Select(v => new Pose(v[0], v[1], v[2], v[3], v[4], v[5], v[6])).ToArray();
-    }
-
     static NetForce? NetOf(JObject step)
     {
         if (step["net"] == null) return null;

@@ -7,7 +7,7 @@ namespace Papilla
     /// <summary>
     /// Which point of the finger each pixel is. Skin (where pressure acts) and interface (where SED is read) share triangles; vertex i of
     /// one lies over vertex i of the other. The finger's frame, mm, right-handed: x from the tip to the base, z towards the nail.
-    /// Unity is left-handed: mirror one axis, and turn the triangles, to draw it.
+    /// Unity has other axes and is left-handed: <see cref="Frames"/> turns vertices and triangles to draw it.
     /// </summary>
     public sealed class Atlas
     {

@@ -3,11 +3,11 @@ using System.Runtime.InteropServices;
 namespace Papilla
 {
     /// <summary>
-    /// Where an object of the hello is in the finger's frame: its origin, mm, and its turn as a unit quaternion. The frame is right-handed:
-    /// from Unity's, mirror z (origin z, and x and y of the quaternion, change sign). As on the wire.
+    /// Where an object of the hello is in the finger's frame: its origin, mm, and its turn as a unit quaternion. As on the wire. Of
+    /// places in Unity it is <see cref="FromUnity(Place, Place, double)"/>: the frame has other axes, and is right-handed.
     /// </summary>
     [StructLayout(LayoutKind.Sequential)]
-    public struct Pose
+    public partial struct Pose
     {
         public float XMm, YMm, ZMm, TurnX, TurnY, TurnZ, TurnW;
 
@@ -32,7 +32,7 @@ namespace Papilla
 
     /// <summary>What pushes back on a finger, in its frame. As on the wire.</summary>
     [StructLayout(LayoutKind.Sequential)]
-    public struct Touch
+    public partial struct Touch
     {
         public float ForceXN, ForceYN, ForceZN;
         /// <summary>Torque about the frame's origin.</summary>

@@ -3,14 +3,12 @@ using Papilla;
 using UnityEngine;
 
 /// <summary>
-/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer. Give it a material that shows vertex colours. A contact of half a newton
-/// circles the pad; a game fills <c>pressurePa</c> from its own contacts.
+/// The atlas's skin as a mesh whose vertex colours are the SED of the last answer: forward (z) is the tip, up (y) the nail. Give it a material that shows
+/// vertex colours. A contact of half a newton circles the pad; a game fills <c>pressurePa</c> from its own contacts. <c>PapillaTouch</c> sends where objects are.
 /// </summary>
 [RequireComponent(typeof(MeshFilter), typeof(MeshRenderer))]
 public sealed class PapillaFinger : MonoBehaviour
 {
-    const float MetresPerMm = 0.001f;
-
     [SerializeField] string address = "http://127.0.0.1:7224";
     [SerializeField] string tier = "nano";
     [SerializeField] float sedOfWhite = 300;
@@ -51,11 +49,7 @@ public sealed class PapillaFinger : MonoBehaviour
         atlas = from;
         sed = new float[atlas.VertexCount];
         colours = new Color32[atlas.VertexCount];
-        var vertices = new Vector3[atlas.VertexCount];
-        // The finger's frame is right-handed, Unity's is not: y changes its sign, and with it the triangles turn.
-        for (int i = 0; i < vertices.Length; i++) vertices[i] = MetresPerMm * new Vector3(atlas.SkinMm[3 * i], -atlas.SkinMm[3 * i + 1], atlas.SkinMm[3 * i + 2]);
-        mesh = new Mesh { vertices = vertices, triangles = atlas.Triangles };
-        mesh.RecalculateNormals();
+        mesh = atlas.ToMesh();
         GetComponent<MeshFilter>().sharedMesh = mesh;
     }
 
