@@ -4,6 +4,7 @@ export { PapillaError } from './src/error.js';
 export { postPressure } from './src/http.js';
 export { Atlas } from './src/atlas.js';
 export { Foundation } from './src/foundation.js';
+export { DRAWN_TURN, JOINTS, feltInWorld, fingerOfJoints, placeOf, poseInFinger, vertexDrawn, vertexMm } from './src/frames.js';
 export { Hand } from './src/hand.js';
 export { Session } from './src/session.js';
 export { Answer, MAP_LEN, SIDE_PX, SUMMARY } from './src/wire.js';

@@ -1,6 +1,8 @@
 // The steps of docs/reference/conformance.md by this client; runs in the page, which has nothing but the client and the server.
 
-import { Atlas, Hand, MAP_LEN, PapillaError, SIDE_PX, Session, postPressure } from '../papilla.js';
+import {
+  Atlas, Hand, MAP_LEN, PapillaError, SIDE_PX, Session, feltInWorld, fingerOfJoints, poseInFinger, postPressure,
+} from '../papilla.js';
 
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
@@ -262,9 +264,32 @@ class Runner {
   }
 
   /** @param {Step} step */
-  touch(step) {
+  async touch(step) {
+    if (step.engines) return this.placed(step);
     const poses = step.poses.map((/** @type {number[]} */ p) => ({ at: p.slice(0, 3), turn: p.slice(3) }));
     return this.press(step, (hand, more) => hand.touch(poses, more));
+  }
+
+  /** The objects where the step says that WebXR has them. @param {Step} step */
+  async placed(step) {
+    const { finger, objects, joints: { distal, tip, inside_mm: insideMm } } = step.engines.openxr;
+    const place = (/** @type {number[]} */ seven) => /** @type {import('../src/frames.js').PlaceInWorld} */ ({ at: seven.slice(0, 3), turn: seven.slice(3) });
+    const poses = objects.map((/** @type {number[]} */ object) => poseInFinger(place(finger), place(object)));
+    const tracked = fingerOfJoints(place(distal), place(tip), { insideMm });
+    step.poses.forEach((/** @type {number[]} */ due, /** @type {number} */ k) => {
+      for (const { at, turn } of [poses[k], poseInFinger(tracked, place(objects[k]))]) {
+        for (let i = 0; i < 3; i++) near(`place ${i} of object ${k}`, at[i], [due[i], 2e-3]);
+        // A quaternion and its negative are one turn.
+        near(`turn of object ${k}`, Math.abs(turn.reduce((/** @type {number} */ sum, /** @type {number} */ v, /** @type {number} */ i) => sum + v * due[3 + i], 0)), [1, 1e-6]);
+      }
+    });
+    const { touch } = await this.press(step, (hand, more) => hand.touch(poses, more)) ?? {};
+    if (!touch) throw new Error('no touch');
+    const felt = feltInWorld(place(finger), touch);
+    const due = step.expect.engines.openxr;
+    allNear('force', felt.forceN, due.force_n);
+    allNear('torque', felt.torqueNM, due.torque_n_m);
+    allNear('centre', felt.centre, due.centre);
   }
 
   /** @param {Step} step */
@@ -282,7 +307,8 @@ class Runner {
     try {
       answer = await send(/** @type {Hand} */ (this.hand), { finger, net: net && { direction: net.slice(0, 3), forceN: net[3] } });
     } catch (error) {
-      return this.refused(expect, error);
+      this.refused(expect, error);
+      return null;
     }
     const { forceN, torqueNMm, areaMm2, centreMm, penetrationMm, stiffnessNPerMm, travelMm, pressureMaxPa, share } = answer.touch;
     same('finger', answer.finger, finger);
@@ -290,6 +316,7 @@ class Runner {
     if (expect.pressure_sum) near('pressure', /** @type {Float32Array} */ (answer.pressurePa).reduce((sum, value) => sum + value, 0), expect.pressure_sum);
     same('flags', answer.noContact ? ['no_contact'] : [], expect.flags);
     same('odd flags', [answer.outOfRange, answer.unsettled], [false, false]);
+    return answer;
   }
 
   /** @param {Step} step */

@@ -2,23 +2,21 @@
 
 import { SPACING } from './objects.js';
 import { Plane, Quaternion, Raycaster, Vector2, Vector3 } from 'three';
+import { DRAWN_TURN, JOINTS, fingerOfJoints } from '../papilla.js';
 
 /** @typedef {import('three').Mesh} Mesh */
+/** @typedef {import('three').Object3D | undefined} Joint */
 
 /** Where the pad is in the finger's frame, mm: the point that a hand or the mouse moves. */
 const PAD_MM = new Vector3(9, 0, -6.4);
 const HOVER_MM = 5;
 const LOWER_MM_PER_S = 12;
-/** The finger's x (tip to base) is the hand's +z, its z (nail) the hand's +y. */
-const FRAME = new Quaternion(-0.5, -0.5, -0.5, 0.5);
+const DRAWN = new Quaternion(...DRAWN_TURN);
 /** With the mouse the finger comes down a little steeply. */
 const TILT = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), 0.35);
 
 /** Fingers by number, as a tracked hand names their tips. */
 export const FINGERS = /** @type {const} */ (['index', 'middle', 'ring', 'little', 'thumb']);
-const TIPS = /** @type {const} */ ([
-  'index-finger-tip', 'middle-finger-tip', 'ring-finger-tip', 'pinky-finger-tip', 'thumb-tip',
-]);
 /** With the mouse or a controller there are so many, spread so that each meets an object of its own. */
 const SPREAD_COUNT = 2;
 
@@ -31,7 +29,7 @@ const DOWN = new Vector3(0, -1, 0);
 
 /** Puts the pad of the mesh to a place of the world. @param {Mesh} mesh @param {Vector3} place @param {Quaternion} turn */
 function place(mesh, place, turn) {
-  mesh.quaternion.copy(turn).multiply(FRAME);
+  mesh.quaternion.copy(turn).multiply(DRAWN);
   mesh.position.copy(PAD_MM).multiply(mesh.scale).applyQuaternion(mesh.quaternion).negate().add(place);
   mesh.updateMatrixWorld();
 }
@@ -109,10 +107,13 @@ export class Hands {
 
   /** Meshes of what is not tracked are hidden. @param {Mesh[]} meshes */
   move(meshes) {
-    const hand = this.hands.find(({ joints }) => joints[TIPS[0]]?.visible);
+    const hand = this.hands.find(({ joints }) => joints[JOINTS[FINGERS[0]][1]]?.visible);
     const controller = this.controllers.find((one) => one.visible);
     if (hand) {
-      meshes.forEach((mesh, n) => this.#follow(mesh, hand.joints[TIPS[n]], n));
+      meshes.forEach((mesh, n) => {
+        const [distal, tip] = JOINTS[FINGERS[n]];
+        this.#follow(mesh, hand.joints[distal], hand.joints[tip], n);
+      });
     } else if (controller) {
       this.#look(controller);
       spread(meshes, this.#place, this.#turn);
@@ -128,11 +129,19 @@ export class Hands {
     one.getWorldQuaternion(this.#turn);
   }
 
-  /** The index finger is where its tip is; the others are as far from it as a hand as large as the finger has them. @param {Mesh} mesh @param {import('three').Object3D | undefined} tip @param {number} n */
-  #follow(mesh, tip, n) {
-    mesh.visible = tip?.visible ?? false;
-    if (!tip || !mesh.visible) return;
-    this.#look(tip);
+  /** @param {import('three').Object3D} one @returns {import('../src/frames.js').PlaceInWorld} */
+  #worldPlace(one) {
+    this.#look(one);
+    return { at: this.#place.toArray(), turn: this.#turn.toArray() };
+  }
+
+  /** The index finger is where its tip is; the others are as far from it as a hand as large as the finger has them. @param {Mesh} mesh @param {Joint} distal @param {Joint} tip @param {number} n */
+  #follow(mesh, distal, tip, n) {
+    mesh.visible = Boolean(distal?.visible && tip?.visible);
+    if (!distal || !tip || !mesh.visible) return;
+    const { at, turn } = fingerOfJoints(this.#worldPlace(distal), this.#worldPlace(tip));
+    this.#place.fromArray(at);
+    this.#turn.fromArray(turn);
     if (n === 0) this.#index.copy(this.#place);
     else this.#place.sub(this.#index).multiplyScalar(1000 * mesh.scale.x).add(this.#index);
     place(mesh, this.#place, this.#turn);

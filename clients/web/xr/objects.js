@@ -1,7 +1,7 @@
 // Objects to touch: each a mesh, a signed distance in its own frame (mm, y up, the origin in its middle), a stiffness, and
 // the shape that the server is told of.
 
-import { BoxGeometry, CapsuleGeometry, Color, Mesh, MeshLambertMaterial, Quaternion, SphereGeometry, Vector3 } from 'three';
+import { BoxGeometry, CapsuleGeometry, Color, Mesh, MeshLambertMaterial, SphereGeometry } from 'three';
 
 /**
  * @typedef {object} Touchable
@@ -11,7 +11,6 @@ import { BoxGeometry, CapsuleGeometry, Color, Mesh, MeshLambertMaterial, Quatern
  * @property {Mesh} mesh scaled from mm to the world
  * @property {number} reachMm radius around its middle
  * @property {import('../src/types.js').Shape} shape of docs/reference/indenters.md
- * @property {Quaternion} shapeTurn from the shape's own frame
  */
 
 const ROUND_MM = 1.5;
@@ -32,19 +31,15 @@ const bar = (radius, half) => (/** @type {number} */ x, /** @type {number} */ y,
 /** A ball. @param {number} radius */
 const ballShape = (radius) => ({ shape: 'sphere', radius_mm: radius });
 
-/** A block, along its own z as high as two plates that overlap. @param {number} half @param {number} halfHeight */
+/** A block, along its own z (up in the world) as high as two plates that overlap. @param {number} half @param {number} halfHeight */
 const blockShape = (half, halfHeight) => {
   const part = { shape: 'plate', size_mm: [2 * half, 2 * half], edge_radius_mm: ROUND_MM };
   const off = halfHeight - 2 - ROUND_MM;
   return { shape: 'union', parts: [off, -off].map((z) => ({ part, at_mm: [0, 0, z] })) };
 };
 
-/** A bar along its own y. @param {number} radius @param {number} half */
+/** A bar along its own y (the world's x). @param {number} radius @param {number} half */
 const barShape = (radius, half) => ({ shape: 'cylinder', radius_mm: radius, length_mm: 2 * (half + radius), end_radius_mm: radius });
-
-const Z_UP = new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2);
-const Y_TO_X = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), -Math.PI / 2);
-const AS_IT_IS = new Quaternion();
 
 /** Between the middles of neighbours, in the world's units. */
 export const SPACING = 0.34;
@@ -56,17 +51,17 @@ export const SPACING = 0.34;
 export function makeObjects(mmToWorld) {
   const capsule = new CapsuleGeometry(2, 14, 8, 24).rotateZ(Math.PI / 2);
   const kinds = /** @type {const} */ ([
-    ['hard ball', sphere(9), Infinity, new SphereGeometry(9, 40, 28), 0xb9c4cf, 9, ballShape(9), AS_IT_IS],
-    ['soft ball', sphere(9), 4000, new SphereGeometry(9, 40, 28), 0x7fae6b, 9, ballShape(9), AS_IT_IS],
-    ['hard block', block(9, 6), Infinity, new BoxGeometry(18, 12, 18), 0xa9875f, 15, blockShape(9, 6), Z_UP],
-    ['soft cushion', block(9, 6), 4000, new BoxGeometry(18, 12, 18), 0xc98fa8, 15, blockShape(9, 6), Z_UP],
-    ['thin bar', bar(2, 7), Infinity, capsule, 0x8a93a8, 10, barShape(2, 7), Y_TO_X],
+    ['hard ball', sphere(9), Infinity, new SphereGeometry(9, 40, 28), 0xb9c4cf, 9, ballShape(9)],
+    ['soft ball', sphere(9), 4000, new SphereGeometry(9, 40, 28), 0x7fae6b, 9, ballShape(9)],
+    ['hard block', block(9, 6), Infinity, new BoxGeometry(18, 12, 18), 0xa9875f, 15, blockShape(9, 6)],
+    ['soft cushion', block(9, 6), 4000, new BoxGeometry(18, 12, 18), 0xc98fa8, 15, blockShape(9, 6)],
+    ['thin bar', bar(2, 7), Infinity, capsule, 0x8a93a8, 10, barShape(2, 7)],
   ]);
-  return kinds.map(([name, distanceMm, objectPaPerMm, geometry, colour, reachMm, shape, shapeTurn], n) => {
+  return kinds.map(([name, distanceMm, objectPaPerMm, geometry, colour, reachMm, shape], n) => {
     const mesh = new Mesh(geometry, new MeshLambertMaterial({ color: new Color(colour) }));
     mesh.name = name;
     mesh.scale.setScalar(mmToWorld);
     mesh.position.set((n - 2) * SPACING, 0.98, -0.75);
-    return { name, distanceMm, objectPaPerMm, mesh, reachMm, shape, shapeTurn };
+    return { name, distanceMm, objectPaPerMm, mesh, reachMm, shape };
   });
 }

@@ -1,7 +1,7 @@
 // What fingers feel: by the server's contact solve, or, without a contact model there, by springs in this page.
 
-import { Matrix4, Quaternion, Vector3 } from 'three';
-import { Hand, MAP_LEN, Session, SUMMARY } from '../papilla.js';
+import { Quaternion } from 'three';
+import { DRAWN_TURN, Hand, MAP_LEN, poseInFinger, Session, SUMMARY } from '../papilla.js';
 
 /**
  * @typedef {import('./finger.js').Finger} Finger
@@ -9,6 +9,9 @@ import { Hand, MAP_LEN, Session, SUMMARY } from '../papilla.js';
  * @typedef {import('../src/types.js').Hello} Hello
  */
 
+const MM_PER_M = 1000;
+/** From the axes of the drawn mesh, those of the finger's frame, to the finger's in the world. */
+const UNDRAWN = new Quaternion(...DRAWN_TURN).invert();
 /** So many late maps in a row, and the budget is doubled. */
 const LATE_MOST = 30;
 /** What becomes of a frame that was not refused. */
@@ -61,11 +64,7 @@ export class Solved {
   #onstate;
   /** @type {import('../src/types.js').Ready | null} */ #told = null;
   #map = new Float32Array(MAP_LEN);
-  #toFinger = new Matrix4();
-  #shape = new Matrix4();
-  #at = new Vector3();
   #turn = new Quaternion();
-  #scale = new Vector3();
 
   /** @param {Finger[]} fingers @param {Touchable[]} objects @param {Hello} hello @param {(words: string) => void} onstate */
   constructor(fingers, objects, { tier, atlas_hash }, onstate) {
@@ -119,11 +118,11 @@ export class Solved {
     finger.feel(this.#map, values.reduce((a, b) => Math.max(a, b), 0), Math.hypot(...touch.forceN), touch, inWords({ outOfRange, unsettled }));
   }
 
-  /** An object's frame in that of the finger, whose scale both share. @param {Touchable} object @param {Finger} finger @returns {import('../src/types.js').Pose} */
-  #poseOf({ mesh, shapeTurn }, finger) {
-    this.#shape.makeRotationFromQuaternion(shapeTurn);
-    this.#toFinger.copy(finger.mesh.matrixWorld).invert().multiply(mesh.matrixWorld).multiply(this.#shape);
-    this.#toFinger.decompose(this.#at, this.#turn, this.#scale);
-    return { at: [this.#at.x, this.#at.y, this.#at.z], turn: [this.#turn.x, this.#turn.y, this.#turn.z, this.#turn.w] };
+  /** An object in the finger's frame; both are drawn at one scale. @param {Touchable} object @param {Finger} finger @returns {import('../src/types.js').Pose} */
+  #poseOf({ mesh }, finger) {
+    const { position, quaternion, scale } = finger.mesh;
+    const turn = this.#turn.copy(quaternion).multiply(UNDRAWN).toArray();
+    const object = { at: mesh.position.toArray(), turn: mesh.quaternion.toArray() };
+    return poseInFinger({ at: position.toArray(), turn }, object, { scale: MM_PER_M * scale.x });
   }
 }
