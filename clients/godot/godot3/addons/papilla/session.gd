@@ -135,7 +135,7 @@ func send_window(samples_pa, column, row, width, height):
 	return _put(0, Frame.encode(samples_pa, column, row, width, height, type, _asked.get("pressure_scale_pa"), _sequence, _stamp(), deadline_us))
 
 
-# Sends where the objects of the hello are in a finger's frame: rows of seven, `Touch.row_of(transform)`. `net`: [x, y, z, N],
+# Sends where the objects of the hello are in a finger's frame: rows of seven, `row_of` of frames.gd. `net`: [x, y, z, N],
 # a net force to be met. Returns the frame's sequence; -1 where there is no such frame.
 func send_poses(rows, finger = 0, net = null):
 	if rows.size() > OBJECTS_MAX or not _is_finger(finger):

@@ -14,13 +14,6 @@ static func is_asked(hello):
 	return false
 
 
-# The row of a Transform in the finger's frame, mm (right-handed, as Godot's): origin x y z, unit quaternion x y z w.
-static func row_of(transform):
-	var origin = transform.origin
-	var turn = transform.basis.get_rotation_quat()
-	return [origin.x, origin.y, origin.z, turn.x, turn.y, turn.z, turn.w]
-
-
 # Rows of seven numbers, and the net force behind them, as bytes.
 static func poses(rows, net):
 	var values = PoolRealArray()
