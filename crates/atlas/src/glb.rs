@@ -95,8 +95,9 @@ pub(super) fn write(atlas: &Atlas, masks: &[Vec<u8>; 2]) -> Vec<u8> {
         meshes.push(json!({"name": name, "primitives": [primitive]}));
         nodes.push(json!({"name": name, "mesh": number}));
     }
-    // mm to metres.
-    nodes.push(json!({"name": "finger", "scale": [0.001, 0.001, 0.001], "children": [0, 1]}));
+    // mm to metres; (x, y, z) to glTF's (z, x, y): the tip ahead (-z), the nail up (y).
+    nodes.push(json!({"name": "finger", "scale": [0.001, 0.001, 0.001],
+        "rotation": [-0.5, -0.5, -0.5, 0.5], "children": [0, 1]}));
     let document = json!({
         "asset": {"version": "2.0", "generator": "Papilla", "extras": {
             "atlas_hash": atlas.hash(), "mm_per_px": atlas.mm_per_px(), "size_px": atlas.size_px(),
