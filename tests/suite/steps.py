@@ -55,6 +55,7 @@ SLOW = [
     "a_plate_is_pressed_once",
     "recorded_scenes_are_found_again",
     "any_pose_of_any_shape_is_answered",
+    "a_body_on_a_straight_way_never_pulls_and_never_fades_silently",
     "no_element_folds",
     "every_mesh_is_well_shaped",
     "a_stopped_indentation_goes_on_to_the_same_bits",

@@ -41,6 +41,8 @@ pub struct Quality {
     pub out_of_range: bool,
     /// Whether the iteration settled.
     pub settled: bool,
+    /// Whether a body lies so deep, or is so thin, that it is held on the side from which it came.
+    pub is_held: bool,
 }
 
 /// What a frame took.
@@ -121,6 +123,19 @@ impl Contact {
     pub(crate) fn is_finite(&self) -> bool {
         self.touched.iter().all(|v| self.pressure_pa[*v as usize].is_finite())
             && self.force_n.iter().chain(&self.torque_n_mm).all(|v| v.is_finite())
+    }
+
+    /// Multiplies all that presses by `strength`, whose derivative by travel is `slope_per_mm`.
+    pub(crate) fn strengthen(&mut self, strength: f64, slope_per_mm: f64) {
+        let size = self.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        for vertex in &self.touched {
+            self.pressure_pa[*vertex as usize] *= strength as f32;
+            if let Some(shear_pa) = self.shear_pa.get_mut(*vertex as usize) {
+                shear_pa.iter_mut().for_each(|q| *q *= strength as f32);
+            }
+        }
+        self.force_n.iter_mut().chain(&mut self.torque_n_mm).for_each(|f| *f *= strength);
+        self.stiffness_n_per_mm = self.stiffness_n_per_mm.map(|_| size * slope_per_mm);
     }
 
     /// Vertices with pressure.

@@ -85,6 +85,38 @@ impl Clusters {
         }
         asked
     }
+
+    /// The point with the least free distance, of which `clearance_mm` tells a lower bound at any
+    /// place, and how often it was asked; none where all of them are certainly farther than
+    /// `margin_mm`.
+    pub(crate) fn nearest(
+        &self,
+        points_mm: &[[f64; 3]],
+        margin_mm: f64,
+        clearance_mm: impl Fn([f64; 3]) -> f64,
+    ) -> (Option<(f64, u32)>, u32) {
+        let (mut at, mut asked) = (0, 0);
+        let mut best: Option<(f64, u32)> = None;
+        while let Some(ball) = self.balls.get(at) {
+            asked += 1;
+            let least = clearance_mm(ball.centre_mm) - ball.radius_mm;
+            if (at == 0 && least > margin_mm) || best.is_some_and(|(free, _)| least >= free) {
+                at += ball.size as usize;
+                continue;
+            }
+            if ball.size == 1 {
+                for &point in &self.order[ball.first as usize..ball.last as usize] {
+                    asked += 1;
+                    let free = clearance_mm(points_mm[point as usize]);
+                    if best.is_none_or(|(least, _)| free < least) {
+                        best = Some((free, point));
+                    }
+                }
+            }
+            at += 1;
+        }
+        (best, asked)
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +139,13 @@ mod tests {
             for (i, p) in points.iter().enumerate() {
                 assert!(away(*p) > 0.2 || found.contains(&(i as u32)), "{i} at {}", away(*p));
             }
+            let least = points.iter().map(|p| away(*p)).fold(f64::INFINITY, f64::min);
+            let (nearest, asked) = clusters.nearest(&points, 0.2, away);
+            let (free, point) = nearest.expect("it is near");
+            assert_eq!((free, away(points[point as usize])), (least, least));
+            assert!(asked < 400, "{asked} questions");
         }
         assert_eq!(clusters.near(1.0, |p| 100.0 + p[0], |_| panic!("all is far")), 1);
+        assert_eq!(clusters.nearest(&points, 1.0, |p| 100.0 + p[0]), (None, 1));
     }
 }

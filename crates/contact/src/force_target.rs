@@ -73,6 +73,7 @@ impl Solver {
         net.validate()?;
         let everywhere = f32::INFINITY;
         self.within(scene.into(), everywhere, |solver, view| {
+            (solver.sides.toward, solver.sides.fine) = (Some(net.direction), false);
             let travel = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame)?;
             let shift_mm = net.direction.map(|d| d * travel / view.length);
             solver.follow_slip(View { shift_mm, ..view });

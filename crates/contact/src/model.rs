@@ -89,6 +89,12 @@ pub struct ContactModel {
     pub(crate) slopes: Vec<Slopes>,
     /// Triangles round each vertex.
     pub(crate) around: Vec<Vec<u32>>,
+    /// Whether the skin ends at each vertex.
+    pub(crate) border: Vec<bool>,
+    /// The lowest vertex, where the pad is.
+    pub(crate) lowest: u32,
+    /// Ends of the skin along x, y and z, mm.
+    ends_mm: [[f64; 2]; 3],
 }
 
 impl ContactModel {
@@ -131,6 +137,12 @@ impl ContactModel {
         let positions_mm: Vec<[f64; 3]> =
             triples(&arrays.positions_mm).into_iter().map(|p| p.map(f64::from)).collect();
         let slopes = slopes(&positions_mm, &triangles);
+        let border = border(v, &triangles);
+        let lowest = (0..v).min_by(|a, b| positions_mm[*a][2].total_cmp(&positions_mm[*b][2]));
+        let ends_mm = [0, 1, 2].map(|i| {
+            let along = positions_mm.iter().map(|p| p[i]);
+            [along.clone().fold(f64::INFINITY, f64::min), along.fold(f64::NEG_INFINITY, f64::max)]
+        });
         let clusters = Clusters::new(&positions_mm);
         let mut rank = vec![0; v];
         for (column, &vertex) in clusters.order().iter().enumerate() {
@@ -146,6 +158,9 @@ impl ContactModel {
             second_order,
             slopes,
             around,
+            border,
+            lowest: lowest.unwrap_or(0) as u32,
+            ends_mm,
             header,
         })
     }
@@ -165,8 +180,18 @@ impl ContactModel {
     /// The lowest vertex, mm: where something flat meets the pad from below.
     #[must_use]
     pub fn lowest_mm(&self) -> [f64; 3] {
-        let lower = |a: [f64; 3], b: &[f64; 3]| if b[2] < a[2] { *b } else { a };
-        self.positions_mm.iter().fold([0.0, 0.0, f64::INFINITY], lower)
+        self.positions_mm[self.lowest as usize]
+    }
+
+    /// Whether a place lies between the ends of the skin.
+    pub(crate) fn is_between_ends(&self, at_mm: [f64; 3]) -> bool {
+        (0..3).all(|i| (self.ends_mm[i][0]..=self.ends_mm[i][1]).contains(&at_mm[i]))
+    }
+
+    /// How far the box round the skin goes along a direction, mm from the origin.
+    pub(crate) fn end_mm(&self, direction: [f64; 3]) -> f64 {
+        let along = |i: usize| self.ends_mm[i].map(|end| end * direction[i]);
+        (0..3).map(|i| along(i)[0].max(along(i)[1])).sum()
     }
 
     /// Refuses a model of another atlas.
@@ -180,6 +205,19 @@ impl ContactModel {
         let (found, expected) = (self.header.atlas_hash.clone(), hash.to_owned());
         Err(ModelError::Atlas { found, expected })
     }
+}
+
+/// Whether each of so many vertices has a side of one triangle alone.
+fn border(vertices: usize, triangles: &[[u32; 3]]) -> Vec<bool> {
+    let sides = |[a, b, c]: &[u32; 3]| [[*a, *b], [*b, *c], [*c, *a]];
+    let mut sides: Vec<[u32; 2]> = triangles.iter().flat_map(sides).collect();
+    sides.iter_mut().for_each(|side| side.sort_unstable());
+    sides.sort_unstable();
+    let mut border = vec![false; vertices];
+    for same in sides.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
+        same[0].iter().for_each(|vertex| border[*vertex as usize] = true);
+    }
+    border
 }
 
 impl Header {

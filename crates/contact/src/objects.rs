@@ -2,6 +2,7 @@
 
 use crate::error::ContactError;
 use crate::gaps::{Field, Gaps};
+use crate::held::Held;
 use crate::model::ContactModel;
 use crate::nearest::{Nearest, require_friction, require_stiffness};
 use papilla_sdf::{Placement, SignedDistance};
@@ -106,6 +107,10 @@ pub(crate) struct View<'a> {
     pub length: f64,
     /// How far the things have moved from their places, reference mm.
     pub shift_mm: [f64; 3],
+    /// By object, how it is held; empty where none is.
+    pub held: &'a [Held],
+    /// How far things that gaps tell of are drawn back along their normals, reference mm.
+    pub back_mm: f64,
 }
 
 /// A scene, ready to be asked.
@@ -115,7 +120,24 @@ pub(crate) enum Things<'a> {
     Field(&'a Field),
 }
 
-impl View<'_> {
+impl<'a> View<'a> {
+    /// Of things in their places.
+    pub(crate) fn of(things: Things<'a>, length: f64) -> Self {
+        Self { things, length, shift_mm: [0.0; 3], held: &[], back_mm: 0.0 }
+    }
+
+    fn held(&self, object: u32) -> Option<&'a Held> {
+        self.held.get(object as usize).filter(|held| held.is_on)
+    }
+
+    fn field_at(&self, field: &Field, vertex: usize, moved: [f64; 3]) -> Nearest {
+        let nearest = field.at(vertex, moved);
+        if self.back_mm > 0.0 {
+            return Nearest { gap_mm: nearest.gap_mm + self.back_mm, ..nearest };
+        }
+        nearest
+    }
+
     /// The nearest thing of a vertex that has moved by `moved` (reference mm).
     pub(crate) fn nearest(&self, model: &ContactModel, vertex: usize, moved: [f64; 3]) -> Nearest {
         match self.things {
@@ -124,7 +146,8 @@ impl View<'_> {
                 self.nearest_object(objects, self.seen(at))
             }
             Things::Field(field) => {
-                field.at(vertex, std::array::from_fn(|i| moved[i] - self.shift_mm[i]))
+                let moved = std::array::from_fn(|i| moved[i] - self.shift_mm[i]);
+                self.field_at(field, vertex, moved)
             }
         }
     }
@@ -147,7 +170,10 @@ impl View<'_> {
         };
         for (object, o) in (0..).zip(objects) {
             let r = &o.placement.rotation;
-            let found = o.shape.distance(local(&o.placement, p));
+            let found = match self.held(object) {
+                None => o.shape.distance(local(&o.placement, p)),
+                Some(held) => held.distance(o, p),
+            };
             let gap_mm = found.gap_mm / self.length;
             if gap_mm < nearest.gap_mm {
                 let n = found.normal;
@@ -182,7 +208,7 @@ impl View<'_> {
             Things::Field(field) => {
                 for vertex in 0..model.vertices() {
                     let away = self.shift_mm.map(|s| -s);
-                    let gap_mm = field.at(vertex, away).gap_mm;
+                    let gap_mm = self.field_at(field, vertex, away).gap_mm;
                     if gap_mm <= margin_mm {
                         each(vertex as u32, gap_mm);
                     }
@@ -204,8 +230,11 @@ impl View<'_> {
     /// A distance that is certainly free round a place, reference mm.
     fn clearance_mm(&self, objects: &[Object], at_mm: [f64; 3]) -> f64 {
         let p = self.seen(at_mm);
-        let free = |o: &Object| o.placement.clearance_mm(o.shape.as_ref(), p);
-        objects.iter().map(free).fold(f64::INFINITY, f64::min) / self.length
+        let free = |(i, o): (u32, &Object)| match self.held(i) {
+            None => o.placement.clearance_mm(o.shape.as_ref(), p),
+            Some(held) => held.clearance_mm(o, p),
+        };
+        (0..).zip(objects).map(free).fold(f64::INFINITY, f64::min) / self.length
     }
 
     /// Whether anything has friction.
@@ -222,7 +251,8 @@ impl View<'_> {
         let seen = self.seen(at_mm);
         match self.things {
             Things::Objects(objects) => {
-                objects.get(object as usize).map(|o| local(&o.placement, seen))
+                let at = self.drawn_back(object, seen, -1.0);
+                objects.get(object as usize).map(|o| local(&o.placement, at))
             }
             Things::Field(_) => Some(seen),
         }
@@ -234,20 +264,28 @@ impl View<'_> {
             Things::Objects(objects) => {
                 let Placement { rotation, origin_mm } = &objects.get(object as usize)?.placement;
                 let turned = |i: usize| (0..3).map(|k| rotation[i][k] * place_mm[k]).sum::<f64>();
-                std::array::from_fn(|i| turned(i) + origin_mm[i])
+                let there = std::array::from_fn(|i| turned(i) + origin_mm[i]);
+                self.drawn_back(object, there, 1.0)
             }
             Things::Field(_) => place_mm,
         };
         Some(std::array::from_fn(|i| there[i] / self.length + self.shift_mm[i]))
     }
 
-    fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
+    /// A place moved with an object that is held, so many times.
+    fn drawn_back(&self, object: u32, at: [f64; 3], times: f64) -> [f64; 3] {
+        self.held(object)
+            .map_or(at, |held| std::array::from_fn(|i| at[i] + times * held.back_mm * held.way[i]))
+    }
+
+    /// A place of the reference finger as objects that have not moved see it, mm of the person.
+    pub(crate) fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.length * (at_mm[i] - self.shift_mm[i]))
     }
 }
 
 /// A place in the frame of a placed object.
-fn local(Placement { rotation: r, origin_mm }: &Placement, p: [f64; 3]) -> [f64; 3] {
+pub(crate) fn local(Placement { rotation: r, origin_mm }: &Placement, p: [f64; 3]) -> [f64; 3] {
     let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
     [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
 }

@@ -10,6 +10,10 @@ use crate::objects::View;
 const STIFFNESS_PA: f64 = 20090.0;
 const EXPONENT: f64 = 0.6;
 const RELIEF: f64 = 0.35;
+/// Cosine between the skin's and an object's outward normals above which a spring does not push in,
+/// and the part of the force by such springs above which an answer is rough.
+const TURNED: f64 = -0.3;
+const TURNED_MAX: f64 = 0.03;
 
 /// Presses the vertices `candidates`.
 pub(crate) fn press(
@@ -24,7 +28,7 @@ pub(crate) fn press(
         (at, view.nearest(model, vertex as usize, [0.0; 3]))
     };
     let deepest = candidates.iter().map(|v| -depth(v).1.gap_mm).fold(0.0, f64::max);
-    let mut size_n = 0.0;
+    let (mut size_n, mut turned_n) = (0.0, 0.0);
     for candidate in candidates {
         let (at, nearest) = depth(candidate);
         let vertex = candidate.1;
@@ -36,8 +40,13 @@ pub(crate) fn press(
             out.press(vertex, pressure as f32);
             out.add(at, nearest.normal.map(|n| size * n), size, area);
             size_n += size;
+            let skin = model.normals[vertex as usize];
+            let facing: f64 = (0..3).map(|i| f64::from(skin[i]) * nearest.normal[i]).sum();
+            turned_n += if facing > TURNED { size } else { 0.0 };
         }
     }
+    // Skin deep in what is narrow is nearer to its sides: springs push it there.
+    out.quality.settled &= turned_n <= TURNED_MAX * size_n;
     out.effort.distances += 2 * candidates.len() as u32;
     out.penetration_mm = deepest;
     out.finish(person, size_n);

@@ -231,7 +231,7 @@ impl Finger {
         let told = |on: bool, flag: u8| if on && is_solved { flag } else { 0 };
         let flags = told(quality.out_of_range, flags::OUT_OF_RANGE)
             | told(!quality.settled, flags::UNSETTLED)
-            | if peak_pa > 0.0 { 0 } else { flags::NO_CONTACT };
+            | if peak_pa > 0.0 || quality.is_held { 0 } else { flags::NO_CONTACT };
         let iterations = is_solved.then_some(self.out.effort.iterations);
         Taken { peak_pa, flags, iterations }
     }

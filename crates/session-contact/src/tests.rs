@@ -119,6 +119,44 @@ fn touch(hand: &Hand, finger: usize, payload: &[u8]) -> Result<(Touch, Taken), P
 
 use bytes::BytesMut;
 
+/// What lies deep goes on pressing, says so, and is no air; elsewhere it goes on from the same side.
+#[test]
+fn a_deep_body_presses_on_and_is_flagged() {
+    let plane = Plane::new();
+    for method in [
+        ContactMethod::Springs,
+        ContactMethod::SmallStrain,
+        ContactMethod::SecondOrder,
+        ContactMethod::CoarsePixels,
+        ContactMethod::Pixels,
+    ] {
+        let small = Hello { objects: Some(vec![ball(3.0)]), method: Some(method), ..objects() };
+        let [hand, elsewhere] = [0, 1].map(|_| plane.hand(&small).expect("a hand"));
+        let at = |depth_mm: f32| {
+            Pose { origin_mm: [0.0, 0.0, depth_mm - 3.0], ..Pose::default() }.encode()
+        };
+        let mut last_n = 0.0;
+        // As far as some of it lies behind this plane.
+        for step in 0..12 {
+            let depth_mm = 0.5 * step as f32;
+            let (found, taken) = touch(&hand, 0, &at(depth_mm)).expect("a touch");
+            let told = format!("{method:?}, {depth_mm} mm: {found:?} {taken:?}");
+            assert!(found.force_n[2] >= 0.98 * last_n, "falls: {told}");
+            if depth_mm > 2.1 {
+                assert_ne!(taken.flags & flags::OUT_OF_RANGE, 0, "silent: {told}");
+                assert_eq!(taken.flags & flags::NO_CONTACT, 0, "no contact: {told}");
+            }
+            last_n = found.force_n[2];
+        }
+        carry(&hand, &elsewhere);
+        let deep = at(5.7);
+        let [here, there] = [&hand, &elsewhere].map(|h| touch(h, 0, &deep).expect("a touch"));
+        let same =
+            |a: &Touch, b: &Touch| (a.force_n, a.pressure_max_pa) == (b.force_n, b.pressure_max_pa);
+        assert!(same(&here.0, &there.0), "{method:?}: {here:?} {there:?}");
+    }
+}
+
 #[test]
 fn a_pose_becomes_a_force_and_air_becomes_none() {
     let plane = Plane::new();

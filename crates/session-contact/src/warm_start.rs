@@ -1,6 +1,6 @@
 //! The warm start of a finger's solver as bytes.
 
-use papilla_contact::{Anchor, Memory, PixelMemory};
+use papilla_contact::{Anchor, Memory, PixelMemory, Side};
 use papilla_session_state::{Reader, StateError, Writer};
 
 /// More vertices than any patch holds, and than a map has pixels: what a damaged count can make the
@@ -18,6 +18,51 @@ pub(crate) fn write(memory: &Memory, state: &mut Writer) {
     let bits = |of: usize| reached.map(|reached| reached[of].to_bits());
     state.option(bits(0));
     state.option(bits(1));
+    write_sides(&memory.sides, state);
+}
+
+fn write_sides(sides: &[Side], state: &mut Writer) {
+    state.number(sides.len() as u64);
+    for Side { way, origin_mm, witness, is_held, is_guess, hardest } in sides {
+        for vector in [way, origin_mm] {
+            for i in 0..3 {
+                state.option(vector.map(|v| v[i].to_bits()));
+            }
+        }
+        state.option(witness.map(u64::from));
+        for i in 0..4 {
+            state.option(hardest.map(|v| v[i].to_bits()));
+        }
+        state.number(u64::from(*is_held) + 2 * u64::from(*is_guess));
+    }
+}
+
+fn read_sides(state: &mut Reader<'_>) -> Result<Vec<Side>, StateError> {
+    let count = state.count(VERTICES_MAX, "a number of objects")?;
+    let side = |_| {
+        let mut vectors = [Some([0.0; 3]); 2];
+        for vector in &mut vectors {
+            for i in 0..3 {
+                match (state.option()?, &mut *vector) {
+                    (Some(bits), Some(v)) => v[i] = f64::from_bits(bits),
+                    _ => *vector = None,
+                }
+            }
+        }
+        let [way, origin_mm] = vectors;
+        let witness = state.option()?.map(|vertex| vertex.min(u64::from(u32::MAX)) as u32);
+        let mut hardest = Some([0.0; 4]);
+        for i in 0..4 {
+            match (state.option()?, &mut hardest) {
+                (Some(bits), Some(v)) => v[i] = f64::from_bits(bits),
+                _ => hardest = None,
+            }
+        }
+        let bits = state.count(3, "how an object is held")?;
+        let (is_held, is_guess) = (bits & 1 != 0, bits & 2 != 0);
+        Ok(Side { way, origin_mm, witness, is_held, is_guess, hardest })
+    };
+    (0..count).map(side).collect()
 }
 
 /// Of a session whose objects may have friction.
@@ -80,6 +125,6 @@ pub(crate) fn read(state: &mut Reader<'_>) -> Result<Memory, StateError> {
     state.floats(made_with.as_flattened_mut())?;
     let [travel_mm, slope] = [state.option()?, state.option()?];
     let reached = travel_mm.zip(slope).map(|(a, b)| [a, b].map(f64::from_bits));
-    let anchors = Vec::new();
-    Ok(Memory { vertices, near, stride, made, forces_n, made_with, reached, anchors })
+    let (anchors, sides) = (Vec::new(), read_sides(state)?);
+    Ok(Memory { vertices, near, stride, made, forces_n, made_with, reached, anchors, sides })
 }

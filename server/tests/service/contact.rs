@@ -46,6 +46,33 @@ async fn poses_go_in_and_forces_come_out_without_a_network() {
     assert_eq!(touch.force_n.map(f32::to_bits), [0; 3]);
 }
 
+/// What goes deep presses on, is flagged, and is never told as air; what left presses no more.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_session_feels_what_lies_deep_and_says_so() {
+    const BALL_MM: f32 = 3.0;
+    let service = service().await;
+    let objects = json!([{"shape": {"shape": "sphere", "radius_mm": BALL_MM}}]);
+    for method in ["springs", "second_order", "pixels"] {
+        let mut socket = service.socket().await;
+        let hello = json!({"objects": objects, "map": false, "method": method});
+        socket.open(hello_3(&hello)).await;
+        let mut last_n = 0.0;
+        for (sequence, depth) in (1..).zip([-0.5, 0.2, 1.0, 2.5, 4.0, 5.5, -3.0]) {
+            let pose = Pose { origin_mm: [0.0, 0.0, depth - BALL_MM], ..Pose::default() };
+            socket.send(rows(sequence, 0, &[pose])).await;
+            let (header, touch, _) = hear(&mut socket).await;
+            let told = header.extension.unwrap().flags;
+            let is_air = told & flags::NO_CONTACT != 0;
+            assert_eq!(is_air, depth < 0.0, "{method}, {depth} mm: {touch:?}");
+            if depth > 2.1 {
+                assert_ne!(told & flags::OUT_OF_RANGE, 0, "{method}, {depth} mm is silent");
+            }
+            assert!(is_air || touch.force_n[2] >= last_n, "{method}, {depth} mm: {touch:?}");
+            last_n = touch.force_n[2];
+        }
+    }
+}
+
 /// A ball between four vertices, none of which it touches.
 #[tokio::test(flavor = "multi_thread")]
 async fn on_pixels_a_session_feels_what_lies_between_vertices() {

@@ -107,8 +107,11 @@ impl Solver {
     ) -> Result<(), ContactError> {
         self.within(objects.into(), 0.0, |solver, view| {
             require_slippery(view)?;
+            (solver.sides.toward, solver.sides.fine) = (None, true);
             solver.frame_until(AT_VERTICES_MM, view, out)?;
-            pixels.refine(solver, view, out)
+            pixels.refine(solver, solver.held(view), out)?;
+            solver.end_frame(view, out);
+            Ok(())
         })
     }
 
@@ -126,14 +129,17 @@ impl Solver {
         net.validate()?;
         self.within(objects.into(), 0.0, |solver, view| {
             require_slippery(view)?;
+            (solver.sides.toward, solver.sides.fine) = (Some(net.direction), true);
             if solver.reached.is_none() {
                 // Vertices may see nothing of what pixels do; then the way begins where objects are.
                 let _ = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame);
             }
-            solver.travel_until(view, net, PIXELS, out, |solver, view, out| {
+            let travel = solver.travel_until(view, net, PIXELS, out, |solver, view, out| {
                 solver.frame_until(AT_VERTICES_MM, view, out)?;
-                pixels.refine(solver, view, out)
-            })
+                pixels.refine(solver, solver.held(view), out)
+            })?;
+            solver.follow_slip(view);
+            Ok(travel)
         })
     }
 }
@@ -187,7 +193,10 @@ impl PixelContact {
         self.turns.forget();
     }
 
-    fn answer(&mut self, model: &ContactModel, person: Person, out: &mut Contact) {
+    /// Sums what pixels hold; `strength` multiplies it, and has a slope.
+    fn answer(&mut self, solver: &Solver, out: &mut Contact) {
+        let (model, person) = (&solver.model, solver.person());
+        let strength = solver.strength();
         let Self { window, pressure, held_pa, map_pa, peak_pa, skin, .. } = self;
         *peak_pa = 0.0;
         let unit_pa = unit_pa(person);
@@ -210,6 +219,9 @@ impl PixelContact {
         }
         // Beside steep edges a cubic falls below zero.
         map_pa.iter_mut().for_each(|p| *p = p.max(0.0));
+        if let Some((strength, _)) = strength {
+            map_pa.iter_mut().for_each(|p| *p *= strength as f32);
+        }
         *peak_pa = map_pa.iter().copied().fold(0.0, f32::max);
         for vertex in 0..model.vertices() {
             let p = window.vertex_pressure(vertex);
@@ -218,5 +230,8 @@ impl PixelContact {
             }
         }
         out.finish(person, size_n);
+        if let Some((strength, slope)) = strength {
+            out.strengthen(strength, slope / person.width);
+        }
     }
 }

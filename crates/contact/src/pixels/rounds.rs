@@ -67,7 +67,7 @@ impl PixelContact {
                 self.turns.forget();
             }
         }
-        self.answer(model, person, out);
+        self.answer(solver, out);
         Ok(())
     }
 

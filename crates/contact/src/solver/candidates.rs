@@ -4,17 +4,28 @@ use super::{CANDIDATE_MM, KEPT_MM, Solver};
 use crate::answer::Effort;
 use crate::objects::View;
 
+/// Vertices that things may touch.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    /// Free distance, reference mm, and vertex.
+    pub(super) candidates: &'a [(f64, u32)],
+    /// Whether all things are far from all of the finger.
+    pub(super) is_far: bool,
+}
+
 impl Solver {
-    pub(super) fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) {
+    /// Finds them; returns whether all things are far from all of the finger.
+    pub(super) fn find_candidates(&mut self, view: View<'_>, effort: &mut Effort) -> bool {
         let Self { model, candidates, wanted, patch, .. } = self;
         for (_, vertex) in candidates.drain(..) {
             wanted[vertex as usize] = false;
         }
-        effort.distances += view.near(model, KEPT_MM, |vertex, free| {
+        let asked = view.near(model, KEPT_MM, |vertex, free| {
             if free < CANDIDATE_MM || (free < KEPT_MM && patch.slot(vertex).is_some()) {
                 candidates.push((free, vertex));
             }
         });
+        effort.distances += asked;
         effort.candidates = candidates.len() as u32;
         let [slots, _] = patch.room();
         self.overflow = candidates.len() > slots;
@@ -25,6 +36,7 @@ impl Solver {
         for (_, vertex) in candidates {
             wanted[*vertex as usize] = true;
         }
+        asked <= 1
     }
 
     /// Makes the patch hold the candidates.

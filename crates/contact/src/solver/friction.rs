@@ -311,8 +311,10 @@ impl Solver {
 
     /// Ends a frame: what stuck is held where it was, what slipped where it is.
     pub(crate) fn follow_slip(&mut self, view: View<'_>) {
-        if let Some(friction) = self.friction.as_mut().filter(|f| f.is_rough) {
-            friction.follow(view, &self.model, &self.patch);
+        let Self { friction, model, patch, sides, .. } = self;
+        if let Some(friction) = friction.as_mut().filter(|f| f.is_rough) {
+            friction.follow(sides.view(view), model, patch);
         }
+        sides.keep();
     }
 }

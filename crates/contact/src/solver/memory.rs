@@ -1,6 +1,6 @@
 //! What a solver keeps from frame to frame: the start of the next one, elsewhere as here.
 
-use super::{Anchor, Reached, Solver};
+use super::{Anchor, Reached, Side, Solver};
 use crate::bounded::Symmetric;
 
 /// The warm start of a [`Solver`]: from the same memory the same frame gets the same bits.
@@ -22,6 +22,8 @@ pub struct Memory {
     pub reached: Option<[f64; 2]>,
     /// Where points in contact would be carried from by friction.
     pub anchors: Vec<Anchor>,
+    /// By object, from which side it came.
+    pub sides: Vec<Side>,
 }
 
 impl Solver {
@@ -41,6 +43,7 @@ impl Solver {
             made_with: (0..self.made).map(|i| [a[i], b[i], c[i], self.made_with[i]]).collect(),
             reached: self.reached.map(|r| [r.travel_mm, r.slope_n_per_mm]),
             anchors: self.friction.iter().flat_map(|f| f.anchors()).collect(),
+            sides: self.sides.kept().to_vec(),
         }
     }
 
@@ -49,12 +52,14 @@ impl Solver {
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
         self.reset();
-        let Memory { vertices, near, stride, made, forces_n, made_with, reached, anchors } = memory;
+        let Memory { vertices, near, stride, made, forces_n, made_with, .. } = memory;
+        let Memory { reached, anchors, sides, .. } = memory;
         let fits = forces_n.len() == vertices.len()
             && *near <= vertices.len()
             && (*made == 0 || made == near)
             && made_with.len() == *made
             && self.patch.refill(&self.model, vertices, *near, *stride)
+            && self.sides.recall(sides)
             && anchors.iter().all(|a| self.friction.as_mut().is_some_and(|f| f.hold(*a)));
         if !fits {
             self.reset();

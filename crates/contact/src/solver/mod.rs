@@ -11,6 +11,7 @@ mod candidates;
 mod friction;
 mod iteration;
 mod memory;
+mod sides;
 
 use crate::answer::{Contact, Effort, Person, collect};
 use crate::bounded::{BoundedSolver, Symmetric};
@@ -22,9 +23,12 @@ use crate::objects::{Scene, Things, View, validate};
 use crate::patch::{Patch, Slots};
 use crate::second_order::Amplitudes;
 use crate::springs;
+use candidates::Seen;
 pub use friction::Anchor;
 use friction::Friction;
 pub use memory::Memory;
+pub use sides::Side;
+use sides::Sides;
 use std::sync::Arc;
 
 /// Undeformed vertices nearer than this may come into contact, reference mm.
@@ -112,6 +116,8 @@ pub struct Solver {
     /// Gaps of this frame.
     field: Field,
     friction: Option<Friction>,
+    /// From which side each object came.
+    pub(crate) sides: Sides,
     /// Where the last frame under a net force ended.
     pub(crate) reached: Option<Reached>,
 }
@@ -149,6 +155,7 @@ impl Solver {
             candidates: Vec::with_capacity(model.vertices()),
             overflow: false,
             field: Field::with_capacity(model.vertices()),
+            sides: Sides::new(settings.method == Method::Springs),
             reached: None,
             friction: settings.friction.then(|| Friction::new(model.vertices(), [slots, row])),
             patch,
@@ -157,8 +164,14 @@ impl Solver {
         })
     }
 
-    /// Forgets the last frame.
+    /// Forgets the frames before.
     pub fn reset(&mut self) {
+        self.forget_start();
+        self.sides.forget();
+    }
+
+    /// Forgets the last frame, but not from which side objects came.
+    fn forget_start(&mut self) {
         self.patch.clear();
         self.made = 0;
         self.reached = None;
@@ -210,10 +223,28 @@ impl Solver {
         out: &mut Contact,
     ) -> Result<(), ContactError> {
         self.within(scene.into(), KEPT_MM as f32, |solver, view| {
+            (solver.sides.toward, solver.sides.fine) = (None, false);
             solver.frame(view, out)?;
-            solver.follow_slip(view);
+            solver.end_frame(view, out);
             Ok(())
         })
+    }
+
+    /// What the force of the trusted depth was multiplied by in the last frame, and its slope over
+    /// that force, 1 / (reference mm).
+    pub(crate) fn strength(&self) -> Option<(f64, f64)> {
+        self.sides.strength(&self.model)
+    }
+
+    /// The view in which the last frame was solved: what is held stands where it is held.
+    pub(crate) fn held<'a>(&'a self, view: View<'a>) -> View<'a> {
+        self.sides.view(view)
+    }
+
+    /// Ends a frame of things in given places: force that has fallen on a straight way in is told.
+    pub(crate) fn end_frame(&mut self, view: View<'_>, out: &mut Contact) {
+        out.quality.settled &= !self.sides.has_faded(out.force_n);
+        self.follow_slip(view);
     }
 
     /// Runs `work` on a view of the scene, of which gaps are told up to `reach_mm`.
@@ -227,7 +258,7 @@ impl Solver {
         match scene {
             Scene::Objects(objects) => {
                 validate(objects)?;
-                let view = View { things: Things::Objects(objects), length, shift_mm: [0.0; 3] };
+                let view = View::of(Things::Objects(objects), length);
                 self.expect_friction(view)?;
                 work(self, view)
             }
@@ -235,7 +266,7 @@ impl Solver {
                 let mut field = std::mem::take(&mut self.field);
                 let read = field.read(&self.model, gaps, length, reach_mm);
                 let result = read.and_then(|()| {
-                    let view = View { things: Things::Field(&field), length, shift_mm: [0.0; 3] };
+                    let view = View::of(Things::Field(&field), length);
                     self.expect_friction(view)?;
                     if let Some(friction) = &mut self.friction {
                         friction.carry(|vertex| field.moved_mm(vertex));
@@ -273,14 +304,17 @@ impl Solver {
         view: View<'_>,
         out: &mut Contact,
     ) -> Result<(), ContactError> {
-        if self.attempt(settled_mm, view, out) {
+        let mut sides = std::mem::take(&mut self.sides);
+        let mut is_found = self.attempt(settled_mm, view, &mut sides, out);
+        if !is_found {
+            self.forget_start();
+            is_found = self.attempt(settled_mm, view, &mut sides, out);
+        }
+        self.sides = sides;
+        if is_found {
             return Ok(());
         }
-        self.reset();
-        if self.attempt(settled_mm, view, out) {
-            return Ok(());
-        }
-        self.reset();
+        self.forget_start();
         out.clear();
         Err(ContactError::Diverged)
     }
@@ -301,13 +335,43 @@ impl Solver {
     }
 
     /// Whether what came out is finite.
-    fn attempt(&mut self, settled_mm: f32, view: View<'_>, out: &mut Contact) -> bool {
+    fn attempt(
+        &mut self,
+        settled_mm: f32,
+        view: View<'_>,
+        sides: &mut Sides,
+        out: &mut Contact,
+    ) -> bool {
         out.pressure_pa.resize(self.model.vertices(), 0.0);
         if self.settings.friction {
             out.shear_pa.resize(self.model.vertices(), [0.0; 3]);
         }
         out.clear();
+        let is_far = self.find_candidates(view, &mut out.effort);
+        let seen = Seen { candidates: &self.candidates, is_far };
+        sides.judge(&self.model, view, seen, &mut out.effort);
+        if !sides.any_held() {
+            let is_finite = self.press(settled_mm, view, false, out);
+            out.quality.out_of_range |= sides.is_beyond();
+            return is_finite;
+        }
+        let view = sides.view(view);
         self.find_candidates(view, &mut out.effort);
+        let is_finite = self.press(settled_mm, view, true, out);
+        out.quality.is_held = true;
+        out.quality.out_of_range |= sides.is_beyond();
+        if !(out.force_n.iter().any(|f| *f != 0.0)) {
+            // A body in the finger presses, but nothing was found by which.
+            out.quality.out_of_range = true;
+        }
+        if let Some((strength, slope)) = sides.strength(&self.model) {
+            out.strengthen(strength, slope / self.settings.person.width);
+        }
+        is_finite && out.is_finite()
+    }
+
+    /// Presses the candidates; returns whether what came out is finite.
+    fn press(&mut self, settled_mm: f32, view: View<'_>, is_held: bool, out: &mut Contact) -> bool {
         // Where no undeformed vertex lies in a thing, no force is an answer; a warm start could find
         // another one, on the far side of something thin.
         if self.candidates.iter().all(|(free, _)| *free > 0.0) {
@@ -327,7 +391,12 @@ impl Solver {
             return false;
         }
         if change > UNSETTLED_MM {
-            self.take_mean();
+            // Skin slips off what is narrow and deep: of that the undeformed skin tells more.
+            if is_held {
+                self.press_undeformed(view, &mut out.effort);
+            } else {
+                self.take_mean();
+            }
         }
         if !self.patch.values.size[..self.patch.near()].iter().any(|s| *s > 0.0) {
             self.press_undeformed(view, &mut out.effort);

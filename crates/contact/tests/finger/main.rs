@@ -2,6 +2,7 @@
 //!
 //! The finger is made here, unless `PAPILLA_CONTACT_MODEL` names a file of `fe-datagen contact`.
 
+mod deep;
 mod support;
 
 use papilla_contact::{Arrays, Contact, Gaps, Header, Object, Settings, Solver};
@@ -59,7 +60,9 @@ fn any_pose_of_any_shape_is_answered() {
         let nearest = finger.clearance_mm(&objects);
         let pressed = !out.touched().is_empty();
         assert!(pressed || nearest > -1e-3, "missed by {nearest} mm, {told}");
-        assert!(!pressed || nearest < 0.0, "pressure across {nearest} mm, {told}");
+        // What is thinner than vertices are apart can lie in the finger and at none of them.
+        let is_held = out.quality.is_held;
+        assert!(!pressed || nearest < 0.0 || is_held, "pressure across {nearest} mm, {told}");
         let judged = out.quality.settled && !out.quality.out_of_range;
         assert!(!judged || out.penetration_mm < 5e-3, "{} mm left, {told}", out.penetration_mm);
         touching += usize::from(pressed);

@@ -1,6 +1,7 @@
 //! A curved finger and objects thrown at it.
 
-use papilla_contact::{Arrays, ContactModel, Header, Object};
+use papilla_atlas::{Atlas, PatchVertices};
+use papilla_contact::{Arrays, ContactModel, Header, Layer, Object};
 use papilla_sdf::{
     Cylinder, Dots, Grating, Mesh, Placement, Plate, Punch, Ring, RoundedPlate, SignedDistance,
     Sphere, Wedge,
@@ -40,11 +41,27 @@ pub(crate) fn arrays() -> (Header, Arrays) {
     }
 }
 
+/// The atlas of [`Finger::new`]: the real one's beside its file, else a plane grid.
+pub(crate) fn atlas() -> Atlas {
+    if let Ok(file) = std::env::var(FILE) {
+        let beside = std::path::Path::new(&file).with_file_name("atlas.json");
+        let text = std::fs::read_to_string(beside).expect("an atlas beside the model");
+        return Atlas::from_json(&text).expect("an atlas");
+    }
+    let arrays = arrays().1;
+    let positions_mm = arrays.positions_mm.as_chunks::<3>().0.to_vec();
+    let triangles = arrays.triangles.as_chunks::<3>().0.to_vec();
+    let uv = |i: usize| [(i / SIDE[0]) as f32 * 8.0 + 16.0, 206.0 - (i % SIDE[0]) as f32 * 7.0];
+    let uv_px = (0..positions_mm.len()).map(uv).collect();
+    let patch = PatchVertices { positions_mm, uv_px };
+    Atlas::new(0.08, triangles, patch.clone(), patch).expect("an atlas")
+}
+
 const HALF_MM: [f64; 3] = [10.0, 7.0, 6.0];
 const MODULUS_MPA: f64 = 0.1;
+const SIDE: [usize; 2] = [29, 23];
 
 fn ellipsoid() -> (Header, Arrays) {
-    const SIDE: [usize; 2] = [29, 23];
     let angle = |k: usize, n: usize| (2.0 * k as f64 / (n - 1) as f64 - 1.0) * 1.05;
     let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for row in 0..SIDE[1] {
@@ -69,6 +86,7 @@ fn ellipsoid() -> (Header, Arrays) {
         share_max: 1.0,
         depth_max_mm: 1.0,
         atlas_hash: "ellipsoid".into(),
+        layers: vec![Layer { young_mpa: 0.075, poisson: 0.49, thickness_mm: 60.0 }],
         ..Header::current()
     };
     (header, Arrays::half_space(positions, normals, areas, triangles, MODULUS_MPA))
@@ -158,6 +176,54 @@ impl Finger {
         let at = self.places_mm[throw.vertex];
         let origin_mm = std::array::from_fn(|i| at[i] + throw.depth_mm * up[i] - tip[i]);
         Object::rigid(shape.clone(), Placement { rotation, origin_mm })
+    }
+
+    /// The lowest vertex.
+    pub(crate) fn lowest(&self) -> usize {
+        let lower = |i: &usize, j: &usize| self.places_mm[*i][2].total_cmp(&self.places_mm[*j][2]);
+        (0..self.places_mm.len()).min_by(lower).expect("a vertex")
+    }
+
+    /// Vertices of the pad, far from where the skin ends.
+    pub(crate) fn inner(&self) -> Vec<usize> {
+        let [x, y, _] = self.places_mm[self.lowest()];
+        let is_near = |i: &usize| {
+            let at = self.places_mm[*i];
+            (at[0] - x).abs() < 3.0 && (at[1] - y).abs() < 2.5
+        };
+        (0..self.places_mm.len()).filter(is_near).collect()
+    }
+
+    /// Whether the tip of an object lies in the finger, a millimetre or more from where its skin ends.
+    pub(crate) fn holds(&self, object: &Object) -> bool {
+        let inward = [0, 1, 2].map(|i| object.placement.rotation[i][2]);
+        let reach = object.placement.reach_mm(object.shape.as_ref(), inward);
+        let o = object.placement.origin_mm;
+        let along: f64 = (0..3).map(|i| o[i] * inward[i]).sum();
+        let tip: [f64; 3] = std::array::from_fn(|i| o[i] + (reach - along) * inward[i]);
+        let top = self.places_mm.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
+        let nearest = |a: &usize, b: &usize| {
+            let away =
+                |i: usize| (0..3).map(|k| (self.places_mm[i][k] - tip[k]).powi(2)).sum::<f64>();
+            away(*a).total_cmp(&away(*b))
+        };
+        let vertex = (0..self.places_mm.len()).min_by(nearest).expect("a vertex");
+        let above: f64 =
+            (0..3).map(|i| (tip[i] - self.places_mm[vertex][i]) * self.normals[vertex][i]).sum();
+        above < -0.3 && tip[2] < top - 1.0
+    }
+
+    /// Whether the tip of an object lies below where the skin ends above.
+    pub(crate) fn is_about(&self, object: &Object) -> bool {
+        let tip = object.placement.reach_mm(object.shape.as_ref(), [0.0, 0.0, 1.0]);
+        tip < self.places_mm.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Whether all of the finger lies below an object, or nearly.
+    pub(crate) fn is_below(&self, object: &Object) -> bool {
+        let low = -object.placement.reach_mm(object.shape.as_ref(), [0.0, 0.0, -1.0]);
+        let top = self.places_mm.iter().map(|p| p[2]).fold(f64::NEG_INFINITY, f64::max);
+        low > top - 0.5
     }
 
     /// Least distance of the undeformed skin from the objects, mm.
