@@ -156,8 +156,15 @@ fn a_file_that_cannot_be_read_is_named_once() {
         (&["dataset", "stats", "empty.toml"], &["empty.toml/manifest.json", "Not a directory"]),
         (&["contact", "none", "--out", "out"], &["none/manifest.json", "No such file"]),
         (&["solve", "good.toml", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+        (&["effects", "good.toml", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+        (&["operator", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+        (&["wedge", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+        (&["stability", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
+        (&["solve", "campaign.toml", "--out", "out"], &["campaign.toml", "is a campaign"]),
+        (&["generate", "good.toml", "--out", "out"], &["good.toml", "is a scene", "`solve`"]),
     ] {
         std::fs::write(folder.path().join("good.toml"), BLOCK).unwrap();
+        std::fs::write(folder.path().join("campaign.toml"), "presses = 4\n").unwrap();
         let output = run(folder.path(), arguments);
         let error = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");

@@ -22,6 +22,7 @@
 
 mod error;
 mod images;
+mod lattice;
 mod limits;
 mod manifest;
 mod maps;
@@ -38,6 +39,7 @@ pub mod testing;
 
 pub use error::DatasetError;
 pub use images::{ImageEntry, ImageOptions, ImagesReport, images};
+pub use lattice::TriangleOnLattice;
 pub use limits::{
     BALANCE_RELATIVE_MAX, PENETRATION_MM_MAX, RESIDUAL_RELATIVE_MAX, fault, worst_checks,
 };
@@ -50,9 +52,7 @@ pub use reader::{Dataset, VerifyReport, verify};
 pub use record::{Cells, Checks, Pose, Sample};
 pub use replay::replay;
 pub use schema::{ArraySpec, FormatSchema, RASTER_ARRAYS, SHARD_ARRAYS, schema};
-pub use shard::{
-    CHECK_COLUMNS, Encoded, Shard, TriangleOnLattice, encode, raster_npz, write_atlas,
-};
+pub use shard::{CHECK_COLUMNS, Encoded, Shard, encode, raster_npz, write_atlas};
 pub use sheet::contact_sheet;
 pub use stats::{DepthStats, Range, StatsReport, stats};
 

@@ -13,6 +13,7 @@ mod states;
 pub use states::{Field, ShardMaps};
 
 use super::{Cells, DatasetError, Shard, TriangleOnLattice};
+use crate::lattice::places;
 use finder::Finder;
 use ndarray::{Ix1, Ix2};
 use papilla_atlas::{Atlas, Patch, Raster};
@@ -48,20 +49,6 @@ impl Pixels {
         };
         Self { raster, points }
     }
-}
-
-/// Where on the lattice the middle of each pixel of a raster lies: its side, row and column. Of 32
-/// bits, as `raster.npz` holds them.
-pub(super) fn places<'a>(
-    raster: &'a Raster,
-    lattice: &'a [TriangleOnLattice],
-) -> impl Iterator<Item = (u32, [f32; 2])> + 'a {
-    raster.pixels().iter().map(|pixel| {
-        let TriangleOnLattice { side, place } = lattice[pixel.triangle as usize];
-        let corners = place.into_iter().zip(pixel.weights);
-        let sum = |k: usize| corners.clone().map(|(c, w)| c[k] * f64::from(w)).sum::<f64>();
-        (side, [sum(0) as f32, sum(1) as f32])
-    })
 }
 
 impl Maps {

@@ -1,7 +1,7 @@
 //! Shards: the vertex values of one indentation in one archive.
 
 use super::{DatasetError, fault, worst_checks};
-use crate::maps::places;
+use crate::lattice::{TriangleOnLattice, places};
 use crate::record::{Cells, Checks, Sample};
 use ndarray::{Array, Array1, Array2, Array3, Dimension, Ix1, Ix2, Ix3, StrideShape};
 use papilla_atlas::{Atlas, Patch, Raster};
@@ -290,15 +290,6 @@ fn shaped<T, D: Dimension>(
         let what = "the values of a dataset's states".into();
         OutputError::Length { what, found, expected }.into()
     })
-}
-
-/// Where the corners of a triangle of the atlas lie on the lattice of [`Cells`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangleOnLattice {
-    /// Side of the half cube.
-    pub side: u32,
-    /// Row and column of each corner.
-    pub place: [[f64; 2]; 3],
 }
 
 /// The bytes of `raster.npz`: for `skin` and `interface` the arrays `_pixel`

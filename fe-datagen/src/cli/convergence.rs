@@ -44,6 +44,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let wanted = |only: &[String], name: &str| only.is_empty() || only.iter().any(|o| o == name);
     let cases: Vec<_> = CASES.iter().filter(|c| wanted(&args.case, c.name)).collect();
     let meshes: Vec<_> = MESHES.into_iter().filter(|m| wanted(&args.mesh, m.name)).collect();
+    papilla_output::atomic::create_folder(&args.out)?;
     let progress = Progress::new("solutions", cases.len() * meshes.len(), 0, args.json);
     let tell = &mut |what: &str, done: usize, _: usize| {
         progress.set_position(done);

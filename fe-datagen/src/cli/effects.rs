@@ -46,10 +46,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     if !args.seconds.is_empty() {
         return at_rates(&scene, args);
     }
+    writable(args)?;
     let study = study(&scene, args)?;
     let table = markdown(&study);
     if let Some(out) = &args.out {
-        atomic::create_folder(out)?;
         atomic::write_json(&out.join("effects.json"), &study)?;
         atomic::write(&out.join("effects.md"), table.as_bytes())?;
         write_svg(&out.join("effects.svg"), &chart(&study))?;
@@ -58,16 +58,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Makes the folder for table and plot before anything is solved.
+fn writable(args: &Args) -> anyhow::Result<()> {
+    Ok(args.out.as_deref().map_or(Ok(()), atomic::create_folder)?)
+}
+
 /// A study for each time that the path is taken in.
 fn at_rates(scene: &Scene, args: &Args) -> anyhow::Result<ExitCode> {
     let (mut studies, mut text) = (Vec::new(), String::new());
+    let mut scenes = Vec::new();
     for &seconds in &args.seconds {
-        let found = study(&effect_study::taken_in(scene, seconds)?, args)?;
+        scenes.push((seconds, effect_study::taken_in(scene, seconds)?));
+    }
+    writable(args)?;
+    for (seconds, scene) in scenes {
+        let found = study(&scene, args)?;
         let _ = write!(text, "## In {seconds} s\n\n{}\n", markdown(&found));
         studies.push(found);
     }
     if let Some(out) = &args.out {
-        atomic::create_folder(out)?;
         atomic::write_json(&out.join("effects.json"), &studies)?;
         atomic::write(&out.join("effects.md"), text.as_bytes())?;
     }

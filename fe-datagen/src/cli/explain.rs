@@ -1,6 +1,6 @@
 //! `explain`: what a scene is going to simulate and cost, before it runs.
 
-use super::{explain_campaign, print};
+use super::{BETTER, explain_campaign, print};
 use papilla_fingertip::forecast::{Forecast, SedError, better};
 use papilla_fingertip::scene::effects::{EFFECTS, Effect};
 use papilla_fingertip::scene::{Geometry, Output, Plan, Scene};
@@ -24,9 +24,6 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
 }
-
-/// How a scene asks for what [`better`] gives.
-pub(super) const BETTER: &str = "with density = \"medium\", order = \"graded\" (the defaults)";
 
 /// An effect that is simulated.
 #[derive(Serialize)]

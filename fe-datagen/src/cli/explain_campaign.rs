@@ -1,7 +1,6 @@
 //! `explain` of a campaign: what a task of a cluster has to ask for.
 
-use super::explain::BETTER;
-use super::print;
+use super::{BETTER, print};
 use papilla_fingertip::campaign::{CampaignSpec, Candidate, Indentation, indentations};
 use papilla_fingertip::forecast::{Forecast, SedError};
 use papilla_fingertip::mesh::fingertip::Order;

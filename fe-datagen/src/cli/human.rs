@@ -50,6 +50,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         density: args.density.into(),
         only: args.only.clone(),
     };
+    papilla_output::atomic::create_folder(&args.out)?;
     let progress = Progress::new("presses", 0, 0, args.json);
     let tell = &mut |what: &str, done: usize, all: usize| {
         progress.set_length(all);

@@ -39,6 +39,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    // Before minutes of work: can it be written?
+    papilla_output::atomic::create_folder(&args.out)?;
     let begun_s = processor::thread_s();
     let (order, materials) = (Order::Linear, TissueTable::default());
     let density = args.density.into();

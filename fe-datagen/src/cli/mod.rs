@@ -95,6 +95,9 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// How a scene asks for the mesh that `papilla_fingertip::forecast::better` gives.
+const BETTER: &str = "with density = \"medium\", order = \"graded\" (the defaults)";
+
 /// Exit code of a run that finished but did not pass its own checks.
 const CHECKS_FAILED: u8 = 3;
 

@@ -3,9 +3,8 @@
 mod maps;
 mod press;
 
-use super::explain::BETTER;
 use super::signals::{self, INTERRUPTED};
-use super::{CHECKS_FAILED, print};
+use super::{BETTER, CHECKS_FAILED, print};
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::{SedError, better};

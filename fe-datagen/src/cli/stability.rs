@@ -68,6 +68,9 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    if let Some(folder) = &args.out {
+        atomic::create_folder(folder)?;
+    }
     if args.list {
         for case in CASES {
             println!("{:<18} {}", case.name, case.promise);

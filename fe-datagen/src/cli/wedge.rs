@@ -36,9 +36,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let (taken, density) = (Reading::from(args.reading), Density::from(args.density));
+    atomic::create_folder(&args.out)?;
     let outcome = simulate(taken, density)?;
     let summary = Summary::from(&outcome);
-    atomic::create_folder(&args.out)?;
     write(&args.out, &outcome, &summary)?;
     let reproduces = summary.reproduces();
     print(&summary, args.json, || format!("{}written to {}", summary.human(), args.out.display()))?;

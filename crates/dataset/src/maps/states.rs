@@ -61,7 +61,7 @@ impl<'a> ShardMaps<'a> {
             Field::SedDermis => shard.sed_dermis_j_per_m3.row(state),
             Field::SedEpidermis => shard.sed_epidermis_j_per_m3.row(state),
             Field::Shear(axis) => match &shard.shear_pa {
-                Some(shear) => return self.draw_signed(shear.slice(s![state, .., axis]), map),
+                Some(shear) => return self.draw_signed(&shear.slice(s![state, .., axis]), map),
                 None => {
                     map.fill(0.0);
                     return Ok(());
@@ -74,7 +74,7 @@ impl<'a> ShardMaps<'a> {
     /// A field of either sign: what is above 0 less what is below.
     fn draw_signed(
         &self,
-        values: ArrayView1<'_, f32>,
+        values: &ArrayView1<'_, f32>,
         map: &mut [f32],
     ) -> Result<(), DatasetError> {
         let reader = self.reader(Patch::Skin)?;

@@ -4,6 +4,7 @@ use super::error::SpecError;
 use crate::geometry::fingertip::FingertipShape;
 use crate::mesh::fingertip::{Density, Order};
 use crate::scene::effects::usual;
+use crate::scene::has_key;
 use crate::scene::{
     Biphasic, EffectName, Friction, Geometry, Motion, Origin, Pose, Scene, TissueTable,
 };
@@ -151,6 +152,10 @@ impl CampaignSpec {
     pub fn read(path: &Path) -> Result<Self, SpecError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| SpecError::Read { path: path.into(), source })?;
+        if has_key(&text, "geometry") {
+            let message = "is a scene, not a campaign: `fe-datagen explain` and `solve` take it";
+            return Err(SpecError::Spec { path: path.into(), message: message.into() });
+        }
         let mut spec: Self = toml::from_str(&text)
             .map_err(|e| SpecError::Spec { path: path.to_path_buf(), message: e.to_string() })?;
         spec.folder = path.parent().unwrap_or(Path::new("")).into();

@@ -93,7 +93,7 @@ pub fn better(geometry: &Geometry) -> Option<Geometry> {
     let (error, _) = SedError::of(geometry)?;
     let Geometry::Fingertip { shape, .. } = geometry else { return None };
     let (density, order) = (Density::Medium, Order::Graded);
-    (!error.is_small()).then(|| Geometry::Fingertip { density, order, shape: *shape })
+    (!error.is_small()).then_some(Geometry::Fingertip { density, order, shape: *shape })
 }
 
 #[cfg(test)]

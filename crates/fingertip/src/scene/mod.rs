@@ -90,6 +90,11 @@ pub fn schema() -> schemars::Schema {
 /// Largest coefficient of friction that is believed; dry skin on glass reaches 3.
 const FRICTION_MAX: f64 = 10.0;
 
+/// Whether a TOML file has this key at its top.
+pub(crate) fn has_key(text: &str, key: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key(key))
+}
+
 impl Scene {
     /// The default finger on the coarse even mesh and the 20 mm plate that presses it by 1 mm, with the
     /// surface-pressure study's analysis: quick, and SED is half wrong.
@@ -130,6 +135,10 @@ impl Scene {
     /// [`SceneError`] names the file and line, or the field and its rule.
     pub fn parse(path: &Path, text: String) -> Result<Self, SceneError> {
         let origin = Origin::new(path, text);
+        if has_key(origin.text(), "presses") {
+            let message = "is a campaign, not a scene: `fe-datagen explain` and `generate` take it";
+            return Err(SceneError::Incomplete { path: path.into(), message: message.into() });
+        }
         let parsed = toml::from_str::<Self>(origin.text());
         let mut scene = parsed.map_err(|e| SceneError::parse(&origin, &e))?;
         scene.folder = path.parent().unwrap_or(Path::new("")).into();
