@@ -29,6 +29,14 @@ sealed class Outcome
 /// <content>What is expected, and the patterns.</content>
 sealed partial class Run
 {
+    /// <summary>Throws where the environment asks for a locale with another decimal point than this program has.</summary>
+    internal static void CheckLocale()
+    {
+        var due = Environment.GetEnvironmentVariable("PAPILLA_DECIMAL");
+        var found = System.Globalization.CultureInfo.CurrentCulture.NumberFormat.NumberDecimalSeparator;
+        if (due != null && due != found) throw new Missed("the locale's decimal point is " + found);
+    }
+
     /// <summary>Does the steps of a case, and prints its line.</summary>
     internal bool Passes(JToken one)
     {

@@ -13,6 +13,7 @@ static class Conformance
 {
     static int Main(string[] arguments)
     {
+        Run.CheckLocale();
         var file = JObject.Parse(File.ReadAllText(Environment.GetEnvironmentVariable("PAPILLA_CONFORMANCE")));
         var url = Environment.GetEnvironmentVariable("PAPILLA_URL");
         var atlas = PapillaHttp.LoadAtlas(url);

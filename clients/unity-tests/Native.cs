@@ -16,6 +16,7 @@ static class Native
 
     static int Main(string[] arguments)
     {
+        Run.CheckLocale();
         var file = JObject.Parse(File.ReadAllText(Environment.GetEnvironmentVariable("PAPILLA_CONFORMANCE")));
         int failed = 0;
         foreach (var one in file["cases"])

@@ -16,6 +16,7 @@ PACKAGES = {
     "mono": "mono-runtime",
     "unshare": "util-linux",
     "ip": "iproute2",
+    "/usr/share/i18n/locales/tr_TR": "locales",
     "/usr/lib/cli/Newtonsoft.Json-5.0/Newtonsoft.Json.dll": "libnewtonsoft-json5.0-cil "
     "libmono-system-numerics4.0-cil libmono-system-runtime4.0-cil",
 }

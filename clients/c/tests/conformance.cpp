@@ -184,6 +184,11 @@ int main(int count, char** arguments) {
   std::stringstream text;
   text << file.rdbuf();
   Value script;
+  try {
+    take_locale();
+  } catch (const Nonconformity& error) {
+    return std::puts(error.what.c_str()), 2;
+  }
   if (!json::parse(text.str(), script)) return std::puts("the script cannot be read"), 2;
   int failed = 0;
   for (const Value& each : script["cases"].items) {

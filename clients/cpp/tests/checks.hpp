@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <clocale>
 #include <cmath>
 #include <cstdlib>
+#include <locale>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,6 +27,15 @@ inline std::string environment(const char* name) {
   const char* const value = std::getenv(name);
   must(value != nullptr, std::string(name) + " is not set");
   return value;
+}
+
+/// Takes the environment's locale, as a desktop's program does, where PAPILLA_DECIMAL says with which decimal point.
+inline void take_locale() {
+  const char* const due = std::getenv("PAPILLA_DECIMAL");
+  if (!due) return;
+  must(std::setlocale(LC_ALL, "") != nullptr, "there is no such locale here");
+  std::locale::global(std::locale(""));
+  must(std::string(std::localeconv()->decimal_point) == due, "the locale's decimal point is another");
 }
 
 inline void control(const std::string& action) {

@@ -316,6 +316,7 @@ class Run {
 int main() {
   int failed = 0;
   try {
+    take_locale();
     std::ifstream file(environment("PAPILLA_CONFORMANCE"));
     std::stringstream text;
     text << file.rdbuf();

@@ -1,4 +1,5 @@
 // Parts that a session against the service exercises only in its good cases.
+#include <clocale>
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -56,6 +57,28 @@ static void json() {
     CHECK(!parse(bad, value));
   }
   CHECK(!parse(std::string(100000, '['), value));
+}
+
+static void numbers() {
+  using papilla::number::print, papilla::number::read;
+  double value = 0.0;
+  for (const double due : {0.0, -2500.0, 1.5, 0.1, 1e-300, 1.7976931348623157e308, 4294967295.0, 12345.678901234567}) {
+    CHECK(read(print(due), value) && value == due);
+    CHECK(print(due).find(',') == std::string::npos);
+  }
+  CHECK(read("1E3", value) && value == 1000.0);
+  for (const char* bad : {"", "-", "+1", "1..2", "1,5", "1.5,", "1e", " 1", "1 ", "1e999", "inf", "nan"}) CHECK(!read(bad, value));
+  CHECK(print(std::nan("")) == "null");
+}
+
+// A hello that cannot be read is refused here, with the place: an empty one took its place, and the service
+// then asked for another version.
+static void hellos() {
+  papilla::Session::Options options;
+  options.hello = R"("objects": [{"shape": {"shape": "sphere", "radius_mm": 10,5}}])";
+  papilla::Session session(options);
+  CHECK(!session.open() && session.problem().code == "bad_json");
+  CHECK(session.problem().message.find("10,5") != std::string::npos);
 }
 
 static void messages() {
@@ -164,7 +187,11 @@ static void silence() {
 }
 
 int main() {
+  // As a desktop's program does: numbers of the protocol must not follow.
+  std::setlocale(LC_ALL, "");
   pieces();
+  numbers();
+  hellos();
   halves();
   json();
   messages();

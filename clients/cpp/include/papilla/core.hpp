@@ -2,6 +2,7 @@
 // Knows no thread and no transport, so that an engine can bring its own (clients/unreal).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -28,6 +29,16 @@ class Core {
   static std::string hello_text(const std::string& members) {
     return "{\"type\":\"hello\",\"version\":" + std::string(is_of_version_3(members) ? "3" : "2") +
            (members.empty() ? "" : "," + members) + "}";
+  }
+  /// Whether the members of a hello can be read; `problem` says where not.
+  static bool is_readable(const std::string& members, Problem& problem) {
+    json::Value hello;
+    std::size_t stop = 0;
+    if (json::parse("{" + members + "}", hello, &stop)) return true;
+    const std::string near = members.substr(std::min(members.size(), stop > 12 ? stop - 12 : 0), 24);
+    problem = {"bad_json", "the hello is no JSON near '" + near + "': its members are due, without braces, as "
+               "\"budget_us\": 11000, and numbers with a point, whatever the locale", "hello"};
+    return false;
   }
   /// Members of a hello of a client that moves when it is asked to.
   static std::string following(const std::string& members) {

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "number.hpp"
 
 namespace papilla::json {
 
@@ -50,16 +50,19 @@ namespace detail {
 
 class Reader {
  public:
-  explicit Reader(std::string_view text) : at_(text.data()), end_(text.data() + text.size()) {}
+  explicit Reader(std::string_view text) : begin_(text.data()), at_(text.data()), end_(text.data() + text.size()) {}
 
   bool document(Value& value) {
     if (!read(value, 0)) return false;
     blank();
     return at_ == end_;
   }
+  /// Bytes that were read: where it is no JSON.
+  std::size_t read_bytes() const { return static_cast<std::size_t>(at_ - begin_); }
 
  private:
   static constexpr int depth_max = 32;
+  const char* begin_;
   const char* at_;
   const char* end_;
 
@@ -118,17 +121,10 @@ class Reader {
   }
 
   bool number(Value& value) {
-    // strtod wants an end: a number is short.
-    char digits[64];
-    std::size_t n = 0;
-    while (at_ != end_ && n + 1 < sizeof digits && std::strchr("+-.eE0123456789", *at_) && *at_) {
-      digits[n++] = *at_++;
-    }
-    digits[n] = '\0';
-    char* stop = nullptr;
+    const char* const begin = at_;
+    while (at_ != end_ && *at_ && std::strchr("+-.eE0123456789", *at_)) ++at_;
     value.type = Value::Type::number;
-    value.number = std::strtod(digits, &stop);
-    return n != 0 && stop == digits + n;
+    return number::read({begin, static_cast<std::size_t>(at_ - begin)}, value.number);
   }
 
   bool text(std::string& out) {
@@ -187,10 +183,13 @@ class Reader {
 
 }  // namespace detail
 
-/// Reads a whole text; false if it is not JSON.
-inline bool parse(std::string_view text, Value& value) {
+/// Reads a whole text; false if it is not JSON, from byte `stop` on.
+inline bool parse(std::string_view text, Value& value, std::size_t* stop = nullptr) {
   value = Value();
-  return detail::Reader(text).document(value);
+  detail::Reader reader(text);
+  const bool good = reader.document(value);
+  if (stop) *stop = reader.read_bytes();
+  return good;
 }
 
 /// A string with its quotes.
@@ -210,11 +209,7 @@ inline std::string print(const Value& value) {
     case Value::Type::null: return "null";
     case Value::Type::boolean: return value.boolean ? "true" : "false";
     case Value::Type::string: return quoted(value.string);
-    case Value::Type::number: {
-      char digits[32];
-      std::snprintf(digits, sizeof digits, "%.17g", value.number);
-      return digits;
-    }
+    case Value::Type::number: return number::print(value.number);
     case Value::Type::array:
       for (const auto& item : value.items) out += (out.empty() ? "" : ",") + print(item);
       return "[" + out + "]";

@@ -53,7 +53,7 @@ class Session {
 
   /// Connects and says hello; false: `problem()` says why not.
   bool open() {
-    if (!connect()) return false;
+    if (!Core::is_readable(options_.hello, problem_) || !connect()) return false;
     reader_ = std::thread([this] { live(); });
     writer_ = std::thread([this] { write(); });
     return true;
@@ -128,6 +128,7 @@ class Session {
   bool renew(const std::string& hello, int timeout_ms = 30000) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (!core_.is_ready()) return problem_ = {"", "there is no session just now", ""}, false;
+    if (!Core::is_readable(hello, problem_)) return false;
     const std::string members = Core::following(hello);
     new_hello_ = Core::hello_text(members);
     is_answered_ = is_granted_ = false;

@@ -55,6 +55,13 @@ void UPapillaSessionComponent::BeginPlay()
 {
     Super::BeginPlay();
     Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
+    papilla::Problem Problem;
+    if (!papilla::Core::is_readable(ToUtf8(Hello), Problem))
+    {
+        UE_LOG(LogTemp, Error, TEXT("Papilla: %s"), *ToFString(Problem.message));
+        OnRefused.Broadcast(ToFString(Problem.code), ToFString(Problem.message));
+        return;
+    }
     Core = MakeUnique<papilla::Core>(papilla::Core::following(ToUtf8(Hello)));
     Core->on_answer = [this](const papilla::Answer& Outcome)
     {
