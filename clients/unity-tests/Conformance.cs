@@ -63,6 +63,8 @@ sealed partial class Run : IDisposable
         var expect = (JObject)step["expect"];
         switch ((string)step["do"])
         {
+            case "address": Address((string)step["address"], expect); break;
+            case "token": Token((string)step["token"], expect); break;
             case "hello": Hello(step, expect); break;
             case "frame": Frame(step, expect); break;
             case "burst": Burst(step, expect); break;
@@ -75,6 +77,41 @@ sealed partial class Run : IDisposable
             case "gaps": Gaps(step, expect); break;
             default: throw new Missed("no step " + step["do"]);
         }
+    }
+
+    void Address(string text, JObject expect)
+    {
+        if ((string)expect["status"] == "error")
+        {
+            Throws(() => new Session(text), expect);
+            Throws(() => PapillaHttp.LoadAtlas(text), expect);
+            return;
+        }
+        var address = new ServerAddress(text);
+        Same("sessions of " + text, address.Session(), (string)expect["session"]);
+        Same("the atlas of " + text, address.Http("/v1/atlas"), (string)expect["http"]);
+        new Session(text).Dispose();
+    }
+
+    void Token(string token, JObject expect)
+    {
+        if ((string)expect["status"] == "error") Throws(() => new Session(url, null, token), expect);
+        else Same("the token", ServerAddress.CleanToken(token), (string)expect["token"]);
+    }
+
+    static void Throws(Action use, JObject expect)
+    {
+        try
+        {
+            use();
+        }
+        catch (PapillaException error)
+        {
+            Same("code", error.Problem.Code, (string)expect["code"]);
+            if (!error.Message.Contains((string)expect["says"] ?? "")) throw new Missed(error.Message);
+            return;
+        }
+        throw new Missed("it is taken");
     }
 
     void Hello(JObject step, JObject expect)

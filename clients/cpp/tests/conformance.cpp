@@ -33,6 +33,7 @@ class Run {
         {"hello", &Run::hello},         {"frame", &Run::frame},         {"burst", &Run::burst},
         {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
         {"move", &Run::moved},
+        {"address", &Run::address},     {"token", &Run::token},
         {"contacts", &Run::contacts},   {"touch", &Run::touch},         {"gaps", &Run::gaps}};
     must(steps.count(name) != 0, "there is no step " + name);
     (this->*steps.at(name))(step);
@@ -47,6 +48,34 @@ class Run {
   std::uint64_t moved_ = 1;           ///< connections at the last move
   // Last: its threads end before what they use.
   std::unique_ptr<Session> session_;
+
+  void address(const Value& step) {
+    const net::Address address = net::Address::of(step["address"].string);
+    const Value& expect = step["expect"];
+    must(address.fault.empty() == (due_status(expect) == "ok"), step["address"].string + ": " + address.fault);
+    if (!address.fault.empty()) {
+      must(address.fault.find(expect["says"].string) != std::string::npos, address.fault);
+      must(http(step["address"].string, "GET", "/v1/atlas").problem.code == expect["code"].string, "another code");
+      Session::Options options;
+      options.url = step["address"].string;
+      Session session(options);
+      return must(!session.open() && session.problem().code == expect["code"].string, "a session has another code");
+    }
+    must(address.session() == expect["session"].string, "sessions are at " + address.session());
+    must(address.http("/v1/atlas") == expect["http"].string, "the atlas is at " + address.http("/v1/atlas"));
+  }
+
+  void token(const Value& step) {
+    std::string token = step["token"].string;
+    const bool good = net::clean_token(token);
+    must(good == (due_status(step["expect"]) == "ok"), "the token: " + token);
+    if (good) return must(token == step["expect"]["token"].string, "the token is '" + token + "'");
+    Session::Options options;
+    options.url = url_;
+    options.token = step["token"].string;
+    Session session(options);
+    must(!session.open() && session.problem().code == step["expect"]["code"].string, "another code");
+  }
 
   Session& session() {
     must(session_ != nullptr, "no session is open");

@@ -14,7 +14,7 @@ from . import frames
 from .aio import AsyncSession
 from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
-from .errors import Closed, NotRendered, PapillaError, Refused, Unreachable
+from .errors import BadAddress, Closed, NotRendered, PapillaError, Refused, Unreachable
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
 from .spikes import Spikes, SpikeTrains
 from .sync import Session
@@ -26,6 +26,7 @@ __all__ = [
     "Answer",
     "AsyncSession",
     "Atlas",
+    "BadAddress",
     "Closed",
     "Contact",
     "Indentation",

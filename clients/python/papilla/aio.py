@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from types import TracebackType
 from typing import Any, Final, TypeAlias
-from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +18,7 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 
 from . import answer as answers
 from . import wire
+from .address import Address, clean_token
 from .answer import Answer, Problem
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
@@ -49,14 +49,15 @@ class AsyncSession:
     """
 
     def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
-        self.url = url.rstrip("/")
+        self._address = Address.parse(url)
+        self.url = self._address.http("")
         self.ready: dict[str, Any] = {}
         """What the service agreed to: tier, ranges, sections, ..."""
         self.superseded_by_client = 0
         """Frames that a newer one replaced before they left."""
         self.connections = 0
         """Times that a session was opened; more than 1 after a reconnect."""
-        self._token = token
+        self._token = clean_token(token)
         self._hello = hello
         self._socket: ClientConnection | None = None
         self._tiers: dict[int, str] = {}
@@ -225,13 +226,10 @@ class AsyncSession:
 
     async def _dial(self) -> ClientConnection:
         """A connection on which nothing was said."""
-        parts = urlsplit(self.url)
-        secure = parts.scheme in ("https", "wss")
-        host, port = parts.hostname or "127.0.0.1", parts.port or (443 if secure else 80)
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
         try:
-            raw = await dial(host, port)
-            ws = f"{'wss' if secure else 'ws'}://{parts.netloc}/v1/session"
+            raw = await dial(self._address.host, self._address.port)
+            ws = self._address.session()
             return await connect(ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None)
         except InvalidStatus as error:
             raise refusal(bytes(error.response.body or b""), str(error)) from None

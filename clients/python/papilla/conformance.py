@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import frames
+from .address import Address, clean_token
 from .answer import Answer
 from .atlas import Atlas, Contact
-from .errors import Refused
-from .http import post
+from .errors import BadAddress, Refused
+from .http import get_json, post
 from .sync import Session
 from .wire import SIDE_PX, Map
 
@@ -153,6 +154,29 @@ class Run:
         must(self.session is not None, "no session is open")
         assert self.session is not None
         return self.session
+
+    def address(self, step: Step) -> None:
+        text, expect = step["address"], step["expect"]
+        if expect.get("status") != "error":
+            address = Address.parse(text)
+            found = (address.session(), address.http("/v1/atlas"))
+            return must(found == (expect["session"], expect["http"]), f"{text}: {found}")
+        for use in (Session, lambda url: get_json(url, "/v1/atlas")):
+            try:
+                use(text)
+                must(False, f"{text} is taken")
+            except BadAddress as error:
+                must(expect["code"] == "bad_address" and expect["says"] in str(error), str(error))
+
+    def token(self, step: Step) -> None:
+        expect = step["expect"]
+        if expect.get("status") != "error":
+            return must(clean_token(step["token"]) == expect["token"], f"{clean_token(step['token'])!r}")
+        try:
+            Session(self.url, step["token"])
+            must(False, "the token is taken")
+        except Refused as error:
+            check_problem(expect, error.code, None)
 
     def hello(self, step: Step) -> None:
         expect = step["expect"]

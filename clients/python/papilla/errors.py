@@ -25,6 +25,14 @@ class Refused(PapillaError):
         self.field = field
 
 
+class BadAddress(PapillaError, ValueError):
+    """What was given as the service's address is none that a client takes."""
+
+    def __init__(self, address: str, why: str) -> None:
+        ways = "write host, host:port, [IPv6]:port or http(s)://host:port/path"
+        super().__init__(f"{address!r} is no address of a papilla-server: {why}; {ways}")
+
+
 class NotRendered(PapillaError):
     """An answer without a map was asked for its map; `status` says why it has none."""
 

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .address import Address, clean_token
 from .errors import Refused, Unreachable
 from .wire import SIDE_PX, Map
 
@@ -47,13 +48,13 @@ def request(
     token: str | None = None,
     timeout_s: float = 30.0,
 ) -> tuple[bytes, dict[str, str]]:
-    """Body and headers of an answer; raises Refused or Unreachable."""
+    """Body and headers of an answer; raises BadAddress, Refused or Unreachable."""
     headers = {"accept": accept}
     if body is not None:
         headers["content-type"] = _NPY
-    if token:
+    if token := clean_token(token):
         headers["authorization"] = f"Bearer {token}"
-    asked = urllib.request.Request(url.rstrip("/") + path, body, headers)
+    asked = urllib.request.Request(Address.parse(url).http(path), body, headers)
     try:
         with _OPENER.open(asked, timeout=timeout_s) as answer:
             return answer.read(), dict(answer.headers)

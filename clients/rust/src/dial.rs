@@ -29,9 +29,3 @@ pub async fn dial(server: &str) -> io::Result<TcpStream> {
     }
     Err(last)
 }
-
-/// Host and port of a URL, or of what is that already.
-pub(crate) fn host_and_port(url: &str) -> &str {
-    let rest = url.split_once("://").map_or(url, |(_, rest)| rest);
-    rest.split('/').next().unwrap_or(rest)
-}

@@ -3,6 +3,8 @@
 use papilla_proto::{ErrorCode, FrameError, Problem, atlas::AtlasError};
 use tokio_tungstenite::tungstenite;
 
+use crate::Address;
+
 /// Why there is no session or no map.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -10,11 +12,25 @@ pub enum PapillaError {
     /// Nobody listens, or the connection broke.
     #[error("{server}: {reason}; is papilla-server running there?")]
     Unreachable {
-        /// Host and port.
+        /// Where it was looked for.
         server: String,
         /// What the system or the library says.
         reason: String,
     },
+    /// What was given as the service's address is none that this client takes.
+    #[error(
+        "'{address}' is no address of a papilla-server: {why}; write host, host:port, \
+         [IPv6]:port or http(s)://host:port/path"
+    )]
+    Address {
+        /// As it was given.
+        address: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
+    /// What was given as a token can be none.
+    #[error("the token holds a blank, a line end or a character that no token has")]
+    Token,
     /// The service refused.
     #[error("refused: {0}")]
     Refused(Problem),
@@ -46,14 +62,15 @@ impl PapillaError {
     pub(crate) fn passes(&self) -> bool {
         use ErrorCode::{Overloaded, RateLimited, ShuttingDown, Timeout};
         let passing = [Overloaded, RateLimited, ShuttingDown, Timeout];
-        self.code().is_none_or(|code| passing.contains(&code))
+        !matches!(self, Self::Address { .. } | Self::Token)
+            && self.code().is_none_or(|code| passing.contains(&code))
     }
 
-    pub(crate) fn unreachable(server: &str, reason: &dyn std::fmt::Display) -> Self {
-        Self::Unreachable { server: server.to_owned(), reason: reason.to_string() }
+    pub(crate) fn unreachable(server: &Address, reason: &dyn std::fmt::Display) -> Self {
+        Self::Unreachable { server: server.to_string(), reason: reason.to_string() }
     }
 
-    pub(crate) fn of_socket(server: &str, error: &tungstenite::Error) -> Self {
+    pub(crate) fn of_socket(server: &Address, error: &tungstenite::Error) -> Self {
         if let tungstenite::Error::Http(answer) = error {
             let body = answer.body().as_deref().unwrap_or_default();
             if let Some(problem) = problem_of(body) {

@@ -1,9 +1,14 @@
 //! One map over HTTP, and the atlas. Blocking.
 
+use std::time::Duration;
+
 use papilla_proto::{ErrorCode, MAP_LEN, Problem, SampleError, SampleType, atlas::Atlas};
 use ureq::{Body, http};
 
-use crate::{PapillaError, dial::host_and_port, error::problem_of};
+use crate::{Address, PapillaError, ToAddress, error::problem_of};
+
+/// Longest wait for an answer: as long as a request may wait for models that are being loaded.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A map that came over HTTP.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,21 +19,25 @@ pub struct Rendered {
     pub tier: String,
 }
 
-/// What a path of the service at `server` (host and port, or a URL) answers.
+/// What a path of the service at `server` (an [`Address`]) answers.
 ///
 /// # Errors
-/// Nobody listens, or the service refuses.
-pub fn get(server: &str, path: &str) -> Result<Vec<u8>, PapillaError> {
-    let server = host_and_port(server);
-    let answer = agent().get(format!("http://{server}{path}")).call();
-    body(server, answer).map(|(_, body)| body)
+/// `server` is no address, nobody listens, or the service refuses.
+pub fn get(server: &(impl ToAddress + ?Sized), path: &str) -> Result<Vec<u8>, PapillaError> {
+    let address = server.to_address()?.plain()?;
+    let mut request = agent().get(address.http(path));
+    if let Some(authorization) = address.authorization() {
+        request = request.header("authorization", authorization);
+    }
+    let answer = request.call();
+    body(&address, answer).map(|(_, body)| body)
 }
 
 /// The atlas of the service at `server`.
 ///
 /// # Errors
 /// As [`get`], or the atlas is damaged.
-pub fn atlas(server: &str) -> Result<Atlas, PapillaError> {
+pub fn atlas(server: &(impl ToAddress + ?Sized)) -> Result<Atlas, PapillaError> {
     let text = String::from_utf8_lossy(&get(server, "/v1/atlas")?).into_owned();
     Ok(Atlas::from_json(&text)?)
 }
@@ -38,27 +47,35 @@ pub fn atlas(server: &str) -> Result<Atlas, PapillaError> {
 /// # Errors
 /// Nobody listens, or the service refuses the map: [`PapillaError::code`] says why.
 pub fn sed(
-    server: &str,
+    server: &(impl ToAddress + ?Sized),
     pressure_pa: &[f32],
     tier: Option<&str>,
 ) -> Result<Rendered, PapillaError> {
-    let server = host_and_port(server);
+    let address = server.to_address()?.plain()?;
     let mut payload = vec![0; 4 * pressure_pa.len()];
     SampleType::F32.encode(pressure_pa, 1.0, &mut payload).map_err(protocol)?;
-    let mut request = agent().post(format!("http://{server}/v1/sed"));
+    let mut request = agent().post(address.http("/v1/sed"));
+    if let Some(authorization) = address.authorization() {
+        request = request.header("authorization", authorization);
+    }
     if let Some(tier) = tier {
         request = request.query("tier", tier);
     }
     let octets = "application/octet-stream";
     let answer = request.header("content-type", octets).header("accept", octets).send(&payload);
-    let (tier, body) = body(server, answer)?;
+    let (tier, body) = body(&address, answer)?;
     let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
     SampleType::F32.decode(&body, 1.0, &mut sed_j_per_m3).map_err(protocol)?;
     Ok(Rendered { sed_j_per_m3, tier })
 }
 
 fn agent() -> ureq::Agent {
-    ureq::Agent::config_builder().http_status_as_error(false).proxy(None).build().into()
+    ureq::Agent::config_builder()
+        .http_status_as_error(false)
+        .proxy(None)
+        .timeout_global(Some(PATIENCE))
+        .build()
+        .into()
 }
 
 fn protocol(error: SampleError) -> PapillaError {
@@ -67,10 +84,10 @@ fn protocol(error: SampleError) -> PapillaError {
 
 /// Tier and body of an answer.
 fn body(
-    server: &str,
+    address: &Address,
     answer: Result<http::Response<Body>, ureq::Error>,
 ) -> Result<(String, Vec<u8>), PapillaError> {
-    let unreachable = |error: ureq::Error| PapillaError::unreachable(server, &error);
+    let unreachable = |error: ureq::Error| PapillaError::unreachable(address, &error);
     let mut answer = answer.map_err(unreachable)?;
     let status = answer.status();
     let header = answer.headers().get("x-papilla-tier");

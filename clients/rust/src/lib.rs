@@ -12,6 +12,7 @@
 //! The protocol itself is the crate `papilla-proto`, whose types this one hands through.
 #![cfg_attr(feature = "guide", doc = include_str!("../../../docs/reference/clients/rust.md"))]
 
+mod address;
 mod answer;
 mod dial;
 mod error;
@@ -19,6 +20,7 @@ mod http;
 mod session;
 mod skin;
 
+pub use address::{Address, ToAddress};
 pub use answer::{Answer, Status};
 pub use dial::dial;
 pub use error::PapillaError;

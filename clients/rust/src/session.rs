@@ -17,7 +17,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-use crate::{Answer, PapillaError, dial::host_and_port};
+use crate::{Answer, PapillaError, ToAddress};
 pub use hand::NetForce;
 use link::Link;
 use state::{Asked, State};
@@ -92,13 +92,16 @@ fn now_us() -> u64 {
 }
 
 impl Session {
-    /// Opens a session at `server` (host and port, or a URL). The hello goes as version 2, or 3 if it
-    /// has members of that.
+    /// Opens a session at `server` (an [`Address`](crate::Address)). The hello goes as version 2, or 3 if it has members
+    /// of that.
     ///
     /// # Errors
-    /// Nobody listens, or the hello is refused: [`PapillaError::code`] says why.
-    pub async fn open(server: &str, hello: Hello) -> Result<Self, PapillaError> {
-        let server = host_and_port(server).to_owned();
+    /// `server` is no address, nobody listens, or the hello is refused: [`PapillaError::code`] says why.
+    pub async fn open(
+        server: &(impl ToAddress + ?Sized),
+        hello: Hello,
+    ) -> Result<Self, PapillaError> {
+        let server = server.to_address()?.plain()?;
         let hello = versioned(hello);
         let (link, ready) = Link::open(&server, &hello).await?;
         let shared = Arc::new(Shared {

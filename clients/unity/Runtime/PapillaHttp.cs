@@ -8,7 +8,7 @@ namespace Papilla
     /// <summary>What needs no session: the atlas, and one map at a time. Calls wait; do not make them on a game's main thread.</summary>
     public static class PapillaHttp
     {
-        /// <summary>The atlas of the server at <paramref name="address"/>, http(s)://host[:port].</summary>
+        /// <summary>The atlas of the server at <paramref name="address"/>; see <see cref="ServerAddress"/>.</summary>
         public static Atlas LoadAtlas(string address, string token = null)
         {
             using (var reader = new StreamReader(Answer(Request(address, "v1/atlas", token)).GetResponseStream())) return new Atlas(reader.ReadToEnd());
@@ -35,9 +35,10 @@ namespace Papilla
 
         static HttpWebRequest Request(string address, string path, string token)
         {
-            var request = WebRequest.CreateHttp(new Uri(new Uri(address), path));
+            var request = WebRequest.CreateHttp(new ServerAddress(address).Http("/" + path));
             request.ServicePoint.Expect100Continue = false;
-            if (token != null) request.Headers["Authorization"] = "Bearer " + token;
+            string clean = ServerAddress.CleanToken(token);
+            if (clean != null) request.Headers["Authorization"] = "Bearer " + clean;
             return request;
         }
 

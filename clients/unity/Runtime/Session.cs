@@ -37,6 +37,7 @@ namespace Papilla
         /// <summary>us of the client's clock.</summary>
         public Func<ulong> ClockUs = Now;
 
+        readonly ServerAddress server;
         readonly Uri uri;
         readonly Func<ITransport> newTransport;
         readonly object gate = new object(), telling = new object();
@@ -55,16 +56,15 @@ namespace Papilla
         ITransport transport;
         Thread receiver, sender;
 
-        /// <param name="address">http(s)://host[:port] of the server</param>
+        /// <param name="address">where the server is; see <see cref="ServerAddress"/></param>
         /// <param name="hello">what to ask for; null: the defaults</param>
-        /// <param name="token">bearer token, for a server that asks for one</param>
+        /// <param name="token">bearer token, for a server that asks for one; blanks around it go</param>
         /// <param name="newTransport">another WebSocket than <see cref="SocketTransport"/></param>
         public Session(string address, Hello hello = null, string token = null, Func<ITransport> newTransport = null)
         {
-            var builder = new UriBuilder(new Uri(new Uri(address), "v1/session"));
-            builder.Scheme = builder.Scheme == "https" || builder.Scheme == "wss" ? "wss" : "ws";
-            if (token != null) builder.Query = "access_token=" + Uri.EscapeDataString(token);
-            uri = builder.Uri;
+            server = new ServerAddress(address);
+            string clean = ServerAddress.CleanToken(token);
+            uri = new Uri(server.Session() + (clean == null ? "" : "?access_token=" + Uri.EscapeDataString(clean)));
             this.hello = hello ?? new Hello();
             this.newTransport = newTransport ?? (() => new SocketTransport());
             for (uint k = 0; k < OutstandingMax; k++) outstanding.Add(k);
@@ -91,7 +91,7 @@ namespace Papilla
                 {
                     if (isRefused) throw new PapillaException(refusal);
                     int left = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (left <= 0 || isClosed) throw new TimeoutException("no session at " + uri + " within " + timeoutMs + " ms");
+                    if (left <= 0 || isClosed) throw new TimeoutException("no session at " + server.Session() + " within " + timeoutMs + " ms");
                     Monitor.Wait(gate, left);
                 }
                 return ready;

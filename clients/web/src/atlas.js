@@ -1,5 +1,6 @@
 // The atlas: which point of the finger each pixel of a map is, and how to fill a map.
 
+import { addressOf, cleanToken } from './address.js';
 import { Patch } from './raster.js';
 import { MAP_LEN, SIDE_PX } from './wire.js';
 
@@ -35,13 +36,14 @@ export class Atlas {
   /** @type {ReturnType<typeof pixelPlaces> | null} */ #pixelPlaces = null;
 
   /**
-   * @param {string} [base] http(s)://host[:port]; '' for the server of the page
+   * @param {string} [base] where the server is: `host:port` or a URL; '' for the server of the page
    * @param {string} [token]
    */
   static async load(base = '', token) {
-    const url = new URL('v1/atlas', new URL(base || '/', globalThis.location?.href));
-    const response = await fetch(url, token ? { headers: { authorization: `Bearer ${token}` } } : {});
-    if (!response.ok) throw new Error(`${url.href}: HTTP ${response.status} ${await response.text()}`);
+    const url = addressOf(base).http('/v1/atlas');
+    const clean = cleanToken(token);
+    const response = await fetch(url, clean ? { headers: { authorization: `Bearer ${clean}` } } : {});
+    if (!response.ok) throw new Error(`${url}: HTTP ${response.status} ${await response.text()}`);
     return new Atlas(await response.json());
   }
 

@@ -81,7 +81,7 @@ export class Hand {
 
   /**
    * A hand that is ready to touch.
-   * @param {string} base http(s)://host[:port]; '' for the server of the page
+   * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
    * @param {HandHello} hello
    * @param {string} [token]
    * @returns {Promise<Hand>} rejected with a PapillaError where the hello is refused

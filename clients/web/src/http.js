@@ -1,22 +1,24 @@
 // One map over HTTP, for tools that need no session.
 
+import { addressOf, cleanToken } from './address.js';
 import { PapillaError } from './error.js';
 import { MAP_LEN } from './wire.js';
 
 /**
  * The SED map of a pressure map, by `POST /v1/sed`.
- * @param {string} base http(s)://host[:port]; '' for the server of the page
+ * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
  * @param {Float32Array} pressurePa 224 x 224, Pa
  * @param {{tier?: string, budgetUs?: number, token?: string}} [options]
  * @returns {Promise<{map: Float32Array, tier: string, totalUs: number}>} rejected with a PapillaError where it is refused
  */
 export async function postPressure(base, pressurePa, options = {}) {
-  const url = new URL('v1/sed', new URL(base || '/', globalThis.location?.href));
+  const url = new URL(addressOf(base).http('/v1/sed'));
   if (options.tier) url.searchParams.set('tier', options.tier);
   if (options.budgetUs) url.searchParams.set('budget_us', String(options.budgetUs));
   /** @type {Record<string, string>} */
   const headers = { 'content-type': 'application/octet-stream', accept: 'application/octet-stream' };
-  if (options.token) headers.authorization = `Bearer ${options.token}`;
+  const token = cleanToken(options.token);
+  if (token) headers.authorization = `Bearer ${token}`;
   const response = await fetch(url, { method: 'POST', body: Float32Array.from(pressurePa), headers });
   if (!response.ok) {
     const { error } = await response.json();

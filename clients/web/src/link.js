@@ -1,5 +1,7 @@
 // A WebSocket that is made anew whenever it is lost.
 
+import { addressOf, cleanToken } from './address.js';
+
 /** Attempts to connect are this far apart, with some chance in it. */
 const RETRY_MS = { least: 100, most: 250 };
 /** An attempt that has not come to a session by then is given up. */
@@ -7,14 +9,13 @@ const ATTEMPT_MS = 5000;
 
 /**
  * Address of the sessions of a server.
- * @param {string} base http(s)://host[:port], or '' for the server of the page
+ * @param {string} base see `addressOf`
  * @param {string} [token]
  */
 export function sessionUrl(base, token) {
-  const url = new URL('v1/session', new URL(base || '/', globalThis.location?.href));
-  url.protocol = url.protocol.replace('http', 'ws');
-  if (token) url.searchParams.set('access_token', token);
-  return url.href;
+  const { session } = addressOf(base);
+  const clean = cleanToken(token);
+  return clean ? `${session}?access_token=${encodeURIComponent(clean)}` : session;
 }
 
 const retryMs = () => RETRY_MS.least + (RETRY_MS.most - RETRY_MS.least) * Math.random();

@@ -66,7 +66,7 @@ export class Session {
   /** @type {Set<string>} */ #warned = new Set();
 
   /**
-   * @param {string} base http(s)://host[:port]; '' for the server of the page
+   * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
    * @param {Hello} [hello] what to ask for; see docs/reference/protocol.md
    * @param {Options} [options]
    */

@@ -27,7 +27,7 @@ export const launch = () => chromium.launch({ executablePath: process.env.PAPILL
 export async function openPage(browser) {
   const page = await browser.newPage();
   const base = serverUrl();
-  await page.route(`${base}/client/**`, async (route) => {
+  await page.route(`${new URL(base).origin}/client/**`, async (route) => {
     const path = new URL(route.request().url()).pathname.replace('/client/', '');
     return route.fulfill({ contentType: 'text/javascript', body: await readFile(ROOT + path) });
   });

@@ -3,6 +3,7 @@
 import {
   Atlas, Hand, MAP_LEN, PapillaError, SIDE_PX, Session, feltInWorld, fingerOfJoints, poseInFinger, postPressure,
 } from '../papilla.js';
+import { addressOf, cleanToken } from '../src/address.js';
 
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
@@ -96,6 +97,34 @@ class Runner {
       if (performance.now() > end) throw new Error(`${what}: not within ${patienceMs} ms`);
       await wait(2);
     }
+  }
+
+  /** @param {Step} step */
+  address({ address, expect }) {
+    if (expect.status !== 'error') {
+      const found = addressOf(address);
+      return same(address, [found.session, found.http('/v1/atlas')], [expect.session, expect.http]);
+    }
+    for (const use of [() => new Session(address), () => addressOf(address)]) this.throws(use, expect);
+  }
+
+  /** @param {Step} step */
+  token({ token, expect }) {
+    if (expect.status !== 'error') return same('the token', cleanToken(token), expect.token);
+    this.throws(() => new Session(this.url, {}, { token }), expect);
+  }
+
+  /** @param {() => unknown} use @param {Step} expect */
+  throws(use, { code, says = '' }) {
+    let error;
+    try {
+      use();
+    } catch (thrown) {
+      error = thrown;
+    }
+    if (!(error instanceof PapillaError)) throw new Error(`it is taken: ${error}`);
+    same('code', error.code, code);
+    if (!error.message.includes(says)) throw new Error(`${error.message} does not say ${says}`);
   }
 
   /** @param {Step} step */

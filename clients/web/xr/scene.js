@@ -4,6 +4,7 @@ import {
   CanvasTexture, Color, DirectionalLight, HemisphereLight, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, PlaneGeometry, Scene, SRGBColorSpace, Vector3, WebGLRenderer,
 } from 'three';
 import { Atlas } from '../papilla.js';
+import { BASE } from './base.js';
 import { Finger } from './finger.js';
 import { FINGERS, Hands, Pointer } from './hands.js';
 import { makeObjects } from './objects.js';
@@ -107,8 +108,8 @@ function inWords({ name, touched, deepestMm, forceN, sedMax, flags }) {
 }
 
 async function start() {
-  const atlas = await Atlas.load();
-  const { methods } = await (await fetch('/v1/tiers')).json();
+  const atlas = await Atlas.load(BASE);
+  const { methods } = await (await fetch(`${BASE}/v1/tiers`)).json();
   const isSolved = methods !== null;
   const fingers = FINGERS.slice(0, isSolved ? FINGERS.length : 1).map((name) => new Finger(atlas, name));
   const [finger] = fingers;

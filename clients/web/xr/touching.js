@@ -2,6 +2,7 @@
 
 import { Quaternion } from 'three';
 import { DRAWN_TURN, Hand, MAP_LEN, poseInFinger, Session, SUMMARY } from '../papilla.js';
+import { BASE } from './base.js';
 
 /**
  * @typedef {import('./finger.js').Finger} Finger
@@ -31,7 +32,7 @@ export class Springs {
   /** @param {Finger[]} fingers @param {Hello} hello @param {(words: string) => void} onstate */
   constructor([finger], hello, onstate) {
     this.#finger = finger;
-    this.session = new Session('', hello);
+    this.session = new Session(BASE, hello);
     this.session.onstate = (now, why) => onstate(why ? `${now}: ${why}` : now);
     this.session.onready = (ready) => onstate(`ready: ${ready.tier}, some ${(ready.predicted_latency_us / 1000).toFixed(1)} ms a map`);
     this.session.onanswer = (answer) => {
@@ -71,7 +72,7 @@ export class Solved {
     this.#fingers = fingers;
     this.#objects = objects;
     this.#busy = fingers.map(() => false);
-    Hand.connect('', {
+    Hand.connect(BASE, {
       tier,
       atlas_hash,
       objects: objects.map(({ shape, objectPaPerMm }) => (

@@ -187,7 +187,7 @@ impl Recorder {
                 let due = Due { force_n, ..Due::of_map(&map_pa, 1e-4) };
                 due.fill(&mut step["expect"]);
             }
-            Some("hello" | "frame" | "http" | "reconnect" | "move") => {}
+            Some("hello" | "frame" | "http" | "reconnect" | "move" | "address" | "token") => {}
             other => return Err(format!("there is no step '{other:?}'")),
         }
         Ok(())

@@ -28,7 +28,7 @@ struct HttpAnswer {
   }
 };
 
-/// Sends a request to a URL or "host:port".
+/// Sends a request to the service at an address (`net::Address`); `path` is one of its own.
 inline HttpAnswer http(const std::string& url, const std::string& method, const std::string& path,
                        const std::string& body = {}, const std::string& headers = {}) {
   HttpAnswer answer;
@@ -37,12 +37,13 @@ inline HttpAnswer http(const std::string& url, const std::string& method, const 
     return answer;
   };
   const net::Address address = net::Address::of(url);
+  if (!address.fault.empty()) return answer.problem = {"bad_address", address.fault, ""}, answer;
   net::Socket socket;
   if (address.secure) return failed("TLS: put a proxy in front, or use another client");
   if (!socket.open(address)) return failed("nobody listens; is papilla-server running there?");
   // As long as a request may wait for models that are being loaded.
   socket.patience(30);
-  const std::string request = method + " " + path + " HTTP/1.1\r\nHost: " + address.text() +
+  const std::string request = method + " " + address.path + path + " HTTP/1.1\r\nHost: " + address.text() +
                               "\r\nConnection: close\r\nContent-Length: " +
                               std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body;
   if (!socket.send(request.data(), request.size())) return failed("the connection broke");

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <string>
 
+#include "address.hpp"
+
 #ifdef _WIN32
 #ifndef NOMINMAX
 #define NOMINMAX
@@ -41,34 +43,6 @@ using Handle = int;
 constexpr Handle none = -1;
 inline void start() {}
 #endif
-
-/// Host, port and whether it is TLS (which this client does not speak), of a URL or "host:port".
-struct Address {
-  std::string host = "127.0.0.1";
-  std::string port = "7224";
-  bool secure = false;
-
-  static Address of(std::string url) {
-    Address address;
-    const std::size_t scheme = url.find("://");
-    if (scheme != std::string::npos) {
-      address.secure = url.compare(0, 5, "https") == 0 || url.compare(0, 3, "wss") == 0;
-      url.erase(0, scheme + 3);
-    }
-    url = url.substr(0, url.find('/'));
-    const std::size_t colon = url.rfind(':');
-    if (colon != std::string::npos && url.find(']', colon) == std::string::npos) {
-      address.port = url.substr(colon + 1);
-      url.erase(colon);
-    }
-    if (url.size() > 2 && url.front() == '[') url = url.substr(1, url.size() - 2);
-    if (!url.empty()) address.host = url;
-    return address;
-  }
-  std::string text() const {
-    return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port;
-  }
-};
 
 class Socket {
  public:

@@ -28,8 +28,8 @@ inline std::uint64_t now_us() {
 class Session {
  public:
   struct Options {
-    std::string url = "127.0.0.1:7224";
-    std::string token;                ///< bearer token, if the service asks for one
+    std::string url = "127.0.0.1:7224";  ///< host, host:port or a URL; see net::Address
+    std::string token;                ///< bearer token, if the service asks for one; blanks around it go
     /// Members of the protocol's hello as JSON without braces: "\"tier\": \"small\"".
     std::string hello;
     /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
@@ -53,6 +53,8 @@ class Session {
 
   /// Connects and says hello; false: `problem()` says why not.
   bool open() {
+    if (!address_.fault.empty()) return problem_ = {"bad_address", address_.fault, ""}, false;
+    if (!net::clean_token(options_.token)) return problem_ = bad_token(), false;
     if (!Core::is_readable(options_.hello, problem_) || !connect()) return false;
     reader_ = std::thread([this] { live(); });
     writer_ = std::thread([this] { write(); });
@@ -241,6 +243,10 @@ class Session {
       wants_ = false;
       changed_.notify_all();
     }
+  }
+
+  static Problem bad_token() {
+    return {"bad_token", "the token holds a blank, a line end or a character that no token has", "token"};
   }
 
   bool connect() {

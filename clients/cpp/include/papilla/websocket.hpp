@@ -77,7 +77,7 @@ class WebSocket {
     std::uint8_t nonce[16];
     for (auto& byte : nonce) byte = static_cast<std::uint8_t>(random_());
     const std::string key = detail::base64(nonce, sizeof nonce);
-    std::string request = "GET " + path + " HTTP/1.1\r\nHost: " + address.text() +
+    std::string request = "GET " + address.path + path + " HTTP/1.1\r\nHost: " + address.text() +
                           "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13"
                           "\r\nSec-WebSocket-Key: " + key + "\r\n";
     if (!token.empty()) request += "Authorization: Bearer " + token + "\r\n";

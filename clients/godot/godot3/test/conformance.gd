@@ -2,6 +2,7 @@
 extends SceneTree
 
 const Session = preload("res://addons/papilla/session.gd")
+const Address = preload("res://addons/papilla/address.gd")
 const Atlas = preload("res://addons/papilla/atlas.gd")
 const Http = preload("res://addons/papilla/http.gd")
 const Patterns = preload("res://test/patterns.gd")
@@ -114,6 +115,41 @@ func on_session_ready(server_ready):
 
 func on_refused(problem):
 	reply = problem
+
+
+func step_address(step, expect):
+	var address = Address.parse(step.address)
+	if expect.get("status") != "error":
+		same(step.address, address.fault, "")
+		if address.fault == "":
+			same(step.address, Address.session(address), expect.session)
+			same(step.address, Address.http(address, "/v1/atlas"), expect.http)
+		return
+	if address.fault.find(expect.says) < 0:
+		fail("%s: '%s' does not say %s" % [step.address, address.fault, expect.says])
+	same("code over HTTP", Http.post_pressure(step.address, PoolRealArray()).problem.code, expect.code)
+	refused_with(step.address, "", expect.code)
+
+
+func step_token(step, expect):
+	var clean = Address.stripped(step.token)
+	if expect.get("status") != "error":
+		same("the token", clean if Address.is_token(clean) else "refused", expect.token)
+		return
+	refused_with(url, step.token, expect.code)
+
+
+func refused_with(address, token, code):
+	reply = {}
+	var own = Session.new()
+	own.url = address
+	own.token = token
+	own.connect("refused", self, "on_refused")
+	own.open()
+	same("code", reply.get("code"), code)
+	own.close()
+	own.free()
+	reply = null
 
 
 func step_hello(step, expect):

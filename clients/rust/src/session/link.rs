@@ -8,9 +8,16 @@ use futures_util::{
 };
 use papilla_proto::{ClientMessage, Hello, Problem, Ready, ServerMessage};
 use tokio::{net::TcpStream, time::timeout};
-use tokio_tungstenite::{WebSocketStream, client_async, tungstenite::Message};
+use tokio_tungstenite::{
+    WebSocketStream, client_async,
+    tungstenite::{
+        Message,
+        client::IntoClientRequest,
+        http::{HeaderValue, header::AUTHORIZATION},
+    },
+};
 
-use crate::{PapillaError, dial::dial};
+use crate::{Address, PapillaError, dial::dial};
 
 /// Pause before the next attempt to connect.
 pub(super) const RETRY: Duration = Duration::from_millis(150);
@@ -42,18 +49,22 @@ pub(super) fn message(text: &str) -> Result<ServerMessage, PapillaError> {
 }
 
 impl Link {
-    pub(super) async fn open(server: &str, hello: &Hello) -> Result<(Self, Ready), PapillaError> {
+    pub(super) async fn open(server: &Address, hello: &Hello) -> Result<(Self, Ready), PapillaError> {
         let opening = async { Self::connect(server).await?.say(server, hello, None).await };
         let silent = |_| PapillaError::unreachable(server, &"no ready came");
         timeout(PATIENCE, opening).await.map_err(silent)?
     }
 
     /// A connection on which nothing was said.
-    pub(super) async fn connect(server: &str) -> Result<Self, PapillaError> {
+    pub(super) async fn connect(server: &Address) -> Result<Self, PapillaError> {
         let broke = |error| PapillaError::of_socket(server, &error);
-        let raw = dial(server).await.map_err(|e| PapillaError::unreachable(server, &e))?;
-        let url = format!("ws://{server}/v1/session");
-        let (socket, _) = client_async(url, raw).await.map_err(broke)?;
+        let raw = dial(&server.to_dial()).await.map_err(|e| PapillaError::unreachable(server, &e))?;
+        let mut request = server.session().into_client_request().map_err(broke)?;
+        if let Some(authorization) = server.authorization() {
+            let value = HeaderValue::from_str(&authorization).map_err(|_| PapillaError::Token)?;
+            request.headers_mut().insert(AUTHORIZATION, value);
+        }
+        let (socket, _) = client_async(request, raw).await.map_err(broke)?;
         let (sink, stream) = socket.split();
         Ok(Self { sink, stream })
     }
@@ -61,7 +72,7 @@ impl Link {
     /// Says hello, with the state that it announces, and waits for ready.
     pub(super) async fn say(
         mut self,
-        server: &str,
+        server: &Address,
         hello: &Hello,
         sealed: Option<Vec<u8>>,
     ) -> Result<(Self, Ready), PapillaError> {

@@ -13,12 +13,13 @@ use super::{
     moving::follow,
     state::Next,
 };
+use crate::Address;
 
 /// Longest wait for the service to take a close.
 const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Keeps a session until it is dropped, or until the service refuses it for good.
-pub(super) async fn live(server: String, shared: Arc<Shared>, link: Link) {
+pub(super) async fn live(server: Address, shared: Arc<Shared>, link: Link) {
     let mut link = link;
     loop {
         let Link { sink, stream } = &mut link;
@@ -44,7 +45,7 @@ pub(super) async fn live(server: String, shared: Arc<Shared>, link: Link) {
 }
 
 /// Opens another session after the connection broke; none: the service refuses it for good.
-async fn reopen(server: &str, shared: &Shared) -> Option<Link> {
+async fn reopen(server: &Address, shared: &Shared) -> Option<Link> {
     shared.state().lose();
     loop {
         sleep(RETRY).await;

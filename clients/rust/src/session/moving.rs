@@ -10,7 +10,7 @@ use super::{
     link::{Link, RETRY},
     state::Moving,
 };
-use crate::PapillaError;
+use crate::{Address, PapillaError};
 
 /// Longest wait for what the service remembers; after it the session starts anew.
 const SEAL_PATIENCE: Duration = Duration::from_secs(5);
@@ -30,7 +30,7 @@ impl Shared {
 /// Waits until the service asks for it, and opens the session anew over another connection, with
 /// what the service remembers. Frames go on over the old one until the new one is there; then they
 /// wait for what was sent to be answered, and for ready.
-pub(super) async fn follow(server: &str, shared: &Shared) -> (Link, Ready) {
+pub(super) async fn follow(server: &Address, shared: &Shared) -> (Link, Ready) {
     loop {
         while shared.state().moving != Moving::Asked {
             shared.moving.notified().await;
@@ -45,7 +45,7 @@ pub(super) async fn follow(server: &str, shared: &Shared) -> (Link, Ready) {
     }
 }
 
-async fn attempt(server: &str, shared: &Shared) -> Result<(Link, Ready), PapillaError> {
+async fn attempt(server: &Address, shared: &Shared) -> Result<(Link, Ready), PapillaError> {
     let silent = |_| PapillaError::unreachable(server, &"no ready came");
     let link = timeout(CONNECT_PATIENCE, Link::connect(server)).await.map_err(silent)??;
     shared.state().moving = Moving::SealDue;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed};
+use papilla_client::{Address, Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed};
 use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch, contact::Pose};
 use papilla_tests::{
     conformance::{
@@ -47,13 +47,14 @@ pub(crate) async fn control(action: &str) -> Result<()> {
 impl Run {
     pub(crate) fn new(timeout_s: f64) -> Result<Self> {
         let url = env::var("PAPILLA_URL").context("PAPILLA_URL")?;
-        let server = url.trim_start_matches("http://").to_owned();
         let patience = Duration::from_secs_f64(timeout_s);
-        Ok(Self { server, patience, session: None, moved: 1, note: String::new() })
+        Ok(Self { server: url, patience, session: None, moved: 1, note: String::new() })
     }
 
     pub(crate) async fn step(&mut self, step: &Value) -> Result<()> {
         match step["do"].as_str().unwrap_or_default() {
+            "address" => address(step).await,
+            "token" => token(step),
             "hello" => self.hello(step).await,
             "frame" => self.frame(step).await,
             "burst" => self.burst(step).await,
@@ -211,4 +212,43 @@ impl Run {
         }
         check_map(&step["expect"], &map_pa)
     }
+}
+
+async fn address(step: &Value) -> Result<()> {
+    let text: String = member(step, "address")?;
+    let expect = &step["expect"];
+    if expect["status"] != "error" {
+        let address: Address = text.parse()?;
+        let found = [address.session(), address.http("/v1/atlas")];
+        let same = expect["session"] == found[0] && expect["http"] == found[1];
+        ensure!(same, "{text}: {found:?}");
+        return Ok(());
+    }
+    let get = text.clone();
+    let got = spawn_blocking(move || get_of(&get)).await?;
+    for refused in [Session::open(&text, Hello::default()).await.err(), got] {
+        let error = refused.with_context(|| format!("{text} is taken"))?;
+        let says = error.to_string().contains(expect["says"].as_str().unwrap_or_default());
+        let is_it = matches!(error, PapillaError::Address { .. });
+        ensure!(is_it && says && expect["code"] == "bad_address", "{error}");
+    }
+    Ok(())
+}
+
+fn get_of(server: &str) -> Option<PapillaError> {
+    papilla_client::get(server, "/v1/atlas").err()
+}
+
+fn token(step: &Value) -> Result<()> {
+    let (token, expect) = (member::<String>(step, "token")?, &step["expect"]);
+    let address: Address = "lab.example".parse()?;
+    match address.clone().with_token(&token) {
+        Ok(found) => {
+            let due = address.with_token(&member::<String>(expect, "token")?)?;
+            ensure!(found == due && !format!("{found:?}").contains(&token), "another token");
+        }
+        Err(PapillaError::Token) => ensure!(expect["code"] == "bad_token", "it is refused"),
+        Err(error) => return Err(error.into()),
+    }
+    Ok(())
 }

@@ -1,28 +1,30 @@
 # What needs no session: the atlas, and one map at a time. Calls wait for the answer: make them while a scene loads, or in a Thread.
 extends Reference
 
+const Address = preload("address.gd")
 const Compat = preload("compat.gd")
 
 
-# {status, headers, body}; status 0 where no answer came within `patience_ms`.
+# {status, headers, body}; status 0 where no answer came within `patience_ms`, or where `url` is no address (address.gd).
 static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body = PoolByteArray(), patience_ms = 10000):
-	var parts = url.split("://")
-	var host = parts[1].rstrip("/").split(":")
-	var is_tls = parts[0] == "https"
-	var port = int(host[1]) if host.size() > 1 else (443 if is_tls else 80)
+	var answer = {"status": 0, "headers": {}, "body": PoolByteArray()}
+	var address = Address.parse(url)
+	if address.fault != "":
+		push_error("papilla: " + address.fault)
+		answer.fault = address.fault
+		return answer
 	var http = HTTPClient.new()
 	http.blocking_mode_enabled = false
 	http.read_chunk_size = 1 << 20
-	Compat.connect_http(http, host[0], port, is_tls)
+	Compat.connect_http(http, address.host, address.port, address.is_secure)
 	var end = OS.get_ticks_msec() + patience_ms
-	var answer = {"status": 0, "headers": {}, "body": PoolByteArray()}
 	var is_asked = false
 	while OS.get_ticks_msec() < end:
 		http.poll()
 		var status = http.get_status()
 		if status == HTTPClient.STATUS_CONNECTED and not is_asked:
 			is_asked = true
-			http.request_raw(method, "/" + path, headers, body)
+			http.request_raw(method, address.path + "/" + path, headers, body)
 		elif is_asked and http.has_response():
 			answer.status = http.get_response_code()
 			answer.headers = http.get_response_headers_as_dictionary()
@@ -41,8 +43,11 @@ static func fetch(url, path, method = HTTPClient.METHOD_GET, headers = [], body 
 
 static func _headers(token):
 	var headers = ["Content-Type: application/octet-stream", "Accept: application/octet-stream, application/json;q=0.5"]
-	if token != "":
-		headers.append("Authorization: Bearer " + token)
+	var clean = Address.stripped(token)
+	if not Address.is_token(clean):
+		push_error("papilla: the token holds a blank, a line end or a character that no token has")
+	elif clean != "":
+		headers.append("Authorization: Bearer " + clean)
 	return headers
 
 
@@ -56,6 +61,8 @@ static func atlas_text(url, token = ""):
 static func post_pressure(url, pressure_pa, tier = "", token = ""):
 	var path = "v1/sed" + ("?tier=" + tier.percent_encode() if tier != "" else "")
 	var answer = fetch(url, path, HTTPClient.METHOD_POST, _headers(token), Compat.floats_to_bytes(pressure_pa))
+	if answer.has("fault"):
+		return {"problem": {"code": "bad_address", "message": answer.fault, "field": null}}
 	if answer.status == 0:
 		return {"problem": {"code": "no_answer", "message": "no answer from " + url, "field": null}}
 	if answer.status != 200:

@@ -5,6 +5,7 @@
 # takes its place. A lost connection is made anew by itself, and the session moves to another when the service asks it to.
 extends Node
 
+const Address = preload("address.gd")
 const Compat = preload("compat.gd")
 const Frame = preload("frame.gd")
 const Link = preload("link.gd")
@@ -30,9 +31,9 @@ const OBJECTS_MAX = 16
 const FINGERS_MAX = 10
 const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_limited"]
 
-# Address of the server.
+# Where the server is: host, host:port, or a URL (address.gd).
 export var url = "http://127.0.0.1:7224"
-# Bearer token, for a server that asks for one.
+# Bearer token, for a server that asks for one; blanks around it go.
 export var token = ""
 # What to ask for, as in docs/reference/protocol.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
 export var hello = {}
@@ -91,7 +92,8 @@ func open():
 	_open = true
 	_is_refused = false
 	_asked = hello.duplicate(true)
-	_connect()
+	if not _fault():
+		_connect()
 
 
 func close():
@@ -248,10 +250,24 @@ func _connect():
 
 
 func _address():
-	var address = url.replace("http", "ws").rstrip("/") + "/v1/session"
-	if token != "":
-		address += "?access_token=" + token.percent_encode()
-	return address
+	var address = Address.session(Address.parse(url))
+	var clean = Address.stripped(token)
+	return address if clean == "" else address + "?access_token=" + clean.percent_encode()
+
+
+# Whether address or token can be none; `refused` then says why.
+func _fault():
+	var fault = Address.parse(url).fault
+	var code = "bad_address"
+	if fault == "" and not Address.is_token(Address.stripped(token)):
+		code = "bad_token"
+		fault = "the token holds a blank, a line end or a character that no token has"
+	if fault == "":
+		return false
+	_open = false
+	push_error("papilla: " + fault)
+	emit_signal("refused", {"type": "error", "code": code, "message": fault, "field": null, "closes": false})
+	return true
 
 
 func _words():

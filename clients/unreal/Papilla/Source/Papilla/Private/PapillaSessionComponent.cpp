@@ -56,7 +56,14 @@ void UPapillaSessionComponent::BeginPlay()
     Super::BeginPlay();
     Drawn.SetNumZeroed(static_cast<int32>(papilla::map_len));
     papilla::Problem Problem;
-    if (!papilla::Core::is_readable(ToUtf8(Hello), Problem))
+    Address = papilla::net::Address::of(ToUtf8(Server));
+    bool bIsGood = papilla::Core::is_readable(ToUtf8(Hello), Problem);
+    if (!Address.fault.empty())
+    {
+        Problem = {"bad_address", Address.fault, "Server"};
+        bIsGood = false;
+    }
+    if (!bIsGood)
     {
         UE_LOG(LogTemp, Error, TEXT("Papilla: %s"), *ToFString(Problem.message));
         OnRefused.Broadcast(ToFString(Problem.code), ToFString(Problem.message));
@@ -104,7 +111,7 @@ void UPapillaSessionComponent::Dial(TSharedPtr<IWebSocket>& Dialled)
 {
     HangUp(Dialled);
     FWebSocketsModule& Module = FModuleManager::LoadModuleChecked<FWebSocketsModule>(TEXT("WebSockets"));
-    Dialled = Module.CreateWebSocket(TEXT("ws://") + Server + TEXT("/v1/session"), FString());
+    Dialled = Module.CreateWebSocket(ToFString(Address.session()), FString());
     // Told apart by address alone: which of the two it is changes when the session moves.
     IWebSocket* const Of = Dialled.Get();
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
@@ -360,7 +367,7 @@ bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
 void UPapillaSessionComponent::FetchAtlas()
 {
     const auto Request = FHttpModule::Get().CreateRequest();
-    Request->SetURL(TEXT("http://") + Server + TEXT("/v1/atlas"));
+    Request->SetURL(ToFString(Address.http("/v1/atlas")));
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)
     {

@@ -4,6 +4,7 @@
 #include "Components/ActorComponent.h"
 #include "CoreMinimal.h"
 
+#include <papilla/address.hpp>
 #include <papilla/atlas.hpp>
 #include <papilla/core.hpp>
 #include <papilla/pieces.hpp>
@@ -73,7 +74,7 @@ class PAPILLA_API UPapillaSessionComponent : public UActorComponent
 public:
     UPapillaSessionComponent();
 
-    /** Host and port of the service. */
+    /** Where the service is: host, host:port, or a URL of http(s) or ws(s). */
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla")
     FString Server = TEXT("127.0.0.1:7224");
 
@@ -154,6 +155,7 @@ private:
     void Pump();
     void FetchAtlas();
 
+    papilla::net::Address Address;
     TUniquePtr<papilla::Core> Core;
     TSharedPtr<IWebSocket> Socket, Next;
     papilla::Pieces Pieces;
