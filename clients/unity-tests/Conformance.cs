@@ -64,6 +64,7 @@ sealed partial class Run : IDisposable
         switch ((string)step["do"])
         {
             case "address": Address((string)step["address"], expect); break;
+            case "silence": Silence(step); break;
             case "token": Token((string)step["token"], expect); break;
             case "hello": Hello(step, expect); break;
             case "frame": Frame(step, expect); break;
@@ -125,6 +126,7 @@ sealed partial class Run : IDisposable
             session.SessionReady += ready => { lock (gate) { reply = ready; tiers[ready.TierNumber] = ready.Tier; Monitor.PulseAll(gate); } };
             session.Refused += problem => { lock (gate) { reply = problem; Monitor.PulseAll(gate); } };
             session.Answered += Keep;
+            session.Warn = null;
             session.Open();
         }
         else
@@ -141,6 +143,7 @@ sealed partial class Run : IDisposable
             return;
         }
         if (refused != null) throw new Missed(refused.ToString());
+        foreach (var words in expect["warnings"] ?? new JArray()) Told((string)words);
         foreach (var member in (JObject)expect["ready"] ?? new JObject())
         {
             if (!JToken.DeepEquals(((Ready)got).Json[member.Key], member.Value)) throw new Missed("ready." + member.Key + " is " + ((Ready)got).Json[member.Key]);
@@ -264,6 +267,39 @@ sealed partial class Run : IDisposable
         lock (gate) reply = null;
         Steer("restart");
         Until("a new session", () => reply as Ready, (int)(1000 * withinS));
+    }
+
+    void Told(string words)
+    {
+        if (!session.Warnings.Any(each => each.Contains(words))) throw new Missed("nobody was told: " + words);
+    }
+
+    /// <summary>The server stops, or dies, while frames wait for it.</summary>
+    void Silence(JObject step)
+    {
+        string how = (string)step["how"];
+        var map = Pattern((JObject)step["pressure"], 1);
+        uint first = session.Send(map), last = 0;
+        Until("the frame before", () => Of(first), patienceMs);
+        session.TimeoutMs = (int)step["timeout_ms"];
+        Steer(how);
+        var sequences = new List<uint>();
+        for (int k = 0; k < (int)step["count"]; k++)
+        {
+            sequences.Add(last = session.Send(map));
+            Thread.Sleep(50);
+        }
+        Until("all outcomes", () => sequences.All(outcomes.ContainsKey) ? sequences : null, patienceMs);
+        foreach (uint one in sequences)
+        {
+            var status = outcomes[one].Status;
+            if (status != Status.Lost && (status != Status.Superseded || one == last)) throw new Missed("a frame is " + status);
+        }
+        Told("no answer within");
+        lock (gate) reply = null;
+        Steer(how == "pause" ? "resume" : "start");
+        session.TimeoutMs = 5000;
+        Until("a new session", () => reply as Ready, (int)(1000 * (double)step["within_s"]));
     }
 
     void Moved(double withinS)

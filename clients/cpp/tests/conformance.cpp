@@ -34,6 +34,7 @@ class Run {
         {"reconnect", &Run::reconnect}, {"http", &Run::post},           {"rasterise", &Run::rasterise},
         {"move", &Run::moved},
         {"address", &Run::address},     {"token", &Run::token},
+        {"silence", &Run::silence},
         {"contacts", &Run::contacts},   {"touch", &Run::touch},         {"gaps", &Run::gaps}};
     must(steps.count(name) != 0, "there is no step " + name);
     (this->*steps.at(name))(step);
@@ -97,6 +98,7 @@ class Run {
         std::lock_guard<std::mutex> lock(mutex_);
         outcomes_.push_back({answer.sequence, answer.status, answer.by_client});
       };
+      options.warn = nullptr;
       auto session = std::make_unique<Session>(std::move(options));
       good = session->open();
       problem = session->problem();
@@ -104,6 +106,7 @@ class Run {
     }
     must(good == (due_status(expect) == "ok"), "the hello: " + problem.code + " " + problem.message);
     if (!good) return check_problem(expect, problem);
+    for (const Value& words : expect["warnings"].items) check_told(words.string);
     const Ready ready = session_->ready();
     for (const auto& [name, due] : expect["ready"].members) {
       must(json::print(ready.message[name]) == json::print(due), "ready." + name + " is another");
@@ -196,6 +199,44 @@ class Run {
       sleep_ms(5);
     }
     note = " (connected " + std::to_string(double(now_us() - begin) * 1e-6) + " s after the server was back)";
+  }
+
+  void check_told(const std::string& words) {
+    const std::vector<std::string> told = session().warnings();
+    const auto holds = [&](const std::string& each) { return each.find(words) != std::string::npos; };
+    must(std::any_of(told.begin(), told.end(), holds), "nobody was told: " + words);
+  }
+
+  /// The service stops, or dies, while frames wait for it.
+  void silence(const Value& step) {
+    const std::uint64_t before = session().connections();
+    const std::vector<float> map = pressure(step["pressure"]);
+    must(session().render(map.data(), {}, now_us(), 0, timeout_ms_).status == Status::ok, "the frame before");
+    session().set_timeout_ms(int(step["timeout_ms"].number));
+    control(step["how"].string);
+    outcomes_.clear();
+    const std::size_t count = step["count"].whole();
+    std::uint32_t last = 0;
+    for (std::size_t k = 0; k < count; ++k) last = session().send(map.data()), sleep_ms(50);
+    std::vector<Outcome> found;
+    for (int waited = 0; found.size() < count; waited += 5) {
+      must(waited < timeout_ms_, "only " + std::to_string(found.size()) + " outcomes");
+      sleep_ms(5);
+      std::lock_guard<std::mutex> lock(mutex_);
+      found = outcomes_;
+    }
+    for (const Outcome& each : found) {
+      const bool is_due = each.status == Status::lost || (each.status == Status::superseded && each.sequence != last);
+      must(is_due, std::string("a frame is ") + name_of(each.status));
+    }
+    check_told("no answer within");
+    control(step["how"].string == "pause" ? "resume" : "start");
+    session().set_timeout_ms(5000);
+    const std::uint64_t begin = now_us();
+    while (session().connections() == before || !session().connected()) {
+      must(double(now_us() - begin) < 1e6 * step["within_s"].number, "no new session in time");
+      sleep_ms(5);
+    }
   }
 
   void moved(const Value& step) {

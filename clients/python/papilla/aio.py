@@ -22,12 +22,14 @@ from .address import Address, clean_token
 from .answer import Answer, Problem
 from .errors import Closed, Refused, Unreachable
 from .http import DEFAULT_URL, refusal
-from .link import Frame, dial
+from .link import Frame, dial, questions
 from .wire import Window
 
 _PATIENCE_S: Final = 30.0
 _RETRY_S: Final = 0.15
 _MOVE_PATIENCE_S: Final = 5.0
+TIMEOUT_S: Final = 5.0
+"""After so long a frame without an answer is `lost`."""
 _LOG: Final = logging.getLogger("papilla")
 NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
@@ -46,9 +48,16 @@ class AsyncSession:
     (docs/reference/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
     so on. When the connection breaks, or the service asks for it, the session opens another by itself;
     where the service asked, no frame is lost and what it remembers goes along.
+
+    A frame that has no answer `timeout_s` after it was handed over is `lost`, whether it waits for a connection
+    or for the service; in the second case the session gives the connection up and opens another.
     """
 
-    def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
+    def __init__(
+        self, url: str = DEFAULT_URL, token: str | None = None, *, timeout_s: float = TIMEOUT_S, **hello: Any
+    ) -> None:
+        if not timeout_s > 0:
+            raise ValueError(f"timeout_s is {timeout_s}; a time above 0 is due, float('inf') for any")
         self._address = Address.parse(url)
         self.url = self._address.http("")
         self.ready: dict[str, Any] = {}
@@ -57,6 +66,10 @@ class AsyncSession:
         """Frames that a newer one replaced before they left."""
         self.connections = 0
         """Times that a session was opened; more than 1 after a reconnect."""
+        self.warnings: list[str] = []
+        """What was logged for people to read: each question of the service's, and each odd answer, once."""
+        self.timeout_s = timeout_s
+        """Time within which a frame has an outcome, s; may be changed."""
         self._token = clean_token(token)
         self._hello = hello
         self._socket: ClientConnection | None = None
@@ -88,7 +101,7 @@ class AsyncSession:
     async def open(self) -> None:
         """Connects and says hello; raises Refused or Unreachable."""
         await self._connect()
-        self._tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._live())]
+        self._tasks = [asyncio.create_task(task) for task in (self._write(), self._live(), self._watch())]
 
     async def close(self) -> None:
         """Ends the session; frames without an outcome are `lost`."""
@@ -141,6 +154,8 @@ class AsyncSession:
             try:
                 await self._socket.send(self._words(hello))
                 ready = await asyncio.wait_for(self._renewal, _PATIENCE_S)
+            except (OSError, WebSocketException, TimeoutError) as error:
+                raise Unreachable(f"{self.url}: no answer to the new hello: {error}") from error
             finally:
                 self._renewal = None
             await self._agree(ready)
@@ -230,7 +245,8 @@ class AsyncSession:
         try:
             raw = await dial(self._address.host, self._address.port)
             ws = self._address.session()
-            return await connect(ws, sock=raw, compression=None, max_size=2**20, additional_headers=headers, proxy=None)
+            options: dict[str, Any] = {"compression": None, "max_size": 2**20, "proxy": None, "close_timeout": 1.0}
+            return await connect(ws, sock=raw, additional_headers=headers, **options)
         except InvalidStatus as error:
             raise refusal(bytes(error.response.body or b""), str(error)) from None
         except (OSError, WebSocketException) as error:
@@ -305,6 +321,8 @@ class AsyncSession:
         self.ready = ready
         self._tiers.update(enumerate(ready.get("tier_names", [])))
         self._tiers.setdefault(ready["tier_number"], ready["tier"])
+        for words in questions(ready):
+            self._warn(words, words)
 
     async def _live(self) -> None:
         """Reads until the connection breaks, and then opens another."""
@@ -342,6 +360,27 @@ class AsyncSession:
                     return
             self._wake.set()
 
+    async def _watch(self) -> None:
+        """Ends frames whose time is over."""
+        while True:
+            await asyncio.sleep(min(max(0.05 * self.timeout_s, 0.005), 0.1))
+            born_s = time.monotonic() - self.timeout_s
+            for finger, frame in list(self._waiting.items()):
+                if frame.born_s < born_s:
+                    del self._waiting[finger]
+                    self._time_out(frame)
+            late = [frame for frame in self._sent.values() if frame.born_s < born_s]
+            for frame in late:
+                del self._sent[frame.sequence]
+                self._time_out(frame)
+            if late and self._socket is not None:
+                # A service that stopped, or a network that is gone: nothing more will come of this connection.
+                self._socket.transport.abort()
+
+    def _time_out(self, frame: Frame) -> None:
+        self._warn("timeout", f"no answer within {self.timeout_s:g} s; such frames are lost")
+        self._lose(frame)
+
     def _lose_sent(self) -> None:
         for frame in list(self._sent.values()):
             self._lose(frame)
@@ -375,6 +414,7 @@ class AsyncSession:
         """Says once in a session what a program that looks at maps alone would not see."""
         if code not in self._warned:
             self._warned.add(code)
+            self.warnings.append(words)
             _LOG.warning("%s", words)
 
     def _told(self, message: dict[str, Any]) -> None:

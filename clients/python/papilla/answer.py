@@ -72,7 +72,7 @@ class Answer:
 
     sequence: int
     status: str
-    """`ok`, `superseded`, `late`, `stale`, `error` or `lost` (the connection broke)."""
+    """`ok`, `superseded`, `late`, `stale`, `error` or `lost` (the connection broke, or no answer came in time)."""
     client_time_us: int
     by_client: bool = False
     """Superseded here: the frame never left the client."""
@@ -162,7 +162,9 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         if name == "touch":
             answer.touch = read_touch(message, offset)
         elif name == "pressure":
-            answer.pressure_pa = wire.floats(message, offset, size)
+            found = wire.floats(message, offset, size)
+            is_map = size == 4 * wire.SIDE_PX**2
+            answer.pressure_pa = found.reshape(wire.SIDE_PX, wire.SIDE_PX) if is_map else found
         elif name == "shear":
             answer.shear_pa = wire.floats(message, offset, size).reshape(-1, 3)
         elif name == "vertices":

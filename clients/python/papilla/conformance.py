@@ -189,6 +189,8 @@ class Run:
             must(expect.get("status") == "error", f"the hello is refused: {error}")
             return check_problem(expect, error.code, error.field)
         must(expect.get("status") != "error", "the hello is not refused")
+        for words in expect.get("warnings", []):
+            must(any(words in told for told in self.session.warnings), f"{words}: {self.session.warnings}")
         for name, value in expect.get("ready", {}).items():
             found = self.session.ready.get(name)
             must(found == value, f"ready.{name} is {found}, {value} is due")
@@ -287,6 +289,27 @@ class Run:
             must(time.monotonic() < begin + step["within_s"], "no new session in time")
             time.sleep(0.005)
         self.note = f"(connected {time.monotonic() - begin:.2f} s after the server was back)"
+
+    def silence(self, step: Step) -> None:
+        """The service stops, or dies, while frames wait for it."""
+        session, before = self.open_session(), self.open_session().connections
+        usual_s, session.timeout_s = session.timeout_s, step["timeout_ms"] * 1e-3
+        sent = [session.send(pressure(step["pressure"]))]
+        sent[0].result(self.timeout_s)
+        control(step["how"])
+        for _ in range(step["count"]):
+            sent.append(session.send(pressure(step["pressure"])))
+            time.sleep(0.05)
+        answers = [each.result(self.timeout_s) for each in sent[1:]]
+        statuses = [answer.status for answer in answers]
+        must(statuses[-1] == "lost" and {*statuses} <= {"lost", "superseded"}, f"{statuses}")
+        must(any("no answer within" in words for words in session.warnings), f"{session.warnings}")
+        control({"pause": "resume", "kill": "start"}[step["how"]])
+        session.timeout_s = usual_s
+        begin = time.monotonic()
+        while session.connections == before or not session.connected:
+            must(time.monotonic() < begin + step["within_s"], "no new session in time")
+            time.sleep(0.005)
 
     def move(self, step: Step) -> None:
         session, before = self.open_session(), self.moved

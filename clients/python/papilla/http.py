@@ -68,7 +68,10 @@ def refusal(body: bytes, otherwise: str) -> Refused:
     """The error that the body of an answer holds."""
     try:
         problem = json.loads(body)["error"]
-        return Refused(problem["code"], problem["message"], problem.get("field"))
+        message = problem["message"]
+        if problem["code"] == "unauthorized":
+            message += '; here as token="...", one of the tokens that the service was started with'
+        return Refused(problem["code"], message, problem.get("field"))
     except (ValueError, KeyError, TypeError):
         return Refused("internal", otherwise)
 

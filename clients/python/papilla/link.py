@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import time
 from concurrent.futures import Future
 from typing import Any, Final
 
@@ -15,9 +16,10 @@ _SOCKET_BYTES: Final = 512 * 1024
 class Frame:
     """A frame on its way, and who waits for its outcome."""
 
-    __slots__ = ("client_time_us", "finger", "message", "outcome", "ready", "sequence")
+    __slots__ = ("born_s", "client_time_us", "finger", "message", "outcome", "ready", "sequence")
 
     def __init__(self, sequence: int, client_time_us: int, message: bytes, finger: int = 0) -> None:
+        self.born_s = time.monotonic()
         self.sequence = sequence
         self.client_time_us = client_time_us
         self.message = message
@@ -26,7 +28,7 @@ class Frame:
         self.ready: dict[str, Any] = {}
 
     def end(self, status: str, by_client: bool = False, problem: Problem | None = None) -> None:
-        self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem))
+        self.give(Answer(self.sequence, status, self.client_time_us, by_client, problem, finger=self.finger))
 
     def give(self, answer: Answer) -> None:
         if not self.outcome.done():
@@ -50,3 +52,14 @@ async def dial(host: str, port: int) -> socket.socket:
             raw.close()
             last = error
     raise last
+
+
+def questions(ready: dict[str, Any]) -> list[str]:
+    """What a person should know of a ready: what the service asks, and a budget that it cannot meet."""
+    asked = [f"{each['member']}: {each['question']}" for each in ready.get("warnings", [])]
+    if ready.get("meets_budget") is False:
+        budget_us = ready["budget_us"]
+        needs = f"a frame of tier {ready['tier']} takes some {ready['predicted_latency_us']} us"
+        meant = f"; it counts microseconds: were {budget_us} ms meant?" if budget_us < 100 else ""
+        asked.append(f"{needs}, and budget_us is {budget_us}, so that frames may be late{meant}")
+    return asked

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .aio import AsyncSession, NetForce
+from .aio import TIMEOUT_S, AsyncSession, NetForce
 from .answer import Answer
 from .http import DEFAULT_URL
 from .wire import Window
@@ -26,21 +26,23 @@ class Session:
     `with Session(tier="small") as session: session.render(pressure_pa).sed`
     """
 
-    def __init__(self, url: str = DEFAULT_URL, token: str | None = None, **hello: Any) -> None:
-        """Connects and says hello; raises Refused or Unreachable."""
+    def __init__(
+        self, url: str = DEFAULT_URL, token: str | None = None, *, timeout_s: float = TIMEOUT_S, **hello: Any
+    ) -> None:
+        """Connects and says hello; raises BadAddress, Refused or Unreachable."""
         self._loop = asyncio.new_event_loop()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True, name="papilla")
         self._thread.start()
         try:
-            self._session = self._call(self._make(url, token, hello))
+            self._session = self._call(self._make(url, token, timeout_s, hello))
         except BaseException:
             self._stop()
             raise
 
     @staticmethod
-    async def _make(url: str, token: str | None, hello: dict[str, Any]) -> AsyncSession:
-        session = AsyncSession(url, token, **hello)
+    async def _make(url: str, token: str | None, timeout_s: float, hello: dict[str, Any]) -> AsyncSession:
+        session = AsyncSession(url, token, timeout_s=timeout_s, **hello)
         await session.open()
         return session
 
@@ -83,6 +85,20 @@ class Session:
     def connections(self) -> int:
         """Times that a session was opened; more than 1 after a reconnect."""
         return self._session.connections
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was logged for people to read; see `AsyncSession.warnings`."""
+        return self._session.warnings
+
+    @property
+    def timeout_s(self) -> float:
+        """Time within which a frame has an outcome, s; after it the frame is `lost`. May be changed."""
+        return self._session.timeout_s
+
+    @timeout_s.setter
+    def timeout_s(self, value: float) -> None:
+        self._session.timeout_s = value
 
     def send(
         self,

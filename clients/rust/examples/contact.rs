@@ -4,7 +4,7 @@
 
 use std::{env, time::Duration};
 
-use papilla_client::{Contact, Session, Skin, atlas, proto::Hello};
+use papilla_client::{Contact, Session, Skin, Status, atlas, proto::Hello};
 use tokio::{task, time};
 
 #[tokio::main]
@@ -21,6 +21,11 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         let force_n = 0.5 * (f64::from(frame) / 57.0).sin().powi(2);
         let contact = Contact { at_mm: [11.25, 0.0, -6.53], force_n, radius_mm: 2.5 };
         let answer = session.render(&skin.contacts(&[contact])).await?;
+        if answer.status != Status::Ok {
+            // Lost, late or refused: an actuator goes to zero, and the next frame is tried.
+            println!("{force_n:.3} N: no map, the frame is {:?}", answer.status);
+            continue;
+        }
         let area_mm2 = answer.summary.map_or(0.0, |summary| summary.contact_area_mm2);
         println!(
             "{force_n:.3} N: {:.0} J/m3 at most, {area_mm2:.1} mm2 in contact, {} us in the server",

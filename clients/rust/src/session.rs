@@ -5,10 +5,11 @@ mod link;
 mod live;
 mod moving;
 mod state;
+mod told;
 
 use std::{
     sync::{Arc, OnceLock},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use papilla_proto::{Hello, Ready, Window};
@@ -57,6 +58,8 @@ struct Shared {
     wake: Notify,
     /// The session is to move, or has what it takes along.
     moving: Notify,
+    /// The connection owed an answer for too long.
+    stalled: Notify,
     /// Sessions opened so far; odd things happen between two of them.
     opened: watch::Sender<u64>,
 }
@@ -73,10 +76,15 @@ impl Shared {
 /// When the connection breaks, or the service asks for it, it opens another by itself, with the same
 /// hello; where the service asked, no frame is lost and what it remembers goes along. Needs a tokio
 /// runtime; dropping it ends the session.
+///
+/// A frame that has no answer after five seconds ([`set_timeout`](Self::set_timeout)) is
+/// [lost](crate::Status::Lost), whether it waits for a connection or for the service; in the second
+/// case the connection is given up and another opened. Set the actuators to zero then.
 #[derive(Debug)]
 pub struct Session {
     shared: Arc<Shared>,
     task: JoinHandle<()>,
+    watch: JoinHandle<()>,
 }
 
 /// The hello in the version that its members need, of a client that moves when it is asked to.
@@ -108,10 +116,12 @@ impl Session {
             state: std::sync::Mutex::new(State::new(hello, ready)),
             wake: Notify::new(),
             moving: Notify::new(),
+            stalled: Notify::new(),
             opened: watch::Sender::new(1),
         });
         let task = tokio::spawn(live::live(server, Arc::clone(&shared), link));
-        Ok(Self { shared, task })
+        let watch = tokio::spawn(live::watch(Arc::clone(&shared)));
+        Ok(Self { shared, task, watch })
     }
 
     /// What the service agreed to.
@@ -163,6 +173,18 @@ impl Session {
         self.shared.opened.subscribe()
     }
 
+    /// Time within which a frame has an outcome, from now on.
+    pub fn set_timeout(&self, timeout: Duration) {
+        self.shared.state().timeout = timeout;
+    }
+
+    /// What people were told on standard error so far, each thing once: the first refused frame, the
+    /// first one out of range, the first timeout, a budget that the service cannot meet.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        self.shared.state().told.words.clone()
+    }
+
     /// Frames that a newer one replaced before they left.
     #[must_use]
     pub fn superseded_by_client(&self) -> u64 {
@@ -173,6 +195,7 @@ impl Session {
 impl Drop for Session {
     fn drop(&mut self) {
         self.task.abort();
+        self.watch.abort();
         self.shared.state().end();
     }
 }

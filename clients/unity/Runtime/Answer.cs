@@ -31,7 +31,7 @@ namespace Papilla
         public float[] PressurePa;
         /// <summary>SED at the atlas' vertices, J/m3; null where the hello does not ask for it in place of the map.</summary>
         public float[] Vertices;
-        /// <summary>The finger of the frame; 0 where the frame never got an answer.</summary>
+        /// <summary>The finger of the frame.</summary>
         public int Finger;
         /// <summary>The contact solve did not settle: its answer is rough.</summary>
         public bool Unsettled;

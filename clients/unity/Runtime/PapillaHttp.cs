@@ -8,6 +8,9 @@ namespace Papilla
     /// <summary>What needs no session: the atlas, and one map at a time. Calls wait; do not make them on a game's main thread.</summary>
     public static class PapillaHttp
     {
+        // As long as a request may wait for models that are being loaded.
+        const int PatienceMs = 30000;
+
         /// <summary>The atlas of the server at <paramref name="address"/>; see <see cref="ServerAddress"/>.</summary>
         public static Atlas LoadAtlas(string address, string token = null)
         {
@@ -37,6 +40,7 @@ namespace Papilla
         {
             var request = WebRequest.CreateHttp(new ServerAddress(address).Http("/" + path));
             request.ServicePoint.Expect100Continue = false;
+            request.Timeout = request.ReadWriteTimeout = PatienceMs;
             string clean = ServerAddress.CleanToken(token);
             if (clean != null) request.Headers["Authorization"] = "Bearer " + clean;
             return request;

@@ -13,6 +13,9 @@ namespace Papilla
         {
             internal Frame Waiting = new Frame();
             internal bool IsWaiting, IsFresh;
+            internal int Number;
+            // When the frame that waits was handed over, by the system's clock.
+            internal ulong BornUs;
             internal Answer Newest = new Answer(), Taken = new Answer();
         }
 
@@ -21,6 +24,7 @@ namespace Papilla
         {
             internal uint Own, Superseded;
             internal bool DidSupersede;
+            internal int Finger;
         }
 
         // A finger's first frame takes its memory.
@@ -88,22 +92,23 @@ namespace Papilla
         Handed HandOver(int finger, ulong timeUs)
         {
             if (finger < 0 || finger >= FingersMax) throw new PapillaException(new Problem("bad_contact", "a session has at most 10 fingers"));
-            if (fingers[finger] == null) fingers[finger] = new Finger();
+            if (fingers[finger] == null) fingers[finger] = new Finger { Number = finger };
             var of = fingers[finger];
-            var handed = new Handed { Own = ++sequence, Superseded = of.Waiting.Sequence, DidSupersede = of.IsWaiting };
+            var handed = new Handed { Own = ++sequence, Superseded = of.Waiting.Sequence, DidSupersede = of.IsWaiting, Finger = finger };
             if (of.IsWaiting) SupersededByClient++;
             draft.Stamp(handed.Own, timeUs, DeadlineUs);
             var old = of.Waiting;
             of.Waiting = draft;
             draft = old;
             of.IsWaiting = true;
+            of.BornUs = Now();
             System.Threading.Monitor.PulseAll(gate);
             return handed;
         }
 
         uint Told(Handed handed)
         {
-            if (handed.DidSupersede) Tell(handed.Superseded, Status.Superseded, null);
+            if (handed.DidSupersede) Tell(handed.Superseded, handed.Finger, Status.Superseded, null);
             return handed.Own;
         }
 
@@ -121,19 +126,28 @@ namespace Papilla
         /// <summary>Ends every frame that waits with this status.</summary>
         void TellWaiting(Status status)
         {
-            while (true)
+            EndWaiting(status, ulong.MaxValue);
+        }
+
+        /// <summary>Ends the frames that wait and were handed over by then; false: there was none.</summary>
+        bool EndWaiting(Status status, ulong bornUs)
+        {
+            bool any = false;
+            for (int k = 0; k < FingersMax; k++)
             {
                 uint own;
                 lock (gate)
                 {
-                    var of = NextWaiting();
-                    if (of == null) return;
+                    var of = fingers[k];
+                    if (of == null || !of.IsWaiting || of.BornUs > bornUs) continue;
                     of.IsWaiting = false;
                     if (status == Status.Superseded) SupersededByClient++;
                     own = of.Waiting.Sequence;
                 }
-                Tell(own, status, null);
+                any = true;
+                Tell(own, k, status, null);
             }
+            return any;
         }
     }
 }

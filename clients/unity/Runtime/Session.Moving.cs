@@ -56,7 +56,7 @@ namespace Papilla
                     next.Connect(uri, AttemptMs);
                     isDone = Attempt(own, next);
                 }
-                catch (Exception error) when (IsConnection(error) || error is FormatException)
+                catch (Exception error) when (IsConnection(error) || error is FormatException || error is PapillaException)
                 {
                     // The old connection goes on for as long as it is there.
                 }

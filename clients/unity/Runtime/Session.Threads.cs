@@ -10,6 +10,17 @@ namespace Papilla
     /// <content>The two threads: one sends the frame that waits, the other connects and receives.</content>
     public sealed partial class Session
     {
+        /// <summary>A frame that has left.</summary>
+        struct Left
+        {
+            internal ulong BornUs;
+            internal int Finger;
+        }
+
+        static readonly string[] Passing = { "overloaded", "internal", "rate_limited", "shutting_down", "timeout" };
+
+        int isExpiring;
+
         void SendWaiting()
         {
             while (true)
@@ -64,7 +75,7 @@ namespace Papilla
             leaving = frame;
             leaving.StampVersion(ready.Version);
             of.IsWaiting = false;
-            outstanding.Add(leaving.Sequence);
+            outstanding.Add(leaving.Sequence, new Left { BornUs = of.BornUs, Finger = of.Number });
             Sent++;
         }
 
@@ -93,9 +104,10 @@ namespace Papilla
                     Greet(next);
                     Attend(next);
                 }
-                catch (Exception error) when (IsConnection(error))
+                catch (Exception error) when (IsConnection(error) || error is PapillaException)
                 {
                     next.Dispose();
+                    OnFailed(error);
                 }
                 lock (gate)
                 {
@@ -109,6 +121,17 @@ namespace Papilla
                 LoseAll();
                 Thread.Sleep(RetryLeastMs + random.Next(RetryMostMs - RetryLeastMs));
             }
+        }
+
+        /// <summary>An attempt to connect failed; a refusal that does not pass by itself ends the session.</summary>
+        void OnFailed(Exception error)
+        {
+            var refused = error as PapillaException;
+            lock (gate) fault = error.Message;
+            if (refused == null || OnRefusal(refused.Problem)) return;
+            if (IsNew("refused")) TellPeople("the session was refused: " + refused.Problem.Message);
+            var told = Refused;
+            if (told != null) told(refused.Problem);
         }
 
         /// <summary>Listens to a connection, and to the one that the session moves to, until the session has none.</summary>
@@ -183,6 +206,7 @@ namespace Papilla
                     isFirstReady = false;
                     Monitor.PulseAll(gate);
                 }
+                Question(terms);
                 var welcome = SessionReady;
                 if (welcome != null) welcome(terms);
                 return true;
@@ -193,16 +217,21 @@ namespace Papilla
                 return true;
             }
             var problem = new Problem(json);
-            bool isOurs;
             if (problem.Sequence != null)
             {
-                lock (gate) isOurs = outstanding.Remove(problem.Sequence.Value);
-                if (isOurs) WarnOnce(ref toldRefusal, "a frame was refused: " + problem.Message);
-                if (isOurs) Tell(problem.Sequence.Value, Status.Error, problem);
+                Left left;
+                bool isOurs;
+                lock (gate)
+                {
+                    isOurs = outstanding.TryGetValue(problem.Sequence.Value, out left);
+                    outstanding.Remove(problem.Sequence.Value);
+                }
+                if (isOurs && IsNew("error")) TellPeople("a frame was refused: " + problem.Message);
+                if (isOurs) Tell(problem.Sequence.Value, left.Finger, Status.Error, problem);
                 return true;
             }
             bool goesOn = OnRefusal(problem);
-            if (!goesOn) WarnOnce(ref toldRefusal, "the session was refused: " + problem.Message);
+            if (!goesOn && IsNew("refused")) TellPeople("the session was refused: " + problem.Message);
             var refused = Refused;
             if (refused != null) refused(problem);
             return goesOn;
@@ -211,7 +240,7 @@ namespace Papilla
         /// <summary>A refused renewal leaves the old terms; a refused first hello ends it, unless the reason passes by itself.</summary>
         bool OnRefusal(Problem problem)
         {
-            bool passes = problem.Closes || problem.Code == "overloaded" || problem.Code == "internal" || problem.Code == "rate_limited";
+            bool passes = problem.Closes || Array.IndexOf(Passing, problem.Code) >= 0;
             lock (gate)
             {
                 if (ready != null || passes) return true;
@@ -246,7 +275,7 @@ namespace Papilla
             lock (telling)
             {
                 filling.Read(message, bytes, terms);
-                if (filling.OutOfRange && filling.Status == Status.Ok) WarnOnce(ref toldRange, "pressure is beyond what the tier knows; such answers are flagged");
+                if (filling.OutOfRange && filling.Status == Status.Ok && IsNew("out_of_range")) TellPeople("pressure is beyond what the tier knows; such answers are flagged");
                 filling.RoundTripUs = (long)(ClockUs() - filling.ClientTimeUs);
                 var answeredEvent = Answered;
                 if (answeredEvent != null) answeredEvent(filling);
@@ -259,11 +288,12 @@ namespace Papilla
             }
         }
 
-        void Tell(uint sequence, Status status, Problem problem)
+        void Tell(uint sequence, int finger, Status status, Problem problem)
         {
             lock (telling)
             {
                 brief.Sequence = sequence;
+                brief.Finger = finger;
                 brief.Status = status;
                 brief.Problem = problem;
                 var answered = Answered;
@@ -274,21 +304,49 @@ namespace Papilla
         /// <summary>What went out on a lost connection is never answered.</summary>
         void LoseAll()
         {
+            LoseLeft(ulong.MaxValue);
+        }
+
+        /// <summary>Loses what left and was handed over by then; false: there was none.</summary>
+        bool LoseLeft(ulong bornUs)
+        {
+            bool any = false;
             while (true)
             {
                 uint lost = 0;
+                int finger = 0;
+                bool isOver = true;
                 lock (gate)
                 {
-                    if (outstanding.Count == 0) return;
-                    foreach (uint one in outstanding)
+                    foreach (var one in outstanding)
                     {
-                        lost = one;
+                        if (one.Value.BornUs > bornUs) continue;
+                        lost = one.Key;
+                        finger = one.Value.Finger;
+                        isOver = false;
                         break;
                     }
+                    if (isOver) return any;
                     outstanding.Remove(lost);
+                    any = true;
                 }
-                Tell(lost, Status.Lost, null);
+                Tell(lost, finger, Status.Lost, null);
             }
+        }
+
+        /// <summary>Ends frames whose time is over; on a thread of the system's, since the others may wait for the socket.</summary>
+        void Expire()
+        {
+            if (Interlocked.Exchange(ref isExpiring, 1) != 0) return;
+            ulong now = Now(), timeoutUs = 1000 * (ulong)Math.Max(1, TimeoutMs);
+            ulong bornUs = now > timeoutUs ? now - timeoutUs : 0;
+            ITransport open;
+            lock (gate) open = transport;
+            bool waited = EndWaiting(Status.Lost, bornUs), left = LoseLeft(bornUs);
+            if ((waited || left) && IsNew("timeout")) TellPeople("no answer within " + TimeoutMs + " ms; such frames are lost");
+            // A server that stopped, or a network that is gone: nothing more will come of this connection.
+            if (left && open != null) open.Dispose();
+            isExpiring = 0;
         }
     }
 }

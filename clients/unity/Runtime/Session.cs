@@ -12,7 +12,7 @@ namespace Papilla
     /// </summary>
     public sealed partial class Session : IDisposable
     {
-        const int AttemptMs = 5000, RetryLeastMs = 100, RetryMostMs = 250, OutstandingMax = 1024;
+        const int AttemptMs = 5000, RetryLeastMs = 100, RetryMostMs = 250, OutstandingMax = 1024, WatchMs = 20;
 
         /// <summary>Once for every frame, whatever became of it; on a thread of the client's. The answer is valid during the call.</summary>
         public event Action<Answer> Answered;
@@ -30,10 +30,18 @@ namespace Papilla
         /// <summary>Connections that the session had: more than 1 after one was lost, or the service asked it to move.</summary>
         public int Connections;
         /// <summary>
-        /// Called with the first refused hello, the first refused frame and the first one out of range, on a thread of the client's:
-        /// by default Unity's console, or standard error.
+        /// A frame without an answer for so long is <see cref="Status.Lost"/>, ms, whether it waits for a connection or for the server; in the
+        /// second case the connection is given up and another made. Set the actuators to zero then.
+        /// </summary>
+        public int TimeoutMs = 5000;
+        /// <summary>
+        /// Called with what people should know, each thing once, on a thread of the client's: the first refused hello, the first refused
+        /// frame, the first one out of range, the first timeout, what the server asks of the hello, a budget that it cannot meet. By default
+        /// Unity's console, or standard error.
         /// </summary>
         public Action<string> Warn = Print;
+        /// <summary>What people were told so far, each thing once.</summary>
+        public string[] Warnings { get { lock (warnings) return warnings.ToArray(); } }
         /// <summary>us of the client's clock.</summary>
         public Func<ulong> ClockUs = Now;
 
@@ -41,20 +49,26 @@ namespace Papilla
         readonly Uri uri;
         readonly Func<ITransport> newTransport;
         readonly object gate = new object(), telling = new object();
-        readonly HashSet<uint> outstanding = new HashSet<uint>();
+        // What has left and has no outcome, by sequence.
+        readonly Dictionary<uint, Left> outstanding = new Dictionary<uint, Left>(OutstandingMax);
+        readonly HashSet<string> told = new HashSet<string>();
+        readonly List<string> warnings = new List<string>();
         readonly byte[] message = new byte[Wire.MessageBytesMax];
         readonly Answer brief = new Answer();
         readonly Random random = new Random();
         Answer filling = new Answer();
         Frame leaving = new Frame();
-        bool isClosed, isRefused, isFirstReady, toldRefusal, toldRange;
+        bool isClosed, isRefused, isFirstReady;
         uint sequence, renewedFrom;
         Hello hello, helloBefore;
         Ready readyBefore, olderReady;
         Problem refusal;
+        // Why the last attempt to connect failed.
+        string fault;
         volatile Ready ready;
         ITransport transport;
         Thread receiver, sender;
+        Timer watch;
 
         /// <param name="address">where the server is; see <see cref="ServerAddress"/></param>
         /// <param name="hello">what to ask for; null: the defaults</param>
@@ -67,8 +81,6 @@ namespace Papilla
             uri = new Uri(server.Session() + (clean == null ? "" : "?access_token=" + Uri.EscapeDataString(clean)));
             this.hello = hello ?? new Hello();
             this.newTransport = newTransport ?? (() => new SocketTransport());
-            for (uint k = 0; k < OutstandingMax; k++) outstanding.Add(k);
-            outstanding.Clear();
         }
 
         /// <summary>Connects, and again whenever the connection is lost, until <see cref="Dispose"/>.</summary>
@@ -78,6 +90,7 @@ namespace Papilla
             sender = new Thread(SendWaiting) { IsBackground = true, Name = "papilla send" };
             receiver.Start();
             sender.Start();
+            watch = new Timer(none => Expire(), null, WatchMs, WatchMs);
             return this;
         }
 
@@ -91,7 +104,11 @@ namespace Papilla
                 {
                     if (isRefused) throw new PapillaException(refusal);
                     int left = timeoutMs - (int)watch.ElapsedMilliseconds;
-                    if (left <= 0 || isClosed) throw new TimeoutException("no session at " + server.Session() + " within " + timeoutMs + " ms");
+                    if (left <= 0 || isClosed)
+                    {
+                        string why = fault == null ? "" : ": " + fault;
+                        throw new TimeoutException("no session at " + server.Session() + " within " + timeoutMs + " ms" + why + "; is papilla-server running there?");
+                    }
                     Monitor.Wait(gate, left);
                 }
                 return ready;
@@ -145,12 +162,32 @@ namespace Papilla
 #endif
         }
 
-        void WarnOnce(ref bool told, string words)
+        /// <summary>Whether nothing of that code was told yet; from now on something was.</summary>
+        bool IsNew(string code)
         {
-            if (told) return;
-            told = true;
+            lock (warnings) return told.Count < 100 && told.Add(code);
+        }
+
+        void TellPeople(string words)
+        {
+            lock (warnings) warnings.Add(words);
             var warn = Warn;
             if (warn != null) warn(words);
+        }
+
+        /// <summary>What the server asks, and a budget that it cannot meet.</summary>
+        void Question(Ready terms)
+        {
+            foreach (var each in terms.Json["warnings"] ?? new Newtonsoft.Json.Linq.JArray())
+            {
+                string words = (string)each["member"] + ": " + (string)each["question"];
+                if (IsNew(words)) TellPeople(words);
+            }
+            if ((bool?)terms.Json["meets_budget"] != false) return;
+            long budget = (long)terms.Json["budget_us"];
+            string late = "a frame of tier " + terms.Tier + " takes some " + terms.PredictedLatencyUs + " us, and budget_us is " + budget + ", so that frames may be late";
+            if (budget < 100) late += "; it counts microseconds: were " + budget + " ms meant?";
+            if (IsNew(late)) TellPeople(late);
         }
 
         /// <summary>us since the system started.</summary>
@@ -178,6 +215,7 @@ namespace Papilla
             {
                 if (isClosed) return;
                 isClosed = true;
+                if (watch != null) watch.Dispose();
                 if (transport != null) transport.Dispose();
                 if (move != null && move.Next != null) move.Next.Dispose();
                 Monitor.PulseAll(gate);

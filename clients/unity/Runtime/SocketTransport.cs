@@ -1,10 +1,12 @@
 using System;
+using System.Globalization;
 using System.IO;
 using System.Net.Security;
 using System.Net.Sockets;
 using System.Security.Cryptography;
 using System.Text;
 using System.Threading;
+using Newtonsoft.Json.Linq;
 
 namespace Papilla
 {
@@ -62,8 +64,26 @@ namespace Papilla
             var text = reply.ToString();
             string due;
             using (var sha = SHA1.Create()) due = Convert.ToBase64String(sha.ComputeHash(Encoding.ASCII.GetBytes(key + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11")));
-            if (!text.StartsWith("HTTP/1.1 101", StringComparison.Ordinal)) throw new IOException("no session: " + text.Split('\r')[0]);
+            if (!text.StartsWith("HTTP/1.1 101", StringComparison.Ordinal)) throw Refusal(text);
             if (text.IndexOf(due, StringComparison.Ordinal) < 0) throw new IOException("the answer to the upgrade is of no WebSocket");
+        }
+
+        /// <summary>Why the server did not upgrade: its own words, where its answer has a body.</summary>
+        Exception Refusal(string reply)
+        {
+            var body = new StringBuilder();
+            const string length = "content-length: ";
+            int at = reply.ToLowerInvariant().IndexOf(length, StringComparison.Ordinal), due = 0;
+            if (at >= 0) int.TryParse(reply.Substring(at + length.Length).Split('\r')[0], NumberStyles.None, CultureInfo.InvariantCulture, out due);
+            while (body.Length < Math.Min(due, 4096) && Read(head, 0, 1) == 1) body.Append((char)head[0]);
+            try
+            {
+                return new PapillaException(new Problem((JObject)JObject.Parse(body.ToString())["error"]));
+            }
+            catch (Exception error) when (error is Newtonsoft.Json.JsonException || error is InvalidCastException || error is NullReferenceException)
+            {
+                return new IOException("no session: " + reply.Split('\r')[0]);
+            }
         }
 
         static bool EndsWith(StringBuilder text, string end)

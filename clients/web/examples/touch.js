@@ -9,7 +9,12 @@ const ball = { shape: { shape: 'sphere', radius_mm: 10 } };
 const hand = await Hand.connect(base, { objects: [ball] });
 for (let step = 0; step <= 10; step++) {
   // The pad's lowest point is at (11.25, 0, -6.53); a ball's origin is its centre.
-  const { touch } = await hand.touch([{ at: [11.25, 0, -16.53 + 0.1 * step] }]);
-  console.log(`${(0.1 * step).toFixed(1)} mm: ${touch.forceN[2].toFixed(3)} N on ${touch.areaMm2.toFixed(1)} mm2`);
+  try {
+    const { touch } = await hand.touch([{ at: [11.25, 0, -16.53 + 0.1 * step] }]);
+    console.log(`${(0.1 * step).toFixed(1)} mm: ${touch.forceN[2].toFixed(3)} N on ${touch.areaMm2.toFixed(1)} mm2`);
+  } catch (error) {
+    // Lost, stale or refused: an actuator goes to zero, and the next frame is tried.
+    console.log(`${(0.1 * step).toFixed(1)} mm: no force: ${error.message}`);
+  }
 }
 hand.close();

@@ -1,6 +1,7 @@
 // The atlas: which point of the finger each pixel of a map is, and how to fill a map.
 
 import { addressOf, cleanToken } from './address.js';
+import { PATIENCE_MS } from './http.js';
 import { Patch } from './raster.js';
 import { MAP_LEN, SIDE_PX } from './wire.js';
 
@@ -42,7 +43,8 @@ export class Atlas {
   static async load(base = '', token) {
     const url = addressOf(base).http('/v1/atlas');
     const clean = cleanToken(token);
-    const response = await fetch(url, clean ? { headers: { authorization: `Bearer ${clean}` } } : {});
+    const headers = clean ? { authorization: `Bearer ${clean}` } : undefined;
+    const response = await fetch(url, { headers, signal: AbortSignal.timeout(PATIENCE_MS) });
     if (!response.ok) throw new Error(`${url}: HTTP ${response.status} ${await response.text()}`);
     return new Atlas(await response.json());
   }

@@ -21,3 +21,6 @@ export function missed(code, sequence) {
   const message = code === 'superseded' ? 'a newer frame took its place' : `the frame was ${code}`;
   return { type: 'error', code, message, sequence, closes: false };
 }
+
+/** @param {string} base @param {string} why */
+export const unreachable = (base, why) => `no session at ${base || 'the server of the page'}: ${why}; is papilla-server running there, and does it take the token?`;

@@ -1,8 +1,9 @@
 // Fingers that touch things: objects or gaps in, forces out. docs/reference/protocol.md, version 3.
 
-import { PapillaError, missed } from './error.js';
+import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
 import { Move } from './move.js';
+import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
 import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
 
 /** @typedef {import('./types.js').HandHello} HandHello */
@@ -46,12 +47,14 @@ class Waiting {
     this.message = message;
     this.resolve = resolve;
     this.reject = reject;
+    this.bornMs = performance.now();
   }
 }
 
 /**
  * One to ten fingers in one session. The newest frame of each finger wins, here and in the service; the connection is
- * made anew by itself.
+ * made anew by itself. A frame without an answer after `timeoutMs` is rejected as `lost`, whether it waits for a connection
+ * or for the service; in the second case the connection is given up and another made.
  */
 export class Hand {
   /** @type {Ready | null} */ ready = null;
@@ -64,9 +67,13 @@ export class Hand {
   /** @type {Map<number, Waiting>} */ #sent = new Map();
   /** @type {(() => void) | null} */ #opened = null;
   #move;
+  #warnings = new Warnings();
+  #watch;
+  #why = 'no answer';
 
-  /** @param {string} base @param {HandHello} hello @param {string} [token] */
-  constructor(base, hello, token) {
+  /** @param {string} base @param {HandHello} hello @param {string} [token] @param {{timeoutMs?: number}} [options] */
+  constructor(base, hello, token, options = {}) {
+    this.#watch = new Watch(options.timeoutMs ?? TIMEOUT_MS, (bornMs) => this.#expire(bornMs));
     this.#hello = { input: hello.objects ? 'objects' : 'gaps', map: false, ...hello, type: 'hello', version: VERSION, reconnect: true };
     this.#link = new Link(sessionUrl(base, token), {
       connecting: () => {},
@@ -74,7 +81,7 @@ export class Hand {
       prepared: () => this.#move.prepared(),
       text: (text) => this.#text(JSON.parse(text)),
       binary: (data) => this.#binary(data),
-      lost: () => this.#lost(),
+      lost: (why) => { this.#why = why; this.#lost(); },
     });
     this.#move = new Move(this.#link, (resume) => this.#greet(resume), () => this.#flush());
   }
@@ -84,13 +91,23 @@ export class Hand {
    * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
    * @param {HandHello} hello
    * @param {string} [token]
-   * @returns {Promise<Hand>} rejected with a PapillaError where the hello is refused
+   * @param {{timeoutMs?: number}} [options] `timeoutMs`: a frame without an answer for so long is lost (default 5000)
+   * @returns {Promise<Hand>} rejected with a PapillaError where the hello is refused, or `unreachable` where no session
+   *   is there within 10 s
    */
-  static connect(base, hello, token) {
-    const hand = new Hand(base, hello, token);
+  static async connect(base, hello, token, options) {
+    const hand = new Hand(base, hello, token, options);
     return new Promise((resolve, reject) => {
-      hand.#opened = () => resolve(hand);
+      const patience = setTimeout(() => {
+        hand.close();
+        reject(refusal('unreachable', unreachable(base, hand.#why)));
+      }, OPEN_MS);
+      hand.#opened = () => {
+        clearTimeout(patience);
+        resolve(hand);
+      };
       hand.onrefused = (problem) => {
+        clearTimeout(patience);
         hand.close();
         reject(new PapillaError(problem));
       };
@@ -98,8 +115,41 @@ export class Hand {
     });
   }
 
+  /** What people were told so far, each thing once. */
+  get warnings() {
+    return this.#warnings.list;
+  }
+
+  /** Time within which a frame has an outcome, ms; may be changed. */
+  get timeoutMs() {
+    return this.#watch.timeoutMs;
+  }
+
+  set timeoutMs(timeoutMs) {
+    this.#watch.timeoutMs = timeoutMs;
+  }
+
+  /** Ends frames whose time is over; false: none is left. @param {number} bornMs */
+  #expire(bornMs) {
+    const why = `no answer within ${this.timeoutMs} ms`;
+    let [late, left] = [false, false];
+    for (const frames of [this.#waiting, this.#sent]) {
+      for (const [key, frame] of frames) {
+        if (frame.bornMs > bornMs) continue;
+        frames.delete(key);
+        frame.reject(new PapillaError(missed('lost', frame.sequence)));
+        late = true;
+        left ||= frames === this.#sent;
+      }
+    }
+    if (late) this.#warnings.tell('timeout', () => `${why}; such frames are lost`);
+    if (left) this.#link.giveUp(why);
+    return this.#waiting.size + this.#sent.size > 0;
+  }
+
   /** Ends the session; frames without an answer are lost. */
   close() {
+    this.#watch.stop();
     this.#link.drop();
     this.#lost();
     for (const waiting of this.#waiting.values()) waiting.reject(new PapillaError(missed('lost', waiting.sequence)));
@@ -156,6 +206,7 @@ export class Hand {
       const old = this.#waiting.get(finger);
       if (old) old.reject(new PapillaError(missed('superseded', old.sequence)));
       this.#waiting.set(finger, new Waiting(sequence, message, resolve, reject));
+      this.#watch.start();
       this.#flush();
     });
   }
@@ -194,13 +245,17 @@ export class Hand {
       this.#link.succeeded();
       this.#move.ready();
       this.ready = message;
+      this.#warnings.question(message);
       this.#opened?.();
       this.#opened = null;
       this.#flush();
       return;
     }
     const sent = this.#take(message.sequence ?? -1);
-    if (sent) sent.reject(new PapillaError(message));
+    if (sent) {
+      this.#warnings.tell('error', () => `a frame was refused: ${message.message}`);
+      sent.reject(new PapillaError(message));
+    }
     else this.onrefused(message);
   }
 

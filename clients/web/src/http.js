@@ -4,6 +4,9 @@ import { addressOf, cleanToken } from './address.js';
 import { PapillaError } from './error.js';
 import { MAP_LEN } from './wire.js';
 
+/** Longest wait for an answer over HTTP: as long as a request may wait for models that are being loaded. */
+export const PATIENCE_MS = 30000;
+
 /**
  * The SED map of a pressure map, by `POST /v1/sed`.
  * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
@@ -19,7 +22,7 @@ export async function postPressure(base, pressurePa, options = {}) {
   const headers = { 'content-type': 'application/octet-stream', accept: 'application/octet-stream' };
   const token = cleanToken(options.token);
   if (token) headers.authorization = `Bearer ${token}`;
-  const response = await fetch(url, { method: 'POST', body: Float32Array.from(pressurePa), headers });
+  const response = await fetch(url, { method: 'POST', body: Float32Array.from(pressurePa), headers, signal: AbortSignal.timeout(PATIENCE_MS) });
   if (!response.ok) {
     const { error } = await response.json();
     throw new PapillaError({ type: 'error', closes: false, ...error });

@@ -128,6 +128,11 @@ export class Link {
     socket.onerror = () => {};
   }
 
+  /** Gives the connection up, and makes another. @param {string} why */
+  giveUp(why) {
+    if (this.#socket) this.#lose(this.#socket, why);
+  }
+
   /** Ends the connection, and tries no other. */
   drop() {
     clearTimeout(this.#retry);

@@ -5,10 +5,13 @@ import { RequestFrame, SAMPLE_TYPES } from './wire.js';
 import { greatest } from './window.js';
 
 /** @typedef {import('./link.js').Link} Link */
+/** @typedef {import('./watch.js').Watch} Watch */
 /** @typedef {import('./types.js').Hello} Hello */
 
 /** Frames that may be without an answer at once; the next one waits. */
 const OUTSTANDING_MAX = 1024;
+/** Frames whose time is kept: a frame that is older than so many others was answered or lost. */
+const BORN = 65536;
 /** How long a frame waits before the socket is looked at again, ms. */
 const DRAIN_MS = 1;
 
@@ -25,7 +28,9 @@ export class Outbox {
   #frame = new RequestFrame();
   #waits = false;
   #outstanding = new Sequences(OUTSTANDING_MAX);
+  #bornMs = new Float64Array(BORN);
   #drainTimer = false;
+  #watch;
   #flush;
   #settle;
   #drained = () => { this.#drainTimer = false; this.#flush(); };
@@ -33,10 +38,38 @@ export class Outbox {
   /**
    * @param {() => void} flush calls `flush` below, if there is a session
    * @param {(sequence: number, status: 'superseded' | 'lost') => void} settle the outcome of a frame that gets no answer
+   * @param {Watch} watch told of frames that wait for their outcome
    */
-  constructor(flush, settle) {
+  constructor(flush, settle, watch) {
     this.#flush = flush;
     this.#settle = settle;
+    this.#watch = watch;
+  }
+
+  /** Whether a frame waits or is without an answer. */
+  get isBusy() {
+    return this.#waits || this.#outstanding.count > 0;
+  }
+
+  /**
+   * Ends the frames that were handed over before: they are lost.
+   * @param {number} bornMs
+   * @returns {{waiting: boolean, left: boolean}} whether there was one that waited, and one that had left
+   */
+  expire(bornMs) {
+    const waiting = this.#waits && this.#bornMs[this.sequence % BORN] <= bornMs;
+    if (waiting) {
+      this.#waits = false;
+      this.#settle(this.sequence, 'lost');
+    }
+    let left = false;
+    while (this.#outstanding.count > 0 && this.#bornMs[this.#outstanding.first() % BORN] <= bornMs) {
+      const sequence = this.#outstanding.first();
+      this.#outstanding.take(sequence);
+      left = true;
+      this.#settle(sequence, 'lost');
+    }
+    return { waiting, left };
   }
 
   /**
@@ -57,7 +90,9 @@ export class Outbox {
     this.sequence = (this.sequence + 1) >>> 0;
     this.#frame.encode(values, first, stride, column, row, width, height, type, scale);
     this.#frame.stamp(this.sequence, timeUs, deadlineUs);
+    this.#bornMs[this.sequence % BORN] = performance.now();
     this.#waits = true;
+    this.#watch.start();
   }
 
   /** The frame that waits, if one does, is never sent. */

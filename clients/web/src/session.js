@@ -1,9 +1,10 @@
 // A session that keeps itself connected: docs/reference/protocol.md, version 2.
 
-import { PapillaError, missed, refusal } from './error.js';
+import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
 import { Move } from './move.js';
 import { Outbox } from './outbox.js';
+import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
 import { crop } from './window.js';
 import { Answer, MAP_LEN, SIDE_PX } from './wire.js';
 
@@ -29,7 +30,8 @@ const nowUs = () => Math.round((performance.timeOrigin + performance.now()) * 10
  * connection without a lost frame, and `onready` is called again.
  *
  * `onanswer(answer)` is called exactly once for every frame, with `answer.status`: `ok`, `superseded` (by this client or the
- * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke before the answer). `onready(ready)`,
+ * server), `late`, `stale`, `error` (then `answer.problem`), `lost` (the connection broke, or no answer came within
+ * `timeoutMs`; a connection that owes an answer for so long is given up and another made). `onready(ready)`,
  * `onrefused(problem)` for refused hellos and faults of the session, `onstate(state, why)`.
  */
 export class Session {
@@ -56,14 +58,15 @@ export class Session {
   /** @type {Hello} */ #hello;
   // Terms to go back to if a renewal is refused.
   /** @type {{hello: Hello, ready: Ready, termsFrom: number} | null} */ #before = null;
-  #outbox = new Outbox(() => this.#flush(), (sequence, status) => this.#settle(sequence, status, null));
+  /** @type {Watch} */ #watch;
+  /** @type {Outbox} */ #outbox;
   // Answers up to the hello of a renewal have the sections of before.
   #termsFrom = 0;
   /** @type {ReturnType<Answer['views']> | null} */ #views = null;
   /** @type {ReturnType<Answer['views']> | null} */ #viewsBefore = null;
   /** @type {Map<number, {resolve: (answer: Answer) => void, reject: (error: Error) => void}>} */ #promised = new Map();
   #opened = false;
-  /** @type {Set<string>} */ #warned = new Set();
+  #warnings = new Warnings();
 
   /**
    * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
@@ -80,6 +83,8 @@ export class Session {
       lost: (why) => this.#lost(why),
     });
     this.#move = new Move(this.#link, (resume) => this.#moved(resume), () => this.#flush());
+    this.#watch = new Watch(options.timeoutMs ?? TIMEOUT_MS, (bornMs) => this.#expire(bornMs));
+    this.#outbox = new Outbox(() => this.#flush(), (sequence, status) => this.#settle(sequence, status, null), this.#watch);
     this.#hello = { ...DEFAULTS, ...hello };
     this.#options = { crop: options.crop ?? true, clockUs: options.clockUs ?? nowUs };
   }
@@ -87,14 +92,26 @@ export class Session {
   /**
    * A session that is ready.
    * @param {string} [base] @param {Hello} [hello] @param {Options} [options]
-   * @returns {Promise<Session>} rejected with a PapillaError where the hello is refused
+   * @returns {Promise<Session>} rejected with a PapillaError where the hello is refused, or `unreachable` where no
+   *   session is there within 10 s
    */
-  static connect(base, hello, options) {
+  static async connect(base, hello, options) {
     const session = new Session(base, hello, options);
     return new Promise((resolve, reject) => {
-      session.onready = () => { session.onready = session.onrefused = () => {}; resolve(session); };
+      let last = 'no answer';
+      const patience = setTimeout(() => {
+        session.close();
+        reject(refusal('unreachable', unreachable(base ?? '', last)));
+      }, OPEN_MS);
+      session.onstate = (_state, why) => { last = why || last; };
+      session.onready = () => {
+        clearTimeout(patience);
+        session.onready = session.onrefused = session.onstate = () => {};
+        resolve(session);
+      };
       session.onrefused = (problem) => {
         if (PASSING.has(problem.code)) return;
+        clearTimeout(patience);
         session.close();
         reject(new PapillaError(problem));
       };
@@ -110,6 +127,20 @@ export class Session {
   /** Frames whose place a newer one took before they could go out. */
   get supersededByClient() {
     return this.#outbox.superseded;
+  }
+
+  /** What people were told so far, each thing once. */
+  get warnings() {
+    return this.#warnings.list;
+  }
+
+  /** Time within which a frame has an outcome, ms; may be changed. */
+  get timeoutMs() {
+    return this.#watch.timeoutMs;
+  }
+
+  set timeoutMs(timeoutMs) {
+    this.#watch.timeoutMs = timeoutMs;
   }
 
   /** Connects, and again whenever the connection is lost, until `close`. */
@@ -198,11 +229,19 @@ export class Session {
 
   /** Says once what a program that looks at maps alone would not see. @param {Answer} answer */
   #warn(answer) {
-    const code = answer.status === 'error' ? 'error' : answer.status === 'ok' && answer.outOfRange ? 'out_of_range' : '';
-    if (!code || this.#warned.has(code)) return;
-    this.#warned.add(code);
-    const flagged = 'pressure is beyond what the tier knows; such answers are flagged';
-    console.warn(`papilla: ${code === 'error' ? `a frame was refused: ${answer.problem?.message}` : flagged}`);
+    if (answer.status === 'error') this.#warnings.tell('error', () => `a frame was refused: ${answer.problem?.message}`);
+    else if (answer.status === 'ok' && answer.outOfRange) {
+      this.#warnings.tell('out_of_range', () => 'pressure is beyond what the tier knows; such answers are flagged');
+    }
+  }
+
+  /** Ends frames whose time is over; false: none is left. @param {number} bornMs */
+  #expire(bornMs) {
+    const { waiting, left } = this.#outbox.expire(bornMs);
+    const why = `no answer within ${this.timeoutMs} ms`;
+    if (waiting || left) this.#warnings.tell('timeout', () => `${why}; such frames are lost`);
+    if (left) this.#link.giveUp(why);
+    return this.#outbox.isBusy;
   }
 
   /** @param {Answer} answer */
@@ -246,6 +285,7 @@ export class Session {
   /** Ends the connection for good: no frame will be answered. @param {State} state @param {string} why */
   #end(state, why) {
     this.#opened = false;
+    this.#watch.stop();
     this.#link.drop();
     this.#move.end();
     this.ready = null;
@@ -276,6 +316,7 @@ export class Session {
     this.#before = null;
     this.#move.ready();
     this.ready = ready;
+    this.#warnings.question(ready);
     this.#enter('ready', '');
     this.onready(ready);
     this.#flush();

@@ -139,6 +139,8 @@ export interface Ready {
   pressure_max_pa: number;
   sed_scale_j_per_m3: number;
   sections: Section[];
+  /** What the service asks of the hello; the client tells people once. */
+  warnings?: { member: string; value: number; question: string }[];
   /** Of version 3. */
   vertices?: number;
   fingers?: number;
@@ -175,6 +177,8 @@ export interface Options {
   token?: string;
   /** Cut a full map to the rectangle of its non-zero pixels before sending (default true). */
   crop?: boolean;
+  /** A frame without an answer for so long is lost, ms (default 5000). */
+  timeoutMs?: number;
   /** us of the client's clock, for the header (default: performance.now). */
   clockUs?: () => number;
 }

@@ -149,6 +149,7 @@ class Runner {
     }
     if (reply.type !== 'ready') throw new Error(`${reply.code}: ${reply.message}`);
     this.moved ??= reply.session;
+    for (const words of expect.warnings ?? []) this.told(words);
     for (const [member, due] of Object.entries(expect.ready ?? {})) same(`ready.${member}`, reply[member], due);
   }
 
@@ -222,7 +223,7 @@ class Runner {
     const maps = Array.from({ length: count }, (_, k) => pressureMap(pressure, (k + 1) / count));
     if (paused) await this.steer('pause');
     /** @type {number[]} */
-    const sequences = [];
+    const sequences = /** @type {number[]} */ ([]);
     for (const map of maps) {
       sequences.push(session.send(map));
       if (gapMs) await wait(gapMs);
@@ -249,6 +250,40 @@ class Runner {
     session.onready = (ready) => { fresh = true; this.tiers.set(ready.tier_number, ready.tier); };
     await this.steer('restart');
     await this.until(`a session after ${before}`, () => fresh && session.ready, withinS * 1000);
+  }
+
+  /** @param {string} words */
+  told(words) {
+    const { warnings } = /** @type {Session} */ (this.session);
+    if (!warnings.some((each) => each.includes(words))) throw new Error(`nobody was told '${words}', but ${JSON.stringify(warnings)}`);
+  }
+
+  /** The service stops, or dies, while frames wait for it. @param {Step} step */
+  async silence({ how, timeout_ms: timeoutMs, count, pressure, within_s: withinS }) {
+    const session = /** @type {Session} */ (this.session);
+    const usualMs = session.timeoutMs;
+    const map = pressureMap(pressure);
+    const first = session.send(map);
+    await this.until('the frame before', () => this.outcomes.get(first));
+    session.timeoutMs = timeoutMs;
+    await this.steer(how);
+    let last = 0;
+    const sequences = /** @type {number[]} */ ([]);
+    for (let k = 0; k < count; k++) {
+      sequences.push((last = session.send(map)));
+      await wait(50);
+    }
+    await this.until('all outcomes', () => sequences.every((sequence) => this.outcomes.has(sequence)));
+    for (const sequence of sequences) {
+      const { status } = /** @type {Outcome} */ (this.outcomes.get(sequence));
+      if (status !== 'lost' && (status !== 'superseded' || sequence === last)) throw new Error(`a frame is ${status}`);
+    }
+    this.told('no answer within');
+    let fresh = false;
+    session.onready = () => { fresh = true; };
+    await this.steer(how === 'pause' ? 'resume' : 'start');
+    session.timeoutMs = usualMs;
+    await this.until('a session', () => fresh && session.ready, withinS * 1000);
   }
 
   /** @param {Step} step */

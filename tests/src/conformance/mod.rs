@@ -187,7 +187,9 @@ impl Recorder {
                 let due = Due { force_n, ..Due::of_map(&map_pa, 1e-4) };
                 due.fill(&mut step["expect"]);
             }
-            Some("hello" | "frame" | "http" | "reconnect" | "move" | "address" | "token") => {}
+            Some(
+                "hello" | "frame" | "http" | "reconnect" | "move" | "address" | "token" | "silence",
+            ) => {}
             other => return Err(format!("there is no step '{other:?}'")),
         }
         Ok(())

@@ -55,6 +55,20 @@ struct Answer {
   std::vector<float> points;
   std::vector<float> actuators;
 
+  /// Nothing of another frame is left in an answer that was not rendered; memory stays.
+  void forget_values() {
+    has_map = has_touch = has_summary = false;
+    window = {0, 0, 0, 0};
+    touch = {};
+    summary = {};
+    for (auto* const list : {&values, &pressure_pa, &vertices, &points, &actuators}) list->clear();
+  }
+  void forget_head() {
+    out_of_range = no_contact = cut_off = unfamiliar = unsettled = false;
+    total_us = queue_us = infer_us = 0;
+    tier.clear();
+  }
+
   /// Value at a pixel of the map; 0 outside of the window.
   float at(int row, int column) const {
     const int r = row - window.row, c = column - window.column;

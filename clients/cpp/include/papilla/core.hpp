@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -13,6 +14,13 @@
 
 namespace papilla {
 
+/// Microseconds of a steady clock.
+inline std::uint64_t now_us() {
+  using namespace std::chrono;
+  return static_cast<std::uint64_t>(
+      duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
+}
+
 class Core {
  public:
   /// `reconnect`: the service asks for it, of clients whose hello says that they follow.
@@ -20,6 +28,8 @@ class Core {
 
   /// Called with every outcome, once a frame. `Answer` is reused: copy what has to stay.
   std::function<void(const Answer&)> on_answer;
+  /// Called with what people should know, each thing once.
+  std::function<void(const std::string&)> on_warning;
 
   /// `hello`: members of the protocol's hello as JSON without braces, as
   /// `"tier": "small", "sample_type": "u16"`.
@@ -138,6 +148,31 @@ class Core {
     sent_.clear();
   }
 
+  /// Ends frames that were handed over longer ago than `timeout_us` and have no outcome: they are lost. True
+  /// where one of them had left: nothing more is to be expected of this connection.
+  bool expire(std::uint64_t timeout_us) {
+    const std::uint64_t now = now_us();
+    const std::uint64_t born_us = now > timeout_us ? now - timeout_us : 0;
+    bool any = false;
+    outbox_.clear([&](const Outgoing& frame) { any = true, outcome(frame.id, Status::lost); }, born_us);
+    bool had_left = false;
+    for (std::size_t i = 0; i < sent_.size();) {
+      if (sent_[i].id.born_us > born_us) {
+        ++i;
+        continue;
+      }
+      const FrameId id = sent_[i].id;
+      sent_.erase(sent_.begin() + static_cast<std::ptrdiff_t>(i));
+      had_left = true;
+      outcome(id, Status::lost);
+    }
+    if ((any || had_left) && is_new("timeout")) tell("no answer within " + number::print(double(timeout_us) * 1e-6) + " s; such frames are lost");
+    return had_left;
+  }
+
+  /// What people were told: each question of the service's, and each odd outcome, once.
+  const std::vector<std::string>& warnings() const { return warnings_; }
+
   /// No more sessions will follow.
   void end() {
     lost();
@@ -187,7 +222,7 @@ class Core {
     const auto& names = ready.message["tier_names"].items;
     if (header.tier < names.size()) answer.tier = names[header.tier].string;
     if (header.status == Status::ok && !read(bytes, size, header, ready)) return Event::broken;
-    outcome({header.sequence, header.client_time_us, header.finger}, header.status);
+    outcome(sent.id, header.status);
     return Event::nothing;
   }
 
@@ -211,6 +246,8 @@ class Core {
   std::uint64_t superseded_ = 0;
   int seals_due_ = 0;
   Answer scratch_;
+  static constexpr std::size_t said_max = 100;
+  std::vector<std::string> said_, warnings_;
 
   Event agree(const json::Value& message) {
     Ready ready;
@@ -234,6 +271,7 @@ class Core {
     scratch_.actuators.reserve(ready.actuators.bytes / 4);
     history_.push_back(std::move(ready));
     is_ready_ = true;
+    question(message);
     return Event::ready;
   }
 
@@ -278,6 +316,42 @@ class Core {
     return false;
   }
 
+  /// Whether nothing of that code was told yet; from now on something was.
+  bool is_new(std::string_view code) {
+    if (std::find(said_.begin(), said_.end(), code) != said_.end() || said_.size() >= said_max) return false;
+    said_.emplace_back(code);
+    return true;
+  }
+
+  void tell(std::string words) {
+    warnings_.push_back(std::move(words));
+    if (on_warning) on_warning(warnings_.back());
+  }
+
+  /// Says what a program that looks at maps alone would not see. Allocates where there is something new.
+  void warn(const Answer& answer) {
+    if (answer.status == Status::error && is_new("error")) tell("a frame was refused: " + answer.problem.message);
+    if (answer.status == Status::ok && answer.out_of_range && is_new("out_of_range")) {
+      tell("pressure is beyond what tier " + answer.tier + " knows; such answers are flagged");
+    }
+  }
+
+  /// What the service asks, and a budget that it cannot meet.
+  void question(const json::Value& ready) {
+    for (const json::Value& each : ready["warnings"].items) {
+      const std::string words = each["member"].string + ": " + each["question"].string;
+      if (is_new(words)) tell(words);
+    }
+    const json::Value& meets = ready["meets_budget"];
+    if (meets.type != json::Value::Type::boolean || meets.boolean) return;
+    const std::string budget = number::print(ready["budget_us"].number);
+    std::string words = "a frame of tier " + ready["tier"].string + " takes some " +
+                        number::print(ready["predicted_latency_us"].number) + " us, and budget_us is " + budget +
+                        ", so that frames may be late";
+    if (ready["budget_us"].number < 100.0) words += "; it counts microseconds: were " + budget + " ms meant?";
+    if (is_new(words)) tell(words);
+  }
+
   void outcome(const FrameId& id, Status status, bool by_client = false) {
     Answer& answer = scratch_;
     answer.sequence = id.sequence;
@@ -285,7 +359,12 @@ class Core {
     answer.finger = id.finger;
     answer.status = status;
     answer.by_client = by_client;
-    if (status != Status::ok) answer.has_map = answer.has_summary = answer.has_touch = false;
+    if (status != Status::error) answer.problem = {};
+    const bool was_answered = status == Status::ok || ((status == Status::late || status == Status::stale ||
+                                                        status == Status::superseded) && !by_client);
+    if (!was_answered) answer.forget_head();
+    if (status != Status::ok) answer.forget_values();
+    if (status == Status::ok || status == Status::error) warn(answer);
     if (on_answer) on_answer(answer);
   }
 
@@ -318,7 +397,7 @@ class Core {
     Outgoing& frame = outbox_.put(header.finger);
     wire::encode(header, frame.data());
     frame.size = header_bytes + payload_bytes;
-    frame.id = {header.sequence, header.client_time_us, header.finger};
+    frame.id = {header.sequence, header.client_time_us, header.finger, now_us()};
     return frame;
   }
 

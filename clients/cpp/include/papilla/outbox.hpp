@@ -14,6 +14,7 @@ struct FrameId {
   std::uint32_t sequence = 0;
   std::uint64_t client_time_us = 0;
   std::uint8_t finger = 0;
+  std::uint64_t born_us = 0;          ///< when it was handed over, by a steady clock
 };
 
 /// The bytes of a frame, with room before them for a transport's own header.
@@ -54,11 +55,13 @@ class Outbox {
       return std::swap(slot.frame, leaving);
     }
   }
-  /// Drops every frame that waits and calls `each` with it.
+  /// Drops every frame that waits and was born by then, and calls `each` with it.
   template <class Each>
-  void clear(const Each& each) {
+  void clear(const Each& each, std::uint64_t born_us = UINT64_MAX) {
     for (Slot& slot : slots_) {
-      if (std::exchange(slot.waits, false)) each(slot.frame);
+      if (!slot.waits || slot.frame.id.born_us > born_us) continue;
+      slot.waits = false;
+      each(slot.frame);
     }
   }
 

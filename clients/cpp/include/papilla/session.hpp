@@ -18,13 +18,6 @@
 
 namespace papilla {
 
-/// Microseconds of a steady clock.
-inline std::uint64_t now_us() {
-  using namespace std::chrono;
-  return static_cast<std::uint64_t>(
-      duration_cast<microseconds>(steady_clock::now().time_since_epoch()).count());
-}
-
 class Session {
  public:
   struct Options {
@@ -35,17 +28,22 @@ class Session {
     /// Called with every outcome, from the session's threads or from `send`, under its lock: copy
     /// what is needed and return.
     std::function<void(const Answer&)> on_answer;
-    /// Called with the first refused frame and the first one out of range: by default it prints.
+    /// Called with what people should know, each thing once: the first refused frame, the first one out of range, the
+    /// first timeout, what the service asks of the hello, a budget that it cannot meet. By default it prints.
     std::function<void(const std::string&)> warn = [](const std::string& words) {
       std::fprintf(stderr, "papilla: %s\n", words.c_str());
     };
     int retry_ms = 150;
+    /// A frame without an answer for so long is lost, whether it waits for a connection or for the service; in the
+    /// second case the connection is given up and another opened. Set the actuators to zero then.
+    int timeout_ms = 5000;
   };
 
   Session() : Session(Options()) {}
   explicit Session(Options options)
       : options_(std::move(options)), address_(net::Address::of(options_.url)), core_(Core::following(options_.hello)) {
     core_.on_answer = [this](const Answer& answer) { outcome(answer); };
+    core_.on_warning = options_.warn;
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -58,6 +56,7 @@ class Session {
     if (!Core::is_readable(options_.hello, problem_) || !connect()) return false;
     reader_ = std::thread([this] { live(); });
     writer_ = std::thread([this] { write(); });
+    watcher_ = std::thread([this] { watch(); });
     return true;
   }
 
@@ -70,6 +69,8 @@ class Session {
       socket_->shut();
     }
     changed_.notify_all();
+    ends_.notify_all();
+    if (watcher_.joinable()) watcher_.join();
     if (reader_.joinable()) reader_.join();
     if (writer_.joinable()) writer_.join();
     if (mover_.joinable()) mover_.join();
@@ -160,6 +161,16 @@ class Session {
     std::lock_guard<std::mutex> lock(mutex_);
     return core_.superseded_by_client();
   }
+  /// What people were told so far, each thing once.
+  std::vector<std::string> warnings() const {
+    std::lock_guard<std::mutex> lock(mutex_);
+    return core_.warnings();
+  }
+  /// `Options::timeout_ms` from now on.
+  void set_timeout_ms(int timeout_ms) {
+    std::lock_guard<std::mutex> lock(mutex_);
+    options_.timeout_ms = timeout_ms;
+  }
   /// Why the last `open` or `renew` failed.
   Problem problem() const {
     std::lock_guard<std::mutex> lock(mutex_);
@@ -176,10 +187,10 @@ class Session {
   Options options_;
   net::Address address_;
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable changed_, ends_;
   Core core_;
   std::unique_ptr<WebSocket> socket_ = std::make_unique<WebSocket>(), next_;
-  std::thread reader_, writer_, mover_;
+  std::thread reader_, writer_, mover_, watcher_;
   std::vector<std::uint8_t> message_;
   bool closed_ = false;
   bool sending_ = false;              ///< the writer has the socket
@@ -193,7 +204,6 @@ class Session {
   bool is_answered_ = true, is_granted_ = false, pong_due_ = false;
   enum class Moving { no, dialling, seal_due, held, failed };
   Moving moving_ = Moving::no;
-  bool told_refusal_ = false, told_range_ = false;
 
   template <class Send>
   std::uint32_t hand_over(const Send& send) {
@@ -212,26 +222,15 @@ class Session {
     wanted_ = send();
     wants_ = true;
     rendered_.status = Status::lost;
-    rendered_.has_map = rendered_.has_touch = false;
+    rendered_.forget_values();
+    rendered_.forget_head();
     changed_.notify_all();
     changed_.wait_for(lock, std::chrono::milliseconds(timeout_ms), [this] { return !wants_ || closed_; });
     wants_ = false;
     return rendered_;
   }
 
-  /// Says once what a program that looks at maps alone would not see.
-  void warn(const Answer& answer) {
-    if (!options_.warn) return;
-    if (answer.status == Status::error && !std::exchange(told_refusal_, true)) {
-      options_.warn("a frame was refused: " + answer.problem.message);
-    }
-    if (answer.status == Status::ok && answer.out_of_range && !std::exchange(told_range_, true)) {
-      options_.warn("pressure is beyond what tier " + answer.tier + " knows; such answers are flagged");
-    }
-  }
-
   void outcome(const Answer& answer) {
-    warn(answer);
     if (options_.on_answer) options_.on_answer(answer);
     if (answer.status == Status::ok) {
       Latest& latest = latest_[std::min<std::size_t>(answer.finger, fingers_max - 1)];
@@ -390,6 +389,16 @@ class Session {
     }
     if (moving_ == Moving::held) moving_ = good ? Moving::no : Moving::failed;
     changed_.notify_all();
+  }
+
+  /// Ends frames whose time is over. A thread of its own: the others may be waiting for the socket.
+  void watch() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!closed_) {
+      const int timeout_ms = options_.timeout_ms;
+      ends_.wait_for(lock, std::chrono::milliseconds(std::clamp(timeout_ms / 20, 5, 100)), [this] { return closed_; });
+      if (!closed_ && core_.expire(std::uint64_t(std::max(1, timeout_ms)) * 1000)) socket_->shut();
+    }
   }
 
   /// Sends what waits, one message at a time; a frame not while new terms are being agreed on.

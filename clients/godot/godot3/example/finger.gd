@@ -16,6 +16,7 @@ onready var picture = $Picture
 func _ready():
 	_atlas = Atlas.new(Http.atlas_text(session.url, session.token))
 	session.connect("map_received", self, "_on_map")
+	session.connect("answered", self, "_on_answered")
 	picture.modulate = Color(1 / SED_OF_WHITE, 1, 1)
 
 
@@ -25,6 +26,12 @@ func _contacts(angle):
 
 func _process(_delta):
 	session.send(_atlas.contact_map(_contacts(TAU * OS.get_ticks_msec() / 1000.0)))
+
+
+# No answer came in time, or the server refuses: nothing is shown, and actuators go to zero, until the next map.
+func _on_answered(answer):
+	if answer.status == "lost" or answer.status == "error":
+		picture.texture = null
 
 
 func _on_map(answer):

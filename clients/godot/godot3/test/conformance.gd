@@ -175,6 +175,8 @@ func step_hello(step, expect):
 	if reply.type != "ready":
 		fail("%s: %s" % [reply.code, reply.message])
 		return
+	for words in expect.get("warnings", []):
+		told(words)
 	var due = expect.get("ready", {})
 	for member in due:
 		same("ready." + member, to_json(reply[member]), to_json(due[member]))
@@ -303,6 +305,38 @@ func step_burst(step, expect):
 func step_reconnect(step, _expect):
 	reply = null
 	steer("restart")
+	wait_for("has_reply", null, int(step.within_s * 1000))
+
+
+func told(words):
+	for each in session.warnings:
+		if each.find(words) >= 0:
+			return
+	fail("nobody was told: " + words)
+
+
+# The server stops, or dies, while frames wait for it.
+func step_silence(step, _expect):
+	var map = Patterns.pattern(step.pressure, 1.0)
+	if not wait_for("has_outcome", session.send(map)):
+		return
+	session.timeout_ms = int(step.timeout_ms)
+	steer(step.how)
+	var sequences = []
+	for _k in int(step.count):
+		sequences.append(session.send(map))
+		session.poll()
+		OS.delay_msec(50)
+	if not wait_for("has_outcomes", sequences):
+		return
+	for sequence in sequences:
+		var status = outcomes[sequence].status
+		if status != "lost" and (status != "superseded" or sequence == sequences[-1]):
+			fail("a frame is " + status)
+	told("no answer within")
+	reply = null
+	steer("resume" if step.how == "pause" else "start")
+	session.timeout_ms = 5000
 	wait_for("has_reply", null, int(step.within_s * 1000))
 
 

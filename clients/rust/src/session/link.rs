@@ -49,7 +49,10 @@ pub(super) fn message(text: &str) -> Result<ServerMessage, PapillaError> {
 }
 
 impl Link {
-    pub(super) async fn open(server: &Address, hello: &Hello) -> Result<(Self, Ready), PapillaError> {
+    pub(super) async fn open(
+        server: &Address,
+        hello: &Hello,
+    ) -> Result<(Self, Ready), PapillaError> {
         let opening = async { Self::connect(server).await?.say(server, hello, None).await };
         let silent = |_| PapillaError::unreachable(server, &"no ready came");
         timeout(PATIENCE, opening).await.map_err(silent)?
@@ -58,7 +61,8 @@ impl Link {
     /// A connection on which nothing was said.
     pub(super) async fn connect(server: &Address) -> Result<Self, PapillaError> {
         let broke = |error| PapillaError::of_socket(server, &error);
-        let raw = dial(&server.to_dial()).await.map_err(|e| PapillaError::unreachable(server, &e))?;
+        let raw =
+            dial(&server.to_dial()).await.map_err(|e| PapillaError::unreachable(server, &e))?;
         let mut request = server.session().into_client_request().map_err(broke)?;
         if let Some(authorization) = server.authorization() {
             let value = HeaderValue::from_str(&authorization).map_err(|_| PapillaError::Token)?;

@@ -26,6 +26,7 @@ pub(super) async fn live(server: Address, shared: Arc<Shared>, link: Link) {
         let moved = tokio::select! {
             () = write(&shared, sink) => None,
             () = read(&shared, stream) => None,
+            () = stalled(&shared) => None,
             moved = follow(&server, &shared) => Some(moved),
         };
         link = match moved {
@@ -41,6 +42,24 @@ pub(super) async fn live(server: Address, shared: Arc<Shared>, link: Link) {
             },
         };
         shared.opened.send_modify(|opened| *opened += 1);
+    }
+}
+
+/// Looks whether the time of a frame is over, for as long as the session is there.
+pub(super) async fn watch(shared: Arc<Shared>) {
+    loop {
+        let timeout = shared.state().timeout;
+        sleep((timeout / 20).clamp(Duration::from_millis(5), Duration::from_millis(100))).await;
+        if shared.state().expire() {
+            shared.stalled.notify_one();
+        }
+    }
+}
+
+/// Waits until nothing more is to be expected of the connection.
+async fn stalled(shared: &Shared) {
+    while !shared.state().is_stalled {
+        shared.stalled.notified().await;
     }
 }
 

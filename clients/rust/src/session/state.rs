@@ -1,6 +1,10 @@
 //! What is agreed, what waits, what is on its way.
 
-use std::{collections::HashMap, mem::replace, sync::Arc};
+use std::{
+    collections::HashMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use papilla_proto::{
     FrameHeader, FrameKind, Hello, Problem, Ready, SEALED_MAGIC, SampleType, ServerMessage,
@@ -8,21 +12,29 @@ use papilla_proto::{
 };
 use tokio::sync::oneshot;
 
-use super::Frame;
+use super::{Frame, told::Told};
 use crate::{Answer, PapillaError, Status};
+
+/// After so long a frame without an answer is lost, unless the program says otherwise.
+pub(super) const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Waits for its turn or its answer.
 #[derive(Debug)]
 struct Pending {
     sequence: u32,
+    finger: u8,
     client_time_us: u64,
+    born: Instant,
     ready: Arc<Ready>,
     outcome: oneshot::Sender<Answer>,
 }
 
 impl Pending {
     fn end(self, status: Status) {
-        let answer = Answer::without_map(self.sequence, self.client_time_us, status);
+        let answer = Answer {
+            finger: self.finger,
+            ..Answer::without_map(self.sequence, self.client_time_us, status)
+        };
         // Err: nobody waits for it any more.
         let _ = self.outcome.send(answer);
     }
@@ -79,8 +91,11 @@ pub(super) struct State {
     waiting: Vec<Waiting>,
     sent: Vec<Pending>,
     over: bool,
-    warned_of_refusal: bool,
-    warned_of_range: bool,
+    /// After so long a frame without an answer is lost.
+    pub(super) timeout: Duration,
+    /// Nothing more is to be expected of the connection: it owed an answer for too long.
+    pub(super) is_stalled: bool,
+    pub(super) told: Told,
 }
 
 impl State {
@@ -96,8 +111,9 @@ impl State {
             waiting: Vec::new(),
             sent: Vec::new(),
             over: false,
-            warned_of_refusal: false,
-            warned_of_range: false,
+            timeout: TIMEOUT,
+            is_stalled: false,
+            told: Told::default(),
         };
         state.agree(Arc::clone(&state.ready));
         state
@@ -110,7 +126,25 @@ impl State {
         for (number, name) in (0..).zip(ready.tier_names.iter().flatten()) {
             self.tiers.insert(number, name.clone());
         }
+        self.told.question(&ready);
         self.ready = ready;
+    }
+
+    /// Ends the frames whose time is over: they are lost. True where one of them had left.
+    pub(super) fn expire(&mut self) -> bool {
+        let timeout = self.timeout;
+        let waiting =
+            self.waiting.extract_if(.., |waiting| waiting.pending.born.elapsed() > timeout);
+        let mut late: Vec<Pending> = waiting.map(|waiting| waiting.pending).collect();
+        let waited = late.len();
+        late.extend(self.sent.extract_if(.., |pending| pending.born.elapsed() > timeout));
+        self.is_stalled |= late.len() > waited;
+        if !late.is_empty() {
+            self.told
+                .once("timeout", || format!("no answer within {timeout:?}; such frames are lost"));
+        }
+        late.into_iter().for_each(|pending| pending.end(Status::Lost));
+        self.is_stalled
     }
 
     /// Encodes a frame and lets it wait in place of the one of its finger that waits.
@@ -140,7 +174,8 @@ impl State {
         let sequence = self.sequence;
         let (outcome, receiver) = oneshot::channel();
         let ready = Arc::clone(&self.ready);
-        let pending = Pending { sequence, client_time_us, ready, outcome };
+        let born = Instant::now();
+        let pending = Pending { sequence, finger, client_time_us, born, ready, outcome };
         match message(sequence) {
             Err(problem) => pending.end(Status::Error(problem)),
             Ok(message) => {
@@ -197,11 +232,11 @@ impl State {
         let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
         let tier = self.tiers.get(&number).cloned().unwrap_or_default();
         let answer = Answer::read(&header, message, &pending.ready, tier)?;
-        if answer.out_of_range && !replace(&mut self.warned_of_range, true) {
-            eprintln!(
-                "papilla: pressure is beyond what tier {} knows; such answers are flagged",
-                answer.tier
-            );
+        if answer.out_of_range {
+            let tier = &answer.tier;
+            self.told.once("out_of_range", || {
+                format!("pressure is beyond what tier {tier} knows; such answers are flagged")
+            });
         }
         // Err: nobody waits for it any more.
         let _ = pending.outcome.send(answer);
@@ -227,9 +262,8 @@ impl State {
                 match sequence.and_then(|sequence| self.forget(sequence)) {
                     Some(pending) => {
                         // Whoever looks at maps alone would not see it.
-                        if !replace(&mut self.warned_of_refusal, true) {
-                            eprintln!("papilla: a frame was refused: {}", problem.message);
-                        }
+                        let words = || format!("a frame was refused: {}", problem.message);
+                        self.told.once("error", words);
                         pending.end(Status::Error(problem));
                     }
                     None => {
@@ -247,6 +281,7 @@ impl State {
     pub(super) fn lose(&mut self) {
         self.sent.drain(..).for_each(|pending| pending.end(Status::Lost));
         self.moving = Moving::Stays;
+        self.is_stalled = false;
         if let Some(asked) = self.asked.take_if(|asked| asked.said) {
             let reason = "the connection broke".to_owned();
             let _ = asked.reply.send(Err(PapillaError::Protocol(reason)));

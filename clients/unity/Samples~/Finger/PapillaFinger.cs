@@ -21,10 +21,13 @@ public sealed class PapillaFinger : MonoBehaviour
     Color32[] colours;
     Thread loading;
     volatile Papilla.Atlas loaded;
+    volatile bool isLost;
 
     void Start()
     {
         session = new Session(address, new Hello { Tier = tier }).Open();
+        // No answer came in time, or the server refuses: nothing is felt, and actuators go to zero, until the next answer.
+        session.Answered += outcome => isLost = outcome.Status == Status.Ok ? false : isLost || outcome.Status == Status.Lost || outcome.Status == Status.Error;
         // HTTP waits: not on the main thread.
         loading = new Thread(() => loaded = PapillaHttp.LoadAtlas(address)) { IsBackground = true };
         loading.Start();
@@ -38,8 +41,9 @@ public sealed class PapillaFinger : MonoBehaviour
         atlas.AddContact(10 + 2 * Mathf.Cos(Time.time), 2 * Mathf.Sin(Time.time), -6.5, 0.5, 2.5, pressurePa);
         session.Send(pressurePa);
         Answer answer;
-        if (!session.TryTakeLatest(out answer)) return;
-        atlas.AtVertices(answer.Map, sed);
+        if (session.TryTakeLatest(out answer)) atlas.AtVertices(answer.Map, sed);
+        else if (isLost) System.Array.Clear(sed, 0, sed.Length);
+        else return;
         for (int i = 0; i < sed.Length; i++) colours[i] = Color32.Lerp(new Color32(219, 168, 143, 255), new Color32(120, 0, 60, 255), sed[i] / sedOfWhite);
         mesh.colors32 = colours;
     }

@@ -6,7 +6,9 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use papilla_client::{Address, Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed};
+use papilla_client::{
+    Address, Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed,
+};
 use papilla_proto::{Hello, MAP_LEN, MAP_SIDE_PX, Window, atlas::Patch, contact::Pose};
 use papilla_tests::{
     conformance::{
@@ -55,6 +57,7 @@ impl Run {
         match step["do"].as_str().unwrap_or_default() {
             "address" => address(step).await,
             "token" => token(step),
+            "silence" => self.silence(step).await,
             "hello" => self.hello(step).await,
             "frame" => self.frame(step).await,
             "burst" => self.burst(step).await,
@@ -87,6 +90,10 @@ impl Run {
             Ok(None) => {}
         }
         ensure!(step["expect"]["status"] != "error", "the hello is not refused");
+        for words in member::<Option<Vec<String>>>(&step["expect"], "warnings")?.unwrap_or_default()
+        {
+            self.told(&words)?;
+        }
         let ready = serde_json::to_value(&*self.session()?.ready())?;
         for (name, due) in step["expect"]["ready"].as_object().into_iter().flatten() {
             ensure!(ready[name] == *due, "ready.{name} is {}, {due} is due", ready[name]);
@@ -161,6 +168,41 @@ impl Run {
         time::timeout(within, opened.wait_for(|opened| *opened > before)).await??;
         let seconds = begin.elapsed().as_secs_f64();
         self.note = format!(" (connected {seconds:.2} s after the server was back)");
+        Ok(())
+    }
+
+    fn told(&self, words: &str) -> Result<()> {
+        let told = self.session()?.warnings();
+        ensure!(told.iter().any(|each| each.contains(words)), "{words}: {told:?}");
+        Ok(())
+    }
+
+    /// The service stops, or dies, while frames wait for it.
+    async fn silence(&self, step: &Value) -> Result<()> {
+        let (session, how) = (self.session()?, member::<String>(step, "how")?);
+        let map: Vec<f32> = member::<Pressure>(step, "pressure")?.draw(1.0, None);
+        time::timeout(self.patience, session.render(&map)).await??;
+        session.set_timeout(Duration::from_millis(member(step, "timeout_ms")?));
+        let mut opened = session.connections();
+        let before = *opened.borrow_and_update();
+        control(&how).await?;
+        let mut sent = Vec::new();
+        for _ in 0..member::<usize>(step, "count")? {
+            sent.push(session.send(&map)?);
+            time::sleep(Duration::from_millis(50)).await;
+        }
+        let mut statuses = Vec::new();
+        for outcome in sent {
+            statuses.push(time::timeout(self.patience, outcome).await??.status);
+        }
+        let is_lost = statuses.last() == Some(&Status::Lost);
+        let is_due = |s: &Status| matches!(s, Status::Lost | Status::Superseded { .. });
+        ensure!(is_lost && statuses.iter().all(is_due), "{statuses:?}");
+        self.told("no answer within")?;
+        control(if how == "pause" { "resume" } else { "start" }).await?;
+        session.set_timeout(Duration::from_secs(5));
+        let within = Duration::from_secs_f64(member(step, "within_s")?);
+        time::timeout(within, opened.wait_for(|opened| *opened > before)).await??;
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 # Put the node into the scene, connect `map_received` or `touched`, call `send`, `send_window` or `send_poses`. The newest
 # frame of a finger wins here too: with `in_flight_max` of its frames without an answer a frame waits, and a newer one
 # takes its place. A lost connection is made anew by itself, and the session moves to another when the service asks it to.
+# A frame without an answer after `timeout_ms` is lost: set the actuators to zero then.
 extends Node
 
 const Address = preload("address.gd")
@@ -41,6 +42,9 @@ export var hello = {}
 export var auto_open = true
 # Frames of a finger that may be without an answer. Two fill the server (one rendered, one waiting); more only help over slow networks.
 export var in_flight_max = 3
+# A frame without an answer for so long is lost, whether it waits for a connection or for the server; in the second case the
+# connection is given up and another made.
+export var timeout_ms = 5000
 
 # The server's `ready`; null while there is no session. (`ready` itself is a signal of every Node.)
 var server_ready = null
@@ -51,6 +55,8 @@ var client_time_us = 0
 # Frames that went out, and frames that a newer one replaced before they left.
 var sent = 0
 var superseded_by_client = 0
+# What people were told so far, each thing once.
+var warnings = []
 # Connections that the session had: more than 1 after one was lost, or the service asked it to move.
 var connections = 0
 
@@ -67,6 +73,8 @@ var _sequence = 0
 var _waiting = {}
 # Finger by sequence.
 var _outstanding = {}
+# When a frame without an outcome was handed over, by sequence.
+var _born_ms = {}
 var _asked = {}
 var _before = null
 var _older_ready = null
@@ -178,6 +186,7 @@ func _put(finger, frame):
 	if _waiting.has(finger):
 		_end_one(finger, "superseded")
 	_waiting[finger] = [frame, own]
+	_born_ms[own] = OS.get_ticks_msec()
 	_flush()
 	return own
 
@@ -197,6 +206,7 @@ func poll():
 	if not _open:
 		return
 	var now = OS.get_ticks_msec()
+	_expire(now - timeout_ms)
 	if _link == null:
 		if now >= _next_try_ms and not _is_refused:
 			_connect()
@@ -302,6 +312,30 @@ func _lost():
 	_next_try_ms = OS.get_ticks_msec() + RETRY_LEAST_MS + randi() % (RETRY_MOST_MS - RETRY_LEAST_MS)
 
 
+# Ends the frames that were handed over before: they are lost.
+func _expire(born_ms):
+	var has_left = false
+	var any = false
+	for sequence in _born_ms.keys():
+		if _born_ms.get(sequence, born_ms + 1) > born_ms:
+			continue
+		any = true
+		if _outstanding.has(sequence):
+			has_left = true
+			var finger = _outstanding[sequence]
+			_outstanding.erase(sequence)
+			_tell({"status": "lost", "sequence": sequence, "finger": finger})
+			continue
+		for finger in _waiting.keys():
+			if _waiting[finger][1] == sequence:
+				_end_one(finger, "lost")
+	if any:
+		_warn("timeout", "no answer within %d ms; such frames are lost" % timeout_ms)
+	# A server that stopped, or a network that is gone: nothing more will come of this connection.
+	if has_left:
+		_lost()
+
+
 # What went out on a lost connection is never answered.
 func _lose_all():
 	var lost = _outstanding
@@ -340,6 +374,7 @@ func _flush():
 
 func _begin(agreed):
 	server_ready = agreed
+	_question(agreed)
 	emit_signal("session_ready", server_ready)
 	_flush()
 
@@ -408,12 +443,27 @@ func _binary(packet):
 
 # Says once what a scene that looks at maps alone would not see.
 func _warn(kind, words):
-	if not _warned.has(kind):
+	if not _warned.has(kind) and _warned.size() < 100:
 		_warned[kind] = true
+		warnings.append(words)
 		push_warning("papilla: " + words)
 
 
+# What the server asks, and a budget that it cannot meet.
+func _question(agreed):
+	for each in agreed.get("warnings", []):
+		_warn(each.member + each.question, each.member + ": " + each.question)
+	if agreed.get("meets_budget") != false:
+		return
+	var budget = int(agreed.budget_us)
+	var words = "a frame of tier %s takes some %d us, and budget_us is %d, so that frames may be late" % [agreed.tier, int(agreed.predicted_latency_us), budget]
+	if budget < 100:
+		words += "; it counts microseconds: were %d ms meant?" % budget
+	_warn(words, words)
+
+
 func _tell(answer):
+	_born_ms.erase(answer.sequence)
 	emit_signal("answered", answer)
 	if answer.status == "ok":
 		emit_signal("map_received", answer)

@@ -70,13 +70,13 @@ void UPapillaSessionComponent::BeginPlay()
         return;
     }
     Core = MakeUnique<papilla::Core>(papilla::Core::following(ToUtf8(Hello)));
+    Core->on_warning = [](const std::string& Words)
+    {
+        UE_LOG(LogTemp, Warning, TEXT("Papilla: %s"), *ToFString(Words));
+    };
     Core->on_answer = [this](const papilla::Answer& Outcome)
     {
-        if (Outcome.status == papilla::Status::error && !bHasWarned)
-        {
-            bHasWarned = true;
-            UE_LOG(LogTemp, Warning, TEXT("Papilla refused a frame: %s"), *ToFString(Outcome.problem.message));
-        }
+        if (Outcome.status == papilla::Status::lost) OnLost.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.finger);
         if (Outcome.status != papilla::Status::ok) return;
         Answer = Outcome;
         bHasAnswer = true;
@@ -280,6 +280,12 @@ void UPapillaSessionComponent::TickComponent(float DeltaTime, ELevelTick Tick, F
     Super::TickComponent(DeltaTime, Tick, Function);
     if (!Core) return;
     const double Now = FPlatformTime::Seconds();
+    // A service that stopped, or a network that is gone: nothing more will come of this connection.
+    if (Core->expire(static_cast<uint64>(FMath::Max(TimeoutSeconds, 0.001f) * 1e6)) && Socket)
+    {
+        HangUp(Socket);
+        Broke(Socket.Get());
+    }
     TickMove(Now);
     if (RetryAt > 0.0 && Now >= RetryAt)
     {
@@ -367,6 +373,8 @@ bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
 void UPapillaSessionComponent::FetchAtlas()
 {
     const auto Request = FHttpModule::Get().CreateRequest();
+    // As long as a request may wait for models that are being loaded.
+    Request->SetTimeout(30.0f);
     Request->SetURL(ToFString(Address.http("/v1/atlas")));
     TWeakObjectPtr<UPapillaSessionComponent> Weak(this);
     Request->OnProcessRequestComplete().BindLambda([Weak](FHttpRequestPtr, FHttpResponsePtr Response, bool bGood)

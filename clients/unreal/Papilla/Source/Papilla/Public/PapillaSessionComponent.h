@@ -58,6 +58,7 @@ struct FPapillaTouch
 DECLARE_DYNAMIC_MULTICAST_DELEGATE(FPapillaReady);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaRefused, const FString&, Code, const FString&, Message);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaMapReceived, int32, Sequence, float, SedMaxJPerM3);
+DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaLost, int32, Sequence, int32, Finger);
 DECLARE_DYNAMIC_MULTICAST_DELEGATE_TwoParams(FPapillaTouched, int32, Finger, const FPapillaTouch&, Touch);
 
 /**
@@ -86,6 +87,13 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "1", ClampMax = "8"))
     int32 InFlightMax = 2;
 
+    /**
+     * A frame without an answer for so long is lost, s, whether it waits for a connection or for the service; in the second case the
+     * connection is given up and another made.
+     */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Papilla", meta = (ClampMin = "0.05"))
+    float TimeoutSeconds = 5.0f;
+
     /** A session is open. */
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
     FPapillaReady OnReady;
@@ -97,6 +105,10 @@ public:
     /** A map came; GetSed reads it. */
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
     FPapillaMapReceived OnMapReceived;
+
+    /** A frame was lost: no answer came in time. Set the actuators to zero. */
+    UPROPERTY(BlueprintAssignable, Category = "Papilla")
+    FPapillaLost OnLost;
 
     /** What pushes back on a finger: of poses and gaps. */
     UPROPERTY(BlueprintAssignable, Category = "Papilla")
@@ -166,7 +178,6 @@ private:
     std::vector<papilla::Pose> Poses;
     bool bHasAtlas = false;
     bool bHasAnswer = false;
-    bool bHasWarned = false;
     EMove Move = EMove::No;
     double RetryAt = 0.0, MoveUntil = 0.0;
 };
