@@ -15,6 +15,8 @@ namespace Papilla
         /// <summary>224 x 224, row-major: SED in J/m3, or firing rates in Hz where <see cref="IsRate"/>; 0 outside the window.</summary>
         public readonly float[] Map = new float[Wire.MapLength];
         public bool IsRate;
+        /// <summary>Whether the answer carries a map; <see cref="Map"/> is 0 without.</summary>
+        public bool HasMap;
         /// <summary>The window of the map that came.</summary>
         public int Column, Row, Width, Height;
         /// <summary>The sixteen numbers of the effect <c>summary</c>; force (N) and contact area (mm2) come first.</summary>
@@ -64,13 +66,15 @@ namespace Papilla
                 Unfamiliar = (m[46] & Wire.FlagUnfamiliar) != 0;
                 CutOff = (m[46] & Wire.FlagCutOff) != 0;
                 Unsettled = (m[46] & Wire.FlagUnsettled) != 0;
+                HasMap = false;
                 if (Status != Status.Ok) return;
                 Clear();
                 ReadContact(m, bytes, terms);
                 HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);
                 PointCount = Copy(m, terms.PointsAt, terms.PointsCount, bytes, Points) ? terms.PointsCount : 0;
                 ActuatorCount = Copy(m, terms.ActuatorsAt, terms.ActuatorsCount, bytes, Actuators) ? terms.ActuatorsCount : 0;
-                if (terms.MapAt >= 0) ReadMap(m, bytes, terms.MapAt);
+                HasMap = terms.MapAt >= 0;
+                if (HasMap) ReadMap(m, bytes, terms.MapAt);
             }
         }
 

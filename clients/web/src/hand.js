@@ -20,14 +20,17 @@ import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
  * @property {number} finger
  * @property {Touch} touch
  * @property {Float32Array | null} pressurePa as a map or at the vertices, if asked for
- * @property {Float32Array | null} vertices SED at the vertices, J/m3, if asked for
- * @property {Float32Array | null} map SED, 224 x 224, J/m3, if asked for
+ * @property {Float32Array | null} vertices what the map shows at the vertices, if asked for in its place
+ * @property {Float32Array | null} map 224 x 224, 0 outside the answer's window, if asked for
  * @property {Float32Array | null} summary
  * @property {Float32Array | null} points
  * @property {Float32Array | null} actuators
+ * @property {'sed' | 'sa1_rate'} kind what map, vertices and points hold: SED in J/m3, or firing rates in Hz (effect `afferents`)
  * @property {boolean} noContact
  * @property {boolean} outOfRange
  * @property {boolean} unsettled
+ * @property {boolean} unfamiliar rougher or heavier than any map the tier was trained on: it may mean nothing
+ * @property {boolean} cutOff the contact reaches the edge of the atlas
  * @property {number} totalUs receipt to sending, in the server
  */
 
@@ -73,6 +76,10 @@ export class Hand {
 
   /** @param {string} base @param {HandHello} hello @param {string} [token] @param {{timeoutMs?: number}} [options] */
   constructor(base, hello, token, options = {}) {
+    for (const name of ['sample_type', 'answer_sample_type']) {
+      const type = /** @type {any} */ (hello)[name] ?? 'f32';
+      if (type !== 'f32') throw refusal('wrong_type', `${name} is ${type}; a hand's samples are f32`);
+    }
     this.#watch = new Watch(options.timeoutMs ?? TIMEOUT_MS, (bornMs) => this.#expire(bornMs));
     this.#hello = { input: hello.objects ? 'objects' : 'gaps', map: false, ...hello, type: 'hello', version: VERSION, reconnect: true };
     this.#link = new Link(sessionUrl(base, token), {
@@ -296,15 +303,30 @@ function read(data, view, ready) {
     touch: touchOf(of('touch') ?? new Float32Array(16)),
     pressurePa: of('pressure'),
     vertices: of('vertices'),
-    map: of('map'),
+    map: mapOf(data, view, ready),
     summary: of('summary'),
     points: of('points'),
     actuators: of('actuators'),
+    kind: view.getUint8(5) === 3 ? 'sa1_rate' : 'sed',
     noContact: (flags & FLAG.noContact) !== 0,
     outOfRange: (flags & FLAG.outOfRange) !== 0,
     unsettled: (flags & FLAG.unsettled) !== 0,
+    unfamiliar: (flags & FLAG.unfamiliar) !== 0,
+    cutOff: (flags & FLAG.cutOff) !== 0,
     totalUs: view.getUint32(24, true),
   };
+}
+
+/** The whole map: a view of the message, or drawn anew of a window. @param {ArrayBuffer} data @param {DataView} view @param {Ready} ready */
+function mapOf(data, view, ready) {
+  const section = ready.sections.find(({ name }) => name === 'map');
+  if (!section) return null;
+  const [width, height, column, row] = [12, 14, 32, 34].map((at) => view.getUint16(at, true));
+  const samples = new Float32Array(data, section.offset, width * height);
+  if (samples.length === MAP_SIDE_PX * MAP_SIDE_PX) return samples;
+  const map = new Float32Array(MAP_SIDE_PX * MAP_SIDE_PX);
+  for (let y = 0; y < height; y++) map.set(samples.subarray(y * width, (y + 1) * width), (row + y) * MAP_SIDE_PX + column);
+  return map;
 }
 
 /** @param {Float32Array} v @returns {Touch} */

@@ -140,7 +140,7 @@ export interface Ready {
   sed_scale_j_per_m3: number;
   sections: Section[];
   /** What the service asks of the hello; the client tells people once. */
-  warnings?: { member: string; value: number; question: string }[];
+  warnings?: { member: string; value?: number; question?: string; message?: string }[];
   /** Of version 3. */
   vertices?: number;
   fingers?: number;

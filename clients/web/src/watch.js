@@ -45,7 +45,10 @@ export class Warnings {
 
   /** What the service asks, and a budget that it cannot meet. @param {import('./types.js').Ready} ready */
   question(ready) {
-    for (const { member, question } of ready.warnings ?? []) this.tell(member + question, () => `${member}: ${question}`);
+    for (const { member, question, message } of ready.warnings ?? []) {
+      const words = `${member}: ${question ?? message}`;
+      this.tell(words, () => words);
+    }
     const { budget_us: budget, tier, predicted_latency_us: needs } = ready;
     if (ready.meets_budget !== false || budget === null) return;
     const meant = budget < 100 ? `; it counts microseconds: were ${budget} ms meant?` : '';

@@ -87,11 +87,11 @@ static func read_header(packet):
 # What follows the header, by the `sections` of the session's ready.
 static func read_sections(answer, packet, sections):
 	answer.samples = PoolByteArray()
-	var has_map = false
+	answer.has_map = false
 	for section in sections:
 		var from = int(section.offset)
 		if section.name == "map":
-			has_map = true
+			answer.has_map = true
 			if from < packet.size():
 				answer.samples = packet.subarray(from, packet.size() - 1)
 		elif section.name == "vertices":
@@ -100,13 +100,17 @@ static func read_sections(answer, packet, sections):
 			answer.touch = Touch.read(Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1)))
 		else:
 			answer[section.name] = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
-	if not has_map:
+	if not answer.has_map:
 		answer.width = 0
 		answer.height = 0
 
 
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
+# An answer without a map has none: an error, and no samples.
 static func map_of(answer):
+	if not answer.get("has_map", false):
+		push_error("papilla: the answer carries no map; its status is " + answer.status)
+		return PoolRealArray()
 	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
 	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
 		return values

@@ -452,7 +452,8 @@ func _warn(kind, words):
 # What the server asks, and a budget that it cannot meet.
 func _question(agreed):
 	for each in agreed.get("warnings", []):
-		_warn(each.member + each.question, each.member + ": " + each.question)
+		var asked = each.member + ": " + str(each.get("question", each.get("message")))
+		_warn(asked, asked)
 	if agreed.get("meets_budget") != false:
 		return
 	var budget = int(agreed.budget_us)
@@ -465,7 +466,7 @@ func _question(agreed):
 func _tell(answer):
 	_born_ms.erase(answer.sequence)
 	emit_signal("answered", answer)
-	if answer.status == "ok":
+	if answer.status == "ok" and answer.has_map:
 		emit_signal("map_received", answer)
 	if answer.has("touch"):
 		emit_signal("touched", answer)

@@ -88,11 +88,11 @@ static func read_header(packet):
 # What follows the header, by the `sections` of the session's ready.
 static func read_sections(answer, packet, sections):
 	answer.samples = PackedByteArray()
-	var has_map = false
+	answer.has_map = false
 	for section in sections:
 		var from = int(section.offset)
 		if section.name == "map":
-			has_map = true
+			answer.has_map = true
 			if from < packet.size():
 				answer.samples = packet.slice(from, packet.size())
 		elif section.name == "vertices":
@@ -101,13 +101,17 @@ static func read_sections(answer, packet, sections):
 			answer.touch = Touch.read(Compat.bytes_to_floats(packet.slice(from, from + int(section.bytes))))
 		else:
 			answer[section.name] = Compat.bytes_to_floats(packet.slice(from, from + int(section.bytes)))
-	if not has_map:
+	if not answer.has_map:
 		answer.width = 0
 		answer.height = 0
 
 
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
+# An answer without a map has none: an error, and no samples.
 static func map_of(answer):
+	if not answer.get("has_map", false):
+		push_error("papilla: the answer carries no map; its status is " + answer.status)
+		return PackedFloat32Array()
 	var values = Samples.decode(answer.samples, answer.sample_type, answer.scale)
 	if answer.width == Samples.SIDE_PX and answer.height == Samples.SIDE_PX:
 		return values

@@ -453,7 +453,8 @@ func _warn(kind, words):
 # What the server asks, and a budget that it cannot meet.
 func _question(agreed):
 	for each in agreed.get("warnings", []):
-		_warn(each.member + each.question, each.member + ": " + each.question)
+		var asked = each.member + ": " + str(each.get("question", each.get("message")))
+		_warn(asked, asked)
 	if agreed.get("meets_budget") != false:
 		return
 	var budget = int(agreed.budget_us)
@@ -466,7 +467,7 @@ func _question(agreed):
 func _tell(answer):
 	_born_ms.erase(answer.sequence)
 	answered.emit(answer)
-	if answer.status == "ok":
+	if answer.status == "ok" and answer.has_map:
 		map_received.emit(answer)
 	if answer.has("touch"):
 		touched.emit(answer)

@@ -80,7 +80,7 @@ void UPapillaSessionComponent::BeginPlay()
         if (Outcome.status != papilla::Status::ok) return;
         Answer = Outcome;
         bHasAnswer = true;
-        OnMapReceived.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
+        if (Outcome.has_map) OnMapReceived.Broadcast(static_cast<int32>(Outcome.sequence), Outcome.max());
         if (Outcome.has_touch) OnTouched.Broadcast(Outcome.finger, ToTouch(Outcome.touch));
     };
     FetchAtlas();
@@ -359,7 +359,7 @@ int32 UPapillaSessionComponent::SendGaps(const TArray<float>& DepthMm, int32 Fin
 bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const
 {
     SedJPerM3.SetNumZeroed(static_cast<int32>(papilla::map_len));
-    if (!bHasAnswer) return false;
+    if (!bHasAnswer || !Answer.has_map) return false;
     for (int32 Row = 0; Row < papilla::side_px; ++Row)
     {
         for (int32 Column = 0; Column < papilla::side_px; ++Column)

@@ -135,7 +135,7 @@ public:
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     int32 SendGaps(const TArray<float>& DepthMm, int32 Finger = 0);
 
-    /** The newest map, 224 x 224, J/m3; false if none came yet. */
+    /** The newest answer's map, 224 x 224, J/m3; false if it has none, or none came yet. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     bool GetSed(TArray<float>& SedJPerM3) const;
 
