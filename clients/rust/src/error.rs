@@ -1,9 +1,9 @@
 //! What can go wrong.
 
+use std::fmt::Display;
+
 use papilla_proto::{ErrorCode, FrameError, Problem, atlas::AtlasError};
 use tokio_tungstenite::tungstenite;
-
-use crate::Address;
 
 /// Why there is no session or no map.
 #[derive(Debug, thiserror::Error)]
@@ -66,11 +66,11 @@ impl PapillaError {
             && self.code().is_none_or(|code| passing.contains(&code))
     }
 
-    pub(crate) fn unreachable(server: &Address, reason: &dyn std::fmt::Display) -> Self {
+    pub(crate) fn unreachable(server: &dyn Display, reason: &dyn Display) -> Self {
         Self::Unreachable { server: server.to_string(), reason: reason.to_string() }
     }
 
-    pub(crate) fn of_socket(server: &Address, error: &tungstenite::Error) -> Self {
+    pub(crate) fn of_socket(server: &dyn Display, error: &tungstenite::Error) -> Self {
         if let tungstenite::Error::Http(answer) = error {
             let body = answer.body().as_deref().unwrap_or_default();
             if let Some(problem) = problem_of(body) {
