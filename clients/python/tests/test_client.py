@@ -3,6 +3,7 @@
 import asyncio
 import os
 import runpy
+import socket
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,23 @@ def test_a_rough_ball_pulls_the_skin_along(url):
     assert pull_n == pytest.approx(0.5 * press_n, rel=0.25)
     assert answer.shear_pa.shape == (vertices, 3)
     assert answer.shear_pa[:, 1].sum() == pytest.approx(abs(answer.shear_pa[:, 1]).sum(), rel=0.1)
+
+
+def test_members_hold_what_they_say(url):
+    ball = {"shape": {"shape": "sphere", "radius_mm": 10}}
+    with papilla.Session(url, input="objects", objects=[ball], fingers=[{}, {}], map=False, pressure="map") as session:
+        pose = [11.25, 0.0, -16.0, 0, 0, 0, 1]
+        assert session.touch(pose).pressure_pa.shape == (224, 224)
+        sent = [session.send_poses(pose, finger=1) for _ in range(3)]
+        assert [outcome.result(10).finger for outcome in sent] == [1, 1, 1]
+
+
+def test_a_service_that_says_nothing_holds_nobody():
+    listening = socket.create_server(("127.0.0.1", 0))
+    with pytest.raises(papilla.Unreachable, match="papilla-server"):
+        papilla.Session("127.0.0.1:%d" % listening.getsockname()[1])
+    with pytest.raises(ValueError, match="timeout_s"):
+        papilla.Session(timeout_s=0)
 
 
 def test_misuse_is_told(url):
