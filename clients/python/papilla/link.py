@@ -56,7 +56,7 @@ async def dial(host: str, port: int) -> socket.socket:
 
 def questions(ready: dict[str, Any]) -> list[str]:
     """What a person should know of a ready: what the service asks, and a budget that it cannot meet."""
-    asked = [f"{each['member']}: {each.get('question', each.get('message'))}" for each in ready.get("warnings", [])]
+    asked = [f"{each['member']}: {each['question']}" for each in ready.get("warnings", [])]
     if ready.get("meets_budget") is False:
         budget_us = ready["budget_us"]
         needs = f"a frame of tier {ready['tier']} takes some {ready['predicted_latency_us']} us"

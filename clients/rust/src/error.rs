@@ -73,7 +73,10 @@ impl PapillaError {
     pub(crate) fn of_socket(server: &dyn Display, error: &tungstenite::Error) -> Self {
         if let tungstenite::Error::Http(answer) = error {
             let body = answer.body().as_deref().unwrap_or_default();
-            if let Some(problem) = problem_of(body) {
+            if let Some(mut problem) = problem_of(body) {
+                if problem.code == ErrorCode::Unauthorized {
+                    problem.message.push_str("; here by Address::with_token");
+                }
                 return Self::Refused(problem);
             }
         }

@@ -129,7 +129,8 @@ namespace Papilla
             var refused = error as PapillaException;
             lock (gate) fault = error.Message;
             if (refused == null || OnRefusal(refused.Problem)) return;
-            if (IsNew("refused")) TellPeople("the session was refused: " + refused.Problem.Message);
+            string hint = refused.Problem.Code == "unauthorized" ? "; here as the session's third argument" : "";
+            if (IsNew("refused")) TellPeople("the session was refused: " + refused.Problem.Message + hint);
             var told = Refused;
             if (told != null) told(refused.Problem);
         }

@@ -180,7 +180,7 @@ namespace Papilla
         {
             foreach (var each in terms.Json["warnings"] ?? new Newtonsoft.Json.Linq.JArray())
             {
-                string words = (string)each["member"] + ": " + ((string)each["question"] ?? (string)each["message"]);
+                string words = (string)each["member"] + ": " + (string)each["question"];
                 if (IsNew(words)) TellPeople(words);
             }
             if ((bool?)terms.Json["meets_budget"] != false) return;

@@ -139,8 +139,6 @@ export interface Ready {
   pressure_max_pa: number;
   sed_scale_j_per_m3: number;
   sections: Section[];
-  /** What the service asks of the hello; the client tells people once. */
-  warnings?: { member: string; value?: number; question?: string; message?: string }[];
   /** Of version 3. */
   vertices?: number;
   fingers?: number;

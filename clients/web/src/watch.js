@@ -45,8 +45,8 @@ export class Warnings {
 
   /** What the service asks, and a budget that it cannot meet. @param {import('./types.js').Ready} ready */
   question(ready) {
-    for (const { member, question, message } of ready.warnings ?? []) {
-      const words = `${member}: ${question ?? message}`;
+    for (const { member, question } of ready.warnings ?? []) {
+      const words = `${member}: ${question}`;
       this.tell(words, () => words);
     }
     const { budget_us: budget, tier, predicted_latency_us: needs } = ready;

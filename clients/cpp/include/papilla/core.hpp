@@ -339,7 +339,7 @@ class Core {
   /// What the service asks, and a budget that it cannot meet.
   void question(const json::Value& ready) {
     for (const json::Value& each : ready["warnings"].items) {
-      const std::string words = each["member"].string + ": " + each["question"].string + each["message"].string;
+      const std::string words = each["member"].string + ": " + each["question"].string;
       if (is_new(words)) tell(words);
     }
     const json::Value& meets = ready["meets_budget"];

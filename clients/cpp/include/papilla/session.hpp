@@ -257,6 +257,7 @@ class Session {
       std::lock_guard<std::mutex> lock(mutex_);
       problem_ = said.is_null() ? Problem{"", error, ""}
                                 : Problem{said["code"].string, said["message"].string, said["field"].string};
+      if (problem_.code == "unauthorized") problem_.message += "; here in Options::token";
       return false;
     }
     socket_->patience(30);

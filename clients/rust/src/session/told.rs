@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use papilla_proto::Ready;
+use papilla_proto::{Ready, Warning};
 
 /// Things that are told, at most.
 const MOST: usize = 100;
@@ -25,8 +25,12 @@ impl Told {
         self.words.push(words);
     }
 
-    /// A budget that the service cannot meet.
+    /// What the service asks, and a budget that it cannot meet.
     pub(super) fn question(&mut self, ready: &Ready) {
+        for Warning { member, question, .. } in &ready.warnings {
+            let words = format!("{member}: {question}");
+            self.once(&words, || words.clone());
+        }
         let (Some(false), Some(budget_us)) = (ready.meets_budget, ready.budget_us) else { return };
         let Ready { tier, predicted_latency_us, .. } = ready;
         let meant = if budget_us < 100 {

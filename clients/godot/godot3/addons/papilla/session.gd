@@ -452,7 +452,7 @@ func _warn(kind, words):
 # What the server asks, and a budget that it cannot meet.
 func _question(agreed):
 	for each in agreed.get("warnings", []):
-		var asked = each.member + ": " + str(each.get("question", each.get("message")))
+		var asked = each.member + ": " + each.question
 		_warn(asked, asked)
 	if agreed.get("meets_budget") != false:
 		return
