@@ -84,7 +84,7 @@ def test_members_hold_what_they_say(url):
 def test_a_service_that_says_nothing_holds_nobody():
     listening = socket.create_server(("127.0.0.1", 0))
     with pytest.raises(papilla.Unreachable, match="papilla-server"):
-        papilla.Session("127.0.0.1:%d" % listening.getsockname()[1])
+        papilla.Session(f"127.0.0.1:{listening.getsockname()[1]}")
     with pytest.raises(ValueError, match="timeout_s"):
         papilla.Session(timeout_s=0)
 
