@@ -14,9 +14,9 @@ sealed class Outcome
 {
     internal Status Status;
     internal string Code, Field;
-    internal float[] Map, Summary, Points, Actuators;
+    internal float[] Map, Summary, Points, Actuators, Rates, PointRatesHz;
     internal int[] Window;
-    internal bool IsRate, OutOfRange, NoContact, Unfamiliar, CutOff;
+    internal bool NotTracked, CoarseClock, OutOfRange, NoContact, Unfamiliar, CutOff;
     internal ulong ClientTimeUs;
     internal int TierNumber;
     internal uint TotalUs, QueueUs, InferUs;
@@ -65,7 +65,6 @@ sealed partial class Run
         if (expect["field"] != null && got.Field != null) Same("field", got.Field, (string)expect["field"]);
         if (got.Status != Status.Ok) return;
         if (got.InferUs + got.QueueUs > got.TotalUs) throw new Missed(got.InferUs + " + " + got.QueueUs + " us are more than " + got.TotalUs);
-        if (expect["kind"] != null) Same("kind", got.IsRate ? "sa1_rate" : "sed", (string)expect["kind"]);
         if (expect["flags"] != null)
         {
             var flags = new List<string>();
@@ -73,6 +72,8 @@ sealed partial class Run
             if (got.NoContact) flags.Add("no_contact");
             if (got.Unfamiliar) flags.Add("unfamiliar");
             if (got.CutOff) flags.Add("cut_off");
+            if (got.NotTracked) flags.Add("not_tracked");
+            if (got.CoarseClock) flags.Add("coarse_clock");
             Same("flags", string.Join(",", flags), string.Join(",", expect["flags"].Select(f => (string)f)));
         }
         if (expect["tier"] != null && got.Window != null) Same("tier", tiers[got.TierNumber], (string)expect["tier"]);
@@ -80,6 +81,9 @@ sealed partial class Run
         if ((bool?)expect["map"] == false && got.Window[2] * got.Window[3] != 0) throw new Missed("a map came");
         All("summary", expect, got.Summary);
         All("points", expect, got.Points);
+        All("point_rates", expect, got.PointRatesHz);
+        if ((expect["rates"] != null) != (got.Rates != null)) throw new Missed("rates are " + (got.Rates == null ? "missing" : "too many"));
+        if (got.Rates != null) CheckMap((JObject)expect["rates"], got.Rates);
         All("actuators", expect, got.Actuators);
         CheckMap(expect, got.Map);
     }
@@ -100,6 +104,7 @@ sealed partial class Run
         All("touch", expect, found);
         CheckFelt(step, t);
         if (expect["pressure_sum"] != null) Near("pressure", got.PressurePa.Sum(v => (double)v), (double)expect["pressure_sum"][0], (double)expect["pressure_sum"][1]);
+        if (got.NotTracked != expect["flags"].Any(f => (string)f == "not_tracked")) throw new Missed("not tracked is " + got.NotTracked);
         if (got.NoContact != expect["flags"].Any(f => (string)f == "no_contact")) throw new Missed("no contact is " + got.NoContact);
         if (got.OutOfRange || got.Unsettled) throw new Missed("out of range or unsettled");
     }

@@ -160,7 +160,7 @@ sealed partial class Run : IDisposable
                 Status = a.Status, Code = a.Problem == null ? null : a.Problem.Code, Field = a.Problem == null ? null : a.Problem.Field,
                 Map = (float[])a.Map.Clone(), Summary = a.HasSummary ? (float[])a.Summary.Clone() : null,
                 Points = a.Points.Take(a.PointCount).ToArray(), Actuators = a.Actuators.Take(a.ActuatorCount).ToArray(),
-                Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate, OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
+                Window = new[] { a.Column, a.Row, a.Width, a.Height }, NotTracked = a.NotTracked, CoarseClock = a.CoarseClock, Rates = a.Rates == null ? null : (float[])a.Rates.Clone(), PointRatesHz = a.PointRatesHz == null ? null : (float[])a.PointRatesHz.Clone(), OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, CutOff = a.CutOff,
                 HasTouch = a.HasTouch, Touch = a.Touch, Finger = a.Finger, Unsettled = a.Unsettled, PressurePa = a.PressurePa == null ? null : (float[])a.PressurePa.Clone(),
                 ClientTimeUs = a.ClientTimeUs, TierNumber = a.TierNumber, TotalUs = a.TotalUs, QueueUs = a.QueueUs, InferUs = a.InferUs,
             };

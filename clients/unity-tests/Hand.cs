@@ -8,6 +8,11 @@ sealed partial class Run
 {
     void Touch(JObject step, JObject expect)
     {
+        if (step["poses"].Type == JTokenType.Null)
+        {
+            CheckTouch(step, expect, () => session.SendNotTracked((int?)step["finger"] ?? 0));
+            return;
+        }
         var poses = PosesOf(step);
         CheckTouch(step, expect, () => session.SendPoses(poses, (int?)step["finger"] ?? 0, NetOf(step)));
     }

@@ -63,11 +63,18 @@ sealed partial class Run : IDisposable
             case "hello": Hello(step, expect); break;
             // Whole maps alone are taken.
             case "frame": if (step["window"] == null) Check(expect, Of(() => session.Send(Pattern((JObject)step["pressure"], 1), (ulong?)step["client_time_us"] ?? 0))); break;
-            case "touch": CheckTouch(step, expect, Of(() => session.SendPoses(PosesOf(step), 0, (int?)step["finger"] ?? 0, NetOf(step)), step)); break;
+            case "touch": Touch(step, expect); break;
             case "gaps": CheckTouch(step, expect, Of(() => session.SendGaps(GapsOf(step), 10000 * ++frames, (int?)step["finger"] ?? 0, NetOf(step)), step)); break;
             case "rasterise": Rasterise(step, expect); break;
             default: throw new Missed("no step " + step["do"]);
         }
+    }
+
+    void Touch(JObject step, JObject expect)
+    {
+        int finger = (int?)step["finger"] ?? 0;
+        Func<NativeAnswer> lost = () => session.SendNotTracked(0, finger), seen = () => session.SendPoses(PosesOf(step), 0, finger, NetOf(step));
+        CheckTouch(step, expect, Of(step["poses"].Type == JTokenType.Null ? lost : seen, step));
     }
 
     void Hello(JObject step, JObject expect)
@@ -95,6 +102,7 @@ sealed partial class Run : IDisposable
         if (ready["atlas_hash"] != null) Same("atlas", model.AtlasHash, (string)ready["atlas_hash"]);
         if (ready["vertices"] != null) Same("vertices", model.VertexCount.ToString(), (string)ready["vertices"]);
         if (ready["tier"] != null) Same("tier", model.Name, (string)ready["tier"]);
+        if (ready["method"] != null) Same("method", session.Method, (string)ready["method"]);
     }
 
     /// <summary>What a frame came to, in the words of the client with a socket.</summary>
@@ -107,7 +115,8 @@ sealed partial class Run : IDisposable
             for (int i = 0; i < a.Width * a.Height; i++) map[(a.Row + i / a.Width) * 224 + a.Column + i % a.Width] = a.Map[i];
             return new Outcome
             {
-                Status = Status.Ok, Map = map, Window = new[] { a.Column, a.Row, a.Width, a.Height }, IsRate = a.IsRate,
+                Status = Status.Ok, Map = map, Window = new[] { a.Column, a.Row, a.Width, a.Height }, NotTracked = a.NotTracked, CoarseClock = a.CoarseClock,
+                Rates = a.RatesHz.Length == 0 ? null : a.RatesHz, PointRatesHz = a.PointRatesHz,
                 Summary = a.Summary, Points = a.Points, Actuators = a.Actuators, PressurePa = a.PressurePa,
                 OutOfRange = a.OutOfRange, NoContact = a.NoContact, Unfamiliar = a.Unfamiliar, Unsettled = a.Unsettled, CutOff = a.CutOff,
                 HasTouch = a.HasTouch, Touch = a.Touch, Finger = step == null ? 0 : (int?)step["finger"] ?? 0,

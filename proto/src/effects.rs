@@ -20,7 +20,7 @@ pub enum RuntimeEffect {
     Points,
     /// The answer carries the intensities of a display's actuators.
     Actuators,
-    /// Map and points carry the firing rate of SA1 afferents, Hz, in place of SED.
+    /// The answer carries the firing rate of SA1 afferents, Hz, beside SED: of the map, and of points.
     Afferents,
     /// The answer carries the [spikes](crate::spikes) of touch units.
     Spikes,
@@ -66,7 +66,7 @@ impl RuntimeEffect {
             Self::Summary => "adds force, contact area, and SED's maximum, centroid and moments",
             Self::Points => "adds values at listed points of the finger",
             Self::Actuators => "adds the intensity of every actuator of a display",
-            Self::Afferents => "turns SED into the firing rate of SA1 afferents in map and points",
+            Self::Afferents => "adds the firing rate of SA1 afferents to the map and to points",
             Self::Spikes => "adds when SA1, RA and Pacinian units of the finger fire",
             Self::Relaxation => "lets the tissue creep: a Prony filter on pressure before the map",
             Self::ShearEnergy => "adds to SED what traction along the skin changes",
@@ -208,13 +208,25 @@ pub struct Afferents {
     pub k_s_hz_per_kpa: f32,
     /// Dynamic sensitivity, Hz/(kPa/s).
     pub k_d_hz_s_per_kpa: f32,
+    /// Whether the map of rates comes with the answer, wherever the map of SED does.
+    pub map: bool,
 }
 
 impl Default for Afferents {
     fn default() -> Self {
-        Self { e_ref_kpa: 80.0, theta_kpa: 8.0, k_s_hz_per_kpa: 1.0, k_d_hz_s_per_kpa: 0.2 }
+        Self {
+            e_ref_kpa: 80.0,
+            theta_kpa: 8.0,
+            k_s_hz_per_kpa: 1.0,
+            k_d_hz_s_per_kpa: 0.2,
+            map: true,
+        }
     }
 }
+
+/// Bytes before the samples of [`SectionName::Rates`]: their scale as f32, Hz per unit of u16 and u8
+/// (else 1), and zeros.
+pub const RATES_HEAD_LEN: usize = 16;
 
 /// A tissue whose relaxation is known (`docs/concepts/physics.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -317,15 +329,20 @@ pub enum SectionName {
     Shear,
     /// A [`Summary`](crate::Summary).
     Summary,
-    /// One f32 a point.
+    /// SED, one f32 a point, J/m3.
     Points,
+    /// Firing rate of SA1 afferents, one f32 a point, Hz.
+    PointRates,
     /// One f32 an actuator.
     Actuators,
     /// [`Fired`](crate::spikes::Fired): who fired, and when.
     Spikes,
-    /// The samples of the map; always last.
+    /// Firing rates of SA1 afferents where the map of SED, or its vertices, are, Hz: a head of
+    /// [`RATES_HEAD_LEN`] bytes, then samples. It is never cut to a window.
+    Rates,
+    /// The samples of the map, SED; always last.
     Map,
-    /// What the map shows at the vertices of the atlas, in place of it. Version 3.
+    /// SED at the vertices of the atlas, in place of the map. Version 3.
     Vertices,
 }
 

@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | 0 | u32 | magic, the bytes `PPL1` |
 //! | 4 | u8 | version, 1 to 3: the hello's |
-//! | 5 | u8 | kind: 1 pressure, 4 poses of objects, 5 gaps (client to server); 2 SED, 3 firing rate of SA1 units (server to client) |
+//! | 5 | u8 | kind: 1 pressure, 4 poses of objects, 5 gaps (client to server); 2 SED (server to client) |
 //! | 6 | u8 | sample type: 0 f32, 1 f16, 2 u16, 3 u8 |
 //! | 7 | u8 | status: 0 in requests; answers 0 ok, 1 superseded, 2 late, 3 error, 4 stale |
 //! | 8 | u32 | sequence, the client's; the answer repeats it |
@@ -15,7 +15,7 @@
 //! | 14 | u16 | height, likewise |
 //! | 16 | u64 | client time, us, of any clock; the answer repeats it |
 //! | 24 | u32 | request: deadline, us from receipt (0: the session's budget); answer: us spent in the server |
-//! | 28 | f32 | scale: Pa, J/m3 or Hz per unit for u16 and u8, else 1 |
+//! | 28 | f32 | scale: Pa or J/m3 per unit for u16 and u8, else 1 |
 //!
 //! Versions 2 and 3 go on ([`Extension`]):
 //!
@@ -26,7 +26,7 @@
 //! | 36 | u32 | answer: us the frame waited for a thread |
 //! | 40 | u32 | answer: us in the network, 0 if it was not asked |
 //! | 44 | u16 | answer: number of the tier, as `ready` gave it |
-//! | 46 | u8 | answer: flags, see [`flags`] |
+//! | 46 | u8 | flags, see [`flags`]; in a request [`flags::NOT_TRACKED`] alone has a meaning |
 //! | 47 | u8 | version 3: number of the finger, both ways; version 2: 0, to be ignored |
 //!
 //! The payload follows. A request's: width x height samples, row-major, first row first. An
@@ -59,8 +59,6 @@ pub enum FrameKind {
     Pressure = 1,
     /// Strain energy density at the dermis-epidermis interface, J/m3; server to client.
     Sed = 2,
-    /// Firing rate of slowly adapting type 1 (SA1) afferents, Hz; server to client, version 2.
-    Sa1Rate = 3,
     /// Poses of objects; client to server, version 3.
     Objects = 4,
     /// Depth of the undeformed skin in things, mm; client to server, version 3.
@@ -106,7 +104,7 @@ pub struct FrameHeader {
     /// Request: deadline in us from receipt, 0 for the session's budget.
     /// Answer: us from receipt to sending.
     pub time_us: u32,
-    /// Pa, J/m3 or Hz per unit for u16 and u8; 1 for floats.
+    /// Pa or J/m3 per unit for u16 and u8; 1 for floats.
     pub scale: f32,
     /// What version 2 adds; none in version 1.
     pub extension: Option<Extension>,
@@ -165,6 +163,20 @@ impl FrameHeader {
     pub fn of_finger(self, kind: FrameKind, finger: u8, [width, height]: [u16; 2]) -> Self {
         let extension = Extension { finger: Some(finger), ..self.extension.unwrap_or_default() };
         Self { kind, width, height, extension: Some(extension), ..self }
+    }
+
+    /// The same header of a frame without a payload: nobody knows where things are.
+    #[must_use]
+    pub fn not_tracked(self) -> Self {
+        let extension = self.extension.unwrap_or_default();
+        let extension = Extension { x: 0, y: 0, flags: flags::NOT_TRACKED, ..extension };
+        Self { width: 0, height: 0, extension: Some(extension), ..self }
+    }
+
+    /// Whether a request says where things are, or what presses.
+    #[must_use]
+    pub fn is_tracked(&self) -> bool {
+        self.extension.is_none_or(|extension| extension.flags & flags::NOT_TRACKED == 0)
     }
 
     /// Version of the frame.
@@ -255,7 +267,6 @@ impl FrameHeader {
         let kind = match b[5] {
             1 => FrameKind::Pressure,
             2 => FrameKind::Sed,
-            3 => FrameKind::Sa1Rate,
             4 if b[4] >= 3 => FrameKind::Objects,
             5 if b[4] >= 3 => FrameKind::Gaps,
             found => return Err(FrameError::UnknownKind { found }),

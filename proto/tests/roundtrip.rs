@@ -102,7 +102,13 @@ fn hello() -> impl Strategy<Value = Hello> {
         points: new.6,
         actuators: new.7,
         afferents: new.8.map(|[e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa]| {
-            Afferents { e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa }
+            Afferents {
+                e_ref_kpa,
+                theta_kpa,
+                k_s_hz_per_kpa,
+                k_d_hz_s_per_kpa,
+                map: theta_kpa > 1.0,
+            }
         }),
         relaxation: new.9,
         ..contact

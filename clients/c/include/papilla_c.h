@@ -31,7 +31,7 @@ extern "C" {
 #endif
 
 /* Raised when a struct or a function changes; compare with papilla_abi(). */
-#define PAPILLA_ABI 1
+#define PAPILLA_ABI 2
 
 #define PAPILLA_MAP_SIDE_PX 224
 #define PAPILLA_MAP_LEN 50176 /* 224 x 224 */
@@ -64,10 +64,8 @@ enum {
 #define PAPILLA_FLAG_UNFAMILIAR 4u   /* rougher or heavier than any map the model was trained on */
 #define PAPILLA_FLAG_UNSETTLED 8u    /* the contact solve did not settle: its answer is rough */
 #define PAPILLA_FLAG_CUT_OFF 16u     /* the contact reaches the edge of the atlas */
-
-/* PapillaAnswer.kind: what map, vertices and points show. */
-#define PAPILLA_KIND_SED 2u      /* strain energy density, J/m3 */
-#define PAPILLA_KIND_SA1_RATE 3u /* firing rate of SA1 afferents, Hz */
+#define PAPILLA_FLAG_NOT_TRACKED 32u /* the frame told that nobody knows where things are; all is zero */
+#define PAPILLA_FLAG_COARSE_CLOCK 64u /* time_us ticks so coarsely that rates and spikes may be far off */
 
 /* A folder of models, read once, for any number of sessions. */
 typedef struct PapillaModel PapillaModel;
@@ -132,12 +130,14 @@ typedef struct PapillaSummary {
 /* What a frame came to; what the hello did not ask for is NULL or empty. */
 typedef struct PapillaAnswer {
   uint32_t flags;
-  uint32_t kind;  /* 0: no network was asked for */
+  uint32_t has_sed;  /* 0: no network was asked for */
   uint32_t column, row, width, height;  /* of map: all of it, unless "contact_window" cuts it */
-  PapillaSamples map;
+  PapillaSamples map;          /* SED, J/m3 */
   PapillaSamples vertices;     /* in place of map: "answer_layout": "vertices" */
   PapillaSamples pressure_pa;  /* what was found: "pressure" */
-  PapillaSamples points;
+  PapillaSamples rates_hz;     /* of SA1 afferents, whole map or vertices: the effect "afferents" */
+  PapillaSamples points;       /* SED, J/m3 */
+  PapillaSamples point_rates_hz;
   PapillaSamples actuators;
   const PapillaSummary *summary;
   const PapillaTouch *touch;   /* to poses and gaps */
@@ -191,6 +191,10 @@ PapillaStatus papilla_send_poses(PapillaSession *session, uint8_t finger, const 
  * vertex_count with "input_layout": "vertices"; with "velocity": true as many x y z mm/s behind. */
 PapillaStatus papilla_send_gaps(PapillaSession *session, uint8_t finger, const float *depth_mm, size_t count,
                                 const PapillaNetForce *net, uint64_t time_us, PapillaAnswer *answer);
+
+/* Tracking is lost: nobody knows where things are, or what presses. The answer is zero, no unit fires, and
+ * what the session remembers waits for the next frame. Better than a pose that is not true. */
+PapillaStatus papilla_send_not_tracked(PapillaSession *session, uint8_t finger, uint64_t time_us, PapillaAnswer *answer);
 
 #ifdef __cplusplus
 }

@@ -50,6 +50,14 @@ class Session {
                           std::uint8_t finger = 0, const PapillaNetForce* net = nullptr) {
     return papilla_send_gaps(handle_.get(), finger, depth_mm, count, net, time_us, &answer);
   }
+  /// Tracking is lost: better than a pose that is not true.
+  PapillaStatus send_not_tracked(PapillaAnswer& answer, std::uint64_t time_us = 0, std::uint8_t finger = 0) {
+    return papilla_send_not_tracked(handle_.get(), finger, time_us, &answer);
+  }
+  /// How pressure is found, as "pixels"; empty where frames are pressure.
+  const char* method() const { return papilla_session_method(handle_.get()); }
+  /// What the hello cannot have as one might expect, a line each; empty if there is nothing.
+  const char* warning() const { return papilla_session_warning(handle_.get()); }
   const char* error() const { return papilla_session_error(handle_.get()); }
   const char* error_field() const { return papilla_session_error_field(handle_.get()); }
 

@@ -1,8 +1,8 @@
 //! What a frame came to.
 
 use papilla_proto::{
-    FrameKind, HEADER_LEN_V2, Window,
-    effects::{Section, SectionName},
+    HEADER_LEN_V2, Window,
+    effects::{RATES_HEAD_LEN, Section, SectionName},
 };
 
 /// What a frame came to; lists are empty where the hello did not ask for them.
@@ -10,18 +10,22 @@ use papilla_proto::{
 pub struct Answer<'a> {
     /// Bits of [`papilla_proto::flags`].
     pub flags: u8,
-    /// What map, vertices and points show; none if the network was not asked for.
-    pub kind: Option<FrameKind>,
+    /// Whether the network was asked, or would have been with a contact: `map` and `points` are SED.
+    pub has_sed: bool,
     /// The pixels of `map`.
     pub window: Window,
-    /// J/m3 or Hz, row-major.
+    /// SED, J/m3, row-major.
     pub map: &'a [f32],
     /// The same at the vertices.
     pub vertices: &'a [f32],
     /// Pressure that was found, Pa: a map or vertices.
     pub pressure_pa: &'a [f32],
-    /// Values at the points.
+    /// Firing rates, Hz: a whole map, or at the vertices.
+    pub rates_hz: &'a [f32],
+    /// SED at the points, J/m3.
     pub points: &'a [f32],
+    /// Firing rates at the points, Hz.
+    pub point_rates_hz: &'a [f32],
     /// Intensities of the actuators.
     pub actuators: &'a [f32],
     /// Sixteen numbers: [`papilla_proto::Summary`].
@@ -34,12 +38,14 @@ impl Answer<'_> {
     /// Nothing was asked for yet.
     pub(crate) const EMPTY: Self = Self {
         flags: 0,
-        kind: None,
+        has_sed: false,
         window: Window::EMPTY,
         map: &[],
         vertices: &[],
         pressure_pa: &[],
+        rates_hz: &[],
         points: &[],
+        point_rates_hz: &[],
         actuators: &[],
         summary: &[],
         touch: &[],
@@ -72,7 +78,13 @@ impl Layout {
             let part = values.get(begin..end).unwrap_or_default();
             let list = match section.name {
                 SectionName::Summary => &mut answer.summary,
+                SectionName::Rates => {
+                    // f32 need no scale.
+                    answer.rates_hz = part.get(RATES_HEAD_LEN / 4..).unwrap_or_default();
+                    continue;
+                }
                 SectionName::Points => &mut answer.points,
+                SectionName::PointRates => &mut answer.point_rates_hz,
                 SectionName::Actuators => &mut answer.actuators,
                 SectionName::Map => &mut answer.map,
                 SectionName::Vertices => &mut answer.vertices,

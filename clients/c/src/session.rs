@@ -8,6 +8,7 @@ use papilla_proto::{
     ErrorCode, FrameKind, MAP_LEN, MapSummary, PressureRange, Problem, SampleType, Window,
     contact::{ContactMethod, Pose, ROW},
     effects::OutOfRange,
+    flags,
 };
 use papilla_render::Maps;
 use papilla_session_contact::{Finger, Frame, Hand, Skin};
@@ -45,7 +46,7 @@ pub struct Session {
 #[derive(Debug, Clone, Copy)]
 struct Last {
     flags: u8,
-    kind: Option<FrameKind>,
+    shows_sed: bool,
     window: Window,
     values: usize,
 }
@@ -105,7 +106,7 @@ impl Session {
             payload: vec![0; payload_len],
             bytes: BytesMut::with_capacity(4 * layout.len()),
             values: vec![0.0; layout.len()],
-            last: Last { flags: 0, kind: None, window: Window::EMPTY, values: 0 },
+            last: Last { flags: 0, shows_sed: false, window: Window::EMPTY, values: 0 },
             layout,
             hand,
         })
@@ -181,13 +182,23 @@ impl Session {
         self.render(finger, time_us)
     }
 
+    /// Nobody knows where things are, or what presses: the answer is zero, and what the session
+    /// remembers waits for the next frame.
+    ///
+    /// # Errors
+    /// No such finger.
+    pub fn send_not_tracked(&mut self, finger: u8, time_us: u64) -> Result<(), Problem> {
+        self.require_finger(finger)?;
+        self.render_frame(finger, time_us, false)
+    }
+
     /// The answer to the last frame that was rendered.
     #[must_use]
     pub fn answer(&self) -> Answer<'_> {
-        let Last { flags, kind, window, values } = self.last;
-        let mut answer = Answer { flags, kind, window, ..Answer::EMPTY };
+        let Last { flags, shows_sed, window, values } = self.last;
+        let mut answer = Answer { flags, has_sed: shows_sed, window, ..Answer::EMPTY };
         self.layout.give(&self.values[..values], &mut answer);
-        if self.effects.is_empty() && kind.is_some() {
+        if self.effects.is_empty() && shows_sed {
             answer.map = &self.maps.sed_j_per_m3;
         }
         answer
@@ -196,11 +207,7 @@ impl Session {
     /// Whether a frame of this kind and length is due.
     fn expect(&self, kind: FrameKind, finger: u8, samples: usize) -> Result<(), Problem> {
         let form = self.hand.form();
-        let fingers = self.hand.fingers().len();
-        if usize::from(finger) >= fingers {
-            let message = format!("finger {finger} was not announced; there are {fingers}");
-            return Err(Problem::new(ErrorCode::BadContact, message).at("finger"));
-        }
+        self.require_finger(finger)?;
         if kind != form.kind() {
             let message = format!("the hello's frames are {:?}, not {kind:?}", form.kind());
             return Err(Problem::new(ErrorCode::WrongType, message).at("kind"));
@@ -213,6 +220,15 @@ impl Session {
             return Err(Problem::new(ErrorCode::WrongLength, message).at("count"));
         }
         Ok(())
+    }
+
+    fn require_finger(&self, finger: u8) -> Result<(), Problem> {
+        let fingers = self.hand.fingers().len();
+        if usize::from(finger) < fingers {
+            return Ok(());
+        }
+        let message = format!("finger {finger} was not announced; there are {fingers}");
+        Err(Problem::new(ErrorCode::BadContact, message).at("finger"))
     }
 
     /// The row of a net force behind the samples; zeros ask for none.
@@ -230,14 +246,28 @@ impl Session {
 
     /// Reads what lies in `payload` or the pressure map, and makes the answer.
     fn render(&mut self, finger: u8, time_us: u64) -> Result<(), Problem> {
+        self.render_frame(finger, time_us, true)
+    }
+
+    fn render_frame(
+        &mut self,
+        finger: u8,
+        mut time_us: u64,
+        is_tracked: bool,
+    ) -> Result<(), Problem> {
         let place = usize::from(finger);
-        self.last.kind = None;
+        self.last.shows_sed = false;
         self.last.values = 0;
         let Self { model, hand, effects, maps, range, network, .. } = self;
         let mut finger = lock(&hand.fingers()[place]);
         let mut effects = effects.get_mut(place);
         let shows_sed = effects.as_ref().is_none_or(|effects| effects.shows_sed());
-        let (mut summary, mut found) = if finger.reads_windows() {
+        let (mut summary, mut found) = if !is_tracked {
+            maps.pressure_pa.fill(0.0);
+            finger.lose();
+            effects.iter_mut().for_each(|effects| effects.lose());
+            (MapSummary { peak_pa: 0.0 }, flags::NOT_TRACKED | flags::NO_CONTACT)
+        } else if finger.reads_windows() {
             let summary = maps.check(*range, &model.pixels)?;
             let part = finger.to_reference(&mut maps.pressure_pa);
             (MapSummary { peak_pa: summary.peak_pa * part }, 0)
@@ -247,7 +277,9 @@ impl Session {
             let taken = maps.take(&mut finger, frame, *range, shows_sed)?;
             (MapSummary { peak_pa: taken.peak_pa }, taken.flags)
         };
-        if let Some(effects) = &mut effects {
+        if let Some(effects) = effects.as_mut().filter(|_| is_tracked) {
+            time_us = effects.time_us(time_us);
+            found |= effects.clock_flags();
             let peak_pa = effects.before(&mut maps.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
@@ -268,21 +300,21 @@ impl Session {
         }
         self.bytes.clear();
         finger.write(&mut self.bytes);
-        let (mut kind, mut window) = (FrameKind::Sed, Window::WHOLE);
+        let mut window = Window::WHOLE;
         if let Some(effects) = effects {
             let written =
                 effects.write(&maps.pressure_pa, &maps.sed_j_per_m3, time_us, &mut self.bytes);
             let written = written.map_err(|error| {
                 Problem::new(ErrorCode::Internal, format!("the answer cannot be written: {error}"))
             })?;
-            (kind, window) = (written.kind, written.window);
+            window = written.window;
         }
         let numbers = self.bytes.as_chunks::<4>().0;
         for (value, number) in self.values.iter_mut().zip(numbers) {
             *value = f32::from_le_bytes(*number);
         }
         let values = numbers.len().min(self.values.len());
-        self.last = Last { flags: found, kind: shows_sed.then_some(kind), window, values };
+        self.last = Last { flags: found, shows_sed, window, values };
         Ok(())
     }
 }

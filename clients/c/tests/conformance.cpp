@@ -74,6 +74,7 @@ class Run {
     same("tier", ready["tier"], "\"" + std::string(info_.name) + "\"");
     same("atlas_hash", ready["atlas_hash"], "\"" + std::string(info_.atlas_hash) + "\"");
     same("vertices", ready["vertices"], std::to_string(info_.vertex_count));
+    same("method", ready["method"], "\"" + std::string(session_.method()) + "\"");
   }
 
   /// The answer in the C++ client's words.
@@ -83,20 +84,23 @@ class Run {
     to.problem = {papilla_status_name(status), session_.error(), session_.error_field()};
     to.finger = finger;
     if (status != PAPILLA_OK) return to;
-    to.kind = from.kind == PAPILLA_KIND_SA1_RATE ? Kind::sa1_rate : Kind::sed;
     to.out_of_range = from.flags & PAPILLA_FLAG_OUT_OF_RANGE;
     to.no_contact = from.flags & PAPILLA_FLAG_NO_CONTACT;
     to.unfamiliar = from.flags & PAPILLA_FLAG_UNFAMILIAR;
     to.unsettled = from.flags & PAPILLA_FLAG_UNSETTLED;
     to.cut_off = from.flags & PAPILLA_FLAG_CUT_OFF;
+    to.not_tracked = from.flags & PAPILLA_FLAG_NOT_TRACKED;
+    to.coarse_clock = from.flags & PAPILLA_FLAG_COARSE_CLOCK;
     to.tier = info_.name;
     const auto px = [](std::uint32_t value) { return static_cast<std::uint16_t>(value); };
     to.window = {px(from.column), px(from.row), px(from.width), px(from.height)};
     to.values = list(from.map);
     // A window of no pixel is a map as well: all of it is zero.
-    to.has_map = from.kind != 0 && (from.map.count > 0 || from.points.count + from.actuators.count == 0);
+    to.has_map = from.has_sed != 0 && (from.map.count > 0 || from.points.count + from.actuators.count == 0);
     to.pressure_pa = list(from.pressure_pa);
+    to.rates_hz = list(from.rates_hz);
     to.points = list(from.points);
+    to.point_rates_hz = list(from.point_rates_hz);
     to.actuators = list(from.actuators);
     to.has_summary = from.summary != nullptr;
     if (from.summary) std::memcpy(to.summary.data(), from.summary, sizeof to.summary);
@@ -132,6 +136,10 @@ class Run {
     PapillaNetForce room{};
     PapillaAnswer answer{};
     const auto finger = std::uint8_t(step["finger"].whole());
+    if (step["poses"].is_null()) {
+      const PapillaStatus lost = session_.send_not_tracked(answer, now_us(), finger);
+      return check_touch(step["expect"], answer_of(lost, answer, finger), finger);
+    }
     const PapillaStatus status =
         session_.send_poses(poses.data(), poses.size(), answer, now_us(), finger, net_of(step, room));
     check_touch(step["expect"], answer_of(status, answer, finger), finger);

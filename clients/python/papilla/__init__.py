@@ -14,7 +14,7 @@ from . import frames
 from .aio import AsyncSession
 from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
-from .errors import BadAddress, Closed, NotRendered, PapillaError, Refused, Unreachable
+from .errors import BadAddress, BadFrame, Closed, NotCarried, NotRendered, PapillaError, Refused, Unreachable
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
 from .spikes import Spikes, SpikeTrains
 from .sync import Session
@@ -27,9 +27,11 @@ __all__ = [
     "AsyncSession",
     "Atlas",
     "BadAddress",
+    "BadFrame",
     "Closed",
     "Contact",
     "Indentation",
+    "NotCarried",
     "NotRendered",
     "PapillaError",
     "Problem",

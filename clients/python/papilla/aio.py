@@ -192,8 +192,24 @@ class AsyncSession:
         self.hand_over(frame)
         return frame.outcome
 
-    async def touch(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Answer:
-        """`send_poses`, and waits for the outcome; `.touch` holds the force."""
+    def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
+        """Hands over that tracking of the finger is lost, and returns at once.
+
+        Better than an old pose, or one of zeros: the answer is zero, no unit fires, and nothing bursts
+        when tracking comes back. What the service remembers of the finger waits for the next frame.
+        """
+        frame = self.encode_not_tracked(finger)
+        self.hand_over(frame)
+        return frame.outcome
+
+    async def not_tracked(self, *, finger: int = 0) -> Answer:
+        """`send_not_tracked`, and waits for the outcome."""
+        return await asyncio.wrap_future(self.send_not_tracked(finger=finger))
+
+    async def touch(self, poses: ArrayLike | None, *, finger: int = 0, net: NetForce | None = None) -> Answer:
+        """`send_poses`, and waits for the outcome; `.touch` holds the force. None: tracking is lost."""
+        if poses is None:
+            return await self.not_tracked(finger=finger)
         return await asyncio.wrap_future(self.send_poses(poses, finger=finger, net=net))
 
     def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
@@ -211,6 +227,13 @@ class AsyncSession:
         time_us = time.monotonic_ns() // 1000
         row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
         message = wire.encode_rows(kind, rows, row, finger, self._sequence, time_us)
+        return Frame(self._sequence, time_us, message, finger)
+
+    def encode_not_tracked(self, finger: int) -> Frame:
+        self._check_open()
+        self._sequence = (self._sequence + 1) % 2**32
+        time_us = time.monotonic_ns() // 1000
+        message = wire.encode_not_tracked(finger, self._sequence, time_us, self.ready["version"])
         return Frame(self._sequence, time_us, message, finger)
 
     def _check_open(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import spikes, wire
-from .errors import NotRendered
+from .errors import NotCarried, NotRendered
 from .wire import Map, Window
 
 
@@ -78,8 +78,6 @@ class Answer:
     """Superseded here: the frame never left the client."""
     problem: Problem | None = None
     """With status `error`."""
-    kind: str = "sed"
-    """`sed` (J/m3) or, with the effect `afferents`, `sa1_rate` (Hz)."""
     out_of_range: bool = False
     """A pressure is above what the tier was trained on; the map is an extrapolation."""
     no_contact: bool = False
@@ -90,6 +88,10 @@ class Answer:
     """The map is rougher or heavier than any the tier was trained on: it may mean nothing."""
     unsettled: bool = False
     """The contact solve did not settle: the answer is rough."""
+    not_tracked: bool = False
+    """To a frame that said that nobody knows where things are: all is zero."""
+    coarse_clock: bool = False
+    """The client's clock ticks so coarsely, or stands, that rates and spikes may be far off."""
     finger: int = 0
     tier: str = ""
     window: Window = wire.WHOLE
@@ -99,7 +101,7 @@ class Answer:
     queue_us: int = 0
     infer_us: int = 0
     values: Map | None = None
-    """The samples of the window, (height, width)."""
+    """SED of the window, J/m3: (height, width)."""
     touch: Touch | None = None
     """Of objects and gaps."""
     pressure_pa: Map | None = None
@@ -107,9 +109,14 @@ class Answer:
     shear_pa: Map | None = None
     """The traction along the skin, if asked for: x y z a vertex, in the finger's frame."""
     vertices: Map | None = None
-    """What the map shows at the vertices, if asked for in its place."""
+    """SED at the vertices, J/m3, if asked for in place of the map."""
+    rates: Map | None = None
+    """With the effect `afferents`: firing rates, Hz, a whole map or at the vertices; `rates_hz` raises without."""
     summary: Summary | None = None
     points: Map | None = None
+    """SED at the points of the hello, J/m3."""
+    point_rates_hz: Map | None = None
+    """Firing rates there, Hz: with the effects `points` and `afferents`."""
     actuators: Map | None = None
     spikes: spikes.Spikes | None = None
     """The effect `spikes`."""
@@ -132,8 +139,23 @@ class Answer:
 
     @property
     def sed(self) -> Map:
-        """`map`, J/m3."""
-        return self.map
+        """Strain energy density, J/m3: `map`, or the values at the vertices.
+
+        Raises NotRendered if the answer carries none.
+        """
+        return self.map if self.vertices is None else self.vertices
+
+    @property
+    def rates_hz(self) -> Map:
+        """Firing rates of SA1 afferents, Hz: a whole map, or the values at the vertices.
+
+        Raises NotCarried if the session has none, NotRendered if the frame was not rendered.
+        """
+        if self.rates is None:
+            if self.status != "ok":
+                raise NotRendered(self.status, self.problem.message if self.problem else "it carries no rates")
+            raise NotCarried("rates_hz", "name the effect 'afferents' in the hello, and leave 'map' true")
+        return self.rates
 
 
 def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) -> Answer:
@@ -142,12 +164,13 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         header.sequence,
         header.status,
         header.client_time_us,
-        kind=header.kind,
         out_of_range="out_of_range" in header.flags,
         no_contact="no_contact" in header.flags,
         cut_off="cut_off" in header.flags,
         unfamiliar="unfamiliar" in header.flags,
         unsettled="unsettled" in header.flags,
+        not_tracked="not_tracked" in header.flags,
+        coarse_clock="coarse_clock" in header.flags,
         finger=header.finger,
         tier=tier,
         window=header.window,
@@ -168,9 +191,13 @@ def read(message: bytes, header: wire.Header, ready: dict[str, Any], tier: str) 
         elif name == "shear":
             answer.shear_pa = wire.floats(message, offset, size).reshape(-1, 3)
         elif name == "vertices":
-            answer.vertices = wire.scaled(message, offset, ready["vertices"], header)
+            answer.vertices = wire.scaled(message, offset, ready["vertices"], header.sample_type, header.scale)
         elif name == "summary":
             answer.summary = Summary(*struct.unpack_from("<16f", message, offset))
+        elif name == "rates":
+            answer.rates = wire.rates(message, offset, size, header)
+        elif name == "point_rates":
+            answer.point_rates_hz = wire.floats(message, offset, size)
         elif name == "points":
             answer.points = wire.floats(message, offset, size)
         elif name == "actuators":

@@ -21,7 +21,7 @@ from . import frames
 from .address import Address, clean_token
 from .answer import Answer
 from .atlas import Atlas, Contact
-from .errors import BadAddress, Refused
+from .errors import BadAddress, NotCarried, Refused
 from .http import get_json, post
 from .sync import Session
 from .wire import SIDE_PX, Map
@@ -79,6 +79,9 @@ def check_problem(expect: Step, code: str, field: str | None) -> None:
         must(field == expect["field"], f"the field is {field}, {expect['field']} is due")
 
 
+_FLAGS = ("out_of_range", "no_contact", "unfamiliar", "cut_off", "not_tracked", "coarse_clock")
+
+
 def check_answer(expect: Step, answer: Answer) -> None:
     status = expect.get("status", "ok")
     said = f" ({answer.problem.message})" if answer.problem else ""
@@ -87,11 +90,10 @@ def check_answer(expect: Step, answer: Answer) -> None:
         check_problem(expect, answer.problem.code, answer.problem.field)
     if status != "ok":
         return
-    for name in ("kind", "tier"):
-        if name in expect:
-            must(getattr(answer, name) == expect[name], f"{name} is {getattr(answer, name)}")
+    if "tier" in expect:
+        must(answer.tier == expect["tier"], f"the tier is {answer.tier}")
     if "flags" in expect:
-        flags = {name for name in ("out_of_range", "no_contact", "unfamiliar", "cut_off") if getattr(answer, name)}
+        flags = {name for name in _FLAGS if getattr(answer, name)}
         must(set(expect["flags"]) == flags, f"flags are {flags}")
     must(answer.queue_us + answer.infer_us <= answer.total_us, "parts take longer than the whole")
     if expect.get("map") is False:
@@ -103,6 +105,15 @@ def check_answer(expect: Step, answer: Answer) -> None:
     for name in ("summary", "points", "actuators"):
         if name in expect:
             check_list(name, getattr(answer, name), expect[name])
+    if "point_rates" in expect:
+        check_list("point_rates", answer.point_rates_hz, expect["point_rates"])
+    if "rates" in expect:
+        check_map(expect["rates"], answer.rates_hz)
+    else:
+        try:
+            must(answer.rates_hz is None, "the answer carries rates")
+        except NotCarried as error:
+            must(error.member == "rates_hz", f"{error}")
 
 
 def check_touch(step: Step, answer: Answer) -> None:
@@ -119,7 +130,8 @@ def check_touch(step: Step, answer: Answer) -> None:
     if "pressure_sum" in expect:
         assert answer.pressure_pa is not None
         near("pressure", float(answer.pressure_pa.sum(dtype=np.float64)), expect["pressure_sum"])
-    must(answer.no_contact == ("no_contact" in expect["flags"]), "flags")
+    for name in ("no_contact", "not_tracked"):
+        must(getattr(answer, name) == (name in expect["flags"]), name)
     must(not answer.out_of_range and not answer.unsettled, f"{answer}")
 
 
@@ -250,6 +262,9 @@ class Run:
         self.note = f"({good} ok, {here} superseded here, {superseded - here} by the service)"
 
     def touch(self, step: Step) -> None:
+        if step["poses"] is None:
+            answer = self.open_session().touch(None, finger=step.get("finger", 0), timeout_s=self.timeout_s)
+            return check_touch(step, answer)
         poses = np.array(step["poses"], np.float32)
         if "engines" not in step:
             return check_touch(step, self.open_session().send_poses(poses, **self.of_hand(step)).result(self.timeout_s))

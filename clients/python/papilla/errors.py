@@ -39,3 +39,19 @@ class NotRendered(PapillaError):
     def __init__(self, status: str, reason: str) -> None:
         super().__init__(f"the frame is {status}: {reason}")
         self.status = status
+
+
+class NotCarried(PapillaError):
+    """An answer was asked for what its session does not carry; `member` is what, the message how to get it."""
+
+    def __init__(self, member: str, advice: str) -> None:
+        super().__init__(f"the answer carries no {member}: {advice}")
+        self.member = member
+
+
+class BadFrame(PapillaError, ValueError):
+    """A number of a frame is none that a frame can hold; `member` is which."""
+
+    def __init__(self, member: str, value: object, most: int) -> None:
+        super().__init__(f"{member} is {value!r}; a frame holds a whole number from 0 to {most}")
+        self.member = member

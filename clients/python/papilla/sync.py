@@ -131,10 +131,23 @@ class Session:
         """Hands over where objects are and returns at once; see `AsyncSession.send_poses`."""
         return self._hand_over("objects", poses, finger, net)
 
+    def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
+        """Hands over that tracking is lost and returns at once; see `AsyncSession.send_not_tracked`."""
+        with self._lock:
+            frame = self._session.encode_not_tracked(finger)
+            self._loop.call_soon_threadsafe(self._session.hand_over, frame)
+        return frame.outcome
+
+    def not_tracked(self, *, finger: int = 0, timeout_s: float | None = None) -> Answer:
+        """`send_not_tracked`, and waits for the outcome."""
+        return self.send_not_tracked(finger=finger).result(timeout_s)
+
     def touch(
-        self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
+        self, poses: ArrayLike | None, *, finger: int = 0, net: NetForce | None = None, timeout_s: float | None = None
     ) -> Answer:
-        """`send_poses`, and waits for the outcome; `.touch` holds the force."""
+        """`send_poses`, and waits for the outcome; `.touch` holds the force. None: tracking is lost."""
+        if poses is None:
+            return self.not_tracked(finger=finger, timeout_s=timeout_s)
         return self.send_poses(poses, finger=finger, net=net).result(timeout_s)
 
     def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:

@@ -8,6 +8,8 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import BadFrame
+
 SIDE_PX: Final = 224
 """Pixels along one side of every map."""
 
@@ -28,13 +30,17 @@ _NAMES: Final = {number: name for name, (number, _, _) in _SAMPLES.items()}
 SEALED: Final = b"PPS"
 """What a sealed state begins with, as opposed to a frame."""
 STATUSES: Final = ("ok", "superseded", "late", "error", "stale")
-KINDS: Final = {2: "sed", 3: "sa1_rate"}
+_SED: Final = 2
+"""Kind of an answer."""
+RATES_HEAD: Final = 16
+"""Bytes before the samples of the section `rates`: their scale, and zeros."""
+NOT_TRACKED: Final = 32
+"""Flag of a frame whose client does not know where things are."""
 
 
 class Header(NamedTuple):
     """The header of an answer."""
 
-    kind: str
     sample_type: str
     status: str
     sequence: int
@@ -47,6 +53,37 @@ class Header(NamedTuple):
     tier: int
     flags: frozenset[str]
     finger: int
+
+
+def _head(
+    version: int,
+    kind: int,
+    number: int,
+    sequence: int,
+    window: Window,
+    client_time_us: int,
+    deadline_us: int,
+    scale: float,
+    flags: int = 0,
+    finger: int = 0,
+) -> bytes:
+    """The header of a frame.
+
+    Raises BadFrame for a number that has no room in it.
+    """
+    column, row, width, height = window
+    side = 2**16 - 1
+    for member, value, most in [
+        ("finger", finger, 255), ("deadline_us", deadline_us, 2**32 - 1),
+        ("client_time_us", client_time_us, 2**64 - 1), ("the window's column", column, side),
+        ("the window's row", row, side), ("the window's width", width, side), ("the window's height", height, side),
+    ]:  # fmt: skip
+        if not isinstance(value, (int, np.integer)) or not 0 <= value <= most:
+            raise BadFrame(member, value, most)
+    return HEADER.pack(
+        b"PPL1", version, kind, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
+        column, row, 0, 0, 0, flags, finger,
+    )  # fmt: skip
 
 
 def encode(
@@ -71,12 +108,7 @@ def encode(
         samples = np.clip(pressure_pa, -65504.0, 65504.0).astype(dtype).tobytes()
     else:
         samples = pressure_pa.astype(dtype, copy=False).tobytes()
-    column, row, width, height = window
-    head = HEADER.pack(
-        b"PPL1", version, 1, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
-        column, row, 0, 0, 0, 0, 0,
-    )  # fmt: skip
-    return head + samples
+    return _head(version, 1, number, sequence, window, client_time_us, deadline_us, scale) + samples
 
 
 def encode_rows(
@@ -96,16 +128,21 @@ def encode_rows(
     if net is not None:
         samples += net.astype("<f4").tobytes()
         height += kind == "objects"
-    head = HEADER.pack(
-        b"PPL1", 3, INPUTS[kind], 0, 0, sequence, width, height, client_time_us, 0, 1.0,
-        0, 0, 0, 0, 0, 0, finger,
-    )  # fmt: skip
-    return head + samples
+    window = (0, 0, width, height)
+    return _head(3, INPUTS[kind], 0, sequence, window, client_time_us, 0, 1.0, finger=finger) + samples
+
+
+def encode_not_tracked(finger: int, sequence: int, client_time_us: int, version: int) -> bytes:
+    """The message of a frame that says that nobody knows where things are: a header alone."""
+    return _head(version, 1, 0, sequence, (0, 0, 0, 0), client_time_us, 0, 1.0, NOT_TRACKED, finger)
 
 
 INPUTS: Final = {"objects": 4, "gaps": 5}
 """Kinds of frames of version 3."""
-FLAGS = {1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "unsettled", 16: "cut_off"}
+FLAGS = {
+    1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "unsettled", 16: "cut_off",
+    NOT_TRACKED: "not_tracked", 64: "coarse_clock",
+}  # fmt: skip
 """Bits of an answer's flags."""
 
 
@@ -118,13 +155,13 @@ def decode(message: bytes) -> Header:
         raise ValueError(f"an answer of {len(message)} bytes; a header has {HEADER.size}")
     (magic, version, kind, number, status, sequence, width, height, client_time_us, total_us,
      scale, column, row, queue_us, infer_us, tier, flags, finger) = HEADER.unpack_from(message)  # fmt: skip
-    if magic != b"PPL1" or version not in (2, 3) or kind not in KINDS or number not in _NAMES:
+    if magic != b"PPL1" or version not in (2, 3) or kind != _SED or number not in _NAMES:
         raise ValueError("not an answer of version 2 or 3 of the protocol")
     if status >= len(STATUSES):
         raise ValueError(f"an answer with status {status}")
     names = {name for bit, name in FLAGS.items() if flags & bit}
     return Header(
-        KINDS[kind], _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
+        _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
         client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names),
         finger if version == 3 else 0,
     )  # fmt: skip
@@ -136,15 +173,23 @@ def floats(message: bytes, offset: int, size: int) -> Map:
 
 
 def samples(message: bytes, offset: int, header: Header) -> Map:
-    """The samples of the window, in J/m3 or Hz: (height, width)."""
+    """The samples of the window, J/m3: (height, width)."""
     _, _, width, height = header.window
-    return scaled(message, offset, width * height, header).reshape(height, width)
+    return scaled(message, offset, width * height, header.sample_type, header.scale).reshape(height, width)
 
 
-def scaled(message: bytes, offset: int, count: int, header: Header) -> Map:
-    """`count` samples at `offset`, in J/m3 or Hz."""
-    _, dtype, unit_max = _SAMPLES[header.sample_type]
+def rates(message: bytes, offset: int, size: int, header: Header) -> Map:
+    """The section `rates`, Hz: a whole map, or a value a vertex."""
+    (scale,) = struct.unpack_from("<f", message, offset)
+    count = (size - RATES_HEAD) // np.dtype(_SAMPLES[header.sample_type][1]).itemsize
+    values = scaled(message, offset + RATES_HEAD, count, header.sample_type, scale)
+    return values.reshape(SIDE_PX, SIDE_PX) if count == SIDE_PX * SIDE_PX else values
+
+
+def scaled(message: bytes, offset: int, count: int, sample_type: str, scale: float) -> Map:
+    """`count` samples at `offset`, of which u16 and u8 carry units of `scale`."""
+    _, dtype, unit_max = _SAMPLES[sample_type]
     values = np.frombuffer(message, dtype, count, offset).astype(np.float32)
     if unit_max:
-        values *= np.float32(header.scale)
+        values *= np.float32(scale)
     return values

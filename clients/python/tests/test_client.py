@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import papilla
+from papilla import answer as answers
+from papilla import wire
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -165,3 +167,43 @@ def test_figure_4_is_drawn(url, tmp_path, monkeypatch):
     assert (tmp_path / "figure4.png").stat().st_size > 20_000
     assert len(names["indentations"]) == 3
     assert os.environ["PAPILLA_URL"] == url
+
+
+def test_numbers_that_no_frame_can_hold_are_named():
+    """They ended in `struct.error`, or in another finger's."""
+    pose = np.zeros((1, 7), np.float32)
+    for finger in (256, -1, 1.5, None):
+        for encode in (
+            lambda: wire.encode_rows("objects", pose, None, finger, 1, 1),  # noqa: B023
+            lambda: wire.encode_not_tracked(finger, 1, 1, 3),  # noqa: B023
+        ):
+            with pytest.raises(papilla.BadFrame, match="finger") as refused:
+                encode()
+            assert refused.value.member == "finger"
+    whole = np.zeros((224, 224), np.float32)
+    with pytest.raises(papilla.BadFrame, match="deadline_us"):
+        wire.encode(whole, wire.WHOLE, "f32", 1, 0, 2**32)
+    with pytest.raises(papilla.BadFrame, match="client_time_us"):
+        wire.encode(whole, wire.WHOLE, "f32", 1, -1, 0)
+
+
+def test_sed_is_sed_and_rates_are_rates():
+    """Units of u16: each has a scale of its own; what is not there is a named error."""
+    head = wire.HEADER.pack(b"PPL1", 2, 2, 2, 0, 7, 2, 1, 5, 9, 2.0, 3, 4, 0, 0, 0, 96, 0)
+    rates = np.full(224 * 224, 30, "<u2")
+    body = np.array([1.5], "<f4").tobytes() + bytes(12) + np.array([0.5], "<f4").tobytes() + bytes(12)
+    message = head + body + rates.tobytes() + np.array([100, 200], "<u2").tobytes()
+    sections = [
+        {"name": "point_rates", "offset": 48, "bytes": 4},
+        {"name": "rates", "offset": 64, "bytes": 16 + 2 * 224 * 224},
+        {"name": "map", "offset": 80 + 2 * 224 * 224, "bytes": 2 * 224 * 224},
+    ]
+    header = wire.decode(message)
+    answer = answers.read(message, header, {"sections": sections}, "nano")
+    assert answer.sed[4, 3] == 200 and answer.sed[4, 4] == 400 and answer.sed.sum() == 600
+    assert answer.rates_hz.shape == (224, 224) and (answer.rates_hz == 15).all()
+    assert answer.point_rates_hz.tolist() == [1.5] and answer.not_tracked and answer.coarse_clock
+    sections.pop(1)
+    plain = answers.read(message, header, {"sections": sections}, "nano")
+    with pytest.raises(papilla.NotCarried, match="afferents"):
+        _ = plain.rates_hz

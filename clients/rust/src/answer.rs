@@ -1,8 +1,11 @@
 //! What becomes of a frame.
 
 use papilla_proto::{
-    Extension, FrameHeader, FrameKind, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary,
-    Window, contact::Touch, effects::SectionName, flags, spikes::Fired,
+    Extension, FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,
+    contact::Touch,
+    effects::{RATES_HEAD_LEN, SectionName},
+    flags,
+    spikes::Fired,
 };
 
 use crate::PapillaError;
@@ -36,8 +39,6 @@ pub struct Answer {
     pub status: Status,
     /// The frame's time by the client's clock, us.
     pub client_time_us: u64,
-    /// SED (J/m3), or with the effect `afferents` firing rates (Hz).
-    pub kind: FrameKind,
     /// A pressure is above what the tier was trained on: the map is of less, or an extrapolation.
     pub out_of_range: bool,
     /// The map is zero; no network was asked.
@@ -48,6 +49,10 @@ pub struct Answer {
     pub cut_off: bool,
     /// The contact solve did not settle: the answer is rough.
     pub unsettled: bool,
+    /// To [`Session::send_not_tracked`](crate::Session::send_not_tracked): all is zero.
+    pub not_tracked: bool,
+    /// The client's clock ticks so coarsely, or stands, that rates and spikes may be far off.
+    pub coarse_clock: bool,
     /// Number of the finger.
     pub finger: u8,
     /// Name of the tier that rendered.
@@ -60,7 +65,7 @@ pub struct Answer {
     pub infer_us: u32,
     /// The pixels of `map` that the answer carried; all others are 0.
     pub window: Window,
-    /// The whole map, 224 x 224, row-major; empty if the session asked for none.
+    /// SED, J/m3: the whole map, 224 x 224, row-major; empty if the session asked for none.
     pub map: Vec<f32>,
     /// What pushes back, of objects and gaps.
     pub touch: Option<Touch>,
@@ -68,12 +73,17 @@ pub struct Answer {
     pub pressure_pa: Vec<f32>,
     /// Traction along the skin at each vertex, Pa, in the finger's frame, if asked for.
     pub shear_pa: Vec<[f32; 3]>,
-    /// What the map shows at the vertices, if asked for in its place.
+    /// SED at the vertices, J/m3, if asked for in place of the map.
     pub vertices: Vec<f32>,
+    /// Firing rates of SA1 afferents, Hz, a whole map or at the vertices: the effect `afferents`;
+    /// [`rates_hz`](Self::rates_hz) says why there are none.
+    pub rates: Vec<f32>,
     /// The effect `summary`.
     pub summary: Option<Summary>,
-    /// The effect `points`.
+    /// The effect `points`: SED there, J/m3.
     pub points: Vec<f32>,
+    /// Firing rates there, Hz: with the effect `afferents` too.
+    pub point_rates_hz: Vec<f32>,
     /// The effect `actuators`.
     pub actuators: Vec<f32>,
     /// The effect `spikes`.
@@ -93,17 +103,49 @@ impl Answer {
         self.map.iter().copied().fold(0.0, f32::max)
     }
 
+    /// SED, J/m3: the whole map, or the values at the vertices if the session asked for those.
+    ///
+    /// # Errors
+    /// [`PapillaError::NotCarried`] where the session asked for neither, or the frame was not rendered.
+    pub fn sed(&self) -> Result<&[f32], PapillaError> {
+        let found = if self.map.is_empty() { &self.vertices } else { &self.map };
+        self.carried("sed", found, "leave 'map' true in the hello")
+    }
+
+    /// Firing rates of SA1 afferents, Hz, where [`sed`](Self::sed) is.
+    ///
+    /// # Errors
+    /// [`PapillaError::NotCarried`] where the session has no such map, or the frame was not rendered.
+    pub fn rates_hz(&self) -> Result<&[f32], PapillaError> {
+        let advice = "name the effect 'afferents' in the hello, and leave 'map' true";
+        self.carried("rates_hz", &self.rates, advice)
+    }
+
+    fn carried<'a>(
+        &self,
+        member: &'static str,
+        found: &'a [f32],
+        advice: &'static str,
+    ) -> Result<&'a [f32], PapillaError> {
+        if !found.is_empty() {
+            return Ok(found);
+        }
+        let advice = if self.is_ok() { advice } else { "the frame was not rendered" };
+        Err(PapillaError::NotCarried { member, advice })
+    }
+
     pub(crate) fn without_map(sequence: u32, client_time_us: u64, status: Status) -> Self {
         Self {
             sequence,
             status,
             client_time_us,
-            kind: FrameKind::Sed,
             out_of_range: false,
             no_contact: false,
             unfamiliar: false,
             cut_off: false,
             unsettled: false,
+            not_tracked: false,
+            coarse_clock: false,
             finger: 0,
             tier: String::new(),
             total_us: 0,
@@ -115,8 +157,10 @@ impl Answer {
             pressure_pa: Vec::new(),
             shear_pa: Vec::new(),
             vertices: Vec::new(),
+            rates: Vec::new(),
             summary: None,
             points: Vec::new(),
+            point_rates_hz: Vec::new(),
             actuators: Vec::new(),
             fired: None,
         }
@@ -141,12 +185,13 @@ impl Answer {
             }
         };
         let mut answer = Self {
-            kind: header.kind,
             out_of_range: bits & flags::OUT_OF_RANGE != 0,
             no_contact: bits & flags::NO_CONTACT != 0,
             unfamiliar: bits & flags::UNFAMILIAR != 0,
             cut_off: bits & flags::CUT_OFF != 0,
             unsettled: bits & flags::UNSETTLED != 0,
+            not_tracked: bits & flags::NOT_TRACKED != 0,
+            coarse_clock: bits & flags::COARSE_CLOCK != 0,
             finger: finger.unwrap_or_default(),
             tier,
             total_us: header.time_us,
@@ -190,7 +235,17 @@ impl Answer {
                         .map_err(|error| PapillaError::Protocol(error.to_string()))?;
                 }
                 SectionName::Summary => self.summary = Summary::decode(part),
+                SectionName::Rates => {
+                    let (head, part) = part.split_at_checked(RATES_HEAD_LEN).ok_or_else(short)?;
+                    let scale = head.first_chunk().map_or(1.0, |b| f32::from_le_bytes(*b));
+                    self.rates = vec![0.0; part.len() / header.sample_type.bytes()];
+                    header
+                        .sample_type
+                        .decode(part, scale, &mut self.rates)
+                        .map_err(|error| PapillaError::Protocol(error.to_string()))?;
+                }
                 SectionName::Points => self.points = floats(part)?,
+                SectionName::PointRates => self.point_rates_hz = floats(part)?,
                 SectionName::Actuators => self.actuators = floats(part)?,
                 SectionName::Spikes => {
                     let fired = Fired::decode(part, header.client_time_us);

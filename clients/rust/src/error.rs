@@ -46,6 +46,14 @@ pub enum PapillaError {
     /// The session was closed by this program.
     #[error("the session is closed")]
     Closed,
+    /// An answer was asked for what its session does not carry.
+    #[error("the answer carries no {member}: {advice}")]
+    NotCarried {
+        /// What.
+        member: &'static str,
+        /// How to get it.
+        advice: &'static str,
+    },
 }
 
 impl PapillaError {

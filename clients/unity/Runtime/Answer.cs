@@ -2,6 +2,12 @@ using System;
 
 namespace Papilla
 {
+    /// <summary>An answer was asked for what its session does not carry.</summary>
+    public sealed class NotCarriedException : InvalidOperationException
+    {
+        internal NotCarriedException(string what, string why) : base("the answer carries no " + what + ": " + why) { }
+    }
+
     /// <summary>
     /// What became of a frame. Its memory is made once and used again: copy what has to stay. <see cref="Map"/> and the
     /// other sections are those of a frame whose <see cref="Status"/> is Ok.
@@ -12,11 +18,14 @@ namespace Papilla
         public uint Sequence;
         /// <summary>What was wrong with a frame of status Error.</summary>
         public Problem Problem;
-        /// <summary>224 x 224, row-major: SED in J/m3, or firing rates in Hz where <see cref="IsRate"/>; 0 outside the window.</summary>
+        /// <summary>SED, J/m3: 224 x 224, row-major; 0 outside the window.</summary>
         public readonly float[] Map = new float[Wire.MapLength];
-        public bool IsRate;
         /// <summary>Whether the answer carries a map; <see cref="Map"/> is 0 without.</summary>
         public bool HasMap;
+        /// <summary>Firing rates, Hz: a whole map or a value a vertex; null without the effect <c>afferents</c>.</summary>
+        public float[] Rates;
+        /// <summary>Firing rates at the points, Hz, of the effects <c>points</c> and <c>afferents</c>: the first PointCount; null without.</summary>
+        public float[] PointRatesHz;
         /// <summary>The window of the map that came.</summary>
         public int Column, Row, Width, Height;
         /// <summary>The sixteen numbers of the effect <c>summary</c>; force (N) and contact area (mm2) come first.</summary>
@@ -26,6 +35,10 @@ namespace Papilla
         public readonly float[] Actuators = new float[1024];
         public int PointCount, ActuatorCount;
         public bool HasSummary, OutOfRange, NoContact;
+        /// <summary>The frame told that nobody knows where things are (<see cref="Session.SendNotTracked"/>): all is zero.</summary>
+        public bool NotTracked;
+        /// <summary>The client's clock ticks so coarsely that rates and spikes may be far off.</summary>
+        public bool CoarseClock;
         /// <summary>What pushes back: of poses and of gaps.</summary>
         public Touch Touch;
         public bool HasTouch;
@@ -46,6 +59,27 @@ namespace Papilla
         public uint TotalUs, QueueUs, InferUs;
         public int TierNumber;
 
+        /// <summary>SED, J/m3: the map, or the values at the vertices. <see cref="NotCarriedException"/> where the answer has neither.</summary>
+        public float[] Sed
+        {
+            get
+            {
+                if (Status == Status.Ok && HasMap) return Map;
+                if (Status == Status.Ok && Vertices != null) return Vertices;
+                throw new NotCarriedException("SED", Status == Status.Ok ? "the hello asks for no map" : "the frame is " + Status);
+            }
+        }
+
+        /// <summary>Firing rates, Hz, where SED is. <see cref="NotCarriedException"/> where the answer has none.</summary>
+        public float[] RatesHz
+        {
+            get
+            {
+                if (Status == Status.Ok && Rates != null) return Rates;
+                throw new NotCarriedException("rates", Status == Status.Ok ? "name the effect 'afferents' in the hello" : "the frame is " + Status);
+            }
+        }
+
         /// <summary>Reads a message; a fault is a FormatException that says what is wrong.</summary>
         internal unsafe void Read(byte[] message, int bytes, Ready terms)
         {
@@ -54,7 +88,7 @@ namespace Papilla
                 Status = (Status)m[7];
                 Sequence = *(uint*)(m + 8);
                 Problem = null;
-                IsRate = m[5] == 3;
+                if (m[5] != 2) throw new FormatException("an answer is of kind " + m[5]);
                 ClientTimeUs = *(ulong*)(m + 16);
                 TotalUs = *(uint*)(m + 24);
                 QueueUs = *(uint*)(m + 36);
@@ -67,11 +101,16 @@ namespace Papilla
                 CutOff = (m[46] & Wire.FlagCutOff) != 0;
                 Unsettled = (m[46] & Wire.FlagUnsettled) != 0;
                 HasMap = false;
+                NotTracked = (m[46] & Wire.FlagNotTracked) != 0;
+                CoarseClock = (m[46] & Wire.FlagCoarseClock) != 0;
                 if (Status != Status.Ok) return;
                 Clear();
                 ReadContact(m, bytes, terms);
                 HasSummary = Copy(m, terms.SummaryAt, 16, bytes, Summary);
                 PointCount = Copy(m, terms.PointsAt, terms.PointsCount, bytes, Points) ? terms.PointsCount : 0;
+                PointRatesHz = Sized(PointRatesHz, terms.PointRatesCount);
+                Copy(m, terms.PointRatesAt, terms.PointRatesCount, bytes, PointRatesHz);
+                ReadRates(m, bytes, terms);
                 ActuatorCount = Copy(m, terms.ActuatorsAt, terms.ActuatorsCount, bytes, Actuators) ? terms.ActuatorsCount : 0;
                 HasMap = terms.MapAt >= 0;
                 if (HasMap) ReadMap(m, bytes, terms.MapAt);
@@ -101,6 +140,17 @@ namespace Papilla
             Vertices = Sized(Vertices, type > SampleType.U8 ? 0 : terms.VerticesBytes / Wire.Bytes(type));
             if (Vertices == null) return;
             fixed (float* to = Vertices) Wire.Decode(m + terms.VerticesAt, Vertices.Length, type, *(float*)(m + 28), to);
+        }
+
+        unsafe void ReadRates(byte* m, int bytes, Ready terms)
+        {
+            var type = (SampleType)m[6];
+            int room = terms.RatesBytes - Wire.RatesHeadBytes;
+            Rates = Sized(Rates, type > SampleType.U8 || room < 0 ? 0 : room / Wire.Bytes(type));
+            if (Rates == null) return;
+            if (terms.RatesAt + terms.RatesBytes > bytes) throw Short(bytes);
+            byte* from = m + terms.RatesAt;
+            fixed (float* to = Rates) Wire.Decode(from + Wire.RatesHeadBytes, Rates.Length, type, *(float*)from, to);
         }
 
         /// <summary>Memory for so many values, the same where it fits; null for none.</summary>

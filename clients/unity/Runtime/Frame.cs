@@ -35,6 +35,18 @@ namespace Papilla
             }
         }
 
+        /// <summary>That nobody knows where things are: a header alone, whose kind and sample type mean nothing.</summary>
+        internal unsafe void EncodeNotTracked(int finger)
+        {
+            Bytes = Wire.HeaderBytes;
+            fixed (byte* start = Buffer)
+            {
+                byte* m = start + Headroom.Bytes;
+                PutHeader(m, KindPressure, SampleType.F32, 0, 0, 1, finger);
+                m[46] = Wire.FlagNotTracked;
+            }
+        }
+
         internal unsafe void EncodePoses(Pose[] poses, int finger, NetForce? net)
         {
             int rows = poses.Length + (net == null ? 0 : 1);

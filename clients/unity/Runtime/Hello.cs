@@ -81,8 +81,8 @@ namespace Papilla
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;
         internal readonly byte Version;
-        internal readonly int TouchAt = -1, PressureAt = -1, PressureCount, VerticesAt = -1, VerticesBytes;
-        internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
+        internal readonly int TouchAt = -1, PressureAt = -1, PressureCount, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
+        internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, PointRatesAt = -1, PointRatesCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
 
         internal Ready(JObject json)
         {
@@ -103,6 +103,8 @@ namespace Papilla
                     case "pressure": PressureAt = at; PressureCount = bytes / 4; break;
                     case "vertices": VerticesAt = at; VerticesBytes = bytes; break;
                     case "summary": SummaryAt = at; break;
+                    case "rates": RatesAt = at; RatesBytes = bytes; break;
+                    case "point_rates": PointRatesAt = at; PointRatesCount = bytes / 4; break;
                     case "points": PointsAt = at; PointsCount = bytes / 4; break;
                     case "actuators": ActuatorsAt = at; ActuatorsCount = bytes / 4; break;
                     case "map": MapAt = at; break;

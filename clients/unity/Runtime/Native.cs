@@ -6,17 +6,19 @@ namespace Papilla
     /// <summary>What a frame came to, of a <see cref="NativeSession"/>. Its arrays are made once and used again.</summary>
     public sealed class NativeAnswer
     {
-        /// <summary>Row by row: SED in J/m3, or firing rates in Hz where <see cref="IsRate"/>; the first Width x Height samples.</summary>
+        /// <summary>SED, J/m3, row by row; the first Width x Height samples.</summary>
         public readonly float[] Map = new float[Wire.MapLength];
         /// <summary>The pixels of <see cref="Map"/>; nothing (0 x 0) where no map was asked for.</summary>
         public int Column, Row, Width, Height;
-        public bool IsRate, OutOfRange, NoContact, Unfamiliar, Unsettled, CutOff;
+        public bool HasSed, OutOfRange, NoContact, Unfamiliar, Unsettled, CutOff, NotTracked, CoarseClock;
         /// <summary>What pushes back: of poses and of gaps.</summary>
         public Touch Touch;
         public bool HasTouch;
         /// <summary>The sixteen numbers of the effect <c>summary</c>; empty without.</summary>
         public float[] Summary = new float[0];
-        /// <summary>Values of the effects; the pressure that was found (Pa); SED at the vertices. Empty without.</summary>
+        /// <summary>Firing rates (Hz), a whole map or at the vertices, and at the points: the effect <c>afferents</c>. Empty without.</summary>
+        public float[] RatesHz = new float[0], PointRatesHz = new float[0];
+        /// <summary>SED at the points; intensities of the actuators; the pressure that was found (Pa); SED at the vertices. Empty without.</summary>
         public float[] Points = new float[0], Actuators = new float[0], PressurePa = new float[0], Vertices = new float[0];
 
         internal unsafe void Take(ref NativeCalls.Answer from)
@@ -25,16 +27,20 @@ namespace Papilla
             Row = (int)from.Row;
             Width = (int)from.Width;
             Height = (int)from.Height;
-            IsRate = from.Kind == 3;
+            HasSed = from.HasSed != 0;
             OutOfRange = (from.Flags & 1) != 0;
             NoContact = (from.Flags & 2) != 0;
             Unfamiliar = (from.Flags & 4) != 0;
             Unsettled = (from.Flags & 8) != 0;
             CutOff = (from.Flags & 16) != 0;
+            NotTracked = (from.Flags & 32) != 0;
+            CoarseClock = (from.Flags & 64) != 0;
             if (from.Map.Count != UIntPtr.Zero) Marshal.Copy(from.Map.Data, Map, 0, (int)from.Map.Count);
             HasTouch = from.Touch != IntPtr.Zero;
             if (HasTouch) Touch = *(Touch*)from.Touch;
             Copy(from.Summary, from.Summary == IntPtr.Zero ? 0 : 16, ref Summary);
+            Copy(from.RatesHz.Data, (int)from.RatesHz.Count, ref RatesHz);
+            Copy(from.PointRatesHz.Data, (int)from.PointRatesHz.Count, ref PointRatesHz);
             Copy(from.Points.Data, (int)from.Points.Count, ref Points);
             Copy(from.Actuators.Data, (int)from.Actuators.Count, ref Actuators);
             Copy(from.PressurePa.Data, (int)from.PressurePa.Count, ref PressurePa);
@@ -139,7 +145,7 @@ namespace Papilla
         public NativeAnswer Send(float[] pressurePa, ulong timeUs = 0, int finger = 0)
         {
             NativeCalls.Answer answer;
-            Must(NativeCalls.papilla_send_map(handle, (byte)finger, pressurePa, (UIntPtr)pressurePa.Length, timeUs, out answer));
+            Must(NativeCalls.papilla_send_map(handle, FingerOf(finger), pressurePa, (UIntPtr)pressurePa.Length, timeUs, out answer));
             return Taken(ref answer);
         }
 
@@ -149,7 +155,7 @@ namespace Papilla
             NativeCalls.Answer answer;
             var force = net.GetValueOrDefault();
             var asked = net.HasValue ? (IntPtr)(&force) : IntPtr.Zero;
-            Must(NativeCalls.papilla_send_poses(handle, (byte)finger, poses, (UIntPtr)poses.Length, asked, timeUs, out answer));
+            Must(NativeCalls.papilla_send_poses(handle, FingerOf(finger), poses, (UIntPtr)poses.Length, asked, timeUs, out answer));
             return Taken(ref answer);
         }
 
@@ -159,8 +165,29 @@ namespace Papilla
             NativeCalls.Answer answer;
             var force = net.GetValueOrDefault();
             var asked = net.HasValue ? (IntPtr)(&force) : IntPtr.Zero;
-            Must(NativeCalls.papilla_send_gaps(handle, (byte)finger, depthMm, (UIntPtr)depthMm.Length, asked, timeUs, out answer));
+            Must(NativeCalls.papilla_send_gaps(handle, FingerOf(finger), depthMm, (UIntPtr)depthMm.Length, asked, timeUs, out answer));
             return Taken(ref answer);
+        }
+
+        /// <summary>Tracking is lost: the answer is zero, no unit fires, and what the session remembers waits for the next frame.</summary>
+        public NativeAnswer SendNotTracked(ulong timeUs = 0, int finger = 0)
+        {
+            NativeCalls.Answer answer;
+            Must(NativeCalls.papilla_send_not_tracked(handle, FingerOf(finger), timeUs, out answer));
+            return Taken(ref answer);
+        }
+
+        /// <summary>How pressure is found, as <c>pixels</c>; empty where frames are pressure.</summary>
+        public string Method { get { return NativeCalls.Text(NativeCalls.papilla_session_method(handle)); } }
+
+        /// <summary>What the hello cannot have as one might expect, a line each; empty if there is nothing.</summary>
+        public string Warning { get { return NativeCalls.Text(NativeCalls.papilla_session_warning(handle)); } }
+
+        /// <summary>A number that a frame can hold.</summary>
+        static byte FingerOf(int finger)
+        {
+            if (finger >= 0 && finger <= byte.MaxValue) return (byte)finger;
+            throw new PapillaException(new Problem("bad_contact", "finger " + finger + " is none: a session has at most 10", "finger"));
         }
 
         NativeAnswer Taken(ref NativeCalls.Answer answer)

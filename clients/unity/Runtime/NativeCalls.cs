@@ -8,7 +8,7 @@ namespace Papilla
     static class NativeCalls
     {
         /// <summary>PAPILLA_ABI of the header that this was written after.</summary>
-        internal const uint Abi = 1;
+        internal const uint Abi = 2;
         // In players for iOS and consoles the library is linked into the program.
 #if (UNITY_IOS || UNITY_TVOS) && !UNITY_EDITOR
         const string Library = "__Internal";
@@ -35,8 +35,8 @@ namespace Papilla
         [StructLayout(LayoutKind.Sequential)]
         internal struct Answer
         {
-            internal uint Flags, Kind, Column, Row, Width, Height;
-            internal Samples Map, Vertices, PressurePa, Points, Actuators;
+            internal uint Flags, HasSed, Column, Row, Width, Height;
+            internal Samples Map, Vertices, PressurePa, RatesHz, Points, PointRatesHz, Actuators;
             internal IntPtr Summary, Touch;
         }
 
@@ -59,6 +59,11 @@ namespace Papilla
         internal static extern int papilla_send_poses(IntPtr session, byte finger, [In] Pose[] poses, UIntPtr count, IntPtr net, ulong timeUs, out Answer answer);
         [DllImport(Library)]
         internal static extern int papilla_send_gaps(IntPtr session, byte finger, float[] depthMm, UIntPtr count, IntPtr net, ulong timeUs, out Answer answer);
+
+        [DllImport(Library)]
+        internal static extern int papilla_send_not_tracked(IntPtr session, byte finger, ulong timeUs, out Answer answer);
+        [DllImport(Library)] internal static extern IntPtr papilla_session_method(IntPtr session);
+        [DllImport(Library)] internal static extern IntPtr papilla_session_warning(IntPtr session);
 
         /// <summary>A text of C; null stays null.</summary>
         internal static byte[] Utf8(string text)

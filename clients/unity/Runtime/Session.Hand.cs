@@ -50,6 +50,22 @@ namespace Papilla
         }
 
         /// <summary>
+        /// Sends that tracking of a finger is lost. Better than an old pose, or one of zeros: the answer is zero, no unit fires, and nothing
+        /// bursts when tracking comes back. The frame's sequence.
+        /// </summary>
+        public uint SendNotTracked(int finger = 0)
+        {
+            ulong timeUs = ClockUs();
+            Handed handed;
+            lock (gate)
+            {
+                draft.EncodeNotTracked(finger);
+                handed = HandOver(finger, timeUs);
+            }
+            return Told(handed);
+        }
+
+        /// <summary>
         /// Sends how deep the undeformed skin lies in things, mm, negative in air: at the vertices or as a map, as the hello says; with
         /// its <c>velocity</c>, x y z mm/s of each vertex behind them. The frame's sequence.
         /// </summary>

@@ -19,7 +19,9 @@ namespace Papilla
         public const int ObjectsMax = 16, RowLength = 7;
 
         internal const uint Magic = 0x314c5050;
-        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagUnsettled = 8, FlagCutOff = 16;
+        internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagUnsettled = 8, FlagCutOff = 16, FlagNotTracked = 32, FlagCoarseClock = 64;
+        /// <summary>Before the samples of the section <c>rates</c>: their scale, and zeros.</summary>
+        internal const int RatesHeadBytes = 16;
         const float HalfMax = 65504;
 
         static readonly float[] Halves = HalfTable();

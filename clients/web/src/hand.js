@@ -4,7 +4,7 @@ import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
 import { Move } from './move.js';
 import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
-import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
+import { FLAG, HEADER_BYTES, STATUS, NotCarriedError, RATES_HEAD_BYTES } from './wire.js';
 
 /** @typedef {import('./types.js').HandHello} HandHello */
 /** @typedef {import('./types.js').Ready} Ready */
@@ -23,9 +23,14 @@ import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
  * @property {Float32Array | null} vertices what the map shows at the vertices, if asked for in its place
  * @property {Float32Array | null} map 224 x 224, 0 outside the answer's window, if asked for
  * @property {Float32Array | null} summary
- * @property {Float32Array | null} points
+ * @property {Float32Array | null} rates firing rates, Hz, where SED is: the effect `afferents`
+ * @property {Float32Array | null} points SED, J/m3
+ * @property {Float32Array | null} pointRatesHz
  * @property {Float32Array | null} actuators
- * @property {'sed' | 'sa1_rate'} kind what map, vertices and points hold: SED in J/m3, or firing rates in Hz (effect `afferents`)
+ * @property {Float32Array} sed the map, or the values at the vertices; throws NotCarriedError where there is neither
+ * @property {Float32Array} ratesHz throws NotCarriedError where the session has none
+ * @property {boolean} notTracked to `notTracked()`: all is zero
+ * @property {boolean} coarseClock the browser's clock ticks so coarsely that rates and spikes may be far off
  * @property {boolean} noContact
  * @property {boolean} outOfRange
  * @property {boolean} unsettled
@@ -36,8 +41,9 @@ import { FLAG, HEADER_BYTES, STATUS } from './wire.js';
 
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
 const VERSION = 3;
-const KIND = { objects: 4, gaps: 5 };
+const KIND = { pressure: 1, objects: 4, gaps: 5 };
 const ROW = 7;
+const FINGERS_MAX = 10;
 const MAP_SIDE_PX = 224;
 const TWO_POW_32 = 4294967296;
 const DRAIN_MS = 1;
@@ -165,15 +171,26 @@ export class Hand {
 
   /**
    * Sends where the objects of the hello are in a finger's frame, and waits for what pushes back.
-   * @param {Pose[]} poses
+   * @param {Pose[] | null} poses null: tracking is lost, as `notTracked`
    * @param {{finger?: number, net?: NetForce}} [more]
    * @returns {Promise<HandAnswer>} rejected with a PapillaError where there is none (`superseded`, `stale`, `lost`, or refused)
    */
   touch(poses, { finger = 0, net } = {}) {
+    if (poses === null) return this.notTracked({ finger });
     const rows = new Float32Array(ROW * (poses.length + (net ? 1 : 0)));
     poses.forEach(({ at, turn = [0, 0, 0, 1] }, i) => rows.set([...at, ...turn], ROW * i));
     if (net) rows.set([...net.direction, net.forceN], ROW * poses.length);
     return this.#put(KIND.objects, finger, ROW, rows.length / ROW, rows);
+  }
+
+  /**
+   * Sends that tracking of a finger is lost. Better than an old pose, or one of zeros: the answer is zero, no unit fires, and
+   * nothing bursts when tracking comes back.
+   * @param {{finger?: number}} [more]
+   * @returns {Promise<HandAnswer>}
+   */
+  notTracked({ finger = 0 } = {}) {
+    return this.#put(KIND.pressure, finger, 0, 0, new Float32Array(0), FLAG.notTracked);
   }
 
   /**
@@ -192,8 +209,11 @@ export class Hand {
     return this.#put(KIND.gaps, finger, width, height, samples);
   }
 
-  /** @param {number} kind @param {number} finger @param {number} width @param {number} height @param {Float32Array} samples */
-  #put(kind, finger, width, height, samples) {
+  /** @param {number} kind @param {number} finger @param {number} width @param {number} height @param {Float32Array} samples @param {number} [flags] */
+  #put(kind, finger, width, height, samples, flags = 0) {
+    if (!(Number.isInteger(finger) && finger >= 0 && finger < FINGERS_MAX)) {
+      return Promise.reject(refusal('bad_contact', `finger ${finger} is none; a session has ${FINGERS_MAX} at most, numbered from 0`));
+    }
     const sequence = (this.#sequence = (this.#sequence + 1) >>> 0);
     const message = new ArrayBuffer(HEADER_BYTES + samples.byteLength);
     const view = new DataView(message);
@@ -207,6 +227,7 @@ export class Hand {
     view.setUint32(16, timeUs % TWO_POW_32, true);
     view.setUint32(20, timeUs / TWO_POW_32, true);
     view.setFloat32(28, 1, true);
+    view.setUint8(46, flags);
     view.setUint8(47, finger);
     new Float32Array(message, HEADER_BYTES).set(samples);
     return new Promise((resolve, reject) => {
@@ -297,6 +318,8 @@ function read(data, view, ready) {
     return section ? new Float32Array(data, section.offset, section.bytes / 4) : null;
   };
   const flags = view.getUint8(46);
+  // Answers of a hand are f32: the scale before the rates is 1.
+  const rates = of('rates');
   return {
     sequence: view.getUint32(8, true),
     finger: view.getUint8(47),
@@ -305,9 +328,20 @@ function read(data, view, ready) {
     vertices: of('vertices'),
     map: mapOf(data, view, ready),
     summary: of('summary'),
+    rates: rates ? rates.subarray(RATES_HEAD_BYTES / 4) : null,
     points: of('points'),
+    pointRatesHz: of('point_rates'),
     actuators: of('actuators'),
-    kind: view.getUint8(5) === 3 ? 'sa1_rate' : 'sed',
+    notTracked: (flags & FLAG.notTracked) !== 0,
+    coarseClock: (flags & FLAG.coarseClock) !== 0,
+    get sed() {
+      if (this.map ?? this.vertices) return /** @type {Float32Array} */ (this.map ?? this.vertices);
+      throw new NotCarriedError('sed', "say 'map': true in the hello");
+    },
+    get ratesHz() {
+      if (this.rates) return this.rates;
+      throw new NotCarriedError('ratesHz', "name the effect 'afferents' in the hello, and say 'map': true");
+    },
     noContact: (flags & FLAG.noContact) !== 0,
     outOfRange: (flags & FLAG.outOfRange) !== 0,
     unsettled: (flags & FLAG.unsettled) !== 0,

@@ -95,6 +95,17 @@ export class Outbox {
     this.#watch.start();
   }
 
+  /** Makes the frame that waits one that tells that tracking is lost. @param {number} timeUs @param {number} deadlineUs */
+  putNotTracked(timeUs, deadlineUs) {
+    this.supersede();
+    this.sequence = (this.sequence + 1) >>> 0;
+    this.#frame.encodeNotTracked();
+    this.#frame.stamp(this.sequence, timeUs, deadlineUs);
+    this.#bornMs[this.sequence % BORN] = performance.now();
+    this.#waits = true;
+    this.#watch.start();
+  }
+
   /** The frame that waits, if one does, is never sent. */
   supersede() {
     if (!this.#waits) return;

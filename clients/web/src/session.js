@@ -198,6 +198,16 @@ export class Session {
   }
 
   /**
+   * Sends that tracking is lost: the answer is zero, no unit fires, and nothing bursts when tracking comes back.
+   * @returns {number} the frame's sequence
+   */
+  sendNotTracked() {
+    this.#outbox.putNotTracked(this.#options.clockUs(), this.deadlineUs);
+    this.#flush();
+    return this.#outbox.sequence;
+  }
+
+  /**
    * Sends a map and waits for its answer. For one map after the other; frames of a running scene go
    * by `send` and `onanswer`.
    * @param {Float32Array} pressurePa

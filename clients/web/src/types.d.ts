@@ -15,6 +15,8 @@ export interface Afferents {
   theta_kpa?: number;
   k_s_hz_per_kpa?: number;
   k_d_hz_s_per_kpa?: number;
+  /** Whether the map of rates comes beside that of SED (default true). */
+  map?: boolean;
 }
 
 export interface Actuators {
@@ -82,6 +84,7 @@ export interface HandHello {
   atlas_hash?: string | null;
   points?: Place[];
   actuators?: Actuators;
+  afferents?: Afferents;
   relaxation?: Relaxation;
 }
 
@@ -115,7 +118,7 @@ export interface Touch {
 }
 
 export interface Section {
-  name: 'touch' | 'pressure' | 'summary' | 'points' | 'actuators' | 'map' | 'vertices';
+  name: 'touch' | 'pressure' | 'summary' | 'points' | 'point_rates' | 'actuators' | 'rates' | 'map' | 'vertices';
   offset: number;
   bytes: number;
 }

@@ -3,14 +3,16 @@
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
 export const HEADER_BYTES = 48;
-/** Room for the largest answer: header, summary, 1024 points, 1024 actuators and an f32 map. */
-export const ANSWER_BYTES_MAX = HEADER_BYTES + 64 + 2 * 4096 + 4 * MAP_LEN;
+/** Before the samples of the section `rates`: their scale, and zeros. */
+export const RATES_HEAD_BYTES = 16;
+/** Room for the largest answer: header, summary, 1024 points with their rates, 1024 actuators, f32 rates and an f32 map. */
+export const ANSWER_BYTES_MAX = HEADER_BYTES + 64 + 3 * 4096 + RATES_HEAD_BYTES + 2 * 4 * MAP_LEN;
 
 export const STATUS = /** @type {const} */ (['ok', 'superseded', 'late', 'error', 'stale']);
 export const SAMPLE_TYPES = /** @type {const} */ (['f32', 'f16', 'u16', 'u8']);
 export const SAMPLE_BYTES = [4, 2, 2, 1];
-export const KIND = { pressure: 1, sed: 2, rate: 3 };
-export const FLAG = { outOfRange: 1, noContact: 2, unfamiliar: 4, unsettled: 8, cutOff: 16 };
+export const KIND = { pressure: 1, sed: 2 };
+export const FLAG = { outOfRange: 1, noContact: 2, unfamiliar: 4, unsettled: 8, cutOff: 16, notTracked: 32, coarseClock: 64 };
 
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
 const VERSION = 2;
@@ -88,6 +90,12 @@ export class RequestFrame {
     this.header.setUint32(24, deadlineUs, true);
   }
 
+  /** That nobody knows what presses: a header alone. */
+  encodeNotTracked() {
+    this.encode(this.samplesF32, 0, 0, 0, 0, 0, 0, 0, 1);
+    this.header.setUint8(46, FLAG.notTracked);
+  }
+
   /**
    * Encodes a window of the map.
    * @param {Float32Array} values Pa, row-major
@@ -102,6 +110,7 @@ export class RequestFrame {
    */
   encode(values, first, stride, column, row, width, height, type, scale) {
     const { header } = this;
+    header.setUint8(46, 0);
     header.setUint8(6, type);
     header.setUint16(12, width, true);
     header.setUint16(14, height, true);
@@ -121,6 +130,16 @@ export class RequestFrame {
         default: for (let x = 0; x < width; x++) this.samplesU8[to++] = clampUnit(values[from + x] * perPa, 255);
       }
     }
+  }
+}
+
+/** An answer was asked for what its session does not carry. */
+export class NotCarriedError extends Error {
+  /** @param {string} member @param {string} advice */
+  constructor(member, advice) {
+    super(`the answer carries no ${member}: ${advice}`);
+    this.name = 'NotCarriedError';
+    this.member = member;
   }
 }
 
@@ -146,9 +165,7 @@ export class Answer {
     this.sequence = 0;
     /** What was wrong with a frame of status `error`. @type {import('./types.js').Problem | null} */
     this.problem = null;
-    /** What the map holds: SED in J/m3, or firing rates in Hz (effect `afferents`). @type {'sed' | 'sa1_rate'} */
-    this.kind = 'sed';
-    /** 224 x 224, row-major; 0 outside the window. Overwritten by the next answer. */
+    /** SED, J/m3: 224 x 224, row-major; 0 outside the window. Overwritten by the next answer. */
     this.map = new Float32Array(MAP_LEN);
     /** The window of the map that came (effect `contact_window`; else all of it). */
     this.column = 0;
@@ -157,8 +174,14 @@ export class Answer {
     this.height = 0;
     /** The sixteen numbers of the effect `summary`, in the protocol's order (SUMMARY); null without it. @type {Float32Array | null} */
     this.summary = null;
-    /** One value a point of the effect `points`. @type {Float32Array | null} */
+    /** Whether the session carries a map of SED. */
+    this.hasMap = false;
+    /** Firing rates, Hz, 224 x 224: the effect `afferents`; `ratesHz` throws without. @type {Float32Array | null} */
+    this.rates = null;
+    /** SED at each point of the effect `points`, J/m3. @type {Float32Array | null} */
     this.points = null;
+    /** Firing rates there, Hz: with the effect `afferents` too. @type {Float32Array | null} */
+    this.pointRatesHz = null;
     /** One intensity an actuator of the effect `actuators`. @type {Float32Array | null} */
     this.actuators = null;
     this.clientTimeUs = 0;
@@ -173,6 +196,22 @@ export class Answer {
     /** The map is rougher or heavier than any the tier was trained on: its answer may mean nothing. */
     this.unfamiliar = false;
     this.cutOff = false;
+    /** To a frame that told that nobody knows where things are: all is zero. */
+    this.notTracked = false;
+    /** The client's clock ticks so coarsely that rates and spikes may be far off. */
+    this.coarseClock = false;
+  }
+
+  /** SED, J/m3, 224 x 224; throws NotCarriedError where the session carries no map. */
+  get sed() {
+    if (this.hasMap) return this.map;
+    throw new NotCarriedError('sed', "leave 'map' true in the hello");
+  }
+
+  /** Firing rates, Hz, 224 x 224; throws NotCarriedError where the session carries none. */
+  get ratesHz() {
+    if (this.rates) return this.rates;
+    throw new NotCarriedError('ratesHz', "name the effect 'afferents' in the hello, and leave 'map' true");
   }
 
   /**
@@ -185,7 +224,11 @@ export class Answer {
       return section ? new Float32Array(this.#buffer, section.offset, section.bytes / 4) : null;
     };
     const map = sections.find((s) => s.name === 'map');
-    return { summary: of('summary'), points: of('points'), actuators: of('actuators'), mapOffset: map ? map.offset : -1 };
+    const rates = sections.find((s) => s.name === 'rates');
+    return {
+      summary: of('summary'), points: of('points'), pointRatesHz: of('point_rates'), actuators: of('actuators'),
+      mapOffset: map ? map.offset : -1, ratesOffset: rates ? rates.offset : -1, rates: rates ? new Float32Array(MAP_LEN) : null,
+    };
   }
 
   /**
@@ -202,8 +245,7 @@ export class Answer {
     if (view.getUint32(0, true) !== MAGIC) throw new Error('an answer does not start with PPL1');
     if (view.getUint8(4) !== VERSION) throw new Error(`an answer has protocol version ${view.getUint8(4)}`);
     const kind = view.getUint8(5);
-    if (kind !== KIND.sed && kind !== KIND.rate) throw new Error(`an answer is of kind ${kind}`);
-    this.kind = kind === KIND.sed ? 'sed' : 'sa1_rate';
+    if (kind !== KIND.sed) throw new Error(`an answer is of kind ${kind}`);
     this.status = STATUS[view.getUint8(7)] ?? 'error';
     this.sequence = view.getUint32(8, true);
     this.clientTimeUs = view.getUint32(16, true) + TWO_POW_32 * view.getUint32(20, true);
@@ -216,6 +258,8 @@ export class Answer {
     this.noContact = (flags & FLAG.noContact) !== 0;
     this.unfamiliar = (flags & FLAG.unfamiliar) !== 0;
     this.cutOff = (flags & FLAG.cutOff) !== 0;
+    this.notTracked = (flags & FLAG.notTracked) !== 0;
+    this.coarseClock = (flags & FLAG.coarseClock) !== 0;
   }
 
   /**
@@ -226,14 +270,24 @@ export class Answer {
   readBody(views, bytes) {
     this.summary = views.summary;
     this.points = views.points;
+    this.pointRatesHz = views.pointRatesHz;
     this.actuators = views.actuators;
+    this.hasMap = views.mapOffset >= 0;
+    this.rates = views.rates;
     // Only what the last answer wrote has to go.
     for (let y = this.row; y < this.row + this.height; y++) {
       this.map.fill(0, y * SIDE_PX + this.column, y * SIDE_PX + this.column + this.width);
     }
     this.width = this.height = this.column = this.row = 0;
-    if (views.mapOffset < 0) return;
     const view = this.#view;
+    if (this.rates) {
+      const sampleType = view.getUint8(6);
+      const end = views.ratesOffset + RATES_HEAD_BYTES + MAP_LEN * (SAMPLE_BYTES[sampleType] ?? 0);
+      if (sampleType > 3 || end > bytes) throw new Error(`an answer of ${bytes} bytes ends before its rates`);
+      const scale = view.getFloat32(views.ratesOffset, true);
+      this.#decode(this.rates, views.ratesOffset + RATES_HEAD_BYTES, sampleType, scale, 0, 0, SIDE_PX, SIDE_PX);
+    }
+    if (views.mapOffset < 0) return;
     const [width, height] = [view.getUint16(12, true), view.getUint16(14, true)];
     const [column, row] = [view.getUint16(32, true), view.getUint16(34, true)];
     const type = view.getUint8(6);
@@ -245,12 +299,14 @@ export class Answer {
     this.height = height;
     this.column = column;
     this.row = row;
-    this.#decode(views.mapOffset, type, view.getFloat32(28, true));
+    this.#decode(this.map, views.mapOffset, type, view.getFloat32(28, true), column, row, width, height);
   }
 
-  /** @param {number} offset @param {number} type @param {number} scale */
-  #decode(offset, type, scale) {
-    const { map, width, height, column, row } = this;
+  /**
+   * @param {Float32Array} map @param {number} offset @param {number} type @param {number} scale
+   * @param {number} column @param {number} row @param {number} width @param {number} height
+   */
+  #decode(map, offset, type, scale, column, row, width, height) {
     const table = halfTable();
     let from = offset / SAMPLE_BYTES[type];
     for (let y = 0; y < height; y++) {

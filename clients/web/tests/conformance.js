@@ -8,7 +8,7 @@ import { addressOf, cleanToken } from '../src/address.js';
 /** @typedef {Record<string, any>} Step */
 /** @typedef {Record<string, any>} Outcome what an answer held, copied */
 
-const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar'], ['cut_off', 'cutOff']]);
+const FLAGS = /** @type {const} */ ([['out_of_range', 'outOfRange'], ['no_contact', 'noContact'], ['unfamiliar', 'unfamiliar'], ['cut_off', 'cutOff'], ['not_tracked', 'notTracked'], ['coarse_clock', 'coarseClock']]);
 
 const wait = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
@@ -156,9 +156,9 @@ class Runner {
   /** @param {import('../papilla.js').Answer} answer */
   keep(answer) {
     if (this.outcomes.has(answer.sequence)) throw new Error(`frame ${answer.sequence} has two outcomes`);
-    const { map, summary, points, actuators, ...rest } = answer;
+    const { map, summary, points, pointRatesHz, rates, actuators, ...rest } = answer;
     const copy = (/** @type {Float32Array | null} */ values) => (values ? Float32Array.from(values) : null);
-    this.outcomes.set(answer.sequence, { ...rest, map: copy(map), summary: copy(summary), points: copy(points), actuators: copy(actuators) });
+    this.outcomes.set(answer.sequence, { ...rest, map: copy(map), summary: copy(summary), points: copy(points), pointRatesHz: copy(pointRatesHz), rates: copy(rates), actuators: copy(actuators) });
     this.order.push(answer.sequence);
   }
 
@@ -201,7 +201,9 @@ class Runner {
     }
     if (outcome.status !== 'ok') return;
     if (outcome.inferUs + outcome.queueUs > outcome.totalUs) throw new Error(`${outcome.inferUs} + ${outcome.queueUs} us are more than ${outcome.totalUs}`);
-    if (expect.kind) same('kind', outcome.kind, expect.kind);
+    same('rates', outcome.rates != null, expect.rates !== undefined);
+    if (expect.rates) checkMap(expect.rates, outcome.rates);
+    if (expect.point_rates) allNear('point_rates', outcome.pointRatesHz, expect.point_rates);
     if (expect.flags) same('flags', FLAGS.filter(([, member]) => outcome[member]).map(([name]) => name), expect.flags);
     if (expect.tier) same('tier', this.tiers.get(outcome.tierNumber), expect.tier);
     if (expect.window) same('window', [outcome.column, outcome.row, outcome.width, outcome.height], expect.window);
@@ -330,7 +332,7 @@ class Runner {
   /** @param {Step} step */
   async touch(step) {
     if (step.engines) return this.placed(step);
-    const poses = step.poses.map((/** @type {number[]} */ p) => ({ at: p.slice(0, 3), turn: p.slice(3) }));
+    const poses = step.poses && step.poses.map((/** @type {number[]} */ p) => ({ at: p.slice(0, 3), turn: p.slice(3) }));
     return this.press(step, (hand, more) => hand.touch(poses, more));
   }
 
@@ -378,7 +380,7 @@ class Runner {
     same('finger', answer.finger, finger);
     allNear('touch', [...forceN, ...torqueNMm, areaMm2, ...centreMm, penetrationMm, stiffnessNPerMm, travelMm, pressureMaxPa, share], expect.touch);
     if (expect.pressure_sum) near('pressure', /** @type {Float32Array} */ (answer.pressurePa).reduce((sum, value) => sum + value, 0), expect.pressure_sum);
-    same('flags', answer.noContact ? ['no_contact'] : [], expect.flags);
+    same('flags', [...(answer.noContact ? ['no_contact'] : []), ...(answer.notTracked ? ['not_tracked'] : [])], expect.flags);
     same('odd flags', [answer.outOfRange, answer.unsettled], [false, false]);
     return answer;
   }

@@ -48,6 +48,8 @@ pub struct Fingertip {
     /// Units that are not at rest in this frame.
     awake: Vec<u16>,
     pub(crate) last_us: Option<u64>,
+    /// Nobody knows what acts: what the next frame brings is taken over at once and unfelt.
+    pub(crate) is_paused: bool,
     pub(crate) fired: u32,
     spikes: Vec<Spike>,
     spikes_max: usize,
@@ -82,6 +84,7 @@ impl Fingertip {
             pacinian_of,
             awake: Vec::with_capacity(units.len()),
             last_us: None,
+            is_paused: false,
             fired: 0,
             spikes: Vec::with_capacity(spikes_max),
             spikes_max,
@@ -110,10 +113,14 @@ impl Fingertip {
     /// Goes on to the next frame: its time, the SED of every pixel, J/m3, and the force on every
     /// cell, N.
     ///
-    /// The first frame, and one whose time goes back, begins with membranes at rest. Of more than
-    /// [`FRAME_MAX_US`] between two frames the end is simulated.
+    /// The first frame, and one whose time goes back, begins with membranes at rest. A frame whose
+    /// time has not gone on changes nothing: what it brings is part of the way to the next one. Of
+    /// more than [`FRAME_MAX_US`] between two frames the end is simulated.
     pub fn step(&mut self, time_us: u64, sed_j_per_m3: &[f32], force_n: &[f32]) {
         self.spikes.clear();
+        if !self.is_paused && self.last_us == Some(time_us) {
+            return;
+        }
         let [before, now] = &mut self.stress_mpa;
         std::mem::swap(before, now);
         for (unit, stress_mpa) in self.units.iter().zip(now.iter_mut()) {
@@ -123,8 +130,10 @@ impl Fingertip {
             *stress_mpa = (2e-9 * f64::from(self.settings.e_ref_kpa) * f64::from(sed)).sqrt();
         }
         let last_us = self.last_us.replace(time_us);
-        let begins = last_us.is_none_or(|last_us| time_us < last_us);
-        if begins {
+        let is_back = std::mem::take(&mut self.is_paused);
+        let goes_back = last_us.is_none_or(|last_us| time_us < last_us);
+        let begins = is_back || goes_back;
+        if goes_back && !is_back {
             self.neurons.iter_mut().for_each(Neuron::rest);
             self.pacinian.rest();
         }
@@ -138,6 +147,13 @@ impl Fingertip {
             self.turn_to(span_s);
             self.integrate(from_us, time_us);
         }
+    }
+
+    /// Nobody knows what acts: nothing fires until the next [`step`](Self::step), which finds
+    /// membranes as they are and takes over what acts then without feeling how it came to be.
+    pub fn pause(&mut self) {
+        self.spikes.clear();
+        self.is_paused = self.last_us.is_some();
     }
 
     /// Drive of this frame, and who is awake in it.

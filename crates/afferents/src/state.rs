@@ -10,7 +10,7 @@ use crate::{
 impl Fingertip {
     /// Hands what later spikes depend on to `put`, number by number.
     pub fn save(&self, put: &mut impl FnMut(u64)) {
-        put(self.last_us.is_some().into());
+        put(u64::from(self.last_us.is_some()) + u64::from(self.is_paused));
         put(self.last_us.unwrap_or_default());
         put(self.fired.into());
         let [_, now] = &self.stress_mpa;
@@ -24,9 +24,10 @@ impl Fingertip {
     /// # Errors
     /// Those of `next`; this fingertip is of no use any more.
     pub fn restore<E>(&mut self, next: &mut impl FnMut() -> Result<u64, E>) -> Result<(), E> {
-        let is_some = next()? != 0;
+        let begun = next()?;
         let last_us = next()?;
-        self.last_us = is_some.then_some(last_us);
+        self.last_us = (begun > 0).then_some(last_us);
+        self.is_paused = begun > 1;
         self.fired = next()? as u32;
         for stress_mpa in &mut self.stress_mpa[1] {
             *stress_mpa = f64::from_bits(next()?);

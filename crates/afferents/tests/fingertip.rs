@@ -183,3 +183,49 @@ fn clocks_that_jump_are_bounded_and_a_full_frame_still_counts() {
     }
     assert!(narrow.fired() > 240);
 }
+
+/// Frames of one tick of a coarse clock: motion within the tick is felt over it, neither lost nor at
+/// once.
+#[test]
+fn frames_of_one_time_are_part_of_the_way_to_the_next() {
+    let alone = spikes(&mut finger(QUIET), (0..=32).map(|n| 5000 * n));
+    let mut doubled = finger(QUIET);
+    let mut all = Vec::new();
+    for n in 0..=32 {
+        for seen_us in [5000 * n, 5000 * n + 2500] {
+            let (sed_j_per_m3, force_n) = stroke(seen_us);
+            doubled.step(5000 * n, &sed_j_per_m3, &force_n);
+            all.extend_from_slice(doubled.spikes());
+        }
+    }
+    assert_eq!(alone, all);
+}
+
+/// Tracking that is lost under a held press, and comes back to it: no unit fires for either.
+#[test]
+fn a_pause_is_silent_and_so_is_its_end() {
+    let mut one = finger(QUIET);
+    let (sed_j_per_m3, force_n) = stroke(50_000);
+    let held = |finger: &mut Fingertip, times_ms: std::ops::Range<u64>| {
+        times_ms
+            .map(|ms| {
+                finger.step(1000 * ms, &sed_j_per_m3, &force_n);
+                finger.spikes().len()
+            })
+            .collect::<Vec<_>>()
+    };
+    held(&mut one, 0..400);
+    let before: usize = held(&mut one, 400..500).iter().sum();
+    one.pause();
+    assert!(one.spikes().is_empty());
+    let mut numbers = Vec::new();
+    one.save(&mut |number| numbers.push(number));
+    let mut rest = numbers.iter().copied();
+    let mut other = finger(QUIET);
+    other.restore(&mut || rest.next().ok_or("short")).unwrap();
+    let after = held(&mut one, 900..1000);
+    assert_eq!(after, held(&mut other, 900..1000));
+    assert_eq!(after[0], 0, "the frame that comes back");
+    let after: usize = after.iter().sum();
+    assert!(after.abs_diff(before) <= before / 5 + 2, "{before} spikes before, {after} after");
+}

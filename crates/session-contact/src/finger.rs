@@ -41,6 +41,8 @@ pub struct Finger {
     /// The pressure that is sent, if as a map.
     sent_pa: Vec<f32>,
     touch: Touch,
+    /// Nobody knows where things are in this frame.
+    is_lost: bool,
 }
 
 impl fmt::Debug for Finger {
@@ -111,6 +113,7 @@ impl Finger {
             shear_energy: shear_energy(hello, skin)?,
             sent_pa: vec![0.0; if sends_map { MAP_LEN } else { 0 }],
             touch: Touch::default(),
+            is_lost: false,
         })
     }
 
@@ -174,6 +177,7 @@ impl Finger {
     /// What cannot be placed, is no depth or no pressure; the finger stays as it was.
     pub fn take(&mut self, frame: Frame<'_>, map_pa: Option<&mut [f32]>) -> Result<Taken, Problem> {
         let Frame { payload, sample_type, scale, time_us } = frame;
+        self.is_lost = false;
         let net = match self.form.input {
             Input::Pressure => {
                 self.read_samples(payload, sample_type, scale)?;
@@ -213,6 +217,13 @@ impl Finger {
             solve_us: start.elapsed().as_secs_f32() * 1e6,
         };
         Ok(self.taken(map_pa))
+    }
+
+    /// In place of [`take`](Self::take) where nobody knows where things are: [`write`](Self::write)
+    /// tells of no touch, and the solver keeps what the next frame starts from.
+    pub fn lose(&mut self) {
+        self.is_lost = true;
+        self.gaps.iter_mut().for_each(GapReader::lose);
     }
 
     /// What the pressure at the vertices comes to.
@@ -268,6 +279,10 @@ impl Finger {
     /// Appends what pushes back, and pressure and shear if they were asked for, each up to a
     /// multiple of 16.
     pub fn write(&mut self, bytes: &mut BytesMut) {
+        if std::mem::take(&mut self.is_lost) {
+            bytes.resize(bytes.len() + self.sections_len(), 0);
+            return;
+        }
         if self.form.input != Input::Pressure {
             bytes.extend_from_slice(&self.touch.encode());
         }

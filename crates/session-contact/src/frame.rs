@@ -78,6 +78,9 @@ impl FrameForm {
     /// Bytes of the payload that goes with a header of this form.
     #[must_use]
     pub fn payload_len(&self, header: &FrameHeader) -> usize {
+        if !header.is_tracked() {
+            return 0;
+        }
         header.payload_len() + self.extra() * header.sample_type.bytes()
     }
 
@@ -97,6 +100,15 @@ impl FrameForm {
         if finger >= self.fingers {
             let message = format!("finger {finger} was not announced; there are {}", self.fingers);
             return Err(unusable("finger", message));
+        }
+        if !header.is_tracked() {
+            // Without samples kind and type mean nothing.
+            return if [header.width, header.height] == [0, 0] {
+                Ok(finger)
+            } else {
+                let message = "a frame that is not tracked has no samples: 0 x 0 is due";
+                Err(Problem::new(ErrorCode::WrongShape, message).at("width"))
+            };
         }
         if header.kind != self.kind() {
             let (found, due) = (header.kind as u8, self.kind() as u8);

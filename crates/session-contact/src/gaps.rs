@@ -80,6 +80,13 @@ impl GapReader {
         }
     }
 
+    /// Nobody knows where things are: they have not moved until somebody does.
+    pub(crate) fn lose(&mut self) {
+        if let Some(motion) = &mut self.motion {
+            motion.last_us = None;
+        }
+    }
+
     /// What the last frame said.
     pub(crate) fn gaps(&self) -> Gaps<'_> {
         let moved_mm = self.motion.as_ref().map_or(&[][..], |motion| &motion.moved_mm);

@@ -19,6 +19,9 @@ pub(super) struct Afferents {
     /// Stress of the last frame, kPa, and its time by the client's clock.
     sigma_kpa: Vec<f32>,
     last_us: Option<u64>,
+    /// The same of the last frame of an older time, if there was one since the clock began.
+    older_kpa: Vec<f32>,
+    older_us: Option<u64>,
     rate_hz: Vec<f32>,
 }
 
@@ -39,45 +42,61 @@ impl Afferents {
                 return Err(unusable("afferents", message));
             }
         }
-        let [sigma_kpa, rate_hz] = [0, 1].map(|_| vec![0.0; MAP_LEN]);
-        Ok(Self { of, sigma_kpa, last_us: None, rate_hz })
+        let [sigma_kpa, older_kpa, rate_hz] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
+        Ok(Self { of, sigma_kpa, last_us: None, older_kpa, older_us: None, rate_hz })
     }
 
-    /// The steady rate at the greatest SED that a tier knows, Hz; 1 at least.
-    pub(super) fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
-        let above_kpa = sigma_kpa(self.of.e_ref_kpa, sed_max_j_per_m3) - self.of.theta_kpa;
-        (self.of.k_s_hz_per_kpa * above_kpa).max(1.0)
-    }
-
-    /// Takes the next map, `time_us` by the client's clock. Where that has not gone on (and in the
-    /// first frame), the rate is the steady one.
+    /// Takes the next map, `time_us` by the client's clock. What changes is held against the last
+    /// frame of an older time; without one (in the first frame, and where the clock goes back) the
+    /// rate is the steady one.
     pub(super) fn step(&mut self, sed_j_per_m3: &[f32], time_us: u64) {
-        let last_us = self.last_us.replace(time_us);
-        let passed_us = last_us.map_or(0, |last_us| time_us.saturating_sub(last_us));
-        let k_d_hz_per_kpa = match passed_us {
-            0 => 0.0,
-            us => self.of.k_d_hz_s_per_kpa / (us as f64 * 1e-6) as f32,
-        };
+        match self.last_us.replace(time_us) {
+            Some(last_us) if last_us < time_us => {
+                std::mem::swap(&mut self.sigma_kpa, &mut self.older_kpa);
+                self.older_us = Some(last_us);
+            }
+            Some(last_us) if last_us == time_us => {}
+            _ => self.older_us = None,
+        }
+        let k_d_hz_per_kpa = self.older_us.map_or(0.0, |older_us| {
+            self.of.k_d_hz_s_per_kpa / ((time_us - older_us) as f64 * 1e-6) as f32
+        });
         let (e_ref, theta, k_s) = (self.of.e_ref_kpa, self.of.theta_kpa, self.of.k_s_hz_per_kpa);
-        let maps = self.rate_hz.iter_mut().zip(&mut self.sigma_kpa).zip(sed_j_per_m3);
-        for ((rate_hz, before_kpa), sed) in maps {
+        let older = self.sigma_kpa.iter_mut().zip(&self.older_kpa);
+        let maps = self.rate_hz.iter_mut().zip(older).zip(sed_j_per_m3);
+        for ((rate_hz, (sigma, older_kpa)), sed) in maps {
             let now_kpa = sigma_kpa(e_ref, *sed);
-            *rate_hz = k_s * (now_kpa - theta).max(0.0)
-                + k_d_hz_per_kpa * (now_kpa - *before_kpa).max(0.0);
-            *before_kpa = now_kpa;
+            *rate_hz =
+                k_s * (now_kpa - theta).max(0.0) + k_d_hz_per_kpa * (now_kpa - *older_kpa).max(0.0);
+            *sigma = now_kpa;
         }
     }
 
-    /// Writes what the last frame left.
+    /// Nobody knows what presses: nothing is shown, and the next frame is the first.
+    pub(super) fn lose(&mut self) {
+        (self.last_us, self.older_us) = (None, None);
+        self.rate_hz.fill(0.0);
+    }
+
+    /// Writes what the last frames left.
     pub(super) fn save(&self, state: &mut Writer) {
         state.option(self.last_us);
         state.floats(&self.sigma_kpa);
+        state.option(self.older_us);
+        state.floats(&self.older_kpa);
     }
 
     /// Goes on from what another one has written.
     pub(super) fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
         self.last_us = state.option()?;
-        state.floats(&mut self.sigma_kpa)
+        state.floats(&mut self.sigma_kpa)?;
+        self.older_us = state.option()?;
+        state.floats(&mut self.older_kpa)?;
+        // A later frame would have no time to have passed.
+        if self.older_us.is_some_and(|older_us| self.last_us.is_none_or(|last| older_us >= last)) {
+            return Err(StateError::Value("rates"));
+        }
+        Ok(())
     }
 
     /// The rates of the last frame, Hz.
@@ -150,6 +169,7 @@ mod tests {
             theta_kpa: 0.0,
             k_s_hz_per_kpa: PARAMETER_MAX,
             k_d_hz_s_per_kpa: PARAMETER_MAX,
+            map: true,
         };
         let mut afferents = Afferents::new(most).unwrap();
         // From nothing to 1e12 J/m3 within 1 us, and the other way round by a clock that jumps.
@@ -158,7 +178,29 @@ mod tests {
             afferents.step(&vec![sed; MAP_LEN], time_us);
             assert!(afferents.rate_hz().iter().all(|rate| rate.is_finite() && *rate >= 0.0));
         }
-        assert!(afferents.value_max(1e12).is_finite());
+    }
+
+    /// Two frames of one tick: both are held against the frame before them.
+    #[test]
+    fn frames_of_one_tick_share_their_motion() {
+        let mut afferents = Afferents::new(Parameters::default()).unwrap();
+        rate(&mut afferents, 10.0, 0);
+        // 100 kPa/s: 1 kPa in 10 ms, then 2 kPa.
+        assert!((rate(&mut afferents, 11.0, 10_000) - (3.0 + 20.0)).abs() < 0.01);
+        assert!((rate(&mut afferents, 12.0, 10_000) - (4.0 + 40.0)).abs() < 0.01);
+        assert!((rate(&mut afferents, 13.0, 20_000) - (5.0 + 20.0)).abs() < 0.01);
+    }
+
+    /// Tracking that is lost shows nothing, and its return is no motion.
+    #[test]
+    fn what_comes_back_does_not_burst() {
+        let mut afferents = Afferents::new(Parameters::default()).unwrap();
+        rate(&mut afferents, 20.0, 0);
+        rate(&mut afferents, 20.0, 10_000);
+        afferents.lose();
+        assert!(afferents.rate_hz().iter().all(|rate| *rate <= 0.0));
+        assert!((rate(&mut afferents, 30.0, 20_000) - 22.0).abs() < 0.01);
+        assert!((rate(&mut afferents, 30.0, 30_000) - 22.0).abs() < 0.01);
     }
 
     #[test]

@@ -59,14 +59,15 @@ use std::sync::Arc;
 
 use bytes::BytesMut;
 use papilla_proto::{
-    ErrorCode, FrameKind, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN,
-    SampleError, SampleType, Window,
+    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN, SampleError,
+    SampleType, Window,
     contact::SampleLayout,
-    effects::{ActuatorInput, Drive, Layout, Section, SectionName},
+    effects::{ActuatorInput, Drive, Layout, RATES_HEAD_LEN, Section, SectionName},
+    flags,
     spikes::PlacedUnit,
 };
 
-use papilla_session_state::{Reader, StateError, Writer};
+use papilla_session_state::{Clock, Reader, StateError, Writer};
 
 pub use cost::measure;
 pub use finger::{Cost, Finger, Shared};
@@ -89,7 +90,13 @@ pub struct Effects {
     vertices: Option<Vertices>,
     relaxation: Option<Relaxation>,
     afferents: Option<Afferents>,
+    /// Whether the map of rates goes beside that of SED.
+    shows_rates: bool,
     spikes: Option<(Arc<Geometry>, Spikes)>,
+    /// The client's, where something goes by it.
+    clock: Option<Clock>,
+    /// Nobody knows what presses in this frame.
+    is_lost: bool,
     margin_px: Option<u16>,
     summary: Option<Arc<Geometry>>,
     points: Option<Points>,
@@ -127,11 +134,9 @@ impl Display {
 /// What [`Effects::write`] put into an answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Written {
-    /// What the samples show.
-    pub kind: FrameKind,
     /// The pixels whose samples were written.
     pub window: Window,
-    /// Unit of scaled samples.
+    /// Unit of scaled samples of SED.
     pub scale: f32,
 }
 
@@ -183,6 +188,7 @@ impl Effects {
         let margin_px = has(RuntimeEffect::ContactWindow)
             .then(|| hello.contact_window.unwrap_or_default().margin_px);
         let sample_type = hello.answer_sample_type.unwrap_or(hello.sample_type);
+        let has_time = relaxation.is_some() || afferents.is_some() || spikes.is_some();
         let mut effects = Self {
             names,
             sections: Vec::new(),
@@ -191,8 +197,11 @@ impl Effects {
             map: map && !by_vertices,
             vertices: (map && by_vertices).then(|| Vertices::new(finger)),
             relaxation,
+            shows_rates: map && hello.afferents.unwrap_or_default().map,
             afferents,
             spikes,
+            clock: has_time.then(Clock::new),
+            is_lost: false,
             margin_px,
             summary,
             points,
@@ -205,11 +214,25 @@ impl Effects {
     /// Each section with its place behind the header.
     fn laid_out(&self) -> Vec<Section> {
         let floats = |count: usize| 4 * count;
+        let rates = self.afferents.as_ref();
+        let shown = match (&self.vertices, self.map) {
+            (Some(vertices), _) => vertices.len(),
+            (None, true) => MAP_LEN,
+            (None, false) => 0,
+        };
+        let rate_map = rates
+            .filter(|_| self.shows_rates)
+            .map(|_| RATES_HEAD_LEN + shown * self.sample_type.bytes());
         let parts = [
             (SectionName::Summary, self.summary.as_ref().map(|_| SUMMARY_LEN)),
             (SectionName::Points, self.points.as_ref().map(|points| floats(points.len()))),
+            (
+                SectionName::PointRates,
+                self.points.as_ref().zip(rates).map(|(points, _)| floats(points.len())),
+            ),
             (SectionName::Actuators, self.actuators.as_ref().map(|display| floats(display.len()))),
             (SectionName::Spikes, self.spikes.as_ref().map(|(_, spikes)| spikes.len())),
+            (SectionName::Rates, rate_map),
             (SectionName::Map, self.map.then(|| MAP_LEN * self.sample_type.bytes())),
             (
                 SectionName::Vertices,
@@ -250,19 +273,6 @@ impl Effects {
         self.spikes.as_ref().map(|(_, spikes)| spikes.placed())
     }
 
-    /// What the map of an answer shows.
-    fn kind(&self) -> FrameKind {
-        if self.afferents.is_some() { FrameKind::Sa1Rate } else { FrameKind::Sed }
-    }
-
-    /// The greatest value to expect of what the map shows, where SED reaches `sed_max_j_per_m3`.
-    #[must_use]
-    pub fn value_max(&self, sed_max_j_per_m3: f32) -> f32 {
-        self.afferents
-            .as_ref()
-            .map_or(sed_max_j_per_m3, |afferents| afferents.value_max(sed_max_j_per_m3))
-    }
-
     /// Most bytes of an answer, its header included.
     #[must_use]
     pub fn size_hint(&self) -> usize {
@@ -272,11 +282,37 @@ impl Effects {
     /// Whether an answer depends on the frames before it.
     #[must_use]
     pub fn has_state(&self) -> bool {
-        self.relaxation.is_some() || self.afferents.is_some() || self.spikes.is_some()
+        self.clock.is_some()
+    }
+
+    /// The time of the next frame, us, by which [`before`](Self::before) and [`write`](Self::write) go:
+    /// the client's stamp, or, of a clock that ticks coarsely, a time within its tick.
+    pub fn time_us(&mut self, stamp_us: u64) -> u64 {
+        self.clock.as_mut().map_or(stamp_us, |clock| clock.time_us(stamp_us))
+    }
+
+    /// Bits of [`flags`] that tell of the client's clock.
+    #[must_use]
+    pub fn clock_flags(&self) -> u8 {
+        let is_coarse = self.clock.as_ref().is_some_and(Clock::is_coarse);
+        if is_coarse { flags::COARSE_CLOCK } else { 0 }
+    }
+
+    /// In place of [`before`](Self::before) where nobody knows what presses: the answer to this frame
+    /// shows nothing, and what effects remember waits for the next.
+    pub fn lose(&mut self) {
+        self.is_lost = true;
+        self.clock.iter_mut().for_each(Clock::forget);
+        self.relaxation.iter_mut().for_each(Relaxation::lose);
+        self.afferents.iter_mut().for_each(Afferents::lose);
+        self.spikes.iter_mut().for_each(|(_, spikes)| spikes.lose());
     }
 
     /// Writes what answers depend on of the frames before.
     pub fn save(&self, state: &mut Writer) {
+        if let Some(clock) = &self.clock {
+            clock.save(state);
+        }
         if let Some(relaxation) = &self.relaxation {
             relaxation.save(state);
         }
@@ -293,6 +329,9 @@ impl Effects {
     /// # Errors
     /// The state is of other effects; these are of no use any more.
     pub fn restore(&mut self, state: &mut Reader<'_>) -> Result<(), StateError> {
+        if let Some(clock) = &mut self.clock {
+            clock.restore(state)?;
+        }
         if let Some(relaxation) = &mut self.relaxation {
             relaxation.restore(state)?;
         }
@@ -349,49 +388,65 @@ impl Effects {
         time_us: u64,
         bytes: &mut BytesMut,
     ) -> Result<Written, SampleError> {
-        if let Some(afferents) = &mut self.afferents {
+        let is_lost = std::mem::take(&mut self.is_lost);
+        if let Some(afferents) = self.afferents.as_mut().filter(|_| !is_lost) {
             afferents.step(sed_j_per_m3, time_us);
         }
         let rate_hz = self.afferents.as_ref().map(Afferents::rate_hz);
-        let shown = rate_hz.unwrap_or(sed_j_per_m3);
-        let sent_pa = self.relaxation.as_ref().map_or(pressure_pa, Relaxation::sent_pa);
+        let felt = self.relaxation.as_ref().filter(|_| !is_lost);
+        let sent_pa = felt.map_or(pressure_pa, Relaxation::sent_pa);
         if let Some(geometry) = &self.summary {
             let contact = Contact { pressure_pa: sent_pa, above_pa: self.contact_pa };
             let summary = summary::of(geometry, contact, sed_j_per_m3, rate_hz);
             bytes.extend_from_slice(&summary.encode());
         }
         if let Some(points) = &self.points {
-            pad(bytes);
-            points.write(shown, bytes);
+            for map in [Some(sed_j_per_m3), rate_hz].into_iter().flatten() {
+                pad(bytes);
+                points.write(map, bytes);
+            }
         }
         if let Some(display) = &self.actuators {
             pad(bytes);
             match display {
                 Display::Formula(ActuatorInput::Sed, by) => by.write(sed_j_per_m3, bytes),
-                Display::Formula(ActuatorInput::Sa1Rate, by) => by.write(shown, bytes),
+                Display::Formula(ActuatorInput::Sa1Rate, by) => {
+                    by.write(rate_hz.unwrap_or_default(), bytes);
+                }
                 Display::Pins(pins) => pins.write(bytes),
             }
         }
         if let Some((geometry, spikes)) = &mut self.spikes {
             pad(bytes);
-            spikes.step(geometry, sent_pa, sed_j_per_m3, time_us);
+            if !is_lost {
+                spikes.step(geometry, sent_pa, sed_j_per_m3, time_us);
+            }
             spikes.write(time_us, bytes);
         }
-        let kind = self.kind();
+        if let Some(rate_hz) = rate_hz.filter(|_| self.shows_rates) {
+            pad(bytes);
+            let head = bytes.len();
+            bytes.resize(head + RATES_HEAD_LEN, 0);
+            let scale = match &mut self.vertices {
+                Some(vertices) => vertices.write(rate_hz, self.sample_type, bytes)?,
+                None => window::encode(Window::WHOLE, self.sample_type, rate_hz, bytes)?,
+            };
+            bytes[head..head + 4].copy_from_slice(&scale.to_le_bytes());
+        }
         if let Some(vertices) = &mut self.vertices {
             pad(bytes);
-            let scale = vertices.write(shown, self.sample_type, bytes)?;
-            return Ok(Written { kind, window: Window::EMPTY, scale });
+            let scale = vertices.write(sed_j_per_m3, self.sample_type, bytes)?;
+            return Ok(Written { window: Window::EMPTY, scale });
         }
         if !self.map {
-            return Ok(Written { kind, window: Window::EMPTY, scale: 1.0 });
+            return Ok(Written { window: Window::EMPTY, scale: 1.0 });
         }
         pad(bytes);
         let window = self
             .margin_px
             .map_or(Window::WHOLE, |margin| Window::around(sent_pa, self.contact_pa, margin));
-        let scale = window::encode(window, self.sample_type, shown, bytes)?;
-        Ok(Written { kind, window, scale })
+        let scale = window::encode(window, self.sample_type, sed_j_per_m3, bytes)?;
+        Ok(Written { window, scale })
     }
 }
 

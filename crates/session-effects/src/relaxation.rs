@@ -101,6 +101,11 @@ impl Relaxation {
         peak(pressure_pa)
     }
 
+    /// Nobody knows what presses: the tissue stays as it is, and no time passes until somebody does.
+    pub(super) fn lose(&mut self) {
+        self.last_us = None;
+    }
+
     /// Writes the history of every pixel.
     pub(super) fn save(&self, state: &mut Writer) {
         state.option(self.last_us);

@@ -111,6 +111,11 @@ impl Spikes {
         self.finger.step(time_us, sed_j_per_m3, &self.force_n);
     }
 
+    /// Nobody knows what presses: nothing fires, and membranes stay as they are until somebody does.
+    pub(super) fn lose(&mut self) {
+        self.finger.pause();
+    }
+
     /// Appends the section.
     pub(super) fn write(&self, time_us: u64, bytes: &mut BytesMut) {
         let end = bytes.len() + self.len();

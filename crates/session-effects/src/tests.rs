@@ -7,6 +7,7 @@ use papilla_proto::{
         Actuator, Afferents as AfferentParameters, ContactWindow, Layout, Place, PronyTerm,
         Relaxation as RelaxationParameters,
     },
+    spikes::Spikes as SpikeParameters,
 };
 use proptest::prelude::*;
 
@@ -112,7 +113,7 @@ fn sections_lie_where_they_are_said_to_be() {
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
     let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!(written.window, Window { x: 99, y: 99, width: 4, height: 3 });
-    assert_eq!((written.kind, bytes.len()), (FrameKind::Sed, 144 + 48));
+    assert_eq!(bytes.len(), 144 + 48);
     let summary = Summary::decode(&bytes[48..]).unwrap();
     assert!((summary.sed_max_j_per_m3 - 9.0).abs() < 1e-6);
     assert_eq!(floats(&bytes[112..120]), [7.0, 9.0]);
@@ -153,28 +154,170 @@ fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
     assert!(left > 400.0 && sent <= 0.0 && pixels == 0, "{left} {sent} {pixels}");
 }
 
+/// Values at sections, by name.
+fn section(effects: &Effects, bytes: &[u8], name: SectionName) -> Vec<f32> {
+    let section = effects.sections.iter().find(|section| section.name == name).unwrap();
+    floats(&bytes[section.offset as usize..][..section.bytes as usize])
+}
+
+/// Map and points stay SED; rates come beside them, with a scale of their own.
 #[test]
-fn afferents_show_rates_in_map_points_and_if_asked_actuators() {
+fn afferents_add_rates_and_change_no_sed() {
     let wish = Hello {
         points: Some(vec![Place::Px([100.5, 100.5])]),
         actuators: Some(Layout { input: ActuatorInput::Sa1Rate, ..display() }),
         answer_sample_type: Some(SampleType::U16),
-        ..hello(&["afferents", "points", "actuators", "summary"])
+        contact_window: Some(ContactWindow { margin_px: 1 }),
+        ..hello(&["afferents", "points", "actuators", "summary", "contact_window"])
     };
     let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     // 20 kPa at 80 kPa: 12 Hz.
     let map = vec![2500.0; MAP_LEN];
     let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
     let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
-    assert_eq!(written.kind, FrameKind::Sa1Rate);
-    let values = [floats(&bytes[112..116]), floats(&bytes[128..140])].concat();
-    assert!(values.iter().all(|hz| (hz - 12.0).abs() < 1e-3), "{values:?}");
-    let mut rates = vec![0.0; MAP_LEN];
-    SampleType::U16.decode(&bytes[144..], written.scale, &mut rates).unwrap();
-    assert!(rates.iter().all(|hz| (hz - 12.0).abs() < 1e-3));
+    assert_eq!(section(&effects, &bytes, SectionName::Points), [2500.0]);
+    let rates = section(&effects, &bytes, SectionName::PointRates);
+    let values = [rates, section(&effects, &bytes, SectionName::Actuators)].concat();
+    assert!(values.len() == 4 && values.iter().all(|hz| (hz - 12.0).abs() < 1e-3), "{values:?}");
+    let [rates, map] = [SectionName::Rates, SectionName::Map].map(|name| {
+        let section = effects.sections.iter().find(|section| section.name == name).unwrap();
+        &bytes[section.offset as usize..][..section.bytes as usize]
+    });
+    let scale = f32::from_le_bytes(rates[..4].try_into().unwrap());
+    let mut found = vec![0.0; MAP_LEN];
+    SampleType::U16.decode(&rates[RATES_HEAD_LEN..], scale, &mut found).unwrap();
+    assert!(found.iter().all(|hz| (hz - 12.0).abs() < 1e-3), "{scale}");
+    SampleType::U16.decode(map, written.scale, &mut found).unwrap();
+    assert!(found.iter().all(|sed| (sed - 2500.0).abs() < 0.1));
     let summary = Summary::decode(&bytes[48..]).unwrap();
     assert!((summary.sa1_rate_hz / (324.0 * 0.7 * 12.0) - 1.0).abs() < 1e-3);
     assert!((summary.sed_max_j_per_m3 - 2500.0).abs() < 1e-3, "the summary is of SED");
+}
+
+/// Who wants no map of rates says so, and who wants no map gets neither.
+#[test]
+fn rates_may_be_had_without_their_map() {
+    let names = |wish: Hello| {
+        let effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
+        effects.sections.iter().map(|section| section.name).collect::<Vec<_>>()
+    };
+    let summary = || hello(&["afferents", "summary"]);
+    let without = AfferentParameters { map: false, ..Default::default() };
+    let of_summary = Hello { afferents: Some(without), ..summary() };
+    assert_eq!(names(of_summary), [SectionName::Summary, SectionName::Map]);
+    assert_eq!(names(Hello { map: Some(false), ..summary() }), [SectionName::Summary]);
+    let all = [SectionName::Summary, SectionName::Rates, SectionName::Map];
+    assert_eq!(names(summary()), all);
+    let by_vertices = Hello { answer_layout: Some(SampleLayout::Vertices), ..summary() };
+    let all = [SectionName::Summary, SectionName::Rates, SectionName::Vertices];
+    assert_eq!(names(by_vertices), all);
+}
+
+/// A press that goes in and is held, frame by frame every 11.1 ms, by a clock that is rounded down.
+fn press_by_a_clock(effects: &mut Effects, tick_us: f64) -> (f64, u32, u32) {
+    let (mut hz_s, mut coarse, mut fired) = (0.0, 0, 0);
+    for frame in 0..180_u32 {
+        let true_us = 5e6 + 11_111.0 * f64::from(frame);
+        let stamp_us = ((true_us / tick_us).floor() * tick_us) as u64;
+        // Air, then in and out twice a second.
+        let phase = (f64::from(frame) - 30.0).max(0.0) * 11_111e-6 * std::f64::consts::TAU * 2.0;
+        let depth = (0.5 * (1.0 - phase.cos())) as f32;
+        let mut pressure_pa = vec![0.0; MAP_LEN];
+        let mut sed = vec![0.0; MAP_LEN];
+        for row in 95..125 {
+            pressure_pa[row * MAP_SIDE_PX + 95..][..30].fill(2e4 * depth);
+            sed[row * MAP_SIDE_PX + 95..][..30].fill(2e4 * depth * depth);
+        }
+        let time_us = effects.time_us(stamp_us);
+        coarse += u32::from(effects.clock_flags() != 0);
+        effects.before(&mut pressure_pa, time_us);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        effects.write(&pressure_pa, &sed, time_us, &mut bytes).unwrap();
+        hz_s += f64::from(section(effects, &bytes, SectionName::PointRates)[0]) * 11_111e-6;
+        let spikes = effects.sections.iter().find(|s| s.name == SectionName::Spikes).unwrap();
+        fired = u32::from_le_bytes(bytes[spikes.offset as usize..][..4].try_into().unwrap());
+    }
+    (hz_s, fired, coarse)
+}
+
+/// Browsers' clocks tick by 1 to 100 ms: rates and counts of spikes stay within a tenth, or the
+/// answer says that its clock is too coarse.
+#[test]
+fn a_coarse_clock_changes_rates_and_spikes_by_a_tenth_at_most_or_is_told() {
+    let wish = Hello {
+        map: Some(false),
+        points: Some(vec![Place::Px([110.5, 110.5])]),
+        spikes: Some(SpikeParameters { spikes_max: 4096, ..Default::default() }),
+        ..hello(&["afferents", "points", "spikes", "relaxation"])
+    };
+    let run = |tick_us: f64| {
+        let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
+        press_by_a_clock(&mut effects, tick_us)
+    };
+    let (hz_s, fired, coarse) = run(1.0);
+    assert!(hz_s > 10.0 && fired > 300 && coarse == 0, "{hz_s} {fired} {coarse}");
+    for tick_us in [1000.0, 4000.0, 16_666.7] {
+        let (found_hz_s, found, coarse) = run(tick_us);
+        assert!((found_hz_s / hz_s - 1.0).abs() < 0.1, "{tick_us}: {found_hz_s}, not {hz_s}");
+        let share = f64::from(found) / f64::from(fired);
+        assert!((share - 1.0).abs() < 0.1, "{tick_us}: {found} spikes, not {fired}");
+        assert_eq!(coarse, 0, "{tick_us}");
+    }
+    let (_, _, coarse) = run(100_000.0);
+    assert!(coarse > 160, "{coarse}");
+}
+
+/// Tracking that is lost under a held press: nothing is shown meanwhile, and nothing bursts when it
+/// comes back, be it at once elsewhere.
+#[test]
+fn lost_tracking_is_silent_and_forgets_nothing() {
+    let wish = Hello {
+        map: Some(false),
+        points: Some(vec![Place::Px([110.5, 110.5])]),
+        spikes: Some(SpikeParameters { spikes_max: 4096, ..Default::default() }),
+        ..hello(&["afferents", "points", "spikes", "relaxation", "summary"])
+    };
+    let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
+    let mut peak_pa = 0.0;
+    let mut frame = |effects: &mut Effects, ms: u64, tracked_pa: Option<f32>| {
+        let mut pressure_pa = vec![0.0; MAP_LEN];
+        let mut sed = vec![0.0; MAP_LEN];
+        let time_us = 1000 * ms;
+        if let Some(pa) = tracked_pa {
+            for row in 80..140 {
+                pressure_pa[row * MAP_SIDE_PX + 80..][..60].fill(pa);
+                sed[row * MAP_SIDE_PX + 80..][..60].fill(1e-4 * pa * pa);
+            }
+            let time_us = effects.time_us(time_us);
+            peak_pa = effects.before(&mut pressure_pa, time_us).unwrap();
+        } else {
+            effects.lose();
+        }
+        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        effects.write(&pressure_pa, &sed, time_us, &mut bytes).unwrap();
+        let hz = section(effects, &bytes, SectionName::PointRates)[0];
+        let at = effects.sections.iter().find(|s| s.name == SectionName::Spikes).unwrap().offset;
+        let here = u32::from_le_bytes(bytes[at as usize + 4..][..4].try_into().unwrap());
+        let summary = Summary::decode(&bytes[HEADER_LEN_V2..]).unwrap();
+        (hz, here, summary.force_n, peak_pa)
+    };
+    for ms in (0..1000).step_by(10) {
+        frame(&mut effects, ms, Some(1e4));
+    }
+    let (steady_hz, _, force_n, crept_pa) = frame(&mut effects, 1000, Some(1e4));
+    for ms in (1010..1500).step_by(10) {
+        let (hz, spikes, force_n, _) = frame(&mut effects, ms, None);
+        assert_eq!((hz.to_bits(), spikes, force_n.to_bits()), (0, 0, 0), "at {ms} ms");
+    }
+    let (hz, spikes, found_n, found_pa) = frame(&mut effects, 1500, Some(1e4));
+    assert!((hz - steady_hz).abs() < 0.05 * steady_hz && spikes == 0, "{hz} Hz, {spikes} spikes");
+    assert!((found_n - force_n).abs() < 1e-3 * force_n);
+    assert!((found_pa - crept_pa).abs() < 1e-3 * crept_pa, "{found_pa}, not {crept_pa}");
+    let (_, held, ..) = frame(&mut effects, 1510, Some(1e4));
+    frame(&mut effects, 1520, None);
+    // Three times as much: unfelt, since nobody saw it come.
+    let (_, spikes, ..) = frame(&mut effects, 1530, Some(3e4));
+    assert_eq!(spikes, 0, "{held} while it was held");
 }
 
 #[test]
@@ -239,7 +382,7 @@ proptest! {
         let wish = Hello {
             relaxation: Some(RelaxationParameters { prony, ..Default::default() }),
             afferents: Some(AfferentParameters {
-                e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa,
+                e_ref_kpa, theta_kpa, k_s_hz_per_kpa, k_d_hz_s_per_kpa, map: true,
             }),
             points: Some(vec![Place::Px([100.5, 100.5])]),
             actuators: Some(Layout { gain: Some(gain), ..display() }),

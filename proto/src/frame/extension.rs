@@ -14,13 +14,20 @@ pub mod flags {
     pub const UNSETTLED: u8 = 8;
     /// The contact reaches the edge of the atlas: what lies beyond is missing from the map.
     pub const CUT_OFF: u8 = 16;
+    /// Request: nobody knows where things are; the frame has no payload. Answer: to such a frame,
+    /// which is zero.
+    pub const NOT_TRACKED: u8 = 32;
+    /// The client's clock ticks so coarsely, or stands, that what depends on time may be far off.
+    pub const COARSE_CLOCK: u8 = 64;
     /// All of them by name.
-    pub const NAMED: [(u8, &str); 5] = [
+    pub const NAMED: [(u8, &str); 7] = [
         (OUT_OF_RANGE, "out_of_range"),
         (NO_CONTACT, "no_contact"),
         (UNFAMILIAR, "unfamiliar"),
         (UNSETTLED, "unsettled"),
         (CUT_OFF, "cut_off"),
+        (NOT_TRACKED, "not_tracked"),
+        (COARSE_CLOCK, "coarse_clock"),
     ];
 }
 
@@ -37,7 +44,7 @@ pub struct Extension {
     pub infer_us: u32,
     /// Answer: number of the tier, as `ready` gave it.
     pub tier: u16,
-    /// Answer: bits of [`flags`].
+    /// Bits of [`flags`]; in a request [`flags::NOT_TRACKED`] alone has a meaning.
     pub flags: u8,
     /// Number of the finger in version 3; none in version 2.
     pub finger: Option<u8>,

@@ -5,7 +5,7 @@ use crate::ErrorCode;
 
 fn any_header() -> impl Strategy<Value = FrameHeader> {
     let enums = (
-        prop::sample::select(vec![FrameKind::Pressure, FrameKind::Sed, FrameKind::Sa1Rate]),
+        prop::sample::select(vec![FrameKind::Pressure, FrameKind::Sed]),
         prop::sample::select(SampleType::ALL.to_vec()),
         prop::sample::select(vec![
             FrameStatus::Ok,

@@ -34,7 +34,9 @@ impl Clocked {
         // `hear_frame` takes the first 32 bytes off.
         let sed = floats_of(&payload[HEADER_LEN_V2 - 32..]);
         assert!(sed.iter().all(|v| v.is_finite() && *v >= 0.0));
-        (header, sed.get(100 * 224 + 100).copied())
+        // The map comes last.
+        let map = &sed[sed.len().saturating_sub(MAP_LEN)..];
+        (header, map.get(100 * 224 + 100).copied())
     }
 }
 
@@ -108,7 +110,7 @@ async fn firing_rates_stay_numbers_whatever_the_clock() {
     let mut session =
         Clocked::open(&service, &json!({"effects": ["afferents"], "afferents": most})).await;
     for time_us in [0, 1, 2, DAY_US, 3, u64::MAX, 0] {
-        // `held` asserts that they are.
+        // `held` asserts that they are; rates come before the map.
         assert!(session.held(time_us).await.1.unwrap() > 0.0);
     }
     let mut socket = service.socket().await;

@@ -329,8 +329,12 @@ async fn time_dependent_effects_follow_the_clients_clock() {
     let mut rate = async |sequence, seconds: f64, map: &[f32]| {
         socket.send(windowed(sequence, (1e6 * seconds) as u64, Window::WHOLE, map)).await;
         let (header, _, message) = socket.hear_2().await;
-        assert_eq!(header.kind, FrameKind::Sa1Rate);
-        floats_of(&message[48..52])[0]
+        assert_eq!(header.kind, FrameKind::Sed);
+        // Points are SED; the next section has their rates.
+        let sed = floats_of(&message[48..52])[0];
+        let hz = floats_of(&message[64..68])[0];
+        assert!((hz - (0.16 * sed).sqrt()).abs() < 1e-3 * hz.max(1.0), "{hz} Hz of {sed} J/m3");
+        hz
     };
     // G = 0.5 + 0.5 exp(-t): J = 2 - exp(-t / 2). SED is half the pressure that was filtered.
     let due = |t: f64| (0.16 * 2500.0 * (2.0 - (-0.5 * t).exp())).sqrt();
@@ -406,4 +410,42 @@ async fn a_contact_pressure_is_looked_at_whoever_uses_it() {
         assert_eq!(error["field"], "contact_pa", "{error}");
     }
     socket.open(hello_2(&json!({"contact_pa": 1.0}))).await;
+}
+
+/// A client that does not know what presses says so: the answer is zero, and nothing of it is felt.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_frame_that_is_not_tracked_shows_nothing_and_changes_nothing() {
+    let service = Service::start().await;
+    let mut socket = service.socket().await;
+    let wish = json!({
+        "effects": ["relaxation", "afferents", "points", "summary"], "map": false,
+        "points": [{"px": [110.5, 65.5]}],
+        "relaxation": {"prony": [{"g": 0.5, "tau_s": 1.0}]},
+    });
+    socket.open(hello_2(&wish)).await;
+    let mut hear = async |frame: Vec<u8>| {
+        socket.send(frame).await;
+        let (header, _, message) = socket.hear_2().await;
+        let summary = Summary::decode(&message[48..]).unwrap();
+        let [sed, hz] = [112, 128].map(|at| floats_of(&message[at..at + 4])[0]);
+        (header.extension.unwrap().flags, summary.force_n, sed, hz)
+    };
+    let press = |n: u32| windowed(n, 10_000 * u64::from(n), Window::WHOLE, &patch());
+    for n in 1..100 {
+        hear(press(n)).await;
+    }
+    let (flags_before, force_n, sed, hz) = hear(press(100)).await;
+    assert!(flags_before == 0 && force_n > 0.0 && hz > 0.0, "{flags_before} {force_n} {hz}");
+    for n in 101..110 {
+        let header = FrameHeader::pressure(n, 10_000 * u64::from(n), 0, SampleType::F32, 1.0);
+        let (found, force_n, sed, hz) = hear(header.not_tracked().encode().to_vec()).await;
+        assert_eq!(found, flags::NOT_TRACKED | flags::NO_CONTACT);
+        assert_eq!([force_n, sed, hz].map(f32::to_bits), [0; 3]);
+    }
+    let (flags_after, found_n, found_sed, found_hz) = hear(press(110)).await;
+    assert_eq!(flags_after, 0);
+    assert!((found_n - force_n).abs() < 1e-4 * force_n, "{found_n}, not {force_n}");
+    // Creep goes on where it was, and no jump is felt.
+    assert!((found_sed - sed).abs() < 0.02 * sed, "{found_sed}, not {sed}");
+    assert!((found_hz - hz).abs() < 0.05 * hz, "{found_hz}, not {hz}");
 }

@@ -1,7 +1,8 @@
 //! The effect `spikes` over the wire: units in `ready`, spikes in answers, refusals.
 
 use papilla_proto::{
-    FrameStatus, HEADER_LEN_V2, MAP_LEN, MAP_SIDE_PX, SampleType, Window, spikes::Fired,
+    FrameStatus, HEADER_LEN_V2, MAP_LEN, MAP_SIDE_PX, SampleType, Window, effects::RATES_HEAD_LEN,
+    spikes::Fired,
 };
 use serde_json::{Value, json};
 
@@ -91,11 +92,12 @@ async fn sessions_without_the_effect_have_no_units_and_no_section() {
     assert_eq!(ready.get("units"), None, "{ready}");
     let names: Vec<_> =
         ready["sections"].as_array().unwrap().iter().map(|section| &section["name"]).collect();
-    assert_eq!(names, ["summary", "map"]);
+    assert_eq!(names, ["summary", "rates", "map"]);
     let time_us = 20_000;
     socket.send(windowed(1, time_us, Window::WHOLE, &press(time_us))).await;
     let (_, payload) = socket.hear_frame().await;
-    assert_eq!(payload.len(), HEADER_LEN_V2 - 32 + 64 + 4 * MAP_LEN);
+    let rates_len = RATES_HEAD_LEN + 4 * MAP_LEN;
+    assert_eq!(payload.len(), HEADER_LEN_V2 - 32 + 64 + rates_len + 4 * MAP_LEN);
 }
 
 #[tokio::test(flavor = "multi_thread")]

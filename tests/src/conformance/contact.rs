@@ -150,7 +150,12 @@ impl ContactRecorder {
                     let sum: f64 = pressure_pa.iter().map(|p| f64::from(*p)).sum();
                     step["expect"]["pressure_sum"] = pair((&sum, (0.02, 10.0)));
                 }
-                let flags = if touch[13] > 0.0 { json!([]) } else { json!(["no_contact"]) };
+                let is_lost = step["do"] == "touch" && step["poses"].is_null();
+                let flags = match (touch[13] > 0.0, is_lost) {
+                    (true, _) => json!([]),
+                    (false, false) => json!(["no_contact"]),
+                    (false, true) => json!(["no_contact", "not_tracked"]),
+                };
                 step["expect"]["flags"] = flags;
             }
             other => return Err(format!("there is no step '{other:?}'")),
@@ -209,6 +214,10 @@ impl ContactRecorder {
             return Err("'net' is due where the hello has force_target, and there alone".to_owned());
         }
         let mut out = Contact::new(self.model.vertices());
+        if step["do"] == "touch" && step["poses"].is_null() {
+            // Not tracked: nothing is solved, and solvers keep what they have.
+            return Ok(([0.0; 15], out.pressure_pa));
+        }
         let (mut objects, mut depth_mm, mut moved_mm) = (Vec::new(), Vec::new(), Vec::new());
         let scene = if step["do"] == "gaps" {
             let sphere: [f64; 4] = member(step, "sphere")?;

@@ -1,6 +1,6 @@
 //! Numbers with their tolerances, as the file has them.
 
-use papilla_proto::{FrameKind, MAP_LEN, MAP_SIDE_PX, Window};
+use papilla_proto::{MAP_LEN, MAP_SIDE_PX, Window};
 use serde_json::{Value, json};
 
 /// What a step is to find. Pairs are value and absolute tolerance.
@@ -9,10 +9,12 @@ pub(super) struct Due {
     pub(super) tolerance: Vec<f64>,
     pub(super) relative: f64,
     pub(super) map: bool,
-    pub(super) kind: Option<FrameKind>,
     pub(super) window: Option<Window>,
     pub(super) summary: Vec<[f64; 2]>,
+    /// The map of firing rates.
+    pub(super) rates: Option<Box<Due>>,
     pub(super) points: Vec<[f64; 2]>,
+    pub(super) point_rates: Vec<[f64; 2]>,
     pub(super) actuators: Vec<[f64; 2]>,
     pub(super) force_n: f64,
 }
@@ -39,10 +41,11 @@ impl Due {
             tolerance: vec![relative * top; MAP_LEN],
             relative,
             map: true,
-            kind: None,
             window: None,
             summary: Vec::new(),
+            rates: None,
             points: Vec::new(),
+            point_rates: Vec::new(),
             actuators: Vec::new(),
             force_n: 0.0,
         }
@@ -50,6 +53,9 @@ impl Due {
 
     /// Writes the numbers that `expect` asks for, in whatever state they are.
     pub(super) fn fill(&self, expect: &mut Value) {
+        if let (Some(rates), Some(expect)) = (&self.rates, expect.get_mut("rates")) {
+            rates.fill(expect);
+        }
         let Some(expect) = expect.as_object_mut() else { return };
         let mut set = |name: &str, value: Value| {
             if let Some(old) = expect.get_mut(name) {
@@ -64,6 +70,7 @@ impl Due {
         set("force_n", pair([self.force_n, 1e-4 * self.force_n]));
         set("summary", self.summary.iter().copied().map(pair).collect());
         set("points", self.points.iter().copied().map(pair).collect());
+        set("point_rates", self.point_rates.iter().copied().map(pair).collect());
         set("actuators", self.actuators.iter().copied().map(pair).collect());
         if let Some(Window { x, y, width, height }) = self.window {
             set("window", json!([x, y, width, height]));

@@ -1,8 +1,8 @@
 //! A session as the documentation describes it: what its effects make of the engine's maps.
 
 use papilla_proto::{
-    FrameKind, Hello, MAP_LEN, RuntimeEffect, SampleType, Window,
-    effects::{Moduli, OutOfRange, Relaxation},
+    Hello, MAP_LEN, RuntimeEffect, SampleType, Window,
+    effects::{ActuatorInput, Moduli, OutOfRange, Relaxation},
 };
 
 use super::{
@@ -13,6 +13,11 @@ use super::{
 
 /// Relative tolerance of a map, of its greatest value: other processors, other kernels.
 const MAP_TOLERANCE: f64 = 2e-4;
+
+/// The same of firing rates.
+const RATE_TOLERANCE: f64 = 2e-3;
+/// Of SED at points.
+const POINT_TOLERANCE: f64 = MAP_TOLERANCE;
 
 /// The state of a session.
 pub(super) struct Session {
@@ -29,7 +34,7 @@ pub(super) struct Session {
 pub(super) struct Answer {
     sed: Vec<f64>,
     rate_hz: Option<Vec<f64>>,
-    /// Tolerance of every pixel of the map.
+    /// Tolerance of every pixel of the map of SED.
     tolerance: Vec<f64>,
 }
 
@@ -80,8 +85,7 @@ impl Session {
         };
         let rate_hz: Vec<f64> = (0..MAP_LEN).map(rate).collect();
         self.stress = Some((now_s, stress));
-        let top = rate_hz.iter().copied().fold(0.0, f64::max);
-        Ok(Answer { sed, rate_hz: Some(rate_hz), tolerance: vec![2e-3 * top; MAP_LEN] })
+        Ok(Answer { sed, rate_hz: Some(rate_hz), tolerance })
     }
 
     /// What the network sees: no pressure beyond its range, unless it was asked to extrapolate.
@@ -127,7 +131,7 @@ impl Session {
         (skin, interface): (&Surface, &Surface),
     ) -> Result<Due, String> {
         let contact_pa = self.hello.contact_pa.unwrap_or(0.0);
-        let whole = answer.rate_hz.as_ref().unwrap_or(&answer.sed);
+        let whole = &answer.sed;
         let mut map = whole.clone();
         let mut window = Window::WHOLE;
         if self.has(RuntimeEffect::ContactWindow) {
@@ -136,13 +140,21 @@ impl Session {
             let kept: Vec<usize> = window.rows().flatten().collect();
             (0..MAP_LEN).filter(|i| kept.binary_search(i).is_err()).for_each(|i| map[i] = 0.0);
         }
-        let relative = if answer.rate_hz.is_some() { 2e-3 } else { MAP_TOLERANCE };
-        let top = whole.iter().copied().fold(0.0, f64::max);
-        let near = |value: f64, scale: f64| [value, relative * scale.abs().max(1e-9)];
-        let mut due = Due { window: Some(window), ..Due::of_map(&map, relative) };
+        let most = |map: &[f64]| map.iter().copied().fold(0.0, f64::max);
+        let near = |value: f64, size: f64| [value, size.abs().max(1e-9)];
+        let mut due = Due { window: Some(window), ..Due::of_map(&map, MAP_TOLERANCE) };
         due.tolerance = answer.tolerance.clone();
         due.map = self.hello.map.unwrap_or(true);
-        due.kind = Some(if answer.rate_hz.is_some() { FrameKind::Sa1Rate } else { FrameKind::Sed });
+        // Half a unit of the smallest samples counts beside other kernels.
+        let rounding = match self.hello.answer_sample_type.unwrap_or(self.hello.sample_type) {
+            SampleType::F32 | SampleType::F16 => 0.0,
+            scaled @ (SampleType::U16 | SampleType::U8) => 0.51 / f64::from(scaled.unit_max()),
+        };
+        let of_rates = |map: &[f64]| RATE_TOLERANCE.max(rounding) * most(map);
+        if let Some(rate_hz) = &answer.rate_hz {
+            let tolerance = vec![of_rates(rate_hz); MAP_LEN];
+            due.rates = Some(Box::new(Due { tolerance, ..Due::of_map(rate_hz, RATE_TOLERANCE) }));
+        }
         if self.has(RuntimeEffect::Summary) {
             let values = summary(
                 (skin, interface),
@@ -158,11 +170,19 @@ impl Session {
             due.summary = values.iter().enumerate().map(one).collect();
         }
         for place in self.hello.points.iter().flatten() {
-            due.points.push(near(interface.at(*place, whole), top));
+            due.points.push(near(interface.at(*place, whole), POINT_TOLERANCE * most(whole)));
+            if let Some(rate_hz) = &answer.rate_hz {
+                let found = interface.at(*place, rate_hz);
+                due.point_rates.push(near(found, RATE_TOLERANCE * most(rate_hz)));
+            }
         }
         if let Some(layout) = &self.hello.actuators {
             for one in &layout.actuators {
-                due.actuators.push([interface.intensity(layout, one, whole), 2e-3]);
+                let input = match layout.input {
+                    ActuatorInput::Sed => whole,
+                    ActuatorInput::Sa1Rate => answer.rate_hz.as_ref().unwrap_or(whole),
+                };
+                due.actuators.push([interface.intensity(layout, one, input), 2e-3]);
             }
         }
         Ok(due)

@@ -165,6 +165,26 @@ pub(crate) unsafe extern "C" fn papilla_send_map(
     unsafe { handle::with(session, work) }
 }
 
+/// Tells that nobody knows where things are, or what presses.
+///
+/// # Safety
+/// `session` is null or of this library, `answer` is null or room for one.
+#[unsafe(no_mangle)]
+pub(crate) unsafe extern "C" fn papilla_send_not_tracked(
+    session: *mut PapillaSession,
+    finger: u8,
+    time_us: u64,
+    answer: *mut PapillaAnswer,
+) -> i32 {
+    let work = |handle: &mut PapillaSession| {
+        // SAFETY: as the caller promises.
+        let answer = unsafe { handle::room("answer", answer)? };
+        handle.send(answer, |session| session.send_not_tracked(finger, time_us))
+    };
+    // SAFETY: as the caller promises.
+    unsafe { handle::with(session, work) }
+}
+
 /// Renders what presses where objects are.
 ///
 /// # Safety

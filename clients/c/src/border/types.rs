@@ -2,7 +2,7 @@
 
 use std::ffi::c_char;
 
-use papilla_proto::{FrameKind, Window, contact::Pose};
+use papilla_proto::{Window, contact::Pose};
 
 use crate::Answer;
 
@@ -67,7 +67,7 @@ pub(crate) struct PapillaNetForce {
 #[repr(C)]
 pub(crate) struct PapillaAnswer {
     flags: u32,
-    kind: u32,
+    has_sed: u32,
     column: u32,
     row: u32,
     width: u32,
@@ -75,7 +75,9 @@ pub(crate) struct PapillaAnswer {
     map: PapillaSamples,
     vertices: PapillaSamples,
     pressure_pa: PapillaSamples,
+    rates_hz: PapillaSamples,
     points: PapillaSamples,
+    point_rates_hz: PapillaSamples,
     actuators: PapillaSamples,
     summary: *const f32,
     touch: *const f32,
@@ -87,7 +89,7 @@ impl From<Answer<'_>> for PapillaAnswer {
         let sixteen = |values: &[f32]| PapillaSamples::from(values).data;
         Self {
             flags: u32::from(answer.flags),
-            kind: answer.kind.map_or(0, |kind: FrameKind| kind as u32),
+            has_sed: answer.has_sed.into(),
             column: u32::from(x),
             row: u32::from(y),
             width: u32::from(width),
@@ -95,7 +97,9 @@ impl From<Answer<'_>> for PapillaAnswer {
             map: answer.map.into(),
             vertices: answer.vertices.into(),
             pressure_pa: answer.pressure_pa.into(),
+            rates_hz: answer.rates_hz.into(),
             points: answer.points.into(),
+            point_rates_hz: answer.point_rates_hz.into(),
             actuators: answer.actuators.into(),
             summary: sixteen(answer.summary),
             touch: sixteen(answer.touch),
@@ -109,5 +113,5 @@ const _: () = {
     use std::mem::offset_of;
     assert!(size_of::<PapillaPose>() == 28 && size_of::<PapillaNetForce>() == 16);
     assert!(size_of::<PapillaModelInfo>() == 80 && offset_of!(PapillaModelInfo, triangles) == 40);
-    assert!(size_of::<PapillaAnswer>() == 120 && offset_of!(PapillaAnswer, map) == 24);
+    assert!(size_of::<PapillaAnswer>() == 152 && offset_of!(PapillaAnswer, map) == 24);
 };

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -25,18 +26,25 @@ enum SummaryMember : std::size_t {
   sed_vv_px2, sed_mean_j_per_m3, sa1_rate_hz
 };
 
+/// An answer was asked for what its session does not carry.
+struct NotCarried : std::logic_error {
+  NotCarried(const char* member, const char* advice)
+      : std::logic_error(std::string("the answer carries no ") + member + ": " + advice) {}
+};
+
 /// The outcome of one frame.
 struct Answer {
   std::uint32_t sequence = 0;
   Status status = Status::lost;
   bool by_client = false;             ///< superseded here: the frame never left
   Problem problem;                    ///< with status error
-  Kind kind = Kind::sed;
   bool out_of_range = false;          ///< a pressure is above what the tier was trained on
   bool no_contact = false;            ///< the map is zero; no network was asked
   bool cut_off = false;               ///< the contact reaches the edge of the atlas
   bool unfamiliar = false;            ///< rougher or heavier than any map the tier was trained on
   bool unsettled = false;             ///< the contact solve did not settle: its answer is rough
+  bool not_tracked = false;           ///< to `send_not_tracked`: all is zero
+  bool coarse_clock = false;          ///< the client's clock ticks so coarsely that rates and spikes may be far off
   std::uint8_t finger = 0;
   std::string tier;
   Window window{0, 0, 0, 0};          ///< of `values`
@@ -45,14 +53,16 @@ struct Answer {
   std::uint32_t queue_us = 0;         ///< waiting for a thread
   std::uint32_t infer_us = 0;         ///< in the network
   bool has_map = false;
-  std::vector<float> values;          ///< the window's samples, J/m3 (or Hz), row by row
+  std::vector<float> values;          ///< SED of the window, J/m3, row by row
   bool has_touch = false;
   Touch touch;                        ///< of poses and of gaps
   std::vector<float> pressure_pa;     ///< that was found, if asked for: a map, or a value a vertex
   std::vector<float> vertices;        ///< SED at the atlas' vertices, if asked for in place of a map
   bool has_summary = false;
   std::array<float, 16> summary{};    ///< see SummaryMember
-  std::vector<float> points;
+  std::vector<float> rates_hz;        ///< firing rates, a whole map or a value a vertex: the effect `afferents`
+  std::vector<float> points;          ///< SED at the points, J/m3
+  std::vector<float> point_rates_hz;  ///< firing rates there: the effect `afferents`
   std::vector<float> actuators;
 
   /// Nothing of another frame is left in an answer that was not rendered; memory stays.
@@ -61,15 +71,27 @@ struct Answer {
     window = {0, 0, 0, 0};
     touch = {};
     summary = {};
-    for (auto* const list : {&values, &pressure_pa, &vertices, &points, &actuators}) list->clear();
+    for (auto* const list : {&values, &pressure_pa, &vertices, &rates_hz, &points, &point_rates_hz, &actuators}) list->clear();
   }
   void forget_head() {
-    out_of_range = no_contact = cut_off = unfamiliar = unsettled = false;
+    out_of_range = no_contact = cut_off = unfamiliar = unsettled = not_tracked = coarse_clock = false;
     total_us = queue_us = infer_us = 0;
     tier.clear();
   }
 
-  /// Value at a pixel of the map; 0 outside of the window.
+  /// The firing rate at a pixel, Hz. Throws `NotCarried` where the answer has no map of rates: the hello has to
+  /// name the effect `afferents`.
+  float rate_hz(int row, int column) const {
+    if (rates_hz.size() != map_len) throw NotCarried("rates_hz", "name the effect 'afferents' in the hello");
+    return rates_hz[std::size_t(row) * side_px + std::size_t(column)];
+  }
+  /// SED at a pixel, J/m3; 0 outside of the window. Throws `NotCarried` where the answer has no map.
+  float sed(int row, int column) const {
+    if (!has_map) throw NotCarried("sed", status == Status::ok ? "the hello asks for no map" : "the frame was not rendered");
+    return at(row, column);
+  }
+
+  /// SED at a pixel of the map, J/m3; 0 outside of the window and without a map.
   float at(int row, int column) const {
     const int r = row - window.row, c = column - window.column;
     const bool inside = has_map && r >= 0 && c >= 0 && r < window.height && c < window.width;
@@ -97,18 +119,20 @@ struct Ready {
   std::uint64_t tier_number = 0;
   float pressure_max_pa = 0.0F;
   std::string atlas_hash;
-  Section touch, pressure, vertices, summary, points, actuators, map;
+  Section touch, pressure, vertices, summary, rates, points, point_rates, actuators, map;
 
   /// The section of that name; null if there is no such section.
   Section* section(std::string_view name) {
-    return name == "touch"       ? &touch
-           : name == "pressure"  ? &pressure
-           : name == "vertices"  ? &vertices
-           : name == "summary"   ? &summary
-           : name == "points"    ? &points
-           : name == "actuators" ? &actuators
-           : name == "map"       ? &map
-                                 : nullptr;
+    return name == "touch"         ? &touch
+           : name == "pressure"    ? &pressure
+           : name == "vertices"    ? &vertices
+           : name == "summary"     ? &summary
+           : name == "rates"       ? &rates
+           : name == "points"      ? &points
+           : name == "point_rates" ? &point_rates
+           : name == "actuators"   ? &actuators
+           : name == "map"         ? &map
+                                   : nullptr;
   }
 };
 

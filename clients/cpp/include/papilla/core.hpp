@@ -130,6 +130,15 @@ class Core {
     return frame.id.sequence;
   }
 
+  /// Takes that nobody knows where things are, or what presses: tracking is lost. The answer is zero, and what the
+  /// service remembers waits for the next frame.
+  std::uint32_t send_not_tracked(std::uint64_t client_time_us, std::uint8_t finger = 0) {
+    // Of any session: kind and sample type of a frame without samples mean nothing.
+    Header header = header_of(Kind::pressure, {0, 0, 0, 0}, client_time_us, finger);
+    header.flags = wire::not_tracked;
+    return put(header, 0).id.sequence;
+  }
+
   /// The frame that waits, if there is one and a session to send it in; it then counts as sent.
   /// The bytes stay until the next call. A frame encoded for older terms is encoded anew.
   Outgoing* take() {
@@ -205,12 +214,13 @@ class Core {
     const Ready& ready = history_[sent.ready];
     if (ready.map.there && !header.window.inside()) return Event::broken;
     Answer& answer = scratch_;
-    answer.kind = header.kind;
     answer.out_of_range = (header.flags & wire::out_of_range) != 0;
     answer.no_contact = (header.flags & wire::no_contact) != 0;
     answer.unfamiliar = (header.flags & wire::unfamiliar) != 0;
     answer.cut_off = (header.flags & wire::cut_off) != 0;
     answer.unsettled = (header.flags & wire::unsettled) != 0;
+    answer.not_tracked = (header.flags & wire::not_tracked) != 0;
+    answer.coarse_clock = (header.flags & wire::coarse_clock) != 0;
     answer.window = header.window;
     answer.total_us = header.time_us;
     answer.queue_us = header.queue_us;
@@ -267,7 +277,9 @@ class Core {
     scratch_.values.reserve(map_len);
     scratch_.pressure_pa.reserve(ready.pressure.bytes / 4);
     scratch_.vertices.reserve(ready.vertices.bytes);
+    scratch_.rates_hz.reserve(ready.rates.bytes);
     scratch_.points.reserve(ready.points.bytes / 4);
+    scratch_.point_rates_hz.reserve(ready.point_rates.bytes / 4);
     scratch_.actuators.reserve(ready.actuators.bytes / 4);
     history_.push_back(std::move(ready));
     is_ready_ = true;
@@ -291,6 +303,16 @@ class Core {
     decode_samples(header.sample_type, bytes + ready.vertices.offset, answer.vertices.size(), header.scale,
                    answer.vertices.data());
     answer.has_summary = ready.summary.there && ready.summary.bytes == 64;
+    answer.rates_hz.clear();
+    if (ready.rates.there) {
+      if (ready.rates.bytes < wire::rates_head_bytes || ready.rates.offset + ready.rates.bytes > size) return false;
+      const std::uint8_t* const at = bytes + ready.rates.offset;
+      answer.rates_hz.resize((ready.rates.bytes - wire::rates_head_bytes) / sample_bytes(header.sample_type));
+      decode_samples(header.sample_type, at + wire::rates_head_bytes, answer.rates_hz.size(), wire::get_float(at),
+                     answer.rates_hz.data());
+    }
+    answer.point_rates_hz.resize(ready.point_rates.bytes / 4);
+    if (!floats(ready.point_rates, answer.point_rates_hz.data())) return false;
     answer.points.resize(ready.points.bytes / 4);
     answer.actuators.resize(ready.actuators.bytes / 4);
     if (answer.has_summary && !floats(ready.summary, answer.summary.data())) return false;
@@ -405,7 +427,7 @@ class Core {
   void recode(Outgoing& frame) {
     std::uint8_t* at = frame.data();
     at[4] = history_.back().version;
-    if (at[5] != static_cast<std::uint8_t>(Kind::pressure)) return;
+    if (at[5] != static_cast<std::uint8_t>(Kind::pressure) || frame.size == header_bytes) return;
     const auto old = static_cast<SampleType>(at[6]);
     const SampleType now = history_.back().sample_type;
     if (old == now) return;

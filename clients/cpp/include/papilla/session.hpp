@@ -98,6 +98,12 @@ class Session {
     return hand_over([&] { return core_.send_gaps(depth_mm, count, client_time_us, finger, net); });
   }
 
+  /// Hands over that tracking of the finger is lost. Better than an old pose, or one of zeros: the answer is zero, no
+  /// unit fires, and nothing bursts when tracking comes back.
+  std::uint32_t send_not_tracked(std::uint8_t finger = 0, std::uint64_t client_time_us = now_us()) {
+    return hand_over([&] { return core_.send_not_tracked(client_time_us, finger); });
+  }
+
   /// The finger's newest answer with status ok, once; false if none came since. Swaps, so that
   /// nothing is copied: `mine` is what a game loop calls this with every frame.
   bool latest(Answer& mine, std::uint8_t finger = 0) {
@@ -118,6 +124,11 @@ class Session {
   const Answer& touch(const std::vector<Pose>& poses, std::uint8_t finger = 0, const NetForce* net = nullptr,
                       int timeout_ms = 30000) {
     return await([&] { return core_.send_poses(poses.data(), poses.size(), now_us(), finger, net); }, timeout_ms);
+  }
+
+  /// `send_not_tracked`, and waits for the outcome.
+  const Answer& not_tracked(std::uint8_t finger = 0, int timeout_ms = 30000) {
+    return await([&] { return core_.send_not_tracked(now_us(), finger); }, timeout_ms);
   }
 
   /// `send_gaps`, and waits for the outcome.

@@ -19,7 +19,7 @@ enum class SampleType : std::uint8_t { f32 = 0, f16 = 1, u16 = 2, u8 = 3 };
 /// What became of a frame. The first five are the wire's numbers.
 enum class Status : std::uint8_t { ok = 0, superseded = 1, late = 2, error = 3, stale = 4, lost = 5 };
 
-enum class Kind : std::uint8_t { pressure = 1, sed = 2, sa1_rate = 3, objects = 4, gaps = 5 };
+enum class Kind : std::uint8_t { pressure = 1, sed = 2, objects = 4, gaps = 5 };
 
 /// A rectangle of the map, pixels; the default is all of it.
 struct Window {
@@ -50,8 +50,13 @@ struct Header {
 
 namespace wire {
 
-/// Bits of an answer's flags.
-enum Flag : std::uint8_t { out_of_range = 1, no_contact = 2, unfamiliar = 4, unsettled = 8, cut_off = 16 };
+/// Bits of an answer's flags; `not_tracked` also of a request.
+enum Flag : std::uint8_t {
+  out_of_range = 1, no_contact = 2, unfamiliar = 4, unsettled = 8, cut_off = 16, not_tracked = 32, coarse_clock = 64
+};
+
+/// Before the samples of the section `rates`: their scale, and zeros.
+constexpr std::size_t rates_head_bytes = 16;
 
 /// Little-endian, whatever the machine is; compilers make one move of it.
 template <class T>
@@ -95,13 +100,14 @@ inline void encode(const Header& header, std::uint8_t* at) {
   put_float(at + 28, header.scale);
   put(at + 32, header.window.column);
   put(at + 34, header.window.row);
+  at[46] = header.flags;
   at[47] = header.finger;
 }
 
 /// Reads an answer's header; false if it is none.
 inline bool decode(const std::uint8_t* at, std::size_t size, Header& header) {
   if (size < header_bytes || std::memcmp(at, "PPL1", 4) != 0 || (at[4] != 2 && at[4] != 3)) return false;
-  if ((at[5] != 2 && at[5] != 3) || at[6] > 3 || at[7] > 4) return false;
+  if (at[5] != 2 || at[6] > 3 || at[7] > 4) return false;
   header.kind = static_cast<Kind>(at[5]);
   header.sample_type = static_cast<SampleType>(at[6]);
   header.status = static_cast<Status>(at[7]);

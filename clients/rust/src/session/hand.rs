@@ -75,6 +75,38 @@ impl Session {
         self.send_rows(FrameKind::Gaps, finger, size, &payload)
     }
 
+    /// Hands over that tracking of a finger is lost, and returns at once. Better than an old pose, or
+    /// one of zeros: the answer is zero, no unit fires, and nothing bursts when tracking comes back.
+    ///
+    /// # Errors
+    /// The session is over.
+    pub fn send_not_tracked(&self, finger: u8) -> Result<oneshot::Receiver<Answer>, PapillaError> {
+        let time_us = now_us();
+        let version = self.ready().version;
+        let message = |sequence| {
+            let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0);
+            // Of any session: kind and sample type of a frame without samples mean nothing.
+            let header = if version > 2 {
+                header.of_finger(FrameKind::Pressure, finger, [0, 0])
+            } else {
+                header
+            };
+            Ok::<_, Problem>(header.not_tracked().encode().to_vec())
+        };
+        let outcome = self.shared.state().put_message(finger, time_us, message)?;
+        self.shared.wake.notify_one();
+        Ok(outcome)
+    }
+
+    /// [`send_not_tracked`](Self::send_not_tracked), and waits for the outcome.
+    ///
+    /// # Errors
+    /// As [`send_not_tracked`](Self::send_not_tracked).
+    pub async fn not_tracked(&self, finger: u8) -> Result<Answer, PapillaError> {
+        let outcome = self.send_not_tracked(finger)?;
+        outcome.await.map_err(|_| PapillaError::Closed)
+    }
+
     fn send_rows(
         &self,
         kind: FrameKind,

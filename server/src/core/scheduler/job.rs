@@ -8,7 +8,7 @@ use std::{
 use bytes::{Bytes, BytesMut};
 use papilla_codec::{Input, Output};
 use papilla_metrics::Stage;
-use papilla_proto::{FrameHeader, FrameKind, Problem, Window, effects::OutOfRange};
+use papilla_proto::{FrameHeader, Problem, Window, effects::OutOfRange};
 use papilla_session_contact::Finger;
 use papilla_session_effects::Effects;
 
@@ -99,8 +99,6 @@ pub(crate) enum Outcome {
 /// What the payload of an answer holds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OutputMeta {
-    /// What the samples show.
-    pub(crate) kind: FrameKind,
     /// The pixels that are sent.
     pub(crate) window: Window,
     /// Bits of [`papilla_proto::flags`].
@@ -109,7 +107,7 @@ pub(crate) struct OutputMeta {
 
 impl Default for OutputMeta {
     fn default() -> Self {
-        Self { kind: FrameKind::Sed, window: Window::WHOLE, flags: 0 }
+        Self { window: Window::WHOLE, flags: 0 }
     }
 }
 

@@ -10,9 +10,10 @@ use std::{
 use papilla_codec::{Input, Map, Quantity, decode, encode};
 use papilla_engine::Session;
 use papilla_metrics::{Metrics, Stage};
-use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem};
+use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
 use papilla_render::{Judged, Maps};
 use papilla_session_contact::{Finger, Frame};
+use papilla_session_effects::Effects;
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
@@ -140,14 +141,20 @@ impl Worker {
         let mut finger = options.finger.as_ref().map(|f| lock(f));
         // Without anything that shows SED, poses go in and forces come out.
         let shows_sed = finger.is_none() || effects.as_ref().is_none_or(|e| e.shows_sed());
-        let (mut summary, range) = match &mut finger {
-            Some(finger) => self.take(job, finger, &payload, shows_sed, meta)?,
-            None => self.decode(job, &payload)?,
+        let is_tracked = options.header.is_none_or(|header| header.is_tracked());
+        let (mut summary, range) = if !is_tracked {
+            self.lose(job, finger.as_deref_mut(), effects.as_deref_mut(), meta)
+        } else if let Some(finger) = &mut finger {
+            self.take(job, finger, &payload, shows_sed, meta)?
+        } else {
+            self.decode(job, &payload)?
         };
         drop(payload);
         let tier = &self.catalogue.tiers[job.tier];
-        let &JobOptions { headroom, time_us, .. } = options;
-        if let Some(effects) = &mut effects {
+        let &JobOptions { headroom, mut time_us, .. } = options;
+        if let Some(effects) = effects.as_mut().filter(|_| is_tracked) {
+            time_us = effects.time_us(time_us);
+            meta.flags |= effects.clock_flags();
             let peak_pa = effects.before(&mut self.maps.pressure_pa, time_us);
             summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
         }
@@ -207,7 +214,7 @@ impl Worker {
             let written = effects
                 .write(pressure_pa, sed, time_us, buffer)
                 .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
-            (meta.kind, meta.window) = (written.kind, written.window);
+            meta.window = written.window;
             (buffer.split(), written.scale)
         } else {
             let buffer = recycler.claim(headroom + job.output.size_hint() + extra);
@@ -226,6 +233,26 @@ impl Worker {
         };
         times.encode = start.elapsed();
         Ok(Outcome::Map { bytes, scale })
+    }
+
+    /// Takes a frame of a client that does not know where things are, or what presses: nothing is
+    /// shown, and what finger and effects remember waits for the next frame.
+    fn lose(
+        &mut self,
+        job: &Job,
+        finger: Option<&mut Finger>,
+        effects: Option<&mut Effects>,
+        meta: &mut OutputMeta,
+    ) -> (MapSummary, PressureRange) {
+        self.maps.pressure_pa.fill(0.0);
+        if let Some(finger) = finger {
+            finger.lose();
+        }
+        if let Some(effects) = effects {
+            effects.lose();
+        }
+        meta.flags |= flags::NOT_TRACKED | flags::NO_CONTACT;
+        (MapSummary { peak_pa: 0.0 }, self.range(job))
     }
 
     /// Reads a frame of version 3; pressure on a finger of reference stiffness is left.

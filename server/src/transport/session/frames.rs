@@ -284,7 +284,7 @@ impl Session {
             return wrong_type("status", "the status of a request is 0".to_owned());
         }
         let sample_type = self.terms.sample_type;
-        if header.sample_type != sample_type {
+        if header.sample_type != sample_type && header.is_tracked() {
             let message =
                 format!("the hello announced {sample_type:?}, not {:?}", header.sample_type);
             return wrong_type("sample_type", message);

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use papilla_session_state::Clock;
+
 /// How fast the best delay seen so far is forgotten: clocks drift by some 50 ppm at most.
 const DRIFT: f64 = 200e-6;
 
@@ -20,6 +22,8 @@ pub(super) struct Freshness {
     newest: Option<u32>,
     fastest: Option<Fastest>,
     in_a_row: u32,
+    /// Of a clock that ticks coarsely, the end of a tick is not held up.
+    clock: Clock,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +36,8 @@ struct Fastest {
 impl Freshness {
     pub(super) fn new(stale_after_us: Option<u32>) -> Self {
         let begun = Instant::now();
-        Self { begun, stale_after_us, newest: None, fastest: None, in_a_row: 0 }
+        let clock = Clock::new();
+        Self { begun, stale_after_us, newest: None, fastest: None, in_a_row: 0, clock }
     }
 
     /// Whether a frame is stale; if it is not, it is the newest from now on.
@@ -56,6 +61,7 @@ impl Freshness {
 
     fn is_held_up(&mut self, client_time_us: u64, received: Instant) -> bool {
         let Some(stale_after_us) = self.stale_after_us else { return false };
+        let client_time_us = self.clock.time_us(client_time_us);
         let since_begun = received.saturating_duration_since(self.begun);
         // Any clock will do, so the difference may wrap.
         let lag_us = (since_begun.as_micros() as i64).wrapping_sub(client_time_us as i64);
@@ -121,6 +127,19 @@ mod tests {
             // Against 2 ms, the fastest: 7 is 5 later, 8 is 6 later.
             assert_eq!(found, [false, false, false, false, true, false], "{clock_us}");
         }
+    }
+
+    /// A clock that ticks every 16.7 ms: frames at the end of a tick are none that were held up.
+    #[test]
+    fn the_end_of_a_coarse_tick_is_not_held_up() {
+        let mut fresh = Freshness::new(Some(5000));
+        let begun = fresh.begun;
+        let late = (0..300_u32).filter(|&n| {
+            let sent_us = 11_111 * u64::from(n);
+            let received = begun + Duration::from_micros(sent_us + 300);
+            fresh.is_stale(n, sent_us / 16_667 * 16_667, received) && n > 40
+        });
+        assert_eq!(late.count(), 0);
     }
 
     #[test]

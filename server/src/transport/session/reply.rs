@@ -149,7 +149,6 @@ impl Reply {
         let mut head = header.answer(FrameStatus::Ok, us(done.received.elapsed()), scale);
         if header.extension.is_some() {
             head = numbered(head.windowed(done.meta.window), done.tier);
-            head.kind = done.meta.kind;
         }
         if let Output::Samples(sample_type) = done.output {
             head.sample_type = sample_type;

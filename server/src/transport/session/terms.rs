@@ -121,8 +121,6 @@ struct ReadyInfo {
     /// Units of the effect `spikes`.
     units: Option<Vec<PlacedUnit>>,
     sections: Vec<Section>,
-    /// Greatest value that the map shows.
-    value_max: Option<f32>,
     /// Whether the network is asked.
     shows_sed: bool,
 }
@@ -149,13 +147,7 @@ fn check_version(hello: &Hello) -> Result<(), Problem> {
 impl Default for ReadyInfo {
     /// The bare map.
     fn default() -> Self {
-        Self {
-            names: Vec::new(),
-            units: None,
-            sections: Vec::new(),
-            value_max: None,
-            shows_sed: true,
-        }
+        Self { names: Vec::new(), units: None, sections: Vec::new(), shows_sed: true }
     }
 }
 
@@ -248,7 +240,6 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
         names: effects.names().to_vec(),
         units: effects.units().map(<[_]>::to_vec),
         sections: effects.sections().to_vec(),
-        value_max: Some(effects.value_max(tier.sed_max_j_per_m3)),
         shows_sed: hand.is_none() || effects.shows_sed(),
     });
     // Answers of version 1 could not tell of another tier.
@@ -295,7 +286,7 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         .saturating_add(shear_us.filter(|_| feels_shear).unwrap_or(0))
         .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
     let is_new = terms.version > 1;
-    let value_max = terms.info.value_max.unwrap_or(tier.sed_max_j_per_m3);
+    let value_max = tier.sed_max_j_per_m3;
     let bare_map = || {
         let output = Output::Samples(terms.answer_sample_type);
         let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail, ensure};
 use papilla_client::{Answer, Status};
-use papilla_proto::{FrameKind, MAP_SIDE_PX, Problem};
+use papilla_proto::{MAP_SIDE_PX, Problem};
 use serde_json::{Value, json};
 
 fn near(what: &str, found: f64, due: f64, tolerance: f64) -> Result<()> {
@@ -68,10 +68,6 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
     }
     let parts = u64::from(answer.queue_us) + u64::from(answer.infer_us);
     ensure!(parts <= u64::from(answer.total_us), "parts take longer than the whole");
-    if let Some(due) = expect.get("kind") {
-        let kind = if answer.kind == FrameKind::Sa1Rate { "sa1_rate" } else { "sed" };
-        ensure!(due == kind, "the kind is {kind}");
-    }
     if let Some(due) = expect.get("tier") {
         ensure!(*due == json!(answer.tier), "the tier is {}", answer.tier);
     }
@@ -81,6 +77,8 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
             ("no_contact", answer.no_contact),
             ("unfamiliar", answer.unfamiliar),
             ("cut_off", answer.cut_off),
+            ("not_tracked", answer.not_tracked),
+            ("coarse_clock", answer.coarse_clock),
         ];
         for (name, is_set) in found {
             ensure!(is_set == due.contains(&json!(name)), "the flag {name} is {is_set}");
@@ -102,7 +100,15 @@ pub(crate) fn check_answer(expect: &Value, answer: &Answer) -> Result<()> {
             bytes.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect();
         check_list("summary", &values, due)?;
     }
-    for (name, found) in [("points", &answer.points), ("actuators", &answer.actuators)] {
+    match expect.get("rates") {
+        Some(due) => check_map(due, answer.rates_hz()?)?,
+        None => ensure!(answer.rates_hz().is_err(), "the answer carries rates"),
+    }
+    for (name, found) in [
+        ("points", &answer.points),
+        ("point_rates", &answer.point_rates_hz),
+        ("actuators", &answer.actuators),
+    ] {
         if let Some(due) = expect.get(name) {
             check_list(name, found, due)?;
         }
@@ -123,8 +129,11 @@ pub(crate) fn check_touch(expect: &Value, answer: &Answer, finger: u8) -> Result
     if let Some(due) = expect.get("pressure_sum") {
         check_pair("the pressure", answer.pressure_pa.iter().map(|p| f64::from(*p)).sum(), due)?;
     }
-    let flags = if answer.no_contact { json!(["no_contact"]) } else { json!([]) };
-    ensure!(expect["flags"] == flags, "flags are {flags}");
+    let flags: Vec<&str> = [("no_contact", answer.no_contact), ("not_tracked", answer.not_tracked)]
+        .into_iter()
+        .filter_map(|(name, on)| on.then_some(name))
+        .collect();
+    ensure!(expect["flags"] == json!(flags), "flags are {flags:?}");
     ensure!(!answer.out_of_range && !answer.unsettled, "{answer:?}");
     Ok(())
 }

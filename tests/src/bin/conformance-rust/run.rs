@@ -151,9 +151,14 @@ impl Run {
                 origin_mm: [x, y, z],
                 quaternion: [a, b, c, d],
             };
-            let poses: Vec<[f32; 7]> = member(step, "poses")?;
-            let poses: Vec<Pose> = poses.into_iter().map(pose).collect();
-            session.send_poses(finger, &poses, net)?
+            let poses: Option<Vec<[f32; 7]>> = member(step, "poses")?;
+            match poses {
+                Some(poses) => {
+                    let poses: Vec<Pose> = poses.into_iter().map(pose).collect();
+                    session.send_poses(finger, &poses, net)?
+                }
+                None => session.send_not_tracked(finger)?,
+            }
         };
         let answer = time::timeout(self.patience, outcome).await??;
         check_touch(&step["expect"], &answer, finger)

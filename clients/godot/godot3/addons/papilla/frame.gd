@@ -9,6 +9,9 @@ const HEADER_BYTES = 48
 const KIND_PRESSURE = 1
 const KIND_OBJECTS = 4
 const KIND_GAPS = 5
+const NOT_TRACKED = 32
+# Before the samples of the section `rates`: their scale, and zeros.
+const RATES_HEAD_BYTES = 16
 
 
 # A request. `scale`: Pa per unit of u16 and u8; null or 0: so that the greatest pressure is the greatest unit.
@@ -35,8 +38,13 @@ static func encode_rows(kind, bytes, width, height, finger, sequence, time_us, d
 	return frame
 
 
+# That nobody knows where things are: a header alone, whose kind and sample type mean nothing.
+static func encode_not_tracked(finger, sequence, time_us, deadline_us):
+	return _header(KIND_PRESSURE, 0, [0, 0, 0, 0], 1.0, finger, sequence, time_us, deadline_us, NOT_TRACKED)
+
+
 # The header; its version is that of the session in which it leaves.
-static func _header(kind, type, window, scale, finger, sequence, time_us, deadline_us):
+static func _header(kind, type, window, scale, finger, sequence, time_us, deadline_us, flags = 0):
 	var head = StreamPeerBuffer.new()
 	head.put_data("PPL1".to_ascii())
 	for byte in [2, kind, type, 0]:
@@ -51,7 +59,7 @@ static func _header(kind, type, window, scale, finger, sequence, time_us, deadli
 	head.put_u16(window[1])
 	head.put_u64(0)
 	head.put_u16(0)
-	head.put_u8(0)
+	head.put_u8(flags)
 	head.put_u8(finger)
 	return head.data_array
 
@@ -62,7 +70,9 @@ static func read_header(packet):
 	head.data_array = packet.subarray(0, HEADER_BYTES - 1)
 	head.seek(4)
 	var version = head.get_u8()
-	var answer = {"kind": "sa1_rate" if head.get_u8() == 3 else "sed", "sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
+	# The kind: SED.
+	head.get_u8()
+	var answer = {"sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
 	answer.sequence = head.get_u32()
 	answer.width = head.get_u16()
 	answer.height = head.get_u16()
@@ -80,6 +90,8 @@ static func read_header(packet):
 	answer.unfamiliar = flags & 4 != 0
 	answer.unsettled = flags & 8 != 0
 	answer.cut_off = flags & 16 != 0
+	answer.not_tracked = flags & NOT_TRACKED != 0
+	answer.coarse_clock = flags & 64 != 0
 	answer.finger = head.get_u8() if version == 3 else 0
 	return answer
 
@@ -94,6 +106,12 @@ static func read_sections(answer, packet, sections):
 			answer.has_map = true
 			if from < packet.size():
 				answer.samples = packet.subarray(from, packet.size() - 1)
+		elif section.name == "rates":
+			# Firing rates, Hz: a whole map, or a value a vertex.
+			var scale = Compat.bytes_to_floats(packet.subarray(from, from + 4 - 1))[0]
+			answer.rates_hz = Samples.decode(packet.subarray(from + RATES_HEAD_BYTES, from + int(section.bytes) - 1), answer.sample_type, scale)
+		elif section.name == "point_rates":
+			answer.point_rates_hz = Compat.bytes_to_floats(packet.subarray(from, from + int(section.bytes) - 1))
 		elif section.name == "vertices":
 			answer.vertices = Samples.decode(packet.subarray(from, from + int(section.bytes) - 1), answer.sample_type, answer.scale)
 		elif section.name == "touch":
@@ -119,6 +137,24 @@ static func map_of(answer):
 		for x in answer.width:
 			map[(answer.row + y) * Samples.SIDE_PX + answer.column + x] = values[y * answer.width + x]
 	return map
+
+
+# SED, J/m3: the map of an answer, or the values at the vertices. Null, and an error that says why, where it carries neither.
+static func sed_of(answer):
+	if answer.get("width", 0) > 0 or answer.get("has_map", false):
+		return map_of(answer)
+	if answer.has("vertices"):
+		return answer.vertices
+	push_error("the answer carries no SED: its frame was not rendered, or the hello asks for no map")
+	return null
+
+
+# Firing rates, Hz, where SED is. Null, and an error that says why, where the answer carries none.
+static func rates_hz_of(answer):
+	if answer.has("rates_hz"):
+		return answer.rates_hz
+	push_error("the answer carries no rates: name the effect 'afferents' in the hello, and leave 'map' true")
+	return null
 
 
 # The window of an answer as a picture for a texture, without a loop: f32 (red in J/m3), f16 or u8 (red 1 is 255 x answer.scale).

@@ -167,6 +167,15 @@ func send_gaps(depth_mm, finger = 0, net = null):
 	return _put(finger, Frame.encode_rows(Frame.KIND_GAPS, Touch.gaps(depth_mm, net), width, height, finger, _sequence, _stamp(), deadline_us))
 
 
+# Sends that tracking of a finger is lost. Better than an old pose, or one of zeros: the answer is zero, no unit fires, and nothing
+# bursts when tracking comes back.
+func send_not_tracked(finger = 0):
+	if not _is_finger(finger):
+		return -1
+	_step()
+	return _put(finger, Frame.encode_not_tracked(finger, _sequence, _stamp(), deadline_us))
+
+
 func _is_finger(finger):
 	if finger < 0 or finger >= FINGERS_MAX:
 		push_error("there is no finger %d; a session has 10 at most" % finger)
@@ -195,6 +204,16 @@ func _put(finger, frame):
 # The map of an answer with status ok: 224 x 224 floats. f32 is fast; other types take a loop over the window.
 func map_of(answer):
 	return Frame.map_of(answer)
+
+
+# SED of an answer, J/m3: the map, or the values at the vertices; null, and an error, where it carries neither.
+func sed_of(answer):
+	return Frame.sed_of(answer)
+
+
+# Firing rates of an answer, Hz, where SED is; null, and an error, without the effect `afferents`.
+func rates_hz_of(answer):
+	return Frame.rates_hz_of(answer)
 
 
 # The window of an answer as a picture for a texture, without a loop: f32 (red in J/m3), f16 or u8 (red 1 is 255 x answer.scale).

@@ -44,6 +44,14 @@ uint64 NowUs()
 {
     return static_cast<uint64>(FPlatformTime::Seconds() * 1e6);
 }
+/** Whether a session can have such a finger; if not, the log says so. */
+bool IsFinger(int32 Finger)
+{
+    constexpr int32 FingersMax = 10;
+    const bool bIsGood = Finger >= 0 && Finger < FingersMax;
+    if (!bIsGood) UE_LOG(LogTemp, Error, TEXT("Papilla: there is no finger %d; a session has %d at most"), Finger, FingersMax);
+    return bIsGood;
+}
 }  // namespace
 
 UPapillaSessionComponent::UPapillaSessionComponent()
@@ -329,7 +337,7 @@ int32 UPapillaSessionComponent::SendContacts(const TArray<FPapillaContact>& Cont
 
 int32 UPapillaSessionComponent::SendPoses(const FTransform& FingerInWorld, const TArray<FTransform>& ObjectsInWorld, int32 Finger, double WorldScale)
 {
-    if (!Core) return 0;
+    if (!Core || !IsFinger(Finger)) return 0;
     Poses.clear();
     const papilla::frames::Place Hand = PapillaFrames::ToPlace(FingerInWorld);
     for (const FTransform& Object : ObjectsInWorld)
@@ -349,11 +357,27 @@ int32 UPapillaSessionComponent::SendPoses(const FTransform& FingerInWorld, const
 
 int32 UPapillaSessionComponent::SendGaps(const TArray<float>& DepthMm, int32 Finger)
 {
-    if (!Core) return 0;
+    if (!Core || !IsFinger(Finger)) return 0;
     const auto Count = static_cast<size_t>(DepthMm.Num());
     const uint32 Sequence = Core->send_gaps(DepthMm.GetData(), Count, NowUs(), static_cast<uint8>(Finger));
     Pump();
     return static_cast<int32>(Sequence);
+}
+
+int32 UPapillaSessionComponent::SendNotTracked(int32 Finger)
+{
+    if (!Core || !IsFinger(Finger)) return 0;
+    const uint32 Sequence = Core->send_not_tracked(NowUs(), static_cast<uint8>(Finger));
+    Pump();
+    return static_cast<int32>(Sequence);
+}
+
+bool UPapillaSessionComponent::GetRatesHz(TArray<float>& RatesHz) const
+{
+    RatesHz.SetNumZeroed(static_cast<int32>(papilla::map_len));
+    if (!bHasAnswer || Answer.rates_hz.size() != papilla::map_len) return false;
+    FMemory::Memcpy(RatesHz.GetData(), Answer.rates_hz.data(), papilla::map_len * sizeof(float));
+    return true;
 }
 
 bool UPapillaSessionComponent::GetSed(TArray<float>& SedJPerM3) const

@@ -135,6 +135,17 @@ public:
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     int32 SendGaps(const TArray<float>& DepthMm, int32 Finger = 0);
 
+    /**
+     * Sends that tracking of a finger is lost. Better than an old pose, or one of zeros: the answer is zero, no unit fires, and nothing
+     * bursts when tracking comes back. Returns the frame's sequence.
+     */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    int32 SendNotTracked(int32 Finger = 0);
+
+    /** The newest firing rates, Hz, 224 x 224; false where the hello does not name the effect "afferents", or none came yet. */
+    UFUNCTION(BlueprintCallable, Category = "Papilla")
+    bool GetRatesHz(TArray<float>& RatesHz) const;
+
     /** The newest answer's map, 224 x 224, J/m3; false if it has none, or none came yet. */
     UFUNCTION(BlueprintCallable, Category = "Papilla")
     bool GetSed(TArray<float>& SedJPerM3) const;
