@@ -45,6 +45,14 @@ test("the validator would find something", async () => {
   assert.ok(report.issues.numErrors > 0);
 });
 
+test("the finger points ahead, its nail up, in metres", () => {
+  const { rotation: [x, y, z, w], scale } = gltf.nodes.find(({ name }) => name === "finger");
+  assert.deepEqual(scale, [0.001, 0.001, 0.001]);
+  const back = [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)];
+  const nail = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)];
+  assert.deepEqual([back, nail], [[0, 0, 1], [0, 1, 0]]);
+});
+
 test("vertices, triangles and pixels are the atlas's, in its order", () => {
   const close = (a, b, what) => assert.ok(Math.abs(a - b) < 1e-5 * Math.max(1, Math.abs(b)), what);
   assert.equal(gltf.asset.extras.atlas_hash, atlas.hash);

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`Session`] | many maps over a WebSocket; the latest frame wins; reconnects by itself |
 //! | [`sed`] | one map over HTTP, blocking |
+//! | [`frames`] | poses of engines and robots to the finger's frame, forces back |
 //! | [`Skin`] | pressure maps from values at vertices or from contact points |
 //!
 //! The protocol itself is the crate `papilla-proto`, whose types this one hands through.
@@ -16,6 +17,7 @@ mod address;
 mod answer;
 mod dial;
 mod error;
+pub mod frames;
 mod http;
 mod session;
 mod skin;

@@ -15,7 +15,7 @@ use papilla_proto::{
 };
 use serde_json::{Value, json};
 
-use super::{ConformanceError, member, read};
+use super::{ConformanceError, engines, member, read};
 
 /// Modulus of the half-space, E / (1 - nu^2), MPa.
 const MODULUS_MPA: f64 = 0.1;
@@ -157,6 +157,11 @@ impl ContactRecorder {
                     (false, true) => json!(["no_contact", "not_tracked"]),
                 };
                 step["expect"]["flags"] = flags;
+                if let Some(world) = member(step, "world")? {
+                    let poses: Vec<[f64; 7]> = member(step, "poses")?;
+                    step["engines"] = engines::inputs(world, &poses);
+                    step["expect"]["engines"] = engines::felt(world, &touch, &TOLERANCES);
+                }
             }
             other => return Err(format!("there is no step '{other:?}'")),
         }
@@ -314,7 +319,7 @@ fn placed([x, y, z, a, b, c, d]: [f32; 7], object: &AnnouncedObject) -> Result<O
 }
 
 /// A value to seven digits and its tolerance to two.
-fn pair((value, (share, beside)): (&f64, (f64, f64))) -> Value {
+pub(super) fn pair((value, (share, beside)): (&f64, (f64, f64))) -> Value {
     let digits = |v: f64, n: usize| format!("{v:.n$e}").parse::<f64>().unwrap_or(v);
     json!([digits(*value, 6), digits(share * value.abs() + beside, 1)])
 }

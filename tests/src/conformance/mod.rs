@@ -5,6 +5,7 @@
 
 mod contact;
 mod due;
+mod engines;
 mod finger;
 pub mod inputs;
 mod print;

@@ -7,8 +7,19 @@ fn root() -> PathBuf {
 }
 
 /// Members whose lists of numbers end in value and tolerance.
-const MEASURED: [&str; 9] =
-    ["pixels", "sum", "max", "force_n", "summary", "points", "actuators", "touch", "pressure_sum"];
+const MEASURED: [&str; 11] = [
+    "pixels",
+    "sum",
+    "max",
+    "force_n",
+    "summary",
+    "points",
+    "actuators",
+    "touch",
+    "pressure_sum",
+    "torque_n_m",
+    "centre",
+];
 
 /// Compares recorded numbers; returns how many there were.
 fn compare(path: &str, measured: bool, found: &Value, due: &Value) -> usize {
