@@ -127,6 +127,7 @@ sealed partial class Run : IDisposable
             session.Refused += problem => { lock (gate) { reply = problem; Monitor.PulseAll(gate); } };
             session.Answered += Keep;
             session.Warn = null;
+            session.TimeoutMs = patienceMs;
             session.Open();
         }
         else
@@ -298,7 +299,7 @@ sealed partial class Run : IDisposable
         Told("no answer within");
         lock (gate) reply = null;
         Steer(how == "pause" ? "resume" : "start");
-        session.TimeoutMs = 5000;
+        session.TimeoutMs = patienceMs;
         Until("a new session", () => reply as Ready, (int)(1000 * (double)step["within_s"]));
     }
 

@@ -99,6 +99,7 @@ class Run {
         outcomes_.push_back({answer.sequence, answer.status, answer.by_client});
       };
       options.warn = nullptr;
+      options.timeout_ms = timeout_ms_;
       auto session = std::make_unique<Session>(std::move(options));
       good = session->open();
       problem = session->problem();
@@ -231,7 +232,7 @@ class Run {
     }
     check_told("no answer within");
     control(step["how"].string == "pause" ? "resume" : "start");
-    session().set_timeout_ms(5000);
+    session().set_timeout_ms(timeout_ms_);
     const std::uint64_t begin = now_us();
     while (session().connections() == before || !session().connected()) {
       must(double(now_us() - begin) < 1e6 * step["within_s"].number, "no new session in time");

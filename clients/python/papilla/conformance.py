@@ -194,7 +194,7 @@ class Run:
         expect = step["expect"]
         try:
             if self.session is None:
-                self.session = Session(self.url, **step["hello"])
+                self.session = Session(self.url, timeout_s=self.timeout_s, **step["hello"])
             else:
                 self.session.renew(**step["hello"])
         except Refused as error:

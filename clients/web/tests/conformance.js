@@ -134,7 +134,7 @@ class Runner {
     if (wire.input) return this.announce(wire, expect);
     let reply = /** @type {any} */ (null);
     const fresh = this.session === null || this.session.state === 'refused';
-    if (fresh) this.session = new Session(this.url, hello, { crop: false, clockUs: () => this.now() });
+    if (fresh) this.session = new Session(this.url, hello, { crop: false, clockUs: () => this.now(), timeoutMs: this.patienceMs });
     const session = /** @type {Session} */ (this.session);
     session.onready = (ready) => { reply = ready; this.tiers.set(ready.tier_number, ready.tier); };
     session.onrefused = (problem) => { reply = problem; };
@@ -314,7 +314,7 @@ class Runner {
   async announce(wire, expect) {
     this.hand?.close();
     try {
-      this.hand = await Hand.connect(this.url, wire);
+      this.hand = await Hand.connect(this.url, wire, undefined, { timeoutMs: this.patienceMs });
     } catch (error) {
       return this.refused(expect, error);
     }

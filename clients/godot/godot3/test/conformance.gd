@@ -158,6 +158,7 @@ func step_hello(step, expect):
 		session = Session.new()
 		session.url = url
 		session.hello = step.hello
+		session.timeout_ms = patience_ms
 		session.connect("answered", self, "on_answered")
 		session.connect("session_ready", self, "on_session_ready")
 		session.connect("refused", self, "on_refused")
@@ -339,7 +340,7 @@ func step_silence(step, _expect):
 	told("no answer within")
 	reply = null
 	steer("resume" if step.how == "pause" else "start")
-	session.timeout_ms = 5000
+	session.timeout_ms = patience_ms
 	wait_for("has_reply", null, int(step.within_s * 1000))
 
 

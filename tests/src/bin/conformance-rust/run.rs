@@ -86,7 +86,10 @@ impl Run {
         match opened {
             Err(PapillaError::Refused(problem)) => return check_problem(&step["expect"], &problem),
             Err(error) => return Err(error.into()),
-            Ok(Some(session)) => self.session = Some(session),
+            Ok(Some(session)) => {
+                session.set_timeout(self.patience);
+                self.session = Some(session);
+            }
             Ok(None) => {}
         }
         ensure!(step["expect"]["status"] != "error", "the hello is not refused");
@@ -205,7 +208,7 @@ impl Run {
         ensure!(is_lost && statuses.iter().all(is_due), "{statuses:?}");
         self.told("no answer within")?;
         control(if how == "pause" { "resume" } else { "start" }).await?;
-        session.set_timeout(Duration::from_secs(5));
+        session.set_timeout(self.patience);
         let within = Duration::from_secs_f64(member(step, "within_s")?);
         time::timeout(within, opened.wait_for(|opened| *opened > before)).await??;
         Ok(())
