@@ -38,6 +38,7 @@ mod error;
 #[cfg(any(test, fuzzing))]
 #[doc(hidden)]
 pub mod fuzz;
+mod priority;
 mod problem;
 mod progress;
 mod runtime;
@@ -51,6 +52,7 @@ pub use check::{Finding, Report, check};
 pub use config::{Cli, Command, Config, ConfigError, SettingError};
 pub use error::{DrainError, StartError};
 use papilla_metrics::Metrics;
+pub use priority::{Grant, RealTime};
 pub use telemetry::Telemetry;
 use tokio::{
     sync::watch,
@@ -60,6 +62,7 @@ use tokio::{
 
 use crate::{
     core::scheduler::Pool,
+    priority::Priorities,
     progress::Progress,
     runtime::IoRuntime,
     start::Opened,
@@ -95,6 +98,7 @@ pub struct Server {
     tiers: Vec<String>,
     default_tier: String,
     threads: usize,
+    real_time: Option<RealTime>,
     drain: EndOnDrop,
     drain_timeout: Duration,
     accepting: JoinHandle<()>,
@@ -129,7 +133,8 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
     let (gate, moves) = (Gate::new(config)?, Moves::new(config)?);
     let tls = tls::acceptor(config)?;
     let bind = |source| StartError::Bind { address: config.bind, source };
-    let io = IoRuntime::start().map_err(StartError::Thread)?;
+    let priorities = Priorities::of(config);
+    let io = IoRuntime::start(&priorities).map_err(StartError::Thread)?;
     let listener = {
         let _within = io.enter();
         net::listen(config.bind).map_err(bind)?
@@ -153,6 +158,7 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
         progress,
         front: Arc::clone(&front),
         drain: Arc::clone(&drain),
+        priorities,
     };
     opening.spawn_on(start::open(parts), io.handle());
     let context = ConnectionContext { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
@@ -199,6 +205,7 @@ impl Starting {
             tiers: opened.tiers,
             default_tier: opened.default_tier,
             threads: self.threads,
+            real_time: opened.real_time,
             drain: self.drain,
             drain_timeout: self.drain_timeout,
             accepting: self.accepting,
@@ -232,6 +239,12 @@ impl Server {
     #[must_use]
     pub fn threads(&self) -> usize {
         self.threads
+    }
+
+    /// What the system has granted of `--real-time`; none: it was not asked for.
+    #[must_use]
+    pub fn real_time(&self) -> Option<&RealTime> {
+        self.real_time.as_ref()
     }
 
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.

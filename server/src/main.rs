@@ -111,6 +111,7 @@ fn announce(server: &Server, config: &Config) -> io::Result<()> {
             "tiers": server.tiers(),
             "default_tier": server.default_tier(),
             "threads": server.threads(),
+            "real_time": server.real_time(),
         });
         writeln!(out, "{line}")?;
     } else {

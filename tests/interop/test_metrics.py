@@ -25,6 +25,7 @@ def test_every_family_is_there_with_its_type(families):
         ("papilla_build", "info"), ("papilla_stage_seconds", "histogram"), ("papilla_request_seconds", "histogram"),
         ("papilla_maps", "counter"), ("papilla_late", "counter"), ("papilla_shed", "counter"),
         ("papilla_errors", "counter"), ("papilla_reloads", "counter"), ("papilla_zero_maps", "counter"),
+        ("papilla_long_frames", "counter"), ("papilla_hellos_left", "counter"),
         ("papilla_queue_length", "gauge"), ("papilla_load_ratio", "gauge"), ("papilla_sessions_open", "gauge"),
         ("papilla_sessions", "counter"),
         ("papilla_connections_open", "gauge"), ("papilla_model", "gauge"), ("process_resident_memory_bytes", "gauge"),

@@ -67,6 +67,9 @@ SLOW = [
     "a_slice_of_a_million_is_a_slice",
     "a_scene_and_a_dataset_show_a_state_alike",
     "an_interrupted_solve_keeps_the_states_that_are_done",
+    "a_slow_reader_is_waited_for",
+    "an_overloaded_service_renders_the_newest_frames",
+    "nobody_waits_for_the_hard_frames_of_others",
 ]
 def fast() -> list[Step]:
     """Rust alone."""

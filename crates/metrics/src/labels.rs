@@ -30,6 +30,11 @@ pub(crate) struct ShedLabels {
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub(crate) struct GrantLabels {
+    pub(crate) what: Word,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub(crate) struct ReloadLabels {
     pub(crate) outcome: Word,
 }
@@ -75,11 +80,13 @@ pub enum Shed {
     TokenSessions,
     /// The client sends more requests a second than it may.
     Rate,
+    /// Too many hellos wait to be worked out, or one takes too long.
+    Hellos,
 }
 
 impl Shed {
-    pub(crate) const ALL: [Self; 4] =
-        [Self::Sessions, Self::Requests, Self::TokenSessions, Self::Rate];
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Sessions, Self::Requests, Self::TokenSessions, Self::Rate, Self::Hellos];
 
     pub(crate) fn word(self) -> Word {
         Word(match self {
@@ -87,6 +94,7 @@ impl Shed {
             Self::Requests => "requests",
             Self::TokenSessions => "token_sessions",
             Self::Rate => "rate",
+            Self::Hellos => "hellos",
         })
     }
 }

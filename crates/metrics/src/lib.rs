@@ -22,8 +22,8 @@ use prometheus_client::{
 
 pub use contact::ContactMetrics;
 use labels::{
-    CodeLabels, LateLabels, MapLabels, ModelLabels, ReloadLabels, RequestLabels, ShedLabels,
-    StageLabels, Word,
+    CodeLabels, GrantLabels, LateLabels, MapLabels, ModelLabels, ReloadLabels, RequestLabels,
+    ShedLabels, StageLabels, Word,
 };
 pub use labels::{Shed, Stage, TierLabels, Transport};
 
@@ -105,6 +105,7 @@ pub struct Metrics {
     models: Family<ModelLabels, Gauge>,
     shed: Family<ShedLabels, Counter>,
     reloads: Family<ReloadLabels, Counter>,
+    real_time: Family<GrantLabels, Gauge>,
     http: TransportMetrics,
     session: TransportMetrics,
     oip: TransportMetrics,
@@ -114,6 +115,10 @@ pub struct Metrics {
     pub contact: ContactMetrics,
     /// Zero maps, answered without inference.
     pub zero_maps: Counter,
+    /// Frames that took long beside their network.
+    pub long_frames: Counter,
+    /// Hellos whose client left before they were worked out.
+    pub hellos_left: Counter,
     /// Thread time that maps of the last seconds ask for, by what they take here, over what there is.
     pub load: Gauge<f64, AtomicU64>,
     /// Slots that wait for a thread.
@@ -149,6 +154,11 @@ impl Metrics {
             models: registered(registry, "model", "Models on offer; the value is always 1"),
             shed: registered(registry, "shed", "Work turned away, by reason"),
             reloads: registered(registry, "reloads", "Reloads of the models, by outcome"),
+            real_time: registered(
+                registry,
+                "real_time",
+                "What the system has granted of the priorities that were asked for: 1, or 0",
+            ),
             http: transport_metrics(&maps, "http"),
             session: transport_metrics(&maps, "session"),
             oip: transport_metrics(&maps, "oip"),
@@ -156,6 +166,16 @@ impl Metrics {
             errors: registered(registry, "errors", "Errors sent to clients by code"),
             contact: ContactMetrics::new(registry),
             zero_maps: registered(registry, "zero_maps", "Zero maps, answered without inference"),
+            long_frames: registered(
+                registry,
+                "long_frames",
+                "Frames that held a thread for more than 10 ms beside their network",
+            ),
+            hellos_left: registered(
+                registry,
+                "hellos_left",
+                "Hellos whose client left before they were worked out",
+            ),
             load: registered_ratio(registry),
             queue_length: registered(registry, "queue_length", "Slots that wait for a thread"),
             sessions_open: registered(registry, "sessions_open", "Open sessions"),
@@ -217,6 +237,12 @@ impl Metrics {
     /// Counts work that was turned away.
     pub fn shed(&self, shed: Shed) {
         self.shed.get_or_create(&ShedLabels { reason: shed.word() }).inc();
+    }
+
+    /// Takes note of what the system has granted of the priorities that were asked for.
+    pub fn real_time(&self, what: &'static str, is_granted: bool) {
+        let labels = GrantLabels { what: Word(what) };
+        self.real_time.get_or_create(&labels).set(is_granted.into());
     }
 
     /// Counts a reload that was done, or changed nothing.

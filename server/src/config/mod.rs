@@ -104,6 +104,11 @@ pub struct Config {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threads: Option<NonZeroUsize>,
 
+    /// Real-time priorities, reading above rendering, and memory that is not paged out; what the
+    /// system refuses is said at the start. Linux.
+    #[arg(long, env = "PAPILLA_REAL_TIME")]
+    pub real_time: bool,
+
     /// Tier for clients that name neither a tier nor a budget [default: index.json's].
     #[arg(long, env = "PAPILLA_DEFAULT_TIER", value_name = "NAME")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -230,6 +235,7 @@ impl Default for Config {
             contact: None,
             watch_models: false,
             threads: None,
+            real_time: false,
             default_tier: None,
             backend: Choice::Auto,
             calibration_ms: 1500,

@@ -1,12 +1,14 @@
 //! What renders maps, whatever transport brings them.
 //!
-//! `scheduler` takes jobs to the inference threads. `catalogue` holds the tiers, the atlas and the
+//! `scheduler` takes jobs to the inference threads, by turns of sessions. `desk` works out hellos on
+//! threads of its own. `catalogue` holds the tiers, the atlas and the
 //! replay; `reload` replaces it while the service runs. `buffers` are used again from frame to frame.
 //! `latency` and `metrics` keep the times.
 
 pub(crate) mod buffers;
 pub(crate) mod cache;
 pub(crate) mod catalogue;
+pub(crate) mod desk;
 pub(crate) mod digest;
 pub(crate) mod latency;
 pub(crate) mod reload;

@@ -10,7 +10,10 @@ use papilla_engine::{Backend, Choice};
 use papilla_metrics::Metrics;
 use papilla_proto::contact::FINGERS_MAX;
 use papilla_session_contact::ContactAssets;
-use tokio::sync::{oneshot, watch};
+use tokio::{
+    sync::{oneshot, watch},
+    task::spawn_blocking,
+};
 
 use crate::{
     SettingError, StartError,
@@ -21,9 +24,11 @@ use crate::{
             assets::{Assets, CONTACT, CONTACT_ERRORS},
             calibrate, golden,
         },
+        desk::Desk,
         reload,
         scheduler::Pool,
     },
+    priority::{Priorities, RealTime, Role},
     progress::{Progress, Stage},
     transport::{app::App, front::Front, gate::Gate, moves::Moves, routes},
 };
@@ -37,6 +42,7 @@ pub(crate) struct Parts {
     pub(crate) progress: Arc<Progress>,
     pub(crate) front: Arc<Front>,
     pub(crate) drain: Arc<watch::Sender<bool>>,
+    pub(crate) priorities: Priorities,
 }
 
 /// What there is once they are ready.
@@ -45,6 +51,7 @@ pub(crate) struct Opened {
     pub(crate) pool: Pool,
     pub(crate) tiers: Vec<String>,
     pub(crate) default_tier: String,
+    pub(crate) real_time: Option<RealTime>,
 }
 
 /// Loads the models and opens the front; returns once every tier is measured.
@@ -53,14 +60,16 @@ pub(crate) struct Opened {
 /// The models are missing or unusable, or do not run; a thread cannot be started; the folder
 /// cannot be watched.
 pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
-    let Parts { config, gate, moves, metrics, progress, front, drain } = parts;
+    let Parts { config, gate, moves, metrics, progress, front, drain, priorities } = parts;
     let (loaded, loading) = oneshot::channel();
     let (measured, measuring) = oneshot::channel();
     let work = {
         let (config, metrics, progress) =
             (config.clone(), Arc::clone(&metrics), Arc::clone(&progress));
+        let priorities = priorities.clone();
         move || {
-            let catalogue = match load(&config, &metrics, &progress) {
+            priorities.enter(Role::Other);
+            let catalogue = match load(&config, &metrics, &progress, &priorities) {
                 Ok((catalogue, pool, contact)) => {
                     let to_measure = Arc::clone(&catalogue);
                     // Err: the start was given up.
@@ -82,11 +91,17 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
     let (catalogue, pool, contact) = loading.await.map_err(|_| StartError::WorkerPanicked)??;
     let tiers = catalogue.tiers.iter().map(|tier| tier.name.clone()).collect();
     let default_tier = catalogue.tiers[catalogue.default].name.clone();
-    let app =
-        App::new(&config, catalogue, metrics, &pool, (gate, moves), drain, Arc::clone(&progress));
+    let real_time = priorities.report(&metrics);
+    let step_back = move || priorities.enter(Role::Behind);
+    let desk = Desk::start(desk_threads(), step_back).map_err(StartError::Thread)?;
+    let parts = (gate, moves, desk);
+    let app = App::new(&config, catalogue, metrics, &pool, parts, drain, Arc::clone(&progress));
     let app = Arc::new(app.with_contact(contact));
     if let (true, Some(folder)) = (config.watch_models, &config.models) {
-        reload::watch(Arc::clone(&app.reloader), folder).map_err(|error| {
+        let (reloader, watched) = (Arc::clone(&app.reloader), folder.clone());
+        // What watches has a thread, which is not to have the priority of those that read.
+        let watching = spawn_blocking(move || reload::watch(reloader, &watched));
+        watching.await.map_err(|_| StartError::WorkerPanicked)?.map_err(|error| {
             let reason = format!("{} cannot be watched: {error}", folder.display());
             SettingError { field: "watch_models", reason }
         })?;
@@ -98,13 +113,19 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
         tokio::spawn(remeasure::until_drain(Arc::clone(&app)));
     }
     tokio::spawn(load::until_drain(Arc::clone(&app), config.thread_count()));
-    Ok(Opened { app, pool, tiers, default_tier })
+    Ok(Opened { app, pool, tiers, default_tier, real_time })
+}
+
+/// Threads for hellos: half of the processors, within bounds.
+fn desk_threads() -> usize {
+    thread::available_parallelism().map_or(2, |cores| (cores.get() / 2).clamp(2, 4))
 }
 
 fn load(
     config: &Config,
     metrics: &Arc<Metrics>,
     progress: &Progress,
+    priorities: &Priorities,
 ) -> Result<(Arc<Catalogue>, Pool, Option<ContactAssets>), StartError> {
     let assets = Assets::of(config)?;
     let loading = Loading::of(config);
@@ -120,7 +141,7 @@ fn load(
     metrics.name_tiers(catalogue.tier_labels());
     // A slot is in the queue at most once, so this many places are always enough.
     let places = config.max_sessions.get() * FINGERS_MAX + config.max_requests.get();
-    let pool = Pool::start(&catalogue, metrics, config.thread_count(), places)?;
+    let pool = Pool::start(&catalogue, metrics, config.thread_count(), places, priorities)?;
     let contact = load_contact(config, &assets, &catalogue)?;
     Ok((catalogue, pool, contact))
 }

@@ -11,14 +11,16 @@ use papilla_session_contact::ContactAssets;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, watch};
 
 use super::{
-    gate::{Gate, Principal},
+    gate::{Gate, Key, Principal},
     moves::Moves,
+    posters::Posters,
 };
 use crate::{
     config::{Config, Timeouts},
     core::{
         buffers::Store,
         catalogue::Catalogue,
+        desk::Desk,
         reload::Reloader,
         scheduler::{Pool, PoolHandle},
     },
@@ -44,6 +46,10 @@ pub(crate) struct App {
     pub(crate) store: Store,
     /// The contact model, if there is one.
     pub(crate) contact: Option<ContactAssets>,
+    /// Where hellos are worked out.
+    pub(crate) desk: Desk<Option<Key>>,
+    /// Accounts of clients that post maps.
+    pub(crate) posters: Posters,
     fingers: Arc<Semaphore>,
     sessions: Arc<Semaphore>,
     requests: Arc<Semaphore>,
@@ -57,7 +63,7 @@ impl App {
         catalogue: Arc<Catalogue>,
         metrics: Arc<Metrics>,
         pool: &Pool,
-        (gate, moves): (Gate, Moves),
+        (gate, moves, desk): (Gate, Moves, Desk<Option<Key>>),
         drain: Arc<watch::Sender<bool>>,
         progress: Arc<Progress>,
     ) -> Self {
@@ -67,6 +73,7 @@ impl App {
             reloader: Arc::new(reloader),
             gate,
             moves,
+            desk,
             body_max: config.max_body_bytes,
             pool: pool.handle(&metrics),
             metrics,
@@ -75,6 +82,7 @@ impl App {
             progress,
             store: Store::new(config.max_sessions.get()),
             contact: None,
+            posters: Posters::default(),
             fingers: Arc::new(Semaphore::new(config.max_fingers.get())),
             sessions: Arc::new(Semaphore::new(config.max_sessions.get())),
             requests: Arc::new(Semaphore::new(config.max_requests.get())),

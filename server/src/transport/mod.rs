@@ -13,6 +13,8 @@ pub(crate) mod moves;
 pub(crate) mod negotiate;
 pub(crate) mod net;
 pub(crate) mod oip;
+mod posters;
+mod room;
 pub(crate) mod routes;
 mod session;
 mod stream;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use axum::{
     body::Body,
-    extract::State,
+    extract::{Extension, State},
     http::{HeaderMap, HeaderValue, Uri},
     response::Response,
 };
@@ -28,6 +28,7 @@ use crate::{
             render::{Rendered, count, through_pool},
         },
         app::App,
+        gate::Principal,
     },
 };
 
@@ -100,14 +101,21 @@ fn named(app: &App, uri: &Uri) -> Result<usize, Problem> {
     }
 }
 
-pub(crate) async fn infer(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
-    let result = answer(&app, &uri, &headers, body).await;
+pub(crate) async fn infer(
+    State(app): Shared,
+    Extension(principal): Extension<Principal>,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Body,
+) -> Answer {
+    let result = answer(&app, &principal, &uri, &headers, body).await;
     count(&app, Transport::Oip, &result);
     result.or_else(|problem| refuse(&app, problem))
 }
 
 async fn answer(
     app: &App,
+    principal: &Principal,
     uri: &Uri,
     headers: &HeaderMap,
     body: Body,
@@ -131,7 +139,8 @@ async fn answer(
         deadline,
         options: JobOptions::default(),
     };
-    let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip).await?;
+    let client = principal.client.as_ref();
+    let Rendered { bytes, timings, .. } = through_pool(app, job, Transport::Oip, client).await?;
     let catalogue = app.catalogue();
     let name = catalogue.tiers[tier].name.clone();
     let mut response = encode(name.clone(), request, bytes.freeze()).await?;

@@ -1,4 +1,4 @@
-//! A TCP stream whose writes are timed.
+//! A TCP stream whose writes are timed: the client may take a while to read anything at all.
 
 use std::{
     io,
@@ -10,20 +10,22 @@ use std::{
 use tokio::{
     io::{AsyncRead, AsyncWrite, ReadBuf},
     net::TcpStream,
-    time::{Sleep, sleep},
+    time::{Instant, Sleep, sleep_until},
 };
+
+use super::room;
 
 /// A stream whose writes give up when the other side makes no room for a while.
 pub(crate) struct TimeoutStream {
     stream: TcpStream,
     timeout: Duration,
-    /// Set while a write waits.
-    alarm: Option<Pin<Box<Sleep>>>,
+    /// Set while a write waits: since when, and the time of the next look.
+    waiting: Option<(Instant, Pin<Box<Sleep>>)>,
 }
 
 impl TimeoutStream {
     pub(crate) fn new(stream: TcpStream, timeout: Duration) -> Self {
-        Self { stream, timeout, alarm: None }
+        Self { stream, timeout, waiting: None }
     }
 
     /// The stream without its timer.
@@ -31,21 +33,41 @@ impl TimeoutStream {
         self.stream
     }
 
-    /// Passes a write's outcome on; while there is none, the timer runs.
+    /// Passes a write's outcome on; while there is none, `bytes` are offered now and then, and the
+    /// clock runs.
     fn timed<T>(
         &mut self,
         outcome: Poll<io::Result<T>>,
+        offer: impl Fn(&TcpStream) -> io::Result<Option<T>>,
         cx: &mut Context<'_>,
     ) -> Poll<io::Result<T>> {
         if outcome.is_ready() {
-            self.alarm = None;
+            self.waiting = None;
             return outcome;
         }
-        let timeout = self.timeout;
-        let alarm = self.alarm.get_or_insert_with(|| Box::pin(sleep(timeout)));
-        ready!(alarm.as_mut().poll(cx));
-        Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the client does not read")))
+        let pause = room::pause(self.timeout);
+        let (since, alarm) = self.waiting.get_or_insert_with(|| {
+            let now = Instant::now();
+            (now, Box::pin(sleep_until(now + pause)))
+        });
+        loop {
+            ready!(alarm.as_mut().poll(cx));
+            let now = Instant::now();
+            let offered = offer(&self.stream).transpose();
+            if offered.is_some() || now - *since >= self.timeout {
+                self.waiting = None;
+                let too_long =
+                    || io::Error::new(io::ErrorKind::TimedOut, "the client does not read");
+                return Poll::Ready(offered.unwrap_or_else(|| Err(too_long())));
+            }
+            alarm.as_mut().reset(now + pause);
+        }
     }
+}
+
+/// Offers bytes; none if not one is taken.
+fn offer(stream: &TcpStream, bytes: &[u8]) -> io::Result<Option<usize>> {
+    Ok(Some(room::send(stream, bytes)?).filter(|&sent| sent > 0))
 }
 
 impl AsyncRead for TimeoutStream {
@@ -65,7 +87,7 @@ impl AsyncWrite for TimeoutStream {
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write(cx, bytes);
-        self.timed(outcome, cx)
+        self.timed(outcome, |stream| offer(stream, bytes), cx)
     }
 
     fn poll_write_vectored(
@@ -74,7 +96,8 @@ impl AsyncWrite for TimeoutStream {
         bytes: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let outcome = Pin::new(&mut self.stream).poll_write_vectored(cx, bytes);
-        self.timed(outcome, cx)
+        let first = bytes.iter().find(|bytes| !bytes.is_empty()).map_or(&[][..], |bytes| bytes);
+        self.timed(outcome, |stream| offer(stream, first), cx)
     }
 
     fn is_write_vectored(&self) -> bool {
@@ -83,11 +106,11 @@ impl AsyncWrite for TimeoutStream {
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let outcome = Pin::new(&mut self.stream).poll_flush(cx);
-        self.timed(outcome, cx)
+        self.timed(outcome, |_| Ok(None), cx)
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         let outcome = Pin::new(&mut self.stream).poll_shutdown(cx);
-        self.timed(outcome, cx)
+        self.timed(outcome, |_| Ok(None), cx)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{net::SocketAddr, time::Duration};
 
-use papilla_proto::{MAP_LEN, SampleType};
+use papilla_proto::{FrameHeader, MAP_LEN, SampleType, Window};
 use serde_json::json;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -11,7 +11,11 @@ use tokio::{
 };
 use tokio_tungstenite::tungstenite::Message;
 
-use crate::support::{Answer, Service, bytes_of, frame, hello, ramp, raw_exchange};
+use crate::support::{
+    Answer, Service, bytes_of, frame, hello, ramp,
+    raw::{Raw, opcode, ws},
+    raw_exchange,
+};
 
 /// A service that waits for nobody longer than 3 s.
 pub(crate) async fn impatient() -> Service {
@@ -86,6 +90,31 @@ async fn a_client_that_never_reads_is_dropped() {
     };
     timeout(Duration::from_secs(60), flood).await.expect("the session is still open");
     assert_serves(&service).await;
+}
+
+/// It asks for large answers by small frames and has the system's own buffers. 80 kB/s is enough for
+/// the system to confirm some bytes every two seconds, and too slow for it to have a third of the
+/// service's room free within the three that a client may take.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_slow_reader_is_waited_for() {
+    let service = Service::start_with(|config| config.io_timeout_s = 3).await;
+    let terms = json!({"version": 2, "sample_type": "u8", "answer_sample_type": "f32"});
+    let mut raw = Raw::open(service.address, &hello(&terms)).await;
+    let mut read = vec![0; 8192];
+    for sequence in 1..=80 {
+        let header = FrameHeader::pressure(sequence, 0, 0, SampleType::U8, 50.0);
+        let window = Window { x: 100, y: 100, width: 4, height: 4 };
+        let head = header.windowed(window).encode();
+        let small: Vec<u8> = head.iter().copied().chain([20; 16]).collect();
+        raw.send(&ws(opcode::FINAL | opcode::BINARY, &small)).await;
+        let reading = raw.stream.read_exact(&mut read);
+        timeout(Duration::from_secs(60), reading)
+            .await
+            .expect("no answer")
+            .expect("it was dropped");
+        sleep(Duration::from_millis(100)).await;
+    }
+    assert!(service.metric("papilla_sessions_open").await > 0.5);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -104,7 +104,7 @@ async fn metrics_are_what_a_scraper_reads() {
     assert!(text.lines().any(|line| line.starts_with(model) && line.ends_with(" 1")), "{text}");
     let request = "papilla_request_seconds_count{route=\"/v1/sed\",status=\"200\"} 1\n";
     assert!(text.contains(request), "{text}");
-    for reason in ["sessions", "requests", "token_sessions", "rate"] {
+    for reason in ["sessions", "requests", "token_sessions", "rate", "hellos"] {
         assert!(text.contains(&format!("papilla_shed_total{{reason=\"{reason}\"}} 0\n")));
     }
     if cfg!(target_os = "linux") {

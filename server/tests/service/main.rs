@@ -10,6 +10,7 @@ mod contact;
 mod drain;
 mod effects;
 mod gate;
+mod hard;
 mod hostile;
 mod information;
 mod ladder;
@@ -23,6 +24,8 @@ mod otlp;
 mod overload;
 mod page;
 mod process;
+#[cfg(target_os = "linux")]
+mod realtime;
 mod recorded;
 mod reload;
 mod rendering;

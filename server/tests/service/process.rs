@@ -201,7 +201,7 @@ async fn it_listens_while_its_models_are_loaded_and_measured() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    let _running = Running { child, address };
+    let _running = Running { child, address, started: serde_json::Value::Null };
     while tokio::net::TcpStream::connect(address).await.is_err() {
         sleep(Duration::from_millis(10)).await;
     }

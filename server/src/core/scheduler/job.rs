@@ -74,6 +74,8 @@ pub(crate) struct Times {
     pub(crate) decode: Duration,
     /// In the network; zero for a zero map.
     pub(crate) infer: Duration,
+    /// The same by the processor's time.
+    pub(crate) network: Duration,
     /// Encoding the answer.
     pub(crate) encode: Duration,
 }

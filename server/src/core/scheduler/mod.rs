@@ -1,9 +1,12 @@
 //! The inference pool: N dedicated threads, each with its own session of every tier.
 //!
 //! tokio only moves bytes. A connection puts a [`Job`] into its [`Slot`] and the
-//! slot into the bounded [`Queue`](queue::Queue); a thread takes it from there, decodes,
+//! slot into the bounded [`Queue`](queue::Queue), where turns are shared by [`Account`], that is by
+//! session; a thread takes it from there, decodes,
 //! checks, infers, encodes, and hands the [`Done`] to the slot's [`Sink`].
 
+mod account;
+mod clock;
 mod exchange;
 mod job;
 mod queue;
@@ -20,10 +23,14 @@ use papilla_metrics::Metrics;
 
 pub(crate) use exchange::Exchange;
 pub(crate) use job::{Done, Job, JobOptions, Outcome, OutputMeta, is_past};
-pub(crate) use slot::{Sink, Slot};
+pub(crate) use slot::{Account, Sink, Slot};
 
 use self::{exchange::Inbox, queue::Queue, work::Worker};
-use crate::{StartError, core::catalogue::Catalogue};
+use crate::{
+    StartError,
+    core::catalogue::Catalogue,
+    priority::{Priorities, Role},
+};
 use job::Times;
 use slot::Offer;
 
@@ -50,8 +57,9 @@ impl Pool {
         metrics: &Arc<Metrics>,
         threads: usize,
         places: usize,
+        priorities: &Priorities,
     ) -> Result<Self, StartError> {
-        let queue = Arc::new(Queue::new(places));
+        let queue = Arc::new(Queue::new(places, threads));
         let inboxes: Vec<_> = (0..threads).map(|_| Arc::default()).collect();
         let mut pool = Self {
             queue: Arc::clone(&queue),
@@ -62,10 +70,12 @@ impl Pool {
         for (number, inbox) in inboxes.into_iter().enumerate() {
             let (catalogue, metrics) = (Arc::clone(catalogue), Arc::clone(metrics));
             let (queue, report) = (Arc::clone(&queue), report.clone());
+            let priorities = priorities.clone();
             let thread = thread::Builder::new()
                 .name(format!("infer-{number}"))
                 .spawn(move || match Worker::prepare(&catalogue, metrics) {
                     Ok(mut worker) => {
+                        priorities.enter(Role::Rendering);
                         let _ = report.send(Ok(()));
                         // The starter counts reports until all senders are gone.
                         drop(report);

@@ -1,81 +1,258 @@
-//! The bounded queue of slots that wait for a thread: first come, first served.
+//! The bounded queue of slots that wait for a thread: turns are shared by account.
+//!
+//! Start-time fair queuing (Goyal, Vin & Cheng 1996): each account has a time on a virtual clock at
+//! which its next turn is due, and every frame moves that on by the thread time that it cost. So
+//! whoever has cost least goes first, ten fingers have the share of one session, and a turn costs
+//! the logarithm of the number of accounts.
+//!
+//! A turn cannot be taken back once a frame is begun. Therefore heavy accounts ([`Weight`]) hold all
+//! threads but one while light ones are about: whatever their number, a light frame finds a thread.
 
 use std::{
-    collections::VecDeque,
+    cmp::Ordering,
+    collections::BinaryHeap,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
-use super::Slot;
+use super::{
+    Account, Slot,
+    account::{Ledger, Spent, Weight},
+};
+
+/// How long after the last frame of a light account a thread is kept free for the next one.
+const LIGHT_FOR: Duration = Duration::from_secs(2);
 
 /// What a thread finds.
 pub(super) enum Next {
     /// A slot with a job.
-    Slot(Arc<Slot>),
+    Turn(Turn),
     /// Nothing within the wait.
     Nothing,
     /// Nothing, and nothing will come.
     Closed,
 }
 
-/// Slots with a job, in the order of their arrival.
+/// A slot whose turn it is; [`Queue::done`] ends it.
+pub(super) struct Turn {
+    pub(super) slot: Arc<Slot>,
+    weight: Weight,
+    /// What its account was charged in advance.
+    charged: Duration,
+}
+
+/// Slots with a job, by what their accounts have cost.
 pub(super) struct Queue {
     state: Mutex<State>,
     arrival: Condvar,
     places: usize,
+    threads: usize,
 }
 
 struct State {
-    slots: VecDeque<Arc<Slot>>,
+    light: BinaryHeap<Entry>,
+    heavy: BinaryHeap<Entry>,
+    slots: usize,
+    /// The virtual clock: when the turn that was taken last was due.
+    clock: Duration,
+    arrivals: u64,
+    /// Turns of heavy accounts that have not ended.
+    heavy_running: usize,
+    light_seen: Option<Instant>,
+    light_for: Duration,
     closed: bool,
 }
 
+/// An account in a heap; the greatest is due first, and of equals the first to come.
+struct Entry {
+    due: Duration,
+    arrival: u64,
+    account: Arc<Account>,
+}
+
+impl Entry {
+    fn rank(&self) -> (Duration, u64) {
+        (self.due, self.arrival)
+    }
+}
+
+impl Ord for Entry {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.rank().cmp(&self.rank())
+    }
+}
+
+impl PartialOrd for Entry {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.rank() == other.rank()
+    }
+}
+
+impl Eq for Entry {}
+
+impl State {
+    fn heap(&mut self, weight: Weight) -> &mut BinaryHeap<Entry> {
+        match weight {
+            Weight::Light => &mut self.light,
+            Weight::Heavy => &mut self.heavy,
+        }
+    }
+
+    /// Puts an account with waiting slots into the heap of its weight.
+    fn list(&mut self, account: &Arc<Account>, ledger: &mut Ledger<Slot>, now: Instant) {
+        let weight = ledger.weight(now);
+        self.arrivals += 1;
+        let (due, arrival) = (ledger.due, self.arrivals);
+        self.heap(weight).push(Entry { due, arrival, account: Arc::clone(account) });
+        ledger.listed = Some(weight);
+    }
+
+    fn enter(&mut self, slot: Arc<Slot>, now: Instant) {
+        let account = Arc::clone(slot.account());
+        let mut ledger = account.ledger();
+        ledger.enter(slot, self.clock);
+        self.slots += 1;
+        if ledger.weight(now) == Weight::Light {
+            self.light_seen = Some(now);
+        }
+        if ledger.listed.is_none() {
+            self.list(&account, &mut ledger, now);
+        }
+    }
+
+    /// Whether a heavy account may take a thread.
+    fn is_heavy_free(&self, threads: usize, now: Instant) -> bool {
+        let is_light_about = self
+            .light_seen
+            .is_some_and(|seen| now.saturating_duration_since(seen) < self.light_for);
+        let kept_free = usize::from(threads > 1 && is_light_about && !self.closed);
+        self.heavy_running < threads - kept_free
+    }
+
+    /// The slot whose turn it is, if a thread may take one.
+    fn next(&mut self, threads: usize, now: Instant) -> Option<Turn> {
+        loop {
+            let heavy = self.heavy.peek().filter(|_| self.is_heavy_free(threads, now));
+            let weight = match (self.light.peek(), heavy) {
+                (None, None) => return None,
+                (Some(light), Some(heavy)) if light.rank() > heavy.rank() => Weight::Heavy,
+                (Some(_), _) => Weight::Light,
+                (None, Some(_)) => Weight::Heavy,
+            };
+            let Entry { due, account, .. } = self.heap(weight).pop()?;
+            let mut ledger = account.ledger();
+            ledger.listed = None;
+            if ledger.due > due || ledger.weight(now) != weight {
+                // It was charged since, or weighs something else now.
+                self.list(&account, &mut ledger, now);
+                continue;
+            }
+            self.clock = self.clock.max(ledger.due);
+            let Some((slot, charged)) = ledger.begin() else { continue };
+            self.slots -= 1;
+            self.heavy_running += usize::from(weight == Weight::Heavy);
+            if !ledger.waiting.is_empty() {
+                self.list(&account, &mut ledger, now);
+            }
+            return Some(Turn { slot, weight, charged });
+        }
+    }
+
+    fn end(&mut self, turn: Turn, spent: Spent, is_again: bool, now: Instant) {
+        let Turn { slot, weight, charged } = turn;
+        self.heavy_running -= usize::from(weight == Weight::Heavy);
+        let account = Arc::clone(slot.account());
+        let mut ledger = account.ledger();
+        ledger.end(charged, spent, now);
+        if is_again {
+            ledger.waiting.push_back(slot);
+            self.slots += 1;
+        }
+        let is_light = ledger.weight(now) == Weight::Light;
+        if is_light {
+            self.light_seen = Some(now);
+        }
+        if is_light && ledger.listed == Some(Weight::Heavy) {
+            // Once for an account, as a rule: its first frame was short.
+            self.heavy.retain(|entry| !Arc::ptr_eq(&entry.account, &account));
+            ledger.listed = None;
+        }
+        if ledger.listed.is_none() && !ledger.waiting.is_empty() {
+            self.list(&account, &mut ledger, now);
+        }
+    }
+}
+
 impl Queue {
-    /// A queue of at most `places` slots; all its memory is taken here.
-    pub(super) fn new(places: usize) -> Self {
-        let state = State { slots: VecDeque::with_capacity(places), closed: false };
-        Self { state: Mutex::new(state), arrival: Condvar::new(), places }
+    /// A queue of at most `places` slots before so many threads; all its memory is taken here.
+    pub(super) fn new(places: usize, threads: usize) -> Self {
+        let state = State {
+            light: BinaryHeap::with_capacity(places),
+            heavy: BinaryHeap::with_capacity(places),
+            slots: 0,
+            clock: Duration::ZERO,
+            arrivals: 0,
+            heavy_running: 0,
+            light_seen: None,
+            light_for: LIGHT_FOR,
+            closed: false,
+        };
+        Self { state: Mutex::new(state), arrival: Condvar::new(), places, threads }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a slot at the end; false if the queue is full or closed.
+    /// Takes a slot in; false if the queue is full or closed.
     pub(super) fn push(&self, slot: Arc<Slot>) -> bool {
         let mut state = self.state();
-        if state.closed || state.slots.len() >= self.places {
+        if state.closed || state.slots >= self.places {
             return false;
         }
-        state.slots.push_back(slot);
+        state.enter(slot, Instant::now());
         drop(state);
         self.arrival.notify_one();
         true
     }
 
-    /// Puts back a slot that a thread has just served; closed or not, its job was accepted.
-    pub(super) fn push_again(&self, slot: Arc<Slot>) {
-        self.state().slots.push_back(slot);
+    /// Ends a turn. With `is_again` its slot has another job; closed or not, that was accepted.
+    pub(super) fn done(&self, turn: Turn, spent: Spent, is_again: bool) {
+        self.state().end(turn, spent, is_again, Instant::now());
+        // Its slot waits again, or a heavy account waited for the end of a heavy turn.
         self.arrival.notify_one();
     }
 
-    /// The slot that waits longest; waits up to `wait` for one.
+    /// The slot whose turn it is; waits up to `wait` for one.
     pub(super) fn pop(&self, wait: Duration) -> Next {
-        let state = self.state();
-        let (mut state, _) = self
-            .arrival
-            .wait_timeout_while(state, wait, |s| s.slots.is_empty() && !s.closed)
-            .unwrap_or_else(PoisonError::into_inner);
-        match state.slots.pop_front() {
-            Some(slot) => Next::Slot(slot),
-            None if state.closed => Next::Closed,
-            None => Next::Nothing,
+        let end = Instant::now() + wait;
+        let mut state = self.state();
+        loop {
+            let now = Instant::now();
+            if let Some(turn) = state.next(self.threads, now) {
+                return Next::Turn(turn);
+            }
+            if state.closed && state.slots == 0 {
+                return Next::Closed;
+            }
+            let left = end.saturating_duration_since(now);
+            if left.is_zero() {
+                return Next::Nothing;
+            }
+            let woken = self.arrival.wait_timeout(state, left);
+            (state, _) = woken.unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     /// How many slots wait.
     pub(super) fn len(&self) -> i64 {
-        self.state().slots.len() as i64
+        self.state().slots as i64
     }
 
     /// Takes no more slots; those that wait are still served.
@@ -84,3 +261,14 @@ impl Queue {
         self.arrival.notify_all();
     }
 }
+
+#[cfg(test)]
+impl Queue {
+    /// Light accounts count for a long time: a test that is held up must not see them expire.
+    pub(super) fn remember_light(&self) {
+        self.state().light_for = Duration::from_secs(3600);
+    }
+}
+
+#[cfg(test)]
+mod tests;

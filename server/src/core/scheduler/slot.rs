@@ -7,7 +7,7 @@ use std::{
 
 use tokio::sync::mpsc;
 
-use super::{Done, Job};
+use super::{Done, Job, account};
 use crate::core::buffers::Recycler;
 
 /// Where answers go, from the thread that rendered and on it.
@@ -52,6 +52,9 @@ pub(crate) enum Offer {
     Schedule,
 }
 
+/// The account of a session, or of one client's posts.
+pub(crate) type Account = account::Account<Slot>;
+
 /// The meeting point of one client and the pool.
 ///
 /// A slot is in the queue or with a thread at most once, so a session never has
@@ -60,6 +63,7 @@ pub(crate) enum Offer {
 pub(crate) struct Slot {
     state: Mutex<State>,
     sink: Arc<dyn Sink>,
+    account: Arc<Account>,
 }
 
 #[derive(Debug)]
@@ -71,10 +75,16 @@ struct State {
 }
 
 impl Slot {
-    /// An empty slot, whose answers are written into the buffers of `recycler` and go to `sink`.
-    pub(crate) fn new(recycler: Recycler, sink: Arc<dyn Sink>) -> Self {
+    /// An empty slot, whose answers are written into the buffers of `recycler` and go to `sink`;
+    /// what they cost goes to `account`.
+    pub(crate) fn new(recycler: Recycler, sink: Arc<dyn Sink>, account: Arc<Account>) -> Self {
         let state = State { waiting: None, scheduled: false, recycler };
-        Self { state: Mutex::new(state), sink }
+        Self { state: Mutex::new(state), sink, account }
+    }
+
+    /// Whose frames these are.
+    pub(super) fn account(&self) -> &Arc<Account> {
+        &self.account
     }
 
     fn state(&self) -> MutexGuard<'_, State> {

@@ -17,14 +17,15 @@ use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, FrameHeader, HEADER_LEN, MAP_LEN, SampleType};
 use tokio::sync::mpsc;
 
-use self::gated::{Act, Gate, Gated};
-use super::{Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot};
+use self::gated::{Act, FREE_PA, Gate, Gated};
+use super::{Account, Done, Job, JobOptions, Outcome, Pool, PoolHandle, Slot, account::Weight};
 use crate::core::{
     buffers::{HEADROOM, Recycler},
     catalogue::testing,
 };
+use crate::priority::Priorities;
 
-/// A pool of one thread and the handles of its gate.
+/// A pool and the handles of its gate.
 struct Bench {
     pool: Pool,
     handle: PoolHandle,
@@ -33,7 +34,12 @@ struct Bench {
     go: SyncSender<Act>,
 }
 
+/// A pool of one thread.
 fn bench() -> Bench {
+    bench_of(1, 4)
+}
+
+fn bench_of(threads: usize, places: usize) -> Bench {
     let (begun_in, begun) = sync_channel(16);
     let (go, go_out) = sync_channel(16);
     let gate = Arc::new(Gate { begun: begun_in, go: Mutex::new(go_out) });
@@ -41,7 +47,7 @@ fn bench() -> Bench {
     let catalogue = Arc::new(testing::catalogue(vec![testing::tier(Arc::new(gated), 0.1)]));
     let metrics = Metrics::new();
     metrics.name_tiers(catalogue.tier_labels());
-    let pool = Pool::start(&catalogue, &metrics, 1, 4).unwrap();
+    let pool = Pool::start(&catalogue, &metrics, threads, places, &Priorities::none()).unwrap();
     let handle = pool.handle(&metrics);
     Bench { pool, handle, metrics, begun, go }
 }
@@ -65,8 +71,14 @@ fn job(sequence: u32, pressure_pa: f32, deadline: Option<Duration>) -> Job {
 }
 
 fn client() -> (Arc<Slot>, mpsc::Receiver<Done>) {
+    finger(&Account::new(1))
+}
+
+/// One finger of a session.
+fn finger(account: &Arc<Account>) -> (Arc<Slot>, mpsc::Receiver<Done>) {
     let (sink, answers) = mpsc::channel(4);
-    (Arc::new(Slot::new(Recycler::default(), Arc::new(sink))), answers)
+    let slot = Slot::new(Recycler::default(), Arc::new(sink), Arc::clone(account));
+    (Arc::new(slot), answers)
 }
 
 fn sequence(done: &Done) -> u32 {
@@ -125,6 +137,46 @@ fn slots_are_served_in_turn_however_fast_one_client_sends() {
     assert!(greedy_answers.try_recv().is_err());
     bench.go.send(Act::Finish).unwrap();
     assert_eq!(sequence(&wait(&mut greedy_answers)), 2);
+}
+
+/// Ten fingers of a session whose frames do not end, and a neighbour: it is served meanwhile.
+#[test]
+fn ten_fingers_do_not_hold_the_last_thread_while_a_light_session_is_about() {
+    let bench = bench_of(2, 16);
+    bench.pool.queue.remember_light();
+    let account = Account::new(1);
+    let (light, mut light_answers) = finger(&account);
+    let begun = || bench.begun.recv_timeout(WAIT_MAX).expect("no inference began");
+    let mut rendered = 0;
+    let mut serve = || {
+        rendered += 1;
+        bench.handle.submit(&light, job(rendered, FREE_PA, None)).unwrap();
+        begun();
+        assert_eq!(sequence(&wait(&mut light_answers)), rendered);
+    };
+    // Nothing is known of a session until one of its frames has been measured.
+    let end = Instant::now() + WAIT_MAX;
+    serve();
+    while account.ledger().weight(Instant::now()) != Weight::Light {
+        assert!(Instant::now() < end, "short frames do not make a session light");
+        sleep(Duration::from_millis(1));
+    }
+    let hostile = Account::new(10);
+    let fingers: Vec<_> = (0..10).map(|_| finger(&hostile)).collect();
+    for (slot, _) in &fingers {
+        bench.handle.submit(slot, job(1, 1.0, None)).unwrap();
+    }
+    begun();
+    for _ in 0..5 {
+        serve();
+    }
+    assert!(bench.begun.try_recv().is_err(), "the hostile session got the last thread");
+    for _ in &fingers {
+        bench.go.send(Act::Finish).unwrap();
+    }
+    for (_, mut answers) in fingers {
+        wait(&mut answers);
+    }
 }
 
 #[test]

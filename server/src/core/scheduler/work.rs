@@ -16,7 +16,9 @@ use papilla_session_contact::{Finger, Frame};
 use papilla_session_effects::Effects;
 
 use super::{
-    Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Times,
+    Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
+    account::{LONG, Spent},
+    clock,
     exchange::Inbox,
     queue::{Next, Queue},
 };
@@ -64,23 +66,41 @@ impl Worker {
             let next = queue.pop(POP_TIMEOUT);
             // After the wait: a job for a new tier comes only once its session is there.
             inbox.collect(&mut self.catalogue, &mut self.sessions);
-            let slot = match next {
-                Next::Slot(slot) => slot,
+            let turn = match next {
+                Next::Turn(turn) => turn,
                 Next::Nothing => continue,
                 Next::Closed => return,
             };
             self.metrics.queue_length.set(queue.len());
-            let abandoned = slot.is_abandoned();
-            let Some((mut job, mut recycler)) = slot.take() else { continue };
-            let done = if abandoned {
-                finished(&job, Progress::default(), Outcome::Gone)
-            } else {
-                self.serve(&mut job, &mut recycler)
-            };
-            if slot.finish(done, recycler) {
-                queue.push_again(slot);
-            }
+            let (spent, is_again) = self.take_turn(&turn.slot);
+            queue.done(turn, spent, is_again);
         }
+    }
+
+    /// Serves a slot; what it cost, and whether another job has come meanwhile.
+    fn take_turn(&mut self, slot: &Slot) -> (Spent, bool) {
+        let (begun, cpu_begun) = (Instant::now(), clock::thread_time());
+        let mut spent = Spent { busy: Duration::ZERO, beside_network: None };
+        let abandoned = slot.is_abandoned();
+        let Some((mut job, mut recycler)) = slot.take() else { return (spent, false) };
+        let done = if abandoned {
+            finished(&job, Progress::default(), Outcome::Gone)
+        } else {
+            self.serve(&mut job, &mut recycler)
+        };
+        let is_rendered = matches!(done.outcome, Outcome::Map { .. });
+        // Of what failed or came too late, a long time tells as much and a short one nothing.
+        let beside_network =
+            clock::thread_time().saturating_sub(cpu_begun).saturating_sub(done.times.network);
+        if is_rendered || beside_network > LONG {
+            spent.beside_network = Some(beside_network);
+        }
+        if beside_network > LONG {
+            self.metrics.long_frames.inc();
+        }
+        let is_again = slot.finish(done, recycler);
+        spent.busy = begun.elapsed();
+        (spent, is_again)
     }
 
     /// Renders one job; a panic below becomes an error of this job alone.
@@ -176,10 +196,12 @@ impl Worker {
             }
             Some(_) if deadline.is_some_and(misses) => return Ok(Outcome::Late(Stage::Inference)),
             Some(_) => {
+                let cpu_begun = clock::thread_time();
                 self.maps.infer(self.sessions[job.tier].as_mut()).map_err(|error| {
                     let error = format_args!("{}.onnx: {error}", tier.name);
                     problem::internal("the inference failed", &error)
                 })?;
+                times.network = clock::thread_time().saturating_sub(cpu_begun);
                 times.infer = decoded.elapsed();
                 tier.latency.learn(times.infer);
             }

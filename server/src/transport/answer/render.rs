@@ -17,7 +17,7 @@ use crate::{
         scheduler::{Done, Job, Outcome, Slot, is_past},
     },
     problem, telemetry,
-    transport::app::App,
+    transport::{app::App, gate::Key},
 };
 
 /// Longest wait for the pool; only a fault of our own can take so long.
@@ -61,6 +61,7 @@ pub(crate) async fn through_pool(
     app: &App,
     job: Job,
     transport: Transport,
+    client: Option<&Key>,
 ) -> Result<Rendered, Problem> {
     let late = |stage| {
         app.metrics.late(transport, stage);
@@ -69,7 +70,7 @@ pub(crate) async fn through_pool(
     if job.is_late() {
         return Err(late(Stage::Admission));
     }
-    let done = submit(app, job).await?;
+    let done = submit(app, job, client).await?;
     match done.outcome {
         Outcome::Failed(problem) => Err(problem),
         Outcome::Late(stage) => Err(late(stage)),
@@ -86,9 +87,9 @@ pub(crate) async fn through_pool(
     }
 }
 
-async fn submit(app: &App, job: Job) -> Result<Done, Problem> {
+async fn submit(app: &App, job: Job, client: Option<&Key>) -> Result<Done, Problem> {
     let (sink, mut answers) = mpsc::channel(1);
-    let slot = Slot::new(Recycler::default(), Arc::new(sink));
+    let slot = Slot::new(Recycler::default(), Arc::new(sink), app.posters.account(client));
     if app.pool.submit(&Arc::new(slot), job).is_err() {
         return Err(problem::shutting_down());
     }

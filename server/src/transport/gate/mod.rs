@@ -14,12 +14,10 @@ use papilla_proto::{ErrorCode, Problem};
 pub(crate) use self::{
     origin::cors,
     places::{Place, PlaceHandle, Places},
+    rate::Key,
     tokens::Holder,
 };
-use self::{
-    rate::{Key, Rates},
-    tokens::Tokens,
-};
+use self::{rate::Rates, tokens::Tokens};
 use crate::config::{Config, SettingError};
 
 /// Cookie that carries the token of a browser.
@@ -53,6 +51,8 @@ pub(crate) struct Principal {
     pub(crate) holder: Option<Arc<Holder>>,
     /// Whether it may change what the service serves.
     pub(crate) is_admin: bool,
+    /// The client that it counts for, if that is known.
+    pub(crate) client: Option<Key>,
 }
 
 /// What decides who comes in.
@@ -121,8 +121,8 @@ impl Gate {
             (None, Some(address)) => Some(Key::of_address(address)),
             (None, None) => None,
         };
-        if let (Some(rates), Some(key)) = (&self.rates, key) {
-            rates.check(&key)?;
+        if let (Some(rates), Some(key)) = (&self.rates, &key) {
+            rates.check(key)?;
         }
         origin::check_host(head, &self.origins, self.is_local)?;
         origin::check(&head.headers, &self.origins, self.is_local)?;
@@ -141,7 +141,7 @@ impl Gate {
             Some(holder) => holder.is_admin,
             None => self.tokens.is_none() && peer.is_some_and(|peer| peer.is_loopback()),
         };
-        Ok(Admitted { principal: Principal { holder, is_admin }, cookie })
+        Ok(Admitted { principal: Principal { holder, is_admin, client: key }, cookie })
     }
 
     fn cookie(&self, token: &str) -> Result<HeaderValue, Problem> {

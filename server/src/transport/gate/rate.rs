@@ -15,9 +15,9 @@ use crate::transport::bucket::{Bucket, Rate};
 /// Beyond so many buckets the full ones are thrown away: their clients have been silent.
 const BUCKETS_MAX: usize = 4096;
 
-/// Whose bucket it is.
+/// A client, as far as one can be told from another.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Key {
+pub(crate) enum Key {
     /// That of a token, by its name.
     Token(Arc<str>),
     /// That of an address.
@@ -25,7 +25,7 @@ pub(super) enum Key {
 }
 
 impl Key {
-    pub(super) fn of_address(address: IpAddr) -> Self {
+    pub(crate) fn of_address(address: IpAddr) -> Self {
         Self::Address(network_of(address))
     }
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use axum::{
     body::Body,
-    extract::State,
+    extract::{Extension, State},
     http::{HeaderMap, HeaderValue, Uri},
     response::Response,
 };
@@ -20,18 +20,26 @@ use crate::{
             render::{Rendered, count, through_pool},
         },
         app::App,
+        gate::Principal,
         negotiate::{self, Query},
     },
 };
 
-pub(crate) async fn post(State(app): Shared, uri: Uri, headers: HeaderMap, body: Body) -> Answer {
-    let result = render(&app, &uri, &headers, body).await;
+pub(crate) async fn post(
+    State(app): Shared,
+    Extension(principal): Extension<Principal>,
+    uri: Uri,
+    headers: HeaderMap,
+    body: Body,
+) -> Answer {
+    let result = render(&app, &principal, &uri, &headers, body).await;
     count(&app, Transport::Http, &result);
     result.or_else(|problem| refuse(&app, problem))
 }
 
 async fn render(
     app: &App,
+    principal: &Principal,
     uri: &Uri,
     headers: &HeaderMap,
     body: Body,
@@ -53,7 +61,8 @@ async fn render(
         Job { tier, payload, input, output, received, deadline, options: JobOptions::default() };
     // Held until the answer is there: it bounds the queue.
     let _place = app.admit_request()?;
-    let Rendered { bytes, scale, timings } = through_pool(app, job, Transport::Http).await?;
+    let rendered = through_pool(app, job, Transport::Http, principal.client.as_ref()).await?;
+    let Rendered { bytes, scale, timings } = rendered;
     let mut response = answer(output.content_type(), bytes.freeze());
     let headers = response.headers_mut();
     timings.label(headers, &catalogue.tiers[tier].name);

@@ -12,7 +12,7 @@ use hyper::upgrade::Upgraded;
 use hyper_util::rt::TokioIo;
 use papilla_proto::{ErrorCode, Problem, ServerMessage, SessionError};
 use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt},
+    io::{AsyncReadExt, AsyncWriteExt, Interest},
     net::TcpStream,
     sync::watch,
     time::{Instant as TokioInstant, Sleep, sleep, sleep_until, timeout},
@@ -28,7 +28,7 @@ use super::{
 use crate::{
     drain::begun,
     problem,
-    transport::{app::App, stream::TimeoutStream},
+    transport::{app::App, gate::Key, room, stream::TimeoutStream},
 };
 
 /// The connection and what it takes to speak over it.
@@ -37,6 +37,8 @@ pub(super) struct Connection {
     pub(super) inbound: Inbound,
     pub(super) reply: Arc<Reply>,
     pub(super) app: Arc<App>,
+    /// Whose connection it is, if that is known.
+    pub(super) client: Option<Key>,
     drain: watch::Receiver<bool>,
     /// When the client's last message came, and whether it was pinged since.
     heard: TokioInstant,
@@ -83,7 +85,12 @@ impl Wait {
 }
 
 impl Connection {
-    pub(super) fn new(upgraded: Upgraded, app: Arc<App>, drain: watch::Receiver<bool>) -> Self {
+    pub(super) fn new(
+        upgraded: Upgraded,
+        app: Arc<App>,
+        drain: watch::Receiver<bool>,
+        client: Option<Key>,
+    ) -> Self {
         let (stream, inbound) = match upgraded.downcast::<TokioIo<TimeoutStream>>() {
             Ok(parts) => {
                 let stream = Arc::new(parts.io.into_inner().into_stream());
@@ -105,6 +112,7 @@ impl Connection {
             inbound,
             reply,
             app,
+            client,
             drain,
             heard,
             is_pinged: false,
@@ -246,32 +254,56 @@ impl Connection {
         Ok(())
     }
 
-    /// Writes what is left, within the time a client may take to make room.
+    /// Waits for work that the client has asked for; given up with the client.
+    pub(super) async fn while_there<T>(&mut self, work: impl Future<Output = T>) -> Result<T, End> {
+        tokio::select! {
+            biased;
+            done = work => Ok(done),
+            error = self.stream.left(&mut self.inbound) => {
+                Err(End::Garbled(error.map_or_else(
+                    || "the client left before its hello was worked out".to_owned(),
+                    |error| error.to_string(),
+                )))
+            }
+        }
+    }
+
+    /// Writes what is left, as long as the client reads: it may take a while for the first byte and
+    /// for each that follows, and as long as it needs for all.
     pub(super) async fn flush(&mut self) -> Result<(), End> {
         let out = &self.reply.out;
         // Nearly always there is nothing left, and no clock to be set.
-        if out.go_on().map_err(End::Broken)? {
+        if out.go_on(false).map_err(End::Broken)?.is_all {
             return Ok(());
         }
-        let writing = async {
-            match &mut self.stream {
-                Stream::Plain(stream) => {
-                    while !out.go_on()? {
-                        stream.writable().await.map_err(|error| error.to_string())?;
+        let broken = |error: io::Error| End::Broken(error.to_string());
+        match &mut self.stream {
+            Stream::Plain(stream) => {
+                let wait_max = self.app.timeouts.io;
+                let mut read = Instant::now();
+                loop {
+                    // Err: there may be less room than the system wakes anybody for.
+                    let woken = timeout(room::pause(wait_max), stream.writable()).await;
+                    let insist = woken.is_err();
+                    woken.unwrap_or(Ok(())).map_err(broken)?;
+                    let written = out.go_on(insist).map_err(End::Broken)?;
+                    if written.is_all {
+                        return Ok(());
                     }
-                }
-                Stream::Tls(stream) => {
-                    while let Some(message) = out.take() {
-                        stream.write_all(&message).await.map_err(|error| error.to_string())?;
+                    if written.bytes > 0 {
+                        read = Instant::now();
+                    } else if read.elapsed() >= wait_max {
+                        return Err(End::Broken("the client does not read its answers".to_owned()));
                     }
-                    stream.flush().await.map_err(|error| error.to_string())?;
                 }
             }
-            Ok(())
-        };
-        match timeout(self.app.timeouts.io, writing).await {
-            Ok(result) => result.map_err(End::Broken),
-            Err(_) => Err(End::Broken("the client does not read its answers".to_owned())),
+            // The stream below the cipher times its writes the same way.
+            Stream::Tls(stream) => {
+                while let Some(message) = out.take() {
+                    stream.write_all(&message).await.map_err(broken)?;
+                }
+                stream.flush().await.map_err(broken)
+            }
         }
     }
 
@@ -309,6 +341,11 @@ impl Connection {
     }
 }
 
+/// Time between two looks at whether a client is still there, and bytes read meanwhile where they
+/// have to be read for that.
+const LOOK: Duration = Duration::from_millis(50);
+const AHEAD_MAX: usize = 256 * 1024;
+
 /// Longest wait for the client's own close; room to read until then, bytes, and the pause between
 /// two reads: a client that goes on sending is listened to at 8 MB/s.
 const FAREWELL: Duration = Duration::from_secs(1);
@@ -316,6 +353,32 @@ const FAREWELL_ROOM: usize = 16 * 1024;
 const FAREWELL_PAUSE: Duration = Duration::from_millis(2);
 
 impl Stream {
+    /// Waits until the client sends nothing more, or the connection breaks; for ever, as a rule.
+    /// What it sends meanwhile waits, in the system's room or in `inbound`.
+    async fn left(&mut self, inbound: &mut Inbound) -> Option<io::Error> {
+        let mut ahead = 0;
+        loop {
+            sleep(LOOK).await;
+            match self {
+                // Err: there is nothing to be read.
+                Self::Plain(stream) => {
+                    match timeout(LOOK, stream.ready(Interest::READABLE)).await {
+                        Ok(Ok(ready)) if ready.is_read_closed() => return None,
+                        Ok(Err(error)) => return Some(error),
+                        Ok(Ok(_)) | Err(_) => {}
+                    }
+                }
+                // Only a read tells, behind the cipher.
+                Self::Tls(_) if ahead >= AHEAD_MAX => {}
+                Self::Tls(stream) => match stream.read_buf(inbound.room()).await {
+                    Ok(0) => return None,
+                    Ok(bytes) => ahead += bytes,
+                    Err(error) => return Some(error),
+                },
+            }
+        }
+    }
+
     /// Reads some bytes behind those of `buffer`; nothing is lost if it is dropped while it waits.
     async fn read(&mut self, buffer: &mut BytesMut) -> io::Result<usize> {
         match self {

@@ -10,8 +10,8 @@ use bytes::Bytes;
 use papilla_codec::{Input, Output};
 use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
-    ClientMessage, ErrorCode, FrameHeader, FrameKind, FrameStatus, MessageError, Problem,
-    Reconnect, ReconnectReason, ServerMessage, Window,
+    ClientMessage, ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, Reconnect,
+    ReconnectReason, ServerMessage, Window, contact::FINGERS_MAX,
 };
 use tokio::{task::spawn_blocking, time::timeout};
 
@@ -27,7 +27,7 @@ use super::{
 use crate::{
     core::{
         buffers::HEADROOM,
-        scheduler::{Job, JobOptions, Slot},
+        scheduler::{Account, Job, JobOptions, Slot},
     },
     problem,
     transport::app::App,
@@ -38,6 +38,8 @@ pub(super) struct Session {
     pub(super) number: u64,
     pub(super) terms: Terms,
     lanes: Vec<Lane>,
+    /// What its frames cost: all fingers have the turns of one session.
+    account: Arc<Account>,
 }
 
 /// The way of one finger's frames.
@@ -91,9 +93,17 @@ pub(super) async fn serve(connection: &mut Connection, mut session: Session) -> 
             Ok(Event::Text(_)) if draining => {
                 connection.reply.send_error(problem::shutting_down(), None);
             }
-            Ok(Event::Text(text)) => match hello::parse(&text).await {
-                Ok(ClientMessage::Seal) if session.terms.follows.is_some() => is_seal_due = true,
-                said => session.renew(connection, said).await,
+            Ok(Event::Text(text)) => match hello::parse(connection, &text).await {
+                Ok(Ok(Ok(ClientMessage::Seal))) if session.terms.follows.is_some() => {
+                    is_seal_due = true;
+                }
+                Ok(Ok(said)) => {
+                    if let Err(end) = session.renew(connection, said).await {
+                        return end;
+                    }
+                }
+                Ok(Err(problem)) => connection.reply.send_error(problem, None),
+                Err(end) => return end,
             },
         }
     }
@@ -109,7 +119,8 @@ fn ask_to_move(connection: &Connection, reason: ReconnectReason, within: Option<
 impl Session {
     /// A session on these terms.
     pub(super) fn new(number: u64, terms: Terms, connection: &Connection) -> Self {
-        let mut session = Self { number, terms, lanes: Vec::new() };
+        let account = Account::new(FINGERS_MAX);
+        let mut session = Self { number, terms, lanes: Vec::new(), account };
         session.open_lanes(connection);
         session
     }
@@ -123,18 +134,15 @@ impl Session {
         let fingers = self.terms.hand.as_ref().map_or(1, |hand| hand.fingers().len());
         for _ in self.lanes.len()..fingers {
             let answers = connection.app.store.answers(self.terms.answer_len_max());
-            let slot = Arc::new(Slot::new(answers, Arc::clone(&connection.reply) as Arc<_>));
-            self.lanes.push(Lane { fresh: fresh(), slot });
+            let sink = Arc::clone(&connection.reply) as Arc<_>;
+            let slot = Slot::new(answers, sink, Arc::clone(&self.account));
+            self.lanes.push(Lane { fresh: fresh(), slot: Arc::new(slot) });
         }
     }
 
     /// Takes a hello for new terms, such as another tier.
-    async fn renew(
-        &mut self,
-        connection: &mut Connection,
-        said: Result<ClientMessage, MessageError>,
-    ) {
-        match hello::renew(&connection.app, said, self.number).await {
+    async fn renew(&mut self, connection: &mut Connection, said: hello::Said) -> Result<(), End> {
+        match hello::renew(connection, said, self.number).await? {
             Ok((terms, ready)) => {
                 self.terms = terms;
                 self.open_lanes(connection);
@@ -145,6 +153,7 @@ impl Session {
             }
             Err(problem) => connection.reply.send_error(problem, None),
         }
+        Ok(())
     }
 
     /// Sets when a client that follows is asked to go on elsewhere.

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage, json::JsonError,
-};
+use papilla_metrics::Shed;
+use papilla_proto::{ClientMessage, ErrorCode, Hello, MessageError, Problem, Ready, ServerMessage};
 use papilla_session_state::is_sealed;
-use tokio::{task::spawn_blocking, time::timeout};
+use tokio::time::timeout;
 
 use super::{
     End, close,
@@ -15,10 +14,16 @@ use super::{
     drained,
     terms::{self, Terms, ready},
 };
-use crate::{problem, transport::app::App};
+use crate::{
+    core::desk::{Cancel, NoResult},
+    problem,
+};
 
 /// Refused hellos after which the session ends.
 const ATTEMPTS: usize = 8;
+
+/// What a text message says, if it can be understood.
+pub(super) type Said = Result<ClientMessage, MessageError>;
 
 /// Waits for a hello that can be met, and answers ready.
 pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Terms, End> {
@@ -56,14 +61,18 @@ async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), P
             return Ok(Err(Problem::new(ErrorCode::UnexpectedBinary, message)));
         }
     };
-    match parse(&text).await {
+    let said = match parse(connection, &text).await? {
+        Ok(said) => said,
+        Err(problem) => return Ok(Err(problem)),
+    };
+    match said {
         Ok(ClientMessage::Hello(hello)) if hello.resume == Some(true) && hello.version > 1 => {
             match state(connection).await? {
-                Ok(sealed) => Ok(meet(&connection.app, hello, Some(sealed)).await),
+                Ok(sealed) => meet(connection, hello, Some(sealed)).await,
                 Err(problem) => Ok(Err(problem)),
             }
         }
-        Ok(ClientMessage::Hello(hello)) => Ok(meet(&connection.app, hello, None).await),
+        Ok(ClientMessage::Hello(hello)) => meet(connection, hello, None).await,
         Ok(_) => Ok(Err(Problem::new(ErrorCode::BadJson, "a hello is due"))),
         Err(MessageError::Hello(error)) => Ok(Err(error.into())),
         Err(MessageError::Unknown(error)) => {
@@ -89,63 +98,97 @@ async fn state(connection: &mut Connection) -> Result<Result<Bytes, Problem>, En
 /// Longest text parsed by a thread that moves bytes, bytes: some 50 us of work.
 const PARSED_INLINE_MAX: usize = 16 * 1024;
 
-pub(super) async fn parse(text: &Bytes) -> Result<ClientMessage, MessageError> {
+/// What a text says; a problem if too much waits to be read.
+pub(super) async fn parse(
+    connection: &mut Connection,
+    text: &Bytes,
+) -> Result<Result<Said, Problem>, End> {
     if text.len() <= PARSED_INLINE_MAX {
-        return ClientMessage::from_json(text);
+        return Ok(Ok(ClientMessage::from_json(text)));
     }
     let text = text.clone();
-    let parsing = spawn_blocking(move || ClientMessage::from_json(&text));
-    parsing.await.unwrap_or_else(|error| {
-        let reason = format!("it cannot be read: {error}");
-        Err(MessageError::Unknown(JsonError { member: None, reason, place: None }))
-    })
+    at_desk(connection, move |_| ClientMessage::from_json(&text)).await
 }
 
-/// New terms for an open session; frames that the server has accepted keep the old ones.
-///
-/// # Errors
-/// The text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
+/// New terms for an open session; frames that the server has accepted keep the old ones. A problem
+/// if the text is no hello, a misspelt one, or one that cannot be met; the old terms stand.
 pub(super) async fn renew(
-    app: &Arc<App>,
-    said: Result<ClientMessage, MessageError>,
+    connection: &mut Connection,
+    said: Said,
     number: u64,
-) -> Result<(Terms, Ready), Problem> {
+) -> Result<Result<(Terms, Ready), Problem>, End> {
+    let hello = match hello_of(said) {
+        Ok(hello) => hello,
+        Err(problem) => return Ok(Err(problem)),
+    };
+    let met = meet(connection, hello, None).await?;
+    Ok(met.map(|(terms, _)| {
+        let ready = ready(&connection.app, number, &terms);
+        (terms, ready)
+    }))
+}
+
+/// The hello for new terms in what a client says.
+fn hello_of(said: Said) -> Result<Hello, Problem> {
     const DUE: &str = "binary frames are due once the session is ready, or a hello for new terms";
-    let hello = match said {
+    match said {
         Ok(ClientMessage::Hello(Hello { resume: Some(true), .. })) => {
             let message = "a state is for the first hello of a connection";
-            return Err(Problem::new(ErrorCode::BadJson, message).at("resume"));
+            Err(Problem::new(ErrorCode::BadJson, message).at("resume"))
         }
-        Ok(ClientMessage::Hello(hello)) => hello,
-        Ok(_) => return Err(Problem::new(ErrorCode::UnexpectedText, DUE)),
-        Err(MessageError::Hello(error)) => return Err(error.into()),
+        Ok(ClientMessage::Hello(hello)) => Ok(hello),
+        Ok(_) => Err(Problem::new(ErrorCode::UnexpectedText, DUE)),
+        Err(MessageError::Hello(error)) => Err(error.into()),
         Err(MessageError::Unknown(error)) => {
             let message = format!("{DUE}, and this is neither: {error}");
-            return Err(Problem::new(ErrorCode::UnexpectedText, message));
+            Err(Problem::new(ErrorCode::UnexpectedText, message))
         }
-    };
-    let (terms, _) = meet(app, hello, None).await?;
-    let ready = ready(app, number, &terms);
-    Ok((terms, ready))
+    }
 }
 
-/// Whether and how the hello can be met. Effects may have to place points and take some MiB: that
-/// is not for a thread that moves bytes.
+/// Whether and how the hello can be met. Effects may have to place points, shapes to be checked:
+/// that is not for a thread that moves bytes.
 async fn meet(
-    app: &Arc<App>,
+    connection: &mut Connection,
     hello: Hello,
     sealed: Option<Bytes>,
-) -> Result<(Terms, Hello), Problem> {
+) -> Result<Result<(Terms, Hello), Problem>, End> {
+    let app = Arc::clone(&connection.app);
     if hello.version == 1 {
-        return terms::meet(app, &hello, None).map(|terms| (terms, hello));
+        return Ok(terms::meet(&app, &hello, None, &Cancel::default()).map(|terms| (terms, hello)));
     }
-    let shared = Arc::clone(app);
-    let meeting = spawn_blocking(move || {
-        terms::meet(&shared, &hello, sealed.as_deref()).map(|terms| (terms, hello))
-    });
-    match timeout(app.timeouts.io, meeting).await {
-        Ok(Ok(result)) => result,
-        Ok(Err(error)) => Err(problem::internal("the hello cannot be worked out", &error)),
-        Err(error) => Err(problem::internal("the hello takes too long to work out", &error)),
-    }
+    let work = move |cancel: &Cancel| {
+        terms::meet(&app, &hello, sealed.as_deref(), cancel).map(|terms| (terms, hello))
+    };
+    Ok(at_desk(connection, work).await?.and_then(|met| met))
+}
+
+/// Does work for a hello at the desk, as long as its client is there; a problem if it is too much.
+async fn at_desk<T: Send + 'static>(
+    connection: &mut Connection,
+    work: impl FnOnce(&Cancel) -> T + Send + 'static,
+) -> Result<Result<T, Problem>, End> {
+    let (app, client) = (Arc::clone(&connection.app), connection.client.clone());
+    // Before the time for a hello ends: it has come, and the client is told why it has to wait.
+    let wait_max = app.timeouts.io * 4 / 5;
+    let working = timeout(wait_max, app.desk.work(client, work));
+    let busy = |message: String| {
+        app.metrics.shed(Shed::Hellos);
+        Problem::new(ErrorCode::Overloaded, message)
+    };
+    let done = connection.while_there(working).await.inspect_err(|_| {
+        app.metrics.hellos_left.inc();
+    })?;
+    Ok(match done {
+        Ok(Ok(result)) => Ok(result),
+        Ok(Err(NoResult::Busy)) => {
+            Err(busy("too many hellos wait to be worked out; try again in a moment".to_owned()))
+        }
+        Ok(Err(NoResult::Broken)) => {
+            Err(problem::internal("the hello cannot be worked out", &"the work broke off"))
+        }
+        Err(_) => Err(busy(format!(
+            "the hello was not worked out within {wait_max:?}; say less, or try again in a moment"
+        ))),
+    })
 }

@@ -23,9 +23,8 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::Response,
 };
-use hyper::upgrade::{OnUpgrade, Upgraded};
+use hyper::upgrade::OnUpgrade;
 use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
-use tokio::sync::watch;
 use tungstenite::handshake::derive_accept_key;
 
 use self::connection::Connection;
@@ -70,12 +69,13 @@ pub(crate) async fn open(
         return Err(not_a_handshake(&"the connection cannot be upgraded"));
     };
     let place = app.admit_session(&principal).map_err(refuse)?;
+    let client = principal.client;
     // Taken before the upgrade: from here on the drain waits for this session.
     let drain = app.drain.subscribe();
     let accept = derive_accept_key(key.as_bytes());
     tokio::spawn(async move {
         match on_upgrade.await {
-            Ok(upgraded) => run(upgraded, app, drain, place).await,
+            Ok(upgraded) => run(Connection::new(upgraded, app, drain, client), place).await,
             Err(error) => tracing::debug!(%error, "upgrade failed"),
         }
     });
@@ -88,16 +88,11 @@ pub(crate) async fn open(
     switching.map_err(|error| HttpProblem(problem::internal("the handshake failed", &error)))
 }
 
-async fn run(
-    upgraded: Upgraded,
-    app: Arc<App>,
-    drain: watch::Receiver<bool>,
-    _place: SessionPlace,
-) {
+async fn run(mut connection: Connection, _place: SessionPlace) {
+    let app = Arc::clone(&connection.app);
     app.metrics.sessions.inc();
     app.metrics.sessions_open.inc();
     let number = app.session_number();
-    let mut connection = Connection::new(upgraded, Arc::clone(&app), drain);
     let end = converse(&mut connection, number).await;
     connection.reply.end();
     match &end {

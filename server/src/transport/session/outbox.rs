@@ -9,6 +9,8 @@ use std::{
 use bytes::Bytes;
 use tokio::{net::TcpStream, sync::Notify};
 
+use crate::transport::room;
+
 /// Room for messages that the system has no room for. The task reads nothing while one is left, so
 /// there are never more than the task's own last words and two answers of threads.
 const LEFT: usize = 8;
@@ -24,6 +26,15 @@ pub(super) struct Outbox {
     state: Mutex<State>,
     /// Told when the task has something to do.
     pub(super) call: Notify,
+}
+
+/// How far the writing of what was left has come.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Written {
+    /// Whether nothing is left.
+    pub(super) is_all: bool,
+    /// Bytes that the system has taken just now: as many as the client has read, or more.
+    pub(super) bytes: usize,
 }
 
 #[derive(Debug)]
@@ -85,24 +96,33 @@ impl Outbox {
         }
     }
 
-    /// Writes what is left as far as there is room; true once nothing is left.
+    /// Writes what is left as far as there is room. To `insist` asks the system itself whether there
+    /// is any ([`room::send`]).
     ///
     /// # Errors
     /// The connection is broken, in words.
-    pub(super) fn go_on(&self) -> Result<bool, String> {
+    pub(super) fn go_on(&self, insist: bool) -> Result<Written, String> {
         let mut state = self.state();
         if let Some(error) = &state.broken {
             return Err(error.clone());
         }
-        let Some(stream) = &self.stream else { return Ok(state.left.is_empty()) };
+        let Some(stream) = &self.stream else {
+            return Ok(Written { is_all: state.left.is_empty(), bytes: 0 });
+        };
+        let mut bytes = 0;
         while let Some(mut message) = state.left.pop_front() {
-            let written = write(stream, &message).map_err(|error| error.to_string())?;
+            let mut written = write(stream, &message).map_err(|error| error.to_string())?;
+            if insist && written < message.len() {
+                let more = room::send(stream, &message[written..]);
+                written += more.map_err(|error| error.to_string())?;
+            }
+            bytes += written;
             if written < message.len() {
                 state.left.push_front(message.split_off(written));
-                return Ok(false);
+                return Ok(Written { is_all: false, bytes });
             }
         }
-        Ok(true)
+        Ok(Written { is_all: true, bytes })
     }
 
     /// The next message that is left, for a task that writes by itself.

@@ -28,6 +28,7 @@ use crate::{
     core::{
         buffers::HEADROOM,
         catalogue::{Catalogue, Tier},
+        desk::Cancel,
     },
     transport::app::App,
 };
@@ -179,8 +180,13 @@ fn runtime_effect(name: &str) -> Option<RuntimeEffect> {
 ///
 /// # Errors
 /// It cannot be met; the problem names the member.
-pub(super) fn meet(app: &App, hello: &Hello, sealed: Option<&[u8]>) -> Result<Terms, Problem> {
-    let mut terms = agree(app, hello, sealed.and_then(tier_of))?;
+pub(super) fn meet(
+    app: &App,
+    hello: &Hello,
+    sealed: Option<&[u8]>,
+    cancel: &Cancel,
+) -> Result<Terms, Problem> {
+    let mut terms = agree(app, hello, sealed.and_then(tier_of), cancel)?;
     let Some(sealed) = sealed else { return Ok(terms) };
     let shape = Shape::of(hello);
     let for_terms = shape.on(&app.catalogue().tiers[terms.tier]);
@@ -188,14 +194,25 @@ pub(super) fn meet(app: &App, hello: &Hello, sealed: Option<&[u8]>) -> Result<Te
     if !matches!(resumption, Resumption::Resumed | Resumption::Nothing) {
         // Nothing of it stays, not even the tier that it named.
         drop(terms);
-        terms = agree(app, hello, None)?;
+        terms = agree(app, hello, None, cancel)?;
     }
     terms.resumption = Some(resumption);
     Ok(terms)
 }
 
+/// Nobody hears of it.
+fn still_asked(cancel: &Cancel) -> Result<(), Problem> {
+    let gone = || Problem::new(ErrorCode::Overloaded, "the client has left");
+    if cancel.is_set() { Err(gone()) } else { Ok(()) }
+}
+
 /// The same without a state, which may have named the tier it came from.
-fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Problem> {
+fn agree(
+    app: &App,
+    hello: &Hello,
+    before: Option<&str>,
+    cancel: &Cancel,
+) -> Result<Terms, Problem> {
     check_version(hello)?;
     let is_of_tier = |name: &&String| hello.version == 1 || runtime_effect(name).is_none();
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
@@ -233,6 +250,7 @@ fn agree(app: &App, hello: &Hello, before: Option<&str>) -> Result<Terms, Proble
     let contact_us = hand.as_ref().zip(app.contact.as_ref()).and_then(|(h, c)| c.us_of(h));
     let mut effects = Vec::new();
     for _ in 0..hand.as_ref().map_or(1, |hand| hand.fingers().len()) {
+        still_asked(cancel)?;
         let own = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
         effects.extend(own);
     }

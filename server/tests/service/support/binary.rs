@@ -18,10 +18,20 @@ pub(crate) fn papilla(args: &[&str]) -> Command {
     command
 }
 
+/// The binary as another program starts it, such as `chrt`; by itself if none is named.
+pub(crate) fn program_by(starter: &[&str], args: &[&str]) -> Command {
+    let Some((first, rest)) = starter.split_first() else { return papilla(args) };
+    let mut command = Command::new(first);
+    command.args(rest).arg(env!("CARGO_BIN_EXE_papilla-server")).args(args);
+    command
+}
+
 /// A running binary with one inference thread; dropped, it is killed.
 pub(crate) struct Running {
     pub(crate) child: Child,
     pub(crate) address: SocketAddr,
+    /// Its start line.
+    pub(crate) started: Value,
 }
 
 impl Running {
@@ -32,13 +42,20 @@ impl Running {
 
     /// The same, with more arguments.
     pub(crate) fn start_with(models: &Path, more: &[&str]) -> Self {
-        Self::spawn(models, &[&["--log", "error"], more].concat(), Stdio::inherit())
+        Self::spawn(&[], models, &[&["--log", "error"], more].concat(), Stdio::inherit(), 1)
     }
 
-    fn spawn(models: &Path, more: &[&str], stderr: Stdio) -> Self {
+    fn spawn(
+        starter: &[&str],
+        models: &Path,
+        more: &[&str],
+        stderr: Stdio,
+        threads: usize,
+    ) -> Self {
         let models = models.to_str().unwrap();
-        let args = ["--models", models, "--bind", "127.0.0.1:0", "--json", "--threads", "1"];
-        let mut child = papilla(&args)
+        let args = ["--models", models, "--bind", "127.0.0.1:0", "--json"];
+        let mut child = program_by(starter, &args)
+            .args(["--threads", &threads.to_string()])
             .args(["--calibration-ms", "1"])
             .args(more)
             .stdout(Stdio::piped())
@@ -49,7 +66,7 @@ impl Running {
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let started: Value = serde_json::from_str(&line).unwrap();
         let port = started["port"].as_u64().unwrap() as u16;
-        Self { child, address: SocketAddr::from(([127, 0, 0, 1], port)) }
+        Self { child, address: SocketAddr::from(([127, 0, 0, 1], port)), started }
     }
 }
 
@@ -82,9 +99,14 @@ pub(crate) struct Logged {
 impl Logged {
     /// Returns once it listens.
     pub(crate) fn start(models: &Path, more: &[&str]) -> Self {
+        Self::start_by(&[], models, more, 1)
+    }
+
+    /// The same, started by another program, with so many inference threads.
+    pub(crate) fn start_by(starter: &[&str], models: &Path, more: &[&str], threads: usize) -> Self {
         let log = NamedTempFile::new().unwrap();
-        let running = Running::spawn(models, more, log.reopen().unwrap().into());
-        Self { running, log }
+        let stderr = log.reopen().unwrap().into();
+        Self { running: Running::spawn(starter, models, more, stderr, threads), log }
     }
 
     /// What it has said on stderr so far.

@@ -19,6 +19,8 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
+#[cfg(target_os = "linux")]
+pub(crate) use binary::program_by;
 pub(crate) use binary::{Logged, Running, papilla, signal};
 pub(crate) use http::{Answer, Request, raw_exchange};
 pub(crate) use socket::{Received, Socket, frame, hello};
