@@ -16,6 +16,13 @@ const ITERATIONS_MAX: u32 = 400;
 /// A travel this near an end of its bracket, as part of it, goes to the middle.
 const MARGIN: f64 = 0.02;
 
+/// How a body lies beyond the trusted depth, mm of the person.
+struct Beyond {
+    excess_mm: f64,
+    /// Slope of the force over the force.
+    part_per_mm: f64,
+}
+
 /// A net force to be met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NetForce {
@@ -81,6 +88,13 @@ impl Solver {
         })
     }
 
+    /// How far the last frame was solved beyond the trusted depth, if it was.
+    fn beyond(&self, length: f64) -> Option<Beyond> {
+        let (strength, slope) = self.strength()?;
+        let excess_mm = (strength - 1.0) / slope * length;
+        Some(Beyond { excess_mm, part_per_mm: slope / strength / length })
+    }
+
     /// Looks for the travel with `frame`, which finds what presses in a view.
     pub(crate) fn travel_until(
         &mut self,
@@ -114,6 +128,25 @@ impl Solver {
                 return Ok(travel);
             }
             last = Some((travel, force));
+            // Beyond the trusted depth force goes on by a known slope.
+            let beyond = self.beyond(view.length);
+            if let Some(Beyond { excess_mm, part_per_mm }) = beyond {
+                let ahead = (force * part_per_mm).max(0.0) * (TRAVEL_MAX_MM - travel);
+                if force < force_n && 1.1 * (force + ahead) < force_n {
+                    let reached_n = reached.max(force + ahead);
+                    let depth_mm = TRAVEL_MAX_MM;
+                    return Err(ContactError::Force { wanted_n: force_n, reached_n, depth_mm });
+                }
+                if force > force_n && low.is_none() {
+                    // No less than what is left at the trusted depth is found by steps from there.
+                    high = last;
+                    travel -= excess_mm.max(STEP_MM);
+                    if travel.abs() > TRAVEL_MAX_MM || effort.iterations > ITERATIONS_MAX {
+                        break;
+                    }
+                    continue;
+                }
+            }
             *if force < force_n { &mut low } else { &mut high } = last;
             let secant = slope.filter(|s| *s > 0.0).map(|s| travel + (force_n - force) / s);
             travel = match (low, high) {

@@ -3,8 +3,8 @@
 use crate::support::{Finger, Throw, atlas};
 use papilla_atlas::{Patch, Raster};
 use papilla_contact::{
-    Contact, Gaps, Method, NetForce, Object, PixelContact, PixelSkin, PixelSpacing, Settings,
-    Solver,
+    Contact, ContactError, Gaps, Method, NetForce, Object, PixelContact, PixelSkin, PixelSpacing,
+    Settings, Solver,
 };
 use papilla_sdf::{RoundedPlate, SignedDistance, Sphere};
 use std::sync::Arc;
@@ -290,4 +290,33 @@ fn a_great_net_force_is_met_and_flagged() {
         last = travel;
     }
     assert!(out.quality.out_of_range);
+}
+
+/// A force that no depth gives is refused after a few frames, wherever things start; one that is
+/// met by drawing back from deep inside is found in about as many.
+#[test]
+fn an_unreachable_net_force_is_seen_at_once() {
+    const FRAMES: u32 = 12;
+    let finger = Finger::new();
+    let skin = skin(&finger);
+    let ball: Shape = (Arc::new(Sphere { radius_mm: 8.0 }), 8.0);
+    let at = |depth_mm: f64| {
+        let throw = Throw { vertex: finger.lowest(), depth_mm, tilt_deg: [0.0; 2], spin_deg: 0.0 };
+        [finger.place(&ball, throw)]
+    };
+    for depth_mm in [-0.5, 0.5, 3.0, 9.0] {
+        for (force_n, is_met) in [(1e30, false), (0.1, true)] {
+            let mut pressed = Pressed::new(&finger, &skin, Way::AtVertices(Method::SecondOrder));
+            let net = NetForce { direction: [0.0, 0.0, 1.0], force_n };
+            let out = &mut pressed.out;
+            let found = pressed.solver.solve_for_force(&at(depth_mm), net, out);
+            let told = format!("{force_n} N from {depth_mm} mm: {found:?}, {:?}", out.effort);
+            assert_eq!(found.is_ok(), is_met, "{told}");
+            if !is_met {
+                assert!(matches!(found, Err(ContactError::Force { .. })), "{told}");
+            }
+            // A frame takes 73 linearisations at most.
+            assert!(out.effort.iterations <= 25 * FRAMES, "{told}");
+        }
+    }
 }
