@@ -101,6 +101,12 @@ def fast() -> list[Step]:
         ),
         Step("cycles", "no module imports itself in a circle", "tests/suite/cycles"),
         Step(
+            "features",
+            "third-party crates are compiled once, whichever program is built",
+            "tests/suite/features.py",
+            after=("build",),
+        ),
+        Step(
             "doc",
             "examples in the crates' documentation",
             f"cargo test --workspace --doc {FEATURES} -q -- --skip clients/rust/src/lib.rs",
