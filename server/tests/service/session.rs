@@ -128,6 +128,10 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
         let error = socket.hear_refusal(code).await;
         assert_eq!(error["field"], field, "{error}");
     }
+    // A decimal comma, as programs of a German desktop print it, is no JSON, whatever the version.
+    let comma = hello(&json!({"version": 2, "objects": []})).to_string();
+    socket.send(comma.replace("[]", r#"[{"radius_mm": 10,5}]"#)).await;
+    socket.hear_refusal("bad_json").await;
     socket.open(hello(&json!({}))).await;
     socket.send(frame(1, 0, SampleType::F32, 1.0, &ramp())).await;
     assert_eq!(socket.hear_frame().await.0.status, FrameStatus::Ok);
