@@ -62,6 +62,7 @@ export class Solved {
   #fingers;
   #objects;
   #busy;
+  #isTracked;
   #onstate;
   /** @type {import('../src/types.js').Ready | null} */ #told = null;
   #map = new Float32Array(MAP_LEN);
@@ -72,6 +73,7 @@ export class Solved {
     this.#fingers = fingers;
     this.#objects = objects;
     this.#busy = fingers.map(() => false);
+    this.#isTracked = fingers.map(() => false);
     Hand.connect(BASE, {
       tier,
       atlas_hash,
@@ -98,7 +100,14 @@ export class Solved {
     if (hand) this.#tell(hand.ready);
     if (!hand?.ready) return;
     this.#fingers.forEach((finger, number) => {
-      if (!finger.mesh.visible) return;
+      if (!finger.mesh.visible) {
+        // The hand has left the cameras' view: told once, so that nothing bursts when it comes back.
+        if (!this.#isTracked[number] || this.#busy[number]) return;
+        this.#isTracked[number] = false;
+        hand.notTracked({ finger: number }).catch(() => {});
+        return;
+      }
+      this.#isTracked[number] = true;
       // The drawn dent of soft objects is that of springs.
       finger.press(Infinity);
       if (this.#busy[number]) return;
