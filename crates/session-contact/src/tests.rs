@@ -473,6 +473,35 @@ fn frames_of_another_form_are_refused_by_field() {
     assert_eq!(field(of(FrameKind::Objects, 0, [ROW as u16, 1])), "width");
 }
 
+/// Tracking that is lost tells of no touch, is shorter than any frame, and leaves what the next frame
+/// starts from.
+#[test]
+fn a_finger_that_is_lost_is_told_as_air_and_goes_on() {
+    let plane = Plane::new();
+    let hello = Hello { pressure: Some(SampleLayout::Vertices), ..objects() };
+    let hand = plane.hand(&hello).expect("a hand");
+    let (before, _) = touch(&hand, 0, &pose(0.3)).expect("an answer");
+    let header = FrameHeader::pressure(1, 0, 0, SampleType::F32, 1.0);
+    let lost = header.of_finger(FrameKind::Pressure, 0, [0, 0]).not_tracked();
+    assert_eq!((hand.form().check(&lost), hand.form().payload_len(&lost)), (Ok(0), 0));
+    let tall = header.of_finger(FrameKind::Objects, 0, [ROW as u16, 1]).not_tracked();
+    assert_eq!(
+        hand.form().check(&FrameHeader { height: 1, ..tall }).expect_err("refused").code,
+        ErrorCode::WrongShape
+    );
+    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    {
+        let mut finger = hand.fingers()[0].lock().expect("no panic");
+        finger.lose();
+        finger.write(&mut bytes);
+    }
+    assert_eq!(bytes.len(), HEADER_LEN_V2 + hand.sections_len());
+    assert!(bytes.iter().all(|byte| *byte == 0));
+    let (after, taken) = touch(&hand, 0, &pose(0.3)).expect("an answer");
+    assert!((after.force_n[2] / before.force_n[2] - 1.0).abs() < 0.01, "{before:?} {after:?}");
+    assert!(taken.flags == 0 && taken.iterations.is_some_and(|n| n < 10), "{taken:?}");
+}
+
 /// Whatever bytes come, of the right length or not: an answer or a refusal, and the finger lives on.
 #[test]
 fn any_bytes_are_answered_or_refused() {
