@@ -15,7 +15,7 @@ use papilla_proto::{
 };
 use serde_json::{Value, json};
 
-use super::{ConformanceError, engines, member, read};
+use super::{ConformanceError, engines, member, pair, read};
 
 /// Modulus of the half-space, E / (1 - nu^2), MPa.
 const MODULUS_MPA: f64 = 0.1;
@@ -316,12 +316,6 @@ fn placed([x, y, z, a, b, c, d]: [f32; 7], object: &AnnouncedObject) -> Result<O
     let stiffness_mpa_per_mm = object.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
     let friction = object.friction.unwrap_or(0.0);
     Ok(Object { shape, placement, stiffness_mpa_per_mm, friction })
-}
-
-/// A value to seven digits and its tolerance to two.
-pub(super) fn pair((value, (share, beside)): (&f64, (f64, f64))) -> Value {
-    let digits = |v: f64, n: usize| format!("{v:.n$e}").parse::<f64>().unwrap_or(v);
-    json!([digits(*value, 6), digits(share * value.abs() + beside, 1)])
 }
 
 /// Outward normals and areas of the vertices of a surface, each triangle in thirds.

@@ -3,6 +3,8 @@
 
 use serde_json::{Value, json};
 
+use super::pair;
+
 type Matrix = [[f64; 3]; 3];
 
 /// How an engine counts: the rows of the matrix that takes its axes to the finger's frame, and mm in one
@@ -161,7 +163,7 @@ pub(super) fn felt(world: [f64; 7], touch: &[f64], tolerances: &[(f64, f64)]) ->
         let [a, b, c] = engine.rows;
         let handed = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
             + a[2] * (b[0] * c[1] - b[1] * c[0]);
-        let pairs = |v: [f64; 3], off: f64| v.map(|v| super::contact::pair((&v, (0.0, off))));
+        let pairs = |v: [f64; 3], off: f64| v.map(|v| pair((&v, (0.0, off))));
         let force = turned(back, turned(finger.0, three(0)));
         // N mm to N m; a turning changes its sign with the hand.
         let torque = turned(back, turned(finger.0, three(3))).map(|v| 1e-3 * handed * v);

@@ -228,5 +228,11 @@ impl Recorder {
     }
 }
 
+/// A value to seven digits and its tolerance to two.
+fn pair((value, (share, beside)): (&f64, (f64, f64))) -> Value {
+    let digits = |v: f64, n: usize| format!("{v:.n$e}").parse::<f64>().unwrap_or(v);
+    json!([digits(*value, 6), digits(share * value.abs() + beside, 1)])
+}
+
 #[cfg(test)]
 mod tests;

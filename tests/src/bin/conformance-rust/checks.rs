@@ -17,7 +17,7 @@ pub(crate) fn check_pair(what: &str, found: f64, pair: &Value) -> Result<()> {
     near(what, found, number(0), number(1))
 }
 
-fn check_list(what: &str, found: &[f32], due: &Value) -> Result<()> {
+pub(crate) fn check_list(what: &str, found: &[f32], due: &Value) -> Result<()> {
     let due = due.as_array().map(Vec::as_slice).unwrap_or_default();
     ensure!(found.len() == due.len(), "{what}: {} values, {} are due", found.len(), due.len());
     for (i, (&found, due)) in found.iter().zip(due).enumerate() {

@@ -6,6 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
+use papilla_client::frames::{Convention, Place};
 use papilla_client::{
     Address, Contact, Frame, NetForce, PapillaError, Session, Skin, Status, atlas, sed,
 };
@@ -21,7 +22,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use tokio::{task::spawn_blocking, time};
 
-use crate::checks::{check_answer, check_map, check_pair, check_problem, check_touch};
+use crate::checks::{check_answer, check_list, check_map, check_pair, check_problem, check_touch};
 
 /// One case.
 pub(crate) struct Run {
@@ -44,6 +45,15 @@ pub(crate) async fn control(action: &str) -> Result<()> {
     let answer = Request::post(&format!("/{action}"), Vec::new()).send(address).await?;
     ensure!(answer.status == 200, "the control refuses {action}");
     Ok(())
+}
+
+/// The pose, if it is the one due: its place within some micrometres, its quaternion up to the sign.
+fn check_pose(engine: &str, found: Pose, due: Pose) -> Result<Pose> {
+    let off = found.origin_mm.iter().zip(due.origin_mm).map(|(f, d)| (f - d).abs());
+    let dot: f32 = found.quaternion.iter().zip(due.quaternion).map(|(f, d)| f * d).sum();
+    let is_there = off.fold(0.0, f32::max) < 2e-3 && dot.abs() > 1.0 - 1e-6;
+    ensure!(is_there, "{engine}: the object is at {found:?}, not {due:?}");
+    Ok(found)
 }
 
 impl Run {
@@ -158,6 +168,9 @@ impl Run {
             match poses {
                 Some(poses) => {
                     let poses: Vec<Pose> = poses.into_iter().map(pose).collect();
+                    if step["engines"].is_object() {
+                        return self.placed(step, &poses).await;
+                    }
                     session.send_poses(finger, &poses, net)?
                 }
                 None => session.send_not_tracked(finger)?,
@@ -165,6 +178,50 @@ impl Run {
         };
         let answer = time::timeout(self.patience, outcome).await??;
         check_touch(&step["expect"], &answer, finger)
+    }
+
+    /// The objects where each engine says that they are.
+    async fn placed(&self, step: &Value, due: &[Pose]) -> Result<()> {
+        let engines = [
+            ("right_handed", Convention::METRES, None),
+            ("openxr", Convention::OPENXR, None),
+            ("godot", Convention::OPENXR, Some([0.0, 0.0, -1.0])),
+            ("unity", Convention::UNITY, None),
+            ("unreal", Convention::UNREAL, None),
+        ];
+        ensure!(step["engines"].as_object().map(serde_json::Map::len) == Some(engines.len()));
+        let place = |of: &Value| -> Result<Place> {
+            let [x, y, z, a, b, c, d]: [f64; 7] = serde_json::from_value(of.clone())?;
+            Ok(Place { at: [x, y, z], turn: [a, b, c, d] })
+        };
+        for (name, convention, up) in engines {
+            let said = &step["engines"][name];
+            let finger = place(&said["finger"])?;
+            let mut poses = Vec::new();
+            for (object, due) in said["objects"].as_array().context("objects")?.iter().zip(due) {
+                let object = place(object)?;
+                poses.push(check_pose(name, convention.pose(finger, object, 1.0)?, *due)?);
+                if let Some(joints) = said.get("joints") {
+                    let (distal, tip) = (place(&joints["distal"])?, place(&joints["tip"])?);
+                    let inside_mm: f64 = member(joints, "inside_mm")?;
+                    let tracked = convention.finger_of_joints(distal, tip, up, inside_mm)?;
+                    check_pose(name, convention.pose(tracked, object, 1.0)?, *due)?;
+                }
+            }
+            let outcome = self.session()?.send_poses(0, &poses, None)?;
+            let answer = time::timeout(self.patience, outcome).await??;
+            check_touch(&step["expect"], &answer, 0)?;
+            let felt = convention.felt(finger, &answer.touch.context("no touch")?, 1.0)?;
+            let wanted = &step["expect"]["engines"][name];
+            for (member, found) in [
+                ("force_n", felt.force_n),
+                ("torque_n_m", felt.torque_n_m),
+                ("centre", felt.centre),
+            ] {
+                check_list(member, &found.map(|v| v as f32), &wanted[member])?;
+            }
+        }
+        Ok(())
     }
 
     async fn reconnect(&mut self, step: &Value) -> Result<()> {
