@@ -56,6 +56,8 @@ pub struct Effort {
     pub products: u32,
     /// Vertices that could touch.
     pub candidates: u32,
+    /// Entries of matrices that the products went over: the frame's budget is of these.
+    pub work: u64,
 }
 
 /// Factors between the reference finger and this one.
@@ -80,6 +82,7 @@ impl Effort {
             iterations: self.iterations + other.iterations,
             products: self.products + other.products,
             candidates: other.candidates,
+            work: self.work + other.work,
         }
     }
 }

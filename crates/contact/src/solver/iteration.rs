@@ -2,7 +2,7 @@
 
 use super::{
     FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SHARE,
-    Solver, TURN_MAX, VIOLATION_MM,
+    Solver, TURN_MAX, VIOLATION_MM, WORK_MAX,
 };
 use crate::answer::Effort;
 use crate::bounded::Symmetric;
@@ -25,9 +25,18 @@ impl Solver {
             self.choose_near();
             let taken = self.share_taken();
             self.remake_matrix();
+            let entries = (self.patch.near() as u64).pow(2).max(1);
+            let most = |left: u32, entries: u64| {
+                let within = WORK_MAX.saturating_sub(effort.work) / entries;
+                left.min(u32::try_from(within).unwrap_or(u32::MAX))
+            };
             let left = FRAME_PRODUCTS_MAX.saturating_sub(effort.products);
-            effort.products += self.complement(1.0 - 2.0 * taken, left);
-            effort.products += self.resist_slip(view, 1.0 - 2.0 * taken, left);
+            // Along two tangents each product goes over four blocks.
+            let [left, slips_left] = [most(left, entries), most(left, 4 * entries)];
+            let products = self.complement(1.0 - 2.0 * taken, left);
+            let slips = self.resist_slip(view, 1.0 - 2.0 * taken, slips_left);
+            effort.products += products + slips;
+            effort.work += (u64::from(products) + 4 * u64::from(slips)) * entries;
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
             if change <= settled_mm {
@@ -37,6 +46,9 @@ impl Solver {
                 if !self.any_far_inside() {
                     return change;
                 }
+            }
+            if effort.work >= WORK_MAX {
+                break;
             }
         }
         self.displace(self.patch.vertices().len());

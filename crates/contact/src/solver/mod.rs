@@ -63,6 +63,9 @@ const PRODUCTS_MAX: u32 = 200;
 /// The same in a frame; then each solve has the least.
 const FRAME_PRODUCTS_MAX: u32 = 3000;
 const PRODUCTS_MIN: u32 = 10;
+/// Entries of matrices that the products of a frame may go over. A frame that has used them ends with
+/// what it has. Of ten thousand random poses on the shipped finger 99 % take 29 million, the most 364.
+const WORK_MAX: u64 = 500_000_000;
 /// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
 const TURN_MAX: f32 = 0.05;
 /// Range of the over- or under-relaxation.

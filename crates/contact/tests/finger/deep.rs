@@ -320,3 +320,34 @@ fn an_unreachable_net_force_is_seen_at_once() {
         }
     }
 }
+
+/// Rough things all round, far in and moving: a frame goes over no more than its budget and one
+/// linearisation, the same each time.
+#[test]
+fn a_frame_keeps_its_budget_of_work() {
+    const BUDGET: u64 = 500_000_000;
+    let finger = Finger::new();
+    let mut random = fastrand::Rng::with_seed(54);
+    let count = finger.places_mm.len();
+    let depth_mm: Vec<f32> = (0..count).map(|_| 0.6 + 0.35 * random.f32()).collect();
+    let moved_mm: Vec<[f32; 3]> = (0..count).map(|_| [0; 3].map(|_| random.f32() - 0.5)).collect();
+    let settings = Settings { friction: true, ..Settings::default() };
+    let of_two = [0, 1].map(|_| {
+        let mut solver = Solver::new(finger.model.clone(), settings).expect("a solver");
+        let mut out = Contact::new(count);
+        for _ in 0..2 {
+            let gaps = Gaps { friction: 8.0, moved_mm: &moved_mm, ..Gaps::rigid(&depth_mm) };
+            solver.solve(gaps, &mut out).expect("an answer");
+            // A linearisation has 200 products along normals and 60 along tangents at most.
+            let one = (200 + 4 * 60) * (count as u64).pow(2);
+            assert!(out.effort.work <= BUDGET + one, "{:?}", out.effort);
+            assert!(out.effort.work < BUDGET || !out.quality.settled, "{:?}", out.quality);
+        }
+        // On the real finger these gaps may be easier.
+        let is_made = std::env::var("PAPILLA_CONTACT_MODEL").is_err();
+        assert!(!is_made || out.effort.work >= BUDGET, "never at its budget: {:?}", out.effort);
+        out
+    });
+    let [a, b] = &of_two;
+    assert_eq!(a, b);
+}
