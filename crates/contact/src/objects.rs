@@ -5,7 +5,7 @@ use crate::gaps::{Field, Gaps};
 use crate::held::Held;
 use crate::model::ContactModel;
 use crate::nearest::{Nearest, require_friction, require_stiffness};
-use papilla_sdf::{Placement, SignedDistance};
+use papilla_sdf::{Body, Distance, Placement, SignedDistance, beneath, may_be_covered};
 use std::sync::Arc;
 
 /// A rigid or soft object in the finger's frame.
@@ -42,6 +42,16 @@ impl Object {
     #[must_use]
     pub fn rigid(shape: Arc<dyn SignedDistance>, placement: Placement) -> Self {
         Self { shape, placement, stiffness_mpa_per_mm: f64::INFINITY, friction: 0.0 }
+    }
+}
+
+impl Body for Object {
+    fn shape(&self) -> &dyn SignedDistance {
+        self.shape.as_ref()
+    }
+
+    fn placement(&self) -> &Placement {
+        &self.placement
     }
 }
 
@@ -168,6 +178,7 @@ impl<'a> View<'a> {
             friction: 0.0,
             object: 0,
         };
+        let mut second_mm = f64::INFINITY;
         for (object, o) in (0..).zip(objects) {
             let r = &o.placement.rotation;
             let found = match self.held(object) {
@@ -175,6 +186,7 @@ impl<'a> View<'a> {
                 Some(held) => held.distance(o, p),
             };
             let gap_mm = found.gap_mm / self.length;
+            second_mm = second_mm.min(gap_mm.max(nearest.gap_mm));
             if gap_mm < nearest.gap_mm {
                 let n = found.normal;
                 let size = n.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -184,7 +196,26 @@ impl<'a> View<'a> {
                 nearest = Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object };
             }
         }
-        nearest
+        // Bodies that are held count with places that they have left: nothing tells what they cover.
+        let (gap_mm, second_mm) = (self.length * nearest.gap_mm, self.length * second_mm);
+        if self.held.is_empty() && may_be_covered(gap_mm, second_mm) {
+            self.uncovered(objects, p, nearest)
+        } else {
+            nearest
+        }
+    }
+
+    /// The nearest surface that no other object covers, where that of the nearest object may be.
+    fn uncovered(&self, objects: &[Object], p: [f64; 3], nearest: Nearest) -> Nearest {
+        let Nearest { gap_mm, normal, object, .. } = nearest;
+        let found = Distance { gap_mm: self.length * gap_mm, normal, hessian: [[0.0; 3]; 3] };
+        beneath(objects, p, object as usize, &found).map_or(nearest, |(index, outer)| Nearest {
+            gap_mm: outer.gap_mm / self.length,
+            normal: outer.normal,
+            stiffness_mpa_per_mm: objects[index].stiffness_mpa_per_mm,
+            friction: objects[index].friction,
+            object: index as u32,
+        })
     }
 
     /// Calls `each` with every vertex that is at most `margin_mm` (reference mm) from a thing, and

@@ -99,6 +99,11 @@ pub struct AnnouncedPart {
     pub yaw_deg: f64,
 }
 
+/// A whole shape below this is a thousandth of what hands touch, mm.
+const TINY_MM: f64 = 0.5;
+/// Heights that differ by less are a thousandth of what a finger feels, mm.
+const SMOOTH_MM: f64 = 1e-3;
+
 /// Most heights of a height map.
 const HEIGHTS_MAX: usize = 65_536;
 
@@ -108,6 +113,18 @@ impl AnnouncedShape {
     /// # Errors
     /// [`AnnouncedError`] names the member, `field` before it, and its rule.
     pub fn build(&self, field: &str) -> Result<Arc<dyn SignedDistance>, AnnouncedError> {
+        self.build_until(field, &|| true)
+    }
+
+    /// The same for as long as `go_on` says so, which is asked now and then.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; [`MeshError::Stopped`] once `go_on` said no.
+    pub fn build_until(
+        &self,
+        field: &str,
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<Arc<dyn SignedDistance>, AnnouncedError> {
         let plain = match self {
             Self::Plate(s) => IndenterSpec::Plate(*s),
             Self::Sphere(s) => IndenterSpec::Sphere(*s),
@@ -120,12 +137,38 @@ impl AnnouncedShape {
             Self::Heightmap(s) => return Ok(Arc::new(s.build().map_err(|e| e.under(field))?)),
             Self::Mesh(s) => {
                 let refuse = |source| AnnouncedError::Mesh { field: field.to_owned(), source };
-                return Ok(Arc::new(s.build().map_err(refuse)?));
+                return Ok(Arc::new(s.build_until(go_on).map_err(refuse)?));
             }
-            Self::Union(s) => return Ok(Arc::new(s.build(field)?)),
+            Self::Union(s) => return Ok(Arc::new(s.build(field, go_on)?)),
         };
         plain.validate_part().map_err(|e| e.under(field))?;
         Ok(plain.build(Path::new(""))?)
+    }
+
+    /// A member of lengths that are so small that metres may have been meant, and the size in
+    /// question, mm: that of the whole `built` shape, or what its heights differ by.
+    #[must_use]
+    pub fn tiny(&self, built: &dyn SignedDistance) -> Option<(&'static str, f64)> {
+        if let Self::Heightmap(grid) = self {
+            return grid.tiny();
+        }
+        let member = match self {
+            Self::Sphere(_) => "radius_mm",
+            Self::Plate(_) => "size_mm",
+            Self::Cylinder(_) | Self::Wedge(_) | Self::Grating(_) => "length_mm",
+            Self::Punch(_) => "radius_mm",
+            Self::Ring(_) => "outer_radius_mm",
+            Self::Dots(_) => "plate_mm",
+            Self::Heightmap(_) | Self::Union(_) => "parts",
+            Self::Mesh(_) => "vertices_mm",
+        };
+        let wide = |i: usize| {
+            let along =
+                |sign| built.reach_mm(std::array::from_fn(|k| if k == i { sign } else { 0.0 }));
+            along(1.0) + along(-1.0)
+        };
+        let largest = (0..3).map(wide).fold(0.0, f64::max);
+        (largest < TINY_MM).then_some((member, largest))
     }
 
     /// Numbers that it takes memory for: triangles of meshes and heights.
@@ -141,6 +184,19 @@ impl AnnouncedShape {
 }
 
 impl HeightGrid {
+    fn tiny(&self) -> Option<(&'static str, f64)> {
+        let rows = self.heights_mm.len() / self.columns.max(1);
+        let wide = (self.columns as f64 * self.pixel_mm[0]).max(rows as f64 * self.pixel_mm[1]);
+        let fold =
+            |pick: fn(f64, f64) -> f64, from| self.heights_mm.iter().copied().fold(from, pick);
+        let range = fold(f64::max, f64::NEG_INFINITY) - fold(f64::min, f64::INFINITY);
+        if wide < TINY_MM {
+            Some(("pixel_mm", wide))
+        } else {
+            (range > 0.0 && range < SMOOTH_MM).then_some(("heights_mm", range))
+        }
+    }
+
     fn build(&self) -> Result<HeightField, BadValue> {
         let n = self.heights_mm.len();
         let fits = self.columns >= 2 && n >= 2 * self.columns && n.is_multiple_of(self.columns);
@@ -158,16 +214,16 @@ impl HeightGrid {
 }
 
 impl AnnouncedUnion {
-    fn build(&self, field: &str) -> Result<AnyOf, AnnouncedError> {
+    fn build(&self, field: &str, go_on: &dyn Fn() -> bool) -> Result<AnyOf, AnnouncedError> {
         parts(self.parts.len()).map_err(|e| e.under(field))?;
         let parts = self.parts.iter().enumerate();
-        let parts = parts.map(|(i, part)| part.build(&format!("{field}.parts[{i}]")));
-        Ok(AnyOf { parts: parts.collect::<Result<_, AnnouncedError>>()? })
+        let parts = parts.map(|(i, part)| part.build(&format!("{field}.parts[{i}]"), go_on));
+        Ok(AnyOf::new(parts.collect::<Result<_, AnnouncedError>>()?))
     }
 }
 
 impl AnnouncedPart {
-    fn build(&self, field: &str) -> Result<Placed, AnnouncedError> {
+    fn build(&self, field: &str, go_on: &dyn Fn() -> bool) -> Result<Placed, AnnouncedError> {
         let check = || {
             let turns = [self.pitch_deg, self.roll_deg, self.yaw_deg];
             placed(self.at_mm, turns)?;
@@ -180,7 +236,8 @@ impl AnnouncedPart {
         check().map_err(|e| e.under(field))?;
         let [pitch, roll, yaw] = [self.pitch_deg, self.roll_deg, self.yaw_deg];
         let placement = Placement::turned(pitch, roll, yaw, self.at_mm);
-        Ok(Placed { part: self.part.build(&format!("{field}.part"))?, placement })
+        let part = self.part.build_until(&format!("{field}.part"), go_on)?;
+        Ok(Placed { part, placement })
     }
 }
 

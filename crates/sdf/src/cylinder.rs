@@ -1,5 +1,6 @@
 //! Lying cylinder.
 
+use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};
 use super::rules::{BadValue, length, rounding};
 use super::{Distance, SignedDistance};
@@ -44,6 +45,22 @@ impl SignedDistance for Cylinder {
             radius_mm: self.end_radius_mm,
         };
         revolve(p, 1, |q| section.distance(q))
+    }
+
+    fn cost(&self) -> f64 {
+        2.0
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let section = Rectangle {
+            half_mm: [self.radius_mm, 0.5 * self.length_mm],
+            radius_mm: self.end_radius_mm,
+        };
+        each(self.distance(p));
+        for side in 0..5 {
+            each(revolve(p, 1, |q| section.sides(q)[side]));
+        }
+        tangents(p, self.radius_mm, &[0, 2], each);
     }
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {

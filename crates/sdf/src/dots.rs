@@ -95,6 +95,19 @@ impl SignedDistance for Dots {
         nearer(dot, plate.distance([x, y, z - below]))
     }
 
+    fn cost(&self) -> f64 {
+        3.0
+    }
+
+    fn exits(&self, [x, y, z]: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let radius_mm = self.radius_mm();
+        let [a, b] = [(x, self.count[0]), (y, self.count[1])]
+            .map(|(v, count)| from_nearest(v, self.pitch_mm, count));
+        let (plate, below) = self.plate();
+        Sphere { radius_mm }.exits([a, b, z + radius_mm], each);
+        plate.exits([x, y, z - below], each);
+    }
+
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         let (plate, below) = self.plate();
         let radius_mm = self.radius_mm();

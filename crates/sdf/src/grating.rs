@@ -103,6 +103,18 @@ impl SignedDistance for Grating {
         nearer(ridge.distance([along, y, z - middle]), base.distance([x, y, z - below]))
     }
 
+    fn cost(&self) -> f64 {
+        3.0
+    }
+
+    fn exits(&self, [x, y, z]: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let (ridge, middle) = self.ridge();
+        let (base, below) = self.base();
+        let along = from_nearest(x, self.pitch_mm(), self.ridges);
+        ridge.exits([along, y, z - middle], each);
+        base.exits([x, y, z - below], each);
+    }
+
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         let (_, middle) = self.ridge();
         let (base, _) = self.base();

@@ -196,6 +196,23 @@ impl SignedDistance for HeightField {
         f64::INFINITY
     }
 
+    fn cost(&self) -> f64 {
+        4.0
+    }
+
+    /// Its gap is approximate: the foot is where the gap vanishes.
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let mut foot = p;
+        for _ in 0..6 {
+            let found = self.distance(foot);
+            let square = found.normal.iter().map(|v| v * v).sum::<f64>().max(1e-6);
+            foot = std::array::from_fn(|i| foot[i] - found.gap_mm * found.normal[i] / square);
+        }
+        let there = self.distance(foot);
+        let behind: f64 = (0..3).map(|i| (p[i] - foot[i]) * there.normal[i]).sum();
+        each(Distance { gap_mm: behind, ..there });
+    }
+
     /// No slope is steeper than the steepest step between two pixels.
     fn clearance_mm(&self, [x, y, z]: [f64; 3]) -> f64 {
         (z - self.jet(x, y)[0][0]) / self.steepest.hypot(1.0)

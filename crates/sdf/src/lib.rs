@@ -18,6 +18,7 @@
 //! ```
 
 mod announced;
+mod beneath;
 mod cylinder;
 mod dots;
 mod grating;
@@ -38,6 +39,7 @@ mod union;
 mod wedge;
 
 pub use announced::{AnnouncedError, AnnouncedPart, AnnouncedShape, AnnouncedUnion, HeightGrid};
+pub use beneath::{Body, beneath, may_be_covered};
 pub use cylinder::Cylinder;
 pub use dots::Dots;
 pub use grating::Grating;
@@ -51,7 +53,7 @@ pub use rules::{BadValue, ShapeError};
 pub use spec::{IndenterSpec, Part, Union};
 pub use sphere::Sphere;
 pub use touch::{TouchError, first_touch_travel};
-pub use union::AnyOf;
+pub use union::{AnyOf, Ball};
 pub use wedge::Wedge;
 
 /// Signed distance with its first two derivatives at a point.
@@ -84,5 +86,24 @@ pub trait SignedDistance: Send + Sync {
     /// unless that is approximate.
     fn clearance_mm(&self, p: [f64; 3]) -> f64 {
         self.distance(p).gap_mm
+    }
+
+    /// Gap of the nearest surface, mm; of a union also where another part covers it. Its sign tells
+    /// inside from outside.
+    fn side_mm(&self, p: [f64; 3]) -> f64 {
+        self.distance(p).gap_mm
+    }
+
+    /// Mean time of a distance near the body, in those of a sphere's: an estimate that depends on
+    /// the body alone and not on the machine.
+    fn cost(&self) -> f64 {
+        1.0
+    }
+
+    /// Tells the faces through which a point leaves the body, in any order: of each the gap of its
+    /// plane, negative where `p` lies behind it, and its outward unit normal. The nearest surface
+    /// is among them where `p` is inside. `each` returns the depth beyond which none is asked for.
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        each(self.distance(p));
     }
 }

@@ -30,8 +30,16 @@ impl Placement {
     /// Distance of a world point from a placed indenter, in world coordinates.
     #[must_use]
     pub fn distance(&self, indenter: &dyn SignedDistance, p: [f64; 3]) -> Distance {
-        let d: [f64; 3] = std::array::from_fn(|i| p[i] - self.origin_mm[i]);
-        let found = indenter.distance(self.to_local(d));
+        self.turned_back(&indenter.distance(self.inside(p)))
+    }
+
+    /// A world point in the local frame.
+    fn inside(&self, p: [f64; 3]) -> [f64; 3] {
+        self.to_local(std::array::from_fn(|i| p[i] - self.origin_mm[i]))
+    }
+
+    /// A distance in the local frame as the world sees it.
+    fn turned_back(&self, found: &Distance) -> Distance {
         // R H R^T, one side at a time.
         let half: [[f64; 3]; 3] = std::array::from_fn(|i| self.to_world(found.hessian[i]));
         let columns: [[f64; 3]; 3] =
@@ -60,7 +68,23 @@ impl Placement {
     /// [`SignedDistance::clearance_mm`] of a world point from a placed indenter.
     #[must_use]
     pub fn clearance_mm(&self, indenter: &dyn SignedDistance, p: [f64; 3]) -> f64 {
-        indenter.clearance_mm(self.to_local(std::array::from_fn(|i| p[i] - self.origin_mm[i])))
+        indenter.clearance_mm(self.inside(p))
+    }
+
+    /// [`SignedDistance::side_mm`] of a world point from a placed indenter.
+    #[must_use]
+    pub fn side_mm(&self, indenter: &dyn SignedDistance, p: [f64; 3]) -> f64 {
+        indenter.side_mm(self.inside(p))
+    }
+
+    /// [`SignedDistance::exits`] of a world point from a placed indenter, in world coordinates.
+    pub fn exits(
+        &self,
+        indenter: &dyn SignedDistance,
+        p: [f64; 3],
+        each: &mut dyn FnMut(Distance) -> f64,
+    ) {
+        indenter.exits(self.inside(p), &mut |face| each(self.turned_back(&face)));
     }
 
     fn to_local(self, v: [f64; 3]) -> [f64; 3] {
@@ -97,6 +121,18 @@ impl SignedDistance for Placed {
 
     fn clearance_mm(&self, p: [f64; 3]) -> f64 {
         self.placement.clearance_mm(self.part.as_ref(), p)
+    }
+
+    fn side_mm(&self, p: [f64; 3]) -> f64 {
+        self.placement.side_mm(self.part.as_ref(), p)
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        self.placement.exits(self.part.as_ref(), p, each);
+    }
+
+    fn cost(&self) -> f64 {
+        self.part.cost()
     }
 
     fn narrowest_mm(&self) -> f64 {

@@ -3,6 +3,7 @@
 use super::rules::{BadValue, lengths, require};
 use super::{Distance, SignedDistance};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Thickness of what only has to be thick enough, mm beside its rounded edges.
 pub(super) const THICKNESS_MM: f64 = 4.0;
@@ -92,6 +93,32 @@ impl SignedDistance for RoundedPlate {
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         let r = self.edge_radius_mm;
         (0..3).map(|i| (self.half_mm[i] - r) * direction[i].abs()).sum::<f64>() + r
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        each(self.distance(p));
+        for i in 0..3 {
+            for sign in [-1.0, 1.0] {
+                let mut normal = [0.0; 3];
+                normal[i] = sign;
+                let gap_mm = sign * p[i] - self.half_mm[i];
+                each(Distance { gap_mm, normal, hessian: [[0.0; 3]; 3] });
+            }
+        }
+        let r = self.edge_radius_mm;
+        if r > 0.0 {
+            // Along each rounded edge the plane that touches its middle.
+            for [i, j] in [[0, 1], [0, 2], [1, 2]] {
+                for [s, t] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+                    let mut normal = [0.0; 3];
+                    normal[i] = s * FRAC_1_SQRT_2;
+                    normal[j] = t * FRAC_1_SQRT_2;
+                    let beyond = s * p[i] - self.half_mm[i] + t * p[j] - self.half_mm[j] + 2.0 * r;
+                    let gap_mm = FRAC_1_SQRT_2 * beyond - r;
+                    each(Distance { gap_mm, normal, hessian: [[0.0; 3]; 3] });
+                }
+            }
+        }
     }
 
     fn narrowest_mm(&self) -> f64 {

@@ -1,5 +1,6 @@
 //! Flat circular punch.
 
+use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};
 use super::rules::{BadValue, length, rounding};
 use super::{Distance, SignedDistance};
@@ -43,6 +44,20 @@ impl SignedDistance for Punch {
         let half = 0.5 * self.height_mm;
         let section = Rectangle { half_mm: [self.radius_mm, half], radius_mm: self.rim_radius_mm };
         revolve(p, 2, |[r, z]| section.distance([r, z + half]))
+    }
+
+    fn cost(&self) -> f64 {
+        2.0
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let half = 0.5 * self.height_mm;
+        let section = Rectangle { half_mm: [self.radius_mm, half], radius_mm: self.rim_radius_mm };
+        each(self.distance(p));
+        for side in 0..5 {
+            each(revolve(p, 2, |[r, z]| section.sides([r, z + half])[side]));
+        }
+        tangents(p, self.radius_mm, &[0, 1], each);
     }
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {

@@ -1,6 +1,7 @@
 //! Solids of revolution: distance in a meridian plane, turned about an axis.
 
 use super::Distance;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Distance in a plane with its derivatives. Its Hessian is the curvature times
 /// the dyad of the unit tangent.
@@ -38,6 +39,22 @@ impl Rectangle {
         let (normal, far) =
             if q[1] >= q[0] { ([0.0, sign[1]], q[1]) } else { ([sign[0], 0.0], q[0]) };
         Flat { gap_mm: far - self.radius_mm, normal, curvature_per_mm: 0.0 }
+    }
+}
+
+impl Rectangle {
+    /// The sides through which a place leaves it: the outer one, both ends, the middles of the
+    /// rounded corners between these, and the same two corners and the side on the inner side.
+    pub(super) fn sides(&self, p: [f64; 2]) -> [Flat; 8] {
+        let side = |normal: [f64; 2]| {
+            let inner: f64 =
+                (0..2).map(|i| normal[i].abs() * (self.half_mm[i] - self.radius_mm)).sum();
+            let along = normal[0] * p[0] + normal[1] * p[1];
+            Flat { gap_mm: along - inner - self.radius_mm, normal, curvature_per_mm: 0.0 }
+        };
+        let k = FRAC_1_SQRT_2;
+        [[1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [k, k], [k, -k], [-k, k], [-k, -k], [-1.0, 0.0]]
+            .map(side)
     }
 }
 

@@ -1,5 +1,6 @@
 //! End of a tube.
 
+use super::beneath::tangents;
 use super::revolved::{Rectangle, disc_reach_mm, revolve};
 use super::rules::{BadValue, length, require, rounding};
 use super::{Distance, SignedDistance};
@@ -54,6 +55,22 @@ impl SignedDistance for Ring {
         let wall = 0.5 * (self.outer_radius_mm - self.inner_radius_mm);
         let section = Rectangle { half_mm: [wall, half], radius_mm: self.rim_radius_mm };
         revolve(p, 2, |[r, z]| section.distance([r - middle, z + half]))
+    }
+
+    fn cost(&self) -> f64 {
+        2.0
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let half = 0.5 * self.height_mm;
+        let middle = 0.5 * (self.outer_radius_mm + self.inner_radius_mm);
+        let wall = 0.5 * (self.outer_radius_mm - self.inner_radius_mm);
+        let section = Rectangle { half_mm: [wall, half], radius_mm: self.rim_radius_mm };
+        each(self.distance(p));
+        for side in 0..8 {
+            each(revolve(p, 2, |[r, z]| section.sides([r - middle, z + half])[side]));
+        }
+        tangents(p, self.outer_radius_mm, &[0, 1], each);
     }
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {

@@ -1,5 +1,6 @@
 //! Rigid sphere.
 
+use super::beneath::tangents;
 use super::rules::{BadValue, length};
 use super::{Distance, SignedDistance};
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,11 @@ impl SignedDistance for Sphere {
             })
         });
         Distance { gap_mm: length - self.radius_mm, normal, hessian }
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        each(self.distance(p));
+        tangents(p, self.radius_mm, &[0, 1, 2], each);
     }
 
     fn reach_mm(&self, _direction: [f64; 3]) -> f64 {

@@ -15,6 +15,8 @@ pub(super) enum Exactness {
     Exact,
     /// The distance outside, no more than it inside (a union).
     ExactOutside,
+    /// The same of curved parts that overlap: where they cover each other it is found by steps.
+    OuterOfCurved,
     /// The distance to first order at the surface.
     Approximate,
 }
@@ -101,6 +103,7 @@ impl Subject {
         let detail = self.detail_mm;
         let h = 1e-5 * detail;
         let d = self.at(p);
+        prop_assume!(self.exactness != Exactness::OuterOfCurved || d.gap_mm > 0.0);
         // Near a focal point differences say nothing.
         prop_assume!(largest(&d.hessian) * detail < 5.0);
         for i in 0..3 {
@@ -130,7 +133,9 @@ impl Subject {
         if self.exactness != Exactness::Approximate {
             let apart = norm(std::array::from_fn(|i| p[i] - q[i]));
             let change = (self.at(p).gap_mm - self.at(q).gap_mm).abs();
-            prop_assert!(change <= apart + 1e-13 * (norm(p) + norm(q)), "{p:?}, {q:?}");
+            let steps = if self.exactness == Exactness::OuterOfCurved { 0.05 } else { 0.0 };
+            let most = apart + 1e-13 * (norm(p) + norm(q)) + steps;
+            prop_assert!(change <= most, "{p:?}, {q:?}");
         }
         Ok(())
     }
@@ -140,7 +145,7 @@ impl Subject {
         let there = self.at(p);
         let exact = match self.exactness {
             Exactness::Exact => true,
-            Exactness::ExactOutside | Exactness::Approximate => there.gap_mm > 0.0,
+            _ => there.gap_mm > 0.0,
         };
         // Next to a kink inside, rounding chooses the side.
         if !exact {

@@ -151,6 +151,25 @@ impl SignedDistance for Wedge {
         Distance { gap_mm: d - r, normal: section, hessian }
     }
 
+    fn cost(&self) -> f64 {
+        2.0
+    }
+
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        let r = self.tip_radius_mm;
+        let Inner { a, b, flank: [nx, nz] } = self.inner();
+        each(self.distance(p));
+        let mut face = |normal: [f64; 3], gap_mm: f64| {
+            each(Distance { gap_mm, normal, hessian: [[0.0; 3]; 3] });
+        };
+        face([0.0, 0.0, 1.0], p[2] - a[1] - r);
+        face([0.0, 0.0, -1.0], b[1] - p[2] - r);
+        for sign in [-1.0, 1.0] {
+            face([sign * nx, 0.0, nz], nx * (sign * p[0] - a[0]) + nz * (p[2] - a[1]) - r);
+            face([0.0, sign, 0.0], sign * p[1] - 0.5 * self.length_mm);
+        }
+    }
+
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {
         let r = self.tip_radius_mm;
         let Inner { a, b, .. } = self.inner();

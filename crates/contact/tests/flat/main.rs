@@ -6,6 +6,7 @@ mod memory;
 mod mirror;
 mod pixels;
 mod plane;
+mod seams;
 mod support;
 
 use papilla_contact::{

@@ -1,6 +1,8 @@
 //! What a mesh has to be, to have an inside.
 
+use super::shells::{covered, lying_upon};
 use super::tree::Tree;
+use super::work::Work;
 use super::{Mesh, TRIANGLES_MAX, cross, dot, minus, normal, scaled_to_one, square};
 use crate::rules::LENGTH_MAX_MM;
 use std::collections::HashMap;
@@ -40,18 +42,56 @@ pub enum MeshError {
     /// An edge that has not one triangle on either side.
     #[error(
         "triangles[{triangle}] has an edge that is not shared with exactly one other, turned the \
-         same way round: the mesh is open, or more than two triangles meet there"
+         same way round: the mesh is open, or more than two triangles meet there, as where bodies \
+         touch. Close it; join bodies that touch into one (a boolean union), or send each as a mesh \
+         of its own in the parts of a 'union'"
     )]
     Open {
         /// A triangle with this edge.
         triangle: usize,
     },
     /// Triangles that cross each other.
-    #[error("triangles[{}] and triangles[{}] cross each other", pair[0], pair[1])]
+    #[error(
+        "triangles[{}] and triangles[{}] cross each other: join bodies that overlap into one (a \
+         boolean union), or send each as a mesh of its own in the parts of a 'union'",
+        pair[0], pair[1]
+    )]
     Crossing {
         /// Which.
         pair: [usize; 2],
     },
+    /// Faces that lie upon each other, as where two bodies touch.
+    #[error(
+        "triangles[{}] and triangles[{}] lie upon each other, so that skin inside would see a face \
+         that is covered: join the bodies into one (a boolean union), or send each as a mesh of its \
+         own in the parts of a 'union'", pair[0], pair[1]
+    )]
+    Touching {
+        /// Which.
+        pair: [usize; 2],
+    },
+    /// A closed surface that lies inside of another one.
+    #[error(
+        "triangles[{triangle}] lies inside another body of the mesh (or is a cavity outside of all): \
+         take it out, or turn it round if it is a cavity"
+    )]
+    Nested {
+        /// A triangle of the inner one.
+        triangle: usize,
+    },
+    /// So many triangles lie beside each other that it takes too long to tell whether they cross.
+    #[error(
+        "to see whether the triangles cross each other more than {most} boxes and triangles would \
+         have to be looked at, since too many reach across each other: remesh the surface with \
+         triangles that are less slender, or with fewer"
+    )]
+    TooTangled {
+        /// How many are looked at.
+        most: u64,
+    },
+    /// Whoever asked for the mesh waits no longer.
+    #[error("the mesh was not read to its end, since nobody waits for it any more")]
+    Stopped,
     /// Normals that point inward.
     #[error("the triangles are inside out; swap two corners of every one")]
     InsideOut,
@@ -64,7 +104,8 @@ pub(super) struct Checked {
     pub(super) tree: Tree,
 }
 
-pub(super) fn checked(mesh: &Mesh) -> Result<Checked, MeshError> {
+/// Checks it for as long as `go_on` says so, which is asked now and then.
+pub(super) fn checked(mesh: &Mesh, go_on: &dyn Fn() -> bool) -> Result<Checked, MeshError> {
     let found = mesh.triangles.len();
     if !(4..=TRIANGLES_MAX).contains(&found) {
         return Err(MeshError::Count { found });
@@ -93,12 +134,19 @@ pub(super) fn checked(mesh: &Mesh) -> Result<Checked, MeshError> {
             }
         }
     }
-    if let Some(pair) = crossing(&triangles, &places, &tree) {
+    let mut work = Work::new(found, go_on);
+    if let Some(pair) = crossing(&triangles, &places, &tree, &mut work)? {
         return Err(MeshError::Crossing { pair });
     }
     let volume: f64 = places.iter().map(|[a, b, c]| dot(*a, cross(*b, *c))).sum();
     if volume <= 0.0 {
         return Err(MeshError::InsideOut);
+    }
+    if let Some(pair) = lying_upon(&places, &tree, &mut work)? {
+        return Err(MeshError::Touching { pair });
+    }
+    if let Some(triangle) = covered(&beside, &places, &tree, &mut work)? {
+        return Err(MeshError::Nested { triangle });
     }
     Ok(Checked { corners_mm, triangles, tree })
 }
@@ -151,22 +199,31 @@ fn neighbours(triangles: &[[u32; 3]]) -> Result<Vec<[usize; 3]>, MeshError> {
 }
 
 /// Two triangles of which an edge of one goes through the other.
-fn crossing(triangles: &[[u32; 3]], places: &[[[f64; 3]; 3]], tree: &Tree) -> Option<[usize; 2]> {
-    (0..triangles.len()).find_map(|own| {
-        (0..3).find_map(|k| {
+fn crossing(
+    triangles: &[[u32; 3]],
+    places: &[[[f64; 3]; 3]],
+    tree: &Tree,
+    work: &mut Work<'_>,
+) -> Result<Option<[usize; 2]>, MeshError> {
+    for own in 0..triangles.len() {
+        for k in 0..3 {
             let ends = [triangles[own][k], triangles[own][(k + 1) % 3]];
             // Each edge once.
             if ends[0] > ends[1] {
-                return None;
+                continue;
             }
             let [a, b] = [places[own][k], places[own][(k + 1) % 3]];
             let bounds = [f64::min, f64::max].map(|pick| [0, 1, 2].map(|i| pick(a[i], b[i])));
-            tree.find(bounds, |other| {
+            let found = tree.find(bounds, work, |other| {
                 let apart = !triangles[other].iter().any(|corner| ends.contains(corner));
                 (apart && goes_through([a, b], places[other])).then_some([own, other])
-            })
-        })
-    })
+            })?;
+            if found.is_some() {
+                return Ok(found);
+            }
+        }
+    }
+    Ok(None)
 }
 
 /// Whether a segment goes through the inside of a triangle.

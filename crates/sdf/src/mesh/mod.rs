@@ -7,10 +7,13 @@
 
 mod check;
 mod closest;
+mod shells;
 mod tree;
+mod work;
 
 pub use check::MeshError;
 
+use super::beneath::SEAM_MM;
 use super::{Distance, SignedDistance};
 use check::Checked;
 use closest::{Feature, closest};
@@ -21,6 +24,13 @@ use tree::Tree;
 pub const TRIANGLES_MAX: usize = 16_384;
 /// Below this distance from the surface, mm, the direction is the surface's own.
 const ON_SURFACE_MM: f64 = 1e-9;
+
+/// Places at which it is counted how many triangles a distance asks.
+const SAMPLES: usize = 128;
+/// How far these are from the surface, mm: about as deep as skin is pressed.
+const AWAY_MM: f64 = 0.5;
+/// Time of a triangle and its share of the boxes, in those of a sphere's distance.
+const PER_TRIANGLE: f64 = 2.5;
 
 /// A mesh as it is told: corners and the triangles between them, counter-clockwise seen from
 /// outside. Corners at the very same place are one.
@@ -39,6 +49,7 @@ pub struct MeshDistance {
     tree: Tree,
     faces: Vec<Face>,
     corners_mm: Vec<[f64; 3]>,
+    cost: f64,
 }
 
 /// A triangle, ready to be asked.
@@ -54,7 +65,16 @@ impl Mesh {
     /// # Errors
     /// [`MeshError`] names the triangle or edge for which the mesh bounds no body.
     pub fn build(&self) -> Result<MeshDistance, MeshError> {
-        let Checked { corners_mm, triangles, tree } = check::checked(self)?;
+        self.build_until(&|| true)
+    }
+
+    /// The same for as long as `go_on` says so, which is asked now and then: most of the time goes
+    /// into the search for triangles that cross.
+    ///
+    /// # Errors
+    /// As [`Self::build`]; [`MeshError::Stopped`] once `go_on` said no.
+    pub fn build_until(&self, go_on: &dyn Fn() -> bool) -> Result<MeshDistance, MeshError> {
+        let Checked { corners_mm, triangles, tree } = check::checked(self, go_on)?;
         let place = |triangle: [u32; 3]| triangle.map(|c| corners_mm[c as usize]);
         let unit: Vec<[f64; 3]> =
             triangles.iter().map(|t| scaled_to_one(normal(place(*t)))).collect();
@@ -78,11 +98,38 @@ impl Mesh {
             Face { corners_mm: place(*triangle), normals: normals.map(scaled_to_one) }
         });
         let faces = faces.collect();
-        Ok(MeshDistance { faces, tree, corners_mm })
+        let mut built = MeshDistance { faces, tree, corners_mm, cost: 1.0 };
+        built.cost = 1.0 + PER_TRIANGLE * built.triangles_asked();
+        Ok(built)
+    }
+}
+
+impl MeshDistance {
+    /// Mean number of triangles that are asked for a distance, at places on both sides of the
+    /// surface.
+    fn triangles_asked(&self) -> f64 {
+        let step = self.faces.len().div_ceil(SAMPLES);
+        let (mut asked, mut places) = (0u32, 0u32);
+        for (i, face) in self.faces.iter().step_by(step).enumerate() {
+            let [a, b, c] = face.corners_mm;
+            let away = if i % 2 == 0 { AWAY_MM } else { -AWAY_MM };
+            let n = face.normals[0];
+            let p = std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0 + away * n[k]);
+            places += 1;
+            self.tree.nearest(p, |face, _| {
+                asked += 1;
+                square(minus(p, closest(p, &self.faces[face].corners_mm).0))
+            });
+        }
+        f64::from(asked) / f64::from(places)
     }
 }
 
 impl SignedDistance for MeshDistance {
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+
     fn distance(&self, p: [f64; 3]) -> Distance {
         let mut best = (f64::INFINITY, 0, [0.0; 3], Feature::Face);
         self.tree.nearest(p, |face, limit| {
@@ -114,6 +161,21 @@ impl SignedDistance for MeshDistance {
             })
         });
         Distance { gap_mm, normal, hessian }
+    }
+
+    /// The planes of the triangles that `p` looks straight at, and its nearest point.
+    fn exits(&self, p: [f64; 3], each: &mut dyn FnMut(Distance) -> f64) {
+        each(self.distance(p));
+        self.tree.nearest(p, |face, _| {
+            let Face { corners_mm, normals: [normal, ..] } = &self.faces[face];
+            let gap_mm = dot(minus(p, corners_mm[0]), *normal);
+            let foot: [f64; 3] = std::array::from_fn(|i| p[i] - gap_mm * normal[i]);
+            let beside = square(minus(closest(p, corners_mm).0, foot));
+            if gap_mm > ON_SURFACE_MM || beside > SEAM_MM * SEAM_MM {
+                return f64::INFINITY;
+            }
+            each(Distance { gap_mm, normal: *normal, hessian: [[0.0; 3]; 3] }).powi(2)
+        });
     }
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {

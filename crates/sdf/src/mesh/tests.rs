@@ -110,6 +110,90 @@ fn what_bounds_no_body_is_named() {
     assert!(matches!(two, MeshError::Crossing { .. }));
 }
 
+/// A second box beside, upon or in the first, of other corners or the same ones.
+fn two_boxes(at: [f64; 3], half: [f64; 3], turn: bool) -> Result<(), MeshError> {
+    let mut mesh = cuboid([1.0; 3]);
+    let mut other = cuboid(half);
+    let mut moved: Vec<_> =
+        other.vertices_mm.iter().map(|p| std::array::from_fn(|i| p[i] + at[i])).collect();
+    if turn {
+        other.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    }
+    mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|c| c + 8)));
+    mesh.vertices_mm.append(&mut moved);
+    mesh.build().map(|_| ())
+}
+
+#[test]
+fn boxes_of_one_mesh_that_touch_are_refused_with_the_cure() {
+    let apart = [2.5, 0.0, 0.0];
+    assert_eq!(two_boxes(apart, [1.0; 3], false), Ok(()));
+    assert_eq!(two_boxes([0.0; 3], [0.5; 3], true), Ok(()), "a cavity");
+    // The same corners: edges of four triangles.
+    let same = two_boxes([2.0, 0.0, 0.0], [1.0; 3], false);
+    assert!(matches!(same, Err(MeshError::Open { .. })), "{same:?}");
+    // Others, also a hair's breadth off, and one with a corner in common.
+    for (at, half) in [
+        ([1.8, 0.1, 0.2], [0.8, 0.7, 0.6]),
+        ([1.8, 0.0, 0.0], [0.8, 2.0, 2.0]),
+        ([1.8 + 5e-4, 0.1, 0.2], [0.8, 0.7, 0.6]),
+        ([1.5, 0.5, 0.5], [0.5; 3]),
+        ([0.3, -1.4, 0.2], [0.3, 0.4, 0.5]),
+    ] {
+        let found = two_boxes(at, half, false);
+        // To rounding, what touches may cross.
+        let named = matches!(found, Err(MeshError::Touching { .. } | MeshError::Crossing { .. }));
+        assert!(named, "{found:?} at {at:?}");
+        assert!(found.unwrap_err().to_string().contains("parts of a 'union'"));
+    }
+    // Side by side with tops in one plane, one reaching into the other.
+    let into = two_boxes([1.0, 0.0, 0.0], [1.0; 3], false);
+    assert!(into.is_err(), "covered faces");
+    assert!(matches!(two_boxes([0.1; 3], [0.5; 3], false), Err(MeshError::Nested { .. })));
+    assert!(matches!(two_boxes([3.0; 3], [0.5; 3], true), Err(MeshError::Nested { .. })));
+}
+
+/// A closed fan of so many slivers, all boxes of which overlap.
+fn slivers(count: u32) -> Mesh {
+    let mut vertices_mm = vec![[0.0, 0.0, 5.0], [0.0, 0.0, -5.0]];
+    let angle = |i: u32| std::f64::consts::TAU * f64::from(i) / f64::from(count);
+    vertices_mm.extend((0..count).map(|i| [20.0 * angle(i).cos(), 20.0 * angle(i).sin(), 0.0]));
+    // Turned, so that no axis separates them.
+    for v in &mut vertices_mm {
+        let [x, y, z] = *v;
+        *v = [0.6 * x + 0.8 * z, y, 0.6 * z - 0.8 * x];
+    }
+    let triangles =
+        (0..count).flat_map(|i| [[0, 2 + i, 2 + (i + 1) % count], [1, 2 + (i + 1) % count, 2 + i]]);
+    Mesh { vertices_mm, triangles: triangles.collect() }
+}
+
+#[test]
+fn the_search_for_crossings_is_bounded_and_can_be_stopped() {
+    assert!(slivers(100).build().is_ok(), "few");
+    let found = slivers(8000).build().map(|_| ()).expect_err("too many boxes overlap");
+    assert!(matches!(found, MeshError::TooTangled { .. }), "{found}");
+    assert!(found.to_string().contains("less slender"), "{found}");
+    let asked = std::cell::Cell::new(0);
+    let stopped = ball(5.0, 4).build_until(&|| {
+        asked.set(asked.get() + 1);
+        asked.get() < 3
+    });
+    assert!(matches!(stopped, Err(MeshError::Stopped)));
+    assert_eq!(asked.get(), 3);
+    // A well-made one of the most triangles needs far less than is allowed.
+    assert!(ball(5.0, 5).build().is_ok());
+}
+
+#[test]
+fn a_mesh_costs_what_its_tree_looks_at() {
+    let [small, large] = [2, 5].map(|times| ball(5.0, times).build().expect("closed").cost());
+    // 64 times the triangles, in a tree six levels deeper.
+    assert!(small < large && large < 4.0 * small, "{small} {large}");
+    let fan = slivers(200).build().expect("closed").cost();
+    assert!(fan > 2.0 * large, "{fan} of 400 slivers, {large} of 8192 triangles");
+}
+
 #[test]
 fn corners_told_for_each_triangle_are_joined() {
     let whole = cuboid([1.0, 2.0, 3.0]);

@@ -1,5 +1,8 @@
 //! A tree of boxes round triangles, so that most are never looked at.
 
+use super::MeshError;
+use super::work::Work;
+
 /// Triangles of a leaf at most.
 const LEAF: usize = 4;
 /// Deepest tree: halves of 2^14 triangles, with room to spare.
@@ -93,24 +96,29 @@ impl Tree {
 
     /// Calls `each` with every triangle whose leaf's box touches the box from `low` to `high`,
     /// until it returns something.
+    ///
+    /// # Errors
+    /// Boxes and triangles are counted as `work`, which may be too much.
     pub(super) fn find<T>(
         &self,
         [low, high]: [[f64; 3]; 2],
+        work: &mut Work<'_>,
         mut each: impl FnMut(usize) -> Option<T>,
-    ) -> Option<T> {
+    ) -> Result<Option<T>, MeshError> {
         let mut stack = [0u32; DEPTH_MAX];
         let mut height = 1;
         while height > 0 {
             height -= 1;
             let at = stack[height];
             let node = &self.nodes[at as usize];
+            work.spend(1 + u64::from(node.leaf[1] - node.leaf[0]))?;
             if !node.overlaps(low, high) {
                 continue;
             }
             if node.second == 0 {
                 let own = &self.order[node.leaf[0] as usize..node.leaf[1] as usize];
                 if let Some(found) = own.iter().find_map(|t| each(*t as usize)) {
-                    return Some(found);
+                    return Ok(Some(found));
                 }
                 continue;
             }
@@ -118,6 +126,6 @@ impl Tree {
             stack[height + 1] = node.second;
             height += 2;
         }
-        None
+        Ok(None)
     }
 }
