@@ -2,7 +2,7 @@
 
 use papilla_contact::{FRICTION_MAX, Object, Person};
 use papilla_proto::{
-    Hello, Problem, SampleType,
+    Hello, Problem, SampleType, Warning,
     contact::{AnnouncedFinger, AnnouncedObject, FINGERS_MAX, Input, OBJECTS_MAX, SampleLayout},
     sdf::Placement,
 };
@@ -11,6 +11,9 @@ use super::unusable;
 
 /// Most triangles and heights of all shapes of a session: some 10 MB.
 const SIZE_MAX: usize = 32_768;
+/// Most that the shapes of a session cost, in distances of a sphere: with more a frame would take
+/// some tenths of a second.
+const COST_MAX: f64 = 512.0;
 /// Where an object is before its first pose: beyond all reach, mm.
 const AWAY_MM: f64 = 9e4;
 
@@ -94,15 +97,20 @@ pub(crate) fn has_friction(hello: &Hello) -> bool {
     hello.shear == Some(true) || hello.has_traction()
 }
 
-/// The objects, each as far away as can be.
-pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Problem> {
+/// The objects, each as far away as can be, and what is to be asked about them; worked out for as
+/// long as `go_on` says so.
+pub(crate) fn objects(
+    hello: &Hello,
+    input: Input,
+    go_on: &dyn Fn() -> bool,
+) -> Result<(Vec<Object>, Vec<Warning>), Problem> {
     let list = match (&hello.objects, input) {
         (Some(list), Input::Objects) => list,
         (None, Input::Objects) => {
             return Err(unusable("objects", "the input 'objects' needs the member 'objects'"));
         }
         (Some(_), _) => return Err(unusable("objects", "'input' has to be 'objects' with them")),
-        (None, _) => return Ok(Vec::new()),
+        (None, _) => return Ok((Vec::new(), Vec::new())),
     };
     if !(1..=OBJECTS_MAX).contains(&list.len()) {
         let message = format!("{} objects; announce 1 to {OBJECTS_MAX}", list.len());
@@ -113,10 +121,14 @@ pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Proble
         let message = format!("{size} triangles and heights in all; {SIZE_MAX} at most");
         return Err(unusable("objects", message));
     }
+    let mut warnings = Vec::new();
     let object = |(index, announced): (usize, &AnnouncedObject)| {
         let field = format!("objects[{index}].shape");
-        let shape = announced.shape.build(&field);
-        let shape = shape.map_err(|error| unusable(field, error.to_string()))?;
+        let shape = announced.shape.build_until(&field, go_on);
+        let shape = shape.map_err(|error| unusable(&field, error.to_string()))?;
+        if let Some((member, value)) = announced.shape.tiny(shape.as_ref()) {
+            warnings.push(tiny(format!("{field}.{member}"), member, value));
+        }
         let stiffness_mpa_per_mm = announced.stiffness_mpa_per_mm.unwrap_or(f64::INFINITY);
         if !(stiffness_mpa_per_mm > 0.0) {
             let message = format!("{stiffness_mpa_per_mm} MPa/mm; a stiffness is positive");
@@ -129,7 +141,33 @@ pub(crate) fn objects(hello: &Hello, input: Input) -> Result<Vec<Object>, Proble
         placement.origin_mm[2] = -AWAY_MM;
         Ok(Object { shape, placement, stiffness_mpa_per_mm, friction })
     };
-    list.iter().enumerate().map(object).collect()
+    let objects = list.iter().enumerate().map(object).collect::<Result<Vec<_>, Problem>>()?;
+    check_cost(&objects)?;
+    Ok((objects, warnings))
+}
+
+/// Whether the shapes are not too slow together.
+fn check_cost(objects: &[Object]) -> Result<(), Problem> {
+    let costs = || objects.iter().map(|object| object.shape.cost());
+    let total: f64 = costs().sum();
+    if total <= COST_MAX {
+        return Ok(());
+    }
+    let (worst, most) = costs().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+    let message = format!(
+        "a distance from all shapes costs as much as {total:.0} of a sphere, objects[{worst}] alone \
+         {most:.0}; {COST_MAX} at most: announce fewer objects, unions with fewer parts in one place, \
+         or meshes whose triangles are fewer or less slender"
+    );
+    Err(unusable(format!("objects[{worst}].shape"), message))
+}
+
+/// Asks whether metres were meant.
+fn tiny(member: String, of: &str, value: f64) -> Warning {
+    let what =
+        if of == "heights_mm" { "the heights differ by" } else { "the whole object measures" };
+    let question = format!("{what} {value} mm; lengths are in mm, was m meant?");
+    Warning { member, value: Some(value), question }
 }
 
 /// The factors of each finger.

@@ -93,12 +93,25 @@ impl Hand {
     /// # Errors
     /// A member is unusable or missing; the problem names it.
     pub fn of(hello: &Hello, skin: Skin<'_>) -> Result<Self, Problem> {
+        Self::of_until(hello, skin, &|| true)
+    }
+
+    /// The same for as long as `go_on` says so, which is asked now and then: shapes of many triangles
+    /// may take some tenths of a second.
+    ///
+    /// # Errors
+    /// As [`Self::of`], and once `go_on` said no.
+    pub fn of_until(
+        hello: &Hello,
+        skin: Skin<'_>,
+        go_on: &dyn Fn() -> bool,
+    ) -> Result<Self, Problem> {
         let input = hello.input.unwrap_or_default();
         announced::check_members(hello, input)?;
         let chosen = Chosen::of(hello, input, skin)?;
         let persons = announced::persons(hello)?;
         let vertices = skin.atlas.vertex_count();
-        let objects = announced::objects(hello, input)?;
+        let (objects, mut warnings) = announced::objects(hello, input, go_on)?;
         let form = FrameForm::of(hello, objects.len(), persons.len(), vertices);
         let model = match (input, skin.model) {
             (Input::Pressure, _) => None,
@@ -120,7 +133,7 @@ impl Hand {
         };
         let fingers = persons.into_iter().map(finger).collect::<Result<_, Problem>>()?;
         let sections = sections(hello, input, vertices);
-        let warnings = chosen.iter().filter_map(|chosen| chosen.warning.clone()).collect();
+        warnings.extend(chosen.iter().filter_map(|chosen| chosen.warning.clone()));
         let method = chosen.map(|chosen| chosen.method);
         Ok(Self { form, method, fingers, sections, warnings })
     }

@@ -531,3 +531,83 @@ fn any_bytes_are_answered_or_refused() {
         }
     }
 }
+
+#[test]
+fn lengths_in_metres_are_asked_about() {
+    let plane = Plane::new();
+    let asked = |shape: &str| {
+        let shape: AnnouncedShape =
+            papilla_proto::json::read_bounded(shape.as_bytes()).expect("a shape");
+        let object = AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None };
+        let hello = Hello { objects: Some(vec![object]), ..objects() };
+        let hand = plane.hand(&hello).expect("a hand");
+        let of_shape = hand.warnings().iter().find(|w| w.member.starts_with("objects"));
+        of_shape.map(|w| (w.member.clone(), w.value.expect("a size"), w.question.clone()))
+    };
+    let tetrahedron = |size: f64| {
+        format!(
+            r#"{{"shape":"mesh","vertices_mm":[[0,0,0],[{size},0,0],[0,{size},0],[0,0,{size}]],
+                "triangles":[[0,2,1],[0,1,3],[0,3,2],[1,2,3]]}}"#
+        )
+    };
+    let map = |pixel: f64, height: f64| {
+        format!(
+            r#"{{"shape":"heightmap","columns":2,"pixel_mm":[{pixel},{pixel}],
+                "heights_mm":[0,{height},0,0]}}"#
+        )
+    };
+    let ball = |radius: f64| format!(r#"{{"shape":"sphere","radius_mm":{radius}}}"#);
+    let union =
+        |radius: f64| format!(r#"{{"shape":"union","parts":[{{"part":{}}}]}}"#, ball(radius));
+    for (shape, member, value) in [
+        (ball(0.01), "objects[0].shape.radius_mm", 0.02),
+        (tetrahedron(0.02), "objects[0].shape.vertices_mm", 0.02),
+        (map(1e-4, 1e-5), "objects[0].shape.pixel_mm", 2e-4),
+        (map(1.0, 1e-4), "objects[0].shape.heights_mm", 1e-4),
+        (union(0.01), "objects[0].shape.parts", 0.02),
+    ] {
+        let (found, size, question) = asked(&shape).expect("a question");
+        assert_eq!(found, member);
+        assert!((size - value).abs() < 1e-12, "{size} of {member}");
+        assert!(question.contains("was m meant?"), "{question}");
+    }
+    for shape in [ball(0.3), tetrahedron(5.0), map(1.0, 0.05), map(1.0, 0.0), union(3.0)] {
+        assert_eq!(asked(&shape), None, "{shape}");
+    }
+}
+
+#[test]
+fn shapes_that_are_slow_together_are_refused_with_the_figure() {
+    let plane = Plane::new();
+    let dots = r#"{"part":{"shape":"dots","count":[40,40],"plate_mm":[99,99]}}"#;
+    let parts = |count: usize| vec![dots; count].join(",");
+    let objects = |objects: usize, count: usize| {
+        let text = format!(r#"{{"shape":"union","parts":[{}]}}"#, parts(count));
+        let shape: AnnouncedShape =
+            papilla_proto::json::read_bounded(text.as_bytes()).expect("a shape");
+        let object = AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None };
+        plane.hand(&Hello { objects: Some(vec![object; objects]), ..self::objects() })
+    };
+    let problem = objects(16, 64).map(|_| ()).expect_err("some tenths of a second a frame");
+    assert_eq!(problem.code, ErrorCode::BadContact);
+    assert_eq!(problem.field.as_deref(), Some("objects[15].shape"));
+    assert!(problem.message.contains("512 at most"), "{}", problem.message);
+    assert!(objects(16, 3).is_ok());
+}
+
+#[test]
+fn a_hello_that_nobody_waits_for_is_not_worked_out() {
+    let plane = Plane::new();
+    let Plane { atlas, raster, model, pixels, interface } = &plane;
+    let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
+    let skin = Skin { atlas, raster, model, pixels, interface };
+    let shape = AnnouncedShape::Mesh(Mesh {
+        vertices_mm: vec![[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    });
+    let object = AnnouncedObject { shape, stiffness_mpa_per_mm: None, friction: None };
+    let hello = Hello { objects: Some(vec![object]), ..objects() };
+    assert!(Hand::of_until(&hello, skin, &|| true).is_ok());
+    let problem = Hand::of_until(&hello, skin, &|| false).map(|_| ()).expect_err("stopped");
+    assert!(problem.message.contains("nobody waits"), "{}", problem.message);
+}
