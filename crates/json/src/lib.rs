@@ -138,6 +138,13 @@ fn text_len(text: &[u8]) -> usize {
 
 /// What serde says, without the names of types.
 fn in_plain_words(text: &str) -> String {
+    // What is due is ours, and told whole; what was found may be of any length.
+    for unknown in ["unknown variant `", "unknown field `"] {
+        let parts = text.strip_prefix(unknown).and_then(|rest| rest.rsplit_once("`, expected "));
+        if let Some((name, due)) = parts {
+            return format!("{unknown}{}`, expected {due}", shortened(name));
+        }
+    }
     let wrong = ["invalid type: ", "invalid value: ", "invalid length "];
     let Some(prefix) = wrong.into_iter().find(|prefix| text.starts_with(prefix)) else {
         return shortened(text);

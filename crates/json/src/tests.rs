@@ -123,3 +123,25 @@ fn what_is_repeated_is_cut_between_characters() {
     let long = shortened(&"ï".repeat(500));
     assert_eq!((long.chars().count(), long.chars().last()), (ECHO_MAX + 1, Some('…')));
 }
+
+#[test]
+fn of_an_unknown_name_all_that_are_known_are_listed() {
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Many {
+        APlateWithRoundedEdges,
+        ACylinderThatLiesAlongY,
+        AWedgeWithARoundedTip,
+        ASurfaceOfListedHeights,
+        AClosedMeshOfTriangles,
+        SeveralOfThemAsOne,
+    }
+    let error = super::read::<Many>(format!("\"{}\"", "x".repeat(400)).as_bytes());
+    let error = error.unwrap_err().to_string();
+    for name in
+        ["a_plate_with_rounded_edges", "a_closed_mesh_of_triangles", "several_of_them_as_one"]
+    {
+        assert!(error.contains(name), "{error}");
+    }
+    assert!(error.len() < 450, "what was sent is cut: {error}");
+}
