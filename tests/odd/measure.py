@@ -1,9 +1,10 @@
-"""How far odd maps lie from the presses that the shipped networks learnt: three numbers of a pressure map.
+"""How far odd maps lie from the presses that the shipped networks learnt: four numbers of a pressure map.
 
     PYTHONPATH=model-export/trainer python tests/odd/measure.py     from the root of the repository; numpy; ten seconds
 
 Roughness: squared steps between neighbouring pixels over four times the squared pressures, 0 (flat) to 1 (every
-pixel against its neighbours). Load: sum of pressure times pixel, near the force in another unit. And their product.
+pixel against its neighbours). Load: sum of pressure times pixel, near the force in another unit. Their product. Area:
+square of the sum of the pressures over the sum of their squares, in pixels.
 """
 
 from collections.abc import Iterator
@@ -18,8 +19,8 @@ DATA = Path("data")
 # Fitted to; only looked at.
 TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded", "proximal-graded"), ("heldout-graded", "final", "heldout")
 # Room beyond the greatest of the training, as proto/src/input_statistics.rs has it.
-HEADROOM = np.array([1.05, 1.05, 2.0])
-WORDS = ("rougher", "heavier", "rougher for its load")
+HEADROOM = np.array([1.05, 1.05, 2.0, 1.5])
+WORDS = ("rougher", "heavier", "rougher for its load", "wider")
 ODD_PA = 10_000.0
 
 Map = NDArray[np.float32]
@@ -31,13 +32,13 @@ def presses(name: str) -> Iterator[Map]:
     yield from dataset.load(sorted(dataset.presses)).pressure_pa.reshape(-1, SIDE_PX, SIDE_PX)
 
 
-def numbers(pressure_pa: Map) -> tuple[float, float, float]:
-    """Roughness, load in MPa px, their product."""
+def numbers(pressure_pa: Map) -> tuple[float, float, float, float]:
+    """Roughness, load in MPa px, their product, area in px."""
     down, right = np.diff(pressure_pa, axis=0), np.diff(pressure_pa, axis=1)
     steps = np.square(down, dtype=np.float64).sum() + np.square(right, dtype=np.float64).sum()
-    rough = steps / (4.0 * np.square(pressure_pa, dtype=np.float64).sum())
-    load = float(pressure_pa.sum(dtype=np.float64)) * 1e-6
-    return rough, load, rough * load
+    total, squares = pressure_pa.sum(dtype=np.float64), np.square(pressure_pa, dtype=np.float64).sum()
+    rough, load = steps / (4.0 * squares), float(total) * 1e-6
+    return rough, load, rough * load, total**2 / squares
 
 
 def odd_maps() -> Iterator[tuple[str, Map]]:
@@ -50,6 +51,10 @@ def odd_maps() -> Iterator[tuple[str, Map]]:
         yield f"checkerboard, {square_px} px", skin * ((rows // square_px + columns // square_px) % 2).astype(np.float32)
     yield "noise", skin * np.random.default_rng(0).random(skin.shape, np.float32)
     yield "all skin alike", skin
+    for block_px in (15, 29, 58):
+        side = SIDE_PX // block_px + 1
+        blocks = np.random.default_rng(0).random((side, side), np.float32).repeat(block_px, 0).repeat(block_px, 1)
+        yield f"random blocks, {block_px} px", skin * blocks[:SIDE_PX, :SIDE_PX]
     from_centre_px = np.hypot(rows + 0.5 - SIDE_PX / 2, columns + 0.5 - SIDE_PX / 2)
     for radius_px in (3, 8, 20):
         yield f"disc, {radius_px} px", (ODD_PA * (from_centre_px <= radius_px)).astype(np.float32)
@@ -59,16 +64,16 @@ def main() -> None:
     """Prints a table."""
     found = {name: np.array([numbers(one) for one in presses(name)]) for name in TRAINED + OTHERS}
     most = HEADROOM * np.concatenate([found[name] for name in TRAINED]).max(axis=0)
-    print("| maps | | roughness, up to | load, up to (MPa px) | product, up to | flagged |")
-    print("|---|---|---|---|---|---|")
+    print("| maps | | roughness, up to | load, up to (MPa px) | product, up to | area, up to (px) | flagged |")
+    print("|---|---|---|---|---|---|---|")
     for name, rows in found.items():
-        rough, load, both = rows.max(axis=0)
+        rough, load, both, area = rows.max(axis=0)
         flagged = f"{100 * np.mean((rows > most).any(axis=1)):.1f} %"
-        print(f"| `{name}` | {len(rows)} | {rough:.3f} | {load:.1f} | {both:.2f} | {flagged} |")
+        print(f"| `{name}` | {len(rows)} | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {flagged} |")
     for name, drawn in odd_maps():
-        rough, load, both = numbers(drawn)
-        words = [word for word, is_beyond in zip(WORDS, (rough, load, both) > most, strict=True) if is_beyond]
-        print(f"| {name}, {ODD_PA / 1000:.0f} kPa | 1 | {rough:.3f} | {load:.1f} | {both:.2f} | {', '.join(words) or 'no'} |")
+        rough, load, both, area = numbers(drawn)
+        words = [word for word, is_beyond in zip(WORDS, (rough, load, both, area) > most, strict=True) if is_beyond]
+        print(f"| {name}, {ODD_PA / 1000:.0f} kPa | 1 | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {', '.join(words) or 'no'} |")
 
 
 if __name__ == "__main__":

@@ -67,10 +67,10 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     for Row { model, input_statistics_max } in &rows {
         match input_statistics_max {
             None => println!("{model}: left as it is"),
-            Some(InputStatistics { roughness, load_mpa_px, rough_load_mpa_px }) => {
+            Some(InputStatistics { roughness, load_mpa_px, rough_load_mpa_px, area_px }) => {
                 println!(
                     "{model}: roughness up to {roughness:.4}, load up to {load_mpa_px:.1} MPa px, \
-                     their product up to {rough_load_mpa_px:.2}"
+                     their product up to {rough_load_mpa_px:.2}, area up to {area_px:.0} px"
                 );
             }
         }
