@@ -342,11 +342,6 @@ class AsyncSession:
 
     async def _agree(self, ready: dict[str, Any]) -> None:
         self.ready = ready
-        for warning in ready.get("warnings", []):
-            text = f"{warning['member']}: {warning['question']}"
-            if text not in self._warned:
-                self._warned.add(text)
-                _LOG.warning("%s", text)
         self._tiers.update(enumerate(ready.get("tier_names", [])))
         self._tiers.setdefault(ready["tier_number"], ready["tier"])
         for words in questions(ready):
