@@ -600,7 +600,7 @@ fn a_hello_that_nobody_waits_for_is_not_worked_out() {
     let plane = Plane::new();
     let Plane { atlas, raster, model, pixels, interface } = &plane;
     let (model, pixels, interface) = (Some(model), Some(pixels), Some(interface));
-    let skin = Skin { atlas, raster, model, pixels, interface };
+    let skin = Skin { atlas, raster, model, pixels, interface, errors: None };
     let shape = AnnouncedShape::Mesh(Mesh {
         vertices_mm: vec![[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]],
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],

@@ -157,6 +157,7 @@ fn hand(
     app: &App,
     catalogue: &Catalogue,
     hello: &Hello,
+    cancel: &Cancel,
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
     let places = app.admit_fingers(hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX))?;
     let contact = app.contact.as_ref();
@@ -168,7 +169,7 @@ fn hand(
         interface: contact.and_then(|contact| contact.interface.as_ref()),
         errors: contact.and_then(|contact| contact.errors.as_ref()),
     };
-    Ok((Hand::of(hello, skin)?, places))
+    Ok((Hand::of_until(hello, skin, &|| !cancel.is_set())?, places))
 }
 
 /// The effects of the session that a hello names; all others are the tier's.
@@ -245,7 +246,7 @@ fn agree(
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
-    let hand = (hello.version > 2).then(|| hand(app, &catalogue, hello)).transpose()?;
+    let hand = (hello.version > 2).then(|| hand(app, &catalogue, hello, cancel)).transpose()?;
     let (hand, fingers) = hand.unzip();
     let contact_us = hand.as_ref().zip(app.contact.as_ref()).and_then(|(h, c)| c.us_of(h));
     let mut effects = Vec::new();
