@@ -142,7 +142,9 @@ fn in_plain_words(text: &str) -> String {
     for unknown in ["unknown variant `", "unknown field `"] {
         let parts = text.strip_prefix(unknown).and_then(|rest| rest.rsplit_once("`, expected "));
         if let Some((name, due)) = parts {
-            return format!("{unknown}{}`, expected {due}", shortened(name));
+            let cut = name.char_indices().nth(NAME_MAX);
+            let name = cut.map_or_else(|| name.to_owned(), |(end, _)| format!("{}…", &name[..end]));
+            return format!("{unknown}{name}`, expected {due}");
         }
     }
     let wrong = ["invalid type: ", "invalid value: ", "invalid length "];
@@ -208,6 +210,8 @@ fn due(wanted: &str) -> String {
     }
 }
 
+/// Longest unknown name that an error repeats, characters: the path before it has it too.
+const NAME_MAX: usize = 40;
 /// Longest piece of the input that an error repeats, characters.
 const ECHO_MAX: usize = 100;
 
