@@ -185,11 +185,8 @@ mod tests {
         for (seed, most_pa) in [(1, 5e3), (2, 10e3), (3, 15e3), (4, 1e3)] {
             let mut random = fastrand::Rng::with_seed(seed);
             let blocks: Vec<f32> = (0..64).map(|_| most_pa * random.f32()).collect();
-            let is_skin = |y: usize, x: usize| {
-                (y as f32 - 112.0).hypot(x as f32 - 112.0) < 109.0
-            };
-            let map =
-                drawn(|y, x| if is_skin(y, x) { blocks[y / 29 * 8 + x / 29] } else { 0.0 });
+            let is_skin = |y: usize, x: usize| (y as f32 - 112.0).hypot(x as f32 - 112.0) < 109.0;
+            let map = drawn(|y, x| if is_skin(y, x) { blocks[y / 29 * 8 + x / 29] } else { 0.0 });
             let found = InputStatistics::of(&map);
             assert!(found.is_out_of_distribution(trained), "{found:?} up to {most_pa} Pa");
             let older = InputStatistics { area_px: 0.0, ..found };
