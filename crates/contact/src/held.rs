@@ -6,7 +6,7 @@
 //! the way. Nothing lies on the far side, so that nothing pulls; it is drawn back to where the model
 //! is trusted.
 
-use crate::objects::{Object, local};
+use crate::object::{Object, local};
 use papilla_sdf::{Distance, Placement, SignedDistance};
 
 /// Distance from a surface that counts as on it, mm.

@@ -5,23 +5,8 @@ use crate::gaps::{Field, Gaps};
 use crate::held::Held;
 use crate::model::ContactModel;
 use crate::nearest::{Nearest, require_friction, require_stiffness};
-use papilla_sdf::{Body, Distance, Placement, SignedDistance, beneath, may_be_covered};
-use std::sync::Arc;
-
-/// A rigid or soft object in the finger's frame.
-#[derive(Clone)]
-pub struct Object {
-    /// Its shape.
-    pub shape: Arc<dyn SignedDistance>,
-    /// Where it is.
-    pub placement: Placement,
-    /// Stiffness of its surface, MPa/mm: pressure over how far it gives way there. Infinite for
-    /// a rigid one.
-    pub stiffness_mpa_per_mm: f64,
-    /// Coulomb's coefficient of friction; 0 of a slippery one. An object that has it keeps its
-    /// place in the list from frame to frame.
-    pub friction: f64,
-}
+use crate::object::{Object, local};
+use papilla_sdf::{Distance, Placement, beneath, may_be_covered};
 
 /// What lies round a finger in a frame.
 #[derive(Clone, Copy)]
@@ -36,24 +21,6 @@ pub enum Scene<'a> {
 const ROTATION_MISS_MAX: f64 = 1e-3;
 /// Farthest place of an object, mm.
 const PLACE_MAX_MM: f64 = 1e5;
-
-impl Object {
-    /// A rigid object.
-    #[must_use]
-    pub fn rigid(shape: Arc<dyn SignedDistance>, placement: Placement) -> Self {
-        Self { shape, placement, stiffness_mpa_per_mm: f64::INFINITY, friction: 0.0 }
-    }
-}
-
-impl Body for Object {
-    fn shape(&self) -> &dyn SignedDistance {
-        self.shape.as_ref()
-    }
-
-    fn placement(&self) -> &Placement {
-        &self.placement
-    }
-}
 
 impl<'a> From<&'a [Object]> for Scene<'a> {
     fn from(objects: &'a [Object]) -> Self {
@@ -313,10 +280,4 @@ impl<'a> View<'a> {
     pub(crate) fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.length * (at_mm[i] - self.shift_mm[i]))
     }
-}
-
-/// A place in the frame of a placed object.
-pub(crate) fn local(Placement { rotation: r, origin_mm }: &Placement, p: [f64; 3]) -> [f64; 3] {
-    let d: [f64; 3] = std::array::from_fn(|i| p[i] - origin_mm[i]);
-    [0, 1, 2].map(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
 }

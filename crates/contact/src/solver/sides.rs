@@ -10,7 +10,8 @@ use super::candidates::Seen;
 use crate::answer::Effort;
 use crate::held::{Front, Held, dot};
 use crate::model::ContactModel;
-use crate::objects::{Object, Things, View};
+use crate::object::Object;
+use crate::objects::{Things, View};
 
 /// Depth that is trusted if a model does not say, reference mm.
 const TRUSTED_MM: f64 = 2.0;

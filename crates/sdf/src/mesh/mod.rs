@@ -6,12 +6,13 @@
 //! take memory for each question; this takes none.
 
 mod check;
+mod error;
 mod closest;
 mod shells;
 mod tree;
 mod work;
 
-pub use check::MeshError;
+pub use error::MeshError;
 
 use super::beneath::SEAM_MM;
 use super::{Distance, SignedDistance};

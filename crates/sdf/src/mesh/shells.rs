@@ -3,7 +3,8 @@
 
 use super::tree::Tree;
 use super::work::Work;
-use super::{MeshError, dot, minus, normal, scaled_to_one};
+use super::error::MeshError;
+use super::{dot, minus, normal, scaled_to_one};
 use crate::beneath::SEAM_MM;
 
 /// Least cosine between normals of faces that lie upon each other.
