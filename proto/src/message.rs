@@ -298,7 +298,7 @@ impl Default for Hello {
 #[non_exhaustive]
 pub enum ServerMessage {
     /// The session is open; binary frames may follow.
-    Ready(Ready),
+    Ready(Box<Ready>),
     /// Something was refused.
     Error(SessionError),
     /// The client is to open another connection and to go on there.

@@ -182,7 +182,7 @@ proptest! {
         offset in any::<u32>(),
     ) {
         let section = Section { name: SectionName::Points, offset, bytes: 8 };
-        let message = ServerMessage::Ready(Ready {
+        let message = ServerMessage::Ready(Box::new(Ready {
             version: 2,
             session: numbers.0,
             tier: names[0].clone(),
@@ -228,7 +228,7 @@ proptest! {
                     question: names[0].clone(),
                 })
                 .collect(),
-        });
+        }));
         let text = serde_json::to_string(&message).unwrap();
         prop_assert_eq!(serde_json::from_str::<ServerMessage>(&text).unwrap(), message);
     }

@@ -120,7 +120,7 @@ pub async fn say(
             sender.send(sealed).await?;
         }
         match receiver.text_or_frame().await? {
-            Said::Text(ServerMessage::Ready(ready)) => Ok((ready, sender, receiver)),
+            Said::Text(ServerMessage::Ready(ready)) => Ok((*ready, sender, receiver)),
             Said::Text(ServerMessage::Error(error)) => Err(SocketError::Refused(Box::new(error))),
             Said::Text(_) | Said::Frame(..) => Err(SocketError::Text("ready is due".to_owned())),
         }

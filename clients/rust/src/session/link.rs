@@ -88,7 +88,7 @@ impl Link {
         while let Some(received) = self.stream.next().await {
             let Message::Text(text) = received.map_err(broke)? else { continue };
             return match message(&text)? {
-                ServerMessage::Ready(ready) => Ok((self, ready)),
+                ServerMessage::Ready(ready) => Ok((self, *ready)),
                 ServerMessage::Error(error) => Err(PapillaError::Refused(Problem {
                     code: error.code,
                     message: error.message,

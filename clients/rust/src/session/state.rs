@@ -247,7 +247,7 @@ impl State {
     pub(super) fn on_text(&mut self, message: ServerMessage) {
         match message {
             ServerMessage::Ready(ready) => {
-                let ready = Arc::new(ready);
+                let ready = Arc::new(*ready);
                 self.agree(Arc::clone(&ready));
                 if let Some(Asked { hello, reply, .. }) = self.asked.take() {
                     self.hello = hello;

@@ -6,8 +6,8 @@
 //! take memory for each question; this takes none.
 
 mod check;
-mod error;
 mod closest;
+mod error;
 mod shells;
 mod tree;
 mod work;

@@ -1,9 +1,9 @@
 //! Closed surfaces of one mesh that touch, or lie inside each other: skin inside would see faces
 //! that are covered.
 
+use super::error::MeshError;
 use super::tree::Tree;
 use super::work::Work;
-use super::error::MeshError;
 use super::{dot, minus, normal, scaled_to_one};
 use crate::beneath::SEAM_MM;
 

@@ -149,7 +149,7 @@ impl Session {
                 if !*connection.app.drain.borrow() {
                     self.set_stay(connection);
                 }
-                connection.reply.send_message(&ServerMessage::Ready(ready));
+                connection.reply.send_message(&ServerMessage::Ready(Box::new(ready)));
             }
             Err(problem) => connection.reply.send_error(problem, None),
         }

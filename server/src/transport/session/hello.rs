@@ -47,7 +47,7 @@ pub(super) async fn agree(connection: &mut Connection, number: u64) -> Result<Te
     };
     let ready = ready(&connection.app, number, &terms);
     tracing::debug!(session = number, ?hello, tier = %ready.tier, "session ready");
-    connection.reply.send_message(&ServerMessage::Ready(ready));
+    connection.reply.send_message(&ServerMessage::Ready(Box::new(ready)));
     Ok(terms)
 }
 
