@@ -41,6 +41,7 @@
 pub mod contact;
 pub mod effects;
 pub mod error;
+pub mod finite;
 pub mod frame;
 pub mod input_statistics;
 pub mod map;

@@ -107,7 +107,16 @@ impl MapSummary {
 }
 
 impl PressureRange {
-    fn limit_pa(self) -> f32 {
+    /// The range of what presses a finger of so many times the stiffness that the model knows: the
+    /// model sees pressure over it.
+    #[must_use]
+    pub fn times(self, stiffness: f32) -> Self {
+        Self { trained_max_pa: self.trained_max_pa * stiffness, ..self }
+    }
+
+    /// Greatest pressure that is taken, Pa.
+    #[must_use]
+    pub fn limit_pa(self) -> f32 {
         self.trained_max_pa
             * match self.beyond {
                 OutOfRange::Refuse => PRESSURE_HEADROOM,

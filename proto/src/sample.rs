@@ -20,7 +20,7 @@
 use half::f16;
 use serde::{Deserialize, Serialize};
 
-use crate::ErrorCode;
+use crate::{ErrorCode, finite::first_not_finite};
 
 /// The type of a sample on the wire. All are little-endian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
@@ -36,6 +36,17 @@ pub enum SampleType {
     U16 = 2,
     /// Unsigned 8-bit units of `scale`.
     U8 = 3,
+}
+
+/// Whether all values are finite, as an answer's have to be.
+///
+/// # Errors
+/// The first that is not.
+pub fn require_finite(values: &[f32]) -> Result<(), SampleError> {
+    match first_not_finite(values) {
+        Some(index) => Err(SampleError::NotFinite { index, value: values[index] }),
+        None => Ok(()),
+    }
 }
 
 /// What is wrong with an encoded map.
@@ -60,6 +71,14 @@ pub enum SampleError {
         /// The scale found.
         scale: f32,
     },
+    /// NaN or an infinity where an answer's samples are due: a fault of whoever made them.
+    #[error("the value at place {index} is {value}; a finite one is due")]
+    NotFinite {
+        /// Its place, from 0.
+        index: usize,
+        /// The value.
+        value: f32,
+    },
 }
 
 impl SampleError {
@@ -69,6 +88,7 @@ impl SampleError {
         match self {
             Self::WrongLength { .. } => ErrorCode::WrongLength,
             Self::BadScale { .. } => ErrorCode::BadScale,
+            Self::NotFinite { .. } => ErrorCode::NotFinite,
         }
     }
 }
@@ -129,6 +149,14 @@ impl SampleType {
             Self::F16 => f16::MAX.to_f32(),
             Self::U16 | Self::U8 => self.unit_max() * scale,
         }
+    }
+
+    /// Whether one of `values` is beyond what this type can hold, whatever its scale: it would be
+    /// clamped, so that the answer has to be flagged.
+    #[must_use]
+    pub fn clips(self, values: &[f32]) -> bool {
+        let most = self.value_max(1.0);
+        self == Self::F16 && values.iter().any(|value| value.abs() > most)
     }
 
     /// The greatest error of encoding `value`, see the module's table.

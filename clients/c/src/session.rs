@@ -268,9 +268,7 @@ impl Session {
             effects.iter_mut().for_each(|effects| effects.lose());
             (MapSummary { peak_pa: 0.0 }, flags::NOT_TRACKED | flags::NO_CONTACT)
         } else if finger.reads_windows() {
-            let summary = maps.check(*range, &model.pixels)?;
-            let part = finger.to_reference(&mut maps.pressure_pa);
-            (MapSummary { peak_pa: summary.peak_pa * part }, 0)
+            (maps.check_of(&finger, *range, &model.pixels)?, 0)
         } else {
             let frame =
                 Frame { payload: &self.payload, sample_type: SampleType::F32, scale: 1.0, time_us };
@@ -289,7 +287,7 @@ impl Session {
             found |= judged.flags;
             if !judged.is_zero {
                 maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
-                maps.feel_shear(&mut finger);
+                maps.feel_shear(&mut finger, *range);
             }
             if let Some(effects) = &mut effects {
                 let infer = |pressure_pa: &[f32], sed: &mut [f32]| network.infer(pressure_pa, sed);
@@ -300,6 +298,7 @@ impl Session {
         }
         self.bytes.clear();
         finger.write(&mut self.bytes);
+        papilla_render::require_finite(&self.bytes)?;
         let mut window = Window::WHOLE;
         if let Some(effects) = effects {
             let written =
@@ -308,6 +307,7 @@ impl Session {
                 Problem::new(ErrorCode::Internal, format!("the answer cannot be written: {error}"))
             })?;
             window = written.window;
+            found |= if written.is_clipped { flags::OUT_OF_RANGE } else { 0 };
         }
         let numbers = self.bytes.as_chunks::<4>().0;
         for (value, number) in self.values.iter_mut().zip(numbers) {

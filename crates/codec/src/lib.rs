@@ -26,7 +26,10 @@ mod npy;
 mod png;
 
 use bytes::{BufMut, BytesMut};
-use papilla_proto::{ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType, Window};
+use papilla_proto::{
+    ErrorCode, MAP_LEN, MAP_SIDE_PX, Problem, SampleError, SampleType, Window,
+    sample::require_finite,
+};
 
 pub use npy::is_npy;
 pub use png::{encode_mask, is_png};
@@ -173,9 +176,10 @@ pub fn scale_of(output: Output, value_max: f32) -> f32 {
 /// value ([`scale_of`]), so that light touch is as precise as heavy touch.
 ///
 /// # Errors
-/// Values that are not finite, or below zero.
+/// A value that is not finite.
 pub fn encode(output: Output, map: Map<'_>, bytes: &mut BytesMut) -> Result<f32, EncodeError> {
     let values = map.values;
+    require_finite(values)?;
     let scale = match output {
         Output::Samples(SampleType::F32 | SampleType::F16) | Output::Npy | Output::Json => 1.0,
         Output::Samples(_) | Output::Png => {

@@ -28,6 +28,22 @@ fn written(output: Output, values: &[f32]) -> (BytesMut, f32) {
     (bytes, scale)
 }
 
+#[test]
+fn a_map_that_holds_no_number_is_not_written() {
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut values = vec![1.0; MAP_LEN];
+        values[777] = bad;
+        let samples = SampleType::ALL.map(Output::Samples);
+        for output in samples.into_iter().chain([Output::Npy, Output::Png, Output::Json]) {
+            let map = Map { quantity: Quantity::Sed, values: &values, source: "test" };
+            let mut bytes = BytesMut::new();
+            let error = encode(output, map, &mut bytes).unwrap_err();
+            assert!(error.to_string().contains("place 777"), "{output:?}: {error}");
+            assert!(bytes.is_empty(), "{output:?}");
+        }
+    }
+}
+
 fn read(input: Input, bytes: &[u8]) -> Result<Vec<f32>, Problem> {
     let mut map = vec![f32::NAN; MAP_LEN];
     decode(input, bytes, &mut map).map(|()| map)

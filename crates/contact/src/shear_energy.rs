@@ -183,7 +183,8 @@ impl ShearEnergy {
 
     /// Adds to `sed_j_per_m3` (224 x 224), which a network made of `pressure_pa` (224 x 224), what
     /// traction along the skin at the vertices changes (Pa, in the finger's frame). All are of the
-    /// finger of reference stiffness times `1 / to_reference`, and SED of that finger itself.
+    /// finger of reference stiffness times `1 / to_reference`, and SED of that finger itself. Traction
+    /// greater than `limit_pa` is felt as one of that size.
     ///
     /// Without traction nothing is done.
     pub fn add(
@@ -191,6 +192,7 @@ impl ShearEnergy {
         pressure_pa: &[f32],
         shear_pa: &[[f32; 3]],
         to_reference: f32,
+        limit_pa: f32,
         sed_j_per_m3: &mut [f32],
     ) {
         if shear_pa.iter().flatten().all(|q| *q == 0.0) {
@@ -202,7 +204,7 @@ impl ShearEnergy {
         for way in 0..2 {
             for ((value, q), tangents) in self.vertices.iter_mut().zip(shear_pa).zip(&of.tangents) {
                 let t = tangents[way];
-                *value = q[0] * t[0] + q[1] * t[1] + q[2] * t[2];
+                *value = within(*q, limit_pa) * (q[0] * t[0] + q[1] * t[1] + q[2] * t[2]);
             }
             // Both lengths are those of the atlas.
             _ = of.skin.rasterise(&self.vertices, &mut self.map);
@@ -215,7 +217,9 @@ impl ShearEnergy {
         self.grid_of_change(&of);
         for &pixel in &of.interface {
             let sed = &mut sed_j_per_m3[pixel as usize];
-            *sed = (*sed + between(&self.grid, pixel as usize)).max(0.0);
+            let sum = *sed + between(&self.grid, pixel as usize);
+            // What is no number stays none, so that whoever sends it sees it.
+            *sed = if sum < 0.0 { 0.0 } else { sum };
         }
     }
 
@@ -263,6 +267,12 @@ impl ShearEnergy {
             *change = J_PER_M3_PER_MPA * change_mpa;
         }
     }
+}
+
+/// The part of a traction that is felt: what makes it no greater than `limit_pa`.
+fn within(q: [f32; 3], limit_pa: f32) -> f32 {
+    let size = q.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
+    if size > f64::from(limit_pa) { (f64::from(limit_pa) / size) as f32 } else { 1.0 }
 }
 
 /// A wave of one of the six numbers, of pressure.

@@ -32,7 +32,8 @@ mod skin;
 
 use papilla_engine::{EngineError, Session};
 use papilla_proto::{
-    InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem, flags, keep_inside,
+    ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem,
+    finite::first_not_finite_in, flags, keep_inside,
 };
 use papilla_session_contact::{Finger, Frame, Taken};
 
@@ -41,6 +42,21 @@ pub use skin::SkinPixels;
 /// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is
 /// zero there in all of them.
 const RIM_SHARE: f32 = 0.01;
+
+/// The last look at what a [finger wrote](Finger::write): every number that is sent is finite.
+///
+/// # Errors
+/// One is not: a fault of the solver, which no client has to read as an answer.
+pub fn require_finite(written: &[u8]) -> Result<(), Problem> {
+    match first_not_finite_in(written) {
+        None => Ok(()),
+        Some(_) => {
+            let message =
+                "a number of touch, pressure or shear is not finite; nothing is sent of it";
+            Err(Problem::new(ErrorCode::Internal, message).at("touch"))
+        }
+    }
+}
 
 /// The maps of one frame.
 #[derive(Debug)]
@@ -84,10 +100,26 @@ impl Maps {
         Ok(keep_inside(&mut self.pressure_pa, &skin.mask))
     }
 
+    /// The same of a finger whose pressure was sent as a map, which becomes that of reference
+    /// stiffness.
+    ///
+    /// # Errors
+    /// The first sample at fault.
+    pub fn check_of(
+        &mut self,
+        finger: &Finger,
+        range: PressureRange,
+        skin: &SkinPixels,
+    ) -> Result<MapSummary, Problem> {
+        let summary = self.check(range.times(finger.stiffness()), skin)?;
+        let part = finger.to_reference(&mut self.pressure_pa);
+        Ok(MapSummary { peak_pa: summary.peak_pa * part })
+    }
+
     /// Reads a frame that is no window into a finger; its pressure is drawn if SED is to be shown.
     ///
     /// # Errors
-    /// As [`Finger::take`], and pressure that is out of range.
+    /// As [`Finger::take`], and pressure or traction that is out of range.
     pub fn take(
         &mut self,
         finger: &mut Finger,
@@ -96,9 +128,12 @@ impl Maps {
         shows_sed: bool,
     ) -> Result<Taken, Problem> {
         let map_pa = shows_sed.then_some(&mut self.pressure_pa[..]);
-        let taken = finger.take(frame, map_pa)?;
+        let mut taken = finger.take(frame, map_pa)?;
         if finger.takes_pressure() {
-            range.check(&self.pressure_pa)?;
+            finger.require_within(range)?;
+        }
+        if range.is_left_by(MapSummary { peak_pa: finger.traction_peak_pa() }) {
+            taken.flags |= flags::OUT_OF_RANGE;
         }
         Ok(taken)
     }
@@ -141,8 +176,9 @@ impl Maps {
     }
 
     /// Adds to SED what traction along the skin changes, if the finger is to feel it.
-    pub fn feel_shear(&mut self, finger: &mut Finger) {
-        finger.feel_shear(&self.pressure_pa, &mut self.sed_j_per_m3);
+    pub fn feel_shear(&mut self, finger: &mut Finger, range: PressureRange) {
+        let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
+        finger.feel_shear(seen_pa, range, &mut self.sed_j_per_m3);
     }
 
     /// Turns pressure and SED of the finger of reference stiffness into this person's.

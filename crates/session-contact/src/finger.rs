@@ -7,9 +7,10 @@ use papilla_contact::{
     Contact, ContactModel, NetForce, Object, Person, PixelContact, Scene, ShearEnergy,
 };
 use papilla_proto::{
-    ErrorCode, Hello, MAP_LEN, Problem, RuntimeEffect, SampleType,
+    ErrorCode, Hello, MAP_LEN, PressureRange, Problem, RuntimeEffect, SampleType,
     atlas::Raster,
     contact::{Input, POSE_LEN, Pose, ROW, SampleLayout, TOUCH_LEN, Touch},
+    effects::OutOfRange,
     flags,
 };
 
@@ -131,11 +132,20 @@ impl Finger {
 
     /// Adds to SED (224 x 224, J/m3), which a network made of `pressure_pa` (224 x 224), what traction
     /// along the skin changes, if the hello names the effect `shear_energy`. Both are of the finger of
-    /// reference stiffness.
-    pub fn feel_shear(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) {
+    /// reference stiffness. Traction beyond a range that is to be clamped is felt as its greatest.
+    pub fn feel_shear(
+        &mut self,
+        pressure_pa: &[f32],
+        range: PressureRange,
+        sed_j_per_m3: &mut [f32],
+    ) {
         let part = 1.0 / self.stiffness();
+        let limit_pa = match range.beyond {
+            OutOfRange::Clamp => range.times(self.stiffness()).trained_max_pa,
+            OutOfRange::Refuse | OutOfRange::Flag => f32::INFINITY,
+        };
         if let Some(energy) = &mut self.shear_energy {
-            energy.add(pressure_pa, &self.out.shear_pa, part, sed_j_per_m3);
+            energy.add(pressure_pa, &self.out.shear_pa, part, limit_pa, sed_j_per_m3);
         }
     }
 
@@ -153,8 +163,49 @@ impl Finger {
 
     /// Stiffness of the tissue over that of the reference finger: the network is asked about
     /// pressure over it, and SED grows with it.
-    fn stiffness(&self) -> f32 {
+    #[must_use]
+    pub fn stiffness(&self) -> f32 {
         self.person.stiffness as f32
+    }
+
+    /// Whether pressure and traction at vertices that were [taken](Self::take) are ones that the model
+    /// of `range` takes.
+    ///
+    /// # Errors
+    /// The first that is not.
+    pub fn require_within(&self, range: PressureRange) -> Result<(), Problem> {
+        let range = range.times(self.stiffness());
+        let (limit_pa, known_pa) = (range.limit_pa(), range.trained_max_pa);
+        let refuse = |what: &str, vertex: usize, pa: f64, field: String| {
+            let message = format!(
+                "the {what} at vertex {vertex} is {pa:e} Pa; the model knows up to {known_pa} Pa on \
+                 this finger"
+            );
+            Err(Problem::new(ErrorCode::OutOfRange, message).at(field))
+        };
+        if self.touch.pressure_max_pa > limit_pa {
+            let pressures = &self.out.pressure_pa;
+            let vertex = pressures.iter().position(|p| *p > limit_pa).unwrap_or_default();
+            return refuse("pressure", vertex, pressures[vertex].into(), "pressure_pa".to_owned());
+        }
+        let tractions = self.out.shear_pa.iter().map(|q| size_of(*q));
+        match tractions.enumerate().find(|(_, size)| *size > f64::from(limit_pa)) {
+            Some((vertex, size)) => {
+                refuse("traction", vertex, size, format!("traction_pa[{vertex}]"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Greatest traction that SED is to feel, on a finger of reference stiffness, Pa; 0 if the hello
+    /// does not name the effect `shear_energy`.
+    #[must_use]
+    pub fn traction_peak_pa(&self) -> f32 {
+        if self.shear_energy.is_none() {
+            return 0.0;
+        }
+        let peak = self.out.shear_pa.iter().map(|q| size_of(*q)).fold(0.0, f64::max);
+        (peak / f64::from(self.stiffness())) as f32
     }
 
     /// Turns a map of the finger of reference stiffness (Pa or J/m3) into this person's.
@@ -384,6 +435,11 @@ impl Finger {
             _ => Ok(None),
         }
     }
+}
+
+/// Size of a vector; that of the greatest f32 is finite.
+fn size_of(vector: [f32; 3]) -> f64 {
+    vector.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt()
 }
 
 /// What feels traction, if the hello asks for it.

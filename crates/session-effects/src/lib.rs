@@ -63,7 +63,9 @@ use papilla_proto::{
     SampleType, Window,
     contact::SampleLayout,
     effects::{ActuatorInput, Drive, Layout, RATES_HEAD_LEN, Section, SectionName},
+    finite::first_not_finite_in,
     flags,
+    sample::require_finite,
     spikes::PlacedUnit,
 };
 
@@ -138,6 +140,24 @@ pub struct Written {
     pub window: Window,
     /// Unit of scaled samples of SED.
     pub scale: f32,
+    /// Whether a sample was beyond what its type can hold, and is smaller than what it stands for.
+    pub is_clipped: bool,
+}
+
+/// Why an answer cannot be written: a fault of the caller or of ours, never of a client.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum WriteError {
+    /// Values of the map that are not finite, or a scale that is none.
+    #[error(transparent)]
+    Samples(#[from] SampleError),
+    /// A number of a section is not finite.
+    #[error("number {index} of the section {section:?} is not finite")]
+    NotFinite {
+        /// The section.
+        section: SectionName,
+        /// Its place in the section, from 0.
+        index: usize,
+    },
 }
 
 /// A refusal of an effect's parameters.
@@ -380,8 +400,43 @@ impl Effects {
     /// `pressure_pa` is what [`before`](Self::before) left.
     ///
     /// # Errors
-    /// Values of the map that are not finite or below zero: a fault of the caller.
+    /// A number of the answer is not finite: a fault of the caller.
     pub fn write(
+        &mut self,
+        pressure_pa: &[f32],
+        sed_j_per_m3: &[f32],
+        time_us: u64,
+        bytes: &mut BytesMut,
+    ) -> Result<Written, WriteError> {
+        let before = bytes.len();
+        require_finite(sed_j_per_m3)?;
+        let written = self.append(pressure_pa, sed_j_per_m3, time_us, bytes)?;
+        self.check_sections(&bytes[before..])?;
+        Ok(written)
+    }
+
+    /// The last look at what was written.
+    fn check_sections(&self, written: &[u8]) -> Result<(), WriteError> {
+        for &Section { name, offset, bytes } in &self.sections {
+            let is_f32 = match name {
+                SectionName::Spikes => false,
+                SectionName::Map | SectionName::Vertices | SectionName::Rates => {
+                    self.sample_type == SampleType::F32
+                }
+                _ => true,
+            };
+            let first = offset as usize - HEADER_LEN_V2;
+            // A window is shorter than the whole map.
+            let end = (first + bytes as usize).min(written.len());
+            let found = written.get(first..end).filter(|_| is_f32).and_then(first_not_finite_in);
+            if let Some(index) = found {
+                return Err(WriteError::NotFinite { section: name, index });
+            }
+        }
+        Ok(())
+    }
+
+    fn append(
         &mut self,
         pressure_pa: &[f32],
         sed_j_per_m3: &[f32],
@@ -393,6 +448,7 @@ impl Effects {
             afferents.step(sed_j_per_m3, time_us);
         }
         let rate_hz = self.afferents.as_ref().map(Afferents::rate_hz);
+        rate_hz.map_or(Ok(()), require_finite)?;
         let felt = self.relaxation.as_ref().filter(|_| !is_lost);
         let sent_pa = felt.map_or(pressure_pa, Relaxation::sent_pa);
         if let Some(geometry) = &self.summary {
@@ -436,17 +492,21 @@ impl Effects {
         if let Some(vertices) = &mut self.vertices {
             pad(bytes);
             let scale = vertices.write(sed_j_per_m3, self.sample_type, bytes)?;
-            return Ok(Written { window: Window::EMPTY, scale });
+            return Ok(Written {
+                window: Window::EMPTY,
+                scale,
+                is_clipped: self.sample_type.clips(sed_j_per_m3),
+            });
         }
         if !self.map {
-            return Ok(Written { window: Window::EMPTY, scale: 1.0 });
+            return Ok(Written { window: Window::EMPTY, scale: 1.0, is_clipped: false });
         }
         pad(bytes);
         let window = self
             .margin_px
             .map_or(Window::WHOLE, |margin| Window::around(sent_pa, self.contact_pa, margin));
         let scale = window::encode(window, self.sample_type, sed_j_per_m3, bytes)?;
-        Ok(Written { window, scale })
+        Ok(Written { window, scale, is_clipped: self.sample_type.clips(sed_j_per_m3) })
     }
 }
 

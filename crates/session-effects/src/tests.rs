@@ -122,6 +122,36 @@ fn sections_lie_where_they_are_said_to_be() {
     assert_eq!(floats(&bytes[144..]), window);
 }
 
+/// Sums of finite numbers may not be finite; nothing of such an answer is sent.
+#[test]
+fn no_answer_holds_a_number_that_is_none() {
+    let pressure = vec![1.0; MAP_LEN];
+    for (names, sed, section) in [
+        (&[][..], f32::NAN, None),
+        (&["summary"], f32::NAN, None),
+        (&["summary"], f32::INFINITY, None),
+        (&["summary"], 5e36, Some(SectionName::Summary)),
+        (&["afferents"], f32::NAN, None),
+    ] {
+        for sample_type in SampleType::ALL {
+            let answer_sample_type = Some(sample_type);
+            let wish = Hello { map: Some(true), answer_sample_type, ..hello(names) };
+            let wish = Hello { answer_layout: Some(SampleLayout::Vertices), version: 3, ..wish };
+            let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
+            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            let error = effects.write(&pressure, &vec![sed; MAP_LEN], 0, &mut bytes).unwrap_err();
+            match (error, section) {
+                (WriteError::Samples(SampleError::NotFinite { index: 0, .. }), None) => {}
+                (WriteError::NotFinite { section: found, .. }, Some(due)) => assert_eq!(found, due),
+                (error, _) => panic!("{names:?} {sed} {sample_type:?}: {error}"),
+            }
+            // The next frame is none the worse.
+            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            effects.write(&pressure, &vec![5.0; MAP_LEN], 11_111, &mut bytes).unwrap();
+        }
+    }
+}
+
 #[test]
 fn no_map_is_no_map() {
     let wish = Hello { map: Some(false), ..hello(&["summary"]) };

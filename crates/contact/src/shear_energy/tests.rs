@@ -66,7 +66,7 @@ fn traction_everywhere_is_simple_shear() {
     let mu_pa = 0.08e6 / (2.0 * 1.48);
     for q in [[900.0, 0.0, 0.0], [0.0, -900.0, 0.0]] {
         let mut sed = vec![1.0; MAP_LEN];
-        energy.add(&vec![0.0; MAP_LEN], &disc(99.0, q), 1.0, &mut sed);
+        energy.add(&vec![0.0; MAP_LEN], &disc(99.0, q), 1.0, f32::INFINITY, &mut sed);
         let (found, due) = (sed[MIDDLE] - 1.0, 900.0 * 900.0 / (2.0 * mu_pa));
         assert!((found / due - 1.0).abs() < 0.03, "{q:?}: {found} for {due}");
     }
@@ -78,8 +78,8 @@ fn what_does_not_shear_adds_nothing() {
     let mut energy = plane(&layers()).unwrap();
     let pressure = vec![5e3; MAP_LEN];
     let mut sed = vec![3.0; MAP_LEN];
-    energy.add(&pressure, &disc(3.0, [0.0; 3]), 1.0, &mut sed);
-    energy.add(&pressure, &disc(3.0, [0.0, 0.0, 700.0]), 1.0, &mut sed);
+    energy.add(&pressure, &disc(3.0, [0.0; 3]), 1.0, f32::INFINITY, &mut sed);
+    energy.add(&pressure, &disc(3.0, [0.0, 0.0, 700.0]), 1.0, f32::INFINITY, &mut sed);
     assert!(sed.iter().all(|v| v.to_bits() == 3f32.to_bits()));
 }
 
@@ -95,7 +95,7 @@ fn the_way_of_traction_turns_the_map() {
     // Columns run along -y, rows along x.
     let [along, down] = [[0.0, -600.0, 0.0], [600.0, 0.0, 0.0]].map(|q| {
         let mut sed = vec![200.0; MAP_LEN];
-        energy.add(&pressure, &disc(4.0, q), 1.0, &mut sed);
+        energy.add(&pressure, &disc(4.0, q), 1.0, f32::INFINITY, &mut sed);
         sed
     });
     let change = |sed: &[f32], i: usize| sed[i] - 200.0;
@@ -118,10 +118,32 @@ fn a_stiffer_finger_is_told_by_its_factor() {
     let pressure = vec![2e3; MAP_LEN];
     let [one, two] = [(500.0, 1.0), (1000.0, 0.5)].map(|(q, to_reference)| {
         let mut sed = vec![10.0; MAP_LEN];
-        energy.add(&pressure, &disc(3.0, [q, 0.0, 0.0]), to_reference, &mut sed);
+        energy.add(&pressure, &disc(3.0, [q, 0.0, 0.0]), to_reference, f32::INFINITY, &mut sed);
         sed
     });
     assert_eq!(one, two);
+}
+
+#[test]
+fn traction_beyond_a_limit_is_felt_as_the_limit_and_what_is_no_number_is_not_hidden() {
+    let mut energy = plane(&layers()).unwrap();
+    let pressure = vec![2e3; MAP_LEN];
+    let mut felt = |q: [f32; 3], limit_pa: f32| {
+        let mut sed = vec![10.0; MAP_LEN];
+        energy.add(&pressure, &disc(3.0, q), 1.0, limit_pa, &mut sed);
+        sed
+    };
+    let due = felt([600.0, 800.0, 0.0], f32::INFINITY);
+    for limit_pa in [1000.0, 1001.0] {
+        assert_eq!(felt([600.0, 800.0, 0.0], limit_pa), due);
+    }
+    for q in [[6e3, 8e3, 0.0], [1.8e38, 2.4e38, 0.0]] {
+        let found = felt(q, 1000.0);
+        let miss = found.iter().zip(&due).map(|(a, b)| (a - b).abs() / b.max(1.0));
+        assert!(miss.fold(0.0, f32::max) < 1e-3, "{q:?}");
+    }
+    // Beyond what f32 can square.
+    assert!(felt([3e38, 3e38, 0.0], f32::INFINITY).iter().any(|sed| !sed.is_finite()));
 }
 
 #[test]

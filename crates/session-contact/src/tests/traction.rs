@@ -1,5 +1,7 @@
 //! Friction of gaps, and traction that SED feels.
 
+use papilla_proto::{PressureRange, effects::OutOfRange};
+
 use super::*;
 
 /// A ball that is dragged, as an object and as gaps with a velocity.
@@ -72,7 +74,8 @@ fn traction_is_felt_where_the_hello_names_it() {
         let mut finger = hand.fingers()[0].lock().expect("no panic");
         finger.take(frame(payload, 0), Some(pressure_pa)).expect("an answer");
         let mut sed = vec![100.0; MAP_LEN];
-        finger.feel_shear(pressure_pa, &mut sed);
+        let range = PressureRange { trained_max_pa: 1e5, beyond: OutOfRange::Refuse };
+        finger.feel_shear(pressure_pa, range, &mut sed);
         let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
         finger.write(&mut bytes);
         (sed, bytes)

@@ -7,11 +7,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_codec::{Input, Map, Quantity, decode, encode};
+use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
 use papilla_engine::Session;
 use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
-use papilla_render::{Judged, Maps};
+use papilla_render::{Judged, Maps, require_finite};
 use papilla_session_contact::{Finger, Frame};
 use papilla_session_effects::Effects;
 
@@ -209,7 +209,7 @@ impl Worker {
         let start = Instant::now();
         let touches = judged.is_some_and(|judged| !judged.is_zero);
         if let Some(finger) = finger.as_mut().filter(|_| touches) {
-            self.maps.feel_shear(finger);
+            self.maps.feel_shear(finger, range);
         }
         if let Some(effects) = effects.as_mut().filter(|_| shows_sed) {
             let session = &mut self.sessions[job.tier];
@@ -231,24 +231,30 @@ impl Worker {
             buffer.resize(headroom, 0);
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
+                require_finite(&buffer[headroom..])?;
             }
             let Maps { pressure_pa, sed_j_per_m3: sed, .. } = &self.maps;
             let written = effects
                 .write(pressure_pa, sed, time_us, buffer)
-                .map_err(|error| problem::internal("the window cannot be encoded", &error))?;
+                .map_err(|error| problem::internal("the answer cannot be written", &error))?;
             meta.window = written.window;
+            meta.flags |= if written.is_clipped { flags::OUT_OF_RANGE } else { 0 };
             (buffer.split(), written.scale)
         } else {
             let buffer = recycler.claim(headroom + job.output.size_hint() + extra);
             buffer.resize(headroom, 0);
             if let Some(finger) = &mut finger {
                 finger.write(buffer);
+                require_finite(&buffer[headroom..])?;
             }
             let map = Map {
                 quantity: Quantity::Sed,
                 values: &self.maps.sed_j_per_m3,
                 source: &tier.name,
             };
+            if matches!(job.output, Output::Samples(of) if of.clips(map.values)) {
+                meta.flags |= flags::OUT_OF_RANGE;
+            }
             let scale = encode(job.output, map, buffer)
                 .map_err(|error| problem::internal("the map cannot be encoded", &error))?;
             (buffer.split(), scale)
@@ -287,9 +293,9 @@ impl Worker {
         meta: &mut OutputMeta,
     ) -> Result<(MapSummary, PressureRange), Problem> {
         if finger.reads_windows() {
-            let (summary, range) = self.decode(job, payload)?;
-            let part = finger.to_reference(&mut self.maps.pressure_pa);
-            return Ok((MapSummary { peak_pa: summary.peak_pa * part }, range));
+            decode(job.input, payload, &mut self.maps.pressure_pa)?;
+            let (range, skin) = (self.range(job), &self.catalogue.skin_pixels);
+            return Ok((self.maps.check_of(finger, range, skin)?, range));
         }
         let Input::Window { sample_type, scale, .. } = job.input else {
             return Err(Problem::new(ErrorCode::Internal, "a frame that is no window"));
