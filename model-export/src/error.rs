@@ -180,7 +180,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, ExportError> {
 /// # Errors
 /// [`ExportError::Io`] naming the file.
 pub fn read_text(path: &Path) -> Result<String, ExportError> {
-    std::fs::read_to_string(path).map_err(|source| ExportError::Io {
+    papilla_proto::json::read_text(path).map_err(|source| ExportError::Io {
         action: "read",
         path: path.to_owned(),
         source,

@@ -121,7 +121,7 @@ fn read(file: PathBuf) -> Result<(PathBuf, Vec<u8>), LoadError> {
 }
 
 fn read_text(file: PathBuf) -> Result<(PathBuf, String), LoadError> {
-    match fs::read_to_string(&file) {
+    match papilla_proto::json::read_text(&file) {
         Ok(text) => Ok((file, text)),
         Err(source) => Err(LoadError::File { file, source }),
     }

@@ -114,7 +114,7 @@ fn check_identity(path: &Path, manifest: &Manifest) -> Result<(), DatasetError> 
 }
 
 fn read_atlas(path: &Path, manifest: &Manifest) -> Result<Atlas, DatasetError> {
-    let text = std::fs::read_to_string(path).map_err(OutputError::io("read", path))?;
+    let text = papilla_json::read_text(path).map_err(OutputError::io("read", path))?;
     let atlas_error = |source| DatasetError::Atlas { path: path.to_path_buf(), source };
     let atlas = Atlas::from_json(&text).map_err(atlas_error)?;
     atlas.require_hash(&manifest.atlas_hash).map_err(atlas_error)?;

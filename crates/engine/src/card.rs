@@ -10,6 +10,7 @@ use serde_json::Value;
 
 /// The card of one model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Card {
     /// Version of this layout.
     pub format: u32,
@@ -49,6 +50,7 @@ pub struct Card {
 
 /// Accuracy over the samples of a split. All but SSIM are errors, relative, without unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Metrics {
     /// SHA-256 of the dataset measured on, one of those it was trained on; absent from cards
     /// written before it was recorded.
@@ -81,6 +83,7 @@ pub struct Metrics {
 
 /// Median and 95th percentile of an error over samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Spread {
     /// Median.
     pub median: f64,
@@ -90,6 +93,7 @@ pub struct Spread {
 
 /// Median and 5th percentile of a similarity over samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Similarity {
     /// Median.
     pub median: f64,
@@ -99,6 +103,7 @@ pub struct Similarity {
 
 /// Time of one inference, ms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Latency {
     /// What ran it, with version.
     pub backend: String,
@@ -176,6 +181,10 @@ impl Card {
                 return Err(EngineError::CardMismatch { field, card, model });
             }
         }
+        if self.network != info.network {
+            let [card, model] = [&self.network, &info.network].map(ToString::to_string);
+            return Err(EngineError::CardMismatch { field: "network", card, model });
+        }
         if self.effects != info.effects {
             let [card, model] = [&self.effects, &info.effects].map(|effects| effects.join(", "));
             return Err(EngineError::CardMismatch { field: "effects", card, model });
@@ -186,6 +195,7 @@ impl Card {
 
 /// `models/index.json`: which models there are.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Index {
     /// The model to take unasked; one of `models`.
     pub default: String,

@@ -233,13 +233,14 @@ fn a_network_that_answers_nonsense() {
 fn the_card_of_another_model() {
     let info = load(TINY, None).unwrap().info().clone();
     let good = card_of(&info);
-    let changes: [(&str, fn(&mut Card)); 6] = [
+    let changes: [(&str, fn(&mut Card)); 7] = [
         ("name", |c| c.name.push('x')),
         ("onnx_sha256", |c| c.onnx_sha256 = "0".repeat(64)),
         ("atlas_hash", |c| c.atlas_hash = "0".repeat(64)),
         ("dataset_sha256", |c| c.dataset_sha256 = "0".repeat(64)),
         ("pressure_range_pa", |c| c.pressure_range_pa[1] *= 2.0),
         ("effects", |c| c.effects.clear()),
+        ("network", |c| c.network["kind"] = json!("x")),
     ];
     for (name, change) in changes {
         let mut card = good.clone();
@@ -263,8 +264,18 @@ fn cards_and_indices_are_checked_when_read() {
         Err(EngineError::UnsupportedFormat { found: 9, .. })
     ));
     assert!(matches!(Card::from_json(&text[..80]), Err(EngineError::BadCard { .. })));
+    let marked = format!("\u{feff}{text}");
+    assert_eq!(Card::from_json(&marked).unwrap(), card);
+    for (known, slip) in [("\"effects\"", "patern_max"), ("\"p50\"", "p51"), ("\"ssim\"", "ssmi")] {
+        let more = text.replacen(known, &format!("\"{slip}\": 1, {known}"), 1);
+        let error = Card::from_json(&more).unwrap_err().to_string();
+        assert!(error.contains(slip), "{slip}: {error}");
+    }
     let index = Index::from_json(r#"{"default":"a","models":["a","b"]}"#).unwrap();
     assert_eq!(index.models, ["a", "b"]);
+    let misspelt = r#"{"default":"a","models":["a"],"defualt":"b"}"#;
+    let error = Index::from_json(misspelt).unwrap_err().to_string();
+    assert!(error.contains("defualt"), "{error}");
     for bad in [r#"{"default":"c","models":["a","b"]}"#, "{}", r#"{"default":1,"models":[]}"#] {
         let error = Index::from_json(bad).unwrap_err();
         assert!(matches!(error, EngineError::BadIndex { .. }), "{error}");

@@ -34,6 +34,20 @@ fn text(name: &str) -> String {
     std::fs::read_to_string(path(name)).unwrap()
 }
 
+/// As editors on Windows write it.
+#[test]
+fn a_byte_order_mark_is_passed_over_and_utf_16_is_named() {
+    let plain = text("ball_tet4.msh");
+    let file = std::env::temp_dir().join(format!("papilla-{}.msh", std::process::id()));
+    std::fs::write(&file, format!("\u{feff}{plain}")).unwrap();
+    assert_eq!(read_file(&file).unwrap().nodes.len(), mesh("ball_tet4.msh").nodes.len());
+    let wide: Vec<u8> = plain.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(&file, wide).unwrap();
+    let error = read_file(&file).unwrap_err().to_string();
+    std::fs::remove_file(&file).unwrap();
+    assert!(error.contains("UTF-16"), "{error}");
+}
+
 fn volume(mesh: &Mesh) -> f64 {
     let mut total = 0.0;
     for b in &mesh.blocks {

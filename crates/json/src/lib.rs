@@ -13,10 +13,14 @@
 //! # Ok::<_, papilla_json::JsonError>(())
 //! ```
 
+mod text;
+
 use std::fmt;
 
 use serde::de::DeserializeOwned;
 use serde_path_to_error::Track;
+
+pub use text::{TextError, plain, read_text, text};
 
 /// Longest name or text that [`read_bounded`] takes, bytes as they stand in the JSON.
 pub const TEXT_BYTES_MAX: usize = 1024;
@@ -46,6 +50,12 @@ impl fmt::Display for JsonError {
     }
 }
 
+impl From<TextError> for JsonError {
+    fn from(error: TextError) -> Self {
+        Self { member: None, reason: error.to_string(), place: None }
+    }
+}
+
 impl From<serde_json::Error> for JsonError {
     fn from(error: serde_json::Error) -> Self {
         let (line, column) = (error.line(), error.column());
@@ -56,7 +66,7 @@ impl From<serde_json::Error> for JsonError {
     }
 }
 
-/// Reads all of `json`.
+/// Reads all of `json`, a byte order mark before it aside.
 ///
 /// # Errors
 /// It is not JSON, or not of the shape of `T`.
@@ -70,6 +80,7 @@ pub fn read<T: DeserializeOwned>(json: &[u8]) -> Result<T, JsonError> {
 /// # Errors
 /// As [`read`], and a text that is too long.
 pub fn read_bounded<T: DeserializeOwned>(json: &[u8]) -> Result<T, JsonError> {
+    let json = plain(json)?;
     check_texts(json)?;
     read(json)
 }
@@ -86,7 +97,7 @@ pub fn read_with<'de, T>(
     json: &'de [u8],
     work: impl for<'a, 'b> FnOnce(Watched<'a, 'b, 'de>) -> Result<T, serde_json::Error>,
 ) -> Result<T, JsonError> {
-    let mut deserializer = serde_json::Deserializer::from_slice(json);
+    let mut deserializer = serde_json::Deserializer::from_slice(plain(json)?);
     let mut track = Track::new();
     let result = work(serde_path_to_error::Deserializer::new(&mut deserializer, &mut track));
     let value = result.map_err(|error| {

@@ -82,6 +82,22 @@ fn a_wrong_type_names_member_and_place_and_no_type_of_ours() {
 }
 
 #[test]
+fn a_byte_order_mark_is_passed_over_and_utf_16_is_named() {
+    let json = "{\"count\": 1}";
+    let marked = format!("\u{feff}{json}");
+    assert_eq!(read::<Outer>(marked.as_bytes()).unwrap().count, 1);
+    assert_eq!(read_bounded::<Outer>(marked.as_bytes()).unwrap().count, 1);
+    // Places are those that an editor shows.
+    let wrong = read::<Outer>("\u{feff}{\"count\": -1}".as_bytes()).unwrap_err();
+    assert_eq!(wrong.place, Some((1, 12)));
+    let wide: Vec<u8> = marked.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for json in [&wide[..], &wide[2..]] {
+        let error = read_bounded::<Outer>(json).unwrap_err().to_string();
+        assert!(error.contains("UTF-16") && error.contains("UTF-8"), "{error}");
+    }
+}
+
+#[test]
 fn long_texts_are_not_repeated() {
     let long = format!(r#"{{"count": "{}"}}"#, "x".repeat(5000));
     assert!(refused(&long).len() < 300, "{}", refused(&long));

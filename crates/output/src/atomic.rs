@@ -99,7 +99,8 @@ pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), OutputErro
 /// it is not the JSON that is expected.
 pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, OutputError> {
     let bytes = std::fs::read(path).map_err(OutputError::io("read", path))?;
-    serde_json::from_slice(&bytes).map_err(|e| OutputError::malformed(path, &e))
+    let json = papilla_json::plain(&bytes).map_err(|e| OutputError::malformed(path, &e))?;
+    serde_json::from_slice(json).map_err(|e| OutputError::malformed(path, &e))
 }
 
 /// Creates a folder and its parents, and finds out that files can be made there: whoever works for

@@ -163,7 +163,7 @@ impl Measured {
     /// # Errors
     /// [`PeopleError::Read`] names the file and line, [`PeopleError::Field`] the field.
     pub fn read(path: &Path) -> Result<Self, PeopleError> {
-        let text = std::fs::read_to_string(path)
+        let text = papilla_json::read_text(path)
             .map_err(|e| PeopleError::Read { path: path.into(), why: e.to_string() })?;
         Self::parse(path, &text)
     }

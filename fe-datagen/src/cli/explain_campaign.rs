@@ -50,7 +50,7 @@ struct Refused {
 
 /// Whether a file is a campaign's rather than a scene's.
 pub(super) fn is_campaign(file: &Path) -> bool {
-    let table = std::fs::read_to_string(file).ok().and_then(|t| t.parse::<toml::Table>().ok());
+    let table = papilla_json::read_text(file).ok().and_then(|t| t.parse::<toml::Table>().ok());
     table.is_some_and(|table| table.contains_key("presses"))
 }
 

@@ -5,13 +5,13 @@
 
 use std::{
     ffi::OsString,
-    fs,
     path::{Path, PathBuf},
 };
 
 use clap::{
     Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches, parser::ValueSource,
 };
+use papilla_proto::json;
 use toml::Value;
 
 use super::{Cli, ConfigError};
@@ -88,7 +88,7 @@ pub(super) fn read(args: Vec<OsString>) -> Result<Layers, ConfigError> {
 
 /// The file's fields as flags, each checked by itself so that an error names it.
 fn file_flags(file: &Path) -> Result<Vec<(String, Vec<String>)>, ConfigError> {
-    let text = fs::read_to_string(file)
+    let text = json::read_text(file)
         .map_err(|source| ConfigError::Read { file: file.to_owned(), source })?;
     let table: toml::Table =
         text.parse().map_err(|source| ConfigError::Syntax { file: file.to_owned(), source })?;

@@ -1,8 +1,9 @@
 //! When sessions are asked to move to another connection, and the keys that seal what they take
 //! along.
 
-use std::{fs, path::Path, time::Duration};
+use std::{path::Path, time::Duration};
 
+use papilla_proto::json;
 use papilla_session_state::Keys;
 
 use crate::{SettingError, config::Config};
@@ -52,6 +53,6 @@ impl Moves {
 
 fn read(file: &Path) -> Result<Keys, String> {
     let named = |error: &dyn std::fmt::Display| format!("{}: {error}", file.display());
-    let text = fs::read_to_string(file).map_err(|error| named(&error))?;
+    let text = json::read_text(file).map_err(|error| named(&error))?;
     Keys::read(&text).map_err(|error| named(&error))
 }

@@ -150,7 +150,7 @@ impl CampaignSpec {
     /// [`SpecError`] naming the file and line, or the field and what it
     /// may be.
     pub fn read(path: &Path) -> Result<Self, SpecError> {
-        let text = std::fs::read_to_string(path)
+        let text = papilla_json::read_text(path)
             .map_err(|source| SpecError::Read { path: path.into(), source })?;
         if has_key(&text, "geometry") {
             let message = "is a scene, not a campaign: `fe-datagen explain` and `solve` take it";

@@ -208,4 +208,13 @@ fn senseless_campaigns_are_refused_by_field() {
     std::fs::write(&path, "name = \"x\"\nspeed = 3\n").unwrap();
     let text = CampaignSpec::read(&path).unwrap_err().to_string();
     assert!(text.contains("odd.toml") && text.contains("speed"), "{text}");
+    // As editors on Windows write it.
+    let smoke = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../campaigns/smoke.toml");
+    let smoke = std::fs::read_to_string(smoke).unwrap();
+    std::fs::write(&path, format!("\u{feff}{smoke}")).unwrap();
+    CampaignSpec::read(&path).unwrap();
+    let wide: Vec<u8> = smoke.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    std::fs::write(&path, wide).unwrap();
+    let text = CampaignSpec::read(&path).unwrap_err().to_string();
+    assert!(text.contains("odd.toml") && text.contains("UTF-16"), "{text}");
 }

@@ -124,7 +124,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError`] names the file and line, or the field and its rule.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path)
+        let text = papilla_json::read_text(path)
             .map_err(|source| SceneError::Read { path: path.into(), source })?;
         Self::parse(path, text)
     }

@@ -7,7 +7,7 @@ use papilla_engine::{
     ladder::{Kind, SET_NAMES},
     load_with,
 };
-use papilla_proto::atlas::Atlas;
+use papilla_proto::{atlas::Atlas, json};
 use serde_json::Value;
 
 use super::{NamedOnly, Tier, assets::Assets, golden};
@@ -86,7 +86,7 @@ fn milliseconds(ms: f64) -> Duration {
 }
 
 pub(super) fn text(bytes: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(bytes).map_err(|error| error.to_string())
+    json::text(bytes).map_err(|error| error.to_string())
 }
 
 /// A card, and the same as it was shipped.
@@ -146,7 +146,7 @@ impl<'a> Loading<'a> {
         }
         let in_tract = |tier: &Tier| {
             let read = |ending| assets.get(&format!("{}.{ending}", tier.name)).unwrap_or_default();
-            let card = std::str::from_utf8(read("json")).unwrap_or_default();
+            let card = json::text(read("json")).unwrap_or_default();
             load_with(Backend::Tract, read("onnx"), Some(&Card::from_json(card)?))
         };
         golden::fall_back(states, tiers, in_tract)

@@ -148,10 +148,10 @@ impl Catalogue {
                 return Err(bad("index.json", &format!("the model '{name}' is listed twice")));
             }
         }
-        let atlas_json = Bytes::copy_from_slice(read("atlas.json")?);
-        let atlas = text(&atlas_json)
-            .and_then(|json| Atlas::from_json(json).map_err(|e| e.to_string()))
-            .map_err(|e| bad("atlas.json", &e))?;
+        // As clients get it: without a byte order mark.
+        let atlas_json = text(read("atlas.json")?).map_err(|e| bad("atlas.json", &e))?;
+        let atlas = Atlas::from_json(atlas_json).map_err(|e| bad("atlas.json", &e))?;
+        let atlas_json = Bytes::copy_from_slice(atlas_json.as_bytes());
         note(Step::Listed(&index.models));
         let mut tiers = Vec::with_capacity(index.models.len());
         let load = |onnx: &[u8], card: &Card| loading.model(onnx, card, index.models.len());

@@ -2,6 +2,7 @@
 
 use std::{fs, num::NonZeroUsize, path::Path, sync::Arc};
 
+use papilla_proto::json;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use subtle::{Choice, ConditionallySelectable, ConstantTimeEq};
@@ -56,7 +57,7 @@ impl Tokens {
     /// # Errors
     /// Which entry is wrong, and how.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
-        let text = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let text = json::read_text(path).map_err(|e| format!("{}: {e}", path.display()))?;
         warn_if_readable(path);
         Self::parse(&text).map_err(|reason| format!("{}: {reason}", path.display()))
     }
@@ -124,6 +125,8 @@ fn holder(entry: Entry) -> Result<Holder, String> {
     }
     let digest = match (&entry.token, &entry.sha256) {
         (Some(token), None) => {
+            // As files end: `token = """` and a pasted line.
+            let token = token.trim();
             // RFC 6750 2.1.
             let is_token = |b: u8| b.is_ascii_alphanumeric() || b"-._~+/=".contains(&b);
             if token.len() < TOKEN_MIN || !token.bytes().all(is_token) {

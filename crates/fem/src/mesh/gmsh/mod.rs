@@ -19,7 +19,7 @@ mod parse;
 pub use error::GmshError;
 
 use super::Mesh;
-use std::path::Path;
+use std::{io, path::Path};
 
 /// Reads a mesh from the text of a `.msh` file; `regions` are the names of the groups of volumes
 /// by [`Region::index`](super::Region::index).
@@ -39,8 +39,10 @@ pub fn read(text: &str, regions: &[&str]) -> Result<Mesh, GmshError> {
 /// # Errors
 /// As [`read`], and if the file cannot be read.
 pub fn read_file(path: &Path, regions: &[&str]) -> Result<Mesh, GmshError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| GmshError::Io { path: path.into(), source })?;
+    let failed = |source| GmshError::Io { path: path.into(), source };
+    let bytes = std::fs::read(path).map_err(failed)?;
+    let bytes = papilla_json::plain(&bytes)
+        .map_err(|error| failed(io::Error::new(io::ErrorKind::InvalidData, error)))?;
     // A binary file is not UTF-8, but its first lines are, and they say so.
-    read(&String::from_utf8_lossy(&bytes), regions)
+    read(&String::from_utf8_lossy(bytes), regions)
 }

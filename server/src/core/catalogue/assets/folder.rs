@@ -11,6 +11,7 @@ use std::{
 };
 
 use papilla_engine::card::Index;
+use papilla_proto::json;
 
 use super::{
     CONTACT, CONTACT_ERRORS, Files,
@@ -42,6 +43,9 @@ pub(super) fn read(
     let at = Arc::new(Mutex::new(None));
     let (place, progress) = (folder.to_owned(), Arc::clone(&at));
     let reading = move || {
+        // Resolved once: a link that is turned meanwhile must not mix two folders.
+        let place = fs::canonicalize(&place)
+            .map_err(|source| StartError::Folder { folder: place.clone(), source })?;
         Folder { path: &place, left: FOLDER_BYTES_MAX, at: &progress, files: Vec::new() }.read()
     };
     match detached(reading, WAIT_MAX, is_to_stop) {
@@ -102,7 +106,7 @@ impl Folder<'_> {
     fn models(&self) -> Vec<String> {
         let index = self.files.iter().find(|(name, _)| name == "index.json");
         index
-            .and_then(|(_, bytes)| std::str::from_utf8(bytes).ok())
+            .and_then(|(_, bytes)| json::text(bytes).ok())
             .and_then(|text| Index::from_json(text).ok())
             .map_or_else(Vec::new, |index| index.models)
     }
