@@ -48,7 +48,7 @@ function operation(document_, method, path, said) {
     box.append(element("p", {}, element("b", {}, status), ` ${description ?? ""}`), ...forms(document_, content));
   }
   if (method === "get" && !path.includes("{") && path !== "/v1/session") {
-    box.append(element("p", {}, element("a", { href: path }, `Open ${path}`)));
+    box.append(element("p", {}, element("a", { href: `.${path}` }, `Open ${path}`)));
   }
   box.dataset.text = `${method} ${path} ${said.summary ?? ""} ${said.description ?? ""}`.toLowerCase();
   return box;

@@ -294,15 +294,18 @@ def long() -> list[Step]:
             "HAProxy and a validator of Kubernetes files, where they can be had",
             f"{AS_ROOT} command -v haproxy /usr/sbin/haproxy || "
             "as_root apt-get install -y -qq --no-install-recommends haproxy || true\n"
+            "command -v nginx /usr/sbin/nginx || "
+            "as_root apt-get install -y -qq --no-install-recommends nginx-light || true\n"
             "tests/suite/environment kubernetes deploy/kubernetes/requirements.txt || true",
             behind=("release",),
-            installs="apt: haproxy; pip: kubernetes-validate (142 MB)",
+            installs="apt: haproxy, nginx-light; pip: kubernetes-validate (142 MB)",
         ),
         Step(
             "balancer",
-            "HAProxy over three services, one drained every ten seconds, one killed",
+            "HAProxy over three services, one drained every ten seconds, one killed; a service below a path",
             "env -u RUSTC_WORKSPACE_WRAPPER -u CLIPPY_ARGS cargo build --release -p papilla-tests --bins\n"
-            'PATH="$PATH:/usr/sbin" tests/balancer/run',
+            'PATH="$PATH:/usr/sbin" tests/balancer/run\n'
+            'PATH="$PATH:/usr/sbin" tests/balancer/path',
             after=("balancer-installs",),
             missing=no_haproxy,
         ),

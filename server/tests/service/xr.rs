@@ -15,7 +15,7 @@ async fn a_folder_is_served_at_xr_and_nothing_outside_of_it() {
     let service = Service::start_with(|config| config.xr_dir = Some(folder.clone())).await;
 
     let bare = service.get("/xr").send().await;
-    assert_eq!((bare.status, bare.header("location")), (308, Some("/xr/")));
+    assert_eq!((bare.status, bare.header("location")), (308, Some("xr/")));
     let page = service.get("/xr/").send().await;
     assert_eq!((page.status, page.header("content-type")), (200, Some("text/html")));
     assert!(page.text().contains("scene"));
@@ -32,6 +32,9 @@ async fn a_folder_is_served_at_xr_and_nothing_outside_of_it() {
         "/xr/%2fetc/passwd",
         "/xr//etc/passwd",
         "/xr/nothing.js",
+        "/xr/parts/scene.js/",
+        "/xr/index.html/",
+        "/xr/parts/",
     ] {
         service.get(path).send().await.assert_refused(404, "not_found");
     }
@@ -60,10 +63,10 @@ async fn with_a_page_below() -> (Service, tempfile::TempDir) {
 async fn a_folder_without_its_slash_leads_to_itself_and_to_no_other_host() {
     let (service, _folder) = with_a_page_below().await;
     let bare = service.get("/xr/sub").send().await;
-    assert_eq!((bare.status, bare.header("location")), (307, Some("/xr/sub/")));
+    assert_eq!((bare.status, bare.header("location")), (307, Some("./sub/")));
     assert_eq!(service.get("/xr/sub/").send().await.status, 200);
     let query = service.get("/xr/sub?scene=a").send().await;
-    assert_eq!(query.header("location"), Some("/xr/sub/?scene=a"));
+    assert_eq!(query.header("location"), Some("./sub/?scene=a"));
     // `Location: //sub/` is the host `sub`.
     for path in ["/xr//sub", "/xr//sub/", "/xr///sub", "/xr/sub//"] {
         service.get(path).send().await.assert_refused(404, "not_found");

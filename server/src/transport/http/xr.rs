@@ -33,8 +33,9 @@ pub(crate) fn routes(folder: &Path) -> Router<Arc<App>> {
     let serve = get(move |state: Shared, request: Request| file(files, state, request));
     let [bare, index, below] = PATHS;
     Router::new()
-        // Without the slash the page's relative addresses would miss the folder.
-        .route(bare, get(|| async { Redirect::permanent("/xr/") }))
+        // Without the slash the page's relative addresses would miss the folder. The redirect is
+        // relative itself: a proxy may serve all this below a path of its own.
+        .route(bare, get(|| async { Redirect::permanent("xr/") }))
         .route(index, serve.clone())
         .route(below, serve)
 }
@@ -59,9 +60,10 @@ async fn file(mut files: ServeDir, State(app): Shared, mut request: Request) -> 
         _ => found.into_response(),
     };
     let headers = response.headers_mut();
-    // A folder without its slash: `ServeDir` names the way as it sees it.
+    // A folder without its slash: `ServeDir` names the way as it sees it, and the browser may see
+    // another, so only its last part is sent.
     let location = headers.get(header::LOCATION).and_then(|location| location.to_str().ok());
-    if let Some(location) = location.and_then(|way| format!("/xr{way}").parse().ok()) {
+    if let Some(location) = location.and_then(|way| last_part(way).parse().ok()) {
         headers.insert(header::LOCATION, location);
     }
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-cache"));
@@ -69,11 +71,25 @@ async fn file(mut files: ServeDir, State(app): Shared, mut request: Request) -> 
     response
 }
 
-/// What `ServeDir` is asked for; none for a path with an empty part, which is no file's and whose
+/// The way from a folder without its slash to the same with it, `sub/?query` of `/a/sub/?query`.
+fn last_part(way: &str) -> String {
+    let (path, query) = way.split_at(way.find('?').unwrap_or(way.len()));
+    let name = path.trim_end_matches('/').rsplit('/').next().unwrap_or_default();
+    // Before a colon a browser would read a scheme.
+    format!("./{name}/{query}")
+}
+
+/// What `ServeDir` is asked for, the page of a folder by its name; none for a path with an empty part, which is no file's and whose
 /// redirect would name another host.
 fn below(asked: &Uri) -> Option<PathAndQuery> {
-    let whole = asked.path_and_query()?.as_str().strip_prefix("/xr")?;
-    if asked.path().contains("//") { None } else { whole.parse().ok() }
+    let path = asked.path().strip_prefix("/xr")?;
+    if path.contains("//") {
+        return None;
+    }
+    // `ServeDir` would answer `a.js/` with the file.
+    let index = if path.ends_with('/') { "index.html" } else { "" };
+    let query = asked.query().map(|query| format!("?{query}")).unwrap_or_default();
+    format!("{path}{index}{query}").parse().ok()
 }
 
 fn broken(app: &App, error: &dyn std::fmt::Display) -> Response {
