@@ -10,7 +10,7 @@ mod process;
 use std::{
     sync::atomic::{AtomicI64, AtomicU64},
     sync::{Arc, OnceLock},
-    time::Duration,
+    time::{Duration, SystemTime, UNIX_EPOCH},
 };
 
 use papilla_proto::ErrorCode;
@@ -26,6 +26,7 @@ use labels::{
     ShedLabels, StageLabels, Word,
 };
 pub use labels::{Shed, Stage, TierLabels, Transport};
+pub use process::resident_bytes;
 
 /// Greatest number of tiers, counting every name since the start: handles have fixed places, so
 /// that the hot path takes no lock.
@@ -121,6 +122,8 @@ pub struct Metrics {
     pub hellos_left: Counter,
     /// Thread time that maps of the last seconds ask for, by what they take here, over what there is.
     pub load: Gauge<f64, AtomicU64>,
+    /// When the folder of models was last looked at, Unix seconds; 0 if it is not watched.
+    looked_at: Gauge<f64, AtomicU64>,
     /// Slots that wait for a thread.
     pub queue_length: Gauge<i64, AtomicI64>,
     /// Open sessions.
@@ -177,6 +180,7 @@ impl Metrics {
                 "Hellos whose client left before they were worked out",
             ),
             load: registered_ratio(registry),
+            looked_at: registered_time(registry),
             queue_length: registered(registry, "queue_length", "Slots that wait for a thread"),
             sessions_open: registered(registry, "sessions_open", "Open sessions"),
             sessions: registered(registry, "sessions", "Sessions ever opened"),
@@ -245,6 +249,12 @@ impl Metrics {
         self.real_time.get_or_create(&labels).set(is_granted.into());
     }
 
+    /// The folder of models was looked at now.
+    pub fn models_looked_at(&self) {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        self.looked_at.set(now.as_secs_f64());
+    }
+
     /// Counts a reload that was done, or changed nothing.
     pub fn reload(&self, is_ok: bool) {
         self.count_reload(RELOADS[usize::from(!is_ok)]);
@@ -296,6 +306,15 @@ fn registered<M: Metric + Clone + Default>(
     let metric = M::default();
     registry.register(name, help, metric.clone());
     metric
+}
+
+/// By what the watch over the folder of models is watched.
+fn registered_time(registry: &mut Registry) -> Gauge<f64, AtomicU64> {
+    let (looked_at, help) =
+        (Gauge::default(), "When the folder of models was last looked at, Unix");
+    let name = "models_looked_at_timestamp";
+    registry.register_with_unit(name, help, Unit::Seconds, looked_at.clone());
+    looked_at
 }
 
 /// What autoscalers scale by.

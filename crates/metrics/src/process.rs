@@ -61,6 +61,12 @@ impl Usage {
     }
 }
 
+/// Resident memory of this process, bytes; none if the system does not say.
+#[must_use]
+pub fn resident_bytes() -> Option<u64> {
+    Usage::read().map(|usage| usage.resident_bytes)
+}
+
 impl Collector for Process {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> Result<(), fmt::Error> {
         let mut gauge = |name: &str, help: &str, value: f64| {

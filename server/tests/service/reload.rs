@@ -6,10 +6,11 @@ use std::{fs, path::Path, time::Duration};
 
 use papilla_proto::{FrameStatus, SampleType};
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 use crate::support::{
     Answer, GAIN, Service, Socket, add_model, add_model_of_gain, atlas, bytes_of, floats_of, frame,
-    hello, ramp, write,
+    hello, model_folder, ramp, write,
 };
 
 async fn reload(service: &Service) -> Answer {
@@ -180,4 +181,68 @@ async fn a_change_during_a_manual_reload_is_not_lost() {
     until_tiers(&service, 4).await;
     assert!(service.metric("papilla_reloads_total{outcome=\"busy\"}").await > 0.5);
     service.server.drain().await.unwrap();
+}
+
+/// As deployments do it: `current` leads to the folder that is served, and is turned to the next.
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread")]
+async fn a_link_that_is_turned_is_followed_and_so_are_edits_where_it_leads() {
+    use std::os::unix::fs::symlink;
+    let [first, second] = [model_folder(), model_folder()];
+    add_model(second.path(), "third", atlas().hash(), 0, 0.1);
+    list(second.path(), "quick", &["quick", "slow", "third"]);
+    let place = tempfile::tempdir().unwrap();
+    let turn = |folder: &TempDir| {
+        // As `ln -sfn` does: made beside it, and renamed.
+        let next = place.path().join("next");
+        symlink(folder.path(), &next).unwrap();
+        std::fs::rename(next, place.path().join("current")).unwrap();
+    };
+    turn(&first);
+    let current = place.path().join("current");
+    let service = Service::on(model_folder(), |config| {
+        config.models = Some(current);
+        config.watch_models = true;
+    })
+    .await
+    .unwrap();
+    assert_eq!(names(&service.json("/v1/tiers").await).len(), 2);
+    turn(&second);
+    until_tiers(&service, 3).await;
+    // And where it leads now.
+    add_model(second.path(), "fourth", atlas().hash(), 0, 0.1);
+    list(second.path(), "quick", &["quick", "slow", "third", "fourth"]);
+    until_tiers(&service, 4).await;
+    let looked_at = service.metric("papilla_models_looked_at_timestamp_seconds").await;
+    let now = std::time::SystemTime::UNIX_EPOCH.elapsed().unwrap().as_secs_f64();
+    assert!((0.0..60.0).contains(&(now - looked_at)), "{looked_at} at {now}");
+    // What only the looks of our own find, where it leads, is not what the link says now.
+    turn(&first);
+    until_tiers(&service, 2).await;
+    service.server.drain().await.unwrap();
+}
+
+/// Files as an editor on Windows writes them.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_byte_order_mark_before_a_file_is_passed_over_and_utf_16_is_named() {
+    let folder = model_folder();
+    for name in ["index.json", "atlas.json", "replay.json", "quick.json"] {
+        let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        write(folder.path(), name, format!("\u{feff}{text}").as_bytes());
+    }
+    let service = Service::on(folder, |_| ()).await.unwrap();
+    assert!(service.get("/v1/atlas").send().await.body.starts_with(b"{"), "clients get it without");
+    let mut socket = service.socket().await;
+    socket.send(format!("\u{feff}{}", hello(&json!({})))).await;
+    assert_eq!(socket.hear_json().await["type"], "ready");
+    let body = format!("\u{feff}{}", json!({"pressure_pa": ramp()}));
+    let posted = service.post("/v1/sed", body).header("content-type", "application/json");
+    assert_eq!(posted.send().await.status, 200);
+    let text = std::fs::read_to_string(service.models.path().join("quick.json")).unwrap();
+    let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    write(service.models.path(), "quick.json", &wide);
+    let refused = service.post("/v1/admin/reload", "").send().await;
+    assert!(refused.text().contains("quick.json"), "{}", refused.text());
+    assert!(refused.text().contains("UTF-16"), "{}", refused.text());
+    refused.assert_refused(422, "bad_model");
 }

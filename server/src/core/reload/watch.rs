@@ -1,11 +1,10 @@
 //! Reloading when the folder of models changes.
 
-use std::{path::Path, sync::Arc, time::Duration};
+mod look;
+mod notice;
 
-use notify::{
-    Event, EventKind, RecommendedWatcher, RecursiveMode, Watcher,
-    event::{AccessKind, AccessMode},
-};
+use std::{io, path::Path, sync::Arc, sync::mpsc as threads, time::Duration};
+
 use tokio::{
     sync::mpsc,
     task::spawn_blocking,
@@ -21,36 +20,23 @@ const QUIET: Duration = Duration::from_millis(700);
 /// A folder that never gets quiet is read after so long all the same.
 const WAIT_MAX: Duration = Duration::from_secs(10);
 
-/// Watches `folder` until the drain begins.
+/// Watches where `folder` leads until the drain begins.
 ///
 /// # Errors
-/// The system cannot watch it.
-pub(crate) fn watch(reloader: Arc<Reloader>, folder: &Path) -> notify::Result<()> {
+/// The thread that looks cannot be started.
+pub(crate) fn watch(reloader: Arc<Reloader>, folder: &Path) -> io::Result<()> {
     // One place is enough: it says that something has changed since it was last emptied.
     let (changed, changes) = mpsc::channel(1);
-    let mut watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
-        // An error is a lost event: better to look.
-        if event.map_or(true, |event| is_change(event.kind)) {
-            let _ = changed.try_send(());
-        }
-    })?;
-    watcher.watch(folder, RecursiveMode::NonRecursive)?;
-    tokio::spawn(follow(reloader, changes, watcher));
+    let (looking, stop) = threads::channel();
+    notice::start(folder, changed, Arc::clone(&reloader.metrics), stop)?;
+    tokio::spawn(follow(reloader, changes, looking));
     Ok(())
-}
-
-/// Reading a file is an event too, and a reload reads them all.
-fn is_change(kind: EventKind) -> bool {
-    match kind {
-        EventKind::Access(kind) => matches!(kind, AccessKind::Close(AccessMode::Write)),
-        _ => true,
-    }
 }
 
 async fn follow(
     reloader: Arc<Reloader>,
     mut changes: mpsc::Receiver<()>,
-    watcher: RecommendedWatcher,
+    looking: threads::Sender<()>,
 ) {
     loop {
         // Held no longer than the wait: a drain waits for whoever holds one.
@@ -66,8 +52,8 @@ async fn follow(
         {}
         once(Arc::clone(&reloader)).await;
     }
-    // It lives as long as the loop.
-    drop(watcher);
+    // The thread that looks ends with it.
+    drop(looking);
 }
 
 /// Loads the models anew once it is its turn, unless the drain begins before. What came of it is in
@@ -92,18 +78,5 @@ async fn turn(reloader: &Reloader) -> Option<Turn> {
                 turn = reloader.begin() => Some(turn),
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reading_is_no_change() {
-        assert!(!is_change(EventKind::Access(AccessKind::Open(AccessMode::Any))));
-        assert!(!is_change(EventKind::Access(AccessKind::Close(AccessMode::Read))));
-        assert!(is_change(EventKind::Access(AccessKind::Close(AccessMode::Write))));
-        assert!(is_change(EventKind::Any));
     }
 }

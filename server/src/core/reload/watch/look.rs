@@ -1,0 +1,99 @@
+//! What a folder of models looks like from outside: whether it has changed, without reading it.
+
+use std::{
+    fs::{self, Metadata},
+    io,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+/// The state of a folder at one look.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Look {
+    /// Where the path leads, links followed.
+    pub(super) folder: PathBuf,
+    /// Its files by name.
+    files: Vec<File>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct File {
+    name: std::ffi::OsString,
+    bytes: u64,
+    modified: Option<SystemTime>,
+    /// Device and number: another file under the same name.
+    place: (u64, u64),
+}
+
+impl Look {
+    /// Looks where `path` leads now. A link inside the folder counts as what it leads to.
+    ///
+    /// # Errors
+    /// There is no folder, or it cannot be read.
+    pub(super) fn at(path: &Path) -> io::Result<Self> {
+        let folder = fs::canonicalize(path)?;
+        let mut files = Vec::new();
+        for entry in fs::read_dir(&folder)? {
+            let entry = entry?;
+            // A link to nothing is a file that is missing.
+            if let Ok(data) = fs::metadata(entry.path()) {
+                let (bytes, modified) = (data.len(), data.modified().ok());
+                files.push(File { name: entry.file_name(), bytes, modified, place: place(&data) });
+            }
+        }
+        files.sort_unstable();
+        Ok(Self { folder, files })
+    }
+}
+
+#[cfg(unix)]
+fn place(data: &Metadata) -> (u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    (data.dev(), data.ino())
+}
+
+#[cfg(not(unix))]
+fn place(_: &Metadata) -> (u64, u64) {
+    (0, 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_is_turned_and_a_file_that_is_replaced_are_seen() {
+        use std::os::unix::fs::symlink;
+        let root = tempfile::tempdir().unwrap();
+        let [v1, v2, link, between] =
+            ["v1", "v2", "current", "stable"].map(|name| root.path().join(name));
+        for folder in [&v1, &v2] {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join("index.json"), "{}").unwrap();
+        }
+        symlink(&v1, &between).unwrap();
+        symlink(&between, &link).unwrap();
+        let first = Look::at(&link).unwrap();
+        assert_eq!(Look::at(&link).unwrap(), first);
+        // A link behind the link.
+        fs::remove_file(&between).unwrap();
+        symlink(&v2, &between).unwrap();
+        let second = Look::at(&link).unwrap();
+        assert_ne!(second, first);
+        assert_eq!(second.folder, fs::canonicalize(&v2).unwrap());
+        // The same name, length and time, by a rename.
+        let time = fs::metadata(v2.join("index.json")).unwrap().modified().unwrap();
+        fs::write(v2.join("new"), "[]").unwrap();
+        fs::File::options().append(true).open(v2.join("new")).unwrap().set_modified(time).unwrap();
+        fs::rename(v2.join("new"), v2.join("index.json")).unwrap();
+        assert_ne!(Look::at(&link).unwrap(), second);
+        // What a link inside leads to.
+        symlink(root.path().join("model"), v2.join("a.onnx")).unwrap();
+        let third = Look::at(&link).unwrap();
+        fs::write(root.path().join("model"), "model").unwrap();
+        assert_ne!(Look::at(&link).unwrap(), third);
+        fs::remove_dir_all(&v2).unwrap();
+        assert!(Look::at(&link).is_err());
+    }
+}
