@@ -2,15 +2,18 @@
 
 use std::{fmt, net::TcpListener, time::Instant};
 
+use papilla_metrics::resident_bytes;
 use papilla_proto::contact::ContactMethod;
-use papilla_session_contact::ContactAssets;
+use papilla_render::Maps;
+use papilla_session_contact::{ContactAssets, FINGER_BYTES_MAX};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::{
     StartError,
     config::Config,
-    core::catalogue::{Catalogue, Loading, assets::Assets, calibrate, golden},
+    core::catalogue::{Catalogue, Loading, Tier, assets::Assets, calibrate, golden},
+    descriptors::Descriptors,
     start::load_contact,
     transport::{gate::Gate, moves::Moves, net, tls},
 };
@@ -20,8 +23,8 @@ use crate::{
 const PER_CONNECTION: usize = net::BUFFER_MAX + 2 * net::SOCKET_BUFFER as usize;
 const PER_SESSION: usize = 5 << 20;
 const PER_EFFECTS: usize = 20 << 20;
-/// A finger's solver and its pixels, during a renewal twice, and the shapes of its session.
-const PER_FINGER: usize = 42 << 20;
+/// A finger, during a renewal twice, and the shapes of its session.
+const PER_FINGER: usize = 2 * FINGER_BYTES_MAX + (10 << 20);
 const PER_REQUEST_BEYOND_BODY: usize = 2 << 20;
 
 /// What was found, in the order it was looked at.
@@ -110,6 +113,8 @@ pub fn check(config: &Config) -> Report {
     let mut solves_contact = false;
     match loaded {
         Ok((assets, catalogue)) => {
+            // First: later, memory that measuring has used is used again.
+            look_at_threads(&mut report, config, &catalogue);
             look_at_models(&mut report, config, &catalogue);
             let contact = load_contact(config, &assets, &catalogue);
             solves_contact = matches!(contact, Ok(Some(_)));
@@ -124,10 +129,50 @@ pub fn check(config: &Config) -> Report {
             report.bad("port", 4, &StartError::Bind { address, source });
         }
     }
+    let descriptors = Descriptors::of(config);
+    let values = json!({"due": descriptors.due, "limit": descriptors.limit});
+    match (descriptors.shortage(), descriptors.limit) {
+        (Some(shortage), _) => report.bad("descriptors", 2, &shortage),
+        (None, Some(limit)) => {
+            let detail = format!("{} of {limit} at most", descriptors.due);
+            report.good("descriptors", detail, values);
+        }
+        (None, None) => {
+            report.good("descriptors", format!("{} at most", descriptors.due), values);
+        }
+    }
     let bytes = memory_bound(config, solves_contact);
     let detail = format!("clients can make it hold {} MiB at most, beside the models", bytes >> 20);
     report.good("memory", detail, json!({"clients_bytes_max": bytes}));
     report
+}
+
+/// What the inference threads take, by the sessions of one.
+fn look_at_threads(report: &mut Report, config: &Config, catalogue: &Catalogue) {
+    let threads = config.thread_count();
+    let before = resident_bytes();
+    let mut maps = Maps::default();
+    let warm = |tier: &Tier, maps: &mut Maps| {
+        tier.warm_session(&mut maps.pressure_pa, &mut maps.sed_j_per_m3)
+    };
+    // Err: the model is named below, by its golden answers.
+    let sessions: Vec<_> =
+        catalogue.tiers.iter().filter_map(|tier| warm(tier, &mut maps).ok()).collect();
+    let grown = resident_bytes().zip(before).map(|(now, before)| now.saturating_sub(before));
+    drop(sessions);
+    let (detail, values) = match grown {
+        Some(bytes) => {
+            let all = bytes.saturating_mul(threads as u64);
+            let detail = format!(
+                "{threads} for inference, about {} MiB each, {} in all, beside the models",
+                bytes.div_ceil(1 << 20),
+                all.div_ceil(1 << 20),
+            );
+            (detail, json!({"threads": threads, "bytes_each": bytes}))
+        }
+        None => (format!("{threads} for inference"), json!({"threads": threads})),
+    };
+    report.good("threads", detail, values);
 }
 
 fn look_at_models(report: &mut Report, config: &Config, catalogue: &Catalogue) {

@@ -33,6 +33,7 @@
 mod check;
 mod config;
 mod core;
+mod descriptors;
 mod drain;
 mod error;
 #[cfg(any(test, fuzzing))]
@@ -132,6 +133,7 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
     config.validate()?;
     let (gate, moves) = (Gate::new(config)?, Moves::new(config)?);
     let tls = tls::acceptor(config)?;
+    descriptors::raise(config);
     let bind = |source| StartError::Bind { address: config.bind, source };
     let priorities = Priorities::of(config);
     let io = IoRuntime::start(&priorities).map_err(StartError::Thread)?;

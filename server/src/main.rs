@@ -15,6 +15,10 @@ use serde_json::json;
 
 use self::signals::{Request, Signals};
 
+/// Memory of sessions that are over is the system's again: glibc keeps it in its arenas.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Exit code of a drain that took too long.
 const DRAIN_TIMED_OUT: u8 = 5;
 
@@ -29,8 +33,9 @@ fn main() -> ExitCode {
             if let Some(ConfigError::Usage(usage)) = error.downcast_ref() {
                 usage.exit();
             }
-            // Without its sources: our errors say them themselves.
-            eprintln!("papilla-server: {error}");
+            // Without its sources: our errors say them themselves. Err: nobody reads it; the exit
+            // code stands.
+            let _ = writeln!(io::stderr(), "papilla-server: {error}");
             let of_start = error.downcast_ref::<StartError>().map(StartError::exit_code);
             let is_setting = error.is::<ConfigError>() || error.is::<SettingError>();
             ExitCode::from(of_start.unwrap_or(if is_setting { 2 } else { 1 }))
@@ -43,7 +48,7 @@ fn run() -> anyhow::Result<ExitCode> {
     let config = &cli.settings;
     if cli.print_config {
         config.validate()?;
-        print!("{printed}");
+        print(&printed)?;
         return Ok(ExitCode::SUCCESS);
     }
     // It outlives the runtime: what the last tasks log and trace is still sent.
@@ -62,13 +67,21 @@ fn run() -> anyhow::Result<ExitCode> {
     }
 }
 
+/// Writes to stdout what was asked for. Whoever closes a pipe has read enough of it.
+fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(anyhow::anyhow!("stdout cannot be written: {error}"))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn check(config: &Config) -> anyhow::Result<ExitCode> {
     let report = papilla_server::check(config);
-    if config.json {
-        println!("{}", serde_json::to_string(&report)?);
-    } else {
-        println!("{report}");
-    }
+    let text = if config.json { serde_json::to_string(&report)? } else { report.to_string() };
+    print(&format!("{text}\n"))?;
     Ok(ExitCode::from(report.exit_code()))
 }
 
@@ -80,7 +93,10 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
         server = starting.ready() => server?,
         () = signals.end() => return Ok(ExitCode::from(INTERRUPTED)),
     };
-    announce(&server, config)?;
+    if let Err(error) = announce(&server, config) {
+        // Clients are served all the same.
+        tracing::warn!(%error, "the start line cannot be written to stdout");
+    }
     while signals.next().await == Request::Reload {
         tracing::info!("SIGHUP: the models are loaded anew");
         server.reload();
@@ -123,12 +139,15 @@ fn announce(server: &Server, config: &Config) -> io::Result<()> {
             .map(String::as_str)
             .filter(|&tier| tier != server.default_tier())
             .collect();
+        let by_name = match &others[..] {
+            [] => String::new(),
+            others => format!(", and by name {},", others.join(", ")),
+        };
         writeln!(
             out,
-            "Papilla {} serves tier {}, and by name {}, on {threads} thread{plural}.\nOpen {address}",
+            "Papilla {} serves tier {}{by_name} on {threads} thread{plural}.\nOpen {address}",
             env!("CARGO_PKG_VERSION"),
             server.default_tier(),
-            others.join(", "),
         )?;
     }
     out.flush()

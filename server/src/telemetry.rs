@@ -9,7 +9,8 @@ use std::{
 };
 
 use axum::http::{Method, StatusCode};
-use tracing::{Instrument, Span, field::Empty};
+use papilla_proto::error::shortened;
+use tracing::{Instrument, Level, Span, field::Empty};
 use tracing_subscriber::{
     Layer,
     filter::{LevelFilter, Targets},
@@ -37,14 +38,13 @@ impl Telemetry {
     pub fn start(config: &Config) -> Result<Self, SettingError> {
         let refuse = |reason| SettingError { field: "log", reason };
         // Spans are asked for by their layer alone, whatever the log's filter lets through.
-        let filter: Targets = config
-            .log
-            .parse()
-            .map_err(|error| refuse(format!("'{}' is not a filter: {error}", config.log)))?;
+        let filter = filter(&config.log).map_err(refuse)?;
         let filter = filter.with_target(SPANS, LevelFilter::OFF);
         let log = tracing_subscriber::fmt::layer()
             .with_ansi(io::stderr().is_terminal())
             .with_writer(io::stderr)
+            // It would be told to stderr as well, and that panics where nobody reads it.
+            .log_internal_errors(false)
             .with_filter(filter);
         let registry = tracing_subscriber::registry().with(log);
         let taken = |error: tracing_subscriber::util::TryInitError| refuse(error.to_string());
@@ -58,6 +58,33 @@ impl Telemetry {
         registry.try_init().map_err(taken)?;
         Ok(Self::default())
     }
+}
+
+/// What `--log` says. A filter that leaves nothing of the service's own log is refused, unless it says
+/// `off`: a slip in a name would silence it.
+fn filter(text: &str) -> Result<Targets, String> {
+    let wanted = "write a level (error, warn, info, debug, trace), or levels by module, as \
+                  `info,papilla_server=debug`; `off` silences it";
+    let is_name = |name: &str| {
+        name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_-:.".contains(&byte))
+    };
+    let mut parts = text.split(',').map(str::trim).filter(|part| !part.is_empty());
+    let of = |part: &str| part.split_once('=').map_or(part, |(name, _)| name).trim().to_owned();
+    if let Some(part) = parts.clone().find(|part| !is_name(&of(part))) {
+        return Err(format!("'{}' is no level and no module; {wanted}", shortened(part)));
+    }
+    let filter: Targets = text
+        .parse()
+        .map_err(|error| format!("'{}' is not a filter: {error}; {wanted}", shortened(text)))?;
+    let own = env!("CARGO_CRATE_NAME");
+    let is_meant = parts.any(|part| {
+        let level = part.rsplit('=').next().unwrap_or_default().trim();
+        level.eq_ignore_ascii_case("off") || of(part).starts_with(&format!("{own}::"))
+    });
+    if is_meant || filter.would_enable(own, &Level::ERROR) {
+        return Ok(filter);
+    }
+    Err(format!("'{}' leaves nothing of the service's log; {wanted}", shortened(text)))
 }
 
 impl Drop for Telemetry {
@@ -138,5 +165,41 @@ pub(crate) fn rendered(tier: &str, times: [Duration; 3]) {
     let names = ["papilla.queue_us", "papilla.infer_us", "papilla.total_us"];
     for (name, time) in names.into_iter().zip(times) {
         span.record(name, u64::try_from(time.as_micros()).unwrap_or(u64::MAX));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_filter_that_silences_the_service_by_a_slip_is_refused() {
+        for good in [
+            "info",
+            "papilla_server=debug",
+            "warn,hyper=trace",
+            "off",
+            "debug",
+            "INFO",
+            "papilla_server::core=info,warn",
+            "off,notify=debug",
+            "papilla_server",
+            "papilla_server::core=info",
+        ] {
+            filter(good).unwrap_or_else(|error| panic!("{good}: {error}"));
+        }
+        for bad in [
+            "[[[",
+            "info,[[[",
+            "",
+            "verbose",
+            "papilla_sever=debug",
+            "hyper=debug",
+            "papilla=loud",
+            "papilla_server[span]=info",
+        ] {
+            let error = filter(bad).unwrap_err();
+            assert!(error.contains("papilla_server=debug"), "{bad}: {error}");
+        }
     }
 }

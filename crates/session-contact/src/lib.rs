@@ -53,6 +53,10 @@ pub use frame::FrameForm;
 
 use self::method::Chosen;
 
+/// Most bytes of one finger, pressed all over, by the dearest method; its objects aside. Held by
+/// `tests/memory.rs`.
+pub const FINGER_BYTES_MAX: usize = 18 << 20;
+
 /// The skin that things press on.
 #[derive(Clone, Copy)]
 pub struct Skin<'a> {
@@ -87,8 +91,7 @@ fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
 impl Hand {
     /// The fingers that a hello of version 3 announces.
     ///
-    /// Takes some milliseconds, and up to 12 MiB a finger once it is pressed all over, 16 on pixels or
-    /// with friction.
+    /// Takes some milliseconds, and up to [`FINGER_BYTES_MAX`] a finger once it is pressed all over.
     ///
     /// # Errors
     /// A member is unusable or missing; the problem names it.

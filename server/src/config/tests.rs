@@ -38,6 +38,22 @@ fn the_command_line_is_sound() {
     assert!(read(&["--thread", "1"]).is_err());
 }
 
+/// One figure of a finger's memory: `--help` and the pages name what the crate's test holds.
+#[test]
+fn help_and_pages_say_what_a_finger_takes() {
+    let help = Cli::command().render_long_help().to_string();
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    let figure = format!("{} MiB", papilla_session_contact::FINGER_BYTES_MAX >> 20);
+    assert!(help.contains(&format!("of up to {figure} each")), "{help}");
+    for (page, line) in [
+        ("docs/reference/settings.md", format!("version 3, up to {figure} each")),
+        ("docs/guides/operating.md", format!("| a finger of version 3 | {figure} ")),
+    ] {
+        let path = format!("{}/../{page}", env!("CARGO_MANIFEST_DIR"));
+        assert!(fs::read_to_string(path).unwrap().contains(&line), "{page}: {line}");
+    }
+}
+
 #[test]
 fn every_setting_has_its_variable() {
     for arg in file::settings() {
@@ -84,6 +100,15 @@ fn what_is_printed_reads_back() {
     let (_folder, path) = file(&text);
     let (again, _) = read(&["--config", &path]).unwrap();
     assert_eq!(format!("{settings:?}"), format!("{again:?}"));
+}
+
+#[test]
+fn a_file_with_a_byte_order_mark_is_read_and_utf_16_is_named() {
+    let (_folder, path) = file("\u{feff}threads = 3\n");
+    assert_eq!(read(&["--config", &path]).unwrap().0.threads, NonZeroUsize::new(3));
+    let wide: Vec<u8> = "threads = 3\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    fs::write(&path, wide).unwrap();
+    assert!(read(&["--config", &path]).unwrap_err().contains("UTF-16"));
 }
 
 #[test]

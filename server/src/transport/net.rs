@@ -12,7 +12,7 @@ use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpSocket, TcpStream},
     sync::watch,
-    time::{sleep, timeout},
+    time::{Instant, sleep, timeout},
 };
 use tokio_rustls::TlsAcceptor;
 
@@ -63,6 +63,7 @@ pub(crate) struct ConnectionContext {
 /// Accepts until the drain begins.
 pub(crate) async fn serve(listener: TcpListener, context: ConnectionContext, places: Places) {
     let mut drain = context.drain.subscribe();
+    let mut warnings = Warnings::default();
     loop {
         let accepted = async {
             let permit = places.free().await;
@@ -75,7 +76,7 @@ pub(crate) async fn serve(listener: TcpListener, context: ConnectionContext, pla
                 (Ok(permit), Ok((stream, peer))) => (permit, stream, peer),
                 (Err(_), _) => return,
                 (_, Err(error)) => {
-                    tracing::warn!(%error, "a connection cannot be accepted");
+                    warnings.tell(&error);
                     sleep(ACCEPT_PAUSE).await;
                     continue;
                 }
@@ -86,6 +87,35 @@ pub(crate) async fn serve(listener: TcpListener, context: ConnectionContext, pla
         }
         let place = places.take(permit, peer.ip());
         tokio::spawn(connection(stream, Peer(peer.ip()), context.clone(), place));
+    }
+}
+
+/// Shortest time between two warnings of the same.
+const WARNING_PAUSE: Duration = Duration::from_secs(60);
+
+/// What keeps a failure that repeats from filling the log.
+#[derive(Default)]
+struct Warnings {
+    last: Option<Instant>,
+    /// Failures since then.
+    untold: u64,
+}
+
+impl Warnings {
+    /// Whether a failure at `now` is to be told, and with how many that were not.
+    fn due(&mut self, now: Instant) -> Option<u64> {
+        if self.last.is_some_and(|last| now.duration_since(last) < WARNING_PAUSE) {
+            self.untold += 1;
+            return None;
+        }
+        self.last = Some(now);
+        Some(std::mem::take(&mut self.untold))
+    }
+
+    fn tell(&mut self, error: &io::Error) {
+        if let Some(untold) = self.due(Instant::now()) {
+            tracing::warn!(%error, untold, "a connection cannot be accepted");
+        }
     }
 }
 
@@ -150,5 +180,22 @@ async fn converse<S>(
                 connection.as_mut().graceful_shutdown();
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_that_repeats_is_told_once_a_minute() {
+        let (mut warnings, start) = (Warnings::default(), Instant::now());
+        let told = |warnings: &mut Warnings, ms| warnings.due(start + Duration::from_millis(ms));
+        assert_eq!(told(&mut warnings, 0), Some(0));
+        for n in 1..1200 {
+            assert_eq!(told(&mut warnings, 50 * n), None, "after {} ms", 50 * n);
+        }
+        assert_eq!(told(&mut warnings, 60_000), Some(1199));
+        assert_eq!(told(&mut warnings, 60_001), None);
     }
 }

@@ -121,7 +121,7 @@ async fn answer(
     body: Body,
 ) -> Result<Response, Problem> {
     // The body first: a client that is still sending would not read our answer.
-    let body = body::read(body, app.body_max, app.timeouts.io).await?;
+    let body = body::read(headers, body, app.body_max, app.timeouts.io).await?;
     body::require_plain(headers)?;
     let received = Instant::now();
     let tier = named(app, uri)?;

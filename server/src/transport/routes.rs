@@ -160,13 +160,14 @@ async fn guard(State(app): Shared, request: Request, next: Next) -> Response {
     response
 }
 
-/// Sends the browser to the page without its token, which it gets as a cookie.
+/// Sends the browser to the same address without its token, which it gets as a cookie. Relative, since
+/// a proxy may serve the page below a path of its own.
 fn welcome(cookie: HeaderValue) -> Response {
     let mut response = Response::new(Body::empty());
     *response.status_mut() = StatusCode::SEE_OTHER;
     let headers = response.headers_mut();
     headers.insert(header::SET_COOKIE, cookie);
-    headers.insert(header::LOCATION, HeaderValue::from_static("/"));
+    headers.insert(header::LOCATION, HeaderValue::from_static("?"));
     headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("no-store"));
     response
 }

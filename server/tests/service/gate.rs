@@ -106,7 +106,7 @@ async fn a_token_has_its_number_of_sessions() {
 async fn a_browser_gets_its_token_as_a_cookie() {
     let (service, _tokens) = guarded().await;
     let answer = service.get(&format!("/?access_token={LAB}")).send().await;
-    assert_eq!((answer.status, answer.header("location")), (303, Some("/")));
+    assert_eq!((answer.status, answer.header("location")), (303, Some("?")));
     let cookie = answer.header("set-cookie").unwrap();
     assert!(cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"), "{cookie}");
     let pair = cookie.split(';').next().unwrap();
@@ -117,6 +117,25 @@ async fn a_browser_gets_its_token_as_a_cookie() {
     // Elsewhere a token does not belong into the query, where logs keep it.
     let leak = service.get(&format!("/v1/tiers?access_token={LAB}")).send().await;
     leak.assert_refused(401, "unauthorized");
+    assert!(leak.text().contains("/v1/session alone"), "{}", leak.text());
+    assert!(leak.text().contains("Authorization: Bearer"), "{}", leak.text());
+    // A proxy may serve all this below a path: the cookie is of the folder that was asked for.
+    assert!(!cookie.contains("Path"), "{cookie}");
+    let wrong =
+        service.get("/v1/tiers").header("authorization", "Bearer none-of-these").send().await;
+    assert!(wrong.text().contains("line ends"), "{}", wrong.text());
+}
+
+/// As an editor or a shell leaves it.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_token_of_a_file_ends_where_its_letters_end() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let text = format!("\u{feff}[[token]]\nname = \"lab\"\ntoken = \"\"\"\n{LAB}\n\"\"\"\n");
+    std::fs::write(file.path(), text).unwrap();
+    let path = file.path().to_owned();
+    let service = Service::start_with(|config| config.tokens = Some(path)).await;
+    let tiers = service.get("/v1/tiers").header("authorization", &bearer(LAB)).send().await;
+    assert_eq!(tiers.status, 200, "{}", tiers.text());
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -161,6 +180,16 @@ async fn pages_of_strangers_are_refused() {
         .send()
         .await;
     assert_eq!(preflight.header("access-control-allow-origin"), Some("https://lab.example"));
+    // A public page asks so before it reaches into a private network.
+    for (origin, due) in [("https://lab.example", Some("true")), (stranger, None)] {
+        let preflight = crate::support::Request::new(service.address, "OPTIONS", "/v1/sed")
+            .header("origin", origin)
+            .header("access-control-request-method", "POST")
+            .header("access-control-request-private-network", "true")
+            .send()
+            .await;
+        assert_eq!(preflight.header("access-control-allow-private-network"), due, "{origin}");
+    }
 }
 
 /// Sends a request of these lines, and an empty line behind them.
@@ -192,6 +221,11 @@ async fn pages_of_strangers_may_not_read_either() {
     }
     let lab = asked(&service, &[tiers, "host: localhost", "origin: https://lab.example"]).await;
     assert_eq!(lab.status, 200);
+    let ours = "origin: https://lab.example";
+    for other in ["origin: https://evil.example", ours] {
+        let both = asked(&service, &[tiers, "host: localhost", ours, other]).await;
+        assert_eq!(both.assert_refused(403, "forbidden").as_deref(), Some("origin"), "{other}");
+    }
 }
 
 /// RFC 9112 3.2.

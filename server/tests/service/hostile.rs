@@ -46,6 +46,19 @@ async fn bodies_too_large_are_refused_and_the_client_gets_to_read_why() {
         endless.extend(&chunk);
     }
     raw_exchange(service.address, &endless).await;
+    // One that is only announced, and never asked for.
+    for path in ["/v1/sed", "/v2/models/quick/infer"] {
+        let head = format!(
+            "POST {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\
+             content-length: 99999999\r\n"
+        );
+        for expect in ["expect: 100-continue\r\n", ""] {
+            let bytes =
+                raw_exchange(service.address, format!("{head}{expect}\r\n").as_bytes()).await;
+            assert!(bytes.starts_with(b"HTTP/1.1 413"), "{}", String::from_utf8_lossy(&bytes));
+            assert!(String::from_utf8_lossy(&bytes).contains("too_large"), "{path}");
+        }
+    }
     assert_serves(&service).await;
 }
 

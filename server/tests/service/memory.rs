@@ -1,12 +1,17 @@
 //! The memory that bodies and messages can claim, against the sum that `check` prints and
 //! docs/guides/operating.md explains: a process of its own, its peak resident memory from the system.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use serde_json::{Value, json};
 
 use crate::support::{
-    Request, Running, Socket, bytes_of, hello, model_folder, papilla, ramp, raw_exchange,
+    Request, Running, Socket, bytes_of, contact, hello, model_folder, model_folder_on, papilla,
+    ramp, raw_exchange, write,
 };
 
 /// Clients at once.
@@ -236,4 +241,54 @@ async fn no_message_takes_more_than_the_documented_sum() {
         }
     }
     assert!(beyond.is_empty(), "more than {} MiB: {beyond:#?}", sum >> 20);
+}
+
+/// What fingers took is the system's again once their sessions are over.
+#[tokio::test(flavor = "multi_thread")]
+async fn the_memory_of_sessions_that_are_over_is_given_back() {
+    if !cfg!(target_os = "linux") {
+        eprintln!("skipped: resident memory is read from /proc, which Linux has");
+        return;
+    }
+    const SESSIONS: usize = 4;
+    let folder = model_folder_on(&contact::atlas());
+    write(folder.path(), "finger.contact", &contact::model());
+    let running = Running::start_with(folder.path(), &[]);
+    let id = running.child.id();
+    let fingers = vec![json!({}); 10];
+    let hello = contact::hello_3(&json!({"method": "pixels", "map": false, "fingers": fingers}));
+    let press = async |sessions: usize| {
+        let mut open = Vec::new();
+        for _ in 0..sessions {
+            let mut socket = Socket::connect(running.address).await.unwrap();
+            socket.open(hello.clone()).await;
+            for finger in 0..10u8 {
+                socket.send(contact::rows(1, finger, &[contact::deep(0.3)])).await;
+                socket.hear_frame().await;
+            }
+            open.push(socket);
+        }
+        status(id, "VmRSS")
+    };
+    // Everything that is made on first use.
+    press(1).await;
+    let settled = async |below: usize| {
+        let begun = Instant::now();
+        loop {
+            let now = status(id, "VmRSS");
+            if now <= below || begun.elapsed() > Duration::from_secs(60) {
+                return now;
+            }
+            // As a balancer or a scraper does: somebody always asks.
+            Request::new(running.address, "GET", "/healthz").send().await;
+            tokio::time::sleep(Duration::from_millis(200)).await;
+        }
+    };
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    let before = status(id, "VmRSS");
+    let pressed = press(SESSIONS).await;
+    let taken = pressed.saturating_sub(before);
+    assert!(taken > (SESSIONS * 10) << 20, "ten fingers take {} MiB", (taken / SESSIONS) >> 20);
+    let left = settled(before + taken / 8).await.saturating_sub(before);
+    assert!(left <= taken / 8, "{} MiB of {} stay", left >> 20, taken >> 20);
 }

@@ -61,6 +61,8 @@ fn what_cannot_be_used_is_refused_with_its_name() {
         (vec!["--threads", "none"], "--threads"),
         (vec!["--bind", "0.0.0.0:0"], "bind"),
         (vec!["--log", "papilla=loud"], "log"),
+        (vec!["--log", "[[["], "papilla_server=debug"),
+        (vec!["--log", "verbose"], "papilla_server=debug"),
         (vec!["--tls-cert", "c.pem"], "tls_key"),
     ] {
         let (code, _, error) = run(&args);
@@ -84,8 +86,17 @@ fn check_finds_what_would_keep_it_from_serving() {
         .iter()
         .map(|f| f["what"].as_str().unwrap())
         .collect();
-    for what in ["settings", "atlas", "calibration", "model quick", "model slow", "port", "memory"]
-    {
+    for what in [
+        "settings",
+        "atlas",
+        "threads",
+        "calibration",
+        "model quick",
+        "model slow",
+        "port",
+        "descriptors",
+        "memory",
+    ] {
         assert!(whats.contains(&what), "{what} is not in {whats:?}");
     }
     let (code, text, _) = with(&[]);
@@ -111,6 +122,123 @@ fn check_finds_what_would_keep_it_from_serving() {
     let (code, text, _) = with(&["--json"]);
     assert_eq!(code, Some(3), "{text}");
     assert!(serde_json::from_str::<Value>(&text).unwrap()["ok"] == json!(false));
+}
+
+/// The binary in a shell that does so much before it.
+#[cfg(target_os = "linux")]
+fn in_shell(before: &str, args: &[&str], after: &str) -> std::process::Output {
+    let line = format!("{before} exec \"$0\" \"$@\" {after}");
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &line, env!("CARGO_BIN_EXE_papilla-server")]).args(args);
+    command.output().unwrap()
+}
+
+/// Whoever reads nothing gets an exit code, and no panic (101).
+#[cfg(target_os = "linux")]
+#[test]
+fn outputs_that_take_nothing_end_it_cleanly() {
+    let models = model_folder();
+    let path = models.path().to_str().unwrap();
+    let check = ["check", "--models", path, "--calibration-ms", "0", "--bind", "127.0.0.1:0"];
+    for (args, after, code) in [
+        (&["--print-config"][..], ">/dev/full 2>/dev/full", 1),
+        (&check[..], ">/dev/full 2>/dev/full", 1),
+        (&["--bind", "nowhere"], ">/dev/full 2>/dev/full", 2),
+        (&["--models", "/no/such/folder", "--bind", "127.0.0.1:0"], ">/dev/full 2>/dev/full", 3),
+        (&["--models", "/no/such/folder", "--bind", "127.0.0.1:0"], ">&- 2>&-", 3),
+        (&["--help"], ">/dev/full 2>/dev/full", 0),
+    ] {
+        let output = in_shell("", args, after);
+        assert_eq!(output.status.code(), Some(code), "{args:?} {after}");
+    }
+    // A pipe whose reader is gone: it has read enough.
+    for args in [&["--print-config"][..], &check[..]] {
+        let line = r#"("$0" "$@"; echo $? >&3) 3>&1 | true"#;
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", line, env!("CARGO_BIN_EXE_papilla-server")]).args(args);
+        let output = command.output().unwrap();
+        let code = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(code.trim(), "0", "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+/// A service whose outputs are full or closed serves on.
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread")]
+async fn a_service_that_nobody_reads_serves_on() {
+    let models = model_folder();
+    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let full = || std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let child = papilla(&["--models", models.path().to_str().unwrap(), "--threads", "1"])
+        .args(["--bind", &address.to_string(), "--calibration-ms", "1", "--log", "debug"])
+        .stdout(full())
+        .stderr(full())
+        .spawn()
+        .unwrap();
+    let mut running = Running { child, address };
+    let ready = async {
+        while tokio::net::TcpStream::connect(address).await.is_err() {
+            assert!(running.child.try_wait().unwrap().is_none(), "it has ended");
+            sleep(Duration::from_millis(20)).await;
+        }
+        let answer = Request::new(address, "POST", "/v1/sed").body(bytes_of(&ramp())).send().await;
+        assert_eq!(answer.status, 200);
+    };
+    timeout(HANG, ready).await.expect("it does not serve");
+    running.signal("TERM");
+    let ended = async {
+        loop {
+            match running.child.try_wait().unwrap() {
+                Some(status) => break status,
+                None => sleep(Duration::from_millis(20)).await,
+            }
+        }
+    };
+    assert_eq!(timeout(HANG, ended).await.expect("it does not end").code(), Some(0));
+}
+
+/// The soft limit is raised; a hard one that is too small is said at the start, and by `check`.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_few_file_descriptors_are_said_at_the_start() {
+    let models = model_folder();
+    let path = models.path().to_str().unwrap();
+    let check = ["check", "--models", path, "--calibration-ms", "0", "--bind", "127.0.0.1:0"];
+    let raised = in_shell("ulimit -Sn 100;", &check, "");
+    assert_eq!(raised.status.code(), Some(0), "{}", String::from_utf8_lossy(&raised.stdout));
+    let few = in_shell("ulimit -Hn 100;", &check, "");
+    let text = String::from_utf8_lossy(&few.stdout);
+    assert_eq!(few.status.code(), Some(2), "{text}");
+    assert!(text.contains("FAILED descriptors") && text.contains("ulimit -Hn"), "{text}");
+    // The port is taken, so that the service ends after it has said so.
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let serve = ["--models", path, "--bind", &address];
+    for (limit, word) in [("ulimit -Sn 100;", "is raised"), ("ulimit -Hn 100;", "max_connections")]
+    {
+        let output = in_shell(limit, &serve, "");
+        let log = String::from_utf8_lossy(&output.stderr);
+        assert!(log.contains(word), "{limit} {log}");
+    }
+}
+
+#[test]
+fn one_tier_is_announced_in_whole_words() {
+    let models = model_folder();
+    let index = json!({"default": "quick", "models": ["quick"]}).to_string();
+    // As an editor on Windows writes it.
+    write(models.path(), "index.json", format!("\u{feff}{index}").as_bytes());
+    let mut child = papilla(&["--models", models.path().to_str().unwrap(), "--threads", "2"])
+        .args(["--bind", "127.0.0.1:0", "--calibration-ms", "1", "--log", "error"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let stdout = child.stdout.take().unwrap();
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(stdout), &mut line).unwrap();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(line.ends_with("serves tier quick on 2 threads.\n"), "{line:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use axum::{
-    body::Body,
+    body::{Body, HttpBody},
     http::{HeaderMap, HeaderValue, header},
 };
 use bytes::{Bytes, BytesMut};
@@ -15,17 +15,29 @@ use super::refusal::CODING;
 
 /// So much more than is taken is read and thrown away, so that a client that is still sending
 /// gets to read why it is refused.
-const DISCARD_MAX: usize = 6 << 20;
+const DISCARD_MAX: usize = 8 << 20;
+
+/// Longest time for that.
+const DISCARD_WAIT: Duration = Duration::from_secs(1);
 
 /// The whole body.
 ///
 /// # Errors
 /// Larger than `bytes_max`, slower than `wait_max`, or cut off.
 pub(crate) async fn read(
+    headers: &HeaderMap,
     body: Body,
     bytes_max: usize,
     wait_max: Duration,
 ) -> Result<Bytes, Problem> {
+    let announced = body.size_hint().lower();
+    if announced > bytes_max as u64 {
+        // Whoever waits for `100 Continue` sends nothing yet, and reading would ask for it.
+        if !headers.contains_key(header::EXPECT) {
+            let _ = timeout(wait_max.min(DISCARD_WAIT), discard(body)).await;
+        }
+        return Err(too_large(bytes_max));
+    }
     match timeout(wait_max, collect(body, bytes_max)).await {
         Ok(result) => result,
         Err(_) => {
@@ -66,9 +78,21 @@ async fn collect(mut body: Body, bytes_max: usize) -> Result<Bytes, Problem> {
             break;
         }
     }
-    if length > bytes_max {
-        let message = format!("the body is larger than {bytes_max} bytes; a raw map has 200704");
-        return Err(Problem::new(ErrorCode::TooLarge, message));
+    if length > bytes_max { Err(too_large(bytes_max)) } else { Ok(whole.freeze()) }
+}
+
+/// Reads a body that is refused already, as far as that is done.
+async fn discard(mut body: Body) {
+    let mut length = 0;
+    while let Some(Ok(frame)) = body.frame().await {
+        length += frame.data_ref().map_or(0, Bytes::len);
+        if length > DISCARD_MAX {
+            break;
+        }
     }
-    Ok(whole.freeze())
+}
+
+fn too_large(bytes_max: usize) -> Problem {
+    let message = format!("the body is larger than {bytes_max} bytes; a raw map has 200704");
+    Problem::new(ErrorCode::TooLarge, message)
 }

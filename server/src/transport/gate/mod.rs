@@ -128,7 +128,18 @@ impl Gate {
         origin::check(&head.headers, &self.origins, self.is_local)?;
         let is_known = self.tokens.is_none() || holder.is_some();
         if !is_known && (in_query.is_some() || !route.is_public) {
-            let message = "a token is asked for here: Authorization: Bearer TOKEN";
+            let is_in_query = head.uri.query().and_then(token_in_query).is_some();
+            let message = match (shown.is_some(), is_in_query && !is_query_read) {
+                (_, true) => {
+                    "a token in the address is taken by / and /v1/session alone, since addresses are \
+                     written into logs; send it as a header here: Authorization: Bearer TOKEN"
+                }
+                (true, false) => {
+                    "this token is none of this service's; is it whole, and without spaces or line \
+                     ends? It is sent as a header: Authorization: Bearer TOKEN"
+                }
+                (false, false) => "a token is asked for here: Authorization: Bearer TOKEN",
+            };
             return Err(Problem::new(ErrorCode::Unauthorized, message).at("authorization"));
         }
         let cookie = match (&holder, &in_query) {
@@ -146,7 +157,8 @@ impl Gate {
 
     fn cookie(&self, token: &str) -> Result<HeaderValue, Problem> {
         let secure = if self.is_tls { "; Secure" } else { "" };
-        let cookie = format!("{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict{secure}");
+        // Without a path it is of the folder that was asked for, which a proxy may have put in front.
+        let cookie = format!("{COOKIE}={token}; HttpOnly; SameSite=Strict{secure}");
         HeaderValue::from_str(&cookie)
             .map_err(|_| Problem::new(ErrorCode::Unauthorized, "the token is no token"))
     }

@@ -9,7 +9,7 @@ use axum::http::{
     HeaderMap, HeaderName, HeaderValue, Method, Version, header, request::Parts, uri::Authority,
 };
 use papilla_proto::{ErrorCode, Problem, error::shortened};
-use tower_http::cors::CorsLayer;
+use tower_http::cors::{AllowPrivateNetwork, CorsLayer};
 
 /// Headers of an answer that a page may read.
 const EXPOSED: [&str; 9] = [
@@ -65,8 +65,16 @@ pub(super) fn check(
     allowed: &[String],
     is_local: bool,
 ) -> Result<(), Problem> {
-    let Some(origin) = headers.get(header::ORIGIN) else { return Ok(()) };
-    let origin = origin.to_str().unwrap_or("?");
+    let mut origins = headers.get_all(header::ORIGIN).iter();
+    let origin = match (origins.next(), origins.next()) {
+        (None, _) => return Ok(()),
+        (Some(origin), None) => origin.to_str().unwrap_or("?"),
+        // No browser does; whichever were looked at, another reader might take the other.
+        (Some(_), Some(_)) => {
+            let message = "the request names more than one origin";
+            return Err(Problem::new(ErrorCode::Forbidden, message).at("origin"));
+        }
+    };
     let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
     if is_own(origin, host, is_local) || allowed.iter().any(|a| a.eq_ignore_ascii_case(origin)) {
         return Ok(());
@@ -104,8 +112,12 @@ fn name(host: &str) -> &str {
 pub(crate) fn cors(origins: &[String]) -> Option<CorsLayer> {
     let origins: Vec<_> = origins.iter().filter_map(|o| HeaderValue::from_str(o).ok()).collect();
     (!origins.is_empty()).then(|| {
+        let own = origins.clone();
+        // Browsers ask so before a public page's request to a private address or the loopback.
+        let private = AllowPrivateNetwork::predicate(move |origin, _| own.contains(origin));
         CorsLayer::new()
             .allow_origin(origins)
+            .allow_private_network(private)
             .allow_methods([Method::GET, Method::POST])
             .allow_headers([
                 header::ACCEPT,

@@ -45,7 +45,7 @@ async fn render(
     body: Body,
 ) -> Result<Response, Problem> {
     // The body first: a client that is still sending would not read our answer.
-    let payload = body::read(body, app.body_max, app.timeouts.io).await?;
+    let payload = body::read(headers, body, app.body_max, app.timeouts.io).await?;
     let received = Instant::now();
     body::require_plain(headers)?;
     let query = Query::parse(uri.query().unwrap_or_default())?;
