@@ -101,10 +101,7 @@ pub(crate) async fn open(parts: Parts) -> Result<Opened, StartError> {
         let (reloader, watched) = (Arc::clone(&app.reloader), folder.clone());
         // What watches has a thread, which is not to have the priority of those that read.
         let watching = spawn_blocking(move || reload::watch(reloader, &watched));
-        watching
-            .await
-            .map_err(|_| StartError::WorkerPanicked)?
-            .map_err(StartError::Thread)?;
+        watching.await.map_err(|_| StartError::WorkerPanicked)?.map_err(StartError::Thread)?;
     }
     front.open(routes::router(Arc::clone(&app), &config.allow_origin, config.xr_dir.as_deref()));
     measuring.await.map_err(|_| StartError::WorkerPanicked)??;
