@@ -175,7 +175,7 @@ async fn a_service_that_nobody_reads_serves_on() {
         .stderr(full())
         .spawn()
         .unwrap();
-    let mut running = Running { child, address };
+    let mut running = Running { child, address, started: serde_json::Value::Null };
     let ready = async {
         while tokio::net::TcpStream::connect(address).await.is_err() {
             assert!(running.child.try_wait().unwrap().is_none(), "it has ended");

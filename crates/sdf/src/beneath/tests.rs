@@ -161,7 +161,11 @@ fn two_plates_that_touch_press_as_one() {
         for depth in [1e-4, 0.2, 0.5, 1.0, 1.9] {
             let found = any.distance([x, 1.0, 2.0 - depth]);
             assert!((found.gap_mm + depth).abs() < 1e-9, "{depth} at {x}: {found:?}");
-            assert_eq!(found.normal, [0.0, 0.0, 1.0], "{depth} at {x}");
+            assert_eq!(
+                found.normal.map(f64::to_bits),
+                [0.0f64, 0.0, 1.0].map(f64::to_bits),
+                "{depth} at {x}"
+            );
         }
     }
 }
