@@ -6,8 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use ndarray::Array2;
-use papilla_dataset::{Dataset, IndentationEntry, Maps, Shard, Split};
+use papilla_dataset::{Dataset, Field, IndentationEntry, Maps, Shard, Split};
 use papilla_engine::Card;
 use papilla_fingertip::scene::Scene;
 use papilla_proto::{
@@ -109,15 +108,14 @@ async fn the_card_tells_the_truth() {
     let mut all = Vec::new();
     for indentation in held_out(&dataset) {
         let shard = dataset.shard(indentation).unwrap();
-        for i in 0..shard.len() {
-            let drawn = |patch, values: &Array2<f32>| {
+        let states = maps.of(&shard);
+        for state in 0..shard.len() {
+            let drawn = |field| {
                 let mut map = vec![0.0; MAP_LEN];
-                let reader = maps.reader(patch, shard.cells.as_ref()).unwrap();
-                reader.draw(&values.row(i).to_vec(), &mut map).unwrap();
+                states.draw(field, state, &mut map).unwrap();
                 map
             };
-            let pressure_pa = drawn(Patch::Skin, &shard.pressure_pa);
-            all.push([pressure_pa, drawn(Patch::Interface, &shard.sed_dermis_j_per_m3)]);
+            all.push([drawn(Field::Pressure), drawn(Field::SedDermis)]);
         }
     }
     let card = &service.cards[0].metrics;
