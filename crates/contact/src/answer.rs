@@ -56,7 +56,8 @@ pub struct Effort {
     pub products: u32,
     /// Vertices that could touch.
     pub candidates: u32,
-    /// Entries of matrices that the products went over: the frame's budget is of these.
+    /// Multiply-adds of products, transforms and distances, as they are counted: the frame's budget
+    /// is of these.
     pub work: u64,
 }
 

@@ -123,13 +123,13 @@ impl BoundedSolver {
     }
 
     /// Sum of `travel f` for the forces `f` with `M f = travel` at the points whose travel is not
-    /// zero, the others free: conjugate gradients.
+    /// zero, the others free: conjugate gradients; with the products that it took.
     pub(crate) fn work_of_travel(
         &mut self,
         m: Symmetric<'_>,
         travel: &[f32],
         products_max: u32,
-    ) -> f32 {
+    ) -> (f32, u32) {
         let n = travel.len();
         let Self { gradient, free, direction, product, .. } = self;
         let [left, f, direction, product] =
@@ -138,12 +138,13 @@ impl BoundedSolver {
         direction.copy_from_slice(travel);
         f.fill(0.0);
         let first = dot(travel, travel);
-        let mut square = first;
-        for _ in 0..products_max {
+        let (mut square, mut products) = (first, 0);
+        while products < products_max {
             if !(square > 1e-6 * first) {
                 break;
             }
             multiply(m.values, m.stride, direction, product);
+            products += 1;
             for (p, t) in product.iter_mut().zip(travel) {
                 if *t == 0.0 {
                     *p = 0.0;
@@ -158,7 +159,7 @@ impl BoundedSolver {
             }
             square = next;
         }
-        dot(travel, f)
+        (dot(travel, f), products)
     }
 }
 

@@ -69,7 +69,8 @@ impl Solver {
     /// is where the last frame ended. What it took is summed over all frames tried.
     ///
     /// # Errors
-    /// [`ContactError::Force`] if no travel up to 30 mm gives the force;
+    /// [`ContactError::Force`] if no travel up to 30 mm gives the force; a search that has used the
+    /// frame's budget ends with what it has, which is not settled;
     /// [`ContactError::Value`] for a direction that is no unit vector, or no positive force.
     pub fn solve_for_force<'a>(
         &mut self,
@@ -81,7 +82,9 @@ impl Solver {
         let everywhere = f32::INFINITY;
         self.within(scene.into(), everywhere, |solver, view| {
             (solver.sides.toward, solver.sides.fine) = (Some(net.direction), false);
-            let travel = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame)?;
+            let mut effort = Effort::default();
+            let how = Search::AT_VERTICES;
+            let travel = solver.travel_until(view, net, how, (&mut effort, out), Self::frame)?;
             let shift_mm = net.direction.map(|d| d * travel / view.length);
             solver.follow_slip(View { shift_mm, ..view });
             Ok(travel)
@@ -95,16 +98,25 @@ impl Solver {
         Some(Beyond { excess_mm, part_per_mm: slope / strength / length })
     }
 
-    /// Looks for the travel with `frame`, which finds what presses in a view.
+    /// Ends a search whose budget is used at the travel that was tried last: what presses there is
+    /// not settled, and the next frame starts from the travel that would have been next.
+    fn end_search(&mut self, [at, next]: [f64; 2], slope: Option<f64>, out: &mut Contact) -> f64 {
+        out.quality.settled = false;
+        let travel_mm = if next.abs() <= TRAVEL_MAX_MM { next } else { at };
+        self.reached = Some(Reached { travel_mm, slope_n_per_mm: slope.unwrap_or(0.0) });
+        at
+    }
+
+    /// Looks for the travel with `frame`, which finds what presses in a view; what was taken before
+    /// counts.
     pub(crate) fn travel_until(
         &mut self,
         view: View<'_>,
         NetForce { direction, force_n }: NetForce,
         Search { tolerance, tries_max }: Search,
-        out: &mut Contact,
+        (effort, out): (&mut Effort, &mut Contact),
         mut frame: impl FnMut(&mut Self, View<'_>, &mut Contact) -> Result<(), ContactError>,
     ) -> Result<f64, ContactError> {
-        let mut effort = Effort::default();
         let [mut low, mut high]: [Option<(f64, f64)>; 2] = [None, None];
         let mut last: Option<(f64, f64)> = None;
         let start = self.reached.take();
@@ -113,9 +125,9 @@ impl Solver {
         for _ in 0..tries_max {
             let shift_mm = direction.map(|d| d * travel / view.length);
             let view = View { shift_mm, ..view };
-            frame(self, view, out)?;
-            effort = effort.plus(out.effort);
-            out.effort = effort;
+            frame(self, view.after(effort), out)?;
+            *effort = effort.plus(out.effort);
+            out.effort = *effort;
             let force = (0..3).map(|i| direction[i] * out.force_n[i]).sum::<f64>();
             reached = reached.max(force);
             if let Some((at, then)) = last.filter(|(_, then)| *then > 0.0 && force > 0.0) {
@@ -128,6 +140,7 @@ impl Solver {
                 return Ok(travel);
             }
             last = Some((travel, force));
+            let at = travel;
             // Beyond the trusted depth force goes on by a known slope.
             let beyond = self.beyond(view.length);
             if let Some(Beyond { excess_mm, part_per_mm }) = beyond {
@@ -141,6 +154,9 @@ impl Solver {
                     // No less than what is left at the trusted depth is found by steps from there.
                     high = last;
                     travel -= excess_mm.max(STEP_MM);
+                    if view.is_spent(effort) {
+                        return Ok(self.end_search([at, travel], slope, out));
+                    }
                     if travel.abs() > TRAVEL_MAX_MM || effort.iterations > ITERATIONS_MAX {
                         break;
                     }
@@ -157,13 +173,16 @@ impl Solver {
                 (Some((a, fa)), None) if fa > 0.0 => {
                     a + secant.map_or(STEP_MM, |t| (1.05 * (t - a)).clamp(1e-4, STEP_MAX_MM))
                 }
-                (Some((a, _)), None) => a + view.free_mm(&self.model).max(STEP_MM),
+                (Some((a, _)), None) => a + view.free_mm(&self.model, effort).max(STEP_MM),
                 (None, Some((b, _))) => {
                     b + secant
                         .map_or(-4.0 * STEP_MM, |t| (1.05 * (t - b)).clamp(-STEP_MAX_MM, -1e-4))
                 }
                 (None, None) => travel,
             };
+            if view.is_spent(effort) {
+                return Ok(self.end_search([at, travel], slope, out));
+            }
             if travel.abs() > TRAVEL_MAX_MM || effort.iterations > ITERATIONS_MAX {
                 break;
             }

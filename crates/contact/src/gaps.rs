@@ -136,7 +136,8 @@ impl Field {
         let along: f64 = (0..3).map(|i| normal[i] * moved[i]).sum();
         let gap_mm = f64::from(self.gap_mm[vertex]) + along;
         let stiffness_mpa_per_mm = self.stiffness_mpa_per_mm;
-        Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction: self.friction, object: 0 }
+        let friction = self.friction;
+        Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object: 0, asked: 0 }
     }
 
     pub(crate) fn with_capacity(vertices: usize) -> Self {

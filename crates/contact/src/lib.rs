@@ -28,6 +28,7 @@
 
 mod answer;
 mod bounded;
+mod budget;
 mod clusters;
 mod compliance;
 mod discs;

@@ -12,6 +12,8 @@ pub(crate) struct Nearest {
     pub friction: f64,
     /// Index of the object; of what is told by gaps 0.
     pub object: u32,
+    /// Distances asked beyond one from each object, in those of a sphere.
+    pub asked: u32,
 }
 
 /// Largest coefficient of friction that is believed; dry skin on glass reaches 3.

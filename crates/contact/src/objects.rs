@@ -1,5 +1,7 @@
 //! What can press on a finger, and how far it is.
 
+use crate::answer::Effort;
+use crate::budget;
 use crate::error::ContactError;
 use crate::gaps::{Field, Gaps};
 use crate::held::Held;
@@ -88,6 +90,10 @@ pub(crate) struct View<'a> {
     pub held: &'a [Held],
     /// How far things that gaps tell of are drawn back along their normals, reference mm.
     pub back_mm: f64,
+    /// What a distance from all things costs, in those of a sphere; of gaps nothing.
+    pub cost: u64,
+    /// Units of work that a frame may take.
+    pub work_max: u64,
 }
 
 /// A scene, ready to be asked.
@@ -100,7 +106,15 @@ pub(crate) enum Things<'a> {
 impl<'a> View<'a> {
     /// Of things in their places.
     pub(crate) fn of(things: Things<'a>, length: f64) -> Self {
-        Self { things, length, shift_mm: [0.0; 3], held: &[], back_mm: 0.0 }
+        let cost = cost(things);
+        let work_max = budget::UNITS_MAX;
+        Self { things, length, shift_mm: [0.0; 3], held: &[], back_mm: 0.0, cost, work_max }
+    }
+
+    /// The same view of one of its objects.
+    pub(crate) fn only(self, object: &'a Object) -> Self {
+        let things = Things::Objects(std::slice::from_ref(object));
+        Self { things, cost: cost(things), ..self }
     }
 
     fn held(&self, object: u32) -> Option<&'a Held> {
@@ -144,6 +158,7 @@ impl<'a> View<'a> {
             stiffness_mpa_per_mm: f64::INFINITY,
             friction: 0.0,
             object: 0,
+            asked: 0,
         };
         let mut second_mm = f64::INFINITY;
         for (object, o) in (0..).zip(objects) {
@@ -160,7 +175,8 @@ impl<'a> View<'a> {
                 let turned = r.map(|row| (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]) / size);
                 let normal = if size > 1e-6 { turned } else { nearest.normal };
                 let (stiffness_mpa_per_mm, friction) = (o.stiffness_mpa_per_mm, o.friction);
-                nearest = Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object };
+                nearest =
+                    Nearest { gap_mm, normal, stiffness_mpa_per_mm, friction, object, asked: 0 };
             }
         }
         // Bodies that are held count with places that they have left: nothing tells what they cover.
@@ -176,12 +192,15 @@ impl<'a> View<'a> {
     fn uncovered(&self, objects: &[Object], p: [f64; 3], nearest: Nearest) -> Nearest {
         let Nearest { gap_mm, normal, object, .. } = nearest;
         let found = Distance { gap_mm: self.length * gap_mm, normal, hessian: [[0.0; 3]; 3] };
-        beneath(objects, p, object as usize, &found).map_or(nearest, |(index, outer)| Nearest {
+        let mut asked = 0;
+        let outer = beneath(objects, p, object as usize, &found, &mut asked);
+        outer.map_or(Nearest { asked, ..nearest }, |(index, outer)| Nearest {
             gap_mm: outer.gap_mm / self.length,
             normal: outer.normal,
             stiffness_mpa_per_mm: objects[index].stiffness_mpa_per_mm,
             friction: objects[index].friction,
             object: index as u32,
+            asked,
         })
     }
 
@@ -217,7 +236,8 @@ impl<'a> View<'a> {
     }
 
     /// A distance that all things are certainly away from the finger at rest, mm.
-    pub(crate) fn free_mm(&self, model: &ContactModel) -> f64 {
+    pub(crate) fn free_mm(&self, model: &ContactModel, effort: &mut Effort) -> f64 {
+        self.count(model.vertices() as u32, effort);
         let free = |vertex: usize| match self.things {
             Things::Objects(objects) => self.clearance_mm(objects, model.positions_mm[vertex]),
             Things::Field(field) => field.at(vertex, self.shift_mm.map(|s| -s)).gap_mm,
@@ -279,5 +299,13 @@ impl<'a> View<'a> {
     /// A place of the reference finger as objects that have not moved see it, mm of the person.
     pub(crate) fn seen(&self, at_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| self.length * (at_mm[i] - self.shift_mm[i]))
+    }
+}
+
+/// What a distance from all things costs, in those of a sphere.
+fn cost(things: Things<'_>) -> u64 {
+    match things {
+        Things::Objects(objects) => objects.iter().map(|o| o.shape.cost().ceil() as u64).sum(),
+        Things::Field(_) => 0,
     }
 }

@@ -47,7 +47,7 @@ pub(crate) fn press(
     }
     // Skin deep in what is narrow is nearer to its sides: springs push it there.
     out.quality.settled &= turned_n <= TURNED_MAX * size_n;
-    out.effort.distances += 2 * candidates.len() as u32;
+    view.count(2 * candidates.len() as u32, &mut out.effort);
     out.penetration_mm = deepest;
     out.finish(person, size_n);
 }

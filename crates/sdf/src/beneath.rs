@@ -74,13 +74,15 @@ pub fn may_be_covered(gap_mm: f64, second_mm: f64) -> bool {
 /// `p` on the nearest body, whose index and distance are given, is covered by others. None if it
 /// is free, so that the nearest body's distance is right already.
 ///
-/// Takes no memory. At most some thousand distances are asked for.
+/// Takes no memory. At most some thousand distances are asked for: `asked` grows by how many, in those
+/// of a sphere.
 #[must_use]
 pub fn beneath<B: Body>(
     bodies: &[B],
     p: [f64; 3],
     nearest: usize,
     distance: &Distance,
+    asked: &mut u32,
 ) -> Option<(usize, Distance)> {
     let size = norm(distance.normal);
     if !(size > 1e-6 && distance.gap_mm < 0.5 * SEAM_MM) {
@@ -95,8 +97,11 @@ pub fn beneath<B: Body>(
         found: None,
         questions: 0,
     };
-    search.cover(along(p, -distance.gap_mm, out), out, Some(nearest))?;
-    search.run(nearest);
+    let covers = search.cover(along(p, -distance.gap_mm, out), out, Some(nearest));
+    if covers.is_some() {
+        search.run(nearest);
+    }
+    *asked += search.questions;
     search.found
 }
 

@@ -113,7 +113,7 @@ impl SignedDistance for AnyOf {
         if !may_be_covered(found.gap_mm, second_mm) {
             return found;
         }
-        beneath(&self.parts, p, nearest, &found).map_or(found, |(_, outer)| outer)
+        beneath(&self.parts, p, nearest, &found, &mut 0).map_or(found, |(_, outer)| outer)
     }
 
     fn reach_mm(&self, direction: [f64; 3]) -> f64 {

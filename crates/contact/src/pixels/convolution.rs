@@ -149,6 +149,12 @@ impl Convolution {
         }
     }
 
+    /// Units of work that a product takes: transforms there and back.
+    pub(super) fn work(&self) -> u64 {
+        let cells = (self.rows * self.columns).max(1) as u64;
+        cells * u64::from(cells.ilog2())
+    }
+
     /// Pixels of a row.
     pub(super) fn columns(&self) -> usize {
         self.columns

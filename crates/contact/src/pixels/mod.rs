@@ -40,7 +40,7 @@ mod spacing;
 mod turns;
 mod window;
 
-use crate::answer::{Contact, Person};
+use crate::answer::{Contact, Effort, Person};
 use crate::bounded::BoundedSolver;
 use crate::error::ContactError;
 use crate::force_target::{NetForce, Search};
@@ -131,11 +131,16 @@ impl Solver {
         self.within(objects.into(), 0.0, |solver, view| {
             require_slippery(view)?;
             (solver.sides.toward, solver.sides.fine) = (Some(net.direction), true);
+            let mut effort = Effort::default();
             if solver.reached.is_none() {
                 // Vertices may see nothing of what pixels do; then the way begins where objects are.
-                let _ = solver.travel_until(view, net, Search::AT_VERTICES, out, Self::frame);
+                let (how, taken) = (Search::AT_VERTICES, (&mut effort, &mut *out));
+                let _ = solver.travel_until(view, net, how, taken, Self::frame);
+                // Its work counts, and no more.
+                effort = Effort { work: effort.work, ..Effort::default() };
             }
-            let travel = solver.travel_until(view, net, PIXELS, out, |solver, view, out| {
+            let taken = (&mut effort, &mut *out);
+            let travel = solver.travel_until(view, net, PIXELS, taken, |solver, view, out| {
                 solver.frame_until(AT_VERTICES_MM, view, out)?;
                 pixels.refine(solver, solver.held(view), out)
             })?;

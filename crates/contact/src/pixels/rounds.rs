@@ -17,6 +17,8 @@ const UNSETTLED: f32 = 0.03;
 const VIOLATION_MM: f32 = 1e-4;
 /// Most products with the compliance in a round.
 const PRODUCTS_MAX: u32 = 80;
+/// The same, when the frame's budget is used.
+const PRODUCTS_MIN: u32 = 10;
 
 impl PixelContact {
     pub(super) fn refine(
@@ -59,8 +61,8 @@ impl PixelContact {
             return Err(ContactError::Diverged);
         };
         // Pixels go by vertices' answer no further than a start.
-        out.quality.settled = change <= UNSETTLED;
-        if !out.quality.settled {
+        out.quality.settled = change <= UNSETTLED && !view.is_spent(&out.effort);
+        if change > UNSETTLED {
             self.stand_in();
             // From what came close the next frame goes on.
             if change > JUMP {
@@ -83,7 +85,7 @@ impl PixelContact {
         for round in 0..ROUNDS_MAX {
             let start = (round == 0).then_some(warm);
             change = self.round(solver, view, start, effort).ok().filter(|c| c.is_finite())?;
-            if change <= SETTLED {
+            if change <= SETTLED || view.is_spent(effort) {
                 break;
             }
         }
@@ -147,6 +149,15 @@ impl PixelContact {
         window.own_dents(skin, grid, size);
         let grid = convolution.press_rows(window.cells(n), &pressure[..n]);
         window.measure(skin, view, solver.person(), grid, effort)?;
+        if view.is_spent(effort) {
+            // Not all gaps are known: the last round's pressure stands, or the vertices'.
+            if start.is_some() {
+                pressure[..n].copy_from_slice(&of_vertices[..n]);
+            }
+            effort.iterations += 1;
+            window.sum_forces(skin, &pressure[..n], turns.found());
+            return Ok(turns.take(&mut window.force_n));
+        }
         let gradient = &mut rest[..m];
         window.gradient([&pressure[..m], &of_vertices[..m]], gradient);
         let [give, ease] = [&window.give[..m], &window.ease[..m]];
@@ -155,10 +166,13 @@ impl PixelContact {
         let cells = window.cells(m);
         let beside = &window.beside[..m];
         let bends = convolution.bends();
+        let unit = convolution.work();
         let nearby = Nearby { convolution, cells, give, ease, norm, beside, bends };
         let p = &mut pressure[..m];
-        effort.products +=
-            bounded.improve(nearby, gradient, p, VIOLATION_MM, PRODUCTS_MAX).products;
+        let most = view.most(PRODUCTS_MAX, unit, effort).max(PRODUCTS_MIN);
+        let products = bounded.improve(nearby, gradient, p, VIOLATION_MM, most).products;
+        effort.products += products;
+        effort.work += (2 + u64::from(products)) * unit;
         effort.iterations += 1;
         window.sum_forces(skin, &pressure[..n], turns.found());
         Ok(turns.take(&mut window.force_n))

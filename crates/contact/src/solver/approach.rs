@@ -20,7 +20,7 @@ impl Solver {
             shift_mm: std::array::from_fn(|i| view.shift_mm[i] + back * away[i]),
             ..view
         };
-        while back < BACK_MAX_MM {
+        while back < BACK_MAX_MM && !view.is_spent(effort) {
             let deep = -f64::from(deepest(&self.patch));
             if deep <= STEP_MM {
                 break;
@@ -31,6 +31,9 @@ impl Solver {
         let steps = (back / STEP_MM).ceil().min(f64::from(STEPS_MAX)) as u32;
         for step in 0..steps {
             let left = back * (1.0 - f64::from(step) / f64::from(steps));
+            if view.is_spent(effort) {
+                break;
+            }
             self.iterate(held(left), ITERATIONS_ON_THE_WAY, SETTLED_MM, effort);
         }
     }

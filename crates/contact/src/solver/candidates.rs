@@ -25,7 +25,7 @@ impl Solver {
                 candidates.push((free, vertex));
             }
         });
-        effort.distances += asked;
+        view.count(asked, effort);
         effort.candidates = candidates.len() as u32;
         let [slots, _] = patch.room();
         self.overflow = candidates.len() > slots;

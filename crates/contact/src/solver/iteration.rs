@@ -2,7 +2,7 @@
 
 use super::{
     FORCE_MIN_N, FRAME_PRODUCTS_MAX, NEAR_MM, PRODUCTS_MAX, PRODUCTS_MIN, RELAXATION, SHARE,
-    Solver, TURN_MAX, VIOLATION_MM, WORK_MAX,
+    Solver, TURN_MAX, VIOLATION_MM,
 };
 use crate::answer::Effort;
 use crate::bounded::Symmetric;
@@ -25,18 +25,8 @@ impl Solver {
             self.choose_near();
             let taken = self.share_taken();
             self.remake_matrix();
-            let entries = (self.patch.near() as u64).pow(2).max(1);
-            let most = |left: u32, entries: u64| {
-                let within = WORK_MAX.saturating_sub(effort.work) / entries;
-                left.min(u32::try_from(within).unwrap_or(u32::MAX))
-            };
             let left = FRAME_PRODUCTS_MAX.saturating_sub(effort.products);
-            // Along two tangents each product goes over four blocks.
-            let [left, slips_left] = [most(left, entries), most(left, 4 * entries)];
-            let products = self.complement(1.0 - 2.0 * taken, left);
-            let slips = self.resist_slip(view, 1.0 - 2.0 * taken, slips_left);
-            effort.products += products + slips;
-            effort.work += (u64::from(products) + 4 * u64::from(slips)) * entries;
+            self.find_forces(view, 1.0 - 2.0 * taken, left, effort);
             relaxation = self.relax(relaxation, iteration == 0);
             change = self.follow() / relaxation.min(1.0);
             if change <= settled_mm {
@@ -47,13 +37,37 @@ impl Solver {
                     return change;
                 }
             }
-            if effort.work >= WORK_MAX {
+            if view.is_spent(effort) {
                 break;
             }
         }
         self.displace(self.patch.vertices().len());
         self.measure_all(view, effort);
         change
+    }
+
+    /// Solves for forces with the compliance scaled by `scale`, of a frame with so many products
+    /// `left`.
+    pub(super) fn find_forces(
+        &mut self,
+        view: View<'_>,
+        scale: f32,
+        left: u32,
+        effort: &mut Effort,
+    ) {
+        let entries = self.entries();
+        // Along two tangents each product goes over four blocks.
+        let [most, slips_most] =
+            [entries, 4 * entries].map(|entries| view.most(left, entries, effort));
+        let products = self.complement(scale, most);
+        let slips = self.resist_slip(view, scale, slips_most);
+        effort.products += products + slips;
+        effort.work += (u64::from(products) + 4 * u64::from(slips)) * entries;
+    }
+
+    /// Entries of the matrix along normals.
+    pub(super) fn entries(&self) -> u64 {
+        (self.patch.near() as u64).pow(2).max(1)
     }
 
     pub(super) fn any_far_inside(&self) -> bool {

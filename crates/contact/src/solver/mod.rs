@@ -63,9 +63,6 @@ const PRODUCTS_MAX: u32 = 200;
 /// The same in a frame; then each solve has the least.
 const FRAME_PRODUCTS_MAX: u32 = 3000;
 const PRODUCTS_MIN: u32 = 10;
-/// Entries of matrices that the products of a frame may go over. A frame that has used them ends with
-/// what it has. Of ten thousand random poses on the shipped finger 99 % take 29 million, the most 364.
-const WORK_MAX: u64 = 500_000_000;
 /// Turn of a normal, as a difference of unit vectors, beyond which the matrix is made anew.
 const TURN_MAX: f32 = 0.05;
 /// Range of the over- or under-relaxation.
@@ -311,7 +308,9 @@ impl Solver {
         let mut is_found = self.attempt(settled_mm, view, &mut sides, out);
         if !is_found {
             self.forget_start();
-            is_found = self.attempt(settled_mm, view, &mut sides, out);
+            let first = out.effort;
+            is_found = self.attempt(settled_mm, view.after(&first), &mut sides, out);
+            out.effort = first.plus(out.effort);
         }
         self.sides = sides;
         if is_found {
@@ -333,8 +332,7 @@ impl Solver {
         self.measure_all(view, effort);
         self.choose_near();
         self.remake_matrix();
-        effort.products += self.complement(1.0, PRODUCTS_MAX);
-        effort.products += self.resist_slip(view, 1.0, PRODUCTS_MAX);
+        self.find_forces(view, 1.0, PRODUCTS_MAX, effort);
     }
 
     /// Whether what came out is finite.
@@ -404,7 +402,8 @@ impl Solver {
         if !self.patch.values.size[..self.patch.near()].iter().any(|s| *s > 0.0) {
             self.press_undeformed(view, &mut out.effort);
         }
-        self.answer(change, out);
+        self.answer(view, change, out);
+        out.quality.settled &= !view.is_spent(&out.effort);
         out.is_finite()
     }
 
@@ -443,12 +442,13 @@ impl Solver {
     fn measure_first(&mut self, view: View<'_>, slots: usize, effort: &mut Effort) {
         let Self { patch, model, settings, friction, .. } = self;
         let Person { width, stiffness } = settings.person;
-        effort.distances += slots as u32;
+        view.count(slots as u32, effort);
         for slot in 0..slots {
             let vertex = patch.vertices()[slot] as usize;
             let v = &mut patch.values;
             let moved = [0, 1, 2].map(|i| f64::from(v.moved[i][slot]));
             let nearest = view.nearest(model, vertex, moved);
+            view.count_more(nearest.asked, effort);
             for i in 0..3 {
                 v.normal[i][slot] = nearest.normal[i] as f32;
             }
@@ -462,7 +462,7 @@ impl Solver {
         }
     }
 
-    fn answer(&mut self, change: f32, out: &mut Contact) {
+    fn answer(&mut self, view: View<'_>, change: f32, out: &mut Contact) {
         let Header { share_max, depth_max_mm, .. } = *self.model.header();
         let deepest = self.candidates.iter().map(|(free, _)| -free).fold(0.0, f64::max);
         let is_deep = depth_max_mm > 0.0 && deepest > f64::from(depth_max_mm);
@@ -481,13 +481,13 @@ impl Solver {
         let shear_n = |slot: usize| friction.map_or([0.0; 3], |f| f.shear_n(slot));
         collect(&self.model, &self.patch, self.settings.person, shear_n, out);
         if self.settings.stiffness {
-            out.stiffness_n_per_mm = self.stiffness(out);
+            out.stiffness_n_per_mm = self.stiffness(view, out);
         }
     }
 
     /// Change of force for a small travel of the objects along it: forces of the points in contact
     /// that move all of them by the part of the travel along their normals.
-    fn stiffness(&mut self, out: &mut Contact) -> Option<f64> {
+    fn stiffness(&mut self, view: View<'_>, out: &mut Contact) -> Option<f64> {
         let size = out.force_n.iter().map(|f| f * f).sum::<f64>().sqrt();
         if !(size > 0.0) {
             return None;
@@ -495,6 +495,8 @@ impl Solver {
         let along = out.force_n.map(|f| (f / size) as f32);
         let scale = 1.0 - 2.0 * self.share_taken();
         self.remake_matrix();
+        let entries = self.entries();
+        let most = view.most(PRODUCTS_MAX, entries, &out.effort).max(PRODUCTS_MIN);
         let Self { patch, matrix, norm, rest, bounded, .. } = self;
         let m = patch.near();
         let v = &patch.values;
@@ -503,7 +505,8 @@ impl Solver {
             rest[slot] = if v.size[slot] > 0.0 { part } else { 0.0 };
         }
         let symmetric = Symmetric { values: matrix, stride: patch.stride(), norm: *norm };
-        let force = bounded.work_of_travel(symmetric, &rest[..m], PRODUCTS_MAX);
+        let (force, products) = bounded.work_of_travel(symmetric, &rest[..m], most);
+        out.effort.work += u64::from(products) * entries;
         let Person { width, stiffness } = self.settings.person;
         let found = f64::from(force / scale) * stiffness * width;
         Some(found).filter(|s| s.is_finite() && *s >= 0.0)

@@ -265,7 +265,8 @@ impl Sides {
             let mut of = (0, -free);
             if objects.len() > 1 {
                 let nearest = view.nearest(model, *vertex as usize, [0.0; 3]);
-                effort.distances += objects.len() as u32;
+                view.count(1, effort);
+                view.count_more(nearest.asked, effort);
                 of = (nearest.object as usize, -nearest.gap_mm);
             }
             let survey = &mut self.surveys[of.0];
@@ -357,7 +358,7 @@ impl Asked<'_> {
         let way = unit(survey.sum).unwrap_or(skin);
         let (mut deep, mut is_narrow) = (depth_mm, false);
         for at in [vertex, self.outermost(vertex, way)] {
-            effort.distances += 1;
+            self.alone().count_look(effort);
             if let Front::Met { ahead_mm, along, .. } = self.front(at, way, 0.0) {
                 deep = deep.max(ahead_mm * along.max(SLANT));
                 // Springs know no displaced skin, which would lie before the front.
@@ -403,7 +404,7 @@ impl Asked<'_> {
         let nearest = survey.nearest.or_else(|| {
             let (found, asked) =
                 self.model.clusters.nearest(&self.model.positions_mm, NEARBY_MM, clear);
-            effort.distances += asked;
+            self.alone().count(asked, effort);
             found
         });
         let Some((free, vertex)) = nearest else { return (Side::default(), None) };
@@ -462,7 +463,7 @@ impl Asked<'_> {
         if dot(normal, self.normal(witness)) <= 0.5 {
             return None;
         }
-        effort.distances += 1;
+        self.alone().count_look(effort);
         let Front::Met { .. } = self.front(witness, way, 0.0) else { return None };
         let sweep = self.sweep(way, 0.0, effort);
         // As deep as its motion since the last frame tells, and not on its other side.
@@ -550,12 +551,14 @@ impl Asked<'_> {
             any_passed: false,
             closest_mm: f64::INFINITY,
         };
+        let alone = self.alone();
         for vertex in 0..self.model.vertices() {
-            if dot(self.normal(vertex as u32), way) < THROUGH {
+            let is_aside = dot(self.normal(vertex as u32), way) < THROUGH;
+            if is_aside || alone.leaves_out(vertex, effort) {
                 continue;
             }
             let at = self.model.positions_mm[vertex];
-            effort.distances += 1;
+            alone.count_look(effort);
             match held.front(self.object, self.view.seen(at)) {
                 Front::Met { ahead_mm, along, .. } => {
                     let along = along.max(SLANT);
@@ -595,6 +598,11 @@ impl Asked<'_> {
         self.model.normals[vertex as usize].map(f64::from)
     }
 
+    /// The view of the object alone.
+    fn alone(&self) -> View<'_> {
+        self.view.only(self.object)
+    }
+
     /// Free distance of a place, reference mm.
     fn clear(&self, at_mm: [f64; 3]) -> f64 {
         let placement = &self.object.placement;
@@ -604,9 +612,8 @@ impl Asked<'_> {
 
     /// Gap (reference mm) of a vertex at rest, and the object's normal there.
     fn nearest(&self, vertex: u32, effort: &mut Effort) -> (f64, [f64; 3]) {
-        effort.distances += 1;
-        let objects = std::slice::from_ref(self.object);
-        let view = View { things: Things::Objects(objects), ..self.view };
+        let view = self.alone();
+        view.count(1, effort);
         let nearest = view.nearest(self.model, vertex as usize, [0.0; 3]);
         (nearest.gap_mm, nearest.normal)
     }

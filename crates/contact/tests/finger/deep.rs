@@ -325,7 +325,7 @@ fn an_unreachable_net_force_is_seen_at_once() {
 /// linearisation, the same each time.
 #[test]
 fn a_frame_keeps_its_budget_of_work() {
-    const BUDGET: u64 = 500_000_000;
+    const BUDGET: u64 = 1_400_000_000;
     let finger = Finger::new();
     let mut random = fastrand::Rng::with_seed(54);
     let count = finger.places_mm.len();

@@ -2,6 +2,7 @@
 //!
 //! The finger is made here, unless `PAPILLA_CONTACT_MODEL` names a file of `fe-datagen contact`.
 
+mod budget;
 mod deep;
 mod support;
 

@@ -19,7 +19,7 @@ const TURNS_MAX: u32 = 8;
 
 impl Window {
     /// Gaps of the pixels along the skin's normal, under the pressure whose displacement is
-    /// `grid`, mm.
+    /// `grid`, mm; none of those that are left when the frame's budget is used.
     pub(in super::super) fn measure(
         &mut self,
         skin: &PixelSkin,
@@ -30,6 +30,12 @@ impl Window {
     ) -> Result<(), ContactError> {
         for slot in 0..self.entries.len() {
             let inward = self.inward[slot];
+            if view.is_spent(effort) {
+                // What is known presses there.
+                (self.give[slot], self.gap_mm[slot]) = (0.0, 0.0);
+                self.normal[slot] = inward;
+                continue;
+            }
             let stencil = &skin.stencils[self.entries[slot] as usize];
             let dent = stencil.value(|vertex| self.dent_mm[vertex]);
             let own = grid[self.cells[slot] as usize] - dent;
@@ -38,12 +44,14 @@ impl Window {
                 let at: [f32; 3] =
                     std::array::from_fn(|i| self.at_mm[slot][i] + (own + way) * inward[i]);
                 let nearest = view.nearest_at(at.map(f64::from)).ok_or(ContactError::Diverged)?;
-                effort.distances += 1;
+                view.count(1, effort);
+                view.count_more(nearest.asked, effort);
                 let along: f32 =
                     nearest.normal.iter().zip(inward).map(|(a, b)| *a as f32 * b).sum();
                 let gap = nearest.gap_mm as f32;
                 // Deep inside, the nearest side need not be the one in whose way the skin is.
-                if turns < TURNS_MAX && gap < -DEEP_MM && (along < STEEP || gap < -FREE_MM) {
+                let is_aside = gap < -DEEP_MM && (along < STEEP || gap < -FREE_MM);
+                if is_aside && turns < TURNS_MAX && !view.is_spent(effort) {
                     way += -gap;
                     turns += 1;
                     continue;

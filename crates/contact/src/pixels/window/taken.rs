@@ -105,8 +105,12 @@ impl Window {
                     (is_near || gap_mm - away > REACH_MM).then_some(is_near)
                 });
                 let is_near = told.unwrap_or_else(|| {
-                    effort.distances += 1;
+                    if view.is_spent(effort) {
+                        return true;
+                    }
+                    view.count(1, effort);
                     let nearest = view.nearest_at(at.map(f64::from));
+                    view.count_more(nearest.map_or(0, |nearest| nearest.asked), effort);
                     let gap_mm = nearest.map_or(f64::INFINITY, |nearest| nearest.gap_mm);
                     asked = Some((at, gap_mm));
                     gap_mm < REACH_MM
@@ -133,7 +137,10 @@ impl Window {
         effort: &mut Effort,
     ) -> bool {
         self.entries.iter().any(|entry| {
-            effort.distances += 1;
+            if view.is_spent(effort) {
+                return true;
+            }
+            view.count(1, effort);
             let nearest = view.nearest_at(skin.rest_mm[*entry as usize].map(f64::from));
             nearest.is_some_and(|nearest| nearest.gap_mm < 0.0)
         })
