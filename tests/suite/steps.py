@@ -70,6 +70,7 @@ SLOW = [
     "a_slow_reader_is_waited_for",
     "an_overloaded_service_renders_the_newest_frames",
     "nobody_waits_for_the_hard_frames_of_others",
+    "a_search_for_a_net_force_has_one_budget",
 ]
 def fast() -> list[Step]:
     """Rust alone."""

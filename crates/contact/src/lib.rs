@@ -31,6 +31,7 @@ mod bounded;
 mod budget;
 mod clusters;
 mod compliance;
+mod counting;
 mod discs;
 mod error;
 mod file;
