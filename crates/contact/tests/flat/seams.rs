@@ -67,9 +67,18 @@ proptest! {
             for _ in 0..3 {
                 solver.solve(&scene, &mut out).unwrap();
             }
-            (out.pressure_pa.clone(), out.force_n[2])
+            let is_flagged = out.quality.out_of_range || !out.quality.settled;
+            (out.pressure_pa.clone(), out.force_n[2], is_flagged)
         });
-        for (found, force_n) in [parts, objects] {
+        // Of objects that lie one upon the other along the way in, the upper one is thin: it may be
+        // held by itself, which is told.
+        let is_stacked = cuts.iter().any(|(_, axis, ..)| *axis == 2);
+        prop_assert!(!parts.2, "{cuts:?} at {depth_mm} mm as one object");
+        prop_assert!(!objects.2 || is_stacked, "{cuts:?} at {depth_mm} mm as objects");
+        for (found, force_n, is_flagged) in [parts, objects] {
+            if is_flagged {
+                continue;
+            }
             let off = miss(&found, &due.0);
             prop_assert!(off < 0.01, "{off} of the pressure of {cuts:?} at {depth_mm} mm");
             prop_assert!((force_n / due.1 - 1.0).abs() < 0.01);
