@@ -95,7 +95,7 @@ def fast() -> list[Step]:
         Step(
             "rust",
             "unit, property, differential and end-to-end tests of less than some seconds",
-            f"cargo test --workspace --all-targets {FEATURES} -q -- "
+            f"cargo test --no-fail-fast --workspace --all-targets {FEATURES} -q -- "
             + " ".join(f"--skip {name}" for name in SLOW),
             after=("build",),
             tests_min=740,
@@ -160,7 +160,7 @@ def full() -> list[Step]:
         Step(
             "slow",
             "tests of seconds: verification rows, hard cases, presses of whole fingers, models' cards",
-            f"cargo test --workspace --lib --tests {FEATURES} -q -- "
+            f"cargo test --no-fail-fast --workspace --lib --tests {FEATURES} -q -- "
             + " ".join(SLOW),
             after=("build",),
             tests_min=23,
