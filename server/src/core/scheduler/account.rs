@@ -10,7 +10,13 @@ use std::{
 /// choice of models; all else depends on what a client sends.
 pub(super) const LONG: Duration = Duration::from_millis(10);
 
-/// How long an account with a long frame stays heavy.
+/// So much longer a single frame makes its account heavy by itself; a cold press on pixels does not.
+const ALONE: u32 = 3;
+
+/// Frames over which work is averaged: an account is heavy whose frames are long on the average.
+const AVERAGED: u32 = 8;
+
+/// How long an account with long frames stays heavy.
 const HEAVY_FOR: Duration = Duration::from_secs(10);
 
 /// Greatest debt that an account takes along when it comes back after a pause.
@@ -47,7 +53,7 @@ impl<S> Account<S> {
 pub(super) enum Weight {
     /// Its frames have been short.
     Light,
-    /// One of them was long not long ago, or none has been measured yet.
+    /// They were long not long ago, or none has been measured yet.
     Heavy,
 }
 
@@ -63,6 +69,8 @@ pub(super) struct Ledger<S> {
     /// What its next frame is taken to cost.
     estimate: Duration,
     has_been_short: bool,
+    /// Work beside the network, averaged over frames.
+    mean: Option<Duration>,
     heavy_until: Option<Instant>,
 }
 
@@ -75,6 +83,7 @@ impl<S> Default for Ledger<S> {
             running: 0,
             estimate: FIRST_ESTIMATE,
             has_been_short: false,
+            mean: None,
             heavy_until: None,
         }
     }
@@ -109,7 +118,11 @@ impl<S> Ledger<S> {
         self.due = self.due.saturating_sub(charged) + spent.busy;
         let Some(beside_network) = spent.beside_network else { return };
         self.estimate = spent.busy;
-        if beside_network > LONG {
+        let mean = self
+            .mean
+            .map_or(beside_network, |mean| (mean * (AVERAGED - 1) + beside_network) / AVERAGED);
+        self.mean = Some(mean);
+        if mean > LONG || beside_network > LONG * ALONE {
             self.heavy_until = Some(now + HEAVY_FOR);
         } else {
             self.has_been_short = true;

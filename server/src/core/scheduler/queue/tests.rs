@@ -156,7 +156,7 @@ fn a_session_is_heavy_by_what_its_frames_take_beside_the_network() {
     }
     let held: Vec<_> = (0..2).map(|_| pop(&queue).unwrap()).collect();
     for turn in held {
-        queue.done(turn, spent(LONG + ms(1)), true);
+        queue.done(turn, spent(LONG * 3 + ms(1)), true);
     }
     light.enter(&queue);
     let turn = pop(&queue).unwrap();
@@ -164,6 +164,24 @@ fn a_session_is_heavy_by_what_its_frames_take_beside_the_network() {
     queue.done(turn, spent(ms(1)), false);
     let _one = pop(&queue).unwrap();
     assert!(pop(&queue).is_none(), "it was short once");
+}
+
+#[test]
+fn a_cold_press_makes_no_session_heavy_and_long_frames_one_after_the_other_do() {
+    let (queue, light, other) = (queue_of(2), client(1), client(10));
+    show_light(&queue, &light);
+    show_light(&queue, &other);
+    other.enter(&queue);
+    let take = |took: Duration| {
+        let held: Vec<_> = std::iter::from_fn(|| pop(&queue)).take(2).collect();
+        let count = held.len();
+        held.into_iter().for_each(|turn| queue.done(turn, spent(took), true));
+        count
+    };
+    assert_eq!(take(LONG + ms(4)), 2);
+    assert_eq!(take(LONG + ms(4)), 2, "two cold presses");
+    let counts: Vec<_> = (0..8).map(|_| take(LONG + ms(4))).collect();
+    assert_eq!(counts.last(), Some(&1), "{counts:?}");
 }
 
 #[test]
