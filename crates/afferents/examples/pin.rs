@@ -20,8 +20,14 @@ fn main() {
         for model in 0..Neuron::models(class) {
             let Some(neuron) = Neuron::new(class, model) else { continue };
             let spikes_s = pins::spikes_s(neuron, &inputs);
-            let (count, first_ms) = (spikes_s.len(), spikes_s.first().map(|s| 1e3 * s));
-            println!("{class} {model}: {count:3} spikes, the first after {first_ms:.1?} ms");
+            match spikes_s.first() {
+                Some(first_s) => println!(
+                    "{class} {model}: {:3} spikes, the first after {:.1} ms",
+                    spikes_s.len(),
+                    1e3 * first_s
+                ),
+                None => println!("{class} {model}: silent"),
+            }
         }
     }
 }
