@@ -73,6 +73,9 @@ fn filter(text: &str) -> Result<Targets, String> {
     if let Some(part) = parts.clone().find(|part| !is_name(&of(part))) {
         return Err(format!("'{}' is no level and no module; {wanted}", shortened(part)));
     }
+    if parts.clone().next().is_none() {
+        return Err(format!("an empty filter silences the service's log; {wanted}"));
+    }
     let filter: Targets = text
         .parse()
         .map_err(|error| format!("'{}' is not a filter: {error}; {wanted}", shortened(text)))?;

@@ -16,7 +16,7 @@ namespace {
 // Of sockets, of other sample types than floats, of windows that are sent, of helpers of the clients.
 const std::set<std::string> of_the_wire = {
     "f16", "u16", "u8", "mixed-types", "windows", "window-u8", "new-terms", "late", "stale",
-    "burst", "latest-wins", "reconnect", "http", "contacts", "addresses", "tokens"};
+    "burst", "latest-wins", "reconnect", "http", "contacts", "addresses", "tokens", "silence", "budget"};
 
 std::vector<float> list(const PapillaSamples& samples) {
   return samples.count ? std::vector<float>(samples.data, samples.data + samples.count) : std::vector<float>();

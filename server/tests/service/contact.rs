@@ -267,7 +267,7 @@ async fn pressure_on_a_soft_finger_is_refused_by_the_value_that_was_sent() {
         assert!(!message.contains("inf") && message.contains("2500 Pa"), "{message}");
     }
     // As maps, the same.
-    let hello = json!({"input": "pressure", "fingers": soft});
+    let hello = json!({"input": "pressure", "fingers": soft, "out_of_range": "refuse"});
     let mut socket = service.socket().await;
     let mut hello = hello_3(&hello);
     hello.as_object_mut().unwrap().remove("objects");
@@ -289,7 +289,7 @@ async fn a_refused_map_of_one_session_refuses_no_frame_of_another() {
     let mut bad = service.socket().await;
     bad.open(hello(&json!({}))).await;
     let mut good = service.socket().await;
-    good.open(pulled_hello(&json!({"map": false, "effects": [], "pressure": "map"}))).await;
+    good.open(pulled_hello(&json!({"map": false, "effects": []}))).await;
     for sequence in 1..4 {
         bad.send(frame(sequence, 0, SampleType::F32, 1.0, &vec![f32::NAN; MAP_LEN])).await;
         bad.hear_refusal("not_finite").await;
@@ -328,7 +328,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
     let ready = socket
         .open(hello_3(
             &json!({"pressure": "vertices", "answer_layout": "vertices", "effects": ["summary"],
-                "out_of_range": "flag"}),
+                "out_of_range": "flag", "method": "second_order"}),
         ))
         .await;
     let at = |name: &str| {
