@@ -258,7 +258,7 @@ async fn pressure_on_a_soft_finger_is_refused_by_the_value_that_was_sent() {
     let service = service().await;
     let soft = json!([{"stiffness": 0.25}]);
     let mut socket = service.socket().await;
-    socket.open(pulled_hello(&json!({"fingers": soft}))).await;
+    socket.open(pulled_hello(&json!({"fingers": soft, "out_of_range": "refuse"}))).await;
     for (sequence, pressure_pa, traction_pa) in [(1, 3.4e38, 0.0), (2, 2.6e3, 0.0), (3, 1e3, 2.6e3)]
     {
         socket.send(pulled(sequence, pressure_pa, traction_pa)).await;
