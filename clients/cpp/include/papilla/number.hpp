@@ -39,8 +39,13 @@ inline bool read(std::string_view text, double& value) {
 }
 
 /// The shortest text that reads as the number again, or 17 digits of it; `null` where it is no number.
+/// Whole numbers have neither point nor exponent: a reader of whole numbers takes no 1e+06.
 inline std::string print(double value) {
   if (!(value - value == 0.0)) return "null";
+  constexpr double kWholeMax = 9007199254740992.0;  // 2^53
+  if (value >= -kWholeMax && value <= kWholeMax && value == static_cast<double>(static_cast<long long>(value))) {
+    return std::to_string(static_cast<long long>(value));
+  }
 #ifdef PAPILLA_STREAM_NUMBERS
   std::ostringstream out;
   out.imbue(std::locale::classic());
