@@ -16,6 +16,8 @@ density (SED), NAME.SET.p95 its 95th percentile, NAME.SET.far the error away fro
 that of the greatest SED, NAME.ms the time of a map on one core, NAME.s that of a state. Sets:
 reference, reference-anew, broad, unseen, pressed, s1. Keys of contact: contact.METHOD.SET.QUANTITY
 and the same with .p95; quantities are pressure, force, sed, us (processor time of a warm frame).
+sessions.NAME.maps and sessions.NAME.poses are the sessions of 90 Hz that one core holds at half
+load, from the two times above (docs/guides/operating.md).
 
 Errors are rounded to what they are worth: one decimal below 10 %, none above.
 """
@@ -44,6 +46,10 @@ METHODS = {
     "second order, pixels": "pixels",
     "second order, gaps": "gaps",
 }
+# Decoding, encoding and sending a map, ms (docs/reports/latency.md, 'Where the time goes').
+BESIDE_MS = 0.12
+# The load to plan for, and the rate of a session.
+LOAD, RATE_HZ = 0.5, 90
 CONTACT_SETS = {"final": "reference", "broad": "broad", "heldout": "unseen"}
 
 
@@ -89,10 +95,22 @@ def of_contact(text: str) -> dict[str, str]:
     return found
 
 
+def of_sizing(text: str, contact_us: float) -> dict[str, str]:
+    """Sessions that one core holds, by what a frame takes of it."""
+    found = {}
+    for rung in json.loads(text)["rungs"]:
+        if latency := (rung["latency_ms"] or {}).get("tract"):
+            for what, contact_ms in [("maps", 0.0), ("poses", contact_us / 1000)]:
+                frame_ms = latency["p50"] + BESIDE_MS + contact_ms
+                found[f"sessions.{rung['name']}.{what}"] = milliseconds(1000 * LOAD / RATE_HZ / frame_ms)
+    return found
+
+
 def figures() -> dict[str, str]:
     """All figures, by key."""
     ladder = (ROOT / "models/ladder.json").read_text()
-    return of_ladder(ladder) | of_contact((ROOT / "docs/reports/contact.md").read_text())
+    contact = of_contact((ROOT / "docs/reports/contact.md").read_text())
+    return of_ladder(ladder) | contact | of_sizing(ladder, float(contact["contact.pixels.broad.us"]))
 
 
 def filled(text: str, known: dict[str, str]) -> tuple[str, list[str]]:
