@@ -12,7 +12,7 @@ static class Native
     static readonly string[] OfTheWire =
     {
         "f16", "u16", "u8", "mixed-types", "windows", "window-u8", "new-terms", "late", "stale", "burst", "latest-wins", "reconnect", "http", "contacts",
-        "addresses", "tokens",
+        "addresses", "tokens", "silence", "budget",
     };
 
     static int Main(string[] arguments)
