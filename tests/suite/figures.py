@@ -14,7 +14,8 @@ is stale and every key that no source has. --write renews them, --list prints al
 Keys of networks and of finite-element rows: NAME.SET is the median relative L2 of strain energy
 density (SED), NAME.SET.p95 its 95th percentile, NAME.SET.far the error away from the contact, NAME.SET.peak
 that of the greatest SED, NAME.ms the time of a map on one core, NAME.s that of a state. Sets:
-reference, reference-anew, broad, unseen, pressed, s1. Keys of contact: contact.METHOD.SET.QUANTITY
+reference, reference-anew, broad, unseen, pressed, s1. reference.error and teacher.pressure are what
+the truths err themselves. Keys of contact: contact.METHOD.SET.QUANTITY
 and the same with .p95; quantities are pressure, force, sed, us (processor time of a warm frame).
 sessions.NAME.maps and sessions.NAME.poses are the sessions of 90 Hz that one core holds at half
 load, from the two times above (docs/guides/operating.md).
@@ -77,7 +78,17 @@ def of_ladder(text: str) -> dict[str, str]:
             found[f"{rung['name']}.ms"] = milliseconds(latency["p50"])
         if seconds := rung["seconds"]:
             found[f"{rung['name']}.s"] = f"{seconds['p50']:.0f}"
-    return found
+    return found | of_truth(json.loads(text))
+
+
+def of_truth(ladder: dict) -> dict[str, str]:
+    """What the truths err themselves: the reference's SED, and the teacher's pressure against it."""
+    pressure = ladder["readings"]["pressure"]
+    return {
+        "reference.error": percent(ladder["discretisation_error"]["sed_relative_l2"]),
+        "teacher.pressure": percent(pressure["median"]),
+        "teacher.pressure.p95": percent(pressure["p95"]),
+    }
 
 
 def of_contact(text: str) -> dict[str, str]:
