@@ -45,7 +45,7 @@ class AsyncSession:
     `async with AsyncSession(tier="small") as session: (await session.render(pressure_pa)).sed`
 
     The arguments after `url` and `token` are the members of the protocol's hello
-    (docs/reference/protocol.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
+    (docs/reference/protocol-hello.md): `tier`, `budget_us`, `sample_type`, `effects` and their parameters, and
     so on. When the connection breaks, or the service asks for it, the session opens another by itself;
     where the service asked, no frame is lost and what it remembers goes along.
 

@@ -14,7 +14,7 @@ from .wire import Map, Window
 
 
 class Summary(NamedTuple):
-    """A map in sixteen numbers; formulas in docs/reference/protocol.md."""
+    """A map in sixteen numbers; formulas in docs/reference/protocol-effects.md."""
 
     force_n: float
     contact_area_mm2: float

@@ -16,7 +16,7 @@ class Closed(PapillaError):
 
 
 class Refused(PapillaError):
-    """The service refused a request or a hello; `code` is one of docs/reference/protocol.md's."""
+    """The service refused a request or a hello; `code` is one of docs/reference/protocol-errors.md's."""
 
     def __init__(self, code: str, message: str, field: str | None = None) -> None:
         super().__init__(f"{code}: {message}" + (f" (in '{field}')" if field else ""))

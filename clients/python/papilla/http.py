@@ -95,7 +95,7 @@ def post(
 ) -> HttpAnswer:
     """SED of one pressure map (224 x 224, Pa), with what is known about it.
 
-    Raises Refused (with the code of docs/reference/protocol.md) or Unreachable.
+    Raises Refused (with the code of docs/reference/protocol-errors.md) or Unreachable.
     """
     body = io.BytesIO()
     np.save(body, np.asarray(pressure_pa, "<f4"))

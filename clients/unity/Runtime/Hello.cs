@@ -3,7 +3,7 @@ using Newtonsoft.Json.Linq;
 
 namespace Papilla
 {
-    /// <summary>What a session asks for; null members take the server's default. See docs/reference/protocol.md.</summary>
+    /// <summary>What a session asks for; null members take the server's default. See docs/reference/protocol-hello.md.</summary>
     public sealed class Hello
     {
         /// <summary>Tier by name; null: the server's choice.</summary>

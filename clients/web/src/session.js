@@ -70,7 +70,7 @@ export class Session {
 
   /**
    * @param {string} base where the server is: `host:port` or a URL; '' for the server of the page
-   * @param {Hello} [hello] what to ask for; see docs/reference/protocol.md
+   * @param {Hello} [hello] what to ask for; see docs/reference/protocol-hello.md
    * @param {Options} [options]
    */
   constructor(base = '', hello = {}, options = {}) {

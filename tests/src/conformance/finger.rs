@@ -1,5 +1,5 @@
-//! The formulas of docs/reference/protocol.md and docs/reference/atlas.md on the finger, in f64 and in their plainest
-//! form. They share nothing with the server, which is compared with them.
+//! The formulas of docs/reference/protocol-effects.md and docs/reference/atlas.md on the finger, in
+//! f64 and in their plainest form. They share nothing with the server, which is compared with them.
 
 use papilla_proto::{
     MAP_LEN, MAP_SIDE_PX,

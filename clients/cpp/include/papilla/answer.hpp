@@ -12,14 +12,14 @@
 
 namespace papilla {
 
-/// An error of the service's; `code` is one of docs/reference/protocol.md's.
+/// An error of the service's; `code` is one of docs/reference/protocol-errors.md's.
 struct Problem {
   std::string code;
   std::string message;
   std::string field;
 };
 
-/// The sixteen numbers of a summary, by name; formulas in docs/reference/protocol.md.
+/// The sixteen numbers of a summary, by name; formulas in docs/reference/protocol-effects.md.
 enum SummaryMember : std::size_t {
   force_n, contact_area_mm2, pressure_max_pa, pressure_u_px, pressure_v_px, sed_max_j_per_m3,
   sed_max_u_px, sed_max_v_px, sed_integral_uj_per_m, sed_u_px, sed_v_px, sed_uu_px2, sed_uv_px2,

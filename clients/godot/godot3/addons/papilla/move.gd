@@ -1,4 +1,4 @@
-# A session's way to another connection when the service asks for it (docs/reference/protocol.md): the connection is
+# A session's way to another connection when the service asks for it (docs/reference/protocol-moving.md): the connection is
 # opened while frames go on over the old one; then they wait until the old one has said what the service remembers,
 # sealed, and the new one is ready. Where a step fails, the old connection goes on, and it is tried again.
 extends Reference

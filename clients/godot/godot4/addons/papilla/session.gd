@@ -37,7 +37,7 @@ const PASSING = ["overloaded", "shutting_down", "timeout", "internal", "rate_lim
 @export var url := "http://127.0.0.1:7224"
 # Bearer token, for a server that asks for one; blanks around it go.
 @export var token := ""
-# What to ask for, as in docs/reference/protocol.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
+# What to ask for, as in docs/reference/protocol-hello.md: {"tier": "nano", "effects": ["summary"], ...}. Type and version are added.
 @export var hello := {}
 # Connect when the scene starts.
 @export var auto_open := true
