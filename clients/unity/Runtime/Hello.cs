@@ -76,7 +76,7 @@ namespace Papilla
         public readonly long Session;
         public readonly string AtlasHash;
         public readonly long PredictedLatencyUs;
-        /// <summary>Pressure above this is refused, Pa.</summary>
+        /// <summary>Greatest pressure that the tier was trained on, Pa; what becomes of more the hello says (<c>out_of_range</c>).</summary>
         public readonly float PressureMaxPa;
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;

@@ -40,7 +40,7 @@ export interface Hello {
   atlas_hash?: string | null;
   map?: boolean;
   contact_pa?: number;
-  out_of_range?: 'refuse' | 'flag';
+  out_of_range?: 'clamp' | 'flag' | 'refuse';
   stale_after_us?: number | null;
   contact_window?: { margin_px?: number };
   points?: Place[];

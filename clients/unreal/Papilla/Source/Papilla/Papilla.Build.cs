@@ -7,6 +7,8 @@ public class Papilla : ModuleRules
     {
         PCHUsage = PCHUsageMode.UseExplicitOrSharedPCHs;
         CppStandard = CppStandardVersion.Cpp20;
+        // papilla/answer.hpp throws where an answer is asked for what it does not carry.
+        bEnableExceptions = true;
         PublicDependencyModuleNames.AddRange(new[] { "Core", "CoreUObject", "Engine" });
         PrivateDependencyModuleNames.AddRange(new[] { "HTTP", "WebSockets" });
         // The C++ client's headers: copied into the plugin, or beside it as in the repository.
