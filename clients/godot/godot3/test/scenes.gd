@@ -21,6 +21,8 @@ func _initialize():
 		_node.set_script(load(path))
 		_node.session.url = _url
 		_node.session.connect("map_received", self, "_on_map")
+		# Of a session without maps.
+		_node.session.connect("touched", self, "_on_map")
 	root.add_child(_node)
 
 
