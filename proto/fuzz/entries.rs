@@ -5,8 +5,8 @@
 use std::fmt::Debug;
 
 use papilla_proto::{
-    ClientMessage, FrameHeader, MAP_LEN, MapError, PressureRange, SampleType, ServerMessage,
-    Summary, Window,
+    ClientMessage, FrameHeader, HEADER_LEN, MAP_LEN, MapError, PressureRange, SampleType,
+    ServerMessage, Summary, Window,
     atlas::{Atlas, AtlasError, Patch, Raster, VertexSampler},
     effects::OutOfRange,
 };
@@ -26,15 +26,10 @@ pub(crate) fn frame(data: &[u8]) {
         }
     };
     assert_eq!(sequence, Some(header.sequence));
-    let len = header.header_len();
-    let mut canonical = data[..len].to_vec();
-    // The last byte of version 2 means nothing; in version 3 it is the finger.
-    if canonical[4] == 2 {
-        canonical[47] = 0;
-    }
-    assert_eq!(&header.encode()[..], &canonical[..]);
+    let (head, payload) = data.split_at(HEADER_LEN);
+    assert_eq!(&header.encode()[..], head);
 
-    let (window, payload) = (header.window(), &data[len..]);
+    let window = header.window();
     let mut map = vec![f32::NAN; MAP_LEN];
     let decoded = window.decode(header.sample_type, payload, header.scale, &mut map);
     if decoded.is_ok() {

@@ -1,6 +1,6 @@
-//! Where things are, in place of pressure, and what pushes back: protocol version 3.
+//! Where things are, in place of pressure, and what pushes back.
 //!
-//! A hello of version 3 says what its frames hold with `input`, and announces objects and fingers.
+//! A hello says what its frames hold with `input`, and announces objects and fingers.
 //!
 //! | `input` | kind | width x height | payload |
 //! |---|---|---|---|
@@ -32,7 +32,7 @@ pub const OBJECTS_MAX: usize = 16;
 /// Most fingers of a session.
 pub const FINGERS_MAX: usize = 10;
 
-/// What frames of version 3 hold.
+/// What frames hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Input {

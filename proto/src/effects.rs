@@ -2,7 +2,7 @@
 //!
 //! A hello names its effects; what it does not name is neither computed nor allocated. What an
 //! effect needs to know goes into the hello's member of the same name, whose members all have a
-//! default unless the text says otherwise. All of this needs version 2.
+//! default unless the text says otherwise.
 
 use std::{fmt, str::FromStr};
 
@@ -26,7 +26,7 @@ pub enum RuntimeEffect {
     Spikes,
     /// The tissue creeps under the pressure.
     Relaxation,
-    /// SED feels traction along the skin. Version 3.
+    /// SED feels traction along the skin.
     ShearEnergy,
 }
 
@@ -170,7 +170,7 @@ pub struct Layout {
     #[serde(default)]
     pub input: ActuatorInput,
     /// How intensities are found.
-    #[serde(default, skip_serializing_if = "is_formula")]
+    #[serde(default)]
     pub drive: Drive,
     /// Radius of a receptive field, or of a pin, mm. Due unless every actuator has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -184,11 +184,6 @@ pub struct Layout {
     /// Greatest intensity.
     #[serde(default = "one")]
     pub max: f32,
-}
-
-/// Services that know no other have no such member.
-fn is_formula(drive: &Drive) -> bool {
-    *drive == Drive::Formula
 }
 
 fn one() -> f32 {
@@ -289,8 +284,8 @@ pub struct Relaxation {
     pub moduli: Moduli,
 }
 
-/// What becomes of pressure above what the tier was trained on. Sessions of version 2 clamp unless
-/// their hello says otherwise; whatever has no flags to show refuses.
+/// What becomes of pressure above what the tier was trained on. Sessions clamp unless their hello
+/// says otherwise; whatever has no flags to show refuses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OutOfRange {
@@ -305,7 +300,7 @@ pub enum OutOfRange {
     Clamp,
 }
 
-/// One part of the payload of an answer of version 2. Parts begin at multiples of 16, which the
+/// One part of the payload of an answer. Parts begin at multiples of 16, which the
 /// parts before them reach with zeros.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Section {
@@ -321,11 +316,11 @@ pub struct Section {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SectionName {
-    /// A [`Touch`](crate::contact::Touch). Version 3.
+    /// A [`Touch`](crate::contact::Touch).
     Touch,
-    /// Pressure, one f32 a vertex or pixel. Version 3.
+    /// Pressure, one f32 a vertex or pixel.
     Pressure,
-    /// Traction along the skin, three f32 a vertex, Pa, in the finger's frame. Version 3.
+    /// Traction along the skin, three f32 a vertex, Pa, in the finger's frame.
     Shear,
     /// A [`Summary`](crate::Summary).
     Summary,
@@ -342,7 +337,7 @@ pub enum SectionName {
     Rates,
     /// The samples of the map, SED; always last.
     Map,
-    /// SED at the vertices of the atlas, in place of the map. Version 3.
+    /// SED at the vertices of the atlas, in place of the map.
     Vertices,
 }
 

@@ -20,14 +20,14 @@
 //! | [`error`] | error codes and their HTTP status |
 //!
 //! ```
-//! use papilla_proto::{FrameHeader, MAP_SIDE_PX, SampleType, Window};
+//! use papilla_proto::{FrameHeader, HEADER_LEN, MAP_SIDE_PX, SampleType, Window};
 //!
-//! // What of a map carries pressure, and a frame of version 2 for it: 90 us to answer.
+//! // What of a map carries pressure, and a frame for it: 90 us to answer.
 //! let mut pressure_pa = vec![0.0_f32; MAP_SIDE_PX * MAP_SIDE_PX];
 //! pressure_pa[100 * MAP_SIDE_PX + 112] = 8e3;
 //! let window = Window::around(&pressure_pa, 0.0, 2);
 //! let header = FrameHeader::pressure(1, 0, 90, SampleType::F32, 1.0).windowed(window);
-//! assert_eq!((header.header_len(), header.payload_len()), (48, 5 * 5 * 4));
+//! assert_eq!((HEADER_LEN, header.payload_len()), (48, 5 * 5 * 4));
 //!
 //! let mut payload = vec![0; header.payload_len()];
 //! window.encode(header.sample_type, &pressure_pa, header.scale, &mut payload)?;
@@ -62,9 +62,7 @@ pub use papilla_sdf as sdf;
 
 pub use effects::RuntimeEffect;
 pub use error::{ErrorCode, Problem};
-pub use frame::{
-    Extension, FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, flags,
-};
+pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, flags};
 pub use input_statistics::InputStatistics;
 pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
@@ -83,7 +81,6 @@ pub const INPUT_NAME: &str = "pressure_pa";
 /// Name of a model's output, `[1, 1, 224, 224]` float32, J/m3.
 pub const OUTPUT_NAME: &str = "sed_j_per_m3";
 
-/// Versions of the session protocol and of the binary frame that are spoken. The second adds to
-/// the first: windows, timings in every answer, run-time effects. The third adds to that: objects
-/// and gaps in place of pressure, forces, several fingers.
-pub const PROTOCOL_VERSIONS: [u8; 3] = [1, 2, 3];
+/// Version of the session protocol, which every hello may and every binary frame has to name. No
+/// other is spoken.
+pub const PROTOCOL_VERSION: u8 = 3;

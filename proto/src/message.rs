@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub use self::moving::{Reconnect, ReconnectReason, Resumption, SEALED_MAGIC};
 use self::tagged::WithoutType;
 use crate::{
-    ErrorCode, Problem, RuntimeEffect, SampleType,
+    ErrorCode, PROTOCOL_VERSION, Problem, RuntimeEffect, SampleType,
     contact::{AnnouncedFinger, AnnouncedObject, ContactMethod, Input, MethodError, SampleLayout},
     effects::{Afferents, ContactWindow, Layout, OutOfRange, Place, Relaxation, Section},
     json::{self, JsonError},
@@ -90,11 +90,11 @@ impl ClientMessage {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hello {
-    /// Version of the protocol the client speaks, one of
-    /// [`PROTOCOL_VERSIONS`](crate::PROTOCOL_VERSIONS).
+    /// Version of the protocol the client speaks: [`PROTOCOL_VERSION`](crate::PROTOCOL_VERSION).
+    #[serde(default = "spoken")]
     pub version: u32,
     /// Effects the scene calls for, by name; the tier must render them all, but for those of the
-    /// session ([`RuntimeEffect`](crate::RuntimeEffect), version 2).
+    /// session ([`RuntimeEffect`](crate::RuntimeEffect)).
     #[serde(default)]
     pub effects: Vec<String>,
     /// Time a frame may spend in the server, us; also the deadline of frames
@@ -114,7 +114,7 @@ pub struct Hello {
     /// Hash of the atlas the client draws with; refused if the tier has another.
     #[serde(default)]
     pub atlas_hash: Option<String>,
-    /// Sample type of the answers, if another. Version 2, as all that follows.
+    /// Sample type of the answers, if another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer_sample_type: Option<SampleType>,
     /// False: answers carry no map, only what the effects add.
@@ -154,7 +154,7 @@ pub struct Hello {
     /// True: the next message is what another session of this client remembers, sealed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub resume: Option<bool>,
-    /// What frames hold. Version 3, as all that follows.
+    /// What frames hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub input: Option<Input>,
     /// Where samples of pressure and gaps are.
@@ -206,56 +206,31 @@ impl Hello {
             || self.objects.iter().flatten().any(|object| rough(object.friction))
     }
 
-    /// The first member of version 2 that is there.
-    #[must_use]
-    pub fn member_of_version_2(&self) -> Option<&'static str> {
-        [
-            (self.answer_sample_type.is_some(), "answer_sample_type"),
-            (self.map.is_some(), "map"),
-            (self.contact_pa.is_some(), "contact_pa"),
-            (self.out_of_range.is_some(), "out_of_range"),
-            (self.stale_after_us.is_some(), "stale_after_us"),
-            (self.contact_window.is_some(), "contact_window"),
-            (self.points.is_some(), "points"),
-            (self.actuators.is_some(), "actuators"),
-            (self.afferents.is_some(), "afferents"),
-            (self.spikes.is_some(), "spikes"),
-            (self.relaxation.is_some(), "relaxation"),
-            (self.reconnect.is_some(), "reconnect"),
-            (self.resume.is_some(), "resume"),
-        ]
-        .into_iter()
-        .find_map(|(there, name)| there.then_some(name))
-    }
-
-    /// The first member of version 3 that is there.
-    #[must_use]
-    pub fn member_of_version_3(&self) -> Option<&'static str> {
-        [
-            (self.input.is_some(), "input"),
-            (self.input_layout.is_some(), "input_layout"),
-            (self.answer_layout.is_some(), "answer_layout"),
-            (self.objects.is_some(), "objects"),
-            (self.fingers.is_some(), "fingers"),
-            (self.method.is_some(), "method"),
-            (self.force_target.is_some(), "force_target"),
-            (self.stiffness.is_some(), "stiffness"),
-            (self.pressure.is_some(), "pressure"),
-            (self.shear.is_some(), "shear"),
-            (self.friction.is_some(), "friction"),
-            (self.velocity.is_some(), "velocity"),
-            (self.traction.is_some(), "traction"),
-        ]
-        .into_iter()
-        .find_map(|(there, name)| there.then_some(name))
+    /// Whether the hello is of the protocol that is spoken.
+    ///
+    /// # Errors
+    /// It names another version.
+    pub fn check_version(&self) -> Result<(), Problem> {
+        if self.version == spoken() {
+            return Ok(());
+        }
+        let message = format!(
+            "version {} is not spoken here; name {PROTOCOL_VERSION}, or leave the member out",
+            self.version
+        );
+        Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"))
     }
 }
 
+fn spoken() -> u32 {
+    PROTOCOL_VERSION.into()
+}
+
 impl Default for Hello {
-    /// A hello of version 1 without a wish.
+    /// A hello without a wish.
     fn default() -> Self {
         Self {
-            version: 1,
+            version: spoken(),
             effects: Vec::new(),
             budget_us: None,
             tier: None,
@@ -337,34 +312,28 @@ pub struct Ready {
     /// J/m3 per unit of u16 and u8 answers that reach the greatest SED the tier knows, 1 for
     /// floats. The header of each answer has its own.
     pub sed_scale_j_per_m3: f32,
-    /// Number that answers name the tier by. Version 2, as all that follows.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub tier_number: Option<u16>,
+    /// Number that answers name the tier by.
+    pub tier_number: u16,
     /// Names of the tiers by the numbers that answers give, where the budget chooses among them
     /// while the session lasts.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tier_names: Option<Vec<String>>,
     /// Sample type of the answers.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub answer_sample_type: Option<SampleType>,
+    pub answer_sample_type: SampleType,
     /// Effects of the session, in the order in which they act.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub session_effects: Option<Vec<RuntimeEffect>>,
+    pub session_effects: Vec<RuntimeEffect>,
     /// What the payload of an answer with status ok holds, and where.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sections: Option<Vec<Section>>,
+    pub sections: Vec<Section>,
     /// The units of the effect `spikes`, by number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Vec<PlacedUnit>>,
     /// What became of the state that the hello brought.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<Resumption>,
-    /// Vertices of the atlas, for what is laid out by them. Version 3, as all that follows.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub vertices: Option<u32>,
+    /// Vertices of the atlas, for what is laid out by them.
+    pub vertices: u32,
     /// Fingers of the session.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fingers: Option<u32>,
+    pub fingers: u32,
     /// Time of the contact solve that is expected, us; within `predicted_latency_us`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_us: Option<u64>,

@@ -115,7 +115,7 @@ fn hello() -> impl Strategy<Value = Hello> {
     })
 }
 
-/// The members of version 3.
+/// The members of contact.
 fn contact() -> impl Strategy<Value = Hello> {
     let layout =
         || prop::option::of(prop::sample::select(vec![SampleLayout::Map, SampleLayout::Vertices]));
@@ -177,13 +177,14 @@ proptest! {
     fn readies_come_back(
         names in prop::collection::vec(".{0,12}", 3),
         numbers in any::<(u64, u64, Option<u32>, Option<bool>, Option<u16>)>(),
+        tier_number in any::<u16>(),
         scales in (number(), number()),
-        effects in prop::option::of(prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=8)),
+        effects in prop::sample::subsequence(RuntimeEffect::ALL.to_vec(), 0..=8),
         offset in any::<u32>(),
     ) {
         let section = Section { name: SectionName::Points, offset, bytes: 8 };
         let message = ServerMessage::Ready(Box::new(Ready {
-            version: 2,
+            version: 3,
             session: numbers.0,
             tier: names[0].clone(),
             effects: vec![names[1].clone()],
@@ -196,18 +197,18 @@ proptest! {
             sample_type: SampleType::U8,
             pressure_max_pa: scales.0,
             sed_scale_j_per_m3: scales.1,
-            tier_number: numbers.4,
+            tier_number,
             tier_names: numbers.3.map(|_| names.clone()),
-            answer_sample_type: Some(SampleType::F16),
+            answer_sample_type: SampleType::F16,
             session_effects: effects,
-            sections: Some(vec![section]),
+            sections: vec![section],
             units: numbers.4.map(|model| {
                 let model = model as u8;
                 vec![PlacedUnit { class: UnitClass::Ra, model, px: [scales.0, 0.5] }]
             }),
             state: numbers.2.map(|_| Resumption::OtherTerms),
-            vertices: Some(offset),
-            fingers: numbers.2,
+            vertices: offset,
+            fingers: tier_number.into(),
             contact_us: Some(numbers.1),
             method: numbers.3.map(|_| ContactMethod::Pixels),
             expected_error: numbers.2.map(|states| {

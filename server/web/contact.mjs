@@ -1,4 +1,4 @@
-// The press as a contact solve of the server's (protocol version 3): the indenter is announced once, then its pose goes
+// The press as a contact solve of the server's: the indenter is announced once, then its pose goes
 // out with every frame, and the pressure that was found and what pushes back come in.
 
 const PLATE_MM = { size: 20, edge: 0.5, halfHeight: 2.5 };

@@ -1,4 +1,4 @@
-// Papilla's session protocol, versions 2 and 3, client side: one WebSocket, a JSON hello, a JSON ready, then binary frames
+// Papilla's session protocol, client side: one WebSocket, a JSON hello, a JSON ready, then binary frames
 // of a 48-byte little-endian header and a payload (here always f32): a row-major 224 x 224 map, or an object's pose.
 
 import { SpikeSection } from './spikes.mjs';
@@ -6,6 +6,8 @@ import { SpikeSection } from './spikes.mjs';
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
 export const HEADER_BYTES = 48;
+
+const VERSION = 3;
 
 const STATUS = ['ok', 'superseded', 'late', 'error', 'late'];
 const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
@@ -25,13 +27,13 @@ const BARE_MAP = { map: HEADER_BYTES };
 
 /** A request frame whose buffer is made once and refilled for every frame. */
 export class RequestFrame {
-  constructor(version, kind, width, height) {
+  constructor(kind, width, height) {
     this.buffer = new ArrayBuffer(HEADER_BYTES + 4 * width * height);
     this.header = new DataView(this.buffer, 0, HEADER_BYTES);
     /** What is sent: write it here. */
     this.values = new Float32Array(this.buffer, HEADER_BYTES, width * height);
     this.header.setUint32(0, MAGIC, true);
-    this.header.setUint8(4, version);
+    this.header.setUint8(4, VERSION);
     this.header.setUint8(5, kind);
     this.header.setUint8(6, SAMPLE_F32);
     this.header.setUint16(12, width, true);
@@ -41,12 +43,12 @@ export class RequestFrame {
 
   /** Of pressure on the skin, Pa, row-major. */
   static map() {
-    return new RequestFrame(2, KIND.pressure, SIDE_PX, SIDE_PX);
+    return new RequestFrame(KIND.pressure, SIDE_PX, SIDE_PX);
   }
 
   /** Of where an object is: origin, mm, and quaternion. */
   static pose() {
-    return new RequestFrame(3, KIND.objects, POSE_LEN, 1);
+    return new RequestFrame(KIND.objects, POSE_LEN, 1);
   }
 
   /** Stamps the frame; the time is split by hand because a BigInt would be an allocation. */
@@ -64,7 +66,7 @@ export function readAnswer(data, into, at = BARE_MAP) {
   }
   const view = new DataView(data);
   if (view.getUint32(0, true) !== MAGIC) throw new Error('answer does not start with PPL1');
-  if (![2, 3].includes(view.getUint8(4))) throw new Error(`answer has protocol version ${view.getUint8(4)}`);
+  if (view.getUint8(4) !== VERSION) throw new Error(`answer has protocol version ${view.getUint8(4)}`);
   if (view.getUint8(5) !== KIND.sed) throw new Error(`answer is of kind ${view.getUint8(5)}, not SED`);
   into.status = STATUS[view.getUint8(7)] ?? 'error';
   into.sequence = view.getUint32(8, true);
@@ -136,8 +138,7 @@ export class Session {
   }
 
   #hello(socket) {
-    const version = this.wish.input ? 3 : 2;
-    socket.send(JSON.stringify({ type: 'hello', version, effects: [], sample_type: 'f32', ...this.wish }));
+    socket.send(JSON.stringify({ type: 'hello', version: VERSION, effects: [], sample_type: 'f32', ...this.wish }));
   }
 
   /** Sends the frame; false while an answer is due or the session is not ready. */

@@ -30,7 +30,7 @@ test('a request frame has the documented bytes', () => {
   frame.stamp(0x04030201, 0x0102 * 2 ** 32 + 0x03040506);
   const bytes = [...new Uint8Array(frame.buffer, 0, HEADER_BYTES)];
   assert.deepEqual(bytes, [
-    0x50, 0x50, 0x4c, 0x31, 2, 1, 0, 0, 1, 2, 3, 4, 224, 0, 224, 0,
+    0x50, 0x50, 0x4c, 0x31, 3, 1, 0, 0, 1, 2, 3, 4, 224, 0, 224, 0,
     6, 5, 4, 3, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0x80, 0x3f,
     ...Array(16).fill(0),
   ]);
@@ -61,7 +61,7 @@ test('the pose of a press turns the indenter into the finger, wherever it stands
 function answerFrame(status, payload) {
   const data = new ArrayBuffer(HEADER_BYTES + payload);
   const view = new DataView(data);
-  [0x50, 0x50, 0x4c, 0x31, 2, 2, 0, status].forEach((byte, i) => view.setUint8(i, byte));
+  [0x50, 0x50, 0x4c, 0x31, 3, 2, 0, status].forEach((byte, i) => view.setUint8(i, byte));
   view.setUint32(8, 7, true);
   view.setUint32(24, 1234, true);
   view.setUint16(44, 3, true);

@@ -50,14 +50,14 @@ def frame_of(first: int, payload: bytes = b"") -> bytes:
 
 
 def hello(**members: object) -> bytes:
-    text = json.dumps({"type": "hello", "version": 2, "tier": "nano", "sample_type": "u8", **members})
+    text = json.dumps({"type": "hello", "tier": "nano", "sample_type": "u8", **members})
     return frame_of(FINAL | TEXT, text.encode())
 
 
 def pressure(sequence: int, side: int) -> bytes:
-    """A frame of version 2 of the protocol whose window of SIDE x SIDE pixels is under 5 kPa."""
+    """A frame of the protocol whose window of SIDE x SIDE pixels is under 5 kPa."""
     time_us, at = time.monotonic_ns() // 1000, (224 - side) // 2
-    head = HEADER.pack(b"PPL1", 2, 1, 3, 0, sequence, side, side, time_us, 0, 50.0, at, at, 0, 0, 0, 0, 0)
+    head = HEADER.pack(b"PPL1", 3, 1, 3, 0, sequence, side, side, time_us, 0, 50.0, at, at, 0, 0, 0, 0, 0)
     return frame_of(FINAL | BINARY, head + bytes([100]) * (side * side))
 
 
@@ -180,7 +180,7 @@ def press(kind: str, stream: socket.socket, stop: multiprocessing.Event, sent: m
 
 
 def leave(_: str, stream: socket.socket, __: multiprocessing.Event, sent: multiprocessing.Value) -> None:
-    said = {"type": "hello", "version": 3, "input": "objects", "map": False, "objects": [{"shape": slivers(12288)}]}
+    said = {"type": "hello", "input": "objects", "map": False, "objects": [{"shape": slivers(12288)}]}
     block = frame_of(FINAL | TEXT, json.dumps(said).encode())
     stream.sendall(block)
     sent.value += len(block)

@@ -46,7 +46,7 @@ SESSIONS = whole(json.loads((Path(__file__).parent / "hostile-sessions.json").re
 
 
 def hello_of(name: str) -> dict:
-    return {"type": "hello", "version": 3, "tier": "nano"} | SESSIONS[name]["hello"]
+    return {"type": "hello", "tier": "nano"} | SESSIONS[name]["hello"]
 
 
 def payload_of(name: str) -> tuple[int, int, int]:

@@ -8,7 +8,7 @@ use futures_util::{
 };
 use papilla_client::dial;
 use papilla_proto::{
-    ClientMessage, FrameError, FrameHeader, Hello, Ready, ServerMessage, SessionError,
+    ClientMessage, FrameError, FrameHeader, HEADER_LEN, Hello, Ready, ServerMessage, SessionError,
 };
 use tokio::{net::TcpStream, time::timeout};
 use tokio_tungstenite::{
@@ -145,7 +145,7 @@ pub fn into_stream(sender: Sender, receiver: Receiver) -> io::Result<std::net::T
 /// A frame: header and samples.
 #[must_use]
 pub fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
-    let mut frame = Vec::with_capacity(header.header_len() + payload.len());
+    let mut frame = Vec::with_capacity(HEADER_LEN + payload.len());
     frame.extend_from_slice(&header.encode());
     frame.extend_from_slice(payload);
     frame
@@ -194,7 +194,7 @@ impl Receiver {
                 }
                 Message::Binary(bytes) => {
                     let header = FrameHeader::decode(&bytes)?;
-                    return Ok(Said::Frame(header, bytes.slice(header.header_len()..)));
+                    return Ok(Said::Frame(header, bytes.slice(HEADER_LEN..)));
                 }
                 Message::Close(_) => return Err(SocketError::Closed),
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}

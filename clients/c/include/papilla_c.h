@@ -5,7 +5,7 @@
  *   PapillaModel *model = papilla_model_new();
  *   PapillaSession *session = papilla_session_new();
  *   papilla_model_load(model, "models", NULL, NULL);
- *   papilla_session_open(session, model, "{\"type\": \"hello\", \"version\": 3}");
+ *   papilla_session_open(session, model, "{\"type\": \"hello\"}");
  *   papilla_send_map(session, 0, pressure_pa, PAPILLA_MAP_LEN, time_us, &answer);
  *
  * Units: mm, N, Pa, J/m3, us. Maps are 224 x 224, row-major, row 0 at the tip of the finger. The
@@ -168,7 +168,7 @@ void papilla_session_free(PapillaSession *session);
 const char *papilla_session_error(const PapillaSession *session);
 /* The member that the error is about, as "objects[0].shape". */
 const char *papilla_session_error_field(const PapillaSession *session);
-/* Opens a session, or an open one anew. hello: the protocol's hello of version 3, as JSON; without
+/* Opens a session, or an open one anew. hello: the protocol's hello, as JSON; without
  * its members budget_us, stale_after_us and pressure_scale_pa. */
 PapillaStatus papilla_session_open(PapillaSession *session, const PapillaModel *model, const char *hello);
 /* How the open session finds pressure, as "pixels": the hello's method, or else the most accurate one

@@ -1,7 +1,7 @@
 //! What a frame came to.
 
 use papilla_proto::{
-    HEADER_LEN_V2, Window,
+    HEADER_LEN, Window,
     effects::{RATES_HEAD_LEN, Section, SectionName},
 };
 
@@ -65,7 +65,7 @@ impl Layout {
 
     /// Most numbers of an answer.
     pub(crate) fn len(&self) -> usize {
-        let end = |s: &Section| (s.offset + s.bytes) as usize - HEADER_LEN_V2;
+        let end = |s: &Section| (s.offset + s.bytes) as usize - HEADER_LEN;
         self.0.iter().map(end).max().unwrap_or(0).next_multiple_of(16) / 4
     }
 
@@ -73,7 +73,7 @@ impl Layout {
     /// cut to a window.
     pub(crate) fn give<'a>(&self, values: &'a [f32], answer: &mut Answer<'a>) {
         for section in &self.0 {
-            let begin = (section.offset as usize - HEADER_LEN_V2) / 4;
+            let begin = (section.offset as usize - HEADER_LEN) / 4;
             let end = (begin + section.bytes as usize / 4).min(values.len());
             let part = values.get(begin..end).unwrap_or_default();
             let list = match section.name {

@@ -1,14 +1,10 @@
 //! What a session asks for: the protocol's hello, as far as it has a meaning without a service.
 
 use papilla_proto::{
-    ClientMessage, ErrorCode, Hello, PROTOCOL_VERSIONS, Problem, RuntimeEffect, SampleType,
-    error::shortened,
+    ClientMessage, ErrorCode, Hello, Problem, RuntimeEffect, SampleType, error::shortened,
 };
 
 use crate::Model;
-
-/// The version that is spoken: the last one.
-const VERSION: u32 = PROTOCOL_VERSIONS[PROTOCOL_VERSIONS.len() - 1] as u32;
 
 /// Reads the text of a hello and holds it against the model.
 pub(crate) fn read(text: &str, model: &Model) -> Result<Hello, Problem> {
@@ -24,10 +20,7 @@ pub(crate) fn read(text: &str, model: &Model) -> Result<Hello, Problem> {
 
 /// Samples are C's floats, and what a network or a queue is asked for has no meaning here.
 fn check_form(hello: &Hello) -> Result<(), Problem> {
-    if hello.version != VERSION {
-        let message = format!("version {} is not spoken here, {VERSION} is", hello.version);
-        return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
-    }
+    hello.check_version()?;
     let other = |sample_type: Option<SampleType>| sample_type.is_some_and(|t| t != SampleType::F32);
     for (is_other, member) in [
         (other(Some(hello.sample_type)), "sample_type"),

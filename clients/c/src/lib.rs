@@ -10,7 +10,7 @@
 //! use papilla_c::{Model, Session};
 //!
 //! let model = Model::load("models".as_ref(), Some("nano"), None)?.into();
-//! let mut session = Session::open(&model, r#"{"type": "hello", "version": 3}"#)?;
+//! let mut session = Session::open(&model, r#"{"type": "hello"}"#)?;
 //! let mut pressure_pa = vec![0.0; 224 * 224];
 //! (95..115).for_each(|row| pressure_pa[row * 224 + 105..][..25].fill(8e3));
 //! session.send_map(0, &pressure_pa, 0)?;

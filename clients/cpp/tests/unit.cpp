@@ -71,8 +71,7 @@ static void numbers() {
   CHECK(print(std::nan("")) == "null");
 }
 
-// A hello that cannot be read is refused here, with the place: an empty one took its place, and the service
-// then asked for another version.
+// A hello that cannot be read is refused here, with the place: an empty one took its place.
 static void hellos() {
   papilla::Session::Options options;
   options.hello = R"("objects": [{"shape": {"shape": "sphere", "radius_mm": 10,5}}])";
@@ -87,7 +86,7 @@ static void messages() {
   int outcomes = 0;
   core.on_answer = [&](const papilla::Answer&) { ++outcomes; };
   CHECK(core.text("no json") == papilla::Core::Event::broken);
-  CHECK(core.text(R"({"type": "ready", "version": 2, "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
+  CHECK(core.text(R"({"type": "ready", "version": 3, "sample_type": "f32", "sections": [{"name": "map", "offset": 48, "bytes": 200704}]})") ==
         papilla::Core::Event::ready);
   const std::vector<float> map(papilla::map_len, 1.0F);
   const std::uint32_t sequence = core.send(map.data(), {}, 7);
@@ -107,10 +106,10 @@ static void messages() {
 }
 
 static void fingers() {
-  // The newest frame of each finger leaves, in turns, in the version and at the place of the protocol.
+  // The newest frame of each finger leaves, in turns, at the place of the protocol.
   papilla::Core core("\"input\": \"objects\"");
   CHECK(core.hello() == R"({"type":"hello","version":3,"input": "objects"})");
-  CHECK(papilla::Core("\"tier\": \"nano\"").hello() == R"({"type":"hello","version":2,"tier": "nano"})");
+  CHECK(papilla::Core("\"tier\": \"nano\"").hello() == R"({"type":"hello","version":3,"tier": "nano"})");
   std::vector<int> superseded;
   core.on_answer = [&](const papilla::Answer& answer) { superseded.push_back(answer.finger); };
   core.text(R"({"type": "ready", "version": 3, "sample_type": "u16", "sections": [{"name": "touch", "offset": 48, "bytes": 64}]})");

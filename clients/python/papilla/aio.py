@@ -33,10 +33,6 @@ TIMEOUT_S: Final = 5.0
 _LOG: Final = logging.getLogger("papilla")
 NetForce: TypeAlias = tuple[Sequence[float], float]
 """A unit vector in the finger's frame, and N along it."""
-_OF_VERSION_3: Final = {
-    "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target",
-    "stiffness", "pressure", "shear", "friction", "velocity", "traction",
-}  # fmt: skip
 
 
 class AsyncSession:
@@ -178,8 +174,8 @@ class AsyncSession:
             raise ValueError(f"{samples.shape} samples for a window of {window[3], window[2]}")
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
-        kind, version = self.ready["sample_type"], self.ready["version"]
-        message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us, version)
+        kind = self.ready["sample_type"]
+        message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
         return Frame(self._sequence, time_us, message)
 
     def send_poses(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
@@ -233,7 +229,7 @@ class AsyncSession:
         self._check_open()
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000
-        message = wire.encode_not_tracked(finger, self._sequence, time_us, self.ready["version"])
+        message = wire.encode_not_tracked(finger, self._sequence, time_us)
         return Frame(self._sequence, time_us, message, finger)
 
     def _check_open(self) -> None:
@@ -254,8 +250,7 @@ class AsyncSession:
         self._wake.set()
 
     def _words(self, hello: dict[str, Any]) -> str:
-        version = 3 if _OF_VERSION_3 & hello.keys() else 2
-        return json.dumps({"type": "hello", "version": version, "reconnect": True, **hello})
+        return json.dumps({"type": "hello", "version": wire.VERSION, "reconnect": True, **hello})
 
     async def _connect(self) -> None:
         socket = await self._dial()

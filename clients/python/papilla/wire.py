@@ -1,4 +1,4 @@
-"""Frames of versions 2 and 3 of the protocol (docs/reference/protocol.md)."""
+"""Frames of the protocol (docs/reference/protocol.md)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from .errors import BadFrame
 
+VERSION: Final = 3
+"""Version of the protocol, in hello and frames."""
 SIDE_PX: Final = 224
 """Pixels along one side of every map."""
 
@@ -56,7 +58,6 @@ class Header(NamedTuple):
 
 
 def _head(
-    version: int,
     kind: int,
     number: int,
     sequence: int,
@@ -81,7 +82,7 @@ def _head(
         if not isinstance(value, (int, np.integer)) or not 0 <= value <= most:
             raise BadFrame(member, value, most)
     return HEADER.pack(
-        b"PPL1", version, kind, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
+        b"PPL1", VERSION, kind, number, 0, sequence, width, height, client_time_us, deadline_us, scale,
         column, row, 0, 0, 0, flags, finger,
     )  # fmt: skip
 
@@ -93,7 +94,6 @@ def encode(
     sequence: int,
     client_time_us: int,
     deadline_us: int,
-    version: int = 2,
 ) -> bytes:
     """The message of one pressure frame; `pressure_pa` has the window's shape."""
     number, dtype, unit_max = _SAMPLES[sample_type]
@@ -108,7 +108,7 @@ def encode(
         samples = np.clip(pressure_pa, -65504.0, 65504.0).astype(dtype).tobytes()
     else:
         samples = pressure_pa.astype(dtype, copy=False).tobytes()
-    return _head(version, 1, number, sequence, window, client_time_us, deadline_us, scale) + samples
+    return _head(1, number, sequence, window, client_time_us, deadline_us, scale) + samples
 
 
 def encode_rows(
@@ -129,16 +129,16 @@ def encode_rows(
         samples += net.astype("<f4").tobytes()
         height += kind == "objects"
     window = (0, 0, width, height)
-    return _head(3, INPUTS[kind], 0, sequence, window, client_time_us, 0, 1.0, finger=finger) + samples
+    return _head(INPUTS[kind], 0, sequence, window, client_time_us, 0, 1.0, finger=finger) + samples
 
 
-def encode_not_tracked(finger: int, sequence: int, client_time_us: int, version: int) -> bytes:
+def encode_not_tracked(finger: int, sequence: int, client_time_us: int) -> bytes:
     """The message of a frame that says that nobody knows where things are: a header alone."""
-    return _head(version, 1, 0, sequence, (0, 0, 0, 0), client_time_us, 0, 1.0, NOT_TRACKED, finger)
+    return _head(1, 0, sequence, (0, 0, 0, 0), client_time_us, 0, 1.0, NOT_TRACKED, finger)
 
 
 INPUTS: Final = {"objects": 4, "gaps": 5}
-"""Kinds of frames of version 3."""
+"""Kinds of frames of poses and gaps."""
 FLAGS = {
     1: "out_of_range", 2: "no_contact", 4: "unfamiliar", 8: "unsettled", 16: "cut_off",
     NOT_TRACKED: "not_tracked", 64: "coarse_clock",
@@ -155,15 +155,14 @@ def decode(message: bytes) -> Header:
         raise ValueError(f"an answer of {len(message)} bytes; a header has {HEADER.size}")
     (magic, version, kind, number, status, sequence, width, height, client_time_us, total_us,
      scale, column, row, queue_us, infer_us, tier, flags, finger) = HEADER.unpack_from(message)  # fmt: skip
-    if magic != b"PPL1" or version not in (2, 3) or kind != _SED or number not in _NAMES:
-        raise ValueError("not an answer of version 2 or 3 of the protocol")
+    if magic != b"PPL1" or version != VERSION or kind != _SED or number not in _NAMES:
+        raise ValueError(f"not an answer of version {VERSION} of the protocol")
     if status >= len(STATUSES):
         raise ValueError(f"an answer with status {status}")
     names = {name for bit, name in FLAGS.items() if flags & bit}
     return Header(
         _NAMES[number], STATUSES[status], sequence, (column, row, width, height),
-        client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names),
-        finger if version == 3 else 0,
+        client_time_us, total_us, scale, queue_us, infer_us, tier, frozenset(names), finger,
     )  # fmt: skip
 
 

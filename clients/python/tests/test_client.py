@@ -175,7 +175,7 @@ def test_numbers_that_no_frame_can_hold_are_named():
     for finger in (256, -1, 1.5, None):
         for encode in (
             lambda: wire.encode_rows("objects", pose, None, finger, 1, 1),  # noqa: B023
-            lambda: wire.encode_not_tracked(finger, 1, 1, 3),  # noqa: B023
+            lambda: wire.encode_not_tracked(finger, 1, 1),  # noqa: B023
         ):
             with pytest.raises(papilla.BadFrame, match="finger") as refused:
                 encode()
@@ -189,7 +189,7 @@ def test_numbers_that_no_frame_can_hold_are_named():
 
 def test_sed_is_sed_and_rates_are_rates():
     """Units of u16: each has a scale of its own; what is not there is a named error."""
-    head = wire.HEADER.pack(b"PPL1", 2, 2, 2, 0, 7, 2, 1, 5, 9, 2.0, 3, 4, 0, 0, 0, 96, 0)
+    head = wire.HEADER.pack(b"PPL1", 3, 2, 2, 0, 7, 2, 1, 5, 9, 2.0, 3, 4, 0, 0, 0, 96, 0)
     rates = np.full(224 * 224, 30, "<u2")
     body = np.array([1.5], "<f4").tobytes() + bytes(12) + np.array([0.5], "<f4").tobytes() + bytes(12)
     message = head + body + rates.tobytes() + np.array([100, 200], "<u2").tobytes()

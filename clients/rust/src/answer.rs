@@ -1,7 +1,7 @@
 //! What becomes of a frame.
 
 use papilla_proto::{
-    Extension, FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,
+    FrameHeader, FrameStatus, MAP_LEN, Problem, Ready, SampleType, Summary, Window,
     contact::Touch,
     effects::{RATES_HEAD_LEN, SectionName},
     flags,
@@ -173,8 +173,7 @@ impl Answer {
         ready: &Ready,
         tier: String,
     ) -> Result<Self, PapillaError> {
-        let Extension { queue_us, infer_us, flags: bits, finger, .. } =
-            header.extension.unwrap_or_default();
+        let &FrameHeader { queue_us, infer_us, flags: bits, finger, .. } = header;
         let status = match header.status {
             FrameStatus::Ok => Status::Ok,
             FrameStatus::Superseded => Status::Superseded { by_client: false },
@@ -192,7 +191,7 @@ impl Answer {
             unsettled: bits & flags::UNSETTLED != 0,
             not_tracked: bits & flags::NOT_TRACKED != 0,
             coarse_clock: bits & flags::COARSE_CLOCK != 0,
-            finger: finger.unwrap_or_default(),
+            finger,
             tier,
             total_us: header.time_us,
             queue_us,
@@ -212,7 +211,7 @@ impl Answer {
         message: &[u8],
         ready: &Ready,
     ) -> Result<(), PapillaError> {
-        for section in ready.sections.iter().flatten() {
+        for section in &ready.sections {
             let bytes = match section.name {
                 // Its window may differ from answer to answer.
                 SectionName::Map => header.payload_len(),
@@ -273,17 +272,18 @@ fn floats(bytes: &[u8]) -> Result<Vec<f32>, PapillaError> {
 
 #[cfg(test)]
 mod tests {
-    use papilla_proto::{HEADER_LEN_V2, spikes::Spike};
+    use papilla_proto::{HEADER_LEN, spikes::Spike};
     use serde_json::{from_value, json};
 
     use super::*;
 
     fn ready(section: &str, bytes: usize) -> Ready {
         from_value(json!({
-            "version": 2, "session": 1, "tier": "nano", "effects": [], "atlas_hash": "",
+            "version": 3, "session": 1, "tier": "nano", "effects": [], "atlas_hash": "",
             "predicted_latency_us": 1, "width": 224, "height": 224, "sample_type": "f32",
-            "pressure_max_pa": 1e4, "sed_scale_j_per_m3": 1.0,
-            "sections": [{"name": section, "offset": HEADER_LEN_V2, "bytes": bytes}],
+            "pressure_max_pa": 1e4, "sed_scale_j_per_m3": 1.0, "tier_number": 0,
+            "answer_sample_type": "f32", "session_effects": [], "vertices": 2, "fingers": 1,
+            "sections": [{"name": section, "offset": HEADER_LEN, "bytes": bytes}],
         }))
         .unwrap()
     }

@@ -87,10 +87,9 @@ pub struct Session {
     watch: JoinHandle<()>,
 }
 
-/// The hello in the version that its members need, of a client that moves when it is asked to.
-fn versioned(hello: Hello) -> Hello {
-    let version = if hello.member_of_version_3().is_some() { 3 } else { 2 };
-    Hello { version, reconnect: Some(true), ..hello }
+/// The hello of a client that moves when it is asked to.
+fn following(hello: Hello) -> Hello {
+    Hello { reconnect: Some(true), ..hello }
 }
 
 /// Microseconds of a steady clock.
@@ -100,8 +99,7 @@ fn now_us() -> u64 {
 }
 
 impl Session {
-    /// Opens a session at `server` (an [`Address`](crate::Address)). The hello goes as version 2, or 3 if it has members
-    /// of that.
+    /// Opens a session at `server` (an [`Address`](crate::Address)).
     ///
     /// # Errors
     /// `server` is no address, nobody listens, or the hello is refused: [`PapillaError::code`] says why.
@@ -110,7 +108,7 @@ impl Session {
         hello: Hello,
     ) -> Result<Self, PapillaError> {
         let server = server.to_address()?.plain()?;
-        let hello = versioned(hello);
+        let hello = following(hello);
         let (link, ready) = Link::open(&server, &hello).await?;
         let shared = Arc::new(Shared {
             state: std::sync::Mutex::new(State::new(hello, ready)),
@@ -161,7 +159,7 @@ impl Session {
     /// It is refused, and the old terms stand; or the connection broke meanwhile.
     pub async fn renew(&self, hello: Hello) -> Result<Arc<Ready>, PapillaError> {
         let (reply, answer) = oneshot::channel();
-        self.shared.state().asked = Some(Asked { hello: versioned(hello), said: false, reply });
+        self.shared.state().asked = Some(Asked { hello: following(hello), said: false, reply });
         self.shared.wake.notify_one();
         answer.await.map_err(|_| PapillaError::Closed)?
     }

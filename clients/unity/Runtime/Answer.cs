@@ -94,7 +94,7 @@ namespace Papilla
                 QueueUs = *(uint*)(m + 36);
                 InferUs = *(uint*)(m + 40);
                 TierNumber = *(ushort*)(m + 44);
-                Finger = m[4] == 3 ? m[47] : 0;
+                Finger = m[47];
                 OutOfRange = (m[46] & Wire.FlagOutOfRange) != 0;
                 NoContact = (m[46] & Wire.FlagNoContact) != 0;
                 Unfamiliar = (m[46] & Wire.FlagUnfamiliar) != 0;
@@ -122,7 +122,7 @@ namespace Papilla
             if (bytes < Wire.HeaderBytes) throw new FormatException("an answer of " + bytes + " bytes has no header");
             fixed (byte* m = message)
             {
-                if (*(uint*)m != Wire.Magic || m[4] != 2 && m[4] != 3) throw new FormatException("an answer does not start with PPL1 and version 2 or 3");
+                if (*(uint*)m != Wire.Magic || m[4] != Wire.Version) throw new FormatException("an answer does not start with PPL1 and version " + Wire.Version);
                 return *(uint*)(m + 8);
             }
         }

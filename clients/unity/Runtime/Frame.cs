@@ -93,12 +93,6 @@ namespace Papilla
             *(NetForce*)m = net.Value;
         }
 
-        /// <summary>The version of the session that the frame leaves in.</summary>
-        internal void StampVersion(byte version)
-        {
-            Buffer[Headroom.Bytes + 4] = version;
-        }
-
         internal unsafe void Stamp(uint sequence, ulong timeUs, uint deadlineUs)
         {
             Sequence = sequence;

@@ -18,15 +18,9 @@ namespace Papilla
         public readonly List<string> Effects = new List<string>();
         /// <summary>
         /// Other members as on the wire: <c>contact_pa</c>, <c>out_of_range</c>, <c>stale_after_us</c>, <c>atlas_hash</c>, <c>map</c>, the
-        /// parameters of effects, and those of version 3: <c>input</c>, <c>objects</c>, <c>fingers</c>, ...
+        /// parameters of effects, <c>input</c>, <c>objects</c>, <c>fingers</c>, ...
         /// </summary>
         public readonly JObject Members = new JObject();
-
-        static readonly string[] OfVersion3 =
-        {
-            "input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear",
-            "friction", "velocity", "traction",
-        };
 
         /// <summary>A hello from its members on the wire, without type and version.</summary>
         public static Hello FromJson(JObject json)
@@ -50,12 +44,11 @@ namespace Papilla
 
         /// <param name="follows">the session moves to another connection when it is asked to</param>
         /// <param name="resumes">what the service remembers is the next message</param>
-        /// <param name="isOf3">version 3 whatever its members are</param>
-        internal string ToText(bool follows, bool resumes = false, bool isOf3 = false)
+        internal string ToText(bool follows, bool resumes = false)
         {
             var json = (JObject)Members.DeepClone();
             json["type"] = "hello";
-            json["version"] = isOf3 || System.Array.Exists(OfVersion3, name => Members[name] != null) ? 3 : 2;
+            json["version"] = Wire.Version;
             json["effects"] = new JArray(Effects);
             json["sample_type"] = SampleType.ToString().ToLowerInvariant();
             if (follows) json["reconnect"] = true;
@@ -80,14 +73,12 @@ namespace Papilla
         public readonly float PressureMaxPa;
         /// <summary>All members, as on the wire.</summary>
         public readonly JObject Json;
-        internal readonly byte Version;
         internal readonly int TouchAt = -1, PressureAt = -1, PressureCount, VerticesAt = -1, VerticesBytes, RatesAt = -1, RatesBytes;
         internal readonly int SummaryAt = -1, PointsAt = -1, PointsCount, PointRatesAt = -1, PointRatesCount, ActuatorsAt = -1, ActuatorsCount, MapAt = -1;
 
         internal Ready(JObject json)
         {
             Json = json;
-            Version = (byte)json["version"];
             Tier = (string)json["tier"];
             TierNumber = (int)json["tier_number"];
             Session = (long)json["session"];

@@ -137,7 +137,7 @@ namespace Papilla
         /// <summary>Opens the session anew. Refused, it goes on as it was.</summary>
         public void Open(NativeModel model, Hello hello)
         {
-            Must(NativeCalls.papilla_session_open(handle, model.Handle, NativeCalls.Utf8(hello.ToText(false, isOf3: true))));
+            Must(NativeCalls.papilla_session_open(handle, model.Handle, NativeCalls.Utf8(hello.ToText(false))));
             GC.KeepAlive(model);
         }
 

@@ -2,7 +2,7 @@ namespace Papilla
 {
     /// <content>
     /// Fingers: each has the newest frame that has not left and its newest answer. What they touch: objects or gaps in, forces out
-    /// (docs/reference/protocol.md, version 3).
+    /// (docs/reference/protocol.md).
     /// </content>
     public sealed partial class Session
     {

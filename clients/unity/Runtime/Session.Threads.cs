@@ -73,7 +73,6 @@ namespace Papilla
             var frame = of.Waiting;
             of.Waiting = leaving;
             leaving = frame;
-            leaving.StampVersion(ready.Version);
             of.IsWaiting = false;
             outstanding.Add(leaving.Sequence, new Left { BornUs = of.BornUs, Finger = of.Number });
             Sent++;

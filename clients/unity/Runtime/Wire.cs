@@ -8,7 +8,7 @@ namespace Papilla
     /// <summary>What became of a frame.</summary>
     public enum Status : byte { Ok = 0, Superseded = 1, Late = 2, Error = 3, Stale = 4, Lost = 255 }
 
-    /// <summary>Sizes and samples of the protocol, versions 2 and 3.</summary>
+    /// <summary>Sizes and samples of the protocol.</summary>
     public static class Wire
     {
         public const int SidePx = 224;
@@ -19,6 +19,7 @@ namespace Papilla
         public const int ObjectsMax = 16, RowLength = 7;
 
         internal const uint Magic = 0x314c5050;
+        internal const byte Version = 3;
         internal const int FlagOutOfRange = 1, FlagNoContact = 2, FlagUnfamiliar = 4, FlagUnsettled = 8, FlagCutOff = 16, FlagNotTracked = 32, FlagCoarseClock = 64;
         /// <summary>Before the samples of the section <c>rates</c>: their scale, and zeros.</summary>
         internal const int RatesHeadBytes = 16;

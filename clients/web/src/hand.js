@@ -1,10 +1,10 @@
-// Fingers that touch things: objects or gaps in, forces out. docs/reference/protocol.md, version 3.
+// Fingers that touch things: objects or gaps in, forces out. docs/reference/protocol.md.
 
 import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
 import { Move } from './move.js';
 import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
-import { FLAG, HEADER_BYTES, STATUS, NotCarriedError, RATES_HEAD_BYTES } from './wire.js';
+import { FLAG, HEADER_BYTES, MAGIC, STATUS, NotCarriedError, RATES_HEAD_BYTES, VERSION } from './wire.js';
 
 /** @typedef {import('./types.js').HandHello} HandHello */
 /** @typedef {import('./types.js').Ready} Ready */
@@ -39,8 +39,6 @@ import { FLAG, HEADER_BYTES, STATUS, NotCarriedError, RATES_HEAD_BYTES } from '.
  * @property {number} totalUs receipt to sending, in the server
  */
 
-const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
-const VERSION = 3;
 const KIND = { pressure: 1, objects: 4, gaps: 5 };
 const ROW = 7;
 const FINGERS_MAX = 10;

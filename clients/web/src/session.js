@@ -1,4 +1,4 @@
-// A session that keeps itself connected: docs/reference/protocol.md, version 2.
+// A session that keeps itself connected: docs/reference/protocol.md.
 
 import { PapillaError, missed, refusal, unreachable } from './error.js';
 import { Link, sessionUrl } from './link.js';
@@ -6,7 +6,7 @@ import { Move } from './move.js';
 import { Outbox } from './outbox.js';
 import { OPEN_MS, TIMEOUT_MS, Warnings, Watch } from './watch.js';
 import { crop } from './window.js';
-import { Answer, MAP_LEN, SIDE_PX } from './wire.js';
+import { Answer, MAP_LEN, SIDE_PX, VERSION } from './wire.js';
 
 /** @typedef {import('./types.js').Hello} Hello */
 /** @typedef {import('./types.js').Ready} Ready */
@@ -272,7 +272,7 @@ export class Session {
   /** @param {boolean} resume */
   #greet(resume) {
     const state = resume ? { resume } : {};
-    this.#link.send(JSON.stringify({ ...this.#hello, ...state, type: 'hello', version: 2, reconnect: true }));
+    this.#link.send(JSON.stringify({ ...this.#hello, ...state, type: 'hello', version: VERSION, reconnect: true }));
   }
 
   /** The session goes on over another connection; what went out was answered. @param {boolean} resume */

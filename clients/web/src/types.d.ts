@@ -125,7 +125,7 @@ export interface Section {
 
 export interface Ready {
   type: 'ready';
-  version: 2 | 3;
+  version: 3;
   session: number;
   tier: string;
   tier_number: number;
@@ -142,9 +142,9 @@ export interface Ready {
   pressure_max_pa: number;
   sed_scale_j_per_m3: number;
   sections: Section[];
-  /** Of version 3. */
-  vertices?: number;
-  fingers?: number;
+  /** Of the atlas, for what is laid out by them. */
+  vertices: number;
+  fingers: number;
   contact_us?: number;
   /** How pressure is found; missing where frames are pressure. */
   method?: ContactMethod;

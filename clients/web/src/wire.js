@@ -1,4 +1,4 @@
-// The frames of protocol version 2: a header of 48 bytes, little-endian, and the samples.
+// The frames of the protocol: a header of 48 bytes, little-endian, and the samples.
 
 export const SIDE_PX = 224;
 export const MAP_LEN = SIDE_PX * SIDE_PX;
@@ -14,8 +14,8 @@ export const SAMPLE_BYTES = [4, 2, 2, 1];
 export const KIND = { pressure: 1, sed: 2 };
 export const FLAG = { outOfRange: 1, noContact: 2, unfamiliar: 4, unsettled: 8, cutOff: 16, notTracked: 32, coarseClock: 64 };
 
-const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
-const VERSION = 2;
+export const MAGIC = 0x314c5050; // the bytes 'P' 'P' 'L' '1'
+export const VERSION = 3;
 const TWO_POW_32 = 4294967296;
 const F16_MAX = 65504;
 

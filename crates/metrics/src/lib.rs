@@ -112,7 +112,7 @@ pub struct Metrics {
     oip: TransportMetrics,
     late: Family<LateLabels, Counter>,
     errors: Family<CodeLabels, Counter>,
-    /// Contact of sessions of version 3.
+    /// Contact of sessions.
     pub contact: ContactMetrics,
     /// Zero maps, answered without inference.
     pub zero_maps: Counter,

@@ -91,12 +91,12 @@ impl FrameForm {
         (width * height + self.extra()) * sample_bytes
     }
 
-    /// Checks finger, kind and size of a frame of version 3.
+    /// Checks finger, kind and size of a frame.
     ///
     /// # Errors
     /// The first that does not fit; the problem names the field of the header.
     pub fn check(&self, header: &FrameHeader) -> Result<usize, Problem> {
-        let finger = header.extension.and_then(|e| e.finger).map_or(0, usize::from);
+        let finger = usize::from(header.finger);
         if finger >= self.fingers {
             let message = format!("finger {finger} was not announced; there are {}", self.fingers);
             return Err(unusable("finger", message));

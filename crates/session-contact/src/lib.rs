@@ -1,4 +1,4 @@
-//! Contact of a session's fingers: what a hello of version 3 announces, frame by frame.
+//! Contact of a session's fingers: what a hello announces, frame by frame.
 //!
 //! A [`Hand`] is made of a hello; it says which frames fit. Each of its fingers is a [`Finger`] with
 //! a solver of its own: [`Finger::take`] reads a frame into pressure, [`Finger::write`] appends what
@@ -17,7 +17,7 @@
 //! let raster = std::sync::Arc::new(Raster::new(&atlas, Patch::Skin));
 //! let skin = Skin { atlas: &atlas, raster: &raster, model: None, pixels: None, interface: None,
 //!     errors: None };
-//! let hello = Hello { version: 3, ..Hello::default() };
+//! let hello = Hello::default();
 //! assert_eq!(Hand::of(&hello, skin)?.fingers().len(), 1);
 //! let objects = Hello { input: Some(Input::Objects), ..hello };
 //! let refused = Hand::of(&objects, skin).map(|_| ()).unwrap_err();
@@ -41,7 +41,7 @@ use std::sync::{Arc, Mutex};
 
 use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem, Warning,
+    ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, Warning,
     atlas::{Atlas, Raster},
     contact::{ContactErrors, ContactMethod, Input, SampleLayout, TOUCH_LEN},
     effects::{Section, SectionName},
@@ -89,7 +89,7 @@ fn unusable(field: impl Into<String>, message: impl Into<String>) -> Problem {
 }
 
 impl Hand {
-    /// The fingers that a hello of version 3 announces.
+    /// The fingers that a hello announces.
     ///
     /// Takes some milliseconds, and up to [`FINGER_BYTES_MAX`] a finger once it is pressed all over.
     ///
@@ -176,7 +176,7 @@ impl Hand {
     pub fn sections_len(&self) -> usize {
         self.sections
             .last()
-            .map_or(0, |s| (s.offset + s.bytes) as usize - HEADER_LEN_V2)
+            .map_or(0, |s| (s.offset + s.bytes) as usize - HEADER_LEN)
             .next_multiple_of(16)
     }
 }
@@ -188,7 +188,7 @@ fn sections(hello: &Hello, input: Input, vertices: usize) -> Vec<Section> {
     };
     let touch = (input != Input::Pressure).then_some(TOUCH_LEN);
     let pressure = hello.pressure.map(|layout| 4 * samples(layout));
-    let mut offset = HEADER_LEN_V2;
+    let mut offset = HEADER_LEN;
     let mut sections = Vec::new();
     let shear = (hello.shear == Some(true)).then_some(12 * vertices);
     let all = [

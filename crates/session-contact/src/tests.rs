@@ -79,12 +79,7 @@ fn ball(radius_mm: f64) -> AnnouncedObject {
 }
 
 fn objects() -> Hello {
-    Hello {
-        version: 3,
-        input: Some(Input::Objects),
-        objects: Some(vec![ball(20.0)]),
-        ..Hello::default()
-    }
+    Hello { input: Some(Input::Objects), objects: Some(vec![ball(20.0)]), ..Hello::default() }
 }
 
 fn pose(depth_mm: f32) -> [u8; POSE_LEN] {
@@ -109,12 +104,12 @@ fn touch(hand: &Hand, finger: usize, payload: &[u8]) -> Result<(Touch, Taken), P
     let mut finger = hand.fingers()[finger].lock().expect("no panic");
     let mut map_pa = vec![0.0; MAP_LEN];
     let taken = finger.take(frame(payload, 0), Some(&mut map_pa))?;
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     finger.write(&mut bytes);
-    assert_eq!(bytes.len(), HEADER_LEN_V2 + hand.sections_len());
+    assert_eq!(bytes.len(), HEADER_LEN + hand.sections_len());
     let peak = map_pa.iter().copied().fold(0.0, f32::max);
     assert!(peak <= 1.0001 * taken.peak_pa, "{peak} {taken:?}");
-    Ok((Touch::decode(&bytes[HEADER_LEN_V2..]).expect("it lies there"), taken))
+    Ok((Touch::decode(&bytes[HEADER_LEN..]).expect("it lies there"), taken))
 }
 
 use bytes::BytesMut;
@@ -252,7 +247,7 @@ fn a_rough_ball_pulls_and_goes_on_elsewhere() {
     let vertices = SIDE * SIDE;
     let shear = Section {
         name: SectionName::Shear,
-        offset: (HEADER_LEN_V2 + TOUCH_LEN) as u32,
+        offset: (HEADER_LEN + TOUCH_LEN) as u32,
         bytes: 12 * vertices as u32,
     };
     assert_eq!(hand.sections()[1], shear);
@@ -263,14 +258,14 @@ fn a_rough_ball_pulls_and_goes_on_elsewhere() {
     let mut answers = [&hand, &other].map(|hand| {
         let mut finger = hand.fingers()[0].lock().expect("no panic");
         finger.take(frame(&aside(0.4), 0), None).expect("an answer");
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         finger.write(&mut bytes);
         bytes
     });
     // The time of the solve differs.
-    answers.iter_mut().for_each(|bytes| bytes[HEADER_LEN_V2 + 60..][..4].fill(0));
+    answers.iter_mut().for_each(|bytes| bytes[HEADER_LEN + 60..][..4].fill(0));
     assert_eq!(answers[0], answers[1]);
-    let pulled = Touch::decode(&answers[0][HEADER_LEN_V2..]).expect("it lies there");
+    let pulled = Touch::decode(&answers[0][HEADER_LEN..]).expect("it lies there");
     let share = pulled.force_n[1] / pulled.force_n[2];
     assert!((0.49..0.51).contains(&share), "{pulled:?}");
     let section = &answers[0][shear.offset as usize..][..shear.bytes as usize];
@@ -384,7 +379,7 @@ fn without_a_name_the_most_accurate_method_serves() {
         let named = Hello { method: Some(ContactMethod::SecondOrder), ..hello.clone() };
         assert_eq!(with(&named, has_layers, None), (Some(ContactMethod::SecondOrder), Vec::new()));
     }
-    let sent = Hello { version: 3, ..Hello::default() };
+    let sent = Hello::default();
     assert_eq!(with(&sent, true, None), (None, Vec::new()));
 }
 
@@ -489,13 +484,13 @@ fn a_finger_that_is_lost_is_told_as_air_and_goes_on() {
         hand.form().check(&FrameHeader { height: 1, ..tall }).expect_err("refused").code,
         ErrorCode::WrongShape
     );
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     {
         let mut finger = hand.fingers()[0].lock().expect("no panic");
         finger.lose();
         finger.write(&mut bytes);
     }
-    assert_eq!(bytes.len(), HEADER_LEN_V2 + hand.sections_len());
+    assert_eq!(bytes.len(), HEADER_LEN + hand.sections_len());
     assert!(bytes.iter().all(|byte| *byte == 0));
     let (after, taken) = touch(&hand, 0, &pose(0.3)).expect("an answer");
     assert!((after.force_n[2] / before.force_n[2] - 1.0).abs() < 0.01, "{before:?} {after:?}");

@@ -18,7 +18,7 @@ use std::{
 use bytes::BytesMut;
 use papilla_contact::{ContactModel, InterfaceSkin, PixelSkin};
 use papilla_proto::{
-    HEADER_LEN_V2, Hello, MAP_LEN, SampleType,
+    HEADER_LEN, Hello, MAP_LEN, SampleType,
     atlas::{Atlas, Patch, Raster},
     contact::{AnnouncedObject, ContactMethod, Input, Pose, SampleLayout},
     sdf::{AnnouncedShape, Sphere},
@@ -60,7 +60,6 @@ fn ball(friction: Option<f64>) -> AnnouncedObject {
 /// The dearest hellos of each kind.
 fn hellos() -> Vec<(&'static str, Hello)> {
     let of = |method, friction, members: Hello| Hello {
-        version: 3,
         input: Some(Input::Objects),
         objects: Some(vec![ball(friction)]),
         method: Some(method),
@@ -120,7 +119,7 @@ fn no_finger_takes_more_than_is_said() {
             let hand = Hand::of(&hello, skin).unwrap();
             let mut finger = hand.fingers()[0].lock().unwrap();
             let mut map_pa = vec![0.0; MAP_LEN];
-            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            let mut bytes = BytesMut::zeroed(HEADER_LEN);
             for step in 1..=6u64 {
                 let depth = 0.4 * step as f32;
                 let payload: Vec<u8> = if hello.objects.is_some() {
@@ -134,7 +133,7 @@ fn no_finger_takes_more_than_is_said() {
                 let (sample_type, time_us) = (SampleType::F32, 11_111 * step);
                 let frame = Frame { payload: &payload, sample_type, scale: 1.0, time_us };
                 finger.take(frame, Some(&mut map_pa)).unwrap();
-                bytes.truncate(HEADER_LEN_V2);
+                bytes.truncate(HEADER_LEN);
                 finger.write(&mut bytes);
             }
             let aside = 4 * map_pa.capacity() + bytes.capacity();

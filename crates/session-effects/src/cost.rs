@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bytes::BytesMut;
 use papilla_proto::{
-    HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
+    HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, RuntimeEffect,
     atlas::Raster,
     effects::{Actuator, ActuatorInput, Drive, Layout, Place},
 };
@@ -20,7 +20,7 @@ const PLACES: usize = 64;
 /// Times every effect on a contact, 224 x 224 values in Pa, against the bare map; keeps the costs
 /// in what the sessions on this finger share ([`Shared::costs`](super::Shared::costs)).
 pub fn measure(finger: Finger<'_>, contact_pa: &[f32]) {
-    let bare = Hello { version: 2, effects: vec!["contact_window".to_owned()], ..Hello::default() };
+    let bare = Hello { effects: vec!["contact_window".to_owned()], ..Hello::default() };
     // An effect that cannot be set up here has no cost to tell of.
     let of = |hello: &Hello| Effects::of(hello, finger).ok().flatten();
     let Some(base_us) = of(&bare).map(|effects| us(effects, contact_pa)) else { return };
@@ -44,7 +44,6 @@ fn hello(effect: RuntimeEffect, interface: &Raster) -> Hello {
     };
     let places = || (0..PLACES).filter(|_| !indices.is_empty()).map(place);
     let mut hello = Hello {
-        version: 2,
         effects: vec!["contact_window".to_owned(), effect.as_str().to_owned()],
         ..Hello::default()
     };
@@ -78,7 +77,7 @@ fn us(mut effects: Effects, contact_pa: &[f32]) -> f64 {
         let map = if run % 2 == 0 { contact_pa } else { &lighter_pa };
         pressure_pa.copy_from_slice(map);
         bytes.clear();
-        bytes.resize(HEADER_LEN_V2, 0);
+        bytes.resize(HEADER_LEN, 0);
         let start = Instant::now();
         let time_us = run * 11_111;
         effects.before(&mut pressure_pa, time_us);

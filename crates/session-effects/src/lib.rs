@@ -8,7 +8,7 @@
 //! ```
 //! use bytes::BytesMut;
 //! use papilla_proto::{
-//!     HEADER_LEN_V2, Hello, MAP_LEN, Summary,
+//!     HEADER_LEN, Hello, MAP_LEN, Summary,
 //!     atlas::{Atlas, Patch, PatchVertices, Raster},
 //! };
 //! use papilla_session_effects::{Effects, Finger, Shared};
@@ -23,7 +23,6 @@
 //! let finger = Finger { atlas: &atlas, skin: &skin, interface: &interface, shared: &shared };
 //!
 //! let hello = Hello {
-//!     version: 2,
 //!     effects: vec!["summary".to_owned()],
 //!     map: Some(false),
 //!     ..Hello::default()
@@ -31,9 +30,9 @@
 //! let mut effects = Effects::of(&hello, finger)?.expect("the hello names one");
 //!
 //! let (pressure_pa, sed_j_per_m3) = (vec![1000.0; MAP_LEN], vec![5.0; MAP_LEN]);
-//! let mut answer = BytesMut::zeroed(HEADER_LEN_V2);
+//! let mut answer = BytesMut::zeroed(HEADER_LEN);
 //! effects.write(&pressure_pa, &sed_j_per_m3, 0, &mut answer)?;
-//! let summary = Summary::decode(&answer[HEADER_LEN_V2..]).expect("it lies there");
+//! let summary = Summary::decode(&answer[HEADER_LEN..]).expect("it lies there");
 //! // 1000 Pa on 324 mm2.
 //! assert!((summary.force_n - 0.324).abs() < 1e-4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -59,7 +58,7 @@ use std::sync::Arc;
 
 use bytes::BytesMut;
 use papilla_proto::{
-    ErrorCode, HEADER_LEN_V2, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN, SampleError,
+    ErrorCode, HEADER_LEN, Hello, MAP_LEN, Problem, RuntimeEffect, SUMMARY_LEN, SampleError,
     SampleType, Window,
     contact::SampleLayout,
     effects::{ActuatorInput, Drive, Layout, RATES_HEAD_LEN, Section, SectionName},
@@ -166,7 +165,7 @@ fn unusable(field: &str, message: impl Into<String>) -> Problem {
 }
 
 impl Effects {
-    /// The effects that a hello of version 2 asks for; none if it asks for the bare map.
+    /// The effects that a hello asks for; none if it asks for the bare map.
     ///
     /// Takes some milliseconds if there are points or actuators to be placed.
     ///
@@ -259,7 +258,7 @@ impl Effects {
                 self.vertices.as_ref().map(|v| v.len() * self.sample_type.bytes()),
             ),
         ];
-        let mut offset = HEADER_LEN_V2;
+        let mut offset = HEADER_LEN;
         let mut sections = Vec::new();
         for (name, bytes) in parts {
             let Some(bytes) = bytes else { continue };
@@ -296,7 +295,7 @@ impl Effects {
     /// Most bytes of an answer, its header included.
     #[must_use]
     pub fn size_hint(&self) -> usize {
-        self.sections.last().map_or(HEADER_LEN_V2, |s| (s.offset + s.bytes) as usize)
+        self.sections.last().map_or(HEADER_LEN, |s| (s.offset + s.bytes) as usize)
     }
 
     /// Whether an answer depends on the frames before it.
@@ -425,7 +424,7 @@ impl Effects {
                 }
                 _ => true,
             };
-            let first = offset as usize - HEADER_LEN_V2;
+            let first = offset as usize - HEADER_LEN;
             // A window is shorter than the whole map.
             let end = (first + bytes as usize).min(written.len());
             let found = written.get(first..end).filter(|_| is_f32).and_then(first_not_finite_in);

@@ -50,7 +50,7 @@ impl Owned {
 
 fn hello(effects: &[&str]) -> Hello {
     let effects = effects.iter().map(|&name| name.to_owned()).collect();
-    Hello { version: 2, effects, ..Hello::default() }
+    Hello { effects, ..Hello::default() }
 }
 
 fn display() -> Layout {
@@ -110,7 +110,7 @@ fn sections_lie_where_they_are_said_to_be() {
     let mut map = vec![0.0; MAP_LEN];
     map[100 * MAP_SIDE_PX + 100] = 7.0;
     map[100 * MAP_SIDE_PX + 101] = 9.0;
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!(written.window, Window { x: 99, y: 99, width: 4, height: 3 });
     assert_eq!(bytes.len(), 144 + 48);
@@ -136,9 +136,9 @@ fn no_answer_holds_a_number_that_is_none() {
         for sample_type in SampleType::ALL {
             let answer_sample_type = Some(sample_type);
             let wish = Hello { map: Some(true), answer_sample_type, ..hello(names) };
-            let wish = Hello { answer_layout: Some(SampleLayout::Vertices), version: 3, ..wish };
+            let wish = Hello { answer_layout: Some(SampleLayout::Vertices), ..wish };
             let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
-            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            let mut bytes = BytesMut::zeroed(HEADER_LEN);
             let error = effects.write(&pressure, &vec![sed; MAP_LEN], 0, &mut bytes).unwrap_err();
             match (error, section) {
                 (WriteError::Samples(SampleError::NotFinite { index: 0, .. }), None) => {}
@@ -146,7 +146,7 @@ fn no_answer_holds_a_number_that_is_none() {
                 (error, _) => panic!("{names:?} {sed} {sample_type:?}: {error}"),
             }
             // The next frame is none the worse.
-            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            let mut bytes = BytesMut::zeroed(HEADER_LEN);
             effects.write(&pressure, &vec![5.0; MAP_LEN], 11_111, &mut bytes).unwrap();
         }
     }
@@ -158,7 +158,7 @@ fn no_map_is_no_map() {
     let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     assert_eq!((effects.sections.len(), effects.size_hint()), (1, 112));
     let map = vec![1.0; MAP_LEN];
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!((written.window, bytes.len()), (Window::EMPTY, 112));
 }
@@ -171,7 +171,7 @@ fn relaxation_changes_what_the_network_is_asked_and_not_what_is_touched() {
         let mut map = vec![0.0; MAP_LEN];
         map[100 * MAP_SIDE_PX + 100] = pa;
         let peak_pa = effects.before(&mut map, time_us).unwrap();
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         let window = effects.write(&map, &map, time_us, &mut bytes).unwrap().window;
         (peak_pa, Summary::decode(&bytes[48..]).unwrap().pressure_max_pa, window.pixel_count())
     };
@@ -203,7 +203,7 @@ fn afferents_add_rates_and_change_no_sed() {
     let mut effects = Effects::of(&wish, Owned::plane().finger()).unwrap().unwrap();
     // 20 kPa at 80 kPa: 12 Hz.
     let map = vec![2500.0; MAP_LEN];
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     let written = effects.write(&map, &map, 0, &mut bytes).unwrap();
     assert_eq!(section(&effects, &bytes, SectionName::Points), [2500.0]);
     let rates = section(&effects, &bytes, SectionName::PointRates);
@@ -261,7 +261,7 @@ fn press_by_a_clock(effects: &mut Effects, tick_us: f64) -> (f64, u32, u32) {
         let time_us = effects.time_us(stamp_us);
         coarse += u32::from(effects.clock_flags() != 0);
         effects.before(&mut pressure_pa, time_us);
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         effects.write(&pressure_pa, &sed, time_us, &mut bytes).unwrap();
         hz_s += f64::from(section(effects, &bytes, SectionName::PointRates)[0]) * 11_111e-6;
         let spikes = effects.sections.iter().find(|s| s.name == SectionName::Spikes).unwrap();
@@ -323,12 +323,12 @@ fn lost_tracking_is_silent_and_forgets_nothing() {
         } else {
             effects.lose();
         }
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         effects.write(&pressure_pa, &sed, time_us, &mut bytes).unwrap();
         let hz = section(effects, &bytes, SectionName::PointRates)[0];
         let at = effects.sections.iter().find(|s| s.name == SectionName::Spikes).unwrap().offset;
         let here = u32::from_le_bytes(bytes[at as usize + 4..][..4].try_into().unwrap());
-        let summary = Summary::decode(&bytes[HEADER_LEN_V2..]).unwrap();
+        let summary = Summary::decode(&bytes[HEADER_LEN..]).unwrap();
         (hz, here, summary.force_n, peak_pa)
     };
     for ms in (0..1000).step_by(10) {
@@ -425,9 +425,9 @@ proptest! {
             prop_assert!((0.0..=100.1 * pressure_pa + 0.1).contains(&peak_pa), "{peak_pa}");
             prop_assert!(map.iter().all(|p| p.is_finite() && *p >= 0.0));
             let sed: Vec<f32> = map.iter().map(|p| p * p).collect();
-            let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+            let mut bytes = BytesMut::zeroed(HEADER_LEN);
             effects.write(&map, &sed, time_us, &mut bytes).unwrap();
-            let found = floats(&bytes[HEADER_LEN_V2..]);
+            let found = floats(&bytes[HEADER_LEN..]);
             prop_assert!(found.iter().all(|v| v.is_finite()), "{:?}", &found[..24]);
         }
     }

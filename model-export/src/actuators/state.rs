@@ -9,7 +9,7 @@ use papilla_actuators::{Inverse, Pin};
 use papilla_dataset::{IndentationEntry, Shard};
 use papilla_engine::Session;
 use papilla_proto::effects::{Actuator, ActuatorInput, Drive, Layout, Place};
-use papilla_proto::{HEADER_LEN_V2, Hello, MAP_LEN, MAP_SIDE_PX, Problem};
+use papilla_proto::{HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX, Problem};
 use papilla_session_effects::{Effects, Finger};
 
 /// Steps towards the best gain: SED is nearly its square, so few are enough.
@@ -46,7 +46,6 @@ impl Formula {
             max: f32::MAX,
         };
         let hello = Hello {
-            version: 2,
             effects: vec!["actuators".to_owned()],
             map: Some(false),
             actuators: Some(layout),
@@ -61,11 +60,11 @@ impl Formula {
     /// The means, and how long they took, us.
     fn means(&mut self, sed: &[f32]) -> Option<(Vec<f32>, f64)> {
         self.bytes.clear();
-        self.bytes.resize(HEADER_LEN_V2, 0);
+        self.bytes.resize(HEADER_LEN, 0);
         let start_s = thread_s();
         self.effects.write(&self.pressure_pa, sed, 0, &mut self.bytes).ok()?;
         let us = 1e6 * (thread_s() - start_s);
-        let numbers = self.bytes[HEADER_LEN_V2..].as_chunks::<4>().0;
+        let numbers = self.bytes[HEADER_LEN..].as_chunks::<4>().0;
         Some((numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(), us))
     }
 }

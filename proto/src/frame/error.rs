@@ -1,18 +1,17 @@
 //! What can be wrong with a frame's header.
 
-use crate::ErrorCode;
+use super::HEADER_LEN;
+use crate::{ErrorCode, PROTOCOL_VERSION};
 
 /// What is wrong with a frame's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
     /// Fewer bytes than a header has.
-    #[error("the frame has {bytes} bytes, its header alone has {due}")]
+    #[error("the frame has {bytes} bytes, its header alone has {HEADER_LEN}")]
     TruncatedHeader {
         /// Bytes found.
         bytes: usize,
-        /// Bytes of a header.
-        due: usize,
     },
     /// Another magic.
     #[error("the frame starts with the bytes {found:02x?}, not with 'PPL1'")]
@@ -21,13 +20,13 @@ pub enum FrameError {
         found: [u8; 4],
     },
     /// Another version.
-    #[error("the frame has version {found}, this side speaks 1 and 2")]
+    #[error("the frame has version {found}; version {PROTOCOL_VERSION} is spoken")]
     UnknownVersion {
         /// The version found.
         found: u8,
     },
     /// A kind with no meaning.
-    #[error("frame kind {found} is unknown; 1 is pressure, 2 is SED, 3 a firing rate")]
+    #[error("frame kind {found} is unknown; 1 is pressure, 2 SED, 4 poses, 5 gaps")]
     UnknownKind {
         /// The kind found.
         found: u8,

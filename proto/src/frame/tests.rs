@@ -5,7 +5,12 @@ use crate::ErrorCode;
 
 fn any_header() -> impl Strategy<Value = FrameHeader> {
     let enums = (
-        prop::sample::select(vec![FrameKind::Pressure, FrameKind::Sed]),
+        prop::sample::select(vec![
+            FrameKind::Pressure,
+            FrameKind::Sed,
+            FrameKind::Objects,
+            FrameKind::Gaps,
+        ]),
         prop::sample::select(SampleType::ALL.to_vec()),
         prop::sample::select(vec![
             FrameStatus::Ok,
@@ -16,26 +21,11 @@ fn any_header() -> impl Strategy<Value = FrameHeader> {
         ]),
     );
     let numbers = (any::<u32>(), any::<u16>(), any::<u16>(), any::<u64>(), any::<u32>());
-    let more = any::<Option<(u16, u16, u32, u32, u16, u8, Option<u8>)>>();
-    let all = (enums, numbers, -1e30f32..1e30, more, any::<bool>());
-    all.prop_map(|((kind, sample_type, status), n, scale, e, input)| {
-        let extension = e.map(|(x, y, queue_us, infer_us, tier, flags, finger)| Extension {
-            x,
-            y,
-            queue_us,
-            infer_us,
-            tier,
-            flags,
-            finger,
-        });
-        let is_new = extension.is_some_and(|e| e.finger.is_some());
-        let kind = if input && is_new {
-            [FrameKind::Objects, FrameKind::Gaps][n.1 as usize % 2]
-        } else {
-            kind
-        };
+    let more = any::<(u16, u16, u32, u32, u16, u8, u8)>();
+    let all = (enums, numbers, -1e30f32..1e30, more);
+    all.prop_map(|((kind, sample_type, status), n, scale, more)| {
+        let (x, y, queue_us, infer_us, tier, flags, finger) = more;
         FrameHeader {
-            extension,
             kind,
             sample_type,
             status,
@@ -45,6 +35,13 @@ fn any_header() -> impl Strategy<Value = FrameHeader> {
             client_time_us: n.3,
             time_us: n.4,
             scale,
+            x,
+            y,
+            queue_us,
+            infer_us,
+            tier,
+            flags,
+            finger,
         }
     })
 }
@@ -61,34 +58,29 @@ fn the_layout_is_the_documented_one() {
         client_time_us: 0x100f_0e0d_0c0b_0a09,
         time_us: 0x1413_1211,
         scale: 1.0,
-        extension: None,
-    };
-    let mut expected = b"PPL1\x01\x02\x02\x02".to_vec();
-    expected.extend(1..=20);
-    expected.extend([0, 0, 0x80, 0x3f]);
-    assert_eq!(header.encode().to_vec(), expected);
-    let extension = Extension {
         x: 0x0201,
         y: 0x0403,
         queue_us: 0x0807_0605,
         infer_us: 0x0c0b_0a09,
         tier: 0x0e0d,
         flags: 15,
-        finger: None,
+        finger: 16,
     };
-    expected[4] = 2;
-    expected.extend(1..=15);
-    expected.push(0);
-    let header = FrameHeader { extension: Some(extension), ..header };
-    assert_eq!((header.encode().to_vec(), header.header_len()), (expected.clone(), 48));
-    expected[4] = 3;
-    expected[5] = 4;
-    expected[47] = 16;
-    let header = header.of_finger(FrameKind::Objects, 16, [0x0605, 0x0807]);
+    let mut expected = b"PPL1\x03\x02\x02\x02".to_vec();
+    expected.extend(1..=20);
+    expected.extend([0, 0, 0x80, 0x3f]);
+    expected.extend(1..=16);
+    assert_eq!((header.encode().to_vec(), HEADER_LEN), (expected.clone(), 48));
+    (expected[5], expected[47]) = (4, 17);
+    let header = header.of_finger(FrameKind::Objects, 17, [0x0605, 0x0807]);
     assert_eq!(header.encode().to_vec(), expected);
-    // Versions before the third know no such kind.
-    expected[4] = 2;
-    assert_eq!(FrameHeader::decode(&expected), Err(FrameError::UnknownKind { found: 4 }));
+    // No other version is spoken.
+    for found in [1, 2, 4] {
+        expected[4] = found;
+        assert_eq!(FrameHeader::decode(&expected), Err(FrameError::UnknownVersion { found }));
+    }
+    expected[4..6].copy_from_slice(&[3, 3]);
+    assert_eq!(FrameHeader::decode(&expected), Err(FrameError::UnknownKind { found: 3 }));
 }
 
 #[test]
@@ -124,17 +116,12 @@ proptest! {
         // Half of them get as far as the kind.
         if begin && bytes.len() > 5 {
             bytes[..4].copy_from_slice(&MAGIC);
-            bytes[4] = 1 + bytes[4] % 2;
+            bytes[4] = PROTOCOL_VERSION;
         }
         let _ = FrameHeader::peek_sequence(&bytes);
         if let Ok(header) = FrameHeader::decode(&bytes) {
             // NaN scales compare unequal; their bytes do not.
-            let mut found = bytes[..header.header_len()].to_vec();
-            // The last byte of version 2 means nothing.
-            if let Some(rest) = found.get_mut(47..) {
-                rest.fill(0);
-            }
-            prop_assert_eq!(&header.encode()[..], &found[..]);
+            prop_assert_eq!(&header.encode()[..], &bytes[..HEADER_LEN]);
         }
     }
 
@@ -153,6 +140,6 @@ proptest! {
     #[test]
     fn short_frames_are_truncated(header in any_header(), len in 0..HEADER_LEN) {
         let error = FrameHeader::decode(&header.encode()[..len]).unwrap_err();
-        prop_assert_eq!(error, FrameError::TruncatedHeader { bytes: len, due: HEADER_LEN });
+        prop_assert_eq!(error, FrameError::TruncatedHeader { bytes: len });
     }
 }

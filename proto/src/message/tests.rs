@@ -5,20 +5,30 @@ use super::*;
 
 #[test]
 fn the_smallest_hello_is_enough() {
-    let hello: ClientMessage =
-        serde_json::from_value(json!({"type": "hello", "version": 1})).unwrap();
-    assert_eq!(hello, ClientMessage::Hello(Hello::default()));
+    for smallest in [json!({"type": "hello"}), json!({"type": "hello", "version": 3})] {
+        let due = ClientMessage::Hello(Hello::default());
+        assert_eq!(read(&smallest), Ok(due.clone()));
+        assert_eq!(serde_json::from_value::<ClientMessage>(smallest).unwrap(), due);
+    }
 }
 
 #[test]
-fn a_hello_of_version_1_keeps_its_form() {
+fn no_other_version_is_spoken() {
+    assert!(Hello::default().check_version().is_ok());
+    for version in [0, 1, 2, 4, u32::MAX] {
+        let problem = Hello { version, ..Hello::default() }.check_version().unwrap_err();
+        assert_eq!(problem.code, ErrorCode::UnknownVersion);
+        assert_eq!(problem.field.as_deref(), Some("version"));
+        assert!(problem.message.contains("name 3"), "{problem}");
+    }
+}
+
+#[test]
+fn a_hello_without_a_wish_is_short() {
     let json = serde_json::to_value(Hello::default()).unwrap();
     let names: Vec<_> = json.as_object().unwrap().keys().cloned().collect();
     let due = ["atlas_hash", "budget_us", "effects", "pressure_scale_pa", "sample_type"];
     assert_eq!(names, [&due[..], &["tier", "version"]].concat());
-    assert_eq!(Hello::default().member_of_version_2(), None);
-    let hello = Hello { map: Some(false), ..Hello::default() };
-    assert_eq!(hello.member_of_version_2(), Some("map"));
 }
 
 #[test]
@@ -30,21 +40,19 @@ fn a_session_that_moves_says_so_in_words() {
         serde_json::to_value(ServerMessage::Reconnect(ask)).unwrap(),
         json!({"type": "reconnect", "reason": "drain", "within_ms": 10_000})
     );
-    let hello = Hello { resume: Some(true), ..Hello::default() };
-    assert_eq!(hello.member_of_version_2(), Some("resume"));
 }
 
 #[test]
 fn misspelt_and_mistyped_members_are_refused() {
     for bad in [
-        json!({"type": "hello", "version": 1, "teir": "x"}),
-        json!({"type": "hello"}),
-        json!({"type": "helo", "version": 1}),
-        json!({"version": 1}),
-        json!({"type": "hello", "version": 1, "sample_type": "f64"}),
-        json!({"type": "hello", "version": 1, "budget_us": -1}),
-        json!({"type": "hello", "version": 1, "budget_us": 1.5}),
-        json!({"type": "hello", "version": "1"}),
+        json!({"type": "hello", "teir": "x"}),
+        json!({"type": "helo"}),
+        json!({"version": 3}),
+        json!({"type": "hello", "sample_type": "f64"}),
+        json!({"type": "hello", "budget_us": -1}),
+        json!({"type": "hello", "budget_us": 1.5}),
+        json!({"type": "hello", "version": "3"}),
+        json!({"type": "hello", "version": null}),
         json!([]),
     ] {
         assert!(serde_json::from_value::<ClientMessage>(bad.clone()).is_err(), "{bad}");
@@ -73,7 +81,6 @@ proptest! {
         scale in prop::option::of(1e-6f32..1e6),
     ) {
         let hello = ClientMessage::Hello(Hello {
-            version: 1,
             effects,
             budget_us,
             tier,
@@ -100,9 +107,9 @@ fn read(json: &serde_json::Value) -> Result<ClientMessage, MessageError> {
 
 #[test]
 fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
-    let with = |members: &str| format!(r#"{{"type":"hello","version":2,{members}}}"#);
+    let with = |members: &str| format!(r#"{{"type":"hello","version":3,{members}}}"#);
     for (text, member, words) in [
-        (r#"{"type":"hello","version":"1"}"#.to_owned(), Some("version"), "line 1, column 29"),
+        (r#"{"type":"hello","version":"3"}"#.to_owned(), Some("version"), "line 1, column 29"),
         (with(r#""budget_us":-1"#), Some("budget_us"), "a whole number from 0"),
         (with(r#""effects":["a",7]"#), Some("effects[1]"), "the number 7 where a text is due"),
         (with(r#""teir":"x""#), None, "unknown field `teir`"),
@@ -112,7 +119,6 @@ fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
             "a list of",
         ),
         (with(r#""points":[{"inch":[1]}]"#), Some("points[0]"), "`inch`"),
-        (r#"{"type":"hello"}"#.to_owned(), None, "missing field `version`"),
     ] {
         let error = ClientMessage::from_json(text.as_bytes()).unwrap_err();
         assert!(matches!(error, MessageError::Hello(_)), "{text}: {error:?}");
@@ -122,8 +128,8 @@ fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
             assert!(!error.to_string().contains(word), "{text}: {error}");
         }
     }
-    let long = json!({"type": "hello", "version": 1, "tier": "x".repeat(2000)});
-    let large = json!({"type": "hello", "version": 1, "effects": vec![""; 1 << 18]});
+    let long = json!({"type": "hello", "tier": "x".repeat(2000)});
+    let large = json!({"type": "hello", "effects": vec![""; 1 << 18]});
     for text in [
         large.to_string(),
         "?".to_owned(),
@@ -138,7 +144,7 @@ fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
 
 #[test]
 fn the_type_may_stand_anywhere() {
-    for text in [r#"{"type":"hello","version":1}"#, r#"{"version":1,"type":"hello"}"#] {
+    for text in [r#"{"type":"hello","version":3}"#, r#"{"version":3,"type":"hello"}"#] {
         let hello = ClientMessage::from_json(text.as_bytes());
         assert_eq!(hello, Ok(ClientMessage::Hello(Hello::default())));
     }

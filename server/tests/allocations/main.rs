@@ -23,7 +23,7 @@ use std::{
 };
 
 use papilla_proto::{
-    FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, RuntimeEffect, SampleType, Window,
+    FrameHeader, FrameStatus, HEADER_LEN, MAP_LEN, RuntimeEffect, SampleType, Window,
 };
 use serde_json::{Value, json};
 use support::{GAIN, Service, bytes_of, contact, model_folder, ramp};
@@ -134,21 +134,31 @@ impl Client {
         bytes.iter().fold(0, |number, &byte| number << 8 | usize::from(byte))
     }
 
-    /// Sends each message `rounds` times in turn and waits for its answer.
-    fn exchange(&mut self, messages: &[Vec<u8>], rounds: usize) {
-        for _ in 0..rounds {
-            for message in messages {
-                self.send(message);
-                let header = FrameHeader::decode(self.receive()).unwrap();
-                assert_eq!(header.status, FrameStatus::Ok, "{header:?}");
-            }
+    /// Sends each message in turn and waits for its answer.
+    fn exchange(&mut self, messages: &[Vec<u8>]) {
+        for message in messages {
+            self.send(message);
+            let header = FrameHeader::decode(self.receive()).unwrap();
+            assert_eq!(header.status, FrameStatus::Ok, "{header:?}");
+        }
+    }
+
+    /// Sends a frame of a whole map so many times, and waits for each answer.
+    fn repeat(&mut self, message: &mut [u8], times: usize) {
+        for _ in 0..times {
+            number_anew(message);
+            self.send(message);
+            let header = FrameHeader::decode(self.receive()).unwrap();
+            assert_eq!(header.status, FrameStatus::Ok, "{header:?}");
         }
     }
 }
 
-/// A client's WebSocket message with a mask of its own.
+/// What the messages of these clients are masked with.
+const MASK: [u8; 4] = [0x12, 0x34, 0x56, 0x78];
+
+/// A client's WebSocket message.
 fn masked(opcode: u8, payload: &[u8]) -> Vec<u8> {
-    let mask = [0x12, 0x34, 0x56, 0x78];
     let mut message = vec![opcode];
     match payload.len() {
         len @ 0..126 => message.push(0x80 | len as u8),
@@ -161,24 +171,34 @@ fn masked(opcode: u8, payload: &[u8]) -> Vec<u8> {
             message.extend((len as u64).to_be_bytes());
         }
     }
-    message.extend(mask);
-    message.extend(payload.iter().zip(mask.iter().cycle()).map(|(byte, mask)| byte ^ mask));
+    message.extend(MASK);
+    message.extend(payload.iter().zip(MASK.iter().cycle()).map(|(byte, mask)| byte ^ mask));
     message
 }
 
-/// A frame of version 1 as a WebSocket message.
+/// A frame of a whole map as a WebSocket message.
 fn whole(map: &[f32]) -> Vec<u8> {
-    let header = FrameHeader::pressure(1, 0, 0, SampleType::F32, 1.0);
+    let header = FrameHeader::pressure(0, 0, 0, SampleType::F32, 1.0);
     masked(0x82, &[&header.encode()[..], &bytes_of(map)].concat())
 }
 
-/// A frame of version 2; every one of a list has a sequence of its own.
+/// Gives a frame of a whole map the next number: one that is not newer would be stale.
+fn number_anew(message: &mut [u8]) {
+    // Behind the head of the WebSocket, 10 bytes and the mask: bytes 8 to 11 of the header.
+    let at = 10 + MASK.len() + 8;
+    let masked = <[u8; 4]>::try_from(&message[at..at + 4]).unwrap();
+    let plain = [0, 1, 2, 3].map(|i| masked[i] ^ MASK[i]);
+    let next = (u32::from_le_bytes(plain) + 1).to_le_bytes();
+    message[at..at + 4].copy_from_slice(&[0, 1, 2, 3].map(|i| next[i] ^ MASK[i]));
+}
+
+/// A frame of a window; every one of a list has a sequence of its own.
 fn windowed(sequence: u32, window: Window, map: &[f32]) -> Vec<u8> {
     let time_us = 11_111 * u64::from(sequence);
     let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0).windowed(window);
     let mut frame = header.encode().to_vec();
-    frame.resize(HEADER_LEN_V2 + 4 * window.pixel_count(), 0);
-    window.encode(SampleType::F32, map, 1.0, &mut frame[HEADER_LEN_V2..]).unwrap();
+    frame.resize(HEADER_LEN + 4 * window.pixel_count(), 0);
+    window.encode(SampleType::F32, map, 1.0, &mut frame[HEADER_LEN..]).unwrap();
     masked(0x82, &frame)
 }
 
@@ -205,7 +225,7 @@ const WARM_UP: usize = 100;
 const FRAMES: usize = 400;
 
 fn plain_hello() -> Value {
-    json!({"type": "hello", "version": 1, "tier": "quick"})
+    json!({"type": "hello", "tier": "quick"})
 }
 
 #[test]
@@ -230,12 +250,13 @@ fn a_warm_session_allocates_nothing_for_a_frame() {
 fn one_frame_at_a_time(service: &Service, engines_own: u64) {
     // Frames of nothing ask no network: what is counted is the path of the frame alone.
     let mut client = Client::connect(service, &plain_hello());
-    let zero = [whole(&vec![0.0; MAP_LEN])];
-    client.exchange(&zero, WARM_UP);
-    assert_eq!(allocations(|| client.exchange(&zero, FRAMES)), 0, "without contact");
-    let frames = [whole(&ramp())];
-    client.exchange(&frames, WARM_UP);
-    let all = allocations(|| client.exchange(&frames, FRAMES));
+    let mut zero = whole(&vec![0.0; MAP_LEN]);
+    client.repeat(&mut zero, WARM_UP);
+    assert_eq!(allocations(|| client.repeat(&mut zero, FRAMES)), 0, "without contact");
+    let mut client = Client::connect(service, &plain_hello());
+    let mut frame = whole(&ramp());
+    client.repeat(&mut frame, WARM_UP);
+    let all = allocations(|| client.repeat(&mut frame, FRAMES));
     assert_eq!(all, FRAMES as u64 * engines_own, "beyond what the engine itself does");
 }
 
@@ -243,12 +264,13 @@ fn one_frame_at_a_time(service: &Service, engines_own: u64) {
 /// some are superseded.
 fn frames_that_wait(service: &Service, engines_own: u64) {
     let mut clients = [(); 2].map(|()| Client::connect(service, &plain_hello()));
-    let frame = whole(&ramp());
+    let mut frame = whole(&ramp());
     let mut maps = 0;
     let mut exchange = |rounds: usize| {
         maps = 0;
         for _ in 0..rounds {
             for _ in 0..3 {
+                number_anew(&mut frame);
                 clients.iter_mut().for_each(|client| client.send(&frame));
             }
             for client in &mut clients {
@@ -268,29 +290,29 @@ fn frames_that_wait(service: &Service, engines_own: u64) {
 /// Two fingers under a ball that moves, forces out alone: nothing is left to the engine.
 fn fingers(service: &Service) {
     let members = json!({"map": false, "stiffness": true, "fingers": [{}, {}]});
-    let mut client = Client::connect(service, &contact::hello_3(&members));
+    let mut client = Client::connect(service, &contact::ball_hello(&members));
     let frame = |n: u32| {
         let depth_mm = 0.2 + 0.001 * (n % 20) as f32;
         masked(0x82, &contact::rows(n, (n % 2) as u8, &[contact::deep(depth_mm)]))
     };
     let frames: Vec<_> = (1..=(WARM_UP + FRAMES) as u32).map(frame).collect();
-    client.exchange(&frames[..WARM_UP], 1);
-    assert_eq!(allocations(|| client.exchange(&frames[WARM_UP..], 1)), 0, "poses in, forces out");
+    client.exchange(&frames[..WARM_UP]);
+    assert_eq!(allocations(|| client.exchange(&frames[WARM_UP..])), 0, "poses in, forces out");
 }
 
 /// A ball that is dragged to and fro, whose traction is felt.
 fn felt_traction(service: &Service, engines_own: u64) {
     let objects = json!([{"shape": {"shape": "sphere", "radius_mm": 20.0}, "friction": 0.5}]);
     let members = json!({"objects": objects, "effects": ["shear_energy"], "tier": "quick"});
-    let mut client = Client::connect(service, &contact::hello_3(&members));
+    let mut client = Client::connect(service, &contact::ball_hello(&members));
     let frame = |n: u32| {
         let mut pose = contact::deep(0.2);
         pose.origin_mm[0] = 0.01 * (n % 20) as f32;
         masked(0x82, &contact::rows(n, 0, &[pose]))
     };
     let frames: Vec<_> = (1..=(WARM_UP + FRAMES) as u32).map(frame).collect();
-    client.exchange(&frames[..WARM_UP], 1);
-    let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
+    client.exchange(&frames[..WARM_UP]);
+    let all = allocations(|| client.exchange(&frames[WARM_UP..]));
     assert_eq!(all, FRAMES as u64 * engines_own, "with traction");
 }
 
@@ -302,7 +324,7 @@ fn every_effect(service: &Service, engines_own: u64, (drive, asked): (&str, u64)
     let of_windows = |effect: &RuntimeEffect| *effect != RuntimeEffect::ShearEnergy;
     let effects: Vec<_> = RuntimeEffect::ALL.into_iter().filter(of_windows).collect();
     let hello = json!({
-        "type": "hello", "version": 2, "effects": effects, "tier": "quick",
+        "type": "hello", "effects": effects, "tier": "quick",
         "points": [{"px": [110.0, 65.0]}],
         "actuators": {"drive": drive, "radius_mm": 1.0, "gain": 1.0,
                       "actuators": [{"at": {"px": [110.0, 65.0]}}]}
@@ -311,7 +333,7 @@ fn every_effect(service: &Service, engines_own: u64, (drive, asked): (&str, u64)
     let window = Window { x: 60, y: 50, width: 100, height: 80 };
     let frames: Vec<_> =
         (1..=(WARM_UP + FRAMES) as u32).map(|n| windowed(n, window, &ramp())).collect();
-    client.exchange(&frames[..WARM_UP], 1);
-    let all = allocations(|| client.exchange(&frames[WARM_UP..], 1));
+    client.exchange(&frames[..WARM_UP]);
+    let all = allocations(|| client.exchange(&frames[WARM_UP..]));
     assert_eq!(all, FRAMES as u64 * asked * engines_own, "with every effect, {drive}");
 }

@@ -1,11 +1,11 @@
 //! Clients whose clock is set, runs backward or wraps: what is promised of time still holds.
 
-use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN_V2, MAP_LEN, Window};
+use papilla_proto::{FrameHeader, FrameStatus, MAP_LEN, Window};
 use serde_json::{Value, json};
 
 use crate::{
-    effects::{hello_2, windowed},
-    support::{GAIN, Service, Socket, floats_of},
+    effects::windowed,
+    support::{GAIN, Service, Socket, floats_of, hello},
 };
 
 const DAY_US: u64 = 86_400_000_000;
@@ -19,7 +19,7 @@ struct Clocked {
 impl Clocked {
     async fn open(service: &Service, wish: &Value) -> Self {
         let mut socket = service.socket().await;
-        socket.open(hello_2(wish)).await;
+        socket.open(hello(wish)).await;
         Self { socket, sequence: 0 }
     }
 
@@ -31,8 +31,7 @@ impl Clocked {
         self.socket.send(windowed(self.sequence, time_us, window, &map)).await;
         let (header, payload) = self.socket.hear_frame().await;
         assert_eq!((header.sequence, header.client_time_us), (self.sequence, time_us));
-        // `hear_frame` takes the first 32 bytes off.
-        let sed = floats_of(&payload[HEADER_LEN_V2 - 32..]);
+        let sed = floats_of(&payload);
         assert!(sed.iter().all(|v| v.is_finite() && *v >= 0.0));
         // The map comes last.
         let map = &sed[sed.len().saturating_sub(MAP_LEN)..];
@@ -115,6 +114,6 @@ async fn firing_rates_stay_numbers_whatever_the_clock() {
     }
     let mut socket = service.socket().await;
     let beyond = json!({"effects": ["afferents"], "afferents": {"k_d_hz_s_per_kpa": 1e35}});
-    socket.send(hello_2(&beyond).to_string()).await;
+    socket.send(hello(&beyond).to_string()).await;
     assert_eq!(socket.hear_refusal("bad_effect").await["field"], "afferents");
 }

@@ -1,7 +1,7 @@
-//! Version 3 of a session: objects and gaps in, forces out, several fingers.
+//! Objects and gaps in, forces out, several fingers.
 
 use papilla_proto::{
-    FrameHeader, FrameKind, FrameStatus, HEADER_LEN, HEADER_LEN_V2, MAP_LEN, SampleType,
+    FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_LEN, SampleType,
     contact::{POSE_LEN, Pose, TOUCH_LEN, Touch},
     flags,
 };
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::support::{
     GAIN, Service, Socket,
     contact::{
-        MODULUS_MPA, RADIUS_MM, atlas, deep, hello_3, hertz_n, model, model_of, rows, service,
+        MODULUS_MPA, RADIUS_MM, atlas, ball_hello, deep, hertz_n, model, model_of, rows, service,
     },
     floats_of, frame, hello, model_folder, model_folder_on, write,
 };
@@ -20,7 +20,6 @@ const VERTICES: usize = 361;
 /// The next answer's header and touch, and the whole payload.
 async fn hear(socket: &mut Socket) -> (FrameHeader, Touch, Vec<u8>) {
     let (header, payload) = socket.hear_frame().await;
-    let payload = payload[HEADER_LEN_V2 - HEADER_LEN..].to_vec();
     (header, Touch::decode(&payload).unwrap_or_default(), payload)
 }
 
@@ -28,21 +27,20 @@ async fn hear(socket: &mut Socket) -> (FrameHeader, Touch, Vec<u8>) {
 async fn poses_go_in_and_forces_come_out_without_a_network() {
     let service = service().await;
     let mut socket = service.socket().await;
-    let ready = socket.open(hello_3(&json!({"map": false, "stiffness": true}))).await;
+    let ready = socket.open(ball_hello(&json!({"map": false, "stiffness": true}))).await;
     assert_eq!(ready["sections"], json!([{"name": "touch", "offset": 48, "bytes": TOUCH_LEN}]));
     assert_eq!((&ready["vertices"], &ready["fingers"]), (&json!(VERTICES), &json!(1)));
     for (sequence, depth) in [(1, 0.2), (2, 0.3)] {
         socket.send(rows(sequence, 0, &[deep(depth)])).await;
         let (header, touch, payload) = hear(&mut socket).await;
-        let extension = header.extension.unwrap();
-        assert_eq!((header.version(), header.sequence, payload.len()), (3, sequence, TOUCH_LEN));
-        assert_eq!((extension.infer_us, extension.flags, extension.finger), (0, 0, Some(0)));
+        assert_eq!((header.sequence, payload.len()), (sequence, TOUCH_LEN));
+        assert_eq!((header.infer_us, header.flags, header.finger), (0, 0, 0));
         assert!((touch.force_n[2] / hertz_n(depth) - 1.0).abs() < 0.1, "{touch:?}");
         assert!(touch.stiffness_n_per_mm > 0.0 && touch.area_mm2 > 1.0, "{touch:?}");
     }
     socket.send(rows(3, 0, &[deep(-9.0)])).await;
     let (header, touch, _) = hear(&mut socket).await;
-    assert_eq!(header.extension.unwrap().flags, flags::NO_CONTACT);
+    assert_eq!(header.flags, flags::NO_CONTACT);
     assert_eq!(touch.force_n.map(f32::to_bits), [0; 3]);
 }
 
@@ -55,13 +53,13 @@ async fn a_session_feels_what_lies_deep_and_says_so() {
     for method in ["springs", "second_order", "pixels"] {
         let mut socket = service.socket().await;
         let hello = json!({"objects": objects, "map": false, "method": method});
-        socket.open(hello_3(&hello)).await;
+        socket.open(ball_hello(&hello)).await;
         let mut last_n = 0.0;
         for (sequence, depth) in (1..).zip([-0.5, 0.2, 1.0, 2.5, 4.0, 5.5, -3.0]) {
             let pose = Pose { origin_mm: [0.0, 0.0, depth - BALL_MM], ..Pose::default() };
             socket.send(rows(sequence, 0, &[pose])).await;
             let (header, touch, _) = hear(&mut socket).await;
-            let told = header.extension.unwrap().flags;
+            let told = header.flags;
             let is_air = told & flags::NO_CONTACT != 0;
             assert_eq!(is_air, depth < 0.0, "{method}, {depth} mm: {touch:?}");
             if depth > 2.1 {
@@ -96,11 +94,11 @@ async fn on_pixels_a_session_feels_what_lies_between_vertices() {
     let hello = json!({"objects": objects, "out_of_range": "flag", "pressure": "map"});
     let mut by_vertices = hello.clone();
     by_vertices["method"] = json!("second_order");
-    let ready = socket.open(hello_3(&by_vertices)).await;
+    let ready = socket.open(ball_hello(&by_vertices)).await;
     assert_eq!((&ready["method"], ready.get("warnings")), (&json!("second_order"), None));
     socket.send(rows(1, 0, &[ball])).await;
     let (header, missed, _) = hear(&mut socket).await;
-    assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, flags::NO_CONTACT);
+    assert_eq!(header.flags & flags::NO_CONTACT, flags::NO_CONTACT);
     assert_eq!(missed.force_n[2].to_bits(), 0);
 
     // Who names none gets pixels.
@@ -110,11 +108,11 @@ async fn on_pixels_a_session_feels_what_lies_between_vertices() {
             hello["method"] = json!(method);
         }
         let method = method.unwrap_or("pixels");
-        let ready = socket.open(hello_3(&hello)).await;
+        let ready = socket.open(ball_hello(&hello)).await;
         assert_eq!(ready["method"], method);
         socket.send(rows(sequence, 0, &[ball])).await;
         let (header, felt, payload) = hear(&mut socket).await;
-        assert_eq!(header.extension.unwrap().flags & flags::NO_CONTACT, 0);
+        assert_eq!(header.flags & flags::NO_CONTACT, 0);
         // Hertz: 4/3 E* sqrt(R) d^1.5.
         let due = 4.0 / 3.0 * MODULUS_MPA * BALL_MM.sqrt() * 0.05f32.powf(1.5);
         assert!((felt.force_n[2] / due - 1.0).abs() < 0.2, "{method}: {felt:?} for {due}");
@@ -137,7 +135,7 @@ async fn pixels_need_objects_and_layers() {
     let methods = without_layers.json("/v1/tiers").await["methods"].clone();
     assert!(methods.as_array().unwrap().len() == 3, "{methods}");
     let mut socket = without_layers.socket().await;
-    let ready = socket.open(hello_3(&json!({}))).await;
+    let ready = socket.open(ball_hello(&json!({}))).await;
     assert_eq!(ready["method"], "second_order");
     let warning = ready["warnings"][0]["question"].as_str().unwrap();
     assert!(warning.contains("layers") && warning.contains("second_order"), "{warning}");
@@ -145,7 +143,7 @@ async fn pixels_need_objects_and_layers() {
         [(service().await, by_gaps), (without_layers, json!({"method": "pixels"}))]
     {
         let mut socket = service.socket().await;
-        socket.send(hello_3(&members).to_string()).await;
+        socket.send(ball_hello(&members).to_string()).await;
         assert_eq!(socket.hear_refusal("bad_contact").await["field"], "method");
     }
 }
@@ -159,7 +157,7 @@ async fn traction_is_felt_by_name() {
     for effects in [json!(["shear_energy"]), json!([])] {
         let mut socket = service.socket().await;
         let members = json!({"objects": rough, "effects": effects, "out_of_range": "flag"});
-        let ready = socket.open(hello_3(&members)).await;
+        let ready = socket.open(ball_hello(&members)).await;
         assert_eq!(ready["session_effects"], effects);
         let mut sed = Vec::new();
         for sequence in 1..=4u32 {
@@ -188,7 +186,7 @@ async fn traction_is_felt_by_name() {
     let with_friction = json!({"effects": ["shear_energy"], "objects": rough});
     for (service, members) in [(&service, named), (&without_layers, with_friction)] {
         let mut socket = service.socket().await;
-        socket.send(hello_3(&members).to_string()).await;
+        socket.send(ball_hello(&members).to_string()).await;
         assert_eq!(socket.hear_refusal("bad_effect").await["field"], "shear_energy");
     }
 }
@@ -208,7 +206,7 @@ fn pulled(sequence: u32, pressure_pa: f32, traction_pa: f32) -> Vec<u8> {
 }
 
 fn pulled_hello(members: &Value) -> Value {
-    let mut hello = hello_3(&json!({"input": "pressure", "input_layout": "vertices",
+    let mut hello = ball_hello(&json!({"input": "pressure", "input_layout": "vertices",
         "traction": true, "effects": ["shear_energy", "summary"]}));
     hello.as_object_mut().unwrap().remove("objects");
     for (name, value) in members.as_object().unwrap() {
@@ -235,7 +233,7 @@ async fn traction_beyond_the_range_is_refused_flagged_or_clamped_as_pressure_is(
                 continue;
             }
             let (header, _, payload) = hear(&mut socket).await;
-            let is_flagged = header.extension.unwrap().flags & flags::OUT_OF_RANGE != 0;
+            let is_flagged = header.flags & flags::OUT_OF_RANGE != 0;
             assert_eq!(is_flagged, traction_pa > 1.01e4, "{beyond} {traction_pa}");
             let numbers = floats_of(&payload);
             assert!(numbers.iter().all(|v| v.is_finite()), "{beyond} {traction_pa}");
@@ -269,7 +267,7 @@ async fn pressure_on_a_soft_finger_is_refused_by_the_value_that_was_sent() {
     // As maps, the same.
     let hello = json!({"input": "pressure", "fingers": soft, "out_of_range": "refuse"});
     let mut socket = service.socket().await;
-    let mut hello = hello_3(&hello);
+    let mut hello = ball_hello(&hello);
     hello.as_object_mut().unwrap().remove("objects");
     socket.open(hello).await;
     for (sequence, pressure_pa) in [(1, 3.4e38), (2, 2.6e3)] {
@@ -305,7 +303,7 @@ async fn solves_are_counted_by_what_they_came_to() {
     let service = service().await;
     assert!(service.json("/v1/tiers").await["methods"].is_array());
     let mut socket = service.socket().await;
-    socket.open(hello_3(&json!({"map": false}))).await;
+    socket.open(ball_hello(&json!({"map": false}))).await;
     for (sequence, depth) in [(1, -9.0), (2, 0.2), (3, 0.3)] {
         socket.send(rows(sequence, 0, &[deep(depth)])).await;
         hear(&mut socket).await;
@@ -326,7 +324,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
     let service = service().await;
     let mut socket = service.socket().await;
     let ready = socket
-        .open(hello_3(
+        .open(ball_hello(
             &json!({"pressure": "vertices", "answer_layout": "vertices", "effects": ["summary"],
                 "out_of_range": "flag", "method": "second_order"}),
         ))
@@ -335,7 +333,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
         let sections = ready["sections"].as_array().unwrap();
         let section = sections.iter().find(|s| s["name"] == name).unwrap();
         let number = |member: &str| section[member].as_u64().unwrap() as usize;
-        number("offset") - HEADER_LEN_V2..number("offset") - HEADER_LEN_V2 + number("bytes")
+        number("offset") - HEADER_LEN..number("offset") - HEADER_LEN + number("bytes")
     };
     socket.send(rows(1, 0, &[deep(0.3)])).await;
     let (_, touch, payload) = hear(&mut socket).await;
@@ -350,7 +348,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
     let summary = papilla_proto::Summary::decode(&payload[at("summary")]).unwrap();
     assert!((summary.force_n / touch.force_n[2] - 1.0).abs() < 0.1, "{summary:?} {touch:?}");
     // The map as ever, behind the touch.
-    let ready = socket.open(hello_3(&json!({"out_of_range": "flag"}))).await;
+    let ready = socket.open(ball_hello(&json!({"out_of_range": "flag"}))).await;
     assert_eq!(ready["sections"][1], json!({"name": "map", "offset": 112, "bytes": 4 * MAP_LEN}));
     socket.send(rows(2, 0, &[deep(0.3)])).await;
     let (_, _, payload) = hear(&mut socket).await;
@@ -364,7 +362,7 @@ async fn answers_are_laid_out_apart_from_what_is_sent() {
 async fn pressure_and_gaps_may_be_told_at_the_vertices() {
     let service = service().await;
     let mut socket = service.socket().await;
-    let members = json!({"version": 3, "input_layout": "vertices", "answer_layout": "vertices"});
+    let members = json!({"input_layout": "vertices", "answer_layout": "vertices"});
     socket.open(hello(&members)).await;
     let frame = |sequence: u32, kind, values: &[f32]| {
         let header = FrameHeader::pressure(sequence, 0, 0, SampleType::F32, 1.0);
@@ -381,7 +379,7 @@ async fn pressure_and_gaps_may_be_told_at_the_vertices() {
     assert!(
         socket.hear_refusal("not_finite").await["message"].as_str().unwrap().contains("vertex 7")
     );
-    let members = json!({"version": 3, "input": "gaps", "input_layout": "vertices", "map": false});
+    let members = json!({"input": "gaps", "input_layout": "vertices", "map": false});
     socket.open(hello(&members)).await;
     let depths: Vec<f32> = atlas()
         .patch(papilla_proto::atlas::Patch::Skin)
@@ -399,7 +397,7 @@ async fn fingers_have_slots_and_states_of_their_own() {
     let service = service().await;
     let mut socket = service.socket().await;
     let fingers = json!([{}, {"stiffness": 2.0}, {"width": 1.5}]);
-    socket.open(hello_3(&json!({"map": false, "fingers": fingers}))).await;
+    socket.open(ball_hello(&json!({"map": false, "fingers": fingers}))).await;
     // The same sequence on each finger: none supersedes another, none is stale.
     for finger in 0..3 {
         socket.send(rows(5, finger, &[deep(0.2)])).await;
@@ -408,7 +406,7 @@ async fn fingers_have_slots_and_states_of_their_own() {
     for _ in 0..3 {
         let (header, touch, _) = hear(&mut socket).await;
         assert_eq!((header.status, header.sequence), (FrameStatus::Ok, 5));
-        found[usize::from(header.extension.unwrap().finger.unwrap())] = touch.force_n[2];
+        found[usize::from(header.finger)] = touch.force_n[2];
     }
     assert!((found[1] / found[0] - 2.0).abs() < 1e-3 && found[2] > 0.0, "{found:?}");
     socket.send(rows(6, 3, &[deep(0.2)])).await;
@@ -421,7 +419,7 @@ async fn fingers_have_slots_and_states_of_their_own() {
 async fn a_net_force_is_met() {
     let service = service().await;
     let mut socket = service.socket().await;
-    socket.open(hello_3(&json!({"map": false, "force_target": true}))).await;
+    socket.open(ball_hello(&json!({"map": false, "force_target": true}))).await;
     let net = |force_n| Pose { origin_mm: [0.0, 0.0, 1.0], quaternion: [force_n, 0.0, 0.0, 0.0] };
     for (sequence, force) in [(1, 0.03), (2, 0.04)] {
         socket.send(rows(sequence, 0, &[deep(-1.0), net(force)])).await;
@@ -437,7 +435,7 @@ async fn a_net_force_is_met() {
 async fn what_cannot_be_is_named_and_nobody_else_notices() {
     let service = service().await;
     let (mut good, mut bad) = (service.socket().await, service.socket().await);
-    good.open(hello_3(&json!({"map": false}))).await;
+    good.open(ball_hello(&json!({"map": false}))).await;
     let open_mesh = json!({"shape": "mesh", "vertices_mm": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
         "triangles": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 1, 2]]});
     let crowd = json!({"shape": "mesh", "vertices_mm": [], "triangles": vec![[0, 0, 0]; 30_000]});
@@ -447,14 +445,14 @@ async fn what_cannot_be_is_named_and_nobody_else_notices() {
         (shape(open_mesh), "bad_contact", "objects[0].shape"),
         (shape(crowd), "bad_contact", "objects[0].shape"),
         (json!({"fingers": []}), "bad_contact", "fingers"),
-        (json!({"version": 2}), "unknown_version", "input"),
+        (json!({"version": 2}), "unknown_version", "version"),
         (json!({"input": "pressure"}), "bad_contact", "objects"),
     ];
     for (members, code, field) in refused {
-        bad.send(hello_3(&members).to_string()).await;
+        bad.send(ball_hello(&members).to_string()).await;
         assert_eq!(bad.hear_refusal(code).await["field"], field, "{members}");
     }
-    bad.open(hello_3(&json!({"map": false}))).await;
+    bad.open(ball_hello(&json!({"map": false}))).await;
     let nan = Pose { origin_mm: [f32::NAN; 3], ..deep(0.2) };
     let turned = Pose { quaternion: [1.0; 4], ..deep(0.2) };
     let frames = [
@@ -462,11 +460,7 @@ async fn what_cannot_be_is_named_and_nobody_else_notices() {
         (rows(2, 0, &[turned]), "bad_contact", "objects[0].quaternion"),
         (rows(3, 0, &[deep(0.2); 2]), "wrong_shape", "width"),
         (rows(4, 9, &[deep(0.2)]), "bad_contact", "finger"),
-        (
-            rows(5, 0, &[deep(0.2)])[..HEADER_LEN_V2 + POSE_LEN - 1].to_vec(),
-            "wrong_length",
-            "payload",
-        ),
+        (rows(5, 0, &[deep(0.2)])[..HEADER_LEN + POSE_LEN - 1].to_vec(), "wrong_length", "payload"),
     ];
     for (sequence, (frame, code, field)) in (1..).zip(frames) {
         bad.send(frame).await;
@@ -487,19 +481,26 @@ async fn places_for_fingers_are_bounded_and_come_back() {
     let mut open = Vec::new();
     for _ in 0..6 {
         let mut socket = service.socket().await;
-        socket.open(hello_3(&json!({"map": false, "fingers": ten}))).await;
+        socket.open(ball_hello(&json!({"map": false, "fingers": ten}))).await;
         open.push(socket);
     }
-    socket.send(hello_3(&json!({"map": false, "fingers": ten})).to_string()).await;
+    socket.send(ball_hello(&json!({"map": false, "fingers": ten})).to_string()).await;
     assert_eq!(socket.hear_refusal("overloaded").await["field"], "fingers");
-    socket.open(hello_3(&json!({"map": false, "fingers": [{}, {}, {}, {}]}))).await;
+    socket.open(ball_hello(&json!({"map": false, "fingers": [{}, {}, {}, {}]}))).await;
+    // All are taken now. One finger whose pressure comes as a map needs none, further ones do.
+    let mut maps = service.socket().await;
+    maps.open(hello(&json!({}))).await;
+    for members in [json!({"fingers": [{}, {}]}), json!({"input_layout": "vertices"})] {
+        maps.send(hello(&members).to_string()).await;
+        assert_eq!(maps.hear_refusal("overloaded").await["field"], "fingers", "{members}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn without_a_contact_model_objects_are_refused() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.send(hello_3(&json!({})).to_string()).await;
+    socket.send(ball_hello(&json!({})).to_string()).await;
     let error = socket.hear_refusal("bad_contact").await;
     assert!(error["message"].as_str().unwrap().contains("--contact"), "{error}");
 }

@@ -15,7 +15,7 @@ use tokio::{
 
 use crate::support::{
     Received, Service, Socket,
-    contact::{deep, hello_3, rows, service_with},
+    contact::{ball_hello, deep, rows, service_with},
     hello,
     raw::{Raw, opcode, ws},
 };
@@ -81,7 +81,7 @@ struct Hostile {
 impl Hostile {
     fn of(session: &Value) -> Self {
         let session = whole(session);
-        let hello = hello_3(&session["hello"]);
+        let hello = ball_hello(&session["hello"]);
         let Some(rows) = session["rows"].as_array() else {
             let gap_mm = session["gaps_mm"].as_f64().unwrap() as f32;
             let side = MAP_SIDE_PX as u16;
@@ -132,7 +132,7 @@ impl Hostile {
         // A finger has its next frame as soon as one is answered, or refused.
         for sequence in 2.. {
             let finger = match socket.receive().await {
-                Received::Frame(header, _) => header.extension.unwrap().finger.unwrap(),
+                Received::Frame(header, _) => header.finger,
                 Received::Json(_) => (sequence % u32::from(fingers)) as u8,
                 Received::Closed(_) => return,
                 Received::Sealed(_) => panic!("nobody asked for the state"),
@@ -156,7 +156,7 @@ async fn trips(socket: &mut Socket, first: u32) -> Vec<f64> {
         socket.send(rows(sequence, 0, &[deep(0.2)])).await;
         let (header, _) = socket.hear_frame().await;
         assert_eq!((header.sequence, header.status), (sequence, FrameStatus::Ok));
-        waits.push(1e-6 * f64::from(header.extension.unwrap().queue_us));
+        waits.push(1e-6 * f64::from(header.queue_us));
     }
     waits.sort_by(f64::total_cmp);
     waits
@@ -186,7 +186,7 @@ async fn nobody_waits_for_the_hard_frames_of_others() {
         let service = service_with(|config| config.threads = std::num::NonZeroUsize::new(2)).await;
         let mut neighbour = service.socket().await;
         // At vertices: in a build of tests a frame on pixels is long itself.
-        neighbour.open(hello_3(&json!({"map": false, "method": "second_order"}))).await;
+        neighbour.open(ball_hello(&json!({"map": false, "method": "second_order"}))).await;
         trips(&mut neighbour, 1).await;
         let begin = timeout(Duration::from_secs(240), besiege(&service, session));
         let Some(mut hostile) = begin.await.expect(kind) else { continue };
@@ -219,7 +219,7 @@ async fn nobody_waits_for_the_hard_frames_of_others() {
 async fn nobody_works_for_clients_that_have_left() {
     const CLIENTS: u32 = 20;
     let service = service_with(|_| ()).await;
-    let long = hello_3(&json!({"map": false, "objects": [{"shape": slivers(8192)}]}));
+    let long = ball_hello(&json!({"map": false, "objects": [{"shape": slivers(8192)}]}));
     let long = ws(opcode::FINAL | opcode::TEXT, long.to_string().as_bytes());
     for _ in 0..CLIENTS {
         let mut client = Raw::connect(service.address).await;
@@ -234,5 +234,5 @@ async fn nobody_works_for_clients_that_have_left() {
     // Some are worked out before the service hears that their client is gone.
     let left = service.metric("papilla_hellos_left_total").await;
     assert!(left >= f64::from(CLIENTS / 2), "{left} of {CLIENTS}");
-    service.socket().await.open(hello(&json!({"version": 2}))).await;
+    service.socket().await.open(hello(&json!({}))).await;
 }

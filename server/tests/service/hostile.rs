@@ -94,8 +94,10 @@ async fn a_client_that_never_reads_is_dropped() {
     let mut socket = service.socket().await;
     socket.open(hello(&json!({}))).await;
     let flood = async {
+        let mut sequence = 0;
         while service.metric("papilla_sessions_open").await > 0.5 {
-            for sequence in 0..8 {
+            for _ in 0..8 {
+                sequence += 1;
                 let frame = frame(sequence, 0, SampleType::F32, 1.0, &ramp());
                 let _ = timeout(Duration::from_millis(100), socket.try_send(frame)).await;
             }
@@ -111,7 +113,7 @@ async fn a_client_that_never_reads_is_dropped() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_reader_is_waited_for() {
     let service = Service::start_with(|config| config.io_timeout_s = 3).await;
-    let terms = json!({"version": 2, "sample_type": "u8", "answer_sample_type": "f32"});
+    let terms = json!({"sample_type": "u8", "answer_sample_type": "f32"});
     let mut raw = Raw::open(service.address, &hello(&terms)).await;
     let mut read = vec![0; 8192];
     for sequence in 1..=80 {
@@ -296,7 +298,7 @@ async fn long_input_is_cut_in_errors() {
         json!({"effects": [long]}),
         json!({"atlas_hash": long}),
         json!({"sample_type": long}),
-        json!({"version": 2, "effects": ["points"], "points": {"names": [long]}}),
+        json!({"effects": ["points"], "points": {"names": [long]}}),
     ] {
         socket.send(hello(&members).to_string()).await;
         let error = socket.hear_json().await.to_string();

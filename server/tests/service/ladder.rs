@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use tokio::time::timeout;
 
 use crate::{
-    effects::{hello_2, windowed},
+    effects::windowed,
     support::{Service, atlas, hello, model_folder, ramp, write},
 };
 
@@ -132,13 +132,13 @@ async fn a_budget_is_kept_although_the_calibration_was_skipped() {
     ladder["rungs"][1] = rung("slow", Some("slow"), 1.0, 0.1);
     let service = with(&ladder, 0).await.unwrap();
     let mut socket = service.socket().await;
-    let ready = socket.open(hello_2(&json!({"budget_us": 5_000}))).await;
+    let ready = socket.open(hello(&json!({"budget_us": 5_000}))).await;
     assert_eq!((&ready["tier"], &ready["tier_names"]), (&json!("slow"), &json!(["quick", "slow"])));
     let mut late = 0;
     for sequence in 1..100 {
         socket.send(windowed(sequence, 0, Window::WHOLE, &ramp())).await;
         let (header, _) = socket.hear_frame().await;
-        let tier = header.extension.unwrap().tier;
+        let tier = header.tier;
         if tier == 0 {
             assert!((1..=10).contains(&late), "{late} late frames");
             return;

@@ -171,12 +171,12 @@ fn messages() -> Vec<(&'static str, String)> {
     let fill = |head: &str, item: &str, tail: &str| {
         String::from_utf8(filled(head, item, tail, MESSAGE_MAX)).unwrap()
     };
-    let start = r#"{"type":"hello","version":2,"#;
+    let start = r#"{"type":"hello","#;
     let with = |members: &str| format!("{start}{members}");
     // As many pixels in receptive fields as a session may have.
     let wide = vec![json!({"at": {"px": [110.5, 110.5]}}); 32];
     let display = json!({"actuators": wide, "radius_mm": 1000.0, "gain": 1.0});
-    let all = hello(&json!({"version": 2, "actuators": display,
+    let all = hello(&json!({"actuators": display,
         "effects": ["actuators", "relaxation", "afferents", "spikes", "summary"],
         "relaxation": {"prony": (1..=6).map(|n| json!({"g": 0.1, "tau_s": n})).collect::<Vec<_>>()}}));
     vec![
@@ -210,7 +210,7 @@ async fn no_message_takes_more_than_the_documented_sum() {
     let mut sockets = Vec::new();
     for _ in 0..CLIENTS {
         let mut socket = Socket::connect(running.address).await.unwrap();
-        socket.open(hello(&json!({"version": 2, "effects": ["summary"]}))).await;
+        socket.open(hello(&json!({"effects": ["summary"]}))).await;
         sockets.push(socket);
     }
     let before = status(id, "VmRSS");
@@ -256,7 +256,7 @@ async fn the_memory_of_sessions_that_are_over_is_given_back() {
     let running = Running::start_with(folder.path(), &[]);
     let id = running.child.id();
     let fingers = vec![json!({}); 10];
-    let hello = contact::hello_3(&json!({"method": "pixels", "map": false, "fingers": fingers}));
+    let hello = contact::ball_hello(&json!({"method": "pixels", "map": false, "fingers": fingers}));
     let press = async |sessions: usize| {
         let mut open = Vec::new();
         for _ in 0..sessions {

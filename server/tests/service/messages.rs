@@ -32,7 +32,7 @@ async fn a_hello_of_a_wrong_type_names_member_and_place() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
     for (members, field) in [
-        (json!({"version": "1"}), "version"),
+        (json!({"version": "3"}), "version"),
         (json!({"budget_us": -1}), "budget_us"),
         (json!({"effects": ["layers", 7]}), "effects[1]"),
         (json!({"sample_type": ["f32"]}), "sample_type"),

@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 use tempfile::NamedTempFile;
 
 use crate::{
-    effects::{hello_2, windowed},
-    support::{PRESSURE_MAX_PA, Received, Service, Socket, add_model, contact, model_folder},
+    effects::windowed,
+    support::{PRESSURE_MAX_PA, Service, Socket, add_model, contact, hello, model_folder},
 };
 
 /// A file of one key, and settings that name it.
@@ -30,9 +30,7 @@ impl Shared {
 
 /// A hello whose answers depend on every frame before.
 fn creeping() -> Value {
-    hello_2(
-        &json!({"effects": ["relaxation", "afferents", "spikes", "summary"], "reconnect": true}),
-    )
+    hello(&json!({"effects": ["relaxation", "afferents", "spikes", "summary"], "reconnect": true}))
 }
 
 /// A patch that moves and breathes, Pa.
@@ -50,8 +48,8 @@ async fn render(socket: &mut Socket, sequence: u32) -> Vec<u8> {
     socket.send(windowed(sequence, time_us, Window::WHOLE, &press(sequence))).await;
     let (header, payload) = socket.hear_frame().await;
     assert_eq!((header.sequence, header.status), (sequence, FrameStatus::Ok));
-    let flags = header.extension.unwrap().flags;
-    [&[flags][..], &payload[16..]].concat()
+    let flags = header.flags;
+    [&[flags][..], &payload[..]].concat()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -91,7 +89,7 @@ async fn fingers_that_moved_start_as_warm_as_they_were() {
     let one = contact::service_with(shared.configure()).await;
     let other = contact::service_with(shared.configure()).await;
     for method in ["second_order", "pixels", "coarse_pixels"] {
-        let hello = contact::hello_3(&json!({
+        let hello = contact::ball_hello(&json!({
             "reconnect": true, "map": false, "pressure": "vertices", "stiffness": true,
             "fingers": [{}, {}], "method": method,
         }));
@@ -124,8 +122,8 @@ async fn touch(socket: &mut Socket, sequence: u32, finger: u8) -> Vec<u8> {
     socket.send(contact::rows(sequence, finger, &[contact::deep(depth_mm)])).await;
     let (header, mut payload) = socket.hear_frame().await;
     assert_eq!((header.sequence, header.status), (sequence, FrameStatus::Ok));
-    payload[16 + TOUCH_LEN - 4..16 + TOUCH_LEN].fill(0);
-    payload.split_off(16)
+    payload[TOUCH_LEN - 4..TOUCH_LEN].fill(0);
+    payload
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -158,10 +156,10 @@ async fn what_cannot_be_resumed_starts_anew_and_is_told_why() {
         }
     }
     let mut plain = one.socket().await;
-    plain.open(hello_2(&json!({"reconnect": true}))).await;
+    plain.open(hello(&json!({"reconnect": true}))).await;
     let nothing = plain.seal().await;
     let mut anew = one.socket().await;
-    let ready = anew.resume(hello_2(&json!({"reconnect": true})), nothing).await;
+    let ready = anew.resume(hello(&json!({"reconnect": true})), nothing).await;
     assert_eq!(ready["state"], "nothing", "{ready}");
 }
 
@@ -190,7 +188,7 @@ async fn a_drain_asks_those_who_follow_and_answers_them_meanwhile() {
     let one = Service::start().await;
     let (mut follows, mut does_not) = (one.socket().await, one.socket().await);
     follows.open(creeping()).await;
-    does_not.open(hello_2(&json!({}))).await;
+    does_not.open(hello(&json!({}))).await;
     let drain = tokio::spawn(one.server.drain());
     let ask = follows.hear_json().await;
     // Two thirds of the 15 s that a drain may take.
@@ -221,7 +219,7 @@ async fn an_old_session_is_asked_again_and_again_but_only_if_it_follows() {
     let one = Service::start_with(|config| config.reconnect_after_s = 1).await;
     let (mut follows, mut does_not) = (one.socket().await, one.socket().await);
     follows.open(creeping()).await;
-    does_not.open(hello_2(&json!({}))).await;
+    does_not.open(hello(&json!({}))).await;
     for _ in 0..2 {
         let ask = follows.hear_json().await;
         assert_eq!(ask, json!({"type": "reconnect", "reason": "age", "within_ms": null}));
@@ -237,19 +235,14 @@ async fn an_old_session_is_asked_again_and_again_but_only_if_it_follows() {
 async fn a_state_is_due_after_a_hello_that_announces_one_and_nowhere_else() {
     let one = Service::start().await;
     let mut socket = one.socket().await;
-    let hello = hello_2(&json!({"resume": true}));
-    for said in [hello.to_string(), "?".to_owned()] {
-        socket.send(hello.to_string()).await;
+    let announces = hello(&json!({"resume": true}));
+    for said in [announces.to_string(), "?".to_owned()] {
+        socket.send(announces.to_string()).await;
         socket.send(said).await;
         assert_eq!(socket.hear_refusal("bad_json").await["field"], "resume");
     }
-    let ready = socket.resume(hello_2(&json!({})), b"PPS\x01\x00".to_vec()).await;
+    let ready = socket.resume(hello(&json!({})), b"PPS\x01\x00".to_vec()).await;
     assert_eq!(ready["state"], "unreadable", "{ready}");
-    socket.send(hello.to_string()).await;
+    socket.send(announces.to_string()).await;
     assert_eq!(socket.hear_refusal("bad_json").await["field"], "resume");
-    socket.send(hello_2(&json!({"version": 1, "resume": true})).to_string()).await;
-    match socket.receive().await {
-        Received::Json(refusal) => assert_ne!(refusal["type"], "ready", "{refusal}"),
-        other => panic!("a refusal is due, not {other:?}"),
-    }
 }

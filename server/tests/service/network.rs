@@ -9,15 +9,12 @@ mod slow;
 
 use std::{cell::Cell, net::SocketAddr, time::Duration};
 
-use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN_V2, SampleType, Window};
+use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN, SampleType, Window};
 use serde_json::json;
 use tokio::time::{sleep, timeout};
 
-use crate::{
-    effects::hello_2,
-    support::{
-        Service, Socket, assert_rendered, floats_of, frame, hello, metric_at, ramp, raw::opcode,
-    },
+use crate::support::{
+    Service, Socket, assert_rendered, floats_of, frame, hello, metric_at, ramp, raw::opcode,
 };
 
 /// Longest wait for what ends within seconds; only a hang takes longer.
@@ -76,17 +73,17 @@ async fn until_open(address: SocketAddr, sessions: i64) {
     timeout(HANG, wait).await.expect("a dead session is still open");
 }
 
-/// A frame of version 2 that carries 5 x 4 pixels of 100 units.
+/// A frame that carries 5 x 4 pixels of 100 units.
 fn small_frame(sequence: u32) -> Vec<u8> {
     let window = Window { x: 60, y: 70, width: 5, height: 4 };
     let header = FrameHeader::pressure(sequence, 0, 0, SampleType::U8, 10.0).windowed(window);
     let mut frame = header.encode().to_vec();
-    frame.resize(HEADER_LEN_V2 + 20, 100);
+    frame.resize(HEADER_LEN + 20, 100);
     frame
 }
 
 fn small_hello() -> serde_json::Value {
-    hello_2(&json!({"sample_type": "u8", "effects": ["contact_window"],
+    hello(&json!({"sample_type": "u8", "effects": ["contact_window"],
         "contact_window": {"margin_px": 0}}))
 }
 
@@ -96,5 +93,5 @@ fn assert_small_answer(message: Option<(u8, Vec<u8>)>, sequence: u32) {
     assert_eq!(kind, opcode::BINARY, "{}", String::from_utf8_lossy(&message));
     let header = FrameHeader::decode(&message).unwrap();
     assert_eq!((header.status, header.sequence), (FrameStatus::Ok, sequence));
-    assert_eq!((header.width, header.height, message.len()), (5, 4, HEADER_LEN_V2 + 20));
+    assert_eq!((header.width, header.height, message.len()), (5, 4, HEADER_LEN + 20));
 }

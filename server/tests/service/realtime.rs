@@ -120,7 +120,7 @@ fn what_the_system_refuses_is_said() {
     }
 }
 
-/// A frame of version 2 under a window of 4 x 4 pixels.
+/// A frame under a window of 4 x 4 pixels.
 fn small(sequence: u32, sent: Duration) -> Vec<u8> {
     let window = Window { x: 100, y: 100, width: 4, height: 4 };
     let sent_us = sent.as_micros() as u64;
@@ -132,7 +132,7 @@ fn small(sequence: u32, sent: Duration) -> Vec<u8> {
 /// many frames were superseded.
 async fn ages(address: SocketAddr, period: Duration, frames: u32) -> (Vec<Duration>, usize) {
     let mut socket = Socket::connect(address).await.unwrap();
-    let terms = json!({"version": 2, "tier": "slow", "sample_type": "u8"});
+    let terms = json!({"tier": "slow", "sample_type": "u8"});
     socket.open(hello(&terms)).await;
     let (begun, mut sent, mut answered) = (Instant::now(), 0, 0);
     let (mut ages, mut superseded) = (Vec::new(), 0);
@@ -145,7 +145,7 @@ async fn ages(address: SocketAddr, period: Duration, frames: u32) -> (Vec<Durati
             (header, _) = socket.hear_frame() => {
                 answered += 1;
                 let age = begun.elapsed() - Duration::from_micros(header.client_time_us);
-                let map = Duration::from_micros(header.extension.unwrap().infer_us.into());
+                let map = Duration::from_micros(header.infer_us.into());
                 match header.status {
                     // Nothing newer takes the place of the last one.
                     FrameStatus::Ok if sent == frames => {}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use papilla_proto::{FrameHeader, FrameKind, FrameStatus, MAP_LEN, SampleType};
+use papilla_proto::{FrameHeader, FrameKind, FrameStatus, HEADER_LEN, MAP_LEN, SampleType, flags};
 use serde_json::{Value, json};
 
 use crate::support::{
@@ -57,7 +57,7 @@ async fn ready_says_what_was_agreed() {
     let wish =
         json!({"effects": ["layers"], "budget_us": 60_000_000, "tier": null, "atlas_hash": hash});
     let ready = socket.open(hello(&wish)).await;
-    assert_eq!(ready["version"], 1);
+    assert_eq!(ready["version"], 3);
     assert_eq!(ready["tier"], "slow", "the most accurate tier that meets the budget");
     assert_eq!(ready["effects"], json!(["finite_strain", "layers"]));
     assert_eq!((&ready["width"], &ready["height"]), (&json!(224), &json!(224)));
@@ -117,7 +117,7 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
     let mut socket = service.socket().await;
     let atlas_hash = "0".repeat(64);
     for (bad, code, field) in [
-        (hello(&json!({"version": 4})), "unknown_version", json!("version")),
+        (hello(&json!({"version": 2})), "unknown_version", json!("version")),
         (hello(&json!({"tier": "nobody"})), "unknown_tier", json!("tier")),
         (hello(&json!({"effects": ["layers", "friction"]})), "unknown_effect", json!("effects")),
         (hello(&json!({"atlas_hash": atlas_hash})), "atlas_mismatch", json!("atlas_hash")),
@@ -128,8 +128,8 @@ async fn a_hello_that_cannot_be_met_may_be_said_again() {
         let error = socket.hear_refusal(code).await;
         assert_eq!(error["field"], field, "{error}");
     }
-    // A decimal comma, as programs of a German desktop print it, is no JSON, whatever the version.
-    let comma = hello(&json!({"version": 2, "objects": []})).to_string();
+    // A decimal comma, as programs of a German desktop print it, is no JSON.
+    let comma = hello(&json!({"objects": []})).to_string();
     socket.send(comma.replace("[]", r#"[{"radius_mm": 10,5}]"#)).await;
     socket.hear_refusal("bad_json").await;
     socket.open(hello(&json!({}))).await;
@@ -150,14 +150,20 @@ async fn hellos_without_end_are_ended() {
     socket.hear_end("bad_json", 1008).await;
 }
 
-/// Sends `bad`, expects `code` with `sequence`, and that the next frame is rendered all the same.
-async fn assert_survives(socket: &mut Socket, bad: Vec<u8>, code: &str, sequence: Value) {
+/// Sends `bad`, expects `code` with `sequence`, and that a frame `next` is rendered all the same.
+async fn assert_survives(
+    socket: &mut Socket,
+    bad: Vec<u8>,
+    code: &str,
+    sequence: Value,
+    next: u32,
+) {
     socket.send(bad).await;
     let error = socket.hear_refusal(code).await;
     assert_eq!(error.get("sequence").cloned().unwrap_or_default(), sequence, "{error}");
-    socket.send(frame(99, 0, SampleType::F32, 1.0, &ramp())).await;
+    socket.send(frame(next, 0, SampleType::F32, 1.0, &ramp())).await;
     let (header, payload) = socket.hear_frame().await;
-    assert_eq!((header.status, header.sequence), (FrameStatus::Ok, 99), "after {code}");
+    assert_eq!((header.status, header.sequence), (FrameStatus::Ok, next), "after {code}");
     assert_eq!(payload.len(), 4 * MAP_LEN);
 }
 
@@ -165,7 +171,7 @@ async fn assert_survives(socket: &mut Socket, bad: Vec<u8>, code: &str, sequence
 async fn a_session_survives_wrong_frames_and_says_so() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    socket.open(hello(&json!({}))).await;
+    socket.open(hello(&json!({"out_of_range": "refuse"}))).await;
     let good = frame(5, 0, SampleType::F32, 1.0, &ramp());
     let with = |at: usize, bytes: &[u8]| {
         let mut bad = good.clone();
@@ -173,33 +179,39 @@ async fn a_session_survives_wrong_frames_and_says_so() {
         bad
     };
     let longer = [&good[..], &vec![0; 100_000]].concat();
-    let five = json!(5);
-    for (bad, code, sequence) in [
-        (vec![], "truncated_header", Value::Null),
-        (good[..31].to_vec(), "truncated_header", five.clone()),
-        (with(0, b"GIF8"), "bad_magic", Value::Null),
-        (with(4, &[2]), "unknown_version", five.clone()),
-        (with(5, &[2]), "wrong_type", five.clone()),
-        (with(5, &[77]), "wrong_type", five.clone()),
-        (with(6, &[3]), "wrong_type", five.clone()),
-        (with(6, &[9]), "wrong_type", five.clone()),
-        (with(7, &[1]), "wrong_type", five.clone()),
-        (with(12, &[225]), "wrong_shape", five.clone()),
-        (with(14, &[0, 0]), "wrong_shape", five.clone()),
-        (good[..32].to_vec(), "wrong_length", five.clone()),
-        (good[..good.len() - 1].to_vec(), "wrong_length", five.clone()),
-        (longer, "wrong_length", five.clone()),
-        (with(36, &f32::NAN.to_le_bytes()), "not_finite", five.clone()),
-        (with(36, &f32::INFINITY.to_le_bytes()), "not_finite", five.clone()),
-        (with(36, &(-1.0_f32).to_le_bytes()), "negative_pressure", five.clone()),
-        (with(36, &1e6_f32.to_le_bytes()), "out_of_range", five.clone()),
-    ] {
-        assert_survives(&mut socket, bad, code, sequence).await;
+    let first = HEADER_LEN + 4;
+    for (n, (bad, code, is_named)) in (5..).step_by(2).zip([
+        (vec![], "truncated_header", false),
+        (good[..47].to_vec(), "truncated_header", true),
+        (with(0, b"GIF8"), "bad_magic", false),
+        (with(4, &[2]), "unknown_version", true),
+        (with(5, &[2]), "wrong_type", true),
+        (with(5, &[77]), "wrong_type", true),
+        (with(6, &[3]), "wrong_type", true),
+        (with(6, &[9]), "wrong_type", true),
+        (with(7, &[1]), "wrong_type", true),
+        (with(12, &[225]), "wrong_shape", true),
+        (with(34, &[1]), "wrong_shape", true),
+        (good[..48].to_vec(), "wrong_length", true),
+        (good[..good.len() - 1].to_vec(), "wrong_length", true),
+        (longer, "wrong_length", true),
+        (with(first, &f32::NAN.to_le_bytes()), "not_finite", true),
+        (with(first, &f32::INFINITY.to_le_bytes()), "not_finite", true),
+        (with(first, &(-1.0_f32).to_le_bytes()), "negative_pressure", true),
+        (with(first, &1e6_f32.to_le_bytes()), "out_of_range", true),
+    ]) {
+        // Each frame is newer than those before it.
+        let mut bad = bad;
+        if let Some(sequence) = bad.get_mut(8..12) {
+            sequence.copy_from_slice(&u32::to_le_bytes(n));
+        }
+        let sequence = if is_named { json!(n) } else { Value::Null };
+        assert_survives(&mut socket, bad, code, sequence, n + 1).await;
     }
     socket.send(r#"{"type":"helo"}"#).await;
     socket.hear_refusal("unexpected_text").await;
-    socket.send(frame(6, 0, SampleType::F32, 1.0, &ramp())).await;
-    assert_eq!(socket.hear_frame().await.0.sequence, 6);
+    socket.send(frame(99, 0, SampleType::F32, 1.0, &ramp())).await;
+    assert_eq!(socket.hear_frame().await.0.sequence, 99);
     assert_eq!(service.metric(&outcome("error")).await as u64, 18);
 }
 
@@ -214,7 +226,7 @@ async fn scales_come_from_the_header_or_the_hello() {
     };
     let mut socket = service.socket().await;
     socket.open(hello(&json!({"sample_type": "u8", "pressure_scale_pa": 2.0}))).await;
-    for frame in [unscaled.clone(), frame(1, 0, SampleType::U8, 2.0, &map)] {
+    for frame in [unscaled.clone(), frame(2, 0, SampleType::U8, 2.0, &map)] {
         socket.send(frame).await;
         let (header, payload) = socket.hear_frame().await;
         let mut sed = vec![0.0; MAP_LEN];
@@ -253,8 +265,8 @@ async fn a_map_of_zeros_has_a_scale_that_can_be_used() {
     let mut socket = service.socket().await;
     socket.open(hello(&json!({"sample_type": "u16"}))).await;
     // A pressure whose SED has no unit of its own is nothing.
-    for value in [0.0, 1e-37] {
-        socket.send(frame(1, 0, SampleType::U16, 1e-37, &vec![value; MAP_LEN])).await;
+    for (sequence, value) in [(1, 0.0), (2, 1e-37)] {
+        socket.send(frame(sequence, 0, SampleType::U16, 1e-37, &vec![value; MAP_LEN])).await;
         let (header, payload) = socket.hear_frame().await;
         assert_eq!((header.status, header.scale.to_bits()), (FrameStatus::Ok, 1_f32.to_bits()));
         assert!(payload.iter().all(|&byte| byte == 0), "{value}");
@@ -387,13 +399,14 @@ async fn the_header_is_the_documented_one() {
     socket.open(hello(&json!({}))).await;
     // Written out by hand, as a client in another language would.
     let mut bytes = b"PPL1".to_vec();
-    bytes.extend([1, 1, 0, 0]);
+    bytes.extend([3, 1, 0, 0]);
     bytes.extend(42_u32.to_le_bytes());
     bytes.extend(224_u16.to_le_bytes());
     bytes.extend(224_u16.to_le_bytes());
     bytes.extend(123_456_789_012_u64.to_le_bytes());
     bytes.extend(0_u32.to_le_bytes());
     bytes.extend(1_f32.to_le_bytes());
+    bytes.extend([0; 16]);
     bytes.extend(bytes_of(&ramp()));
     socket.send(bytes).await;
     let (header, _) = socket.hear_frame().await;
@@ -407,8 +420,14 @@ async fn the_header_is_the_documented_one() {
         client_time_us: 123_456_789_012,
         time_us: header.time_us,
         scale: 1.0,
-        extension: None,
+        x: 0,
+        y: 0,
+        queue_us: header.queue_us,
+        infer_us: header.infer_us,
+        tier: 0,
+        flags: flags::CUT_OFF,
+        finger: 0,
     };
     assert_eq!(header, due);
-    assert!(header.time_us > 0);
+    assert!(header.time_us > 0 && header.infer_us > 0);
 }

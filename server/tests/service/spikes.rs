@@ -1,14 +1,14 @@
 //! The effect `spikes` over the wire: units in `ready`, spikes in answers, refusals.
 
 use papilla_proto::{
-    FrameStatus, HEADER_LEN_V2, MAP_LEN, MAP_SIDE_PX, SampleType, Window, effects::RATES_HEAD_LEN,
+    FrameStatus, HEADER_LEN, MAP_LEN, MAP_SIDE_PX, SampleType, Window, effects::RATES_HEAD_LEN,
     spikes::Fired,
 };
 use serde_json::{Value, json};
 
 use crate::{
-    effects::{hello_2, windowed},
-    support::{Service, Socket},
+    effects::windowed,
+    support::{Service, Socket, hello},
 };
 
 /// A round press that goes up and down in 80 ms.
@@ -32,10 +32,10 @@ struct Firing {
 impl Firing {
     async fn open(service: &Service, members: &Value) -> Self {
         let mut socket = service.socket().await;
-        let mut hello = json!({"effects": ["spikes"], "map": false, "tier": "quick"});
+        let mut wish = json!({"effects": ["spikes"], "map": false, "tier": "quick"});
         let members = members.as_object().unwrap().clone();
-        hello.as_object_mut().unwrap().extend(members);
-        let ready = socket.open(hello_2(&hello)).await;
+        wish.as_object_mut().unwrap().extend(members);
+        let ready = socket.open(hello(&wish)).await;
         Self { socket, ready, sequence: 0 }
     }
 
@@ -47,8 +47,8 @@ impl Firing {
         let section = &self.ready["sections"][0];
         assert_eq!(section["name"], "spikes");
         let [offset, bytes] = ["offset", "bytes"].map(|name| section[name].as_u64().unwrap());
-        // `hear_frame` takes the first 32 bytes off.
-        let part = &payload[offset as usize - 32..][..bytes as usize];
+        // `hear_frame` takes the header off.
+        let part = &payload[offset as usize - HEADER_LEN..][..bytes as usize];
         Fired::decode(part, time_us).unwrap()
     }
 
@@ -88,7 +88,7 @@ async fn a_seed_decides_units_and_spikes_whatever_a_frame_carries() {
 async fn sessions_without_the_effect_have_no_units_and_no_section() {
     let service = Service::start().await;
     let mut socket = service.socket().await;
-    let ready = socket.open(hello_2(&json!({"effects": ["summary", "afferents"]}))).await;
+    let ready = socket.open(hello(&json!({"effects": ["summary", "afferents"]}))).await;
     assert_eq!(ready.get("units"), None, "{ready}");
     let names: Vec<_> =
         ready["sections"].as_array().unwrap().iter().map(|section| &section["name"]).collect();
@@ -97,7 +97,7 @@ async fn sessions_without_the_effect_have_no_units_and_no_section() {
     socket.send(windowed(1, time_us, Window::WHOLE, &press(time_us))).await;
     let (_, payload) = socket.hear_frame().await;
     let rates_len = RATES_HEAD_LEN + 4 * MAP_LEN;
-    assert_eq!(payload.len(), HEADER_LEN_V2 - 32 + 64 + rates_len + 4 * MAP_LEN);
+    assert_eq!(payload.len(), 64 + rates_len + 4 * MAP_LEN);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -118,7 +118,7 @@ async fn what_gives_no_unit_is_named() {
         ),
         (json!({"effects": ["spikes"], "spikes": {"seed": -1}}), "bad_json"),
     ] {
-        socket.send(hello_2(&bad).to_string()).await;
+        socket.send(hello(&bad).to_string()).await;
         let error = socket.hear_refusal(code).await;
         assert!(error["field"].as_str().is_some_and(|f| f.starts_with("spikes")), "{error}");
     }

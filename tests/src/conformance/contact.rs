@@ -130,9 +130,7 @@ impl ContactRecorder {
         match step["do"].as_str() {
             Some(_) if refused => {}
             Some("hello") => {
-                let mut hello = step["hello"].clone();
-                hello["version"] = json!(3);
-                let hello: Hello = serde_json::from_value(hello).map_err(|e| e.to_string())?;
+                let hello: Hello = member(step, "hello")?;
                 // What the script asks of ready stays; how pressure is found is written.
                 if hello.input.is_some_and(|input| input != Input::Pressure) {
                     let has_friction = hello.has_traction() || hello.shear == Some(true);

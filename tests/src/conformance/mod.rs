@@ -151,9 +151,7 @@ impl Recorder {
         let refused = step["expect"]["status"].as_str().is_some_and(|status| status != "ok");
         match step["do"].as_str() {
             Some("hello") if !refused => {
-                let mut hello = step["hello"].clone();
-                hello["version"] = json!(2);
-                let hello: Hello = serde_json::from_value(hello).map_err(|e| e.to_string())?;
+                let hello: Hello = member(step, "hello")?;
                 *session = Some(Session::new(hello)?);
             }
             Some("frame") if !refused => {
@@ -169,7 +167,7 @@ impl Recorder {
             }
             Some("http") if !refused => {
                 let tier = member(step, "tier")?;
-                let hello = Hello { version: 2, tier: Some(tier), ..Hello::default() };
+                let hello = Hello { tier: Some(tier), ..Hello::default() };
                 let due = self.frame(step, &mut Session::new(hello)?, 1.0)?;
                 due.fill(&mut step["expect"]);
             }

@@ -1,4 +1,4 @@
-//! Poses in place of maps: what is sent and asked for in version 3 of the protocol.
+//! Poses in place of maps: what is sent and asked for.
 
 use std::f32::consts::TAU;
 
@@ -35,7 +35,6 @@ impl Contact {
     /// Puts into a hello what it takes.
     pub(super) fn ask(self, fingers: u8, hello: &mut Hello) {
         let shape = AnnouncedShape::Sphere(Sphere { radius_mm: f64::from(RADIUS_MM) });
-        hello.version = 3;
         // Poses are f32; --sample-type is that of the answers.
         hello.answer_sample_type = Some(hello.sample_type);
         hello.sample_type = SampleType::F32;

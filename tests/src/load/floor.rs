@@ -9,7 +9,7 @@ use std::{
 };
 
 use papilla_client::dial;
-use papilla_proto::{HEADER_LEN_V2, MAP_LEN};
+use papilla_proto::{HEADER_LEN, MAP_LEN};
 use serde::{Deserialize, Serialize};
 
 use super::{report::Percentiles, tally::Times};
@@ -21,7 +21,7 @@ const SLEEP: Duration = Duration::from_millis(1);
 const GAP: Duration = Duration::from_millis(5);
 
 /// Bytes there and back: a frame of float32 with its header.
-const FRAME_BYTES: usize = HEADER_LEN_V2 + 4 * MAP_LEN;
+const FRAME_BYTES: usize = HEADER_LEN + 4 * MAP_LEN;
 
 /// What a machine does without any service.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -29,7 +29,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{Hello, SampleError, SampleType, atlas::AtlasError};
+use papilla_proto::{FrameKind, Hello, SampleError, SampleType, atlas::AtlasError};
 use tokio::{
     runtime::Handle,
     sync::mpsc,
@@ -132,8 +132,8 @@ struct Target {
     /// Where the frames are from, for people.
     source: String,
     encoded: Encoded,
-    /// Version of the protocol.
-    version: u32,
+    /// What frames of sessions hold.
+    kind: FrameKind,
     tier: String,
     predicted_latency_us: Option<u64>,
     opening: Opening,
@@ -159,7 +159,7 @@ impl Target {
             let encoded = Encoded::new(&content, options.sample_type)?;
             (encoded, content.source, content.atlas_hash)
         };
-        let version = if options.contact.is_some() { 3 } else { options.protocol };
+        let kind = if options.contact.is_some() { FrameKind::Objects } else { FrameKind::Pressure };
         let (tier, predicted_latency_us, opening) = match options.speak {
             Speak::Session => Self::agree(options, atlas_hash).await?,
             speak => {
@@ -176,7 +176,7 @@ impl Target {
         } else {
             None
         };
-        Ok(Self { source, encoded, version, tier, predicted_latency_us, opening, reference })
+        Ok(Self { source, encoded, kind, tier, predicted_latency_us, opening, reference })
     }
 
     /// Opens a first session, which learns the tier: all others ask for that one, so that all
@@ -186,7 +186,6 @@ impl Target {
         atlas_hash: String,
     ) -> Result<(String, Option<u64>, Opening), LoadError> {
         let mut hello = Hello {
-            version: options.protocol,
             budget_us: options.budget(),
             tier: options.tier.clone(),
             sample_type: options.sample_type,
@@ -226,7 +225,7 @@ impl Target {
             encoded: self.encoded.clone(),
             reference: self.reference.clone(),
             deadline: options.deadline().map(|us| Duration::from_micros(us.into())),
-            version: self.version,
+            kind: self.kind,
             follow: self.follow(options),
             drain: Duration::from_secs(options.drain_s),
         });

@@ -128,11 +128,6 @@ pub struct Options {
     #[arg(long, default_value = "4", value_name = "N")]
     pub rounds: NonZeroU32,
 
-    /// Version of the protocol. The first says neither how long a frame waited nor how long the
-    /// network took.
-    #[arg(long, default_value = "2", value_name = "1|2", value_parser = clap::value_parser!(u32).range(1..=2))]
-    pub protocol: u32,
-
     /// Time measured, seconds.
     #[arg(long, default_value = "10", value_name = "S", value_parser = positive)]
     pub duration_s: f64,

@@ -18,7 +18,7 @@ use hyper::{
 };
 use hyper_util::rt::TokioIo;
 use papilla_client::dial;
-use papilla_proto::{FrameHeader, FrameStatus, MAP_LEN, MAP_SIDE_PX, Window};
+use papilla_proto::{FrameHeader, FrameStatus, MAP_LEN, MAP_SIDE_PX};
 use serde_json::json;
 use tokio::{sync::mpsc::UnboundedReceiver, time::timeout};
 
@@ -131,8 +131,7 @@ pub(super) async fn run(
 fn header(shared: &Shared, number: u32) -> FrameHeader {
     let time_us = shared.plan.start.elapsed().as_micros() as u64;
     let encoded = &shared.encoded;
-    let header = FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
-    if shared.version > 1 { header.windowed(Window::WHOLE) } else { header }
+    FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale)
 }
 
 /// A map, and what the service says of it, if it is Papilla.
@@ -146,11 +145,8 @@ struct Answer {
 impl Answer {
     fn header(&self, request: FrameHeader) -> FrameHeader {
         let us = |time: Duration| time.as_micros() as u32;
-        let mut header = request.answer(FrameStatus::Ok, us(self.total), 1.0);
-        if let Some(extension) = &mut header.extension {
-            (extension.queue_us, extension.infer_us) = (us(self.queue), us(self.infer));
-        }
-        header
+        let header = request.answer(FrameStatus::Ok, us(self.total), 1.0);
+        FrameHeader { queue_us: us(self.queue), infer_us: us(self.infer), ..header }
     }
 }
 

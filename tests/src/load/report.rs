@@ -68,8 +68,6 @@ pub struct Report {
     pub duration_s: f64,
     /// How frames followed one another.
     pub arrivals: Arrivals,
-    /// Version of the protocol.
-    pub protocol: u32,
     /// What answers to poses carried; none: frames were pressure.
     pub contact: Option<Contact>,
     /// Fingers of a session.
@@ -114,19 +112,18 @@ pub struct Report {
     pub round_trip_us: Option<Percentiles>,
     /// In the server, from receipt to sending, us.
     pub server_us: Option<Percentiles>,
-    /// Of that, waiting for a thread, us; version 2 of the protocol.
+    /// Of that, waiting for a thread, us.
     pub queue_us: Option<Percentiles>,
-    /// Of that, in the network, us; version 2.
+    /// Of that, in the network, us.
     pub infer_us: Option<Percentiles>,
-    /// Of that, solving the contact, us; version 3.
+    /// Of that, solving the contact, us.
     pub solve_us: Option<Percentiles>,
-    /// Of that, neither waiting, solving nor in the network, us: the service's own; version 2.
+    /// Of that, neither waiting, solving nor in the network, us: the service's own.
     pub service_us: Option<Percentiles>,
     /// The bytes of such a frame and its answer over loopback TCP, between two threads, with
     /// nothing done; with --contact.
     pub echo_us: Option<Percentiles>,
-    /// From the sending to the map, but for the network, us: what transport and service add;
-    /// version 2.
+    /// From the sending to the map, but for the network, us: what transport and service add.
     pub overhead_us: Option<Percentiles>,
     /// Age of the newest map, looked at every millisecond, us: since the instant its frame was
     /// meant to leave.
@@ -165,7 +162,6 @@ impl Report {
             rate_hz: options.rate_hz,
             duration_s: options.duration_s,
             arrivals: options.arrivals,
-            protocol: target.version,
             contact: options.contact,
             fingers: options.fingers,
             sample_type: options.sample_type,

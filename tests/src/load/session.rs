@@ -7,7 +7,7 @@ use std::{
 };
 
 use papilla_proto::{
-    FrameHeader, FrameKind, FrameStatus, SessionError, Window,
+    FrameHeader, FrameKind, FrameStatus, HEADER_LEN, SessionError,
     contact::{ROW, Touch},
 };
 
@@ -31,8 +31,8 @@ pub(super) struct Shared {
     pub(super) reference: Option<Arc<Reference>>,
     /// How long a map may take to be in time; none: any time will do.
     pub(super) deadline: Option<Duration>,
-    /// Version of the frames.
-    pub(super) version: u32,
+    /// What frames hold.
+    pub(super) kind: FrameKind,
     /// How sessions go on elsewhere; none: they do not.
     pub(super) follow: Option<Follow>,
     /// How long to wait after the last frame.
@@ -77,13 +77,9 @@ fn send(shared: &Shared, session: usize, mut mouth: Mouth) -> (Mouth, Times) {
         let time_us = plan.start.elapsed().as_micros() as u64;
         let mut header =
             FrameHeader::pressure(number, time_us, 0, encoded.sample_type, encoded.scale);
-        header = match shared.version {
-            1 => header,
-            2 => header.windowed(Window::WHOLE),
-            _ => {
-                header.of_finger(FrameKind::Objects, (number % plan.fingers) as u8, [ROW as u16, 1])
-            }
-        };
+        if shared.kind == FrameKind::Objects {
+            header = header.of_finger(shared.kind, (number % plan.fingers) as u8, [ROW as u16, 1]);
+        }
         if number >= plan.warmup {
             delay.record(intended.elapsed());
         }
@@ -219,9 +215,9 @@ impl<'a> Ear<'a> {
                     self.tally.gap.record(now.saturating_duration_since(before));
                 }
                 self.tally.server.record(Duration::from_micros(header.time_us.into()));
-                self.version_2(now, header, payload);
+                self.parts(now, header, payload);
                 let sent = &self.shared.encoded.payloads[0][..];
-                self.tally.bytes = [sent, payload].map(|part| header.header_len() + part.len());
+                self.tally.bytes = [sent, payload].map(|part| HEADER_LEN + part.len());
             }
             FrameStatus::Stale => self.tally.stale += 1,
             FrameStatus::Superseded => self.tally.superseded += 1,
@@ -247,16 +243,16 @@ impl<'a> Ear<'a> {
         }
     }
 
-    /// Where the time went, as answers of versions 2 and 3 tell.
-    fn version_2(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
-        let Some(extension) = header.extension else { return };
-        let infer = Duration::from_micros(extension.infer_us.into());
+    /// Where the time went, as the answer tells.
+    fn parts(&mut self, now: Instant, header: &FrameHeader, payload: &[u8]) {
+        let infer = Duration::from_micros(header.infer_us.into());
         let sent = self.shared.plan.start + Duration::from_micros(header.client_time_us);
-        let queue = Duration::from_micros(extension.queue_us.into());
+        let queue = Duration::from_micros(header.queue_us.into());
         self.tally.queue.record(queue);
         self.tally.infer.record(infer);
         let mut known = queue + infer;
-        if let Some(touch) = extension.finger.and_then(|_| Touch::decode(payload)) {
+        let solves = self.shared.kind == FrameKind::Objects;
+        if let Some(touch) = Touch::decode(payload).filter(|_| solves) {
             let solve = Duration::try_from_secs_f32(touch.solve_us * 1e-6).unwrap_or_default();
             self.tally.solve.record(solve);
             known += solve;

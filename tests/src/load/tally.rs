@@ -55,15 +55,15 @@ pub(super) struct Tally {
     pub(super) round_trip: Times,
     /// Time in the server, as it says.
     pub(super) server: Times,
-    /// Of that, waiting for a thread; version 2.
+    /// Of that, waiting for a thread.
     pub(super) queue: Times,
-    /// Of that, in the network; version 2.
+    /// Of that, in the network.
     pub(super) infer: Times,
-    /// Of that, solving the contact; version 3.
+    /// Of that, solving the contact.
     pub(super) solve: Times,
     /// Of that, none of the three.
     pub(super) rest: Times,
-    /// From the sending to the map, but for the network; version 2.
+    /// From the sending to the map, but for the network.
     pub(super) overhead: Times,
     /// Age of the newest map, every millisecond: since the instant its frame was meant to leave.
     pub(super) age: Times,

@@ -11,9 +11,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use papilla_proto::{
-    FrameHeader, HEADER_LEN_V2, MAP_LEN, SEALED_MAGIC, ServerMessage, SessionError,
-};
+use papilla_proto::{FrameHeader, HEADER_LEN, MAP_LEN, SEALED_MAGIC, ServerMessage, SessionError};
 
 use crate::socket::SocketError;
 
@@ -31,7 +29,7 @@ const MASKED: u8 = 0x80;
 const LOOK: Duration = Duration::from_millis(500);
 
 /// Room for an answer with every section there is, and the heads before it, bytes.
-const ROOM: usize = 16 + HEADER_LEN_V2 + 8 * MAP_LEN;
+const ROOM: usize = 16 + HEADER_LEN + 8 * MAP_LEN;
 
 /// The sending half.
 #[derive(Debug)]
@@ -167,7 +165,7 @@ impl Hearer {
                 BINARY => {
                     let frame = &self.buffer[start..end];
                     let header = FrameHeader::decode(frame)?;
-                    let said = Said::Frame(header, &frame[header.header_len()..]);
+                    let said = Said::Frame(header, &frame[HEADER_LEN..]);
                     return Ok(Some((now, said)));
                 }
                 TEXT => match serde_json::from_slice(&self.buffer[start..end]) {

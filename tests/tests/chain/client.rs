@@ -8,7 +8,7 @@ use papilla_engine::Model;
 use papilla_model_export::metrics::quantile;
 use papilla_proto::{
     ErrorCode, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, Hello, MAP_LEN, MAP_SIDE_PX,
-    SampleType,
+    SampleType, effects::OutOfRange,
 };
 use papilla_tests::{
     http::{Request, Response},
@@ -173,6 +173,7 @@ impl Session {
             tier: Some(tier.to_owned()),
             sample_type,
             atlas_hash: Some(service.atlas.hash().to_owned()),
+            out_of_range: Some(OutOfRange::Refuse),
             ..Hello::default()
         };
         let (ready, sender, receiver) = socket::open(&service.address, &hello).await.unwrap();
@@ -247,25 +248,29 @@ pub(crate) async fn sessions_survive_mistakes(service: &Service, sample: &Sample
         bad[at..at + bytes.len()].copy_from_slice(bytes);
         bad
     };
-    for (bad, code, sequence) in [
-        (good[..31].to_vec(), ErrorCode::TruncatedHeader, Some(5)),
-        (with(0, b"PNG1"), ErrorCode::BadMagic, None),
-        (with(4, &[9]), ErrorCode::UnknownVersion, Some(5)),
-        (with(6, &[1]), ErrorCode::WrongType, Some(5)),
-        (with(12, &[1]), ErrorCode::WrongShape, Some(5)),
-        (good[..good.len() - 4].to_vec(), ErrorCode::WrongLength, Some(5)),
-        (with(HEADER_LEN, &f32::NAN.to_le_bytes()), ErrorCode::NotFinite, Some(5)),
-        (with(HEADER_LEN, &(-1.0_f32).to_le_bytes()), ErrorCode::NegativePressure, Some(5)),
-        (with(HEADER_LEN, &1e9_f32.to_le_bytes()), ErrorCode::OutOfRange, Some(5)),
-    ] {
+    for (sequence, (bad, code, is_named)) in (5..).zip([
+        (good[..31].to_vec(), ErrorCode::TruncatedHeader, true),
+        (with(0, b"PNG1"), ErrorCode::BadMagic, false),
+        (with(4, &[9]), ErrorCode::UnknownVersion, true),
+        (with(6, &[1]), ErrorCode::WrongType, true),
+        (with(12, &[225]), ErrorCode::WrongShape, true),
+        (good[..good.len() - 4].to_vec(), ErrorCode::WrongLength, true),
+        (with(HEADER_LEN, &f32::NAN.to_le_bytes()), ErrorCode::NotFinite, true),
+        (with(HEADER_LEN, &(-1.0_f32).to_le_bytes()), ErrorCode::NegativePressure, true),
+        (with(HEADER_LEN, &1e9_f32.to_le_bytes()), ErrorCode::OutOfRange, true),
+    ]) {
+        // Each frame is newer than those before it.
+        let mut bad = bad;
+        bad[8..12].copy_from_slice(&u32::to_le_bytes(sequence));
         session.sender.send(bad).await.unwrap();
         let Received::Error(error) = session.receive().await else { panic!("{code} is due") };
-        assert_eq!((error.code, error.sequence, error.closes), (code, sequence, false));
+        let named = is_named.then_some(sequence);
+        assert_eq!((error.code, error.sequence, error.closes), (code, named, false));
     }
     session.sender.send("press harder".to_owned()).await.unwrap();
     let Received::Error(error) = session.receive().await else { panic!("a refusal is due") };
     assert_eq!((error.code, error.closes), (ErrorCode::UnexpectedText, false));
-    let (_, found) = session.render(6, &map).await;
+    let (_, found) = session.render(99, &map).await;
     assert_close("after ten mistakes", &found, &due, EQUAL);
 }
 

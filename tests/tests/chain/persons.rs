@@ -58,7 +58,6 @@ fn hand() -> (Hand, [f32; 3]) {
     };
     let other = AnnouncedFinger { width: WIDTH, stiffness: STIFFNESS };
     let hello = Hello {
-        version: 3,
         input: Some(Input::Objects),
         objects: Some(vec![ball(RADIUS_MM), ball(WIDTH * RADIUS_MM)]),
         fingers: Some(vec![AnnouncedFinger::default(), other]),

@@ -112,7 +112,6 @@ struct Ready {
     bool there = false;
   };
   json::Value message;                ///< as it came
-  std::uint8_t version = 2;
   std::size_t fingers = 1;
   SampleType sample_type = SampleType::f32;
   std::string tier;

@@ -37,7 +37,7 @@ class Core {
 
   std::string hello() const { return hello_text(hello_); }
   static std::string hello_text(const std::string& members) {
-    return "{\"type\":\"hello\",\"version\":" + std::string(is_of_version_3(members) ? "3" : "2") +
+    return "{\"type\":\"hello\",\"version\":" + std::to_string(protocol_version) +
            (members.empty() ? "" : "," + members) + "}";
   }
   /// Whether the members of a hello can be read; `problem` says where not.
@@ -270,7 +270,6 @@ class Core {
       Ready::Section* const at = ready.section(section["name"].string);
       if (at) *at = {section["offset"].whole(), section["bytes"].whole(), true};
     }
-    ready.version = static_cast<std::uint8_t>(message["version"].whole());
     ready.fingers = message.has("fingers") ? message["fingers"].whole() : 1;
     ready.message = message;
     // Reserved here, so that no answer allocates.
@@ -390,16 +389,6 @@ class Core {
     if (on_answer) on_answer(answer);
   }
 
-  static bool is_of_version_3(const std::string& members) {
-    json::Value hello;
-    if (!json::parse("{" + members + "}", hello)) return false;  // the service says what is wrong
-    for (const char* name : {"input", "input_layout", "answer_layout", "objects", "fingers", "method",
-                             "force_target", "stiffness", "pressure", "shear", "friction", "velocity", "traction"}) {
-      if (hello.has(name)) return true;
-    }
-    return false;
-  }
-
   static Header header_of(Kind kind, Window window, std::uint64_t client_time_us, std::uint8_t finger) {
     Header header;
     header.kind = kind;
@@ -426,7 +415,6 @@ class Core {
   /// A frame that was encoded before the terms changed. Poses and gaps are f32 in all of them.
   void recode(Outgoing& frame) {
     std::uint8_t* at = frame.data();
-    at[4] = history_.back().version;
     if (at[5] != static_cast<std::uint8_t>(Kind::pressure) || frame.size == header_bytes) return;
     const auto old = static_cast<SampleType>(at[6]);
     const SampleType now = history_.back().sample_type;

@@ -1,4 +1,4 @@
-// Where things are and what pushes back: frames of version 3 of the protocol. No allocation.
+// Where things are and what pushes back: frames of the protocol. No allocation.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// Frames of versions 2 and 3 of the protocol (docs/reference/protocol.md): headers and samples. No allocation.
+// Frames of the protocol (docs/reference/protocol.md): headers and samples. No allocation.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,7 @@ namespace papilla {
 constexpr int side_px = 224;
 constexpr std::size_t map_len = std::size_t{side_px} * side_px;
 constexpr std::size_t header_bytes = 48;
+constexpr std::uint8_t protocol_version = 3;
 
 enum class SampleType : std::uint8_t { f32 = 0, f16 = 1, u16 = 2, u8 = 3 };
 
@@ -45,7 +46,7 @@ struct Header {
   std::uint32_t infer_us = 0;
   std::uint16_t tier = 0;
   std::uint8_t flags = 0;               ///< bits of wire::Flag
-  std::uint8_t finger = 0;              ///< version 3
+  std::uint8_t finger = 0;              ///< its number
 };
 
 namespace wire {
@@ -89,7 +90,7 @@ inline float get_float(const std::uint8_t* at) {
 inline void encode(const Header& header, std::uint8_t* at) {
   std::memset(at, 0, header_bytes);
   std::memcpy(at, "PPL1", 4);
-  at[4] = 2;
+  at[4] = protocol_version;
   at[5] = static_cast<std::uint8_t>(header.kind);
   at[6] = static_cast<std::uint8_t>(header.sample_type);
   put(at + 8, header.sequence);
@@ -106,7 +107,7 @@ inline void encode(const Header& header, std::uint8_t* at) {
 
 /// Reads an answer's header; false if it is none.
 inline bool decode(const std::uint8_t* at, std::size_t size, Header& header) {
-  if (size < header_bytes || std::memcmp(at, "PPL1", 4) != 0 || (at[4] != 2 && at[4] != 3)) return false;
+  if (size < header_bytes || std::memcmp(at, "PPL1", 4) != 0 || at[4] != protocol_version) return false;
   if (at[5] != 2 || at[6] > 3 || at[7] > 4) return false;
   header.kind = static_cast<Kind>(at[5]);
   header.sample_type = static_cast<SampleType>(at[6]);
@@ -121,7 +122,7 @@ inline bool decode(const std::uint8_t* at, std::size_t size, Header& header) {
   header.infer_us = get<std::uint32_t>(at + 40);
   header.tier = get<std::uint16_t>(at + 44);
   header.flags = at[46];
-  header.finger = at[4] == 3 ? at[47] : 0;
+  header.finger = at[47];
   return true;
 }
 

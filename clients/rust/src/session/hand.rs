@@ -1,4 +1,4 @@
-//! Frames of a session with objects, gaps and fingers: protocol version 3.
+//! Frames of a session with objects, gaps and fingers.
 
 use papilla_proto::{
     FrameHeader, FrameKind, MAP_LEN, MAP_SIDE_PX, Problem, SampleType,
@@ -82,16 +82,11 @@ impl Session {
     /// The session is over.
     pub fn send_not_tracked(&self, finger: u8) -> Result<oneshot::Receiver<Answer>, PapillaError> {
         let time_us = now_us();
-        let version = self.ready().version;
         let message = |sequence| {
-            let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0);
             // Of any session: kind and sample type of a frame without samples mean nothing.
-            let header = if version > 2 {
-                header.of_finger(FrameKind::Pressure, finger, [0, 0])
-            } else {
-                header
-            };
-            Ok::<_, Problem>(header.not_tracked().encode().to_vec())
+            let header = FrameHeader::pressure(sequence, time_us, 0, SampleType::F32, 1.0);
+            let header = FrameHeader { finger, ..header.not_tracked() };
+            Ok::<_, Problem>(header.encode().to_vec())
         };
         let outcome = self.shared.state().put_message(finger, time_us, message)?;
         self.shared.wake.notify_one();

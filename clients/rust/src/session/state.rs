@@ -7,8 +7,7 @@ use std::{
 };
 
 use papilla_proto::{
-    FrameHeader, FrameKind, Hello, Problem, Ready, SEALED_MAGIC, SampleType, ServerMessage,
-    SessionError,
+    FrameHeader, Hello, Problem, Ready, SEALED_MAGIC, SampleType, ServerMessage, SessionError,
 };
 use tokio::sync::oneshot;
 
@@ -120,9 +119,7 @@ impl State {
     }
 
     pub(super) fn agree(&mut self, ready: Arc<Ready>) {
-        if let Some(number) = ready.tier_number {
-            self.tiers.insert(number, ready.tier.clone());
-        }
+        self.tiers.insert(ready.tier_number, ready.tier.clone());
         for (number, name) in (0..).zip(ready.tier_names.iter().flatten()) {
             self.tiers.insert(number, name.clone());
         }
@@ -154,9 +151,8 @@ impl State {
         client_time_us: u64,
     ) -> Result<oneshot::Receiver<Answer>, PapillaError> {
         let sample_type = self.ready.sample_type;
-        let of_hand = self.ready.version > 2;
         self.put_message(0, client_time_us, |sequence| {
-            encode(frame, sequence, client_time_us, sample_type, of_hand)
+            encode(frame, sequence, client_time_us, sample_type)
         })
     }
 
@@ -229,8 +225,7 @@ impl State {
         }
         let header = FrameHeader::decode(message)?;
         let Some(pending) = self.forget(header.sequence) else { return Ok(()) };
-        let number = header.extension.map(|extension| extension.tier).unwrap_or_default();
-        let tier = self.tiers.get(&number).cloned().unwrap_or_default();
+        let tier = self.tiers.get(&header.tier).cloned().unwrap_or_default();
         let answer = Answer::read(&header, message, &pending.ready, tier)?;
         if answer.out_of_range {
             let tier = &answer.tier;
@@ -316,7 +311,6 @@ fn encode(
     sequence: u32,
     client_time_us: u64,
     sample_type: SampleType,
-    of_hand: bool,
 ) -> Result<Vec<u8>, Problem> {
     let Frame { pressure_pa, window, deadline_us, .. } = *frame;
     let top_pa = pressure_pa.iter().copied().fold(0.0, f32::max);
@@ -325,11 +319,6 @@ fn encode(
         if sample_type.is_scaled() && top_pa > 0.0 { top_pa / sample_type.unit_max() } else { 1.0 };
     let header = FrameHeader::pressure(sequence, client_time_us, deadline_us, sample_type, scale)
         .windowed(window);
-    let header = if of_hand {
-        header.of_finger(FrameKind::Pressure, 0, [window.width, window.height])
-    } else {
-        header
-    };
     let head = header.encode();
     let mut message = vec![0; head.len() + window.pixel_count() * sample_type.bytes()];
     message[..head.len()].copy_from_slice(&head);

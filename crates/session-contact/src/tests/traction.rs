@@ -33,13 +33,13 @@ fn gaps_that_say_how_things_move_pull_as_the_object_does() {
         let speed = if step > 2 { 2.0 } else { 0.0 };
         let velocities = skin_mm.iter().flat_map(|_| [speed, 0.0, 0.0]);
         let payload: Vec<u8> = depths.chain(velocities).flat_map(f32::to_le_bytes).collect();
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         {
             let mut finger = hand.fingers()[0].lock().expect("no panic");
             finger.take(frame(&payload, 10_000 * step), None).expect("an answer");
             finger.write(&mut bytes);
         }
-        let found = Touch::decode(&bytes[HEADER_LEN_V2..]).expect("it lies there");
+        let found = Touch::decode(&bytes[HEADER_LEN..]).expect("it lies there");
         let miss = (found.force_n[0] - due.force_n[0]).hypot(found.force_n[1] - due.force_n[1]);
         assert!(miss < 0.05 * 0.5 * due.force_n[2], "{step}: {found:?} {due:?}");
         if step == 19 {
@@ -76,7 +76,7 @@ fn traction_is_felt_where_the_hello_names_it() {
         let mut sed = vec![100.0; MAP_LEN];
         let range = PressureRange { trained_max_pa: 1e5, beyond: OutOfRange::Refuse };
         finger.feel_shear(pressure_pa, range, &mut sed);
-        let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+        let mut bytes = BytesMut::zeroed(HEADER_LEN);
         finger.write(&mut bytes);
         (sed, bytes)
     };
@@ -97,7 +97,6 @@ fn traction_is_felt_where_the_hello_names_it() {
     };
     let payload = [of(SectionName::Pressure), of(SectionName::Shear)].concat();
     let sent = Hello {
-        version: 3,
         input_layout: Some(SampleLayout::Vertices),
         traction: Some(true),
         effects: rough.effects,

@@ -1,7 +1,7 @@
 //! The effect on the plane finger: what is drawn, refused, written and carried on.
 
 use papilla_proto::{
-    HEADER_LEN_V2, Hello, MAP_LEN,
+    HEADER_LEN, Hello, MAP_LEN,
     effects::{Place, SectionName},
     spikes::{Fired, Unit as Placed},
 };
@@ -10,7 +10,7 @@ use super::{super::tests::Owned, *};
 use crate::Effects;
 
 fn hello(of: Parameters) -> Hello {
-    Hello { version: 2, effects: vec!["spikes".to_owned()], spikes: Some(of), ..Hello::default() }
+    Hello { effects: vec!["spikes".to_owned()], spikes: Some(of), ..Hello::default() }
 }
 
 fn effects(of: Parameters) -> Effects {
@@ -36,7 +36,7 @@ fn press(time_us: u64) -> (Vec<f32>, Vec<f32>) {
 
 fn fired(effects: &mut Effects, time_us: u64) -> Fired {
     let (pressure_pa, sed) = press(time_us);
-    let mut bytes = BytesMut::zeroed(HEADER_LEN_V2);
+    let mut bytes = BytesMut::zeroed(HEADER_LEN);
     effects.write(&pressure_pa, &sed, time_us, &mut bytes).unwrap();
     let section = effects.sections()[0];
     assert_eq!(section.name, SectionName::Spikes);

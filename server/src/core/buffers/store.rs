@@ -9,7 +9,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use papilla_proto::{HEADER_LEN_V2, MAP_LEN};
+use papilla_proto::{HEADER_LEN, MAP_LEN};
 
 use super::{HEADROOM, Recycler};
 
@@ -23,7 +23,7 @@ pub(crate) type Answers = Recycler;
 /// Room of every buffer, bytes: that of a whole float32 map with the heads around it, so that any
 /// session can use it.
 /// What a session does not touch the system does not provide.
-const ROOM: usize = 2 * HEADROOM + HEADER_LEN_V2 + 4 * MAP_LEN;
+const ROOM: usize = 2 * HEADROOM + HEADER_LEN + 4 * MAP_LEN;
 
 /// The buffers that nobody uses.
 #[derive(Debug)]

@@ -43,7 +43,7 @@ pub(crate) struct JobOptions {
     /// The session's effects. Only the thread that renders the frame locks them, and a session
     /// has one frame with a thread at a time.
     pub(crate) effects: Option<Arc<Mutex<Effects>>>,
-    /// The session's finger that the frame is of, in version 3; locked as the effects are.
+    /// The session's finger that the frame is of; locked as the effects are.
     pub(crate) finger: Option<Arc<Mutex<Finger>>>,
     /// Time that the contact is expected to take, us, if one is to be solved.
     pub(crate) contact_us: Option<u64>,

@@ -283,7 +283,7 @@ impl Worker {
         (MapSummary { peak_pa: 0.0 }, self.range(job))
     }
 
-    /// Reads a frame of version 3; pressure on a finger of reference stiffness is left.
+    /// Reads a frame of a finger; pressure on one of reference stiffness is left.
     fn take(
         &mut self,
         job: &Job,

@@ -10,7 +10,7 @@ use bytes::Bytes;
 use papilla_codec::{Input, Output};
 use papilla_metrics::{Stage, Transport};
 use papilla_proto::{
-    ClientMessage, ErrorCode, FrameHeader, FrameKind, FrameStatus, Problem, Reconnect,
+    ClientMessage, ErrorCode, FrameHeader, FrameStatus, HEADER_LEN, Problem, Reconnect,
     ReconnectReason, ServerMessage, Window, contact::FINGERS_MAX,
 };
 use tokio::{task::spawn_blocking, time::timeout};
@@ -131,7 +131,7 @@ impl Session {
         for lane in &mut self.lanes {
             lane.fresh = fresh();
         }
-        let fingers = self.terms.hand.as_ref().map_or(1, |hand| hand.fingers().len());
+        let fingers = self.terms.hand.fingers().len();
         for _ in self.lanes.len()..fingers {
             let answers = connection.app.store.answers(self.terms.answer_len_max());
             let sink = Arc::clone(&connection.reply) as Arc<_>;
@@ -190,11 +190,8 @@ impl Session {
             Err(problem) => return reply.refuse(problem, FrameHeader::peek_sequence(frame)),
         };
         let Some(header) = job.options.header else { return };
-        let finger = header.extension.and_then(|e| e.finger).map_or(0, usize::from);
-        let Some(lane) = self.lanes.get_mut(finger) else { return };
-        // In version 1 sequences mean nothing to the server.
-        let is_new = header.extension.is_some();
-        if is_new && lane.fresh.is_stale(header.sequence, header.client_time_us, received) {
+        let Some(lane) = self.lanes.get_mut(usize::from(header.finger)) else { return };
+        if lane.fresh.is_stale(header.sequence, header.client_time_us, received) {
             metrics.of(Transport::Session).stale.inc();
             return reply.send_status(&header, job.tier, FrameStatus::Stale, received);
         }
@@ -234,9 +231,9 @@ impl Session {
     fn job(&self, frame: &Bytes, received: Instant) -> Result<Job, Problem> {
         let header = FrameHeader::decode(frame).map_err(problem::of_frame)?;
         let finger = self.check(&header)?;
-        let payload = frame.slice(header.header_len()..);
-        let hand = self.terms.hand.as_ref();
-        let due = hand.map_or(header.payload_len(), |hand| hand.form().payload_len(&header));
+        let payload = frame.slice(HEADER_LEN..);
+        let hand = &self.terms.hand;
+        let due = hand.form().payload_len(&header);
         if payload.len() != due {
             let found = payload.len();
             let message = format!("the payload has {found} bytes, {due} are due");
@@ -263,11 +260,11 @@ impl Session {
             received,
             deadline: budget_us.map(|us| received + Duration::from_micros(us.into())),
             options: JobOptions {
-                headroom: HEADROOM + header.header_len(),
+                headroom: HEADROOM + HEADER_LEN,
                 out_of_range: self.terms.out_of_range,
                 time_us: header.client_time_us,
                 effects: self.terms.effects.get(finger).cloned(),
-                finger: hand.and_then(|hand| hand.fingers().get(finger).cloned()),
+                finger: hand.fingers().get(finger).cloned(),
                 contact_us: self.terms.contact_us,
                 is_contact_alone: !self.terms.shows_sed(),
                 header: Some(header),
@@ -279,16 +276,8 @@ impl Session {
     fn check(&self, header: &FrameHeader) -> Result<usize, Problem> {
         let wrong_type =
             |field, message| Err(Problem::new(ErrorCode::WrongType, message).at(field));
-        let version = u32::from(header.version());
-        if version != self.terms.version {
-            let agreed = self.terms.version;
-            let message = format!("the hello had version {agreed}, the frame has {version}");
-            return Err(Problem::new(ErrorCode::UnknownVersion, message).at("version"));
-        }
-        let finger = self.terms.hand.as_ref().map(|hand| hand.form().check(header)).transpose()?;
-        if finger.is_none() && header.kind != FrameKind::Pressure {
-            return wrong_type("kind", "clients send pressure, kind 1".to_owned());
-        }
+        let form = self.terms.hand.form();
+        let finger = form.check(header)?;
         if header.status != FrameStatus::Ok {
             return wrong_type("status", "the status of a request is 0".to_owned());
         }
@@ -299,18 +288,12 @@ impl Session {
             return wrong_type("sample_type", message);
         }
         let window = header.window();
-        let is_window = self.terms.hand.as_ref().is_none_or(|hand| hand.form().is_window());
-        if is_window && header.extension.is_some() && !window.is_inside() {
+        if form.is_window() && !window.is_inside() {
             let Window { x, y, width, height } = window;
             let message =
                 format!("the window of {width} x {height} at column {x}, row {y} leaves the map");
             return Err(Problem::new(ErrorCode::WrongShape, message).at("x"));
         }
-        if header.extension.is_none() && window != Window::WHOLE {
-            let Window { width, height, .. } = window;
-            let message = format!("the frame is {width} x {height}, 224 x 224 is due");
-            return Err(Problem::new(ErrorCode::WrongShape, message).at("width"));
-        }
-        Ok(finger.unwrap_or(0))
+        Ok(finger)
     }
 }

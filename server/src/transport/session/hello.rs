@@ -66,7 +66,7 @@ async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), P
         Err(problem) => return Ok(Err(problem)),
     };
     match said {
-        Ok(ClientMessage::Hello(hello)) if hello.resume == Some(true) && hello.version > 1 => {
+        Ok(ClientMessage::Hello(hello)) if hello.resume == Some(true) => {
             match state(connection).await? {
                 Ok(sealed) => meet(connection, hello, Some(sealed)).await,
                 Err(problem) => Ok(Err(problem)),
@@ -77,7 +77,7 @@ async fn attempt(connection: &mut Connection) -> Result<Result<(Terms, Hello), P
         Err(MessageError::Hello(error)) => Ok(Err(error.into())),
         Err(MessageError::Unknown(error)) => {
             let mut problem = Problem::from(error);
-            problem.message.push_str("; {\"type\":\"hello\",\"version\":1,…} is due");
+            problem.message.push_str("; {\"type\":\"hello\",…} is due");
             Ok(Err(problem))
         }
     }
@@ -154,9 +154,6 @@ async fn meet(
     sealed: Option<Bytes>,
 ) -> Result<Result<(Terms, Hello), Problem>, End> {
     let app = Arc::clone(&connection.app);
-    if hello.version == 1 {
-        return Ok(terms::meet(&app, &hello, None, &Cancel::default()).map(|terms| (terms, hello)));
-    }
     let work = move |cancel: &Cancel| {
         terms::meet(&app, &hello, sealed.as_deref(), cancel).map(|terms| (terms, hello))
     };

@@ -24,7 +24,7 @@ use axum::{
     response::Response,
 };
 use hyper::upgrade::OnUpgrade;
-use papilla_proto::{ErrorCode, HEADER_LEN_V2, MAP_LEN, Problem};
+use papilla_proto::{ErrorCode, HEADER_LEN, MAP_LEN, Problem};
 use tungstenite::handshake::derive_accept_key;
 
 use self::connection::Connection;
@@ -114,7 +114,7 @@ async fn converse(connection: &mut Connection, number: u64) -> End {
     };
     connection
         .inbound
-        .expect(HEADER_LEN_V2 + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
+        .expect(HEADER_LEN + MAP_LEN * terms.sample_type.bytes(), &connection.app.store);
     let session = frames::Session::new(number, terms, connection);
     frames::serve(connection, session).await
 }

@@ -12,9 +12,7 @@ use std::{
 use bytes::BytesMut;
 use papilla_codec::Output;
 use papilla_metrics::{Stage, Transport};
-use papilla_proto::{
-    Extension, FrameHeader, FrameStatus, HEADER_LEN_V2, Problem, ServerMessage, SessionError,
-};
+use papilla_proto::{FrameHeader, FrameStatus, HEADER_LEN, Problem, ServerMessage, SessionError};
 
 use super::{
     budget::FrameCounts,
@@ -117,8 +115,9 @@ impl Reply {
             self.counts.late(tier);
         }
         let total_us = us(received.elapsed());
-        let head = numbered(header.answer(status, total_us, 1.0), tier).encode();
-        let mut message = [0; OUT_HEAD_MAX + HEADER_LEN_V2];
+        let answer = header.answer(status, total_us, 1.0);
+        let head = FrameHeader { tier: tier_number(tier), ..answer }.encode();
+        let mut message = [0; OUT_HEAD_MAX + HEADER_LEN];
         let (frame, len) = wire::out_head(opcode::BINARY, head.len());
         message[..len].copy_from_slice(&frame[OUT_HEAD_MAX - len..]);
         message[len..len + head.len()].copy_from_slice(&head);
@@ -128,11 +127,9 @@ impl Reply {
     /// Sends what a thread made of a frame.
     fn answer(&self, done: Done) {
         let Some(mut header) = done.header else { return };
-        if let Some(extension) = &mut header.extension {
-            extension.queue_us = us(done.times.queue);
-            extension.infer_us = us(done.times.infer);
-            extension.flags = done.meta.flags;
-        }
+        header.queue_us = us(done.times.queue);
+        header.infer_us = us(done.times.infer);
+        header.flags = done.meta.flags;
         let (bytes, scale) = match done.outcome {
             Outcome::Map { bytes, scale } if !is_past(done.deadline) => (bytes, scale),
             outcome @ (Outcome::Map { .. } | Outcome::Late(_)) => {
@@ -146,10 +143,9 @@ impl Reply {
                 return;
             }
         };
-        let mut head = header.answer(FrameStatus::Ok, us(done.received.elapsed()), scale);
-        if header.extension.is_some() {
-            head = numbered(head.windowed(done.meta.window), done.tier);
-        }
+        let total_us = us(done.received.elapsed());
+        let mut head = header.answer(FrameStatus::Ok, total_us, scale).windowed(done.meta.window);
+        head.tier = tier_number(done.tier);
         if let Output::Samples(sample_type) = done.output {
             head.sample_type = sample_type;
         }
@@ -186,12 +182,6 @@ impl Sink for Reply {
     fn take_back(&self, recycler: &mut Recycler) {
         self.app.store.keep_answers(recycler);
     }
-}
-
-/// The header with the tier's number, where there is room for it.
-fn numbered(header: FrameHeader, tier: usize) -> FrameHeader {
-    let number = |extension| Extension { tier: tier_number(tier), ..extension };
-    FrameHeader { extension: header.extension.map(number), ..header }
 }
 
 fn us(time: Duration) -> u32 {

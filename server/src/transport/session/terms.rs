@@ -7,9 +7,9 @@ use std::sync::{
 
 use papilla_codec::{Output, scale_of};
 use papilla_proto::{
-    ErrorCode, HEADER_LEN_V2, Hello, MAP_SIDE_PX, PROTOCOL_VERSIONS, Problem, Ready, Resumption,
+    ErrorCode, HEADER_LEN, Hello, MAP_SIDE_PX, PROTOCOL_VERSION, Problem, Ready, Resumption,
     RuntimeEffect, SampleType,
-    contact::FINGERS_MAX,
+    contact::{FINGERS_MAX, Input, SampleLayout},
     effects::{OutOfRange, Section, SectionName},
     error::shortened,
     spikes::PlacedUnit,
@@ -41,8 +41,6 @@ pub(super) struct Terms {
     pub(super) budget_us: Option<u32>,
     /// Who chooses the tier while the session lasts; none: it stays.
     pub(super) budget: Option<Budget>,
-    /// Version of the frames, both ways.
-    pub(super) version: u32,
     /// Sample type of the client's frames.
     pub(super) sample_type: SampleType,
     /// Sample type of the answers.
@@ -55,11 +53,10 @@ pub(super) struct Terms {
     pub(super) stale_after_us: Option<u32>,
     /// What was asked for beside the bare map, of each finger; none of the bare map.
     pub(super) effects: Vec<Arc<Mutex<Effects>>>,
-    /// The fingers, in version 3.
-    pub(super) hand: Option<Hand>,
+    pub(super) hand: Hand,
     /// Time that a frame's contact is expected to take, us; none if nothing is solved.
     pub(super) contact_us: Option<u64>,
-    _fingers: Option<OwnedSemaphorePermit>,
+    _fingers: OwnedSemaphorePermit,
     /// Of clients that follow a request to reconnect: what shapes their state.
     pub(super) follows: Option<Shape>,
     /// What became of the state that the hello brought.
@@ -83,17 +80,15 @@ impl Terms {
 
     /// What answers depend on of the frames before.
     pub(super) fn memory(&self) -> Memory {
-        let fingers = self.hand.as_ref().map_or(&[][..], Hand::fingers).to_vec();
-        Memory { effects: self.effects.clone(), fingers }
+        Memory { effects: self.effects.clone(), fingers: self.hand.fingers().to_vec() }
     }
 
     /// Most bytes of an answer, its heads included.
     pub(super) fn answer_len_max(&self) -> usize {
-        let plain = HEADER_LEN_V2 + Output::Samples(self.answer_sample_type).size_hint();
+        let plain = HEADER_LEN + Output::Samples(self.answer_sample_type).size_hint();
         let effects = self.effects.first();
-        let touch = self.hand.as_ref().map_or(0, Hand::sections_len);
         HEADROOM
-            + touch
+            + self.hand.sections_len()
             + effects.map_or(plain, |effects| {
                 effects.lock().unwrap_or_else(PoisonError::into_inner).size_hint()
             })
@@ -126,25 +121,6 @@ struct ReadyInfo {
     shows_sed: bool,
 }
 
-fn check_version(hello: &Hello) -> Result<(), Problem> {
-    let refuse = |message: String, field: &str| {
-        Err(Problem::new(ErrorCode::UnknownVersion, message).at(field))
-    };
-    if !PROTOCOL_VERSIONS.map(u32::from).contains(&hello.version) {
-        let message = format!("version {} is not spoken here, 1 to 3 are", hello.version);
-        return refuse(message, "version");
-    }
-    match (hello.member_of_version_2(), hello.member_of_version_3()) {
-        (Some(member), _) if hello.version < 2 => {
-            refuse(format!("'{member}' needs version 2 of the protocol"), member)
-        }
-        (_, Some(member)) if hello.version < 3 => {
-            refuse(format!("'{member}' needs version 3 of the protocol"), member)
-        }
-        _ => Ok(()),
-    }
-}
-
 impl Default for ReadyInfo {
     /// The bare map.
     fn default() -> Self {
@@ -152,14 +128,23 @@ impl Default for ReadyInfo {
     }
 }
 
-/// The fingers of a hello of version 3, and their places.
+/// Fingers of a hello that take a place: a session that sends maps of pressure has the memory of
+/// one by itself.
+fn places(hello: &Hello) -> usize {
+    let fingers = hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX);
+    let sends_maps = hello.input.unwrap_or_default() == Input::Pressure
+        && hello.input_layout.unwrap_or_default() == SampleLayout::Map;
+    fingers.saturating_sub(usize::from(sends_maps))
+}
+
+/// The fingers of a hello, and their places.
 fn hand(
     app: &App,
     catalogue: &Catalogue,
     hello: &Hello,
     cancel: &Cancel,
 ) -> Result<(Hand, OwnedSemaphorePermit), Problem> {
-    let places = app.admit_fingers(hello.fingers.as_ref().map_or(1, Vec::len).min(FINGERS_MAX))?;
+    let places = app.admit_fingers(places(hello))?;
     let contact = app.contact.as_ref();
     let skin = Skin {
         atlas: &catalogue.atlas,
@@ -214,8 +199,8 @@ fn agree(
     before: Option<&str>,
     cancel: &Cancel,
 ) -> Result<Terms, Problem> {
-    check_version(hello)?;
-    let is_of_tier = |name: &&String| hello.version == 1 || runtime_effect(name).is_none();
+    hello.check_version()?;
+    let is_of_tier = |name: &&String| runtime_effect(name).is_none();
     let wanted: Vec<String> = hello.effects.iter().filter(is_of_tier).cloned().collect();
     let budget_us = hello.budget_us.filter(|&us| us > 0);
     let catalogue = app.catalogue();
@@ -233,8 +218,7 @@ fn agree(
     let tier = &catalogue.tiers[index];
     if let Some(effect) = wanted.iter().find(|effect| !tier.effects.contains(effect)) {
         let (effect, rendered) = (shortened(effect), tier.effects.join(", "));
-        let hint = runtime_effect(&effect).map_or("", |_| "; effects of sessions need version 2");
-        let message = format!("tier {} renders {rendered}, but not '{effect}'{hint}", tier.name);
+        let message = format!("tier {} renders {rendered}, but not '{effect}'", tier.name);
         return Err(Problem::new(ErrorCode::UnknownEffect, message).at("effects"));
     }
     if let Some(hash) = hello.atlas_hash.as_ref().filter(|&hash| *hash != tier.atlas_hash) {
@@ -246,36 +230,28 @@ fn agree(
         let message = format!("{scale} Pa per unit is no scale; it must be finite and above zero");
         return Err(Problem::new(ErrorCode::BadScale, message).at("pressure_scale_pa"));
     }
-    let hand = (hello.version > 2).then(|| hand(app, &catalogue, hello, cancel)).transpose()?;
-    let (hand, fingers) = hand.unzip();
-    let contact_us = hand.as_ref().zip(app.contact.as_ref()).and_then(|(h, c)| c.us_of(h));
+    let (hand, fingers) = hand(app, &catalogue, hello, cancel)?;
+    let contact_us = app.contact.as_ref().and_then(|contact| contact.us_of(&hand));
     let mut effects = Vec::new();
-    for _ in 0..hand.as_ref().map_or(1, |hand| hand.fingers().len()) {
+    for _ in hand.fingers() {
         still_asked(cancel)?;
-        let own = if hello.version > 1 { Effects::of(hello, catalogue.finger())? } else { None };
-        effects.extend(own);
+        effects.extend(Effects::of(hello, catalogue.finger())?);
     }
     let info = effects.first().map_or_else(ReadyInfo::default, |effects| ReadyInfo {
         names: effects.names().to_vec(),
         units: effects.units().map(<[_]>::to_vec),
         sections: effects.sections().to_vec(),
-        shows_sed: hand.is_none() || effects.shows_sed(),
+        shows_sed: effects.shows_sed(),
     });
-    // Answers of version 1 could not tell of another tier.
-    let by_budget = budget_us.filter(|_| hello.version > 1 && hello.tier.is_none());
+    let by_budget = budget_us.filter(|_| hello.tier.is_none());
     Ok(Terms {
         tier: index,
         budget_us,
         budget: by_budget.map(|us| Budget::new(us, wanted)),
-        version: hello.version,
         sample_type: hello.sample_type,
         answer_sample_type: hello.answer_sample_type.unwrap_or(hello.sample_type),
         pressure_scale_pa: hello.pressure_scale_pa,
-        // Frames of version 1 have no flags.
-        out_of_range: hello.out_of_range.unwrap_or(match hello.version {
-            1 => OutOfRange::Refuse,
-            _ => OutOfRange::Clamp,
-        }),
+        out_of_range: hello.out_of_range.unwrap_or(OutOfRange::Clamp),
         stale_after_us: hello.stale_after_us,
         effects: effects.into_iter().map(|effects| Arc::new(Mutex::new(effects))).collect(),
         hand,
@@ -304,28 +280,26 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         .saturating_add(contact_us.unwrap_or(0))
         .saturating_add(shear_us.filter(|_| feels_shear).unwrap_or(0))
         .saturating_add(catalogue.runtime.cost_us(&terms.info.names));
-    let is_new = terms.version > 1;
     let value_max = tier.sed_max_j_per_m3;
     let bare_map = || {
         let output = Output::Samples(terms.answer_sample_type);
-        let (offset, bytes) = (HEADER_LEN_V2 as u32, output.size_hint() as u32);
+        let (offset, bytes) = (HEADER_LEN as u32, output.size_hint() as u32);
         vec![Section { name: SectionName::Map, offset, bytes }]
     };
+    let hand = &terms.hand;
     let sections = || {
         let rest = match terms.effects.first() {
             Some(_) => terms.info.sections.clone(),
             None => bare_map(),
         };
-        let Some(hand) = &terms.hand else { return rest };
         let behind = hand.sections_len() as u32;
         let moved = rest.into_iter().map(|s| Section { offset: s.offset + behind, ..s });
         hand.sections().iter().copied().chain(moved).collect()
     };
-    let fingers = terms.hand.as_ref().map(|hand| hand.fingers().len() as u32);
-    let method = terms.hand.as_ref().and_then(Hand::method);
+    let method = hand.method();
     let errors = app.contact.as_ref().and_then(|contact| contact.errors.as_ref());
     Ready {
-        version: terms.version,
+        version: PROTOCOL_VERSION.into(),
         session: number,
         tier: tier.name.clone(),
         effects: tier.effects.clone(),
@@ -338,21 +312,21 @@ pub(super) fn ready(app: &App, number: u64, terms: &Terms) -> Ready {
         sample_type: terms.sample_type,
         pressure_max_pa: tier.pressure_max_pa,
         sed_scale_j_per_m3: scale_of(Output::Samples(terms.answer_sample_type), value_max),
-        tier_number: is_new.then(|| tier_number(terms.tier)),
+        tier_number: tier_number(terms.tier),
         tier_names: terms
             .budget
             .as_ref()
             .map(|_| catalogue.tiers.iter().map(|tier| tier.name.clone()).collect()),
-        answer_sample_type: is_new.then_some(terms.answer_sample_type),
-        session_effects: is_new.then(|| terms.info.names.clone()),
-        sections: is_new.then(sections),
+        answer_sample_type: terms.answer_sample_type,
+        session_effects: terms.info.names.clone(),
+        sections: sections(),
         units: terms.info.units.clone(),
         state: terms.resumption,
-        vertices: fingers.map(|_| catalogue.atlas.vertex_count() as u32),
-        fingers,
+        vertices: catalogue.atlas.vertex_count() as u32,
+        fingers: hand.fingers().len() as u32,
         contact_us,
         method,
         expected_error: errors.zip(method).and_then(|(errors, of)| errors.of(of)).cloned(),
-        warnings: terms.hand.as_ref().map_or_else(Vec::new, |hand| hand.warnings().to_vec()),
+        warnings: hand.warnings().to_vec(),
     }
 }

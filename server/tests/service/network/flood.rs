@@ -7,14 +7,11 @@ use serde_json::json;
 use tokio::time::timeout;
 
 use super::{HANG, Neighbour, small_frame, small_hello};
-use crate::{
-    effects::hello_2,
-    support::{
-        Running, Service,
-        flood::{Flood, Flooding},
-        model_folder,
-        raw::{HANDSHAKE, Raw, opcode, ws},
-    },
+use crate::support::{
+    Running, Service,
+    flood::{Flood, Flooding},
+    hello, model_folder,
+    raw::{HANDSHAKE, Raw, opcode, ws},
 };
 
 /// What each flooding client may send, bytes: far more than the service takes from it while it
@@ -47,7 +44,7 @@ fn pongs_before_the_hello() -> Flood {
 
 /// Hellos of almost the longest message there may be.
 fn hellos() -> Flood {
-    let mut hello = hello_2(&json!({})).to_string();
+    let mut hello = hello(&json!({})).to_string();
     hello.pop();
     hello.push_str(&format!(r#","effects":["{}"]}}"#, "x".repeat(1_000_000)));
     saying_hello(ws(TEXT, hello.as_bytes()))

@@ -1,4 +1,4 @@
-//! A finger that is a plane of an elastic half-space, and frames of version 3 for it.
+//! A finger that is a plane of an elastic half-space, and frames for it.
 
 use papilla_contact::{Arrays, Header, Layer};
 use papilla_proto::{
@@ -77,8 +77,8 @@ pub(crate) fn model_of(layers: Vec<Layer>) -> Vec<u8> {
     arrays.to_bytes(&header).unwrap()
 }
 
-/// A hello of version 3 for one ball, with more members.
-pub(crate) fn hello_3(members: &Value) -> Value {
+/// A hello for one ball, with more members.
+pub(crate) fn ball_hello(members: &Value) -> Value {
     let mut hello = hello(&json!({
         "version": 3, "input": "objects",
         "objects": [{"shape": {"shape": "sphere", "radius_mm": RADIUS_MM}}],

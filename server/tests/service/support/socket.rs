@@ -201,9 +201,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Socket<S> {
     }
 }
 
-/// A hello with these members beside type and version.
+/// A hello with these members beside its type.
 pub(crate) fn hello(members: &Value) -> Value {
-    let mut hello = json!({"type": "hello", "version": 1});
+    let mut hello = json!({"type": "hello"});
     for (name, value) in members.as_object().unwrap() {
         hello[name] = value.clone();
     }

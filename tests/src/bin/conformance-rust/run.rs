@@ -19,7 +19,7 @@ use papilla_tests::{
     http::Request,
 };
 use serde::de::DeserializeOwned;
-use serde_json::{Value, json};
+use serde_json::Value;
 use tokio::{task::spawn_blocking, time};
 
 use crate::checks::{check_answer, check_list, check_map, check_pair, check_problem, check_touch};
@@ -86,9 +86,7 @@ impl Run {
     }
 
     async fn hello(&mut self, step: &Value) -> Result<()> {
-        let mut hello = step["hello"].clone();
-        hello["version"] = json!(2);
-        let hello: Hello = serde_json::from_value(hello)?;
+        let hello: Hello = member(step, "hello")?;
         let opened = match &self.session {
             Some(session) => session.renew(hello).await.map(|_| None),
             None => Session::open(&self.server, hello).await.map(Some),

@@ -2,7 +2,7 @@
 
 use std::{net::TcpListener, thread};
 
-use papilla_proto::{ErrorCode, FrameStatus, Problem, SampleType};
+use papilla_proto::{ErrorCode, FrameStatus, HEADER_LEN, Problem, SampleType};
 use tokio_tungstenite::tungstenite::{
     Message, WebSocket,
     protocol::{Role, WebSocketConfig},
@@ -39,8 +39,8 @@ fn a_library_understands_what_is_sent() {
     for len in lens {
         let Message::Binary(frame) = server.read().unwrap() else { panic!("no frame") };
         let header = FrameHeader::decode(&frame).unwrap();
-        assert_eq!((header.sequence, frame.len()), (len as u32, header.header_len() + len));
-        let samples = &frame[header.header_len()..];
+        assert_eq!((header.sequence, frame.len()), (len as u32, HEADER_LEN + len));
+        let samples = &frame[HEADER_LEN..];
         assert!(samples.iter().enumerate().all(|(i, &byte)| byte == i as u8), "{len}");
     }
     assert!(matches!(server.read().unwrap(), Message::Close(Some(_))));

@@ -1,10 +1,11 @@
-# Frames of the protocol, versions 2 and 3: a header of 48 bytes, little-endian, and what follows.
+# Frames of the protocol: a header of 48 bytes, little-endian, and what follows.
 extends Reference
 
 const Compat = preload("compat.gd")
 const Samples = preload("samples.gd")
 const Touch = preload("touch.gd")
 const STATUS = ["ok", "superseded", "late", "error", "stale"]
+const VERSION = 3
 const HEADER_BYTES = 48
 const KIND_PRESSURE = 1
 const KIND_OBJECTS = 4
@@ -43,11 +44,11 @@ static func encode_not_tracked(finger, sequence, time_us, deadline_us):
 	return _header(KIND_PRESSURE, 0, [0, 0, 0, 0], 1.0, finger, sequence, time_us, deadline_us, NOT_TRACKED)
 
 
-# The header; its version is that of the session in which it leaves.
+# The header.
 static func _header(kind, type, window, scale, finger, sequence, time_us, deadline_us, flags = 0):
 	var head = StreamPeerBuffer.new()
 	head.put_data("PPL1".to_ascii())
-	for byte in [2, kind, type, 0]:
+	for byte in [VERSION, kind, type, 0]:
 		head.put_u8(byte)
 	head.put_u32(sequence)
 	head.put_u16(window[2])
@@ -68,10 +69,8 @@ static func _header(kind, type, window, scale, finger, sequence, time_us, deadli
 static func read_header(packet):
 	var head = StreamPeerBuffer.new()
 	head.data_array = packet.subarray(0, HEADER_BYTES - 1)
-	head.seek(4)
-	var version = head.get_u8()
-	# The kind: SED.
-	head.get_u8()
+	# Behind the version, and the kind: SED.
+	head.seek(6)
 	var answer = {"sample_type": head.get_u8(), "status": STATUS[head.get_u8()]}
 	answer.sequence = head.get_u32()
 	answer.width = head.get_u16()
@@ -92,7 +91,7 @@ static func read_header(packet):
 	answer.cut_off = flags & 16 != 0
 	answer.not_tracked = flags & NOT_TRACKED != 0
 	answer.coarse_clock = flags & 64 != 0
-	answer.finger = head.get_u8() if version == 3 else 0
+	answer.finger = head.get_u8()
 	return answer
 
 

@@ -302,7 +302,7 @@ func _fault():
 func _words():
 	var message = _asked.duplicate(true)
 	message["type"] = "hello"
-	message["version"] = 3 if Touch.is_asked(_asked) else 2
+	message["version"] = Frame.VERSION
 	message["reconnect"] = true
 	return message
 
@@ -382,7 +382,6 @@ func _flush():
 		if server_ready == null or not _waiting.has(finger) or _outstanding.values().count(finger) >= in_flight_max:
 			continue
 		var frame = _waiting[finger][0]
-		frame[4] = int(server_ready.version)
 		_outstanding[_waiting[finger][1]] = finger
 		_waiting.erase(finger)
 		sent += 1

@@ -1,18 +1,9 @@
 # Made of clients/godot/godot3/addons/papilla/touch.gd by clients/godot/generate: edit that one.
-# Where things are and what pushes back, as they travel: frames of the protocol, version 3.
+# Where things are and what pushes back, as they travel.
 extends RefCounted
 
 const Compat = preload("compat.gd")
-const OF_HELLO = ["input", "input_layout", "answer_layout", "objects", "fingers", "method", "force_target", "stiffness", "pressure", "shear", "friction", "velocity", "traction"]
 const ROW_LEN = 7
-
-
-# Whether a hello asks for something of version 3.
-static func is_asked(hello):
-	for member in OF_HELLO:
-		if hello.has(member):
-			return true
-	return false
 
 
 # Rows of seven numbers, and the net force behind them, as bytes.
