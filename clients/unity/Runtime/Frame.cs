@@ -77,6 +77,7 @@ namespace Papilla
         {
             for (int k = 0; k < Wire.HeaderBytes; k++) m[k] = 0;
             *(uint*)m = Wire.Magic;
+            m[4] = Wire.Version;
             m[5] = kind;
             m[6] = (byte)type;
             *(ushort*)(m + 12) = (ushort)width;
