@@ -117,12 +117,15 @@ struct Plane {
 const NO_PLANE: Plane = Plane { normal: [0.0; 3], depth_mm: 0.0, bend: [[0.0; 3]; 3], body: 0 };
 
 /// The shortest way into some half-spaces.
+#[derive(Clone, Copy)]
 struct Way {
     to: [f64; 3],
     length_mm: f64,
     hessian: [[f64; 3]; 3],
     /// Of the planes that it ends at, the one that turns it most first.
     bodies: [usize; 3],
+    /// Between the normals of these planes: in a corner the way itself may run along one of them.
+    between: [f64; 3],
 }
 
 struct Search<'a, B> {
@@ -199,7 +202,9 @@ impl<B: Body> Search<'_, B> {
             }
             sum.map(|v| v / size)
         };
-        let Some(cover) = self.cover(there, out, None) else {
+        let size = norm(way.between);
+        let beyond = if size > 0.1 { way.between.map(|v| v / size) } else { out };
+        let Some(cover) = self.cover(there, beyond, None) else {
             self.take(way, out, there);
             return;
         };
@@ -303,7 +308,7 @@ impl<B: Body> Search<'_, B> {
     /// Goes from a place in the air towards `p` for as long as it stays in the air: each step is the
     /// shortest way into the half-spaces beyond the tangent planes of what is near.
     fn pulled(&mut self, way: Way, out: [f64; 3], mut at: [f64; 3]) -> (Way, [f64; 3]) {
-        let mut best = way;
+        let (mut best, mut last) = (way, way);
         for _ in 0..PULLS_MAX {
             if self.questions > QUESTIONS_MAX {
                 break;
@@ -329,6 +334,11 @@ impl<B: Body> Search<'_, B> {
                 }
             }
             let count = gaps.partition_point(|gap| gap.is_finite());
+            if is_seam(&planes[..count], &gaps) {
+                best = last;
+                break;
+            }
+            last = best;
             let Some(next) = shortest(&planes[..count]) else { break };
             let step = minus(next.to, behind);
             let share = [1.0, 0.5, 0.25, 0.125, 0.0625]
@@ -341,6 +351,10 @@ impl<B: Body> Search<'_, B> {
             if !(length_mm < best.length_mm) {
                 break;
             }
+            if length_mm <= INSIDE_MM {
+                // A foot of `p` is covered: `p` is between bodies that touch, not in the air.
+                break;
+            }
             let gained = best.length_mm - length_mm;
             best = Way { to, length_mm, ..next };
             if gained < 1e-3 * INSIDE_MM {
@@ -351,6 +365,13 @@ impl<B: Body> Search<'_, B> {
             if best.length_mm > INSIDE_MM { best.to.map(|v| v / best.length_mm) } else { out };
         (best, out)
     }
+}
+
+/// Whether two of these planes face each other without room in between.
+fn is_seam(planes: &[Plane], gaps: &[f64; PLANES_MAX]) -> bool {
+    let near = gaps.partition_point(|gap| *gap < 0.5 * SEAM_MM).min(planes.len());
+    let near = &planes[..near];
+    near.iter().enumerate().any(|(i, a)| near[..i].iter().any(|b| dot(a.normal, b.normal) < -0.99))
 }
 
 /// The shortest way into all of these half-spaces that lies on the last one: on its plane, in a
@@ -420,7 +441,9 @@ fn meeting(active: [&Plane; 3], count: usize, all: &[Plane]) -> Option<Way> {
     let most = (0..count).max_by(|a, b| factors[*a].total_cmp(&factors[*b])).unwrap_or(0);
     let mut bodies = active.map(|plane| plane.body);
     bodies.swap(0, most);
-    Some(Way { to, length_mm, hessian, bodies })
+    let between =
+        std::array::from_fn(|i| active[..count].iter().map(|plane| plane.normal[i]).sum());
+    Some(Way { to, length_mm, hessian, bodies, between })
 }
 
 /// Factors of the normals whose sum reaches all `count` planes at once.
