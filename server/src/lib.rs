@@ -88,6 +88,7 @@ pub struct Starting {
     /// One task; dropped, it is given up.
     opening: JoinSet<Result<Opened, StartError>>,
     threads: usize,
+    front: Arc<Front>,
     io: IoRuntime,
 }
 
@@ -163,7 +164,13 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
         priorities,
     };
     opening.spawn_on(start::open(parts), io.handle());
-    let context = ConnectionContext { front, metrics, drain: Arc::clone(&drain), timeouts, tls };
+    let context = ConnectionContext {
+        front: Arc::clone(&front),
+        metrics,
+        drain: Arc::clone(&drain),
+        timeouts,
+        tls,
+    };
     let places = Places::new(config.max_connections.get(), config.tokens.is_some());
     let accepting = io.handle().spawn(net::serve(listener, context, places));
     Ok(Starting {
@@ -173,6 +180,7 @@ pub fn listen(config: &Config) -> Result<Starting, StartError> {
         accepting,
         opening,
         threads: config.thread_count(),
+        front,
         io,
     })
 }
@@ -190,6 +198,13 @@ impl Starting {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Tells whether clients are answered already. It can be asked while [`ready`](Self::ready)
+    /// runs: the service answers a moment before that returns.
+    pub fn answers(&self) -> impl Fn() -> bool + use<> {
+        let front = Arc::clone(&self.front);
+        move || front.is_open()
     }
 
     /// Waits until the models are loaded and measured on this machine, and every thread is warm.

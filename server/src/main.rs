@@ -5,6 +5,7 @@ mod signals;
 use std::{
     env,
     io::{self, Write},
+    pin::pin,
     process::ExitCode,
 };
 
@@ -89,9 +90,18 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
     let mut signals = Signals::listen()?;
     let starting = papilla_server::listen(config)?;
     tracing::info!(address = %starting.address(), "listening; the models are being loaded");
-    let server = tokio::select! {
-        server = starting.ready() => server?,
-        () = signals.end() => return Ok(ExitCode::from(INTERRUPTED)),
+    let answers = starting.answers();
+    let mut ready = pin!(starting.ready());
+    let started = tokio::select! {
+        biased;
+        server = &mut ready => Some(server?),
+        () = signals.end() => None,
+    };
+    let server = match started {
+        Some(server) => server,
+        // Clients have had answers: what they sent is answered before the end.
+        None if answers() => return drain(ready.await?, &mut signals).await,
+        None => return Ok(ExitCode::from(INTERRUPTED)),
     };
     if let Err(error) = announce(&server, config) {
         // Clients are served all the same.
@@ -101,6 +111,11 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
         tracing::info!("SIGHUP: the models are loaded anew");
         server.reload();
     }
+    drain(server, &mut signals).await
+}
+
+/// Answers what was accepted, then ends; a second signal ends at once.
+async fn drain(server: Server, signals: &mut Signals) -> anyhow::Result<ExitCode> {
     tracing::info!("draining; a second signal ends at once");
     tokio::select! {
         result = server.drain() => match result {

@@ -66,7 +66,7 @@ def chosen(only: list[str], all_steps: list[Step]) -> list[Step]:
     return [step for step in all_steps if step.name in due]
 
 
-def environment() -> dict[str, str]:
+def environment(asks_anew: bool) -> dict[str, str]:
     """What the steps see: where things are built, and nothing of a developer's colours."""
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
     return os.environ | {
@@ -79,6 +79,9 @@ def environment() -> dict[str, str]:
         "CARGO_TERM_COLOR": "never",
         "NO_COLOR": "1",
         "PYTHONUNBUFFERED": "1",
+        # Property tests ask the same each time, so that a change is judged and not its luck; other
+        # questions: PROPTEST_RNG_SEED=... ./test, and the long form asks new ones itself.
+        **({"PROPTEST_RNG_SEED": os.environ.get("PROPTEST_RNG_SEED", "1")} if not asks_anew else {}),
     } | steps.lints()
 
 
@@ -96,7 +99,7 @@ def main() -> int:
             print(f"installs: {step.installs}")
     print(f"takes {MINUTES[extent]} where measured (two cores), and the installs once", flush=True)
     begun = time.monotonic()
-    surroundings = environment()
+    surroundings = environment(asks_anew=extent == "all")
     logs = Path(surroundings["TARGET"]) / "test-logs"
     run = Run(suite, ROOT, logs, surroundings, chosen_options.lanes)
     if chosen_options.record:

@@ -50,6 +50,11 @@ impl Front {
         let _ = self.router.set(router);
     }
 
+    /// Whether the routes answer.
+    pub(crate) fn is_open(&self) -> bool {
+        self.router.get().is_some()
+    }
+
     /// Answers a request: by its route, or for as long as there is none by how far the start is.
     pub(crate) async fn answer<B>(&self, request: Request<B>) -> Result<Response, Infallible>
     where

@@ -153,7 +153,7 @@ fn outputs_that_take_nothing_end_it_cleanly() {
     }
     // A pipe whose reader is gone: it has read enough.
     for args in [&["--print-config"][..], &check[..]] {
-        let line = r#"("$0" "$@"; echo $? >&3) 3>&1 | true"#;
+        let line = r#"exec 3>&1; ("$0" "$@"; echo $? >&3) | true"#;
         let mut command = std::process::Command::new("sh");
         command.args(["-c", line, env!("CARGO_BIN_EXE_papilla-server")]).args(args);
         let output = command.output().unwrap();
@@ -206,7 +206,7 @@ fn too_few_file_descriptors_are_said_at_the_start() {
     let check = ["check", "--models", path, "--calibration-ms", "0", "--bind", "127.0.0.1:0"];
     let raised = in_shell("ulimit -Sn 100;", &check, "");
     assert_eq!(raised.status.code(), Some(0), "{}", String::from_utf8_lossy(&raised.stdout));
-    let few = in_shell("ulimit -Hn 100;", &check, "");
+    let few = in_shell("ulimit -n 100;", &check, "");
     let text = String::from_utf8_lossy(&few.stdout);
     assert_eq!(few.status.code(), Some(2), "{text}");
     assert!(text.contains("FAILED descriptors") && text.contains("ulimit -Hn"), "{text}");
@@ -214,8 +214,7 @@ fn too_few_file_descriptors_are_said_at_the_start() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();
     let serve = ["--models", path, "--bind", &address];
-    for (limit, word) in [("ulimit -Sn 100;", "is raised"), ("ulimit -Hn 100;", "max_connections")]
-    {
+    for (limit, word) in [("ulimit -Sn 100;", "is raised"), ("ulimit -n 100;", "max_connections")] {
         let output = in_shell(limit, &serve, "");
         let log = String::from_utf8_lossy(&output.stderr);
         assert!(log.contains(word), "{limit} {log}");
