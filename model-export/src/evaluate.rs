@@ -116,6 +116,7 @@ impl Evaluation {
             network: info.network.clone(),
             pressure_range_pa: [0.0, info.pressure_max_pa],
             input_statistics_max: None,
+            response_max_per_mpa: None,
             sed_max_j_per_m3: info.sed_max_j_per_m3,
             dataset_sha256: info.dataset_sha256.clone(),
             training: info.training.clone(),

@@ -1,11 +1,11 @@
 //! Input statistics: what tells a map that no indentation makes, though every pressure in it is an
 //! ordinary one.
 //!
-//! A network answers a checkerboard as readily as a contact, and its answer means nothing. Four
+//! A network answers a checkerboard as readily as a contact, and its answer means nothing. These
 //! numbers tell such maps from contacts: skin under an indenter shares its load smoothly among
 //! neighbours, no indentation carries much more than the hardest one a model has seen, what is
-//! pressed hard is pressed by something wide, whose map is smooth, and no indentation presses on the
-//! whole finger at once.
+//! pressed hard is pressed by something wide, whose map is smooth, no indentation presses on the
+//! whole finger at once, and what was never pressed in the training is not known.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,92 @@ pub const ROUGH_LOAD_HEADROOM: f32 = 2.0;
 /// over the whole finger to 3.5 times as much.
 pub const AREA_HEADROOM: f32 = 1.5;
 
+/// The same for the contrast: shapes that a model has not seen come to 1.13 times the greatest, random
+/// blocks of 1 to 4 mm on 3000 px and more to 2 to 13 times.
+pub const CONTRAST_HEADROOM: f32 = 1.5;
+
+/// Share of the pressed cells that may lie where no indentation of the training pressed.
+pub const STRANGE_CELLS_MAX: f32 = 0.25;
+
+/// Side of a cell, px.
+pub const CELL_PX: usize = 8;
+
+/// Cells along a side of the map.
+pub const CELLS: usize = MAP_SIDE_PX / CELL_PX;
+
+/// Share of the load of the most loaded cell from which a cell counts as pressed.
+const PRESSED_SHARE: f32 = 0.05;
+
+/// Which cells of 8 x 8 pixels are pressed: those with at least 5 % of the load of the most loaded one.
+///
+/// A card has it as 28 rows of 28 characters, `#` for pressed, as the map lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<String>", into = "Vec<String>")]
+pub struct PressedCells([u32; CELLS]);
+
+impl Default for PressedCells {
+    fn default() -> Self {
+        Self([0; CELLS])
+    }
+}
+
+impl PressedCells {
+    /// Those of a finger that was pressed everywhere: nothing is strange to it.
+    const EVERYWHERE: Self = Self([u32::MAX >> (32 - CELLS); CELLS]);
+
+    fn of_loads(loads: &[[f32; CELLS]; CELLS]) -> Self {
+        let most = loads.as_flattened().iter().fold(0.0_f32, |a, b| a.max(*b));
+        if !(most > 0.0) {
+            return Self::default();
+        }
+        let bits = |row: &[f32; CELLS]| {
+            let is_pressed = |load: f32| u32::from(load >= PRESSED_SHARE * most);
+            row.iter().enumerate().map(|(i, load)| is_pressed(*load) << i).sum()
+        };
+        Self(std::array::from_fn(|row| bits(&loads[row])))
+    }
+
+    /// Pressed in one or the other.
+    fn or(self, other: Self) -> Self {
+        Self(std::array::from_fn(|row| self.0[row] | other.0[row]))
+    }
+
+    /// Share of the pressed cells that are not pressed in `known`; 0 where nothing is pressed.
+    #[must_use]
+    pub fn share_beyond(self, known: Self) -> f32 {
+        let strange = Self(std::array::from_fn(|row| self.0[row] & !known.0[row]));
+        strange.count() as f32 / self.count().max(1) as f32
+    }
+
+    /// How many are pressed.
+    #[must_use]
+    pub fn count(self) -> u32 {
+        self.0.iter().map(|row| row.count_ones()).sum()
+    }
+}
+
+impl From<PressedCells> for Vec<String> {
+    fn from(cells: PressedCells) -> Self {
+        let sign = |row: u32, i: usize| if row >> i & 1 == 1 { '#' } else { '.' };
+        cells.0.iter().map(|row| (0..CELLS).map(|i| sign(*row, i)).collect()).collect()
+    }
+}
+
+impl TryFrom<Vec<String>> for PressedCells {
+    type Error = String;
+
+    fn try_from(rows: Vec<String>) -> Result<Self, String> {
+        let is_row =
+            |row: &String| row.len() == CELLS && row.bytes().all(|c| c == b'#' || c == b'.');
+        if rows.len() != CELLS || !rows.iter().all(is_row) {
+            return Err(format!("cells are {CELLS} rows of {CELLS} characters, '#' or '.'"));
+        }
+        let bits =
+            |row: &String| row.bytes().enumerate().map(|(i, c)| u32::from(c == b'#') << i).sum();
+        Ok(Self(std::array::from_fn(|row| bits(&rows[row]))))
+    }
+}
+
 /// Statistics of a pressure map.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -39,6 +125,17 @@ pub struct InputStatistics {
     /// exactly so where all of it is pressed alike. Cards from before it was noted bound it not.
     #[serde(default = "unbounded")]
     pub area_px: f32,
+    /// Squared steps between neighbours that are both pressed, over four times the squared pressures,
+    /// times the area, px: how much the pressure changes inside contact. Cards as above.
+    #[serde(default = "unbounded")]
+    pub contrast_px: f32,
+    /// Where it presses. Cards from before it was noted know every place.
+    #[serde(default = "everywhere")]
+    pub cells: PressedCells,
+}
+
+fn everywhere() -> PressedCells {
+    PressedCells::EVERYWHERE
 }
 
 fn unbounded() -> f32 {
@@ -51,7 +148,9 @@ impl InputStatistics {
     #[must_use]
     pub fn of(map_pa: &[f32]) -> Self {
         // Lanes of f32 along a row, f64 over the rows: in vectors, and exact enough for 1e-4.
-        let (mut steps, mut squares, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut steps, mut inner, mut squares, mut sum) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+        let mut loads = [[0.0_f32; CELLS]; CELLS];
+        let mut columns = [0.0_f32; MAP_SIDE_PX];
         let rows = map_pa.as_chunks::<MAP_SIDE_PX>().0;
         for (y, row) in rows.iter().enumerate() {
             let below = rows.get(y + 1).unwrap_or(row);
@@ -59,30 +158,44 @@ impl InputStatistics {
             let mut right = *row;
             right.copy_within(1.., 0);
             right[MAP_SIDE_PX - 1] = row[MAP_SIDE_PX - 1];
-            let mut lanes = [[0.0_f32; LANES]; 3];
+            columns.iter_mut().zip(row).for_each(|(sum, p)| *sum += p);
+            if y % CELL_PX == CELL_PX - 1 {
+                for (load, columns) in loads[y / CELL_PX].iter_mut().zip(columns.chunks(CELL_PX)) {
+                    *load = columns.iter().sum();
+                }
+                columns.fill(0.0);
+            }
+            let mut lanes = [[0.0_f32; LANES]; 4];
             let [row, below, right] = [row, below, &right].map(|row| row.as_chunks::<LANES>().0);
             for ((p, below), right) in row.iter().zip(below).zip(right) {
                 for i in 0..LANES {
                     let (down, across) = (below[i] - p[i], right[i] - p[i]);
-                    lanes[0][i] += down * down + across * across;
+                    let (down, across) = (down * down, across * across);
+                    lanes[0][i] += down + across;
                     lanes[1][i] += p[i] * p[i];
                     lanes[2][i] += p[i];
+                    let down = if below[i] > 0.0 { down } else { 0.0 };
+                    let across = if right[i] > 0.0 { across } else { 0.0 };
+                    lanes[3][i] += if p[i] > 0.0 { down + across } else { 0.0 };
                 }
             }
-            let [a, b, c] = lanes.map(|lanes| f64::from(lanes.iter().sum::<f32>()));
-            (steps, squares, sum) = (steps + a, squares + b, sum + c);
+            let [a, b, c, d] = lanes.map(|lanes| f64::from(lanes.iter().sum::<f32>()));
+            (steps, squares, sum, inner) = (steps + a, squares + b, sum + c, inner + d);
         }
-        let roughness = if squares > 0.0 { steps / (4.0 * squares) } else { 0.0 };
+        let over = |part: f64| if squares > 0.0 { part / squares } else { 0.0 };
+        let (roughness, area_px) = (0.25 * over(steps), over(sum * sum));
         let load_mpa_px = 1e-6 * sum;
         Self {
             roughness: roughness as f32,
             load_mpa_px: load_mpa_px as f32,
             rough_load_mpa_px: (roughness * load_mpa_px) as f32,
-            area_px: if squares > 0.0 { (sum * sum / squares) as f32 } else { 0.0 },
+            area_px: area_px as f32,
+            contrast_px: (0.25 * over(inner) * area_px) as f32,
+            cells: PressedCells::of_loads(&loads),
         }
     }
 
-    /// The greater of each.
+    /// The greater of each, and every cell that is pressed in one of them.
     #[must_use]
     pub fn max(self, other: Self) -> Self {
         Self {
@@ -90,17 +203,21 @@ impl InputStatistics {
             load_mpa_px: self.load_mpa_px.max(other.load_mpa_px),
             rough_load_mpa_px: self.rough_load_mpa_px.max(other.rough_load_mpa_px),
             area_px: self.area_px.max(other.area_px),
+            contrast_px: self.contrast_px.max(other.contrast_px),
+            cells: self.cells.or(other.cells),
         }
     }
 
-    /// Whether a map with these statistics is rougher, heavier, rougher for its load, or wider than
-    /// all whose greatest are `trained`.
+    /// Whether a map with these statistics is rougher, heavier, rougher for its load, wider or richer
+    /// in contrast than all whose greatest are `trained`, or presses where none of them did.
     #[must_use]
     pub fn is_out_of_distribution(self, trained: Self) -> bool {
         self.roughness > TRAINED_HEADROOM * trained.roughness
             || self.load_mpa_px > TRAINED_HEADROOM * trained.load_mpa_px
             || self.rough_load_mpa_px > ROUGH_LOAD_HEADROOM * trained.rough_load_mpa_px
             || self.area_px > AREA_HEADROOM * trained.area_px
+            || self.contrast_px > CONTRAST_HEADROOM * trained.contrast_px
+            || self.cells.share_beyond(trained.cells) > STRANGE_CELLS_MAX
     }
 }
 
@@ -156,7 +273,8 @@ mod tests {
 
     fn statistics(numbers: [f32; 4]) -> InputStatistics {
         let [roughness, load_mpa_px, rough_load_mpa_px, area_px] = numbers;
-        InputStatistics { roughness, load_mpa_px, rough_load_mpa_px, area_px }
+        let (contrast_px, cells) = (unbounded(), everywhere());
+        InputStatistics { roughness, load_mpa_px, rough_load_mpa_px, area_px, contrast_px, cells }
     }
 
     #[test]
@@ -189,9 +307,64 @@ mod tests {
             let map = drawn(|y, x| if is_skin(y, x) { blocks[y / 29 * 8 + x / 29] } else { 0.0 });
             let found = InputStatistics::of(&map);
             assert!(found.is_out_of_distribution(trained), "{found:?} up to {most_pa} Pa");
-            let older = InputStatistics { area_px: 0.0, ..found };
+            let older = InputStatistics { area_px: 0.0, contrast_px: 0.0, ..found };
             assert!(most_pa > 12e3 || !older.is_out_of_distribution(trained), "{found:?}");
         }
+    }
+
+    /// What the shipped networks saw at most where contact is wide, and which cells.
+    fn pad() -> InputStatistics {
+        let cells = [PressedCells::default(), PressedCells::EVERYWHERE];
+        let rows =
+            (0..CELLS).map(|row| cells[usize::from((5..27).contains(&row))].0[row] & 0x1f_ff00);
+        let mut known = PressedCells::default();
+        known.0.iter_mut().zip(rows).for_each(|(to, from)| *to = from);
+        InputStatistics {
+            contrast_px: 54.0,
+            cells: known,
+            ..statistics([0.34, 252.0, 2.7, 7016.0])
+        }
+    }
+
+    /// Blocks of 1 to 4 mm of some pressure each, on a part of the pad no wider than a hard contact.
+    #[test]
+    fn random_blocks_on_a_part_of_the_finger_are_no_contact() {
+        for (seed, block_px, half_px) in [(1, 8, 45), (2, 8, 60), (3, 15, 45), (4, 15, 60)] {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let blocks: Vec<f32> = (0..1024).map(|_| 15e3 * random.f32()).collect();
+            let is_in = |y: usize, x: usize| y.abs_diff(112).max(x.abs_diff(120)) < half_px;
+            let block = |y: usize, x: usize| blocks[y / block_px * 32 + x / block_px];
+            let map = drawn(|y, x| if is_in(y, x) { block(y, x) } else { 0.0 });
+            let found = InputStatistics::of(&map);
+            assert!(found.is_out_of_distribution(pad()), "{found:?}");
+            let older = InputStatistics { contrast_px: 0.0, ..found };
+            assert!(half_px > 50 || !older.is_out_of_distribution(pad()), "{found:?}");
+        }
+    }
+
+    /// A ball, as it is pressed on the pad and on the side of the finger, where no training pressed.
+    #[test]
+    fn what_presses_beside_the_training_is_told() {
+        let ball = |middle: [f32; 2]| {
+            let off = move |y: usize, x: usize| (y as f32 - middle[0]).hypot(x as f32 - middle[1]);
+            InputStatistics::of(&drawn(|y, x| 2e4 * (1.0 - off(y, x) / 20.0).max(0.0).sqrt()))
+        };
+        assert!(!ball([112.0, 110.0]).is_out_of_distribution(pad()));
+        for side in [[112.0, 40.0], [112.0, 196.0], [20.0, 112.0]] {
+            assert!(ball(side).is_out_of_distribution(pad()), "{side:?}");
+        }
+    }
+
+    #[test]
+    fn cells_are_a_picture_in_the_card() {
+        let found = InputStatistics::of(&drawn(|y, x| if y < 8 && x >= 216 { 1.0 } else { 0.0 }));
+        let rows: Vec<String> = found.cells.into();
+        assert_eq!((rows.len(), rows[0].find('#'), rows[1].find('#')), (CELLS, Some(27), None));
+        let text = serde_json::to_string(&found).unwrap();
+        assert_eq!(serde_json::from_str::<InputStatistics>(&text).unwrap(), found);
+        let short = text.replacen("\"....", "\"...", 1);
+        let error = serde_json::from_str::<InputStatistics>(&short).unwrap_err().to_string();
+        assert!(error.contains("28 rows of 28"), "{error}");
     }
 
     #[test]
@@ -211,6 +384,9 @@ mod tests {
             let found = InputStatistics::of(&map);
             prop_assert!((f64::from(found.roughness) / roughness - 1.0).abs() < 1e-4);
             prop_assert!((f64::from(found.load_mpa_px) / load - 1.0).abs() < 1e-4);
+            // All is pressed: every step is one inside of contact.
+            let contrast = f64::from(found.contrast_px) / f64::from(found.area_px);
+            prop_assert!((contrast / roughness - 1.0).abs() < 1e-3);
             let product = f64::from(found.rough_load_mpa_px);
             prop_assert!((product / (roughness * load) - 1.0).abs() < 2e-4);
         }

@@ -1,10 +1,11 @@
-"""How far odd maps lie from the presses that the shipped networks learnt: four numbers of a pressure map.
+"""How far odd maps lie from the presses that the shipped networks learnt: five numbers of a pressure map.
 
     PYTHONPATH=model-export/trainer python tests/odd/measure.py     from the root of the repository; numpy; ten seconds
 
 Roughness: squared steps between neighbouring pixels over four times the squared pressures, 0 (flat) to 1 (every
 pixel against its neighbours). Load: sum of pressure times pixel, near the force in another unit. Their product. Area:
-square of the sum of the pressures over the sum of their squares, in pixels.
+square of the sum of the pressures over the sum of their squares, in pixels. Contrast: roughness of the steps between
+pixels that are both pressed, times the area, in pixels.
 """
 
 from collections.abc import Iterator
@@ -19,8 +20,8 @@ DATA = Path("data")
 # Fitted to; only looked at.
 TRAINED, OTHERS = ("more-graded", "broad-graded", "pressed-graded", "hard-graded", "proximal-graded"), ("heldout-graded", "final", "heldout")
 # Room beyond the greatest of the training, as proto/src/input_statistics.rs has it.
-HEADROOM = np.array([1.05, 1.05, 2.0, 1.5])
-WORDS = ("rougher", "heavier", "rougher for its load", "wider")
+HEADROOM = np.array([1.05, 1.05, 2.0, 1.5, 1.5])
+WORDS = ("rougher", "heavier", "rougher for its load", "wider", "richer in contrast")
 ODD_PA = 10_000.0
 
 Map = NDArray[np.float32]
@@ -32,13 +33,18 @@ def presses(name: str) -> Iterator[Map]:
     yield from dataset.load(sorted(dataset.presses)).pressure_pa.reshape(-1, SIDE_PX, SIDE_PX)
 
 
-def numbers(pressure_pa: Map) -> tuple[float, float, float, float]:
-    """Roughness, load in MPa px, their product, area in px."""
-    down, right = np.diff(pressure_pa, axis=0), np.diff(pressure_pa, axis=1)
-    steps = np.square(down, dtype=np.float64).sum() + np.square(right, dtype=np.float64).sum()
+def numbers(pressure_pa: Map) -> tuple[float, float, float, float, float]:
+    """Roughness, load in MPa px, their product, area in px, contrast in px."""
+    is_pressed = pressure_pa > 0
+    steps = inner = 0.0
+    for axis in (0, 1):
+        squared = np.square(np.diff(pressure_pa, axis=axis), dtype=np.float64)
+        rows = np.moveaxis(is_pressed, axis, 0)
+        steps += squared.sum()
+        inner += (squared * np.moveaxis(rows[1:] & rows[:-1], 0, axis)).sum()
     total, squares = pressure_pa.sum(dtype=np.float64), np.square(pressure_pa, dtype=np.float64).sum()
     rough, load = steps / (4.0 * squares), float(total) * 1e-6
-    return rough, load, rough * load, total**2 / squares
+    return rough, load, rough * load, total**2 / squares, inner / (4.0 * squares) * total**2 / squares
 
 
 def odd_maps() -> Iterator[tuple[str, Map]]:
@@ -55,6 +61,8 @@ def odd_maps() -> Iterator[tuple[str, Map]]:
         side = SIDE_PX // block_px + 1
         blocks = np.random.default_rng(0).random((side, side), np.float32).repeat(block_px, 0).repeat(block_px, 1)
         yield f"random blocks, {block_px} px", skin * blocks[:SIDE_PX, :SIDE_PX]
+        part = np.maximum(abs(rows - SIDE_PX // 2), abs(columns - SIDE_PX // 2)) < 45
+        yield f"random blocks, {block_px} px, on 90 x 90", skin * part * blocks[:SIDE_PX, :SIDE_PX]
     from_centre_px = np.hypot(rows + 0.5 - SIDE_PX / 2, columns + 0.5 - SIDE_PX / 2)
     for radius_px in (3, 8, 20):
         yield f"disc, {radius_px} px", (ODD_PA * (from_centre_px <= radius_px)).astype(np.float32)
@@ -64,16 +72,16 @@ def main() -> None:
     """Prints a table."""
     found = {name: np.array([numbers(one) for one in presses(name)]) for name in TRAINED + OTHERS}
     most = HEADROOM * np.concatenate([found[name] for name in TRAINED]).max(axis=0)
-    print("| maps | | roughness, up to | load, up to (MPa px) | product, up to | area, up to (px) | flagged |")
-    print("|---|---|---|---|---|---|---|")
+    print("| maps | | roughness, up to | load, up to (MPa px) | product, up to | area, up to (px) | contrast, up to (px) | flagged |")
+    print("|---|---|---|---|---|---|---|---|")
     for name, rows in found.items():
-        rough, load, both, area = rows.max(axis=0)
+        rough, load, both, area, contrast = rows.max(axis=0)
         flagged = f"{100 * np.mean((rows > most).any(axis=1)):.1f} %"
-        print(f"| `{name}` | {len(rows)} | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {flagged} |")
+        print(f"| `{name}` | {len(rows)} | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {contrast:.1f} | {flagged} |")
     for name, drawn in odd_maps():
-        rough, load, both, area = numbers(drawn)
-        words = [word for word, is_beyond in zip(WORDS, (rough, load, both, area) > most, strict=True) if is_beyond]
-        print(f"| {name}, {ODD_PA / 1000:.0f} kPa | 1 | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {', '.join(words) or 'no'} |")
+        rough, load, both, area, contrast = numbers(drawn)
+        words = [word for word, is_beyond in zip(WORDS, (rough, load, both, area, contrast) > most, strict=True) if is_beyond]
+        print(f"| {name}, {ODD_PA / 1000:.0f} kPa | 1 | {rough:.3f} | {load:.1f} | {both:.2f} | {area:.0f} | {contrast:.1f} | {', '.join(words) or 'no'} |")
 
 
 if __name__ == "__main__":

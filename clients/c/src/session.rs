@@ -287,6 +287,7 @@ impl Session {
             found |= judged.flags;
             if !judged.is_zero {
                 maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
+                found |= maps.judge_answer(model.card.response_max_per_mpa);
                 maps.feel_shear(&mut finger, *range);
             }
             if let Some(effects) = &mut effects {

@@ -32,6 +32,10 @@ pub struct Card {
     /// models that were fitted to no maps, and until `model-export patterns` has looked.
     #[serde(rename = "pattern_max", default, skip_serializing_if = "Option::is_none")]
     pub input_statistics_max: Option<InputStatistics>,
+    /// Greatest SED of a map over its greatest pressure squared, of all the training data, 1/MPa: an
+    /// answer far beyond it is flagged. Absent as above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub response_max_per_mpa: Option<f32>,
     /// Greatest SED of the training data, J/m3.
     pub sed_max_j_per_m3: f32,
     /// SHA-256 of the dataset it was trained on, of several that of their hashes one after

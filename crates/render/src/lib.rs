@@ -43,6 +43,10 @@ pub use skin::SkinPixels;
 /// zero there in all of them.
 const RIM_SHARE: f32 = 0.01;
 
+/// Room above the greatest response of the training, as a factor: about what networks err by at worst
+/// where they know the pressure.
+const RESPONSE_HEADROOM: f32 = 1.5;
+
 /// The last look at what a [finger wrote](Finger::write): every number that is sent is finite.
 ///
 /// # Errors
@@ -68,6 +72,8 @@ pub struct Maps {
     /// What the network sees in place of pressure beyond its range.
     clamped_pa: Vec<f32>,
     is_clamped: bool,
+    /// Greatest pressure that the network sees, Pa.
+    seen_peak_pa: f32,
 }
 
 /// What [`Maps::judge`] found.
@@ -82,7 +88,7 @@ pub struct Judged {
 impl Default for Maps {
     fn default() -> Self {
         let [pressure_pa, sed_j_per_m3, clamped_pa] = [(); 3].map(|()| vec![0.0; MAP_LEN]);
-        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false }
+        Self { pressure_pa, sed_j_per_m3, clamped_pa, is_clamped: false, seen_peak_pa: 0.0 }
     }
 }
 
@@ -150,6 +156,7 @@ impl Maps {
         let least_pa = RIM_SHARE * summary.peak_pa;
         let is_cut_off = skin.rim.iter().any(|&i| self.pressure_pa[i] > least_pa);
         self.is_clamped = range.clamp(&self.pressure_pa, summary, &mut self.clamped_pa);
+        self.seen_peak_pa = if self.is_clamped { range.trained_max_pa } else { summary.peak_pa };
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         let is_outside = |trained| InputStatistics::of(seen_pa).is_out_of_distribution(trained);
         let is_unfamiliar = !is_zero && trained_max.is_some_and(is_outside);
@@ -173,6 +180,20 @@ impl Maps {
     pub fn infer(&mut self, session: &mut dyn Session) -> Result<(), EngineError> {
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         session.infer(seen_pa, &mut self.sed_j_per_m3)
+    }
+
+    /// Judges the answer by how much SED the training had of such a pressure, `response_max_per_mpa`:
+    /// no indentation makes tissue store more energy than the square of the pressure allows. To be
+    /// asked after [`infer`](Self::infer), before anything is added to SED.
+    #[must_use]
+    pub fn judge_answer(&self, response_max_per_mpa: Option<f32>) -> u8 {
+        let top = self.sed_j_per_m3.iter().fold(0.0_f32, |a, b| a.max(*b));
+        let is_beyond = |most: f32| {
+            let peak_mpa = 1e-6 * self.seen_peak_pa;
+            // SED in MPa: 1 J/m3 is 1 Pa.
+            1e-6 * top > RESPONSE_HEADROOM * most * peak_mpa * peak_mpa
+        };
+        if response_max_per_mpa.is_some_and(is_beyond) { flags::UNFAMILIAR } else { 0 }
     }
 
     /// Adds to SED what traction along the skin changes, if the finger is to feel it.

@@ -63,7 +63,8 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
     if let Some(path) = &options.card {
         // Input statistics are the data's, not the model's: those noted for them still hold.
         let noted = load_card(path).ok().filter(|old| old.dataset_sha256 == card.dataset_sha256);
-        card.input_statistics_max = noted.and_then(|old| old.input_statistics_max);
+        card.input_statistics_max = noted.as_ref().and_then(|old| old.input_statistics_max);
+        card.response_max_per_mpa = noted.and_then(|old| old.response_max_per_mpa);
         write(path, card.to_json()?.as_bytes())?;
     }
     let pictures = draw_pictures(options, &subject, &dataset, &evaluation)?;

@@ -151,6 +151,7 @@ fn card_of(onnx: &[u8]) -> Card {
         network: info.network.clone(),
         pressure_range_pa: [0.0, info.pressure_max_pa],
         input_statistics_max: None,
+        response_max_per_mpa: None,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         dataset_sha256: info.dataset_sha256.clone(),
         training: info.training.clone(),

@@ -192,6 +192,7 @@ pub(super) fn load_tier(
         atlas_hash: info.atlas_hash.clone(),
         pressure_max_pa: info.pressure_max_pa,
         input_statistics_max: card.input_statistics_max,
+        response_max_per_mpa: card.response_max_per_mpa,
         sed_max_j_per_m3: info.sed_max_j_per_m3,
         relative_l2_median: card.metrics.relative_l2.median,
         relative_l2_p95: card.metrics.relative_l2.p95,

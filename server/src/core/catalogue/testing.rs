@@ -67,6 +67,7 @@ pub(crate) fn tier(model: Arc<dyn Model>, relative_l2_median: f64) -> Tier {
         atlas_hash: String::new(),
         pressure_max_pa: 100.0,
         input_statistics_max: None,
+        response_max_per_mpa: None,
         sed_max_j_per_m3: 100.0,
         kind: Kind::Network,
         relative_l2_median,

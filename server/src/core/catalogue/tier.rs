@@ -27,6 +27,8 @@ pub(crate) struct Tier {
     pub(crate) pressure_max_pa: f32,
     /// Roughest and heaviest map it was trained on; none if it was fitted to no maps.
     pub(crate) input_statistics_max: Option<InputStatistics>,
+    /// Greatest SED over squared pressure it was trained on, 1/MPa; none likewise.
+    pub(crate) response_max_per_mpa: Option<f32>,
     /// Greatest SED it was trained on, J/m3.
     pub(crate) sed_max_j_per_m3: f32,
     /// What it is.

@@ -201,6 +201,7 @@ impl Worker {
                     let error = format_args!("{}.onnx: {error}", tier.name);
                     problem::internal("the inference failed", &error)
                 })?;
+                meta.flags |= self.maps.judge_answer(tier.response_max_per_mpa);
                 times.network = clock::thread_time().saturating_sub(cpu_begun);
                 times.infer = decoded.elapsed();
                 tier.latency.learn(times.infer);
