@@ -13,7 +13,6 @@ use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
 use papilla_render::{Known, Maps, Read, Rendering, require_finite};
 use papilla_session_contact::{Finger, Frame};
-use papilla_session_effects::Effects;
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
