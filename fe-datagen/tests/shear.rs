@@ -11,6 +11,7 @@ use papilla_fingertip::mesh::fingertip::{Density, Order};
 use papilla_fingertip::scene::{Scene, TissueTable};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::drive::DrivePoint;
+use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 use papilla_sdf::{Placement, SignedDistance};
 use std::path::Path;
@@ -20,7 +21,6 @@ const FRICTION: f64 = 0.5;
 /// Equilibria of the finite elements, and frames of the contact solver, for each step between two
 /// states: friction depends on the way, and steps are part of it.
 const STEPS: u32 = 2;
-const PA_PER_MPA: f64 = 1e6;
 
 /// A press of a depth, dragged along x and then along y, mm.
 fn scene(mesh: &str, effects: &str, indenter: &str, depth_mm: f64, drags: &[[f64; 2]]) -> Scene {

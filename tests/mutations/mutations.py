@@ -34,7 +34,7 @@ MUTATIONS = [
     ),
     Mutation(
         "SED from the wrong side of the interface",
-        "crates/fem/src/mesh/recovery.rs",
+        "crates/fem/src/mesh/recovery/mod.rs",
         "let owner = element_on_side(mesh, region);",
         "let owner = element_on_side(mesh, Region(1 - region.0.min(1)));",
         rust("--test mesh", "recovery::"),
@@ -69,7 +69,7 @@ MUTATIONS = [
     ),
     Mutation(
         "u16 samples with the scale of u8",
-        "proto/src/sample.rs",
+        "proto/src/sample/mod.rs",
         "*value = f32::from(u16::from_le_bytes([b[0], b[1]])) * scale;",
         "*value = f32::from(u16::from_le_bytes([b[0], b[1]])) * scale * 257.0;",
         "cargo test -p papilla-proto -q sample",

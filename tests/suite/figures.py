@@ -9,7 +9,7 @@ A page marks a figure with two comments, which a reader does not see:
 
 Between the comments stands what the key's source says: models/ladder.json for networks, the first
 table of docs/reports/contact.md for contact. Without an option exit code 1 names every figure that
-is stale and every key that no source has. --write renews them, --list prints all keys with values.
+is stale, every key that no source has, and where models/contact.json is not the report's. --write renews them, --list prints all keys with values.
 
 Keys of networks and of finite-element rows: NAME.SET is the median relative L2 of strain energy
 density (SED), NAME.SET.p95 its 95th percentile, NAME.SET.far the error away from the contact, NAME.SET.peak
@@ -51,6 +51,7 @@ METHODS = {
 BESIDE_MS = 0.12
 # The load to plan for, and the rate of a session.
 LOAD, RATE_HZ = 0.5, 90
+QUANTITIES = {"pressure": "pressure_relative_l2", "force": "force_relative", "sed": "sed_relative_l2"}
 CONTACT_SETS = {"final": "reference", "broad": "broad", "heldout": "unseen"}
 
 
@@ -106,6 +107,20 @@ def of_contact(text: str) -> dict[str, str]:
     return found
 
 
+def differing(model: str, contact: dict[str, str]) -> list[str]:
+    """Where models/contact.json, which the service answers from, is not what the report says."""
+    faults = []
+    for method in json.loads(model)["methods"]:
+        for errors in method["errors"]:
+            key = f"contact.{method['name']}.{CONTACT_SETS[errors['set']]}"
+            for quantity, member in QUANTITIES.items():
+                for suffix, value in [("", errors[member]["median"]), (".p95", errors[member]["p95"])]:
+                    due = contact.get(f"{key}.{quantity}{suffix}")
+                    if percent(value) != due:
+                        faults.append(f"models/contact.json: {key}.{quantity}{suffix} is {percent(value)}, the report says {due}")
+    return faults
+
+
 def of_sizing(text: str, contact_us: float) -> dict[str, str]:
     """Sessions that one core holds, by what a frame takes of it."""
     found = {}
@@ -147,7 +162,8 @@ def main() -> int:
         return 0
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    count, faults = 0, []
+    contact = of_contact((ROOT / "docs/reports/contact.md").read_text())
+    count, faults = 0, differing((ROOT / "models/contact.json").read_text(), contact)
     for name in sorted(filter(None, listed.split("\0"))):
         path = ROOT / name
         text = path.read_text() if path.exists() else ""

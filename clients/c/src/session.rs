@@ -10,7 +10,7 @@ use papilla_proto::{
     effects::OutOfRange,
     flags,
 };
-use papilla_render::Maps;
+use papilla_render::{Known, Maps, Read, Rendering};
 use papilla_session_contact::{Finger, Frame, Hand, Skin};
 use papilla_session_effects as effects;
 use papilla_session_effects::Effects;
@@ -249,12 +249,7 @@ impl Session {
         self.render_frame(finger, time_us, true)
     }
 
-    fn render_frame(
-        &mut self,
-        finger: u8,
-        mut time_us: u64,
-        is_tracked: bool,
-    ) -> Result<(), Problem> {
+    fn render_frame(&mut self, finger: u8, time_us: u64, is_tracked: bool) -> Result<(), Problem> {
         let place = usize::from(finger);
         self.last.shows_sed = false;
         self.last.values = 0;
@@ -262,11 +257,8 @@ impl Session {
         let mut finger = lock(&hand.fingers()[place]);
         let mut effects = effects.get_mut(place);
         let shows_sed = effects.as_ref().is_none_or(|effects| effects.shows_sed());
-        let (mut summary, mut found) = if !is_tracked {
-            maps.pressure_pa.fill(0.0);
-            finger.lose();
-            effects.iter_mut().for_each(|effects| effects.lose());
-            (MapSummary { peak_pa: 0.0 }, flags::NOT_TRACKED | flags::NO_CONTACT)
+        let (summary, mut found) = if !is_tracked {
+            papilla_render::lose(maps, Some(&mut finger), effects.as_deref_mut())
         } else if finger.reads_windows() {
             (maps.check_of(&finger, *range, &model.pixels)?, 0)
         } else {
@@ -275,28 +267,20 @@ impl Session {
             let taken = maps.take(&mut finger, frame, *range, shows_sed)?;
             (MapSummary { peak_pa: taken.peak_pa }, taken.flags)
         };
-        if let Some(effects) = effects.as_mut().filter(|_| is_tracked) {
-            time_us = effects.time_us(time_us);
-            found |= effects.clock_flags();
-            let peak_pa = effects.before(&mut maps.pressure_pa, time_us);
-            summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
+        let known = Known {
+            skin: &model.pixels,
+            input_max: model.card.input_statistics_max,
+            response_max_per_mpa: model.card.response_max_per_mpa,
+        };
+        let read = Read { summary, range: *range, time_us, is_tracked, shows_sed };
+        let mut rendering =
+            Rendering::begin(maps, Some(&mut finger), effects.as_deref_mut(), known, read);
+        if rendering.touches() {
+            rendering.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
         }
-        if shows_sed {
-            let trained_max = model.card.input_statistics_max;
-            let judged = maps.judge(summary, *range, &model.pixels, trained_max);
-            found |= judged.flags;
-            if !judged.is_zero {
-                maps.infer(network.as_mut()).map_err(|error| of_engine(&error))?;
-                found |= maps.judge_answer(model.card.response_max_per_mpa);
-                maps.feel_shear(&mut finger, *range);
-            }
-            if let Some(effects) = &mut effects {
-                let infer = |pressure_pa: &[f32], sed: &mut [f32]| network.infer(pressure_pa, sed);
-                effects.fit(&maps.sed_j_per_m3, infer).map_err(|error| of_engine(&error))?;
-                finger.to_person(effects.pin_pa_mut());
-            }
-            maps.to_person(&finger);
-        }
+        found |= rendering.flags();
+        let time_us = rendering.time_us();
+        rendering.end(network.as_mut()).map_err(|error| of_engine(&error))?;
         self.bytes.clear();
         finger.write(&mut self.bytes);
         papilla_render::require_finite(&self.bytes)?;

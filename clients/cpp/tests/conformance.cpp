@@ -157,13 +157,7 @@ class Run {
       sleep_ms(step["gap_ms"].number);
     }
     if (step["paused"].boolean) control("resume");
-    std::vector<Outcome> found;
-    for (int waited = 0; found.size() < count; waited += 5) {
-      must(waited < timeout_ms_, "only " + std::to_string(found.size()) + " outcomes");
-      sleep_ms(5);
-      std::lock_guard<std::mutex> lock(mutex_);
-      found = outcomes_;
-    }
+    const std::vector<Outcome> found = wait_for_outcomes(count);
     std::set<std::uint32_t> named;
     std::uint32_t last = 0;
     std::size_t superseded = 0, here = 0, good = 0;
@@ -208,6 +202,18 @@ class Run {
     must(std::any_of(told.begin(), told.end(), holds), "nobody was told: " + words);
   }
 
+  /// What became of so many frames, once it is known.
+  std::vector<Outcome> wait_for_outcomes(std::size_t count) {
+    std::vector<Outcome> found;
+    for (int waited = 0; found.size() < count; waited += 5) {
+      must(waited < timeout_ms_, "only " + std::to_string(found.size()) + " outcomes");
+      sleep_ms(5);
+      std::lock_guard<std::mutex> lock(mutex_);
+      found = outcomes_;
+    }
+    return found;
+  }
+
   /// The service stops, or dies, while frames wait for it.
   void silence(const Value& step) {
     const std::uint64_t before = session().connections();
@@ -219,13 +225,7 @@ class Run {
     const std::size_t count = step["count"].whole();
     std::uint32_t last = 0;
     for (std::size_t k = 0; k < count; ++k) last = session().send(map.data()), sleep_ms(50);
-    std::vector<Outcome> found;
-    for (int waited = 0; found.size() < count; waited += 5) {
-      must(waited < timeout_ms_, "only " + std::to_string(found.size()) + " outcomes");
-      sleep_ms(5);
-      std::lock_guard<std::mutex> lock(mutex_);
-      found = outcomes_;
-    }
+    const std::vector<Outcome> found = wait_for_outcomes(count);
     for (const Outcome& each : found) {
       const bool is_due = each.status == Status::lost || (each.status == Status::superseded && each.sequence != last);
       must(is_due, std::string("a frame is ") + name_of(each.status));

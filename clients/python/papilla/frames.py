@@ -213,13 +213,13 @@ def _read(what: str, poses: ArrayLike, scalar_first: bool) -> list[tuple[Numbers
     if rows.ndim != 2 or rows.shape[1] != 7:
         raise ValueError(f"{what}: x y z and a quaternion are due, seven numbers; there are {rows.shape[-1]}")
     if not np.isfinite(rows).all():
-        raise ValueError(f"{what}: a number is not finite; skip the frame while the hand is not tracked")
+        raise ValueError(f"{what}: a number is not finite; while the hand is not tracked call send_not_tracked")
     read = []
     for row in rows:
         turn = np.roll(row[3:], -1) if scalar_first else row[3:]
         size = np.linalg.norm(turn)
         if size < 1e-6:
-            raise ValueError(f"{what}: a quaternion is zero; skip the frame while the hand is not tracked")
+            raise ValueError(f"{what}: a quaternion is zero; while the hand is not tracked call send_not_tracked")
         read.append((row[:3], turn / size))
     return read
 

@@ -54,8 +54,8 @@ namespace Papilla
         internal Place Checked(string what)
         {
             double size = Math.Sqrt(TurnX * TurnX + TurnY * TurnY + TurnZ * TurnZ + TurnW * TurnW), sum = X + Y + Z;
-            if (double.IsNaN(sum) || double.IsInfinity(sum) || double.IsNaN(size) || double.IsInfinity(size)) throw Frames.Refused(what + ": a number is not finite; skip the frame while the hand is not tracked");
-            if (size < 1e-6) throw Frames.Refused(what + ": the quaternion is zero; skip the frame while the hand is not tracked");
+            if (double.IsNaN(sum) || double.IsInfinity(sum) || double.IsNaN(size) || double.IsInfinity(size)) throw Frames.Refused(what + ": a number is not finite; while the hand is not tracked call SendNotTracked");
+            if (size < 1e-6) throw Frames.Refused(what + ": the quaternion is zero; while the hand is not tracked call SendNotTracked");
             return new Place(X, Y, Z, TurnX / size, TurnY / size, TurnZ / size, TurnW / size);
         }
     }

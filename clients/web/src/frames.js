@@ -41,9 +41,9 @@ export function placeOf({ position, orientation, quaternion }) {
 function checked(what, { at, turn }) {
   const size = Math.hypot(...turn);
   if (!Number.isFinite(at[0] + at[1] + at[2]) || !Number.isFinite(size)) {
-    throw refusal('bad_contact', `${what}: a number is not finite; skip the frame while the hand is not tracked`);
+    throw refusal('bad_contact', `${what}: a number is not finite; while the hand is not tracked call notTracked()`);
   }
-  if (size < 1e-6) throw refusal('bad_contact', `${what}: the quaternion is zero; skip the frame while the hand is not tracked`);
+  if (size < 1e-6) throw refusal('bad_contact', `${what}: the quaternion is zero; while the hand is not tracked call notTracked()`);
   const [x, y, z, w] = turn;
   return { at, turn: [x / size, y / size, z / size, w / size] };
 }

@@ -1,5 +1,6 @@
 //! What presses on a finger: the outcome of a frame.
 
+use crate::PA_PER_MPA;
 use crate::model::ContactModel;
 use crate::patch::Patch;
 
@@ -87,8 +88,6 @@ impl Effort {
         }
     }
 }
-
-const PA_PER_MPA: f64 = 1e6;
 
 impl Contact {
     /// Memory for a finger of `vertices`.

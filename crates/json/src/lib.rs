@@ -1,4 +1,4 @@
-//! JSON from outside: read within bounds, and refused in plain words with member and place.
+//! JSON from outside: read within bounds, and refused in serde's words with member and place.
 //!
 //! ```
 //! #[derive(Debug, serde::Deserialize)]
@@ -61,7 +61,7 @@ impl From<serde_json::Error> for JsonError {
         let (line, column) = (error.line(), error.column());
         let text = error.to_string();
         let place = format!(" at line {line} column {column}");
-        let reason = in_plain_words(text.strip_suffix(&place).unwrap_or(&text));
+        let reason = own_words(text.strip_suffix(&place).unwrap_or(&text));
         Self { member: None, reason, place: (line > 0).then_some((line, column)) }
     }
 }
@@ -147,82 +147,17 @@ fn text_len(text: &[u8]) -> usize {
     text.len()
 }
 
-/// What serde says, without the names of types.
-fn in_plain_words(text: &str) -> String {
-    // What is due is ours, and told whole; what was found may be of any length.
-    for unknown in ["unknown variant `", "unknown field `"] {
-        let parts = text.strip_prefix(unknown).and_then(|rest| rest.rsplit_once("`, expected "));
-        if let Some((name, due)) = parts {
-            let cut = name.char_indices().nth(NAME_MAX);
-            let name = cut.map_or_else(|| name.to_owned(), |(end, _)| format!("{}…", &name[..end]));
-            return format!("{unknown}{name}`, expected {due}");
-        }
-    }
-    let wrong = ["invalid type: ", "invalid value: ", "invalid length "];
-    let Some(prefix) = wrong.into_iter().find(|prefix| text.starts_with(prefix)) else {
-        return shortened(text);
-    };
-    // What was found may hold anything; what is due holds no comma before this one.
-    match text[prefix.len()..].rsplit_once(", expected ") {
-        Some((length, wanted)) if prefix.ends_with("length ") => {
-            format!("a list of {length} where {} is due", due(wanted))
-        }
-        Some((what, wanted)) => format!("{} where {} is due", found(what), due(wanted)),
+/// serde's own words. Of a long message what was sent is cut, which may be of any length, and not what
+/// is expected, which is ours.
+fn own_words(text: &str) -> String {
+    match text.rsplit_once(EXPECTED) {
+        Some((sent, expected)) => format!("{}{EXPECTED}{expected}", shortened(sent)),
         None => shortened(text),
     }
 }
 
-/// What was found: serde writes `integer `5``, `string "x"`, `sequence`.
-fn found(what: &str) -> String {
-    match what.split_once(' ') {
-        Some(("integer", number)) => format!("the number {}", number.trim_matches('`')),
-        Some(("boolean", value)) => value.trim_matches('`').to_owned(),
-        Some(("floating", rest)) => {
-            format!("the number {}", rest.trim_start_matches("point ").trim_matches('`'))
-        }
-        Some(("string", text)) => format!("the text {}", shortened(text)),
-        _ => match what {
-            "sequence" => "a list".to_owned(),
-            "map" => "an object".to_owned(),
-            other => shortened(other),
-        },
-    }
-}
-
-/// What serde expected: the name of a type, or words of a reader.
-fn due(wanted: &str) -> String {
-    let up_to = |greatest: u64| format!("a whole number from 0 to {greatest}");
-    match wanted {
-        "u8" => up_to(u8::MAX.into()),
-        "u16" => up_to(u16::MAX.into()),
-        "u32" => up_to(u32::MAX.into()),
-        "u64" | "usize" | "a nonzero usize" | "a nonzero u64" => "a whole number".to_owned(),
-        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number".to_owned(),
-        "f32" | "f64" => "a number".to_owned(),
-        "a string" | "string" => "a text".to_owned(),
-        "a boolean" => "true or false".to_owned(),
-        "a sequence" => "a list".to_owned(),
-        "a map" | "map" => "an object".to_owned(),
-        "variant identifier" | "field identifier" => "a name".to_owned(),
-        other => match other.split_once(' ') {
-            Some(("struct", of)) => match of.rsplit_once(" with ") {
-                Some((_, members)) => {
-                    format!("an object of {}", members.replace("element", "member"))
-                }
-                None => "an object".to_owned(),
-            },
-            Some(("enum" | "internally" | "adjacently", _)) => "a name or an object".to_owned(),
-            Some(("tuple", _)) => "a list".to_owned(),
-            Some(("an", of)) if of.starts_with("array of length ") => {
-                format!("a list of {}", of.trim_start_matches("array of length "))
-            }
-            _ => shortened(other),
-        },
-    }
-}
-
-/// Longest unknown name that an error repeats, characters: the path before it has it too.
-const NAME_MAX: usize = 40;
+/// Between what serde found and what it expected; without it a long message is only cut elsewhere.
+const EXPECTED: &str = ", expected ";
 /// Longest piece of the input that an error repeats, characters.
 const ECHO_MAX: usize = 100;
 

@@ -28,6 +28,7 @@
 //! # }
 //! ```
 
+mod frame;
 mod skin;
 
 use papilla_engine::{EngineError, Session};
@@ -37,6 +38,7 @@ use papilla_proto::{
 };
 use papilla_session_contact::{Finger, Frame, Taken};
 
+pub use frame::{Known, Read, Rendering, lose};
 pub use skin::SkinPixels;
 
 /// Share of the greatest pressure that none of 2824 FE states has at the edge of the atlas: it is

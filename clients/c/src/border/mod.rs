@@ -26,7 +26,7 @@ pub(crate) extern "C" fn papilla_abi() -> u32 {
     ABI
 }
 
-/// The library's version, as `0.1.0`.
+/// The library's version, as `0.2.0`.
 #[unsafe(no_mangle)]
 pub(crate) extern "C" fn papilla_version() -> *const c_char {
     const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");

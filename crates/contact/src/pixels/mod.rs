@@ -40,6 +40,7 @@ mod spacing;
 mod turns;
 mod window;
 
+use crate::PA_PER_MPA;
 use crate::answer::{Contact, Effort, Person};
 use crate::bounded::BoundedSolver;
 use crate::error::ContactError;
@@ -64,13 +65,12 @@ pub use spacing::PixelSpacing;
 const AT_VERTICES_MM: f32 = 5e-4;
 /// Change of the forces without pixels, of their sum, up to which the last frame is a start.
 const JUMP: f32 = 0.5;
-const PA_PER_MPA: f32 = 1e6;
 /// Pixels settle to a hundredth of the force: [`rounds`].
 const PIXELS: Search = Search { tolerance: 0.01, tries_max: 12 };
 
 /// Pressure of a person for 1 MPa on the reference finger, Pa.
 fn unit_pa(person: Person) -> f32 {
-    PA_PER_MPA * person.stiffness as f32
+    PA_PER_MPA as f32 * person.stiffness as f32
 }
 
 /// Contact on the pixels of one finger. All memory is taken at construction.

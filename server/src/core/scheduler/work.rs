@@ -8,12 +8,11 @@ use std::{
 };
 
 use papilla_codec::{Input, Map, Output, Quantity, decode, encode};
-use papilla_engine::Session;
+use papilla_engine::{EngineError, Session};
 use papilla_metrics::{Metrics, Stage};
 use papilla_proto::{ErrorCode, MapSummary, PressureRange, Problem, flags};
-use papilla_render::{Judged, Maps, require_finite};
+use papilla_render::{Known, Maps, Read, Rendering, require_finite};
 use papilla_session_contact::{Finger, Frame};
-use papilla_session_effects::Effects;
 
 use super::{
     Done, Job, JobOptions, Outcome, OutputMeta, POP_TIMEOUT, Slot, Times,
@@ -162,8 +161,11 @@ impl Worker {
         // Without anything that shows SED, poses go in and forces come out.
         let shows_sed = finger.is_none() || effects.as_ref().is_none_or(|e| e.shows_sed());
         let is_tracked = options.header.is_none_or(|header| header.is_tracked());
-        let (mut summary, range) = if !is_tracked {
-            self.lose(job, finger.as_deref_mut(), effects.as_deref_mut(), meta)
+        let (summary, range) = if !is_tracked {
+            let (maps, finger) = (&mut self.maps, finger.as_deref_mut());
+            let (summary, flags) = papilla_render::lose(maps, finger, effects.as_deref_mut());
+            meta.flags |= flags;
+            (summary, self.range(job))
         } else if let Some(finger) = &mut finger {
             self.take(job, finger, &payload, shows_sed, meta)?
         } else {
@@ -171,62 +173,48 @@ impl Worker {
         };
         drop(payload);
         let tier = &self.catalogue.tiers[job.tier];
-        let &JobOptions { headroom, mut time_us, .. } = options;
-        if let Some(effects) = effects.as_mut().filter(|_| is_tracked) {
-            time_us = effects.time_us(time_us);
-            meta.flags |= effects.clock_flags();
-            let peak_pa = effects.before(&mut self.maps.pressure_pa, time_us);
-            summary.peak_pa = peak_pa.unwrap_or(summary.peak_pa);
-        }
-        // Without SED the map is not even drawn.
-        let judged = shows_sed.then(|| {
-            self.maps.judge(summary, range, &self.catalogue.skin_pixels, tier.input_statistics_max)
-        });
-        meta.flags |= judged.map_or(0, |judged| judged.flags);
+        let &JobOptions { headroom, time_us, .. } = options;
+        let known = Known {
+            skin: &self.catalogue.skin_pixels,
+            input_max: tier.input_statistics_max,
+            response_max_per_mpa: tier.response_max_per_mpa,
+        };
+        let read = Read { summary, range, time_us, is_tracked, shows_sed };
+        let (finger_here, effects_here) = (finger.as_deref_mut(), effects.as_deref_mut());
+        let mut rendering =
+            Rendering::begin(&mut self.maps, finger_here, effects_here, known, read);
+        let time_us = rendering.time_us();
+        let session = self.sessions[job.tier].as_mut();
         let decoded = Instant::now();
         times.decode = decoded - start;
 
         let deadline = job.deadline;
         let misses =
             |deadline: Instant| tier.latency.will_miss(deadline.saturating_duration_since(decoded));
-        match judged {
-            None => (),
-            Some(Judged { is_zero: true, .. }) => {
+        let of_network = |doing: &'static str| {
+            move |error: EngineError| {
+                problem::internal(doing, &format_args!("{}.onnx: {error}", tier.name))
+            }
+        };
+        if !rendering.touches() {
+            if shows_sed {
                 self.metrics.zero_maps.inc();
             }
-            Some(_) if deadline.is_some_and(misses) => return Ok(Outcome::Late(Stage::Inference)),
-            Some(_) => {
-                let cpu_begun = clock::thread_time();
-                self.maps.infer(self.sessions[job.tier].as_mut()).map_err(|error| {
-                    let error = format_args!("{}.onnx: {error}", tier.name);
-                    problem::internal("the inference failed", &error)
-                })?;
-                meta.flags |= self.maps.judge_answer(tier.response_max_per_mpa);
-                times.network = clock::thread_time().saturating_sub(cpu_begun);
-                times.infer = decoded.elapsed();
-                tier.latency.learn(times.infer);
-            }
+        } else if deadline.is_some_and(misses) {
+            meta.flags |= rendering.flags();
+            return Ok(Outcome::Late(Stage::Inference));
+        } else {
+            let cpu_begun = clock::thread_time();
+            rendering.infer(session).map_err(of_network("the inference failed"))?;
+            times.network = clock::thread_time().saturating_sub(cpu_begun);
+            times.infer = decoded.elapsed();
+            tier.latency.learn(times.infer);
         }
+        meta.flags |= rendering.flags();
         let start = Instant::now();
-        let touches = judged.is_some_and(|judged| !judged.is_zero);
-        if let Some(finger) = finger.as_mut().filter(|_| touches) {
-            self.maps.feel_shear(finger, range);
-        }
-        if let Some(effects) = effects.as_mut().filter(|_| shows_sed) {
-            let session = &mut self.sessions[job.tier];
-            let infer = |pressure_pa: &[f32], sed: &mut [f32]| session.infer(pressure_pa, sed);
-            effects.fit(&self.maps.sed_j_per_m3, infer).map_err(|error| {
-                let error = format_args!("{}.onnx: {error}", tier.name);
-                problem::internal("the drive of the actuators cannot be corrected", &error)
-            })?;
-        }
+        let corrects = "the drive of the actuators cannot be corrected";
+        rendering.end(session).map_err(of_network(corrects))?;
         let extra = finger.as_ref().map_or(0, |finger| finger.sections_len());
-        if let Some(finger) = finger.as_ref().filter(|_| shows_sed) {
-            self.maps.to_person(finger);
-            if let Some(effects) = &mut effects {
-                finger.to_person(effects.pin_pa_mut());
-            }
-        }
         let (bytes, scale) = if let Some(effects) = &mut effects {
             let buffer = recycler.claim(HEADROOM + effects.size_hint() + extra);
             buffer.resize(headroom, 0);
@@ -262,26 +250,6 @@ impl Worker {
         };
         times.encode = start.elapsed();
         Ok(Outcome::Map { bytes, scale })
-    }
-
-    /// Takes a frame of a client that does not know where things are, or what presses: nothing is
-    /// shown, and what finger and effects remember waits for the next frame.
-    fn lose(
-        &mut self,
-        job: &Job,
-        finger: Option<&mut Finger>,
-        effects: Option<&mut Effects>,
-        meta: &mut OutputMeta,
-    ) -> (MapSummary, PressureRange) {
-        self.maps.pressure_pa.fill(0.0);
-        if let Some(finger) = finger {
-            finger.lose();
-        }
-        if let Some(effects) = effects {
-            effects.lose();
-        }
-        meta.flags |= flags::NOT_TRACKED | flags::NO_CONTACT;
-        (MapSummary { peak_pa: 0.0 }, self.range(job))
     }
 
     /// Reads a frame of a finger; pressure on one of reference stiffness is left.

@@ -73,7 +73,7 @@ static func _is_place(what, transform):
 	var volume = transform.basis.determinant()
 	var sum = volume + transform.origin.x + transform.origin.y + transform.origin.z
 	if is_nan(sum) or is_inf(sum) or not volume > 1e-12:
-		push_error("Papilla: %s is no place: it is not finite, flat or mirrored; leave the frame out while the hand is not tracked" % what)
+		push_error("Papilla: %s is no place: it is not finite, flat or mirrored; while the hand is not tracked call send_not_tracked" % what)
 		return false
 	return true
 

@@ -345,7 +345,7 @@ int32 UPapillaSessionComponent::SendPoses(const FTransform& FingerInWorld, const
         const std::optional<papilla::Pose> Pose = papilla::frames::to_finger(papilla::frames::unreal, Hand, PapillaFrames::ToPlace(Object), WorldScale);
         if (!Pose)
         {
-            UE_LOG(LogTemp, Warning, TEXT("Papilla: a transform is not finite or WorldScale not above 0; leave the frame out while the hand is not tracked"));
+            UE_LOG(LogTemp, Warning, TEXT("Papilla: a transform is not finite or WorldScale not above 0; while the hand is not tracked call SendNotTracked"));
             return 0;
         }
         Poses.push_back(*Pose);

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What comes with the program.
-const SHIPPED: &str = include_str!("../measured.toml");
+const SHIPPED: &str = include_str!("../../measured.toml");
 
 /// Everything that the finger is compared with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -12,6 +12,7 @@
 //! part too. The map is taken by 2 x 2 pixels (.27 mm; the vertices that carry traction are .7 mm
 //! apart), as one period of waves.
 
+use crate::PA_PER_MPA;
 use crate::interface::{InterfaceResponse, Response};
 use crate::kernels::turn;
 use crate::model::ContactModel;
@@ -31,7 +32,6 @@ const SIDE: usize = MAP_SIDE / 2;
 const CELLS: usize = SIDE * SIDE;
 const HALF: usize = SIDE / 2 + 1;
 const WAVES: usize = SIDE * HALF;
-const PA_PER_MPA: f32 = 1e6;
 const J_PER_M3_PER_MPA: f32 = 1e6;
 
 /// Strain `xx yy xy` and traction `xz yz zz` (MPa) at the interface.
@@ -200,7 +200,7 @@ impl ShearEnergy {
         }
         let of = Arc::clone(&self.of);
         self.map.copy_from_slice(pressure_pa);
-        self.transform(0, &of, 1.0 / PA_PER_MPA);
+        self.transform(0, &of, 1.0 / PA_PER_MPA as f32);
         for way in 0..2 {
             for ((value, q), tangents) in self.vertices.iter_mut().zip(shear_pa).zip(&of.tangents) {
                 let t = tangents[way];
@@ -208,7 +208,7 @@ impl ShearEnergy {
             }
             // Both lengths are those of the atlas.
             _ = of.skin.rasterise(&self.vertices, &mut self.map);
-            self.transform(1 + way, &of, to_reference / PA_PER_MPA);
+            self.transform(1 + way, &of, to_reference / PA_PER_MPA as f32);
         }
         for part in 0..6 {
             self.field(part, &of, false);

@@ -25,18 +25,18 @@ const SIZE_MIN: f64 = 1e-6;
 /// Joints nearer to each other than this are the same, mm.
 const APART_MIN_MM: f64 = 1.0;
 
-/// What is no place, and so no pose: skip the frame.
+/// What is no place, and so no pose: while the hand is not tracked, say so with `send_not_tracked`.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlaceError {
     /// The hand is not tracked, as a rule.
-    #[error("{of}: a number is not finite; skip the frame while the hand is not tracked")]
+    #[error("{of}: a number is not finite; while the hand is not tracked call send_not_tracked")]
     NotFinite {
         /// `finger`, `object`, `distal` or `tip`.
         of: &'static str,
     },
     /// The hand is not tracked, as a rule.
-    #[error("{of}: the quaternion is zero; skip the frame while the hand is not tracked")]
+    #[error("{of}: the quaternion is zero; while the hand is not tracked call send_not_tracked")]
     NoTurn {
         /// `finger`, `object`, `distal` or `tip`.
         of: &'static str,
