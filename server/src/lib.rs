@@ -264,6 +264,14 @@ impl Server {
         self.real_time.as_ref()
     }
 
+    /// Sessions that have ended so far.
+    #[must_use]
+    pub fn sessions_over(&self) -> u64 {
+        let metrics = &self.app.metrics;
+        let open = u64::try_from(metrics.sessions_open.get()).unwrap_or_default();
+        metrics.sessions.get().saturating_sub(open)
+    }
+
     /// Loads the models anew, as `POST /v1/admin/reload` does; the log says what came of it.
     pub fn reload(&self) {
         self.io.handle().spawn(core::reload::once(Arc::clone(&self.app.reloader)));

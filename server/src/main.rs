@@ -1,5 +1,6 @@
 //! The Papilla service; see `--help`.
 
+mod allocator;
 mod signals;
 
 use std::{
@@ -15,10 +16,6 @@ use papilla_server::{
 use serde_json::json;
 
 use self::signals::{Request, Signals};
-
-/// Memory of sessions that are over is the system's again: glibc keeps it in its arenas.
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 /// Exit code of a drain that took too long.
 const DRAIN_TIMED_OUT: u8 = 5;
@@ -107,9 +104,18 @@ async fn serve(config: &Config) -> anyhow::Result<ExitCode> {
         // Clients are served all the same.
         tracing::warn!(%error, "the start line cannot be written to stdout");
     }
-    while signals.next().await == Request::Reload {
-        tracing::info!("SIGHUP: the models are loaded anew");
-        server.reload();
+    let mut giving = allocator::Giving::default();
+    loop {
+        tokio::select! {
+            request = signals.next() => match request {
+                Request::Reload => {
+                    tracing::info!("SIGHUP: the models are loaded anew");
+                    server.reload();
+                }
+                Request::End => break,
+            },
+            () = giving.next() => giving.look(server.sessions_over()),
+        }
     }
     drain(server, &mut signals).await
 }
