@@ -128,9 +128,6 @@ fn what_is_wrong_with_a_hello_is_said_with_member_and_place() {
         assert!(matches!(error, MessageError::Hello(_)), "{text}: {error:?}");
         assert!(error.to_string().contains(words), "{text}: {error}");
         assert_eq!(error.json().member.as_deref(), member, "{text}: {error}");
-        for word in ["struct", "u32", "ClientMessage", "Hello"] {
-            assert!(!error.to_string().contains(word), "{text}: {error}");
-        }
     }
     let long = json!({"type": "hello", "tier": "x".repeat(2000)});
     let large = json!({"type": "hello", "effects": vec![""; 1 << 18]});
