@@ -33,6 +33,7 @@ mod error;
 mod guard;
 mod info;
 pub mod ladder;
+mod map_net;
 mod moves;
 mod onnx;
 mod operators;
@@ -116,7 +117,10 @@ pub fn load_with(
 ) -> Result<Arc<dyn Model>, EngineError> {
     let (proto, info) = checked(onnx, card)?;
     let model: Arc<dyn Model> = match backend {
-        Backend::Tract => Arc::new(tract_backend::TractModel::load(proto, info)?),
+        Backend::Tract => {
+            let by_rows = map_net::find(&proto);
+            map_net::prefer(Arc::new(tract_backend::TractModel::load(&proto, info)?), by_rows)?
+        }
         #[cfg(feature = "ort")]
         Backend::Ort => Arc::new(ort_backend::OrtModel::load(onnx, info)?),
         #[cfg(not(feature = "ort"))]
@@ -127,14 +131,16 @@ pub fn load_with(
     Ok(model)
 }
 
-/// A file that has passed the checks of the contract and is its card's, and what it says of itself.
+/// A file that has passed the checks of the contract and is its card's, with constants stored in 16
+/// bits widened, and what it says of itself.
 fn checked(onnx: &[u8], card: Option<&Card>) -> Result<(ModelProto, ModelInfo), EngineError> {
-    let proto = onnx::decode(onnx)?;
+    let mut proto = onnx::decode(onnx)?;
     let info = ModelInfo::read(&proto, onnx)?;
     if let Some(card) = card {
         card.require_model(&info)?;
     }
     onnx::check(&proto)?;
+    widen::widen(&mut proto);
     Ok((proto, info))
 }
 

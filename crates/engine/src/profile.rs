@@ -32,7 +32,7 @@ pub struct Operator {
 pub fn profile(onnx: &[u8], runs: usize) -> Result<Vec<Operator>, EngineError> {
     let (proto, info) = checked(onnx, None)?;
     let pressure_pa = trial_map(info.pressure_max_pa);
-    let model = TractModel::load(proto, info)?;
+    let model = TractModel::load(&proto, info)?;
     let plan = model.plan();
     let typed = plan.model();
     let mut times = vec![Vec::with_capacity(runs); typed.nodes.len()];

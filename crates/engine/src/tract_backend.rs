@@ -2,7 +2,7 @@
 
 use crate::{
     Backend, EngineError, MAP_LEN, MAP_SIDE_PX, Model, ModelInfo, Session, check_maps,
-    check_output, convolution, guard::guarded, moves, products, sparse, widen::widen,
+    check_output, convolution, guard::guarded, moves, products, sparse,
 };
 use std::sync::Arc;
 use tract_onnx::pb::ModelProto;
@@ -22,12 +22,11 @@ pub(crate) struct TractModel {
 }
 
 impl TractModel {
-    /// `proto` has passed the checks of the contract.
-    pub(crate) fn load(mut proto: ModelProto, mut info: ModelInfo) -> Result<Self, EngineError> {
+    /// `proto` has passed the checks of the contract; its constants have been widened.
+    pub(crate) fn load(proto: &ModelProto, mut info: ModelInfo) -> Result<Self, EngineError> {
         info.backend = LABEL.to_owned();
-        widen(&mut proto);
         let typed = guarded("read the model", || {
-            let typed = tract_onnx::onnx().model_for_proto_model(&proto)?.into_typed()?;
+            let typed = tract_onnx::onnx().model_for_proto_model(proto)?.into_typed()?;
             convolution::run_direct(products::keep_joined(typed)?)
         })?;
         check_sizes(&typed)?;

@@ -1,0 +1,111 @@
+//! Networks on maps, run in passes over rows that stay in the nearest cache.
+//!
+//! The graph of such a network (`docs/concepts/networks.md`) says what is answered and tract can run
+//! it. But as a graph it does more than it has to:
+//!
+//! - it interpolates components by a convolution over 3 x 3 pixels, where a mix of the components
+//!   and an interpolation by rows and columns give the same;
+//! - it computes what pressures give around them everywhere, though it is zero where no pressure is
+//!   near;
+//! - it writes and reads a map as large as the cache between any two operators.
+//!
+//! So [`find`] looks for the network in the graph, operator by operator, and [`Runner`] evaluates
+//! it. Every file is compared on loading with tract's own answers to several maps. A graph that is
+//! not recognised, or is answered otherwise, stays tract's.
+
+mod correction;
+mod gain;
+mod graph;
+mod level;
+mod net;
+mod parts;
+mod pattern;
+mod pixels;
+mod pressures;
+mod reach;
+mod sums;
+#[cfg(test)]
+mod tests;
+mod trial;
+mod upsampling;
+
+use crate::{
+    Backend, EngineError, Model, ModelInfo, Session, check_maps, check_output, guard::guarded,
+    tract_backend::LABEL,
+};
+use net::{Net, Work, Workspace};
+use std::sync::Arc;
+use tract_onnx::pb::ModelProto;
+
+pub(crate) use trial::prefer;
+
+/// The networks of a model, whose answers are added up.
+#[derive(Clone, Debug)]
+pub(crate) struct Runner(Arc<Vec<Net>>);
+
+/// Finds out whether a graph is one of these networks, or a mean of several. The constants of the
+/// file have been widened.
+pub(crate) fn find(proto: &ModelProto) -> Option<Runner> {
+    let nets = pattern::find(proto)?.iter().map(Net::new).collect();
+    Some(Runner(Arc::new(nets)))
+}
+
+/// A model that is run so.
+pub(crate) struct MapModel {
+    info: ModelInfo,
+    runner: Runner,
+}
+
+impl MapModel {
+    pub(crate) fn new(mut info: ModelInfo, runner: Runner) -> Self {
+        info.backend = format!("{LABEL} by rows");
+        Self { info, runner }
+    }
+}
+
+impl Model for MapModel {
+    fn info(&self) -> &ModelInfo {
+        &self.info
+    }
+
+    fn backend(&self) -> Backend {
+        Backend::Tract
+    }
+
+    fn session(&self) -> Result<Box<dyn Session>, EngineError> {
+        let runner = self.runner.clone();
+        let spaces = runner.spaces();
+        Ok(Box::new(MapSession { runner, spaces }))
+    }
+}
+
+impl Runner {
+    fn spaces(&self) -> Vec<Workspace> {
+        self.0.iter().map(Workspace::new).collect()
+    }
+}
+
+struct MapSession {
+    runner: Runner,
+    spaces: Vec<Workspace>,
+}
+
+impl Session for MapSession {
+    fn infer(&mut self, pressure_pa: &[f32], sed_j_per_m3: &mut [f32]) -> Result<(), EngineError> {
+        check_maps(pressure_pa, sed_j_per_m3)?;
+        let (nets, spaces) = (&self.runner.0, &mut self.spaces);
+        let done = guarded("infer a map", || {
+            for (index, (net, space)) in nets.iter().zip(spaces).enumerate() {
+                let sed_j_per_m3 = &mut *sed_j_per_m3;
+                Work { net, space, pressure_pa, sed_j_per_m3, adds: index > 0 }.run();
+            }
+            Ok(())
+        });
+        if let Err(error) = done {
+            // What an interrupted run leaves behind is not known: start afresh.
+            self.spaces = self.runner.spaces();
+            return Err(error);
+        }
+        check_output(sed_j_per_m3)
+    }
+}

@@ -1,0 +1,146 @@
+//! A network on maps, laid out for the evaluation, and where one thread works.
+
+use super::correction::Correction;
+use super::gain::Gain;
+use super::level::{Level, LevelSpace};
+use super::parts::{LevelParts, Parts};
+use super::pixels::{Pixels, Target};
+use super::pressures::{Layout, Pressures};
+use super::reach::Reach;
+use super::sums::{GROUP, MARGIN, Sums};
+use super::upsampling::{Above, Upsampling, mix};
+use pulp::{Arch, Simd, WithSimd};
+
+#[derive(Debug)]
+pub(super) struct Net {
+    unit: f32,
+    pixel: usize,
+    components: usize,
+    /// The finest first.
+    levels: Vec<Level>,
+    reach: Reach,
+    pixels: Pixels,
+}
+
+impl Net {
+    pub(super) fn new(parts: &Parts) -> Self {
+        let components = parts.components;
+        let levels: Vec<_> =
+            parts.levels.iter().map(|level| self::level(level, components)).collect();
+        let coarsest = parts.levels[parts.levels.len() - 1].side;
+        let reach = Reach::new(parts.rank, &parts.reach_in, &parts.reach_out, coarsest);
+        let pixels = Pixels::new(parts.mask.clone());
+        Self { unit: parts.unit, pixel: parts.pixel, components, levels, reach, pixels }
+    }
+}
+
+fn level(parts: &LevelParts, components: usize) -> Level {
+    let LevelParts { side, kernel, near, mix: matrix, over_finger, place, correction } = parts;
+    let (side, kernel) = (*side, *kernel);
+    let layout = Layout { side, around: kernel / 2 };
+    let area = kernel * kernel;
+    let taps = (0..GROUP * area)
+        .map(|tap| {
+            let (plane, row, column) = (tap / area, tap % area / kernel, tap % kernel);
+            plane * layout.plane_len() + row * layout.stride() + column
+        })
+        .collect();
+    let near =
+        Sums::new(taps, GROUP * components, |channel, tap| near[channel * GROUP * area + tap]);
+    Level {
+        layout,
+        near,
+        gain: Gain::of_rows(over_finger, place, side),
+        mix: mix(components, side, |to, from| matrix[to * components + from]),
+        correction: correction.as_ref().map(|parts| Correction::new(parts, side)),
+    }
+}
+
+/// All that one thread writes to while it evaluates a network.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    pressures: Pressures,
+    /// What each level is given from above, the finest first.
+    above: Vec<Above>,
+    levels: Vec<LevelSpace>,
+    reach: Vec<f32>,
+    /// Densities of a row of blocks, `[4, n + MARGIN]`.
+    densities: Vec<f32>,
+    /// Densities of pixels of 2 x 2, and what interpolates between them.
+    coarse: Option<(Above, Upsampling)>,
+}
+
+impl Workspace {
+    pub(super) fn new(net: &Net) -> Self {
+        let layouts: Vec<_> = net.levels.iter().map(|level| level.layout).collect();
+        let side = 2 * layouts[0].side;
+        Self {
+            pressures: Pressures::new(net.unit, net.pixel, &layouts),
+            above: layouts.iter().map(|layout| Above::new(net.components, layout.side)).collect(),
+            levels: net.levels.iter().map(|level| LevelSpace::new(level, net.components)).collect(),
+            reach: net.reach.space(),
+            densities: vec![0.0; GROUP * (side + MARGIN)],
+            coarse: (net.pixel == 2).then(|| (Above::new(1, side), Upsampling::new(1, side))),
+        }
+    }
+}
+
+/// One evaluation.
+pub(super) struct Work<'a> {
+    pub net: &'a Net,
+    pub space: &'a mut Workspace,
+    pub pressure_pa: &'a [f32],
+    pub sed_j_per_m3: &'a mut [f32],
+    /// Whether the densities are added to those that are there.
+    pub adds: bool,
+}
+
+impl Work<'_> {
+    /// With vectors as wide as this processor has.
+    pub(super) fn run(self) {
+        Arch::new().dispatch(self);
+    }
+}
+
+impl WithSimd for Work<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { net, space, pressure_pa, sed_j_per_m3, adds } = self;
+        let Workspace { pressures, above, levels, reach, densities, coarse } = space;
+        if !pressures.take(pressure_pa) {
+            // There is no bias anywhere.
+            if !adds {
+                sed_j_per_m3.fill(0.0);
+            }
+            return;
+        }
+        let last = net.levels.len() - 1;
+        net.reach.write(simd, pressures.coarsest(), reach, &mut above[last]);
+        for index in (0..=last).rev() {
+            let (finer, its) = above.split_at_mut(index);
+            let mut target = match (finer.last_mut(), &mut *coarse) {
+                (Some(next), _) => Target::Next(next),
+                (None, Some((map, _))) => Target::Densities { row: &mut densities[..], map },
+                (None, None) => Target::Pixels {
+                    row: &mut densities[..],
+                    pixels: &net.pixels,
+                    map: &mut sed_j_per_m3[..],
+                    adds,
+                },
+            };
+            let level = &net.levels[index];
+            level.evaluate(
+                simd,
+                &pressures.levels[index],
+                &its[0],
+                &mut levels[index],
+                &mut target,
+            );
+        }
+        if let Some((map, upsampling)) = coarse {
+            net.pixels.interpolate(simd, map, upsampling, densities, (sed_j_per_m3, adds));
+        }
+    }
+}

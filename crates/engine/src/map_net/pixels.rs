@@ -1,0 +1,203 @@
+//! From a row's components to what comes next: components above, or densities of pixels.
+
+use super::sums::{GROUP, MARGIN, settled, vectors, vectors_mut};
+use super::upsampling::{Above, Upsampling};
+use crate::MAP_SIDE_PX;
+use pulp::Simd;
+use std::ops::Range;
+
+/// Rows and columns of blocks of the map.
+const SIDE: usize = MAP_SIDE_PX / 2;
+/// Blocks that a range of columns begins at a multiple of.
+const STEP: usize = 8;
+
+/// The end of the network: which densities are answered, in which unit.
+#[derive(Debug)]
+pub(super) struct Pixels {
+    /// What the densities are multiplied with, `[224, 224]`.
+    mask: Vec<f32>,
+    /// Of each row of blocks, those that are not all blank.
+    columns: Vec<Range<usize>>,
+}
+
+/// What a level's rows become.
+pub(super) enum Target<'a> {
+    /// What the next level is given from above.
+    Next(&'a mut Above),
+    /// Densities of pixels of 2 x 2, to be interpolated.
+    Densities { row: &'a mut [f32], map: &'a mut Above },
+    /// Densities of pixels.
+    Pixels { row: &'a mut [f32], pixels: &'a Pixels, map: &'a mut [f32], adds: bool },
+}
+
+impl Pixels {
+    pub(super) fn new(mask: Vec<f32>) -> Self {
+        let mask: Vec<_> = mask.into_iter().map(settled).collect();
+        let columns = mask.chunks_exact(2 * MAP_SIDE_PX).map(|rows| {
+            let (upper, lower) = rows.split_at(MAP_SIDE_PX);
+            let some = |column: usize| {
+                [upper[2 * column], upper[2 * column + 1], lower[2 * column], lower[2 * column + 1]]
+                    .iter()
+                    .any(|factor| *factor != 0.0)
+            };
+            let first = (0..SIDE).find(|&column| some(column)).unwrap_or(0);
+            let end = (0..SIDE).rfind(|&column| some(column)).map_or(0, |column| column + 1);
+            first / STEP * STEP..end.next_multiple_of(STEP).min(SIDE)
+        });
+        let columns = columns.collect();
+        Self { mask, columns }
+    }
+
+    /// Writes the pixels of a row of blocks: `row` is `[4, 112 + MARGIN]`.
+    #[inline(always)]
+    fn write(&self, at: usize, row: &[f32], map: &mut [f32], adds: bool) {
+        let Range { start, end } = self.columns[at].clone();
+        for (half, densities) in row.chunks_exact(2 * (SIDE + MARGIN)).take(2).enumerate() {
+            let place = (2 * at + half) * MAP_SIDE_PX;
+            let map = &mut map[place..place + MAP_SIDE_PX];
+            let mask = &self.mask[place..place + MAP_SIDE_PX];
+            let (left, right) = densities.split_at(SIDE + MARGIN);
+            let (left, right) = (&left[start..end], &right[start..end]);
+            let mask = &mask[2 * start..2 * end];
+            if adds {
+                interleave(left, right, &mut map[2 * start..2 * end], |was, value, at| {
+                    was + value * mask[at]
+                });
+                continue;
+            }
+            interleave(left, right, &mut map[2 * start..2 * end], |_, value, at| value * mask[at]);
+            map[..2 * start].fill(0.0);
+            map[2 * end..].fill(0.0);
+        }
+    }
+
+    /// Pixels between those of 2 x 2.
+    #[inline(always)]
+    pub(super) fn interpolate<S: Simd>(
+        &self,
+        simd: S,
+        coarse: &Above,
+        upsampling: &mut Upsampling,
+        densities: &mut [f32],
+        (map, adds): (&mut [f32], bool),
+    ) {
+        upsampling.begin(simd, coarse, None);
+        for row in 0..SIDE {
+            upsampling.advance(simd, coarse, None, row);
+            upsampling.write(simd, row, &self.columns[row], densities);
+            self.write(row, densities, map, adds);
+        }
+    }
+}
+
+impl Target<'_> {
+    /// The columns of a row that are asked for, if not all.
+    pub(super) fn columns(&self, row: usize) -> Option<Range<usize>> {
+        match self {
+            Self::Pixels { pixels, .. } => Some(pixels.columns[row].clone()),
+            _ => None,
+        }
+    }
+
+    /// Whether it takes components without a row of them being written.
+    pub(super) fn takes_phases(&self) -> bool {
+        matches!(self, Self::Pixels { .. })
+    }
+
+    /// Takes a row that comes from above alone.
+    #[inline(always)]
+    pub(super) fn take_phases<S: Simd>(
+        &mut self,
+        simd: S,
+        row: usize,
+        columns: &Range<usize>,
+        upsampling: &Upsampling,
+    ) {
+        let Self::Pixels { row: densities, pixels, map, adds } = self else { return };
+        upsampling.write_squares(simd, row, columns, densities);
+        pixels.write(row, densities, map, *adds);
+    }
+
+    /// Takes a row of components, `[4 C .., n + MARGIN]`.
+    #[inline(always)]
+    pub(super) fn take_row<S: Simd>(&mut self, simd: S, at: usize, components: &[f32]) {
+        match self {
+            Self::Next(above) => {
+                let side = above.side / 2;
+                let wide = side + MARGIN;
+                for channel in 0..above.channels() {
+                    let of_channel = &components[GROUP * channel * wide..][..GROUP * wide];
+                    to_pixels(of_channel, side, channel, at, above);
+                }
+            }
+            Self::Densities { row, map } => {
+                let side = map.side / 2;
+                squares(simd, 0..side, side, components, row);
+                to_pixels(row, side, 0, at, map);
+            }
+            Self::Pixels { row, pixels, map, adds } => {
+                squares(simd, pixels.columns[at].clone(), SIDE, components, row);
+                pixels.write(at, row, map, *adds);
+            }
+        }
+    }
+}
+
+/// Sums of the squares of all components: `[4, n + MARGIN]`.
+#[inline(always)]
+fn squares<S: Simd>(
+    simd: S,
+    columns: Range<usize>,
+    side: usize,
+    components: &[f32],
+    densities: &mut [f32],
+) {
+    let wide = side + MARGIN;
+    let components = &components[..components.len() - GROUP * wide];
+    let count = columns.len().div_ceil(S::F32_LANES);
+    for pixel in 0..GROUP {
+        let sums = vectors_mut::<S>(&mut densities[pixel * wide + columns.start..], count);
+        sums.fill(simd.splat_f32s(0.0));
+        for of_component in components.chunks_exact(GROUP * wide) {
+            let values = vectors::<S>(&of_component[pixel * wide + columns.start..], count);
+            for k in 0..count {
+                sums[k] = simd.mul_add_e_f32s(values[k], values[k], sums[k]);
+            }
+        }
+    }
+}
+
+/// Four values of each block of a row become pixels of two rows.
+#[inline(always)]
+fn to_pixels(blocks: &[f32], side: usize, channel: usize, row: usize, above: &mut Above) {
+    let wide = side + MARGIN;
+    for half in 0..2 {
+        let left = &blocks[2 * half * wide..][..side];
+        let right = &blocks[(2 * half + 1) * wide..][..side];
+        let place = Above::place(above.side, channel, 2 * row + half);
+        let pixels = &mut above.values[place..place + 2 * side];
+        interleave(left, right, pixels, |_, value, _| value);
+    }
+}
+
+/// Writes values of two rows in turn. `write`: of what was there, a value and where it comes.
+#[inline(always)]
+fn interleave(left: &[f32], right: &[f32], to: &mut [f32], write: impl Fn(f32, f32, usize) -> f32) {
+    let count = left.len() / STEP;
+    for k in 0..count {
+        let (mut values, from) = ([0.0; 2 * STEP], k * STEP);
+        let (left, right) = (&left[from..from + STEP], &right[from..from + STEP]);
+        let to = &mut to[2 * from..2 * (from + STEP)];
+        for i in 0..STEP {
+            values[2 * i] = left[i];
+            values[2 * i + 1] = right[i];
+        }
+        for i in 0..2 * STEP {
+            to[i] = write(to[i], values[i], 2 * from + i);
+        }
+    }
+    for k in count * STEP..left.len() {
+        to[2 * k] = write(to[2 * k], left[k], 2 * k);
+        to[2 * k + 1] = write(to[2 * k + 1], right[k], 2 * k + 1);
+    }
+}

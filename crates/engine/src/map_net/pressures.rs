@@ -1,0 +1,206 @@
+//! The pressures of a map as blocks of 2 x 2 pixels, at every level, and where there are any.
+
+use std::ops::Range;
+
+use super::sums::MARGIN;
+use crate::{MAP_LEN, MAP_SIDE_PX};
+
+/// A pressure below this is none, Pa. Squares of what it causes may be denormal numbers, which
+/// processors are slow with; as SED it is less than 1e-20 J/m3.
+const PRESSURE_MIN_PA: f32 = 1e-9;
+
+/// How the blocks of a level lie in memory: four planes, of the pixels above left, above right,
+/// below left and below right, each with zeros around.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Blocks across.
+    pub side: usize,
+    /// Zeros around: what a convolution reaches over.
+    pub around: usize,
+}
+
+impl Layout {
+    pub(super) fn stride(self) -> usize {
+        self.side + 2 * self.around + MARGIN
+    }
+
+    pub(super) fn plane_len(self) -> usize {
+        self.stride() * (self.side + 2 * self.around)
+    }
+
+    /// Where a block of the first plane lies.
+    pub(super) fn place(self, row: usize, column: usize) -> usize {
+        (row + self.around) * self.stride() + column + self.around
+    }
+
+    fn len(self) -> usize {
+        4 * self.plane_len() + MARGIN
+    }
+}
+
+/// The pressures of one level.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    pub layout: Layout,
+    pub planes: Vec<f32>,
+    /// Of each row, a bit for every block with pressure.
+    some: Vec<u128>,
+}
+
+impl Blocks {
+    fn new(layout: Layout) -> Self {
+        Self { layout, planes: vec![0.0; layout.len()], some: vec![0; layout.side] }
+    }
+
+    /// Of a row, a bit for each block that a pressure is near to: at most `around` blocks away.
+    pub(super) fn near(&self, row: usize) -> u128 {
+        let Layout { side, around } = self.layout;
+        let rows = row.saturating_sub(around)..(row + around + 1).min(side);
+        let mut near = self.some[rows].iter().fold(0, |all, row| all | row);
+        for _ in 0..around {
+            near |= near << 1 | near >> 1;
+        }
+        near & (u128::MAX >> (128 - side))
+    }
+
+    /// A row of a plane.
+    pub(super) fn row(&self, plane: usize, row: usize) -> &[f32] {
+        let at = plane * self.layout.plane_len() + self.layout.place(row, 0);
+        &self.planes[at..at + self.layout.side]
+    }
+
+    /// Takes a row of blocks from two rows of pixels, and gives the mean of each block. False if
+    /// all is zero as it was.
+    #[inline(always)]
+    fn take(&mut self, row: usize, pixels: [&[f32]; 2], means: &mut [f32]) -> bool {
+        let some = bits(pixels);
+        if some == 0 && self.some[row] == 0 {
+            return false;
+        }
+        self.some[row] = some;
+        let (side, place) = (self.layout.side, self.layout.place(row, 0));
+        let plane_len = self.layout.plane_len();
+        for (pair, pixels) in self.planes.chunks_exact_mut(2 * plane_len).zip(pixels) {
+            let (left, right) = pair.split_at_mut(plane_len);
+            let blocks = left[place..place + side].iter_mut().zip(&mut right[place..place + side]);
+            for ((left, right), [a, b]) in blocks.zip(pixels.as_chunks::<2>().0) {
+                (*left, *right) = (*a, *b);
+            }
+        }
+        halve(pixels, means);
+        true
+    }
+}
+
+/// A bit for every block of two rows of pixels that are not all zero.
+#[inline(always)]
+fn bits([upper, lower]: [&[f32]; 2]) -> u128 {
+    const BLOCKS: usize = 8;
+    let mut bits = 0;
+    let chunks = upper.chunks(2 * BLOCKS).zip(lower.chunks(2 * BLOCKS)).enumerate();
+    for (chunk, (upper, lower)) in chunks {
+        let any =
+            upper.iter().zip(lower).fold(false, |any, (a, b)| any | (*a != 0.0) | (*b != 0.0));
+        if any {
+            let pairs = upper.chunks_exact(2).zip(lower.chunks_exact(2)).enumerate();
+            bits |= pairs.fold(0, |bits, (block, (a, b))| {
+                let some = (a[0] != 0.0) | (a[1] != 0.0) | (b[0] != 0.0) | (b[1] != 0.0);
+                bits | u128::from(some) << (chunk * BLOCKS + block)
+            });
+        }
+    }
+    bits
+}
+
+/// The pressures of a map, at every level.
+#[derive(Debug)]
+pub(super) struct Pressures {
+    /// What a pressure is multiplied with.
+    unit: f32,
+    /// Two rows of the map in the network's unit.
+    rows: Vec<f32>,
+    /// Pixels across one of the network's: 1 or 2.
+    pixel: usize,
+    /// The finest first.
+    pub levels: Vec<Blocks>,
+    /// The pixels that each level's blocks are made of, and behind them the means of the coarsest
+    /// blocks. The first is empty if those are the map's own.
+    maps: Vec<Vec<f32>>,
+    /// Rows of the map in which there was any pressure, of two rows each.
+    had_some: Vec<bool>,
+}
+
+impl Pressures {
+    pub(super) fn new(unit: f32, pixel: usize, layouts: &[Layout]) -> Self {
+        let mut maps: Vec<_> =
+            layouts.iter().map(|layout| vec![0.0; 4 * layout.side * layout.side]).collect();
+        if pixel == 1 {
+            maps[0] = vec![];
+        }
+        let coarsest = layouts[layouts.len() - 1].side;
+        maps.push(vec![0.0; coarsest * coarsest]);
+        Self {
+            unit,
+            rows: vec![0.0; 2 * MAP_SIDE_PX],
+            pixel,
+            levels: layouts.iter().map(|layout| Blocks::new(*layout)).collect(),
+            maps,
+            had_some: vec![true; MAP_SIDE_PX / 2],
+        }
+    }
+
+    /// Means of the coarsest blocks.
+    pub(super) fn coarsest(&self) -> &[f32] {
+        self.maps.last().map_or(&[], |map| &map[..])
+    }
+
+    /// Takes a map, Pa. False if there is no pressure in it.
+    #[inline(always)]
+    pub(super) fn take(&mut self, pressure_pa: &[f32]) -> bool {
+        debug_assert_eq!(pressure_pa.len(), MAP_LEN);
+        let mut any = false;
+        for (row, pressure_pa) in pressure_pa.chunks_exact(2 * MAP_SIDE_PX).enumerate() {
+            let some =
+                pressure_pa.iter().fold(false, |some, p| some | (p.abs() >= PRESSURE_MIN_PA));
+            any |= some;
+            if !some && !self.had_some[row] {
+                continue;
+            }
+            self.had_some[row] = some;
+            for (value, p) in self.rows.iter_mut().zip(pressure_pa) {
+                *value = if p.abs() >= PRESSURE_MIN_PA { *p * self.unit } else { 0.0 };
+            }
+            let (upper, lower) = self.rows.split_at(MAP_SIDE_PX);
+            if self.pixel == 1 {
+                let means = of_row(row, MAP_SIDE_PX / 2);
+                self.levels[0].take(row, [upper, lower], &mut self.maps[1][means]);
+            } else {
+                let means = &mut self.maps[0][of_row(row, MAP_SIDE_PX / 2)];
+                halve([upper, lower], means);
+            }
+        }
+        let first = if self.pixel == 1 { 1 } else { 0 };
+        for (level, blocks) in self.levels.iter_mut().enumerate().skip(first) {
+            let (maps, coarser) = self.maps.split_at_mut(level + 1);
+            let (map, side) = (&maps[level], blocks.layout.side);
+            for row in 0..side {
+                let (upper, lower) = map[4 * side * row..4 * side * (row + 1)].split_at(2 * side);
+                blocks.take(row, [upper, lower], &mut coarser[0][of_row(row, side)]);
+            }
+        }
+        any
+    }
+}
+
+/// Means of blocks of two rows of pixels.
+#[inline(always)]
+fn halve([upper, lower]: [&[f32]; 2], means: &mut [f32]) {
+    let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+    for (mean, ([a, b], [c, d])) in means.iter_mut().zip(pairs) {
+        *mean = 0.25 * (a + b + c + d);
+    }
+}
+
+fn of_row(row: usize, side: usize) -> Range<usize> {
+    row * side..(row + 1) * side
+}

@@ -1,0 +1,68 @@
+//! A warm frame of a network on maps takes no memory.
+
+// clippy.toml allows it in tests; helpers outside of test functions are tests too.
+#![allow(clippy::unwrap_used)]
+// An allocator is unsafe by its nature; this one hands everything to the system's.
+#![allow(unsafe_code)]
+
+use papilla_engine::{MAP_LEN, MAP_SIDE_PX, load};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+struct Counting;
+
+thread_local! {
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+fn count() {
+    // Err: the thread is ending.
+    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+}
+
+// SAFETY: every method hands its arguments on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promised.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        // SAFETY: as the caller promised.
+        unsafe { System.realloc(place, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        // SAFETY: as the caller promised.
+        unsafe { System.dealloc(place, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// A square of pressure of this many pixels, Pa.
+fn square(middle: usize, side: usize) -> Vec<f32> {
+    let near = |at: usize| at.abs_diff(middle) <= side / 2;
+    (0..MAP_LEN)
+        .map(|i| if near(i / MAP_SIDE_PX) && near(i % MAP_SIDE_PX) { 8e3 } else { 0.0 })
+        .collect()
+}
+
+#[test]
+fn a_warm_frame_takes_no_memory() {
+    for name in ["pico", "nano", "small", "large-maps"] {
+        let path = format!("{}/../../models/{name}.onnx", env!("CARGO_MANIFEST_DIR"));
+        let mut session = load(&std::fs::read(path).unwrap(), None).unwrap().session().unwrap();
+        let maps = [square(112, 30), square(70, 1), square(112, 224), square(0, 0)];
+        let mut sed_j_per_m3 = vec![0.0; MAP_LEN];
+        session.infer(&maps[0], &mut sed_j_per_m3).unwrap();
+        let before = ALLOCATIONS.get();
+        for map in maps.iter().chain(&maps) {
+            session.infer(map, &mut sed_j_per_m3).unwrap();
+        }
+        assert_eq!(ALLOCATIONS.get() - before, 0, "{name}");
+    }
+}
