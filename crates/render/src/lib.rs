@@ -210,3 +210,21 @@ impl Maps {
         finger.to_person(&mut self.sed_j_per_m3);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 kPa has made at most 6 /MPa of it, as SED: 2400 J/m3.
+    #[test]
+    fn more_energy_than_any_simulation_had_is_told() {
+        let mut maps = Maps { seen_peak_pa: 2e4, ..Maps::default() };
+        for (sed_j_per_m3, flag) in
+            [(0.0, 0), (2400.0, 0), (3500.0, 0), (3700.0, flags::UNFAMILIAR)]
+        {
+            maps.sed_j_per_m3[7] = sed_j_per_m3;
+            assert_eq!(maps.judge_answer(Some(6.0)), flag, "{sed_j_per_m3} J/m3");
+            assert_eq!(maps.judge_answer(None), 0, "nothing is known of the training");
+        }
+    }
+}
