@@ -66,7 +66,7 @@ pub use frame::{FrameError, FrameHeader, FrameKind, FrameStatus, HEADER_LEN, fla
 pub use input_statistics::InputStatistics;
 pub use map::{
     MAP_LEN, MAP_SIDE_PX, MapError, MapSummary, PixelMask, PressureRange, check_pressure,
-    keep_inside,
+    keep_inside, peak,
 };
 pub use message::{
     ClientMessage, Hello, MessageError, Ready, Reconnect, ReconnectReason, Resumption,

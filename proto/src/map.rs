@@ -162,8 +162,7 @@ impl PressureRange {
             }
         }
         if good.iter().all(|&good| good) {
-            let peak_pa = peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak });
-            return Ok(MapSummary { peak_pa });
+            return Ok(MapSummary { peak_pa: greatest(peaks) });
         }
         Err(self.culprit(map_pa))
     }
@@ -212,7 +211,23 @@ pub fn keep_inside(map_pa: &mut [f32], mask: &PixelMask) -> MapSummary {
             *peak = if *p > *peak { *p } else { *peak };
         }
     }
-    MapSummary { peak_pa: peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak }) }
+    MapSummary { peak_pa: greatest(peaks) }
+}
+
+/// The greatest value of a map, 224 x 224, of which none is negative or NaN.
+#[must_use]
+pub fn peak(map: &[f32]) -> f32 {
+    let mut peaks = [0.0_f32; LANES];
+    for lanes in map.as_chunks::<LANES>().0 {
+        for (peak, &value) in peaks.iter_mut().zip(lanes) {
+            *peak = if value > *peak { value } else { *peak };
+        }
+    }
+    greatest(peaks)
+}
+
+fn greatest(peaks: [f32; LANES]) -> f32 {
+    peaks.iter().fold(0.0, |peak, &p| if p > peak { p } else { peak })
 }
 
 /// Samples looked at together; [`MAP_SIDE_PX`] is a multiple.

@@ -4,50 +4,16 @@
 
 // clippy.toml allows it in tests; helpers outside of test functions are tests too.
 #![allow(clippy::unwrap_used)]
-// An allocator is unsafe by its nature; this one hands everything to the system's.
-#![allow(unsafe_code)]
 #![cfg(feature = "ort")]
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use common::{TINY, press_pa};
+use counting::ALLOCATIONS;
 use papilla_engine::{Backend, Choice, MAP_LEN, load_with};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::{cell::Cell, env, fs, path::Path, process::Command, time::Duration};
-
-struct Counting;
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-fn count() {
-    // Err: the thread is ending.
-    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-}
-
-// SAFETY: every method hands its arguments on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: as the caller promised.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: as the caller promised.
-        unsafe { System.realloc(place, layout, size) }
-    }
-
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
-        // SAFETY: as the caller promised.
-        unsafe { System.dealloc(place, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use std::{env, fs, path::Path, process::Command, time::Duration};
 
 #[test]
 fn a_warm_session_allocates_nothing_of_ours() {

@@ -106,11 +106,10 @@ impl<'a> Rendering<'a> {
     /// # Errors
     /// As [`Session::infer`].
     pub fn end(self, session: &mut dyn Session) -> Result<(), EngineError> {
-        let Self { maps, finger, mut effects, read, touches, .. } = self;
+        let Self { maps, mut finger, mut effects, read, touches, .. } = self;
         if !read.shows_sed {
             return Ok(());
         }
-        let mut finger = finger;
         if let Some(finger) = finger.as_mut().filter(|_| touches) {
             maps.feel_shear(finger, read.range);
         }
@@ -119,7 +118,7 @@ impl<'a> Rendering<'a> {
             effects.fit(&maps.sed_j_per_m3, infer)?;
         }
         if let Some(finger) = finger {
-            maps.to_person(finger);
+            maps.turn_to_person(finger);
             if let Some(effects) = effects {
                 finger.to_person(effects.pin_pa_mut());
             }

@@ -8,7 +8,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))?;
 //! use papilla_proto::{PressureRange, atlas::{Atlas, Patch, Raster}, effects::OutOfRange, flags};
-//! use papilla_render::{Maps, SkinPixels};
+//! use papilla_render::{Known, Maps, Read, Rendering, SkinPixels};
 //!
 //! let atlas = Atlas::from_json(&std::fs::read_to_string("models/atlas.json")?)?;
 //! let skin = SkinPixels::from(&Raster::new(&atlas, Patch::Skin));
@@ -20,9 +20,12 @@
 //! let mut maps = Maps::default();
 //! (95..115).for_each(|row| maps.pressure_pa[row * 224 + 105..][..25].fill(8e3));
 //! let summary = maps.check(range, &skin)?;
-//! let judged = maps.judge(summary, range, &skin, None);
-//! assert_eq!(judged.flags & flags::OUT_OF_RANGE, 0);
-//! maps.infer(session.as_mut())?;
+//! let known = Known { skin: &skin, input_max: None, response_max_per_mpa: None };
+//! let read = Read { summary, range, time_us: 0, is_tracked: true, shows_sed: true };
+//! let mut rendering = Rendering::begin(&mut maps, None, None, known, read);
+//! assert_eq!(rendering.flags() & flags::OUT_OF_RANGE, 0);
+//! rendering.infer(session.as_mut())?;
+//! rendering.end(session.as_mut())?;
 //! assert!(maps.sed_j_per_m3.iter().any(|sed| *sed > 0.0));
 //! # Ok(())
 //! # }
@@ -34,7 +37,7 @@ mod skin;
 use papilla_engine::{EngineError, Session};
 use papilla_proto::{
     ErrorCode, InputStatistics, MAP_LEN, MapSummary, PressureRange, Problem,
-    finite::first_not_finite_in, flags, keep_inside,
+    finite::first_not_finite_in, flags, keep_inside, peak,
 };
 use papilla_session_contact::{Finger, Frame, Taken};
 
@@ -80,11 +83,11 @@ pub struct Maps {
 
 /// What [`Maps::judge`] found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Judged {
+pub(crate) struct Judged {
     /// Bits of [`papilla_proto::flags`].
-    pub flags: u8,
+    pub(crate) flags: u8,
     /// Nothing touches the finger: SED is zero, and no network is to be asked.
-    pub is_zero: bool,
+    pub(crate) is_zero: bool,
 }
 
 impl Default for Maps {
@@ -147,7 +150,7 @@ impl Maps {
     }
 
     /// Judges the pressure by what the network was trained on, and clamps it if `range` says so.
-    pub fn judge(
+    pub(crate) fn judge(
         &mut self,
         summary: MapSummary,
         range: PressureRange,
@@ -188,8 +191,8 @@ impl Maps {
     /// no indentation makes tissue store more energy than the square of the pressure allows. To be
     /// asked after [`infer`](Self::infer), before anything is added to SED.
     #[must_use]
-    pub fn judge_answer(&self, response_max_per_mpa: Option<f32>) -> u8 {
-        let top = self.sed_j_per_m3.iter().fold(0.0_f32, |a, b| a.max(*b));
+    pub(crate) fn judge_answer(&self, response_max_per_mpa: Option<f32>) -> u8 {
+        let top = peak(&self.sed_j_per_m3);
         let is_beyond = |most: f32| {
             let peak_mpa = 1e-6 * self.seen_peak_pa;
             // SED in MPa: 1 J/m3 is 1 Pa.
@@ -199,13 +202,13 @@ impl Maps {
     }
 
     /// Adds to SED what traction along the skin changes, if the finger is to feel it.
-    pub fn feel_shear(&mut self, finger: &mut Finger, range: PressureRange) {
+    pub(crate) fn feel_shear(&mut self, finger: &mut Finger, range: PressureRange) {
         let seen_pa = if self.is_clamped { &self.clamped_pa } else { &self.pressure_pa };
         finger.feel_shear(seen_pa, range, &mut self.sed_j_per_m3);
     }
 
     /// Turns pressure and SED of the finger of reference stiffness into this person's.
-    pub fn to_person(&mut self, finger: &Finger) {
+    pub(crate) fn turn_to_person(&mut self, finger: &Finger) {
         finger.to_person(&mut self.pressure_pa);
         finger.to_person(&mut self.sed_j_per_m3);
     }

@@ -7,7 +7,7 @@ use papilla_engine::{MAP_LEN, ladder::Kind};
 use papilla_model_export::dataset::Dataset;
 use papilla_model_export::{read_text, write};
 use papilla_progress::Progress;
-use papilla_proto::InputStatistics;
+use papilla_proto::{InputStatistics, peak};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -117,10 +117,9 @@ fn look(folder: &Path, hidden: bool) -> anyhow::Result<(String, Greatest)> {
         for index in 0..indentation.samples {
             dataset.draw_pressure(indentation, &shard, index, &mut pressure_pa)?;
             dataset.draw_sed(indentation, &shard, index, &mut sed_j_per_m3)?;
-            let top = |map: &[f32]| map.iter().fold(0.0_f32, |a, b| a.max(*b));
             // J/m3 over Pa squared is 1/Pa.
-            let response_per_mpa = match top(&pressure_pa) {
-                peak_pa if peak_pa > 0.0 => 1e6 * (top(&sed_j_per_m3) / peak_pa) / peak_pa,
+            let response_per_mpa = match peak(&pressure_pa) {
+                peak_pa if peak_pa > 0.0 => 1e6 * (peak(&sed_j_per_m3) / peak_pa) / peak_pa,
                 _ => 0.0,
             };
             let input = InputStatistics::of(&pressure_pa);

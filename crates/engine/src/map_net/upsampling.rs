@@ -172,13 +172,7 @@ impl Upsampling {
         for channel in 0..self.channels {
             let lines = self.lines::<S>(channel, row, from, count);
             let components = &mut components[GROUP * channel * wide..][..GROUP * wide];
-            let (upper, lower) = components.split_at_mut(2 * wide);
-            let (a, b) = upper.split_at_mut(wide);
-            let (c, d) = lower.split_at_mut(wide);
-            let a = vectors_mut::<S>(&mut a[from..], count);
-            let b = vectors_mut::<S>(&mut b[from..], count);
-            let c = vectors_mut::<S>(&mut c[from..], count);
-            let d = vectors_mut::<S>(&mut d[from..], count);
+            let [a, b, c, d] = quarters::<S>(components, wide, from, count);
             for k in 0..count {
                 [a[k], b[k], c[k], d[k]] = phases(simd, &lines, k);
             }
@@ -196,13 +190,7 @@ impl Upsampling {
     ) {
         let (wide, from) = (self.side + MARGIN, columns.start);
         let count = columns.len().div_ceil(S::F32_LANES);
-        let (upper, lower) = sums.split_at_mut(2 * wide);
-        let (a, b) = upper.split_at_mut(wide);
-        let (c, d) = lower.split_at_mut(wide);
-        let a = vectors_mut::<S>(&mut a[from..], count);
-        let b = vectors_mut::<S>(&mut b[from..], count);
-        let c = vectors_mut::<S>(&mut c[from..], count);
-        let d = vectors_mut::<S>(&mut d[from..], count);
+        let [a, b, c, d] = quarters::<S>(sums, wide, from, count);
         for channel in 0..self.channels {
             let lines = self.lines::<S>(channel, row, from, count);
             for k in 0..count {
@@ -219,6 +207,20 @@ impl Upsampling {
             }
         }
     }
+}
+
+/// The four rows of a group, one after another, each from a column on.
+#[inline(always)]
+fn quarters<S: Simd>(
+    rows: &mut [f32],
+    wide: usize,
+    from: usize,
+    count: usize,
+) -> [&mut [S::f32s]; 4] {
+    let (upper, lower) = rows.split_at_mut(2 * wide);
+    let (a, b) = upper.split_at_mut(wide);
+    let (c, d) = lower.split_at_mut(wide);
+    [a, b, c, d].map(|row| vectors_mut::<S>(&mut row[from..], count))
 }
 
 /// A row and its neighbours, each interpolated to the left and to the right.

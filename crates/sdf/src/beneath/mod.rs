@@ -348,11 +348,8 @@ impl<B: Body> Search<'_, B> {
             at = along(at, share, step);
             let to = minus(at, self.p);
             let length_mm = norm(to);
-            if !(length_mm < best.length_mm) {
-                break;
-            }
-            if length_mm <= INSIDE_MM {
-                // A foot of `p` is covered: `p` is between bodies that touch, not in the air.
+            // At `p` itself it is between bodies that touch, not in the air: a foot of `p` is covered.
+            if !(length_mm < best.length_mm) || length_mm <= INSIDE_MM {
                 break;
             }
             let gained = best.length_mm - length_mm;
