@@ -5,10 +5,10 @@
 
 In every tracked Markdown file each relative link leads to a file or folder of the repository and
 each anchor to a heading. Hand-written files keep to LINE_MAX columns outside of tables, code and
-links. Reports (docs/reports) are written by commands: of them only links are looked at. No text of
-a plot (docs/**/*.svg) is cut off by the picture's edge. The number of words has no limit; --words
-prints each file's. A word is anything between blanks that holds a letter; tables count, fenced
-code, comments and the targets of links do not.
+links. Reports (docs/reports, studies/reports) are written by commands: of them only links are
+looked at. No text of a plot (an .svg of docs or studies) is cut off by the picture's edge. The
+number of words has no limit; --words prints each file's. A word is anything between blanks that
+holds a letter; tables count, fenced code, comments and the targets of links do not.
 Exit code 1 if a rule is broken.
 """
 
@@ -22,7 +22,7 @@ from urllib.parse import unquote
 ROOT = Path(__file__).resolve().parents[2]
 LINE_MAX = 100
 # Files that a command writes.
-GENERATED = re.compile(r"docs/reports/")
+GENERATED = re.compile(r"(docs|studies)/reports/")
 # Heads of such files; they are looked at where they end up.
 HEADS = re.compile(r".*/(introduction|head)\.md$")
 FENCE = re.compile(r"^\s*(```+|~~~+)")
@@ -132,7 +132,7 @@ def main() -> int:
         wrong += [f"{name}:{rule}" for rule in rules]
     if "--words" in sys.argv[1:]:
         print("\n".join(f"{count:6} {name}" for name, count in counts.items()))
-    for path in sorted((ROOT / "docs").rglob("*.svg")):
+    for path in sorted(plot for folder in ("docs", "studies") for plot in (ROOT / folder).rglob("*.svg")):
         wrong += [f"{path.relative_to(ROOT)}: {fault}" for fault in cut_off(path.read_text())]
     total = sum(counts.values())
     print("\n".join(wrong))

@@ -10,7 +10,7 @@ import { MAP_LEN, toHalf } from '../src/wire.js';
 import { launch, openPage } from './browser.js';
 
 const page = await readFile(new URL('../../../docs/reference/clients/web.md', import.meta.url), 'utf8');
-const penetration = await readFile(new URL('../../../docs/reports/penetration.md', import.meta.url), 'utf8');
+const penetration = await readFile(new URL('../../../studies/reports/penetration.md', import.meta.url), 'utf8');
 
 test('f16 rounds to the nearest, ties to even, and clamps', () => {
   for (const [value, bits] of [[0, 0], [1, 0x3c00], [65504, 0x7bff], [1e9, 0x7bff], [-1, 0xbc00], [2 ** -24, 1], [2 ** -25, 0],

@@ -1,4 +1,4 @@
-//! Writes `docs/reports/spikes.md`: TouchSim's values, pins against SED, the time of a frame.
+//! Writes `studies/reports/spikes.md`: TouchSim's values, pins against SED, the time of a frame.
 
 use std::{fs, time::Instant};
 
@@ -15,7 +15,7 @@ const HEAD: &str = "\
 Written by
 
 ```sh
-cargo run --release -p papilla-afferents --example report > docs/reports/spikes.md
+cargo run --release -p papilla-afferents --example report > studies/reports/spikes.md
 ```
 
 ## Against TouchSim

@@ -1,7 +1,7 @@
 //! The baseline: a spring for each vertex.
 //!
 //! `p = k max(0, d - relief d_max)^n` with the penetration `d` of the undeformed vertex and that
-//! of the deepest one. Constants are a fit to FE indentations: `docs/reports/penetration.md`.
+//! of the deepest one. Constants are a fit to FE indentations: `studies/reports/penetration.md`.
 
 use crate::answer::{Contact, Person};
 use crate::model::ContactModel;

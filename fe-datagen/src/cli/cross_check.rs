@@ -14,7 +14,7 @@ use std::process::ExitCode;
 /// how far they may be. Says so and stops if there is no CalculiX.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit code 3 if any row is past its tolerance. docs/reports/calculix.md says what each row \
+    after_help = "Exit code 3 if any row is past its tolerance. studies/reports/calculix.md says what each row \
                   shows.\nExample: fe-datagen cross-check --only sphere --keep out/calculix"
 )]
 pub(super) struct Args {

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 /// fingers, then the shares of relaxation to the energy lost in a tap.
 ///
 /// Writes fit.json, fit.md, materials.toml (tables for a scene) and a file a press; see
-/// docs/reports/fit.md. No chance in it: the same measurements give the same constants. Can be killed
+/// studies/reports/fit.md. No chance in it: the same measurements give the same constants. Can be killed
 /// at any moment and started again: what is pressed is not pressed again.
 #[derive(clap::Args)]
 #[command(after_help = "Example: fe-datagen fit --out out/fit")]

@@ -9,7 +9,7 @@ use papilla_validation::wedge::run as simulate;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Reproduce the wedge of Chen, Shuai & Zhu (docs/reports/wedge.md).
+/// Reproduce the wedge of Chen, Shuai & Zhu (studies/reports/wedge.md).
 ///
 /// Presses their wedge 1 mm into the section in 1 s and holds it for 10 s; writes
 /// their figures 2(a), 2(b) and 3 as .svg and .csv, and s2.json. Exits with 3 if

@@ -26,7 +26,7 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 1, value_name = "N")]
     every: usize,
     /// The page; its pictures go into `pictures/actuators` beside it.
-    #[arg(long, default_value = "docs/reports/actuators.md", value_name = "FILE")]
+    #[arg(long, default_value = "studies/reports/actuators.md", value_name = "FILE")]
     markdown: PathBuf,
 }
 

@@ -10,7 +10,7 @@ pub(crate) struct Options {
     #[arg(required = true, value_name = "MODEL")]
     models: Vec<PathBuf>,
     /// The page.
-    #[arg(long, default_value = "docs/reports/operators.md", value_name = "FILE")]
+    #[arg(long, default_value = "studies/reports/operators.md", value_name = "FILE")]
     markdown: PathBuf,
 }
 

@@ -30,7 +30,7 @@ pub enum MaterialSet {
     /// Prony series too).
     #[default]
     Papers,
-    /// Soft tissues fitted to what was measured on people (docs/reports/fit.md), for the effects
+    /// Soft tissues fitted to what was measured on people (studies/reports/fit.md), for the effects
     /// `hyperelastic` and `viscoelastic`.
     People,
 }
@@ -97,7 +97,7 @@ impl MaterialSet {
 }
 
 /// Epidermis, dermis and fat of [`MaterialSet::People`]: what `fe-datagen fit` writes, and the values
-/// that it holds (docs/reports/fit.md).
+/// that it holds (studies/reports/fit.md).
 fn people() -> [MaterialSpec; 3] {
     let prony = PronySpec {
         share: vec![0.925, 0.025, 0.025],

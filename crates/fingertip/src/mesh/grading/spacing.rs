@@ -1,6 +1,6 @@
 //! How closely the skin has to be meshed under an indenter.
 //!
-//! A plane section pressed by a plate, bars, a punch and an edge (docs/reports/section-study.md)
+//! A plane section pressed by a plate, bars, a punch and an edge (studies/reports/section-study.md)
 //! needs a node spacing of some `0.14 sqrt(R)` mm, `R` the indenter's radius of curvature in mm,
 //! for SED within 5 % at the interface. Away from what is touched spacing may grow.
 

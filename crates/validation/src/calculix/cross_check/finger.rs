@@ -56,10 +56,10 @@ const BAR: Press = Press {
 };
 
 /// The 0.5 % and 2 % of the other cases do not hold on a mesh this coarse, with one
-/// quadratic element through each layer: docs/reports/calculix.md.
+/// quadratic element through each layer: studies/reports/calculix.md.
 const EVEN: Tolerance = Tolerance { force: 5e-2, displacement: 8e-2, sed: 2e-1, limit: None };
 /// On meshes whose cells are halved under what touches. The 0.5 % of force and 3 % of SED that are
-/// expected hold on `FINE`, the reference's: docs/reports/calculix.md.
+/// expected hold on `FINE`, the reference's: studies/reports/calculix.md.
 const COARSE: Tolerance =
     Tolerance { force: 2e-2, displacement: 4e-2, sed: 2e-1, limit: Some(1.5e-1) };
 const MEDIUM: Tolerance =
