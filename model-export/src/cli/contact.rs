@@ -63,13 +63,13 @@ pub(crate) fn run(options: &Options, json: bool) -> anyhow::Result<()> {
         return print_json(&rows);
     }
     println!(
-        "| rung | set | pressure, % | force, % | SED, % | cold, us | warm, us | 1 um, % | flagged |"
+        "| method | set | pressure, % | force, % | SED, % | first frame, us | next frame, us | 1 um aside, % | flagged |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     rows.iter().for_each(print_row);
     println!(
-        "\nRelative L2 against FE and processor time, median / 95 %; by how much 1 um sideways changes \
-         the pressure, median / most; unsettled + out of range of all."
+        "\nRelative L2 against FE and processor time, median / 95th percentile; by how much 1 um sideways changes \
+         the pressure, median / greatest; unsettled + out of range, of all states."
     );
     Ok(())
 }
