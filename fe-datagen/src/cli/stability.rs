@@ -41,11 +41,11 @@ pub(super) struct Args {
     /// Print the lines as JSON.
     #[arg(long)]
     json: bool,
-    /// Write stability.md and stability.json into this folder; with --scenes the scenes'
+    /// Write stability.md, .csv and .json into this folder; with --scenes the scenes'
     /// record, by which a later run goes on.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Also write the report as Markdown to this file.
+    /// Also write the report as Markdown to this file, and all variants beside it as .csv.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
     /// Press this many random scenes of --campaign, to their deepest state.
@@ -140,9 +140,11 @@ fn suite(args: &Args) -> anyhow::Result<ExitCode> {
         atomic::create_folder(folder)?;
         atomic::write_json(&folder.join("stability.json"), &report)?;
         write(&folder.join("stability.md"), &report.markdown())?;
+        write(&folder.join("stability.csv"), &report.csv())?;
     }
     if let Some(path) = &args.markdown {
         write(path, &report.markdown())?;
+        write(&path.with_extension("csv"), &report.csv())?;
     }
     print(&report, args.json, || report.summary())?;
     Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })

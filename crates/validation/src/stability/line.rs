@@ -147,10 +147,7 @@ impl Line {
     /// The check that is nearest to its tolerance, or farthest past it.
     #[must_use]
     pub fn tightest(&self) -> Option<&Check> {
-        let strain = |c: &Check| if c.pass { c.difference / c.tolerance } else { f64::INFINITY };
-        // A band has no tolerance: 0 / 0 counts as no strain.
-        let order = |c: &Check| if strain(c).is_nan() { 0.0 } else { strain(c) };
-        self.checks.iter().max_by(|a, b| order(a).total_cmp(&order(b)))
+        self.checks.iter().max_by(|a, b| strain(a).total_cmp(&strain(b)))
     }
 
     /// The line for a terminal.
@@ -191,6 +188,13 @@ impl Line {
     }
 }
 
+/// Share of its tolerance that a check uses up; infinite where it does not pass.
+pub(super) fn strain(c: &Check) -> f64 {
+    let share = if c.pass { c.difference / c.tolerance } else { f64::INFINITY };
+    // A band has no tolerance: 0 / 0 counts as no strain.
+    if share.is_nan() { 0.0 } else { share }
+}
+
 /// What a refusal says, without the lines of the scene that it points at.
 pub(super) fn first_line(text: &str) -> &str {
     text.lines().next().unwrap_or("")
@@ -201,7 +205,7 @@ pub(super) fn comparison(c: &Check) -> String {
     if c.tolerance == 0.0 {
         format!("{}: {:.6e} ({})", c.quantity, c.value, c.source)
     } else {
-        format!("{}: {:.1e} of {:.0e} ({})", c.quantity, c.difference, c.tolerance, c.source)
+        format!("{}: {:.1e} of {:e} ({})", c.quantity, c.difference, c.tolerance, c.source)
     }
 }
 

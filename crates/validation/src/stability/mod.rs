@@ -87,48 +87,51 @@ pub struct Case {
 pub const CASES: &[Case] = &[
     Case {
         name: "incompressible",
-        promise: "No locking from nu = .49 to .49999: Cook's membrane and a squeezed block give the \
-                  tip and the force of quadratic elements.",
+        promise: "Up to a Poisson's ratio of .49999 nothing locks: Cook's membrane and a \
+                  squeezed block give the tip and the force of quadratic elements.",
         run: incompressible::run,
     },
     Case {
         name: "thin-layer",
-        promise: "Elements 50 times as wide as thick, in an epidermis of .02 mm, give the force of \
-                  quadratic ones and balance.",
+        promise: "An epidermis of .02 mm, whose elements are 50 times as wide as thick, gives \
+                  the force of quadratic elements and balances.",
         run: bodies::thin_layer,
     },
     Case {
         name: "elastic-bone",
-        promise: "Beside elastic bone 5e5 to 5e6 times as stiff as fat, the indentation tends to the one \
-                  on a rigid bone as 1 / E.",
+        promise: "With elastic bone 5e5 to 5e6 times as stiff as fat, the solution tends to that \
+                  on rigid bone as 1 / E.",
         run: bodies::elastic_bone,
     },
     Case {
         name: "ogden",
-        promise: "alpha = 25 and negative mu, at the edge of stability and far beyond: finite, \
-                  flagged where outside the calibrated stretches, closed form within.",
+        promise: "Ogden's law with alpha = 25 or negative mu, at the edge of stability and far \
+                  beyond: results are finite, flagged outside of the calibrated stretches, and \
+                  those of the closed form within.",
         run: ogden::run,
     },
     Case {
         name: "equal-stretches",
-        promise: "Stress and tangent at principal stretches that differ by 0, 1e-16 ... 1e-6 are \
-                  those of the limit and of a law that knows no principal stretches.",
+        promise: "At principal stretches that differ by 0 to 1e-6, stress and tangent are those \
+                  of the limit, and of a law without principal stretches.",
         run: stretches::run,
     },
     Case {
         name: "volume",
-        promise: "J from 1 down to .05 on distorted meshes follows the closed form from a single \
-                  increment; J below 0 is refused.",
+        promise: "A confined body squeezed to a volume ratio J of .05 on distorted meshes \
+                  follows the closed form; J below 0 is refused.",
         run: volume::run,
     },
     Case {
         name: "one-increment",
-        promise: "2 mm in one increment ends in the state that ten increments end in.",
+        promise: "An indenter that goes 2 mm deep in one increment ends in the state that ten \
+                  increments end in.",
         run: indentation::one_increment,
     },
     Case {
         name: "deep",
-        promise: "3 mm, near the bone: balances hold, no element inverts, quadratic elements agree.",
+        promise: "At 3 mm depth, near the bone, balances hold, no element inverts, and quadratic \
+                  elements agree.",
         run: indentation::deep,
     },
     Case {
@@ -139,79 +142,83 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "sharp-wedge",
-        promise: "An edge of 2 mm across faces of 1 and .73 mm keeps its hold: it balances, to the \
-                  force of a finer mesh. Wedges with tips of .05 and .005 mm balance, or are \
-                  refused with the depth that was not reached; one that fits between nodes is \
-                  refused before anything is solved.",
+        promise: "A ruler 2 mm thick across faces of 1 and .73 mm balances and has the force of a \
+                  finer mesh. Wedges with tips of .05 and .005 mm balance, or are refused with \
+                  the depth that was not reached. One that fits between nodes is refused before \
+                  anything is solved.",
         run: edges::run,
     },
     Case {
         name: "contact-lost",
-        promise: "Contact lost leaves a body at rest, contact regained gives the first state again.",
+        promise: "Without contact the body is at rest again; pressed again, it is in the first \
+                  state again.",
         run: touch::lost_and_regained,
     },
     Case {
         name: "grazing",
-        promise: "A graze of one face gives a force that rises smoothly from nothing.",
+        promise: "If an indenter grazes one face, the force rises smoothly from nothing.",
         run: touch::grazing,
     },
     Case {
         name: "first-gap",
-        promise: "First contact from a gap of 1e-9 mm and of 5 mm ends where contact from no gap \
-                  ends.",
+        promise: "First contact from a gap of 1e-9 mm, 5 mm or 100 mm ends where contact without \
+                  a gap ends.",
         run: touch::gaps,
     },
     Case {
         name: "penetration",
-        promise: "An indenter that starts inside the body is refused, or pushed out to the state of \
-                  one that came from outside: never silent.",
+        promise: "An indenter that starts inside the body is refused, or pushed out to the state \
+                  of one that came from outside.",
         run: touch::penetration,
     },
     Case {
         name: "time-steps",
-        promise: "A ramp of 1e-6 s finds the instantaneous modulus, one of 1e6 s the long-term one, \
-                  in a bounded number of steps.",
+        promise: "A ramp of 1e-6 s finds the instantaneous modulus, one of 1e6 s the long-term \
+                  one, in a bounded number of steps.",
         run: history::durations,
     },
     Case {
         name: "relaxation-times",
-        promise: "Tiny and huge relaxation times reach their limits, zero and nonsense are refused.",
+        promise: "Tiny and huge relaxation times reach their limits; zero and nonsense are \
+                  refused.",
         run: history::relaxation_times,
     },
     Case {
         name: "friction",
-        promise: "Coefficients 0, 1e-9, 1 and 10: no drag, Coulomb's drag, Coulomb's drag, a glued \
-                  block's force.",
+        promise: "A block that is dragged has no drag at a coefficient of friction of 0, \
+                  Coulomb's drag at 1e-9 and 1, and the force of a glued block at 10.",
         run: friction::run,
     },
     Case {
         name: "free-modes",
-        promise: "A body, or a part of one, that nothing holds is refused, and the motion that is \
-                  free is named.",
+        promise: "A body, or a part of one, that nothing holds is refused, and the free motion \
+                  is named.",
         run: bodies::free_modes,
     },
     Case {
         name: "mesh-files",
-        promise: "Inverted, duplicate and sliver elements, loose parts and absurd scales in a .msh \
-                  file are refused with line and cure.",
+        promise: "Inverted, duplicate and sliver elements, loose parts and absurd scales in a \
+                  .msh file are refused with line and cure.",
         run: files::run,
     },
     Case {
         name: "units",
-        promise: "Values off by a factor of 1000 and more are refused with the unit that was meant.",
+        promise: "Values that are wrong by a factor of 1000 or more are refused, and the unit \
+                  that was meant is named.",
         run: units::run,
     },
     Case {
         name: "snap-through",
-        promise: "A shallow arch below its limit load is where the controlled path says; above it, \
-                  it is on the far branch of that path or refused at the limit load.",
+        promise: "A shallow arch below its limit load is where the path under control of \
+                  displacement says. Above it, the arch is on the far branch of that path, or \
+                  refused at the limit load.",
         run: snap::run,
     },
     Case {
         name: "differential",
-        promise: "Random small problems: loose and tight tolerances, one step and many, three \
-                  elimination orders, one and two threads, linear and quadratic elements agree; \
-                  a second run repeats bit for bit.",
+        promise: "Random small problems agree for loose and tight tolerances, one step and many, \
+                  three elimination orders, one and two threads, linear and quadratic elements. \
+                  A second run repeats bit for bit.",
         run: differential::run,
     },
 ];

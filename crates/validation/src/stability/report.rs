@@ -1,13 +1,23 @@
 //! The table of all lines.
 
-use super::line::{comparison, first_line};
-use super::{CASES, End, Extent, Line};
+use super::line::{comparison, first_line, strain};
+use super::{CASES, End, Extent, Hardness, Line};
 use crate::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 
 /// Head of docs/reports/stability.md up to the table.
 const INTRODUCTION: &str = include_str!("introduction.md");
+
+/// Head of the table of cases.
+const CASES_HEAD: &str = "\
+| case | what is promised | variants | converged or evaluated | refused | iterations | smallest J | condition | nearest to its tolerance |
+|---|---|---|---|---|---|---|---|---|
+";
+
+/// Head of the table of variants, docs/reports/stability.csv.
+const VARIANTS_HEAD: &str = "case,variant,end,error,iterations,steps,cuts,smallest J,condition at least,\
+worse balance,nearest to its tolerance,promise\n";
 
 /// Every line of one run.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -45,24 +55,64 @@ impl Report {
         self.lines.iter().filter(move |l| l.case == case)
     }
 
-    /// docs/reports/stability.md: a section a case.
+    /// docs/reports/stability.md: a row a case.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut out = String::from(INTRODUCTION);
-        let _ = writeln!(out, "\n{}. {}.\n", self.summary(), today_here());
+        out.push('\n');
+        out += CASES_HEAD;
         for case in CASES {
             let lines: Vec<_> = self.of(case.name).collect();
-            let Some(first) = lines.first() else { continue };
-            let _ =
-                writeln!(out, "## `{}`\n\n{} ({:.1} s)\n", case.name, case.promise, first.seconds);
-            out += "| variant | end | iterations | steps, cuts | J min | condition | balances | tightest check | |\n";
-            out += "|---|---|---|---|---|---|---|---|---|\n";
-            for line in lines {
-                out += &line.row();
+            if !lines.is_empty() {
+                let _ = writeln!(out, "{}", row(case.name, case.promise, &lines));
             }
-            out.push('\n');
+        }
+        let _ = writeln!(out, "\n{}. {}.", self.summary(), today_here());
+        out
+    }
+
+    /// docs/reports/stability.csv: a row a variant.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut out = String::from(VARIANTS_HEAD);
+        for line in &self.lines {
+            out += &line.csv_row();
         }
         out
+    }
+}
+
+/// A case in the page.
+fn row(name: &str, promise: &str, lines: &[&Line]) -> String {
+    let hard: Vec<&Hardness> = lines.iter().filter_map(|line| line.hardness.as_ref()).collect();
+    let refused = lines.iter().filter(|line| matches!(line.end, End::Refused(_))).count();
+    let broken = lines.iter().filter(|line| line.is_broken()).count();
+    let [iterations, j, condition] = if hard.is_empty() {
+        <[String; 3]>::default()
+    } else {
+        let iterations = hard.iter().map(|h| h.newton_iterations).max().unwrap_or_default();
+        let j = hard.iter().map(|h| h.j_min).fold(f64::INFINITY, f64::min);
+        let condition = hard.iter().map(|h| h.condition_at_least).fold(0.0, f64::max);
+        [iterations.to_string(), format!("{j:.4}"), format!("{condition:.1e}")]
+    };
+    let nearest = lines.iter().filter_map(|line| line.tightest());
+    let nearest = nearest.max_by(|a, b| strain(a).total_cmp(&strain(b)));
+    let nearest = nearest.map_or_else(String::new, comparison).replace('|', "\\|");
+    let breaking = lines.iter().filter(|line| !line.kept).count();
+    let warning = if breaking > 0 { format!("; **{breaking} break it**") } else { String::new() };
+    format!(
+        "| `{name}` | {promise} | {}{warning} | {} | {refused} | {iterations} | {j} | {condition} | {nearest} |",
+        lines.len(),
+        lines.len() - refused - broken,
+    )
+}
+
+/// A field of a CSV file.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
     }
 }
 
@@ -71,31 +121,31 @@ impl Line {
         matches!(self.end, End::Broken(_))
     }
 
-    fn row(&self) -> String {
-        let end = match &self.end {
-            End::Converged => "converged".into(),
-            End::Evaluated => "evaluated".into(),
-            End::Refused(why) => format!("refused: *{}*", first_line(why)),
-            End::Broken(what) => format!("**broken: {what}**"),
+    fn csv_row(&self) -> String {
+        let (end, error) = match &self.end {
+            End::Converged => ("converged", ""),
+            End::Evaluated => ("evaluated", ""),
+            End::Refused(why) => ("refused", first_line(why)),
+            End::Broken(what) => ("broken", what.as_str()),
         };
         let number = |v: f64| if v.is_nan() { String::new() } else { format!("{v:.1e}") };
-        let [iterations, steps, j, condition, balances] =
+        let [iterations, steps, cuts, j, condition, balance] =
             self.hardness.as_ref().map_or_else(Default::default, |h| {
                 [
                     h.newton_iterations.to_string(),
-                    format!("{}, {}", h.steps, h.cuts),
+                    h.steps.to_string(),
+                    h.cuts.to_string(),
                     format!("{:.4}", h.j_min),
                     number(h.condition_at_least),
                     number(h.balance_worst),
                 ]
             });
         let check = self.tightest().map_or_else(String::new, comparison);
-        let verdict = if self.kept { "kept" } else { "**broken**" };
+        let promise = if self.kept { "kept" } else { "broken" };
+        let [variant, error, check] = [self.variant.as_str(), error, check.as_str()].map(quoted);
         format!(
-            "| {} | {} | {iterations} | {steps} | {j} | {condition} | {balances} | {} | {verdict} |\n",
-            self.variant,
-            end.replace('|', "\\|"),
-            check.replace('|', "\\|"),
+            "{},{variant},{end},{error},{iterations},{steps},{cuts},{j},{condition},{balance},{check},{promise}\n",
+            self.case
         )
     }
 }
@@ -104,15 +154,30 @@ impl Line {
 mod tests {
     use super::*;
 
-    /// The page is written by minutes of solving; its words are those of this file.
+    /// Page and table are written by minutes of solving; their words are those of this file.
     #[test]
-    fn the_committed_page_begins_as_a_new_one_would() {
+    fn the_committed_page_is_of_the_committed_variants() {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reports/stability.md");
         let page = std::fs::read_to_string(root).unwrap();
         assert!(page.starts_with(INTRODUCTION), "fe-datagen stability --markdown {root}");
+        assert!(page.contains(CASES_HEAD), "fe-datagen stability --markdown {root}");
+        let variants = std::fs::read_to_string(root.replace(".md", ".csv")).unwrap();
+        let rows = variants.strip_prefix(VARIANTS_HEAD).unwrap();
+        let mut all = 0;
         for case in CASES {
-            let head = format!("## `{}`\n\n{} (", case.name, case.promise);
-            assert!(page.contains(&head), "{head}");
+            let of_case = |line: &&str| line.starts_with(&format!("{},", case.name));
+            let count = rows.lines().filter(of_case).count();
+            let row = format!("| `{}` | {} | {count} |", case.name, case.promise);
+            assert!(page.contains(&row), "{row}");
+            all += count;
         }
+        assert_eq!(all, rows.lines().count(), "a case that is no more");
+        assert!(rows.lines().all(|row| row.ends_with(",kept")), "a promise that is broken");
+    }
+
+    #[test]
+    fn fields_with_commas_are_quoted() {
+        assert_eq!(quoted("plain"), "plain");
+        assert_eq!(quoted("a, \"b\""), "\"a, \"\"b\"\"\"");
     }
 }

@@ -95,8 +95,9 @@ impl ScenesReport {
         let Self { of, scenes, now, counted, first_run, .. } = self;
         let mut out = format!(
             "# Random scenes\n\n\
-             `fe-datagen stability --scenes {scenes} --seed {}` ([the suite](stability.md)): {of}.\n\n\
-             | | as they end now | when first run, of the {counted} nothing had been mended for |\n\
+             **Question.** Does every random scene converge and balance ([method and \
+             command](stability.md#random-scenes))?\nThese scenes: {of} (`--scenes {scenes} --seed {}`).\n\n\
+             | | as they end now | when first run: the {counted} for which nothing had been changed |\n\
              |---|---|---|\n| scenes | {scenes} | {counted} |\n\
              | converged, every balance kept | {} | {} |\n",
             of.seed, now.balanced, first_run.balanced
@@ -107,9 +108,9 @@ impl ScenesReport {
         let verdict = if self.passed() { "met" } else { "**not met**" };
         let _ = write!(
             out,
-            "\nThe criterion (99.9 % converge, each of them balances, no panic) is {verdict} as they \
-             end now.\nOf all scenes drawn like these, at most **{:.3} %** fail when first run, at 95 % \
-             confidence\n(Clopper and Pearson's bound of {} among {counted}, which takes the scenes for \
+            "\nThe criterion is {verdict} now: 99.9 % converge, each of them balances, and nothing \
+             panics. At 95 %\nconfidence at most **{:.3} %** of all scenes drawn like these fail when \
+             first run (bound of Clopper and\nPearson for {} among {counted}, which takes the scenes for \
              independent).\n",
             100.0 * self.failing_at_most,
             first_run.failed(),
@@ -117,16 +118,16 @@ impl ScenesReport {
         if let Some(MendedOn { scenes, failed }) = of.mended_on {
             let _ = writeln!(
                 out,
-                "Not counted are the first {scenes}: {failed} of them failed, the solver was mended on \
-                 them, and their first\nlines are lost."
+                "The first {scenes} do not count: {failed} of them failed, and the solver was changed on \
+                 them. Their first\nrecords are lost."
             );
         }
         let _ = write!(
             out,
-            "\nVersion, contact rule and attempts are recorded for {} of {scenes} scenes, of which {} took \
-             more than one\nattempt; the other lines say `unrecorded`.\n\n\
-             Iterations are those of the path that was kept, seconds of processor time those of every \
-             path taken.\n\n",
+            "\nThe record names version, contact rule and attempts of {} of {scenes} scenes; {} of these \
+             took more than\none attempt.\n\n\
+             Iterations are those of Newton's method on the path that was kept. Times are processor \
+             times of all paths\nof a scene.\n\n",
             self.recorded, self.retried
         );
         out += &table::markdown(&self.indenters);

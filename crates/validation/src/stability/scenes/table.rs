@@ -74,7 +74,7 @@ impl Row {
 /// The rows as a table of the page in docs/reports.
 pub(super) fn markdown(rows: &[Row]) -> String {
     let mut out = String::from(
-        "| indenter | scenes | balanced | with cuts | iterations, median | most | smallest J | s a scene | slowest |\n\
+        "| indenter | scenes | balanced | with halved steps | iterations, median | most | smallest volume ratio | mean time, s | longest, s |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows {
