@@ -19,6 +19,7 @@
 pub mod acceptance;
 pub mod calculix;
 pub mod convergence;
+mod csv;
 pub mod effect_study;
 pub mod finger_maps;
 pub mod part;

@@ -13,7 +13,7 @@ use std::process::ExitCode;
 /// from, how far apart they are and how far they may be.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Exit code 3 if any row is past its tolerance. docs/reports/verification.md says what each row \
+    after_help = "Exit code 3 if any row is past its tolerance. docs/reports/verification.md says what each case \
                         shows.\nExample: fe-datagen verify --only hertz --only cook"
 )]
 pub(super) struct Args {
@@ -23,7 +23,7 @@ pub(super) struct Args {
     /// Smaller meshes and indentations, without the cases that have no small form: for a test run.
     #[arg(long)]
     quick: bool,
-    /// Also write the table as Markdown to this file.
+    /// Also write the cases as Markdown to this file, and all rows beside it as .csv.
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
     /// Print the rows as JSON.
@@ -55,8 +55,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     });
     drop(progress);
     if let Some(path) = &args.markdown {
-        std::fs::write(path, report.markdown())
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        let table = path.with_extension("csv");
+        for (path, text) in [(path, report.markdown()), (&table, report.csv())] {
+            std::fs::write(path, text)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
     }
     print(&report, args.json, || report.summary())?;
     Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::from(CHECKS_FAILED) })

@@ -147,7 +147,7 @@ impl Line {
     /// The check that is nearest to its tolerance, or farthest past it.
     #[must_use]
     pub fn tightest(&self) -> Option<&Check> {
-        self.checks.iter().max_by(|a, b| strain(a).total_cmp(&strain(b)))
+        self.checks.iter().max_by(|a, b| a.strain().total_cmp(&b.strain()))
     }
 
     /// The line for a terminal.
@@ -186,13 +186,6 @@ impl Line {
         }
         out
     }
-}
-
-/// Share of its tolerance that a check uses up; infinite where it does not pass.
-pub(super) fn strain(c: &Check) -> f64 {
-    let share = if c.pass { c.difference / c.tolerance } else { f64::INFINITY };
-    // A band has no tolerance: 0 / 0 counts as no strain.
-    if share.is_nan() { 0.0 } else { share }
 }
 
 /// What a refusal says, without the lines of the scene that it points at.

@@ -1,7 +1,8 @@
 //! The table of all lines.
 
-use super::line::{comparison, first_line, strain};
+use super::line::{comparison, first_line};
 use super::{CASES, End, Extent, Hardness, Line};
+use crate::csv::quoted;
 use crate::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
@@ -96,7 +97,7 @@ fn row(name: &str, promise: &str, lines: &[&Line]) -> String {
         [iterations.to_string(), format!("{j:.4}"), format!("{condition:.1e}")]
     };
     let nearest = lines.iter().filter_map(|line| line.tightest());
-    let nearest = nearest.max_by(|a, b| strain(a).total_cmp(&strain(b)));
+    let nearest = nearest.max_by(|a, b| a.strain().total_cmp(&b.strain()));
     let nearest = nearest.map_or_else(String::new, comparison).replace('|', "\\|");
     let breaking = lines.iter().filter(|line| !line.kept).count();
     let warning = if breaking > 0 { format!("; **{breaking} break it**") } else { String::new() };
@@ -105,15 +106,6 @@ fn row(name: &str, promise: &str, lines: &[&Line]) -> String {
         lines.len(),
         lines.len() - refused - broken,
     )
-}
-
-/// A field of a CSV file.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
 }
 
 impl Line {
@@ -173,11 +165,5 @@ mod tests {
         }
         assert_eq!(all, rows.lines().count(), "a case that is no more");
         assert!(rows.lines().all(|row| row.ends_with(",kept")), "a promise that is broken");
-    }
-
-    #[test]
-    fn fields_with_commas_are_quoted() {
-        assert_eq!(quoted("plain"), "plain");
-        assert_eq!(quoted("a, \"b\""), "\"a, \"\"b\"\"\"");
     }
 }

@@ -93,6 +93,13 @@ impl Check {
         check
     }
 
+    /// Share of its tolerance that the check uses up; infinite where it does not pass.
+    pub(crate) fn strain(&self) -> f64 {
+        let share = if self.pass { self.difference / self.tolerance } else { f64::INFINITY };
+        // A band has no tolerance: 0 / 0 counts as no strain.
+        if share.is_nan() { 0.0 } else { share }
+    }
+
     /// A case that ended with an error.
     pub(crate) fn failed(error: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::new(format!("failed: {error}"), [f64::NAN, f64::NAN, f64::NAN, 0.0], "")

@@ -54,43 +54,45 @@ pub struct Case {
 pub const CASES: &[Case] = &[
     Case {
         name: "patch",
-        shows: "Any element reproduces constant strain exactly on a distorted mesh, at small and \
-                at finite deformation.",
+        shows: "Every element reproduces constant strain exactly on a distorted mesh, at small \
+                and at finite strain.",
         quick: true,
         run: patch::run,
     },
     Case {
         name: "uniaxial",
-        shows: "The material law and its stress: one element stretched and squeezed with free \
-                sides against the closed form.",
+        shows: "Material law and stress: one element stretched and squeezed with free sides, \
+                against the closed form.",
         quick: true,
         run: uniaxial::run,
     },
     Case {
         name: "ogden",
-        shows: "Both published Ogden laws: one element uniaxially, planar and equibiaxially \
-                strained against the closed form.",
+        shows: "Both published Ogden laws: one element in uniaxial, planar and equibiaxial \
+                strain, against the closed form.",
         quick: true,
         run: ogden::run,
     },
     Case {
         name: "relaxation",
         shows: "Prony series: a confined column relaxes under a held plate and creeps under a \
-                rising load as the closed forms say; energy is stored or dissipated, not lost.",
+                rising load as the closed forms say, and energy is stored or dissipated but \
+                not lost.",
         quick: true,
         run: relaxation::run,
     },
     Case {
         name: "tangent",
-        shows: "The assembled tangent is the derivative of the assembled residual, contact with a \
-                curved indenter included, so Newton's method converges as it should.",
+        shows: "The assembled tangent is the derivative of the assembled residual, also with \
+                contact of a curved indenter.",
         quick: true,
         run: tangent::run,
     },
     Case {
         name: "convergence",
-        shows: "Errors fall with mesh size at the order theory gives each element, on a curved \
-                finite-strain solution manufactured with its body force.",
+        shows: "Errors fall with the mesh size at the order that theory gives each element, \
+                for a curved solution at finite strain that was manufactured with its body \
+                force.",
         quick: true,
         run: manufactured::run,
     },
@@ -103,8 +105,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "ring",
-        shows: "A ring under internal pressure opens as Lame's solution says, in plane strain and \
-                nearly incompressible too.",
+        shows: "A ring under internal pressure opens as Lame's solution says, also in plane \
+                strain and nearly incompressible.",
         quick: true,
         run: ring::run,
     },
@@ -116,21 +118,22 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "hertz",
-        shows: "Contact: a rigid sphere on a half-space at small load, force and contact radius.",
+        shows: "Contact: force and contact radius of a rigid sphere on a half-space at small \
+                load.",
         quick: true,
         run: hertz::run,
     },
     Case {
         name: "coulomb",
-        shows: "Friction: a block that is dragged slips with Coulomb's force and sticks as if \
-                glued.",
+        shows: "Friction: a block that is dragged slips with Coulomb's force, and sticks as if \
+                it were glued.",
         quick: true,
         run: coulomb::run,
     },
     Case {
         name: "cylinder",
-        shows: "Line contact in plane strain: a rigid cylinder along a half-plane, half-width \
-                and pressure for its force.",
+        shows: "Line contact in plane strain: half-width and pressure of a rigid cylinder on a \
+                half-plane for its force.",
         quick: true,
         run: half_plane::cylinder,
     },
@@ -142,55 +145,57 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "punch",
-        shows: "A flat punch: force on a half-space, pressure on a half-plane and its growth \
-                at the edge as elements shrink.",
+        shows: "A flat punch: force on a half-space, pressure on a half-plane, and growth of \
+                the pressure at the edge as elements shrink.",
         quick: true,
         run: punch::run,
     },
     Case {
         name: "file",
-        shows: "A body from a Gmsh file: a two-layer block under a sphere is the block that this \
-                code makes itself.",
+        shows: "A body from a Gmsh file: a block of two layers under a sphere is the block \
+                that this code makes itself.",
         quick: true,
         run: file::run,
     },
     Case {
         name: "locking",
-        shows: "No volumetric locking: a bonded block at nu = 0.4999 squeezed by a plate, linear \
-                against quadratic elements, solid and in plane strain.",
+        shows: "No volumetric locking: a bonded block of Poisson's ratio 0.4999 squeezed by a \
+                plate, linear against quadratic elements, solid and in plane strain.",
         quick: true,
         run: locking::run,
     },
     Case {
         name: "balances",
-        shows: "An indentation of the fingertip balances at every equilibrium: plate against \
+        shows: "The fingertip under an indenter balances at every equilibrium: plate against \
                 supports, energy against work.",
         quick: true,
         run: balances::run,
     },
     Case {
         name: "density",
-        shows: "Force, pressure and SED of a flat indentation change less from medium to fine than \
-                from coarse to medium.",
+        shows: "Force, pressure and SED under a flat plate change less from the medium to the \
+                fine mesh than from the coarse to the medium one.",
         quick: false,
         run: density::run,
     },
     Case {
         name: "increments",
-        shows: "Pressure and SED of an elastic indentation do not depend on the number of increments.",
+        shows: "Pressure and SED of an elastic simulation do not depend on the number of \
+                increments.",
         quick: true,
         run: increments::run,
     },
     Case {
         name: "solid-parts",
-        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and bone \
-                carries as a rigid one does.",
+        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and \
+                the bone carries as a rigid one does.",
         quick: false,
         run: solid_parts::run,
     },
     Case {
         name: "mirror",
-        shows: "An indentation rolled to the left is the mirror image of one rolled to the right.",
+        shows: "A simulation with the finger rolled to the left is the mirror image of one \
+                rolled to the right.",
         quick: true,
         run: mirror::run,
     },
