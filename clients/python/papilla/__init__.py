@@ -5,6 +5,7 @@ out, both as arrays of 224 x 224 float32, row 0 at the fingertip's far end.
 
 - `sed(pressure_pa)`: one map over HTTP
 - `Session`, `AsyncSession`: many maps, or where things are, over a WebSocket; the latest frame wins
+- `render`: a series of frames in one call, as arrays with units and files (`Series`)
 - `SpikeTrains`: when the touch units of a finger fire, as files
 - `frames`: poses of engines and robots to the finger's frame, forces back
 - `Atlas`: which point of the finger each pixel is; pressure maps from vertices or contact points
@@ -14,8 +15,22 @@ from . import frames
 from .aio import AsyncSession
 from .answer import Answer, Problem, Summary, Touch
 from .atlas import Atlas, Contact
-from .errors import BadAddress, BadFrame, Closed, NotCarried, NotRendered, PapillaError, Refused, Unreachable
+from .errors import (
+    BadAddress,
+    BadFrame,
+    BadInput,
+    Closed,
+    FrameFailed,
+    MissingExtra,
+    NotCarried,
+    NotRendered,
+    PapillaError,
+    Refused,
+    Unreachable,
+)
 from .http import DEFAULT_URL, Indentation, indentation, post, sed
+from .render import render, render_chunks
+from .series import Series
 from .spikes import Spikes, SpikeTrains
 from .sync import Session
 from .wire import SIDE_PX
@@ -28,14 +43,18 @@ __all__ = [
     "Atlas",
     "BadAddress",
     "BadFrame",
+    "BadInput",
     "Closed",
     "Contact",
+    "FrameFailed",
     "Indentation",
+    "MissingExtra",
     "NotCarried",
     "NotRendered",
     "PapillaError",
     "Problem",
     "Refused",
+    "Series",
     "Session",
     "SpikeTrains",
     "Spikes",
@@ -45,5 +64,7 @@ __all__ = [
     "frames",
     "indentation",
     "post",
+    "render",
+    "render_chunks",
     "sed",
 ]

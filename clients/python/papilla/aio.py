@@ -17,7 +17,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
 
 from . import answer as answers
-from . import wire
+from . import check, wire
 from .address import Address, clean_token
 from .answer import Answer, Problem
 from .errors import Closed, Refused, Unreachable
@@ -114,6 +114,11 @@ class AsyncSession:
         self._waiting.clear()
 
     @property
+    def hello(self) -> dict[str, Any]:
+        """The terms that this session asked for last."""
+        return dict(self._hello)
+
+    @property
     def connected(self) -> bool:
         """Whether there is a session with the service just now."""
         return self._connected.is_set()
@@ -168,23 +173,28 @@ class AsyncSession:
         self._check_open()
         if pressure_pa is None:
             pressure_pa, window = np.zeros((0, 0), np.float32), window or (0, 0, 0, 0)
-        samples = np.asarray(pressure_pa, np.float32)
         window = window or wire.WHOLE
-        if samples.shape != (window[3], window[2]):
-            raise ValueError(f"{samples.shape} samples for a window of {window[3], window[2]}")
+        samples = check.samples(pressure_pa, window)
         self._sequence = (self._sequence + 1) % 2**32
         time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         kind = self.ready["sample_type"]
         message = wire.encode(samples, window, kind, self._sequence, time_us, deadline_us)
         return Frame(self._sequence, time_us, message)
 
-    def send_poses(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+    def send_poses(
+        self,
+        poses: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
         """Hands over where the objects of the hello are, and returns at once.
 
         `poses` has a row of seven for each: its origin in the finger's frame, mm, and its turn as a
         unit quaternion x y z w. `net` is a net force to be met: a unit vector and N.
         """
-        frame = self.encode_rows("objects", np.atleast_2d(np.asarray(poses, np.float32)), finger, net)
+        frame = self.encode_rows("objects", np.atleast_2d(np.asarray(poses, np.float32)), finger, net, client_time_us)
         self.hand_over(frame)
         return frame.outcome
 
@@ -208,19 +218,28 @@ class AsyncSession:
             return await self.not_tracked(finger=finger)
         return await asyncio.wrap_future(self.send_poses(poses, finger=finger, net=net))
 
-    def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+    def send_gaps(
+        self,
+        depth_mm: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
         """Hands over how deep the undeformed skin lies in things, mm; negative in air.
 
         With `velocity` in the hello, x y z mm/s of each vertex follow the depths.
         """
-        frame = self.encode_rows("gaps", np.atleast_2d(np.asarray(depth_mm, np.float32)), finger, net)
+        frame = self.encode_rows("gaps", np.atleast_2d(np.asarray(depth_mm, np.float32)), finger, net, client_time_us)
         self.hand_over(frame)
         return frame.outcome
 
-    def encode_rows(self, kind: str, rows: wire.Map, finger: int, net: NetForce | None) -> Frame:
+    def encode_rows(
+        self, kind: str, rows: wire.Map, finger: int, net: NetForce | None, client_time_us: int | None = None
+    ) -> Frame:
         self._check_open()
         self._sequence = (self._sequence + 1) % 2**32
-        time_us = time.monotonic_ns() // 1000
+        time_us = time.monotonic_ns() // 1000 if client_time_us is None else client_time_us
         row = None if net is None else np.array([*net[0], net[1], 0.0, 0.0, 0.0], np.float32)
         message = wire.encode_rows(kind, rows, row, finger, self._sequence, time_us)
         return Frame(self._sequence, time_us, message, finger)

@@ -55,3 +55,29 @@ class BadFrame(PapillaError, ValueError):
     def __init__(self, member: str, value: object, most: int) -> None:
         super().__init__(f"{member} is {value!r}; a frame holds a whole number from 0 to {most}")
         self.member = member
+
+
+class BadInput(PapillaError, ValueError):
+    """An argument is not what it has to be; nothing was sent or written. `member` names it, `frame` counts from 0."""
+
+    def __init__(self, member: str, message: str, frame: int | None = None) -> None:
+        super().__init__(f"{member}" + ("" if frame is None else f", frame {frame}") + f": {message}")
+        self.member = member
+        self.frame = frame
+
+
+class FrameFailed(PapillaError):
+    """A frame of a series came to no answer; `frame` counts from 0, `status` is its outcome."""
+
+    def __init__(self, frame: int, status: str, reason: str) -> None:
+        super().__init__(f"frame {frame} is {status}: {reason}")
+        self.frame = frame
+        self.status = status
+
+
+class MissingExtra(PapillaError, ImportError):
+    """A function needs packages that are not installed; `extra` is the extra of papilla that brings them."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(f"{what} needs packages that are missing here: pip install 'papilla[{extra}]'")
+        self.extra = extra

@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from . import check
 from .address import Address, clean_token
 from .errors import Refused, Unreachable
-from .wire import SIDE_PX, Map
+from .wire import SIDE_PX, WHOLE, Map
 
 DEFAULT_URL: Final = "http://127.0.0.1:7224"
 _NPY: Final = "application/x-npy"
@@ -95,10 +96,10 @@ def post(
 ) -> HttpAnswer:
     """SED of one pressure map (224 x 224, Pa), with what is known about it.
 
-    Raises Refused (with the code of docs/reference/protocol-errors.md) or Unreachable.
+    Raises BadInput, Refused (with the code of docs/reference/protocol-errors.md) or Unreachable.
     """
     body = io.BytesIO()
-    np.save(body, np.asarray(pressure_pa, "<f4"))
+    np.save(body, check.samples(pressure_pa, WHOLE).astype("<f4", copy=False))
     asked = {"tier": tier, "budget_us": budget_us}
     query = urllib.parse.urlencode({k: v for k, v in asked.items() if v is not None})
     path = "/v1/sed" + (f"?{query}" if query else "")
@@ -119,7 +120,7 @@ def sed(
     """SED (J/m3) of one pressure map (Pa), both 224 x 224.
 
     `tier` by name, or the most accurate that meets `budget_us`, or the service's default.
-    Raises Refused or Unreachable.
+    Raises BadInput, Refused or Unreachable.
     """
     return post(pressure_pa, url=url, tier=tier, budget_us=budget_us, token=token).sed
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import PapillaError
+from .errors import MissingExtra, PapillaError
 
 if TYPE_CHECKING:
     from .answer import Answer
@@ -43,8 +43,8 @@ class SpikeTrains:
     `trains = SpikeTrains(session.ready)`, then `trains.add(answer)` for every answer.
     """
 
-    def __init__(self, ready: dict[str, Any], finger: int = 0) -> None:
-        """Raises PapillaError if the session has no effect `spikes`."""
+    def __init__(self, ready: dict[str, Any], finger: int = 0, *, resumed: bool = False) -> None:
+        """Raises PapillaError if the session has no effect `spikes`. `resumed`: spikes before do not count as lost."""
         if "units" not in ready:
             raise PapillaError("the session does not name the effect 'spikes'")
         self.finger = finger
@@ -56,7 +56,7 @@ class SpikeTrains:
         """Place of each unit in the map, (column + 0.5, row + 0.5)."""
         self.lost = 0
         """Spikes that no answer carried: of late answers, or beyond `spikes_max`."""
-        self._total = 0
+        self._total = None if resumed else 0
         self._units: list[NDArray[np.uint16]] = []
         self._times_us: list[NDArray[np.int64]] = []
 
@@ -64,11 +64,19 @@ class SpikeTrains:
         """Takes the next answer; those of other fingers and without spikes are passed over."""
         if answer.spikes is None or answer.finger != self.finger:
             return
+        if self._total is None:
+            self._total = answer.spikes.total - len(answer.spikes.unit)
         fired = (answer.spikes.total - self._total) % 2**32
         self._total = answer.spikes.total
         self.lost += fired - len(answer.spikes.unit)
         self._units.append(answer.spikes.unit)
         self._times_us.append(answer.spikes.time_us)
+
+    def append(self, later: SpikeTrains) -> None:
+        """Takes the spikes of a later part of the same session."""
+        self._units += later._units
+        self._times_us += later._times_us
+        self.lost += later.lost
 
     @property
     def unit(self) -> NDArray[np.uint16]:
@@ -101,24 +109,28 @@ class SpikeTrains:
     def save_nwb(self, path: str | PathLike[str], start: datetime | None = None) -> None:
         """Writes the units table of a Neurodata Without Borders file, times in s from the first spike on.
 
-        Needs `pip install 'papilla[nwb]'`; raises PapillaError without. `start`: when the session began (now).
+        Raises MissingExtra without `papilla[nwb]`. `start`: when the session began (now).
         """
         try:
             from pynwb import NWBHDF5IO, NWBFile
         except ImportError as error:
-            raise PapillaError("NWB files need pynwb (pip install pynwb); save_npz needs nothing more") from error
+            raise MissingExtra("an NWB file", "nwb") from error
         file = NWBFile(
             session_description=f"simulated touch units of a fingertip, {self.lost} spikes lost",
             identifier=f"papilla-{self.atlas_hash}",
             session_start_time=start or datetime.now(UTC),
         )
+        times_us = self.time_us
+        self.add_units(file, -1e-6 * int(times_us.min()) if times_us.size else 0.0)
+        with NWBHDF5IO(str(path), "w") as out:
+            out.write(file)
+
+    def add_units(self, file: Any, first_s: float = 0.0) -> None:
+        """Adds the units table to an `NWBFile`; spikes at 0 of the client's clock are at `first_s`."""
         file.add_unit_column("unit_class", "sa1, ra or pc")
         file.add_unit_column("unit_model", "number of the model neuron of its class")
         file.add_unit_column("px", "place in the map, column and row")
         units, times_us = self.unit, self.time_us
-        first_us = int(times_us.min()) if times_us.size else 0
         for unit, (kind, model, px) in enumerate(zip(self.classes, self.models, self.px, strict=True)):
-            times_s = 1e-6 * (times_us[units == unit] - first_us)
+            times_s = 1e-6 * times_us[units == unit] + first_s
             file.add_unit(spike_times=times_s, unit_class=str(kind), unit_model=int(model), px=px)
-        with NWBHDF5IO(str(path), "w") as out:
-            out.write(file)

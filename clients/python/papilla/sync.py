@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterable, Iterator
 from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,10 @@ from .aio import TIMEOUT_S, AsyncSession, NetForce
 from .answer import Answer
 from .http import DEFAULT_URL
 from .wire import Window
+
+if TYPE_CHECKING:
+    from .render import Progress
+    from .series import Series
 
 _T = TypeVar("_T")
 
@@ -127,9 +131,16 @@ class Session:
         sent = self.send(pressure_pa, window=window, client_time_us=client_time_us, deadline_us=deadline_us)
         return sent.result(timeout_s)
 
-    def send_poses(self, poses: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+    def send_poses(
+        self,
+        poses: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
         """Hands over where objects are and returns at once; see `AsyncSession.send_poses`."""
-        return self._hand_over("objects", poses, finger, net)
+        return self._hand_over("objects", poses, finger, net, client_time_us)
 
     def send_not_tracked(self, *, finger: int = 0) -> Future[Answer]:
         """Hands over that tracking is lost and returns at once; see `AsyncSession.send_not_tracked`."""
@@ -150,14 +161,58 @@ class Session:
             return self.not_tracked(finger=finger, timeout_s=timeout_s)
         return self.send_poses(poses, finger=finger, net=net).result(timeout_s)
 
-    def send_gaps(self, depth_mm: ArrayLike, *, finger: int = 0, net: NetForce | None = None) -> Future[Answer]:
+    def send_gaps(
+        self,
+        depth_mm: ArrayLike,
+        *,
+        finger: int = 0,
+        net: NetForce | None = None,
+        client_time_us: int | None = None,
+    ) -> Future[Answer]:
         """Hands over gaps and returns at once; see `AsyncSession.send_gaps`."""
-        return self._hand_over("gaps", depth_mm, finger, net)
+        return self._hand_over("gaps", depth_mm, finger, net, client_time_us)
 
-    def _hand_over(self, kind: str, values: ArrayLike, finger: int, net: NetForce | None) -> Future[Answer]:
+    def series(
+        self,
+        frames: ArrayLike | Iterable[ArrayLike],
+        times: ArrayLike | None = None,
+        *,
+        unit: str | None = None,
+        progress: Progress = None,
+    ) -> Series:
+        """Renders many frames in their order, none of which supersedes another; as `papilla.render`.
+
+        What the session remembers goes on from what it was. No other thread may send meanwhile.
+        """
+        from .render import on_session
+
+        return on_session(self, frames, times, unit=unit, progress=progress)
+
+    def series_chunks(
+        self,
+        frames: ArrayLike | Iterable[ArrayLike],
+        times: ArrayLike | None = None,
+        *,
+        chunk: int = 256,
+        unit: str | None = None,
+        progress: Progress = None,
+    ) -> Iterator[Series]:
+        """`series` for what does not fit in memory: a result for each `chunk` frames."""
+        from .render import chunks_on_session
+
+        return chunks_on_session(self, frames, times, chunk=chunk, unit=unit, progress=progress)
+
+    @property
+    def hello(self) -> dict[str, Any]:
+        """The terms that this session asked for last."""
+        return self._session.hello
+
+    def _hand_over(
+        self, kind: str, values: ArrayLike, finger: int, net: NetForce | None, client_time_us: int | None
+    ) -> Future[Answer]:
         rows = np.atleast_2d(np.asarray(values, np.float32))
         with self._lock:
-            frame = self._session.encode_rows(kind, rows, finger, net)
+            frame = self._session.encode_rows(kind, rows, finger, net, client_time_us)
             self._loop.call_soon_threadsafe(self._session.hand_over, frame)
         return frame.outcome
 

@@ -1,0 +1,143 @@
+"""What a map or a series has to be, and words for each way in which it is not."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import BadInput
+from .wire import SIDE_PX, WHOLE, Map, Window
+
+SIDE: Final = (SIDE_PX, SIDE_PX)
+UNITS: Final[dict[str, dict[str, float]]] = {
+    "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
+    "objects": {"mm": 1.0, "m": 1e3},
+    "gaps": {"mm": 1.0, "m": 1e3},
+}
+"""Units that a series may come in, by the hello's `input`: the first is the protocol's."""
+# Below these a series in the protocol's unit is asked about: no touch is so weak, no scene so small.
+_ASKED_BELOW: Final = {"pressure": 150.0, "objects": 0.2, "gaps": 0.2}
+
+
+def numbers(values: ArrayLike, member: str) -> NDArray[Any]:
+    """The values as an array of real numbers."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise BadInput(member, f"its rows are not equally long ({error})") from error
+    if array.dtype.kind not in "fiu":
+        raise BadInput(member, f"it is of type {array.dtype}; real numbers are due, such as np.float32")
+    return array
+
+
+def samples(pressure_pa: ArrayLike, window: Window) -> Map:
+    """The samples of a window as float32; raises BadInput with what to do."""
+    array = numbers(pressure_pa, "pressure_pa")
+    due = (window[3], window[2])
+    if array.shape != due:
+        if window != WHOLE:
+            raise BadInput("pressure_pa", f"{array.shape} samples for a window of {due}")
+        raise BadInput("pressure_pa", f"it has shape {array.shape}; {_cure(array.shape)}")
+    return array.astype(np.float32, copy=False)
+
+
+def _cure(shape: tuple[int, ...]) -> str:
+    """What to do with an array that is no map."""
+    whole = f"a map of the finger has {SIDE_PX} x {SIDE_PX} pixels"
+    if shape == (SIDE_PX * SIDE_PX,):
+        return f"{whole}: call .reshape({SIDE_PX}, {SIDE_PX})"
+    if len(shape) == 3 and shape[1:] == SIDE:
+        return "this is a series of maps: papilla.render(frames, times) takes it as it is"
+    if len(shape) == 3:
+        return f"{whole}, and a series of them goes to papilla.render(frames, times)"
+    return (
+        f"{whole}. For readings of a sensor describe it, and let it make the map: "
+        "papilla.sensors.Taxels.grid(rows, columns, pitch_mm=...).pressure(readings). "
+        "For points of contact: papilla.Atlas.load().contacts([...]). "
+        "For a part of a map: Session.render(part, window=(column, row, width, height))"
+    )
+
+
+def shape_of_frames(got: tuple[int, ...], due: tuple[int, ...], kind: str) -> None:
+    """Raises BadInput, with a cure, unless an array of shape `got` is a series of frames of shape `due`."""
+    if len(got) == len(due) + 1 and got[1:] == due:
+        return
+    series = "(" + ", ".join(["frames", *map(str, due)]) + ")"
+    said = f"the array has shape {got}; {series} is due"
+    if len(due) == 2 and got == due:
+        cure = "this is one frame: give frames[None], or call Session.render or touch"
+    elif len(got) == len(due) + 1 and got[: len(due)] == due:
+        cure = "time seems to come last: give np.moveaxis(frames, -1, 0)"
+    elif kind == "pressure" and got[-1:] == (7,):
+        cure = "these seem to be poses: name input='objects' and objects=[...]"
+    elif kind == "pressure":
+        cure = "for readings of a sensor see papilla.sensors.Taxels"
+    elif kind == "objects" and got[-1:] == (7,):
+        cure = f"the hello names {due[0]} object(s), and each frame has a row of seven numbers for each of them"
+    elif kind == "objects" and got[-2:] == (4, 4):
+        cure = "papilla.frames.from_matrices makes poses of 4 x 4 matrices"
+    else:
+        cure = "see the method's text for what a frame holds"
+    raise BadInput("frames", f"{said}; {cure}")
+
+
+def frame(values: ArrayLike, due: tuple[int, ...], kind: str, number: int, factor: float) -> Map:
+    """One frame of a series as float32 in the protocol's unit; raises BadInput naming frame and place."""
+    array = numbers(values, "frames")
+    if array.shape != due:
+        raise BadInput("frames", f"it has shape {array.shape}; {due} is due", number)
+    if factor != 1.0:
+        # Of a pose the place has a unit, the quaternion has none.
+        array = array.astype(np.float64)
+        array[..., : 3 if kind == "objects" else None] *= factor
+    result: Map = array.astype(np.float32, copy=False)
+    if not np.isfinite(result).all():
+        raise BadInput("frames", f"{_first(~np.isfinite(result), array)}; find out why, or leave the frame out", number)
+    if kind == "pressure" and result.size and float(result.min()) < 0.0 and len(due) == 2:
+        why = "skin is pressed, never pulled: take the sensor's offset away, then np.maximum(frames, 0)"
+        raise BadInput("frames", f"{_first(result < 0, array)}; {why}", number)
+    return result
+
+
+def _first(wrong: NDArray[np.bool_], array: NDArray[Any]) -> str:
+    """Where the first wrong value is."""
+    place = tuple(int(i) for i in np.unravel_index(int(np.argmax(wrong)), wrong.shape))
+    return f"{array[place]} at {list(place)} ({int(wrong.sum())} such values)"
+
+
+def unit_factor(unit: str | None, kind: str) -> float:
+    """The factor to the protocol's unit."""
+    known = UNITS[kind]
+    if unit is not None and unit not in known:
+        raise BadInput("unit", f"{unit!r} is none of {', '.join(known)}")
+    return 1.0 if unit is None else known[unit]
+
+
+def ask_unit(greatest: float, kind: str) -> None:
+    """Raises BadInput where values are so small that another unit was probably meant."""
+    if not 0.0 < greatest < _ASKED_BELOW[kind]:
+        return
+    first, *others = UNITS[kind]
+    meant = " or ".join(f"unit={other!r}" for other in others)
+    raise BadInput(
+        "unit",
+        f"the greatest value is {greatest:.3g}, which is little for {first}: give {meant} if that is meant, "
+        f"or unit={first!r} if the values are right",
+    )
+
+
+def times(values: ArrayLike, count: int | None) -> NDArray[np.float64]:
+    """Times of frames, s: finite, rising by 1 us at least, as many as frames."""
+    array = numbers(values, "times").astype(np.float64)
+    if array.ndim != 1 or (count is not None and len(array) != count):
+        raise BadInput("times", f"shape {array.shape} for {count} frames; one time for each frame is due, in s")
+    if not np.isfinite(array).all():
+        raise BadInput("times", f"{_first(~np.isfinite(array), array)}; each frame needs its time, in s")
+    steps = np.diff(array)
+    if (steps < 1e-6).any():
+        at = int(np.argmax(steps < 1e-6))
+        cure = "they have to rise by 1 us at least: sort the frames, and drop those that stand twice"
+        raise BadInput("times", f"{array[at + 1]:.9g} s follows {array[at]:.9g} s; {cure}", at + 1)
+    return array
