@@ -72,7 +72,7 @@ def main() -> None:
     """Prints a table."""
     found = {name: np.array([numbers(one) for one in presses(name)]) for name in TRAINED + OTHERS}
     most = HEADROOM * np.concatenate([found[name] for name in TRAINED]).max(axis=0)
-    print("| maps | | roughness, up to | load, up to (MPa px) | product, up to | area, up to (px) | contrast, up to (px) | flagged |")
+    print("| maps | number | greatest roughness | greatest load, MPa px | greatest rough load, MPa px | greatest area, px | greatest contrast, px | flagged |")
     print("|---|---|---|---|---|---|---|---|")
     for name, rows in found.items():
         rough, load, both, area, contrast = rows.max(axis=0)
