@@ -22,20 +22,17 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(floor) = &ladder.discretisation_error {
         let _ = writeln!(
             text,
-            "The reference itself is good to {} of relative L2 ({}); no comparison means anything below that.\n",
+            "The reference itself is good to {} of relative L2 ({}). Smaller differences mean nothing.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );
     }
     costs(&mut text, ladder);
-    for set in &ladder.sets {
-        let _ = writeln!(text, "## Errors on {}\n", set.name);
-        if set.samples == 0 {
-            let _ = writeln!(text, "{}.\n", sentence(&set.about));
-        } else {
-            let _ = writeln!(text, "{} samples: {}.\n", set.samples, set.about);
-            errors(&mut text, ladder, &set.name);
-        }
+    overview(&mut text, ladder);
+    let measured = ladder.sets.iter().find(|set| set.samples > 0).map(|set| set.name.as_str());
+    if let Some(set) = ladder.pareto_set.as_deref().or(measured) {
+        let _ = writeln!(text, "## All errors on {set}\n");
+        errors(&mut text, ladder, set);
     }
     if let Some(found) = &ladder.readings {
         readings(&mut text, found);
@@ -50,10 +47,11 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
 fn traction(text: &mut String, found: &[Traction]) {
     text.push_str(
         "## With traction along the skin\n\n\
-         Presses with friction .5, which no network learnt, of the teacher: straight in (`friction`), and dragged aside by up to 1.1 mm\n\
-         (`sliding`: three states of each way in, two aside). Of SED, the network's alone and with what the session effect `shear_energy` adds\n\
-         ([how](../concepts/contact.md#friction)): pressure and traction are the finite elements'.\n\n\
-         | rung | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
+         Simulations of the teacher with a coefficient of friction of .5, which no network learnt. In `friction` the indenter goes straight in;\n\
+         in `sliding` it is then dragged aside by up to 1.1 mm (three states of each simulation on the way in, two aside). The table\n\
+         gives the error of SED (relative L2) of the network alone, and with what the session effect `shear_energy` adds\n\
+         ([how](../concepts/contact.md#friction)). Pressure and traction are those of FE.\n\n\
+         | way | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for Traction { model, set, samples, alone, felt, added_ms } in found {
@@ -74,8 +72,8 @@ fn readings(text: &mut String, found: &Readings) {
     let _ = write!(
         text,
         "## What a pressure map is worth\n\n\
-         {} states of the reference, their pressure read on its mesh and on {}. A model cannot know better than the map it is\n\
-         given: how far its two answers are apart is in its error, and no training takes it away.\n\n\
+         The pressure of {} states of the reference was read on its mesh and on {}. A model cannot know better than the map\n\
+         that it is given. So the difference of its two answers is part of its error, and no training takes it away.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
     );
@@ -87,23 +85,24 @@ fn readings(text: &mut String, found: &Readings) {
     text.push('\n');
 }
 
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
 fn costs(text: &mut String, ladder: &Ladder) {
-    text.push_str("## Time and size\n\nIn bold: nothing faster comes as close");
+    text.push_str(
+        "## Time and size\n\nIn bold are ways that are more accurate than every faster way in bold",
+    );
     if let Some(set) = &ladder.pareto_set {
         let _ = write!(text, " (relative L2 on {set}");
         let apart = ladder.told_apart(set);
         if apart > 0.0 {
-            let _ = write!(text, ", to {:.1} %, its own error", 100.0 * apart);
+            let _ = write!(
+                text,
+                "; by {:.1} percentage points or more, the error of the reference",
+                100.0 * apart
+            );
         }
         text.push(')');
     }
     text.push_str(
-        ".\n\n| rung | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\
+        ".\n\n| way | kind | tract p50, ms | p99 | ONNX Runtime p50, ms | p99 | load, ms | memory, MiB | file, kB |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for rung in by_time(ladder).filter(|rung| ![Kind::Fe, Kind::Floor].contains(&rung.kind)) {
@@ -121,7 +120,7 @@ fn costs(text: &mut String, ladder: &Ladder) {
         );
     }
     if ladder.rungs.iter().any(|rung| rung.kind == Kind::Fe) {
-        text.push_str("\n| FE rung | s a state, median | p99 |\n|---|---|---|\n");
+        text.push_str("\n| FE way | s a state, median | p99 |\n|---|---|---|\n");
         for rung in by_time(ladder).filter(|rung| rung.kind == Kind::Fe) {
             let _ = writeln!(text, "| {} | {} |", name(rung), times(rung.seconds));
         }
@@ -129,9 +128,40 @@ fn costs(text: &mut String, ladder: &Ladder) {
     text.push('\n');
 }
 
+/// Relative L2 on every set.
+fn overview(text: &mut String, ladder: &Ladder) {
+    text.push_str(
+        "## Errors on all sets\n\nRelative L2 of SED, median / 95th percentile.\n\n| way | ms |",
+    );
+    let measured: Vec<_> = ladder.sets.iter().filter(|set| set.samples > 0).collect();
+    for set in &measured {
+        let _ = write!(text, " {}, {} states |", set.name, set.samples);
+    }
+    let _ = writeln!(text, "\n|---|---|{}", "---|".repeat(measured.len()));
+    for rung in by_time(ladder) {
+        let ms = rung.time_ms().map_or_else(|| "-".to_owned(), milliseconds);
+        let _ = write!(text, "| {} | {ms} |", name(rung));
+        for set in &measured {
+            let _ = match rung.errors.get(&set.name) {
+                Some(_) if rung.reference => write!(text, " the truth |"),
+                Some(errors) => {
+                    let l2 = errors.relative_l2;
+                    write!(text, " {} / {} |", percent(l2.median), percent(l2.p95))
+                }
+                None => write!(text, " - |"),
+            };
+        }
+        text.push('\n');
+    }
+    text.push('\n');
+    for set in ladder.sets.iter().filter(|set| set.samples == 0) {
+        let _ = writeln!(text, "`{}`: {}.\n", set.name, set.about);
+    }
+}
+
 fn errors(text: &mut String, ladder: &Ladder, set: &str) {
     text.push_str(
-        "| rung | ms | relative L2 | p95 | far field | p95 | peak | p95 | place, mm | p95 | nail base | p95 | energy | p95 | SSIM | p5 |\n\
+        "| way | ms | relative L2 | p95 | far field | p95 | peak | p95 | place, mm | p95 | nail base | p95 | energy | p95 | SSIM | p5 |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for rung in by_time(ladder) {
@@ -167,10 +197,10 @@ fn zone(text: &mut String, stem: &str) {
     let _ = write!(
         text,
         "## The zone toward the nail base\n\n![The zone on the atlas]({stem}-zone.svg)\n\n\
-         The interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the default\n\
-         fingertip ends at 14 mm, so this is 2 mm to either side of that edge, over the nail's matrix and its fold. Contact on the pad\n\
-         rarely touches the skin here but loads it through the tissue. The U-Net paper reports that its network misses this\n\
-         spread; one that sees 2 to 3 mm around a pixel has to.\n",
+         The zone is the interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the\n\
+         default fingertip ends at 14 mm, so these are 2 mm to either side of that edge, over the nail's matrix and its fold. Contact\n\
+         on the pad rarely touches the skin here but loads it through the tissue. The U-Net paper reports that its network misses\n\
+         the SED there. A network that sees only 2 to 3 mm around a pixel has to miss it.\n",
         NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }
