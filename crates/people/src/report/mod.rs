@@ -3,6 +3,7 @@
 mod charts;
 mod page;
 mod rates;
+mod tables;
 pub(crate) mod words;
 
 use crate::PeopleError;
@@ -203,20 +204,30 @@ impl Report {
         !self.rows.iter().any(bad)
     }
 
-    /// Writes `human.json`, `human.md` and the plots.
+    /// Writes `human.json`, `human.md`, the tables beside it and the plots.
     pub(crate) fn write(&self, folder: &Path) -> Result<(), PeopleError> {
         atomic::write_json(&folder.join("human.json"), self)?;
         atomic::write(&folder.join("human.md"), self.markdown().as_bytes())?;
+        self.write_tables(folder)?;
         Ok(self.write_charts(folder)?)
     }
 
-    /// Writes the page, and the plots that it shows beside it.
+    fn write_tables(&self, folder: &Path) -> Result<(), OutputError> {
+        for (name, text) in self.tables() {
+            atomic::write(&folder.join(format!("human-{name}.csv")), text.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    /// Writes the page, and tables and plots beside it.
     ///
     /// # Errors
     /// [`OutputError`] if a file cannot be written.
     pub fn write_page(&self, page: &Path) -> Result<(), OutputError> {
         atomic::write(page, self.markdown().as_bytes())?;
-        let folder = page.parent().unwrap_or_else(|| Path::new("")).join(PICTURES);
+        let beside = page.parent().unwrap_or_else(|| Path::new(""));
+        self.write_tables(beside)?;
+        let folder = beside.join(PICTURES);
         atomic::create_folder(&folder)?;
         self.write_charts(&folder)
     }

@@ -39,12 +39,12 @@ impl Row {
 }
 
 impl Report {
-    /// The report as a page of docs/reports.
+    /// The report as a page of studies/reports, which links the tables beside it.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = format!(
-            "{}\n{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
-             `coarse`.\n\n## Rows\n\n| quantity | finger here | people | spread | source | | what would \
+            "{}{}. Materials: {}. Spheres on the mesh `{}` in `order = \"graded\"`, plates on \
+             `coarse`.\n\n## Rows\n\n| quantity | finger here | people | spread | source | verdict | what would \
              mend it |\n|---|---|---|---|---|---|---|\n",
             HEAD.replace("DENSITY", density(self.density)),
             self.made,
@@ -77,12 +77,19 @@ impl Report {
     }
 
     fn plates(&self, text: &mut String) {
-        let _ = write!(text, "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\n");
+        let _ = write!(
+            text,
+            "\n## Plates\n\n![Force under a plate]({PICTURES}/force.svg)\n\nEvery fourth state; all of them are in \
+             [human-plates.csv](human-plates.csv).\n\n"
+        );
         text.push_str("| plate | depth, mm | force, N | stiffness, N/mm | contact area, mm2 |\n");
         text.push_str("|---|---|---|---|---|\n");
         for p in &self.plates {
             let stiffness = p.path.stiffness_n_per_mm();
             for (k, s) in stiffness.iter().enumerate() {
+                if (k + 1) % 4 != 0 && k + 1 != stiffness.len() {
+                    continue;
+                }
                 let _ = writeln!(
                     text,
                     "| {} degrees | {:.2} | {:.3} | {s:.2} | {:.1} |",
@@ -93,7 +100,7 @@ impl Report {
         for p in &self.plates {
             let _ = writeln!(
                 text,
-                "\nPlate at {} degrees: {} unknowns, {:.0} s of processor time, energy and work part \
+                "\nPlate at {} degrees: {} unknowns, {:.0} s of processor time, energy and work differ \
                  by {:.2} % at most{}.",
                 p.pitch_deg,
                 p.unknowns,

@@ -3,8 +3,7 @@
 use crate::measured::Quantity;
 
 /// What would bring rates nearer.
-pub(super) const RATES_MEND: &str =
-    "another stimulus, deeper and over a disc (table below); a monkey's finger, which is smaller";
+pub(super) const RATES_MEND: &str = "another stimulus, deeper and over a disc (table below), or a monkey's finger, which is smaller";
 
 /// A quantity with its unit.
 pub(crate) fn quantity(quantity: &Quantity) -> String {
@@ -46,15 +45,15 @@ pub(super) const fn mends(quantity: &Quantity) -> &'static str {
     match quantity {
         Quantity::Stiffness { .. }
         | Quantity::Stiffening { .. }
+        | Quantity::Exponential { .. }
         | Quantity::AreaRatio { .. }
         | Quantity::HertzModulus { .. } => {
-            "fat that stiffens as it is squeezed (an exponential law, or a skin under tension)"
+            "fat that stiffens as it is squeezed (an exponential law), or a skin under tension"
         }
-        Quantity::Exponential { .. } => "the same",
         Quantity::RelaxationTime { .. } | Quantity::EnergyLost { .. } => {
             "Prony terms of 4 and 70 ms, of whose amplitudes the abstract says nothing"
         }
-        Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed; a finer mesh",
+        Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed, or a finer mesh",
         Quantity::VolumeLost { .. } => "a Poisson's ratio nearer to 1/2",
     }
 }
