@@ -1,42 +1,65 @@
 //! The page.
 
-use super::Table;
+use super::{Row, Table};
 use crate::ladder::machine;
 use std::fmt::Write;
+
+/// What a table of the page holds of a drive, and how it is shown.
+const FIGURES: [(&str, fn(&Row) -> String); 4] = [
+    ("Error of means over the pins", |row| percent(row.means)),
+    ("Error of SED", |row| percent(row.relative_l2)),
+    ("Error of the greatest SED", |row| percent(row.peak)),
+    ("Time of a frame, us", |row| row.us.map_or_else(String::new, us)),
+];
 
 /// The page of these tables, each with its picture.
 #[must_use]
 pub fn markdown(tables: &[(Table, String)]) -> String {
     let mut text = include_str!("head.md").to_owned();
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "\nMeasured on {}.", machine());
-    for (table, picture) in tables {
-        let percent =
-            |[median, p95]: [f64; 2]| format!("{:.1} / {:.1} %", 100.0 * median, 100.0 * p95);
-        let us = |[median, p95]: [f64; 2]| format!("{median:.0} / {p95:.0}");
+    let _ = writeln!(
+        text,
+        "\nMeasured on {}.\n\n| array | states | judge | time of `small`, us |\n|---|---|---|---|",
+        machine()
+    );
+    for (table, _) in tables {
+        let (judge, network) = (percent(table.judge), us(table.network_us));
+        let _ = writeln!(text, "| {} | {} | {judge} | {network} |", array(table), table.states);
+    }
+    let arrays: Vec<_> = tables.iter().map(|(table, _)| array(table)).collect();
+    for (title, cell) in FIGURES {
         let _ = writeln!(
             text,
-            "\n## {}: {} pins, {} mm apart\n\n{} states; judge {}; `small` {} us.\n\n\
-             | drive | SED, relative L2 | means over the pins | peak of SED | us a frame |\n|---|---|---|---|---|",
-            table.set,
-            table.pins,
-            table.pitch_mm,
-            table.states,
-            percent(table.judge),
-            us(table.network_us),
+            "\n## {title}\n\n| drive | {} |\n|---|{}",
+            arrays.join(" | "),
+            "---|".repeat(arrays.len())
         );
-        for row in &table.rows {
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} | {} |",
-                row.way.name(),
-                percent(row.relative_l2),
-                percent(row.means),
-                percent(row.peak),
-                row.us.map_or_else(String::new, us),
-            );
+        let rows = tables.first().map_or(&[][..], |(table, _)| &table.rows[..]);
+        for (k, row) in rows.iter().enumerate() {
+            let _ = write!(text, "| {} |", row.way.name());
+            for (table, _) in tables {
+                let _ = write!(text, " {} |", table.rows.get(k).map_or_else(String::new, cell));
+            }
+            text.push('\n');
         }
-        let _ = writeln!(text, "\n![press, drives and pins]({picture})");
+    }
+    text.push_str(
+        "\n## Pictures\n\nThe median state of each array: simulation, drives and pins.\n",
+    );
+    for (table, picture) in tables {
+        let _ = writeln!(text, "\n![{}]({picture})", array(table));
     }
     text
+}
+
+fn array(table: &Table) -> String {
+    format!("{}, {} pins, {} mm apart", table.set, table.pins, table.pitch_mm)
+}
+
+fn percent([median, p95]: [f64; 2]) -> String {
+    format!("{:.1} / {:.1} %", 100.0 * median, 100.0 * p95)
+}
+
+fn us([median, p95]: [f64; 2]) -> String {
+    format!("{median:.0} / {p95:.0}")
 }
