@@ -12,7 +12,12 @@ use papilla_afferents::{
 const HEAD: &str = "\
 # Spikes of touch units
 
-Written by
+**Question.** Do the nerve fibres of the effect `afferents` fire as those of TouchSim, whose model neurons they are, and
+do they fire the same if they are driven by strain energy density (SED) instead of a pin? What does a frame cost?
+
+**Method.** The first table repeats TouchSim's own tests, which hold to one spike and 0.25 ms (`tests/test_timing.py` of
+github.com/hsaal/touchsim; Saal, Delhaye, Rayhaun & Bensmaia 2017): the first neuron of each class under a pin that
+moves for a second. SA1 are slowly adapting, RA rapidly adapting and PC Pacinian fibres. The command writes this page:
 
 ```sh
 cargo run --release -p papilla-afferents --example report > studies/reports/spikes.md
@@ -20,33 +25,31 @@ cargo run --release -p papilla-afferents --example report > studies/reports/spik
 
 ## Against TouchSim
 
-Values that TouchSim's own tests hold to one spike and 0.25 ms (`tests/test_timing.py` of
-github.com/hsaal/touchsim; Saal, Delhaye, Rayhaun & Bensmaia 2017): the first neuron of each class
-under a pin that moves for a second.
-
-| class | pin | radius, mm | off by, mm | spikes | TouchSim | first, ms | TouchSim | |
+| class | movement of the pin | radius, mm | distance of the neuron, mm | spikes | of TouchSim | first spike, ms | of TouchSim | |
 |---|---|---|---|---|---|---|---|---|
 ";
 
 const SED: &str = "
 ## Pins against strain energy density
 
-The same ramp of 1 mm by a pin of 1 mm radius, its stress at 0.3 mm given as SED in 1000 frames: what
-the finger of Papilla makes of a stress, without its mechanics. PC units take force, not SED.
-
-At the default 80 kPa a stress below some 8 kPa, 400 J/m3, leaves SA1 silent. A plate at 0.9 N, whose
-SED is 340 J/m3 at most (`large`, on the page), fires but a few of 470: `e_ref_kpa` is not fitted to
-the rates of people.
+A pin of 1 mm radius makes a ramp of 1 mm. Its stress at 0.3 mm is given as SED in 1000 frames: what the finger of
+Papilla makes of a stress, without its mechanics. The truth is the neuron under the pin. PC units take force and not SED.
 
 | neuron | spikes under the pin | spikes of SED | first under the pin, ms | first of SED, ms |
 |---|---|---|---|---|
 ";
 
+const AFTER: &str = "
+Driven by SED, each neuron fires as often as under the pin, and 0.2 ms later. The threshold (`e_ref_kpa`) is not fitted
+to people. At the default 80 kPa a stress below some 8 kPa, which is 400 J/m3, leaves SA1 silent. Under a plate at 0.9 N,
+whose SED is 340 J/m3 at most (network `large`), only a few of 470 units fire.
+";
+
 const COST: &str = "
 ## Time of a frame
 
-A plane interface of 6.7 cm2 at the densities of a fingertip, SED and force going up and down seven
-times a second; medians of 400 frames, membranes, places of SED and waves together.
+A plane interface of 6.7 cm2 at the densities of a fingertip. SED and force go up and down seven times a second. Times
+are medians of 400 frames and cover membranes, places of SED and waves.
 
 | SED on | noise | frames a second | units | spikes a second | time of a frame, us |
 |---|---|---|---|---|---|
@@ -83,7 +86,7 @@ fn main() -> Result<(), PlacementError> {
     for class in [Class::Sa1, Class::Ra] {
         (0..Neuron::models(class)).for_each(|model| from_sed(class, model));
     }
-    print!("{COST}");
+    print!("{AFTER}{COST}");
     for (what, radius_mm) in [("77 mm2", 4.95), ("all", f32::INFINITY)] {
         for (noise, name) in [(None, "no"), (Some(1), "yes")] {
             for period_us in [1000, 11_111] {
@@ -91,7 +94,7 @@ fn main() -> Result<(), PlacementError> {
             }
         }
     }
-    println!("\nMeasured on {}, which others used too.", machine());
+    println!("\nMeasured on {}, beside other programs.", machine());
     Ok(())
 }
 

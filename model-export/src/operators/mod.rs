@@ -56,7 +56,7 @@ pub fn markdown(profiles: &[Profile], rates: &Rates) -> String {
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "\nMeasured on {}, {RUNS} runs a model. The core does {:.0} operations a ns and reads, in GB/s, of",
+        "\nMeasured on {}, {RUNS} runs of each network. The core does {:.0} operations a ns and reads, in GB/s, of",
         machine(),
         rates.operations_per_s / 1e9
     );
@@ -66,14 +66,24 @@ pub fn markdown(profiles: &[Profile], rates: &Rates) -> String {
         .zip(0..)
         .map(|(rate, size)| format!("{} kB {:.0}", (LEAST_BYTES << size) >> 10, rate / 1e9));
     let _ = writeln!(text, "{}.", sizes.collect::<Vec<_>>().join(", "));
+    text.push_str(
+        "\n| network | weights and maps, MB | operations, million | bound, us | time, us | times the bound |\n\
+         |---|---|---|---|---|---|\n",
+    );
     for profile in profiles {
+        let bound: f64 = profile.operators.iter().map(|o| bound_us(o, rates)).sum();
+        let time: f64 = profile.operators.iter().map(|o| us(o.median)).sum();
         let _ = writeln!(
             text,
-            "\n## `{}`\n\n{:.2} MB of weights and maps, {:.1} million operations.\n",
+            "| `{}` | {:.2} | {:.1} | {bound:.1} | {time:.1} | {:.1} |",
             profile.name,
             profile.bytes() as f64 / 1e6,
             profile.operators.iter().map(|o| o.operations).sum::<u64>() as f64 / 1e6,
+            time / bound,
         );
+    }
+    for profile in profiles {
+        let _ = writeln!(text, "\n## `{}`\n", profile.name);
         table(&mut text, &profile.operators, rates);
     }
     text

@@ -63,10 +63,10 @@ impl Fit {
         }
         let _ = write!(
             text,
-            "\n*Known to*: standard error, as a share of the way between the bounds; 100 % says that \
-             the rows do not tell the constant.\n\nHalf the sum of squares falls from {:.3} to {:.3} in \
-             {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | start | \
-             end | weighted residual |\n|---|---|---|---|---|\n",
+            "\n*Known to* is the standard error, as a share of the way between the bounds; 100 % says that \
+             the rows do not determine the constant. Half the sum of the squared residuals falls from {:.3} to \
+             {:.3} in {} evaluations ({}), {:.0} s of processor time.\n\n## Rows\n\n| quantity | people | at \
+             the start | at the end | weighted residual at the end |\n|---|---|---|---|---|\n",
             self.cost[0],
             self.cost[1],
             self.tried.len(),
@@ -109,7 +109,7 @@ impl Fit {
         let stays = 1.0 - s.share.iter().sum::<f64>();
         let _ = write!(
             text,
-            "\nPeople: {} %. Times {:?} s, shares {:?}; {:.3} stays, so a sudden strain meets {:.0} times \
+            "\nPeople: {} %. Times {:?} s, shares {:?}; a share of {:.3} stays, so a sudden strain meets {:.0} times \
              the modulus of a held one.\n",
             s.people_percent,
             s.time_s,

@@ -48,9 +48,10 @@ impl Sets {
     /// The tables of the page.
     pub(super) fn page(&self, text: &mut String) {
         text.push_str(
-            "\n## What it does to every row\n\nBoth sets on the even coarse mesh; the default set on the \
-             split mesh: [comparison](human.md#rows).\n\n| quantity | people | default | | fitted | | \
-             what would mend the fitted |\n|---|---|---|---|---|---|---|\n",
+            "\n## What it does to every row\n\nBoth sets are on the even coarse mesh. The default set on the graded \
+             mesh: [comparison](human.md#rows); the difference is what the coarse mesh costs.\n\n| quantity | people \
+             | default set | verdict | fitted set | verdict | what would bring the fitted set nearer \
+             |\n|---|---|---|---|---|---|---|\n",
         );
         for (a, b) in self.papers.iter().zip(&self.people) {
             let _ = writeln!(
@@ -69,9 +70,10 @@ impl Sets {
             return;
         }
         text.push_str(
-            "\n## What it does to maps\n\nAt the same force, fitted against default; even Hex8, coarse; \
-             relative L2 over the vertices.\n\n| indenter | force, N | depth, mm | pressure, L2 | its peak \
-             | SED at the interface, L2 | its peak |\n|---|---|---|---|---|---|---|\n",
+            "\n## What it does to maps\n\nThe fitted set against the default set at the same force, on the even \
+             coarse mesh; relative L2 over the vertices. SED is the strain energy density.\nThe depths are those of \
+             the default and of the fitted finger.\n\n| indenter | force, N | depths, mm | pressure, L2 | peak of \
+             pressure | SED at the interface, L2 | peak of SED |\n|---|---|---|---|---|---|---|\n",
         );
         for c in &self.maps {
             let [from, to] = c.depth_mm;
@@ -99,9 +101,9 @@ fn near(verdict: &Verdict) -> bool {
 fn mends(quantity: &str) -> &'static str {
     let of = |what: &str| quantity.contains(what);
     if of("stiffness") || of("contact area") {
-        "skin in tension round a soft pulp (Serina et al. 1998), or another bone"
+        "skin under tension around a soft pulp (Serina et al. 1998), or another bone"
     } else if of("Hertz") {
-        "a softer rise, which the flat plate's stiffness forbids: one finger has not both"
+        "a softer rise, which the stiffness under the flat plate rules out"
     } else if of("peak over mean") {
         "a finer mesh at small force"
     } else if of("energy") {
