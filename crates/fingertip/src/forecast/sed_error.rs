@@ -24,11 +24,11 @@ struct Row {
     source: &'static str,
 }
 
-/// Medians over 23 presses of other shapes; the error of the finest mesh is estimated.
+/// Medians over 23 simulations of other shapes; the error of the finest mesh is estimated.
 const LADDER: &str =
-    "median of 23 presses against the fine graded mesh, docs/reports/accuracy-vs-time.md";
+    "median of 23 simulations against the fine graded mesh, docs/reports/accuracy-vs-time.md";
 const EXTRAPOLATED: &str =
-    "extrapolated from medium and fine over 23 presses, docs/reports/accuracy-vs-time.md";
+    "extrapolated from medium and fine over 23 simulations, docs/reports/accuracy-vs-time.md";
 const WORSE: &str =
     "that of medium, from which SED is another 19 % away, docs/reports/verification.csv";
 
