@@ -10,7 +10,7 @@ use std::process::ExitCode;
 /// Press the finger as people's were pressed, and compare: stiffness, contact area, pressure,
 /// volume, energy lost, and the rates of SA1 afferents under spheres.
 ///
-/// Writes human.json, human.md, plots and a file a press; see studies/reports/human.md. Can be killed
+/// Writes human.json, human.md with tables and plots, and a file a simulation; see studies/reports/human.md. Can be killed
 /// at any moment and started again: what is pressed is not pressed again.
 #[derive(clap::Args)]
 #[command(after_help = "Exit code 3 if a figure lies outside people's spread.\n\

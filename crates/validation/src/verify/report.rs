@@ -41,7 +41,8 @@ cargo run --release -p papilla-fe-datagen -- verify --markdown docs/reports/veri
 
 The table has a row for each case. It shows the comparison that uses up most of its tolerance. Units are mm, N and
 MPa. The difference is relative where the truth is not zero, but absolute for orders of convergence. A value that
-only has to stay within a bound has the bound as its truth. SED is the strain energy density.
+only has to stay within a bound has the bound as its truth. SED is the strain energy density. Hex,
+Tet and Quad are hexahedra, tetrahedra and plane quadrilaterals; the number is that of their nodes.
 
 ";
 
