@@ -87,39 +87,40 @@ pub struct Case {
 pub const CASES: &[Case] = &[
     Case {
         name: "incompressible",
-        promise: "Up to a Poisson's ratio of .49999 nothing locks: Cook's membrane and a \
-                  squeezed block give the tip and the force of quadratic elements.",
+        promise: "Up to a Poisson's ratio of .49999 no element locks: the deflection of Cook's \
+                  membrane and the force on a squeezed block are those of quadratic elements.",
         run: incompressible::run,
     },
     Case {
         name: "thin-layer",
-        promise: "An epidermis of .02 mm, whose elements are 50 times as wide as thick, gives \
-                  the force of quadratic elements and balances.",
+        promise: "With an epidermis of .02 mm, whose elements are 50 times as wide as thick, \
+                  linear elements give the same force as quadratic ones, and balances hold.",
         run: bodies::thin_layer,
     },
     Case {
         name: "elastic-bone",
-        promise: "With elastic bone 5e5 to 5e6 times as stiff as fat, the solution tends to that \
-                  on rigid bone as 1 / E.",
+        promise: "With elastic bone 5e5 to 5e6 times as stiff as fat, the difference from the \
+                  solution on rigid bone falls as 1 / E, where E is the bone's Young's modulus.",
         run: bodies::elastic_bone,
     },
     Case {
         name: "ogden",
-        promise: "Ogden's law with alpha = 25 or negative mu, at the edge of stability and far \
-                  beyond: results are finite, flagged outside of the calibrated stretches, and \
-                  those of the closed form within.",
+        promise: "Ogden's law with an exponent alpha of 25 or a negative mu, at the edge of its \
+                  stability and far beyond: all results are finite. Inside the calibrated \
+                  stretches they are those of the closed form, outside they are flagged.",
         run: ogden::run,
     },
     Case {
         name: "equal-stretches",
-        promise: "At principal stretches that differ by 0 to 1e-6, stress and tangent are those \
-                  of the limit, and of a law without principal stretches.",
+        promise: "At principal stretches that differ by 0 to 1e-6, stress and tangent are those of \
+                  the limit of equal stretches, and those of a law that needs no principal \
+                  stretches.",
         run: stretches::run,
     },
     Case {
         name: "volume",
-        promise: "A confined body squeezed to a volume ratio J of .05 on distorted meshes \
-                  follows the closed form; J below 0 is refused.",
+        promise: "A confined body squeezed to a volume ratio J of .05 on distorted meshes follows \
+                  the closed form; J below 0 is refused.",
         run: volume::run,
     },
     Case {
@@ -130,8 +131,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "deep",
-        promise: "At 3 mm depth, near the bone, balances hold, no element inverts, and quadratic \
-                  elements agree.",
+        promise: "At 3 mm depth, near the bone, balances hold, no element inverts, and linear and \
+                  quadratic elements agree.",
         run: indentation::deep,
     },
     Case {
@@ -142,16 +143,16 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "sharp-wedge",
-        promise: "A ruler 2 mm thick across faces of 1 and .73 mm balances and has the force of a \
-                  finer mesh. Wedges with tips of .05 and .005 mm balance, or are refused with \
-                  the depth that was not reached. One that fits between nodes is refused before \
-                  anything is solved.",
+        promise: "Under a ruler 2 mm thick on element faces of 1 and .73 mm, balances hold and the \
+                  force is that of a finer mesh. Wedges with tips of .05 and .005 mm balance, or \
+                  are refused with the depth that was not reached. A wedge that fits between two \
+                  nodes is refused before anything is solved.",
         run: edges::run,
     },
     Case {
         name: "contact-lost",
-        promise: "Without contact the body is at rest again; pressed again, it is in the first \
-                  state again.",
+        promise: "After contact is lost the body returns to rest; pressed again, it returns to its \
+                  first state.",
         run: touch::lost_and_regained,
     },
     Case {
@@ -161,64 +162,64 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "first-gap",
-        promise: "First contact from a gap of 1e-9 mm, 5 mm or 100 mm ends where contact without \
-                  a gap ends.",
+        promise: "An indenter that starts 1e-9, 5 or 100 mm away from the body ends in the same \
+                  state as one that starts in touch.",
         run: touch::gaps,
     },
     Case {
         name: "penetration",
-        promise: "An indenter that starts inside the body is refused, or pushed out to the state \
-                  of one that came from outside.",
+        promise: "An indenter that starts inside the body is refused, or the body is pushed out of \
+                  it into the state that an indenter from outside causes.",
         run: touch::penetration,
     },
     Case {
         name: "time-steps",
-        promise: "A ramp of 1e-6 s finds the instantaneous modulus, one of 1e6 s the long-term \
-                  one, in a bounded number of steps.",
+        promise: "A ramp of 1e-6 s shows the instantaneous modulus of a relaxing tissue, one of \
+                  1e6 s the long-term modulus, both in a bounded number of steps.",
         run: history::durations,
     },
     Case {
         name: "relaxation-times",
-        promise: "Tiny and huge relaxation times reach their limits; zero and nonsense are \
-                  refused.",
+        promise: "Tiny and huge relaxation times give the limits of fast and slow relaxation; \
+                  times of zero, below zero or not finite are refused.",
         run: history::relaxation_times,
     },
     Case {
         name: "friction",
-        promise: "A block that is dragged has no drag at a coefficient of friction of 0, \
-                  Coulomb's drag at 1e-9 and 1, and the force of a glued block at 10.",
+        promise: "A block that is dragged has no drag at a coefficient of friction of 0, Coulomb's \
+                  drag at 1e-9 and 1, and the force of a glued block at 10.",
         run: friction::run,
     },
     Case {
         name: "free-modes",
-        promise: "A body, or a part of one, that nothing holds is refused, and the free motion \
-                  is named.",
+        promise: "A body, or a part of one, that no support holds is refused, and the error names \
+                  its free motion.",
         run: bodies::free_modes,
     },
     Case {
         name: "mesh-files",
-        promise: "Inverted, duplicate and sliver elements, loose parts and absurd scales in a \
-                  .msh file are refused with line and cure.",
+        promise: "Inverted, duplicate and sliver elements, loose parts and absurd scales in a Gmsh \
+                  file (.msh) are refused; the error names the line and the cure.",
         run: files::run,
     },
     Case {
         name: "units",
-        promise: "Values that are wrong by a factor of 1000 or more are refused, and the unit \
-                  that was meant is named.",
+        promise: "Values that are wrong by a factor of 1000 or more are refused, and the error \
+                  names the unit that was probably meant.",
         run: units::run,
     },
     Case {
         name: "snap-through",
-        promise: "A shallow arch below its limit load is where the path under control of \
-                  displacement says. Above it, the arch is on the far branch of that path, or \
-                  refused at the limit load.",
+        promise: "The truth is the equilibrium path of a shallow arch under prescribed \
+                  displacement. Under a load below the limit load the arch is on this path. Above, \
+                  it is on the far branch of the path, or refused at the limit load.",
         run: snap::run,
     },
     Case {
         name: "differential",
         promise: "Random small problems agree for loose and tight tolerances, one step and many, \
-                  three elimination orders, one and two threads, linear and quadratic elements. \
-                  A second run repeats bit for bit.",
+                  three elimination orders, one and two threads, linear and quadratic elements. A \
+                  second run repeats bit for bit.",
         run: differential::run,
     },
 ];
