@@ -8,7 +8,7 @@ use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::{IncrementRecord, relative_l2};
 
-const SOURCE: &str = "elastic: no memory of the way";
+const SOURCE: &str = "an elastic state does not depend on its path";
 const DEPTH_MM: f64 = 1.0;
 
 pub(super) fn run(context: &Context) -> Result<Vec<Check>, CaseError> {

@@ -61,45 +61,45 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "uniaxial",
-        shows: "Material law and stress: one element stretched and squeezed with free sides, \
-                against the closed form.",
+        shows: "One element that is stretched and squeezed with free sides has the stress and the \
+                force of the closed form of its material law.",
         quick: true,
         run: uniaxial::run,
     },
     Case {
         name: "ogden",
-        shows: "Both published Ogden laws: one element in uniaxial, planar and equibiaxial \
-                strain, against the closed form.",
+        shows: "With both published Ogden laws (dermis and subcutaneous tissue) one element in \
+                uniaxial, planar and equibiaxial strain has the force of the closed form.",
         quick: true,
         run: ogden::run,
     },
     Case {
         name: "relaxation",
-        shows: "Prony series: a confined column relaxes under a held plate and creeps under a \
-                rising load as the closed forms say, and energy is stored or dissipated but \
-                not lost.",
+        shows: "A confined column whose material relaxes by a Prony series follows the closed \
+                forms, both under a held plate and under a rising load. Work is stored or \
+                dissipated, but not lost.",
         quick: true,
         run: relaxation::run,
     },
     Case {
         name: "tangent",
-        shows: "The assembled tangent is the derivative of the assembled residual, also with \
-                contact of a curved indenter.",
+        shows: "The assembled tangent stiffness is the derivative of the assembled residual, also \
+                in contact with a curved indenter.",
         quick: true,
         run: tangent::run,
     },
     Case {
         name: "convergence",
-        shows: "Errors fall with the mesh size at the order that theory gives each element, \
-                for a curved solution at finite strain that was manufactured with its body \
-                force.",
+        shows: "Errors fall with the mesh size at the order that theory gives each element. The \
+                truth is a manufactured solution: a curved field of finite strain is prescribed, \
+                and the body force that balances it is applied.",
         quick: true,
         run: manufactured::run,
     },
     Case {
         name: "cook",
-        shows: "Cook's membrane: bending and shear of a skewed mesh at large deflection, \
-                compressible and nearly incompressible.",
+        shows: "Cook's membrane, a skewed mesh in bending and shear, deflects as published, also \
+                at large deflection and nearly incompressible.",
         quick: true,
         run: cook::run,
     },
@@ -118,56 +118,58 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "hertz",
-        shows: "Contact: force and contact radius of a rigid sphere on a half-space at small \
-                load.",
+        shows: "Under a small load a rigid sphere on a half-space has the force, the pressure and \
+                the contact radius of Hertz' theory.",
         quick: true,
         run: hertz::run,
     },
     Case {
         name: "coulomb",
-        shows: "Friction: a block that is dragged slips with Coulomb's force, and sticks as if \
-                it were glued.",
+        shows: "A block that is dragged slips with Coulomb's force. Where friction holds it, it \
+                has the force of a glued block.",
         quick: true,
         run: coulomb::run,
     },
     Case {
         name: "cylinder",
-        shows: "Line contact in plane strain: half-width and pressure of a rigid cylinder on a \
-                half-plane for its force.",
+        shows: "A rigid cylinder that presses a half-plane with a given force (plane strain) has \
+                the half-width of contact and the pressure of Hertz' theory.",
         quick: true,
         run: half_plane::cylinder,
     },
     Case {
         name: "wedge",
-        shows: "A blunt wedge on a half-plane: half-width and pressure for its force.",
+        shows: "A blunt wedge that presses a half-plane with a given force has the half-width of \
+                contact and the pressure of the closed form.",
         quick: true,
         run: half_plane::wedge,
     },
     Case {
         name: "punch",
-        shows: "A flat punch: force on a half-space, pressure on a half-plane, and growth of \
-                the pressure at the edge as elements shrink.",
+        shows: "A flat punch has the force of the closed form on a half-space and its pressure on \
+                a half-plane. At the edge the pressure grows without end as the elements shrink.",
         quick: true,
         run: punch::run,
     },
     Case {
         name: "file",
-        shows: "A body from a Gmsh file: a block of two layers under a sphere is the block \
-                that this code makes itself.",
+        shows: "A block of two layers that is read from a Gmsh file behaves as the block that \
+                this code meshes itself.",
         quick: true,
         run: file::run,
     },
     Case {
         name: "locking",
-        shows: "No volumetric locking: a bonded block of Poisson's ratio 0.4999 squeezed by a \
-                plate, linear against quadratic elements, solid and in plane strain.",
+        shows: "No element locks: linear elements give the force of quadratic ones for a bonded \
+                block of Poisson's ratio 0.4999 that a plate squeezes, as a solid and in plane \
+                strain.",
         quick: true,
         run: locking::run,
     },
     Case {
         name: "balances",
-        shows: "The fingertip under an indenter balances at every equilibrium: plate against \
-                supports, energy against work.",
+        shows: "At every equilibrium of the fingertip the force on the plate equals that on the \
+                supports, and the energy equals the work.",
         quick: true,
         run: balances::run,
     },
@@ -187,15 +189,15 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "solid-parts",
-        shows: "Elastic bone and nail, 5e5 times as stiff as fat, converge and balance, and \
-                the bone carries as a rigid one does.",
+        shows: "With elastic bone and nail, 5e5 times as stiff as fat, the solution converges, \
+                balances hold, and the force is that with a rigid bone.",
         quick: false,
         run: solid_parts::run,
     },
     Case {
         name: "mirror",
-        shows: "A simulation with the finger rolled to the left is the mirror image of one \
-                rolled to the right.",
+        shows: "A simulation with the finger rolled to the left is the mirror image of one rolled \
+                to the right.",
         quick: true,
         run: mirror::run,
     },

@@ -35,14 +35,22 @@ cargo run --release -p papilla-fe-datagen -- verify --markdown docs/reports/veri
 
 | option | does |
 |---|---|
-| `--quick` | takes smaller meshes, without `density` and `solid-parts`, as `./test` does |
+| `--quick` | takes smaller meshes and leaves out the cases `density` and `solid-parts`, as `./test` does |
 | `--only NAME` | runs one case |
 | `--json` | prints the comparisons for a program |
 
-The table has a row for each case. It shows the comparison that uses up most of its tolerance. Units are mm, N and
-MPa. The difference is relative where the truth is not zero, but absolute for orders of convergence. A value that
-only has to stay within a bound has the bound as its truth. SED is the strain energy density. Hex,
-Tet and Quad are hexahedra, tetrahedra and plane quadrilaterals; the number is that of their nodes.
+The table has a row for each case. It shows the comparison of the case that uses up most of its tolerance. The
+difference is relative to the truth. It is absolute where the truth is zero, and for orders of convergence. Some
+values only have to stay below a bound. Then the bound stands as the truth, *allowed* says `bound`, and the difference
+is zero as long as the bound is kept. Units are mm, N and MPa.
+
+| word | meaning |
+|---|---|
+| SED | strain energy density |
+| Hex8, Tet4, Quad9 and others | hexahedra, tetrahedra and plane quadrilaterals; the number is that of their nodes |
+| nu, E, mu | Poisson's ratio; Young's modulus; for `coulomb` mu is the coefficient of friction |
+| L2 | root of the sum of squares over all nodes or points, relative to that of the truth |
+| E* | plane strain modulus, `E / (1 - nu^2)` |
 
 ";
 
