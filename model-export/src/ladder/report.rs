@@ -22,7 +22,8 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
     if let Some(floor) = &ladder.discretisation_error {
         let _ = writeln!(
             text,
-            "The reference itself is good to {} of relative L2 ({}). Smaller differences mean nothing.\n",
+            "The SED of the reference itself errs by about {} (relative L2; {}). Differences between ways that are smaller\n\
+             than this mean nothing.\n",
             percent(floor.sed_relative_l2),
             floor.how
         );
@@ -47,10 +48,12 @@ pub fn markdown(ladder: &Ladder, stem: &str) -> String {
 fn traction(text: &mut String, found: &[Traction]) {
     text.push_str(
         "## With traction along the skin\n\n\
-         Simulations of the teacher with a coefficient of friction of .5, which no network learnt. In `friction` the indenter goes straight in;\n\
-         in `sliding` it is then dragged aside by up to 1.1 mm (three states of each simulation on the way in, two aside). The table\n\
-         gives the error of SED (relative L2) of the network alone, and with what the session effect `shear_energy` adds\n\
-         ([how](../concepts/contact.md#friction)). Pressure and traction are those of FE.\n\n\
+         The truth of this table is the teacher with a coefficient of friction of .5; no network was trained on friction. In\n\
+         the set `friction` the indenter goes straight in. In `sliding` it is then dragged aside by up to 1.1 mm; each\n\
+         simulation has three states on the way in and two on the way aside. *Pressure alone* is the relative L2 error of the\n\
+         SED that a way answers. *With traction* is the error after the session effect `shear_energy` has added SED for the\n\
+         traction along the skin ([how](../concepts/contact.md#friction)). Pressure and traction are those of FE. *Adds* is the\n\
+         time of the effect.\n\n\
          | way | set | states | pressure alone | p95 | with traction | p95 | adds, ms | p95 |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
@@ -72,13 +75,19 @@ fn readings(text: &mut String, found: &Readings) {
     let _ = write!(
         text,
         "## What a pressure map is worth\n\n\
-         The pressure of {} states of the reference was read on its mesh and on {}. A model cannot know better than the map\n\
-         that it is given. So the difference of its two answers is part of its error, and no training takes it away.\n\n\
+         Each of {} states of the reference was solved on two meshes, its own and `{}`, which gives two pressure\n\
+         maps of the same state. A network can only know the map that it is given. So the difference between its answers to\n\
+         the two maps is a part of its error that no training can take away. The table compares the two pressure maps, and\n\
+         each network's two answers.\n\n\
          | relative L2 between the two | median | p95 |\n|---|---|---|\n",
         found.states, found.mesh
     );
     line(text, "pressure", found.pressure);
-    line(text, "pressure under a Gaussian of .1 mm", found.averaged);
+    line(
+        text,
+        "pressure, both maps smoothed by a Gaussian of .1 mm standard deviation",
+        found.averaged,
+    );
     for (name, apart) in &found.answers {
         line(text, &format!("SED that `{name}` answers"), *apart);
     }
@@ -87,15 +96,15 @@ fn readings(text: &mut String, found: &Readings) {
 
 fn costs(text: &mut String, ladder: &Ladder) {
     text.push_str(
-        "## Time and size\n\nIn bold are ways that are more accurate than every faster way in bold",
+        "## Time and size\n\nA way is in bold if its error is smaller than that of every faster way in bold",
     );
     if let Some(set) = &ladder.pareto_set {
-        let _ = write!(text, " (relative L2 on {set}");
+        let _ = write!(text, " (median relative L2 on {set}");
         let apart = ladder.told_apart(set);
         if apart > 0.0 {
             let _ = write!(
                 text,
-                "; by {:.1} percentage points or more, the error of the reference",
+                "; smaller by at least {:.1} percentage points, which is the error of the reference itself",
                 100.0 * apart
             );
         }
@@ -197,10 +206,11 @@ fn zone(text: &mut String, stem: &str) {
     let _ = write!(
         text,
         "## The zone toward the nail base\n\n![The zone on the atlas]({stem}-zone.svg)\n\n\
-         The zone is the interface from {:.0} to {:.0} mm behind the tip (x in the finger's frame, undeformed). The nail plate of the\n\
-         default fingertip ends at 14 mm, so these are 2 mm to either side of that edge, over the nail's matrix and its fold. Contact\n\
-         on the pad rarely touches the skin here but loads it through the tissue. The U-Net paper reports that its network misses\n\
-         the SED there. A network that sees only 2 to 3 mm around a pixel has to miss it.\n",
+         The zone is the interface from {:.0} to {:.0} mm behind the tip (x in the undeformed finger's frame). The nail plate\n\
+         of the default fingertip ends at 14 mm, so the zone reaches 2 mm to either side of that edge. It holds the nail's\n\
+         matrix and fold. An object that presses the pad rarely touches the skin here, but it loads this zone through the\n\
+         tissue. The U-Net paper reports that its network misses the SED there. A network has to miss it if each pixel of its\n\
+         answer depends on no more than the pressure within 2 to 3 mm.\n",
         NAIL_BASE_MM.start, NAIL_BASE_MM.end
     );
 }

@@ -68,7 +68,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "ogden",
-        shows: "With both published Ogden laws (dermis and subcutaneous tissue) one element in \
+        shows: "With both published Ogden laws (skin and subcutaneous tissue) one element in \
                 uniaxial, planar and equibiaxial strain has the force of the closed form.",
         quick: true,
         run: ogden::run,
