@@ -149,16 +149,14 @@ fn a_file_that_cannot_be_read_is_named_once() {
         (&["solve", "none.toml", "--out", "out"][..], &["none.toml", "No such file"][..]),
         (&["explain", "none.toml"], &["none.toml", "No such file"]),
         (&["generate", "none.toml", "--out", "out"], &["none.toml", "No such file"]),
-        (&["effects", "folder"], &["folder", "Is a directory"]),
+        (&["explain", "folder"], &["folder", "Is a directory"]),
         (&["explain", "empty.toml"], &["empty.toml", "missing field `geometry`"]),
         (&["generate", "empty.toml", "--out", "out"], &["empty.toml", "missing field `name`"]),
         (&["dataset", "verify", "none"], &["none/manifest.json", "No such file", "check the path"]),
         (&["dataset", "stats", "empty.toml"], &["empty.toml/manifest.json", "Not a directory"]),
         (&["contact", "none", "--out", "out"], &["none/manifest.json", "No such file"]),
         (&["solve", "good.toml", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
-        (&["effects", "good.toml", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
         (&["operator", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
-        (&["wedge", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
         (&["stability", "--out", "empty.toml"], &["empty.toml", "a folder is due"]),
         (&["solve", "campaign.toml", "--out", "out"], &["campaign.toml", "is a campaign"]),
         (&["generate", "good.toml", "--out", "out"], &["good.toml", "is a scene", "`solve`"]),
@@ -176,18 +174,6 @@ fn a_file_that_cannot_be_read_is_named_once() {
             );
         }
         assert!(!folder.path().join("out").exists(), "{arguments:?} left a folder");
-    }
-}
-
-#[test]
-fn a_depth_has_no_time_to_be_taken_in() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("bad.toml"), FINGER).unwrap();
-    let output = run(folder.path(), &["effects", "bad.toml", "--seconds", "0.1,1"]);
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{error}");
-    for word in ["error: bad.toml:7:", "motion.path", "path = [{ time_s = 1.0, depth_mm = 1.0 }]"] {
-        assert!(error.contains(word), "{error}should say {word}");
     }
 }
 

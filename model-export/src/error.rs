@@ -46,14 +46,6 @@ pub enum ExportError {
         /// What is wrong with it.
         source: papilla_contact::ModelError,
     },
-    /// An array cannot be.
-    #[error("pins {pitch_mm} mm apart: {reason}")]
-    Pins {
-        /// Distance of the pins, mm.
-        pitch_mm: f32,
-        /// What is wrong with it.
-        reason: String,
-    },
     /// The dataset cannot be read or trusted.
     #[error(transparent)]
     Dataset(#[from] DatasetError),

@@ -23,14 +23,12 @@
 //! assert!((metrics.total_energy_error - 0.025).abs() < 1e-12);
 //! ```
 
-pub mod actuators;
 pub mod contact;
 pub mod dataset;
 mod error;
 pub mod evaluate;
 pub mod ladder;
 pub mod metrics;
-pub mod operators;
 pub mod part;
 pub mod picture;
 mod processor;

@@ -5,7 +5,8 @@
 
 Without --write compares the picture in ARCHITECTURE.md with the workspace. Exit code 1 if the
 picture is out of date, if crates need each other in a circle (dependencies of tests alone are not
-drawn), or if a crate builds on Unix alone (a crate of UNIX_ONLY that is not under `cfg(unix)`).
+drawn), if a crate builds on Unix alone (a crate of UNIX_ONLY that is not under `cfg(unix)`), or if
+a crate outside of studies needs one of studies, be it for its tests.
 
 Sizes have no limit, since a crate is cut by what one would use alone. --sizes prints each crate's
 lines; a plain run names the largest crate and the largest file.
@@ -22,6 +23,8 @@ from statistics import median_low
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "ARCHITECTURE.md"
 UNIX_ONLY = {"nix", "rustix", "libc"}
+# What was asked once: it uses the product, never the other way round.
+STUDIES = "studies"
 PLACE = re.compile(r"(<!-- tests/suite/crates\.py -->\n).*?(<!-- end -->\n)", re.DOTALL)
 Arrows = dict[str, set[str]]
 SOURCE = re.compile(r"\.(rs|py|pyi|c?js|mjs|ts|cs|gd|cpp|hpp|h|css|html|sh)$|/(run|wire|test|bench|docs-test|cycles|generate)$")
@@ -44,6 +47,18 @@ def unix_only(metadata: dict) -> list[str]:
         for p in metadata["packages"]
         for d in p["dependencies"]
         if d["name"] in UNIX_ONLY and d["kind"] is None and not d["target"]
+    ]
+
+
+def on_studies(metadata: dict) -> list[str]:
+    """A line for each dependency of the product on a study, of whatever kind."""
+    root = Path(metadata["workspace_root"])
+    where = {p["name"]: Path(p["manifest_path"]).relative_to(root).parts[0] for p in metadata["packages"]}
+    return [
+        f"{p['name']} needs {d['name']}: a study uses the product, which must do without it"
+        for p in metadata["packages"]
+        for d in p["dependencies"]
+        if where[p["name"]] != STUDIES and where.get(d["name"]) == STUDIES
     ]
 
 
@@ -116,7 +131,7 @@ def main() -> int:
         print(f"a circle of crates: {' -> '.join(found)}")
         return 1
     found = lines()
-    if wrong := unix_only(metadata):
+    if wrong := unix_only(metadata) + on_studies(metadata):
         print("\n".join(wrong))
         return 1
     if "--sizes" in sys.argv[1:]:

@@ -85,6 +85,24 @@ class Crates(unittest.TestCase):
         self.assertEqual(crates.direct(arrows), {"a": {"b"}, "b": {"c"}, "c": set()})
 
 
+class Studies(unittest.TestCase):
+    def needs(self, crate: str, other: str, kind: str | None) -> list[str]:
+        packages = [
+            {"name": "product", "manifest_path": "/r/crates/product/Cargo.toml", "dependencies": []},
+            {"name": "study", "manifest_path": "/r/studies/Cargo.toml", "dependencies": []},
+        ]
+        needing = next(package for package in packages if package["name"] == crate)
+        needing["dependencies"] = [{"name": other, "kind": kind}, {"name": "serde", "kind": None}]
+        return crates.on_studies({"workspace_root": "/r", "packages": packages})
+
+    def test_a_study_may_use_the_product(self) -> None:
+        self.assertEqual(self.needs("study", "product", None), [])
+
+    def test_the_product_may_not_use_a_study_even_in_its_tests(self) -> None:
+        for kind in (None, "dev", "build"):
+            self.assertEqual(len(self.needs("product", "study", kind)), 1)
+
+
 class Sizes(unittest.TestCase):
     def test_the_largest_are_named(self) -> None:
         # Tests beside `src` are programs of their own.

@@ -343,7 +343,7 @@ def long() -> list[Step]:
         Step(
             "calculix-long",
             "every simulation in CalculiX",
-            '"$BIN/fe-datagen" cross-check',
+            '"$BIN/papilla-studies" calculix',
             after=("build", "packages"),
             behind=("stability-long",),
         ),

@@ -1,4 +1,5 @@
-//! How far long work is: a bar on a terminal, elsewhere a line every few seconds.
+//! How far long work is: a bar on a terminal, elsewhere a line every few seconds. And what it took:
+//! [`processor`].
 //!
 //! ```
 //! use papilla_progress::Progress;
@@ -9,6 +10,8 @@
 //!     progress.inc();
 //! }
 //! ```
+
+pub mod processor;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write as _;

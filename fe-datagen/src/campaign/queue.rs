@@ -7,7 +7,7 @@ use papilla_dataset as dataset;
 use papilla_dataset::Sample;
 use papilla_fingertip::campaign::Indentation;
 use papilla_progress::Progress;
-use papilla_validation::processor::thread_s;
+use papilla_progress::processor::thread_s;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;

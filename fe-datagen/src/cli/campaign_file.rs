@@ -1,7 +1,7 @@
 //! The campaign that a command is about.
 
 use papilla_fingertip::campaign::CampaignSpec;
-use papilla_validation::convergence::MESHES;
+use papilla_fingertip::mesh::named::MESHES;
 use std::path::PathBuf;
 
 /// A campaign file, and the mesh if it is not the file's own.

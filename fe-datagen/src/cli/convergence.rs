@@ -1,8 +1,9 @@
 //! `convergence`: SED at the interface on ever finer meshes.
 
 use super::{CHECKS_FAILED, print, refuse_unknown};
+use papilla_fingertip::mesh::named::MESHES;
 use papilla_progress::Progress;
-use papilla_validation::convergence::{self, CASES, MESHES};
+use papilla_validation::convergence::{self, CASES};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

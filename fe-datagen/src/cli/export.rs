@@ -2,9 +2,9 @@
 
 use super::choices::{LinearHex, QuadraticHex};
 use anyhow::Context as _;
+use papilla_calculix::{ElementTypes, SceneDeck};
 use papilla_fingertip::scene::Scene;
 use papilla_output::atomic;
-use papilla_validation::calculix::{ElementTypes, SceneDeck};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -19,7 +19,7 @@ use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::Approach;
 use papilla_fingertip::simulation::record::IncrementRecord;
-use papilla_validation::{acceptance, finger_maps};
+use papilla_fingertip::simulation::{maps, sample};
 use serde::Serialize;
 use std::num::NonZero;
 use std::path::PathBuf;
@@ -107,7 +107,7 @@ impl IndentationSolver for OwnMesh<'_> {
         scene.motion = indentation.motion();
         let Simulation { mut body, approach, .. } = Simulation::new(&scene)?;
         let no_patch = || PressError::Failed("a fingertip has a patch".into());
-        let cells = finger_maps::read_at_cells(&mut body).ok_or_else(no_patch)?;
+        let cells = maps::read_at_cells(&mut body).ok_or_else(no_patch)?;
         let mut solver = body.solver(Options::default())?;
         let found = pressed(&body, &mut solver, &approach, indentation, checkpoints)?;
         let on_cells = |sample| Sample { cells: Some(Arc::clone(&cells)), ..sample };
@@ -125,7 +125,7 @@ fn pressed(
     let states: Vec<_> = indentation.states().collect();
     let keep = &mut |state: usize, _: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
         let slide_mm = states.get(state).map_or([0.0; 2], |(_, slide_mm)| *slide_mm);
-        Sample { slide_mm, ..acceptance::sample(record) }
+        Sample { slide_mm, ..sample::of(record) }
     };
     let drive = indentation.drive();
     let mut from = checkpoints.stored();
@@ -169,7 +169,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..RunOptions::default()
     };
     let solved = if spec.order == Order::Graded {
-        let lattice = finger_maps::lattice(&body);
+        let lattice = maps::lattice(&body);
         let solver = || Ok(OwnMesh { spec: &spec, candidates: &candidates });
         campaign::solve(&spec, (&atlas, lattice.as_deref()), solver, &args.out, &options)?
     } else {

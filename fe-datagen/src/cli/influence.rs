@@ -6,8 +6,7 @@ use crate::influence_file::{self, Card};
 use papilla_fingertip::influence;
 use papilla_fingertip::mesh::fingertip::Order;
 use papilla_fingertip::scene::TissueTable;
-use papilla_progress::Progress;
-use papilla_validation::processor;
+use papilla_progress::{Progress, processor};
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -2,18 +2,14 @@
 
 mod atlas;
 mod campaign_file;
-mod choices;
+pub mod choices;
 mod contact;
 mod convergence;
-mod cross_check;
 mod dataset;
-mod effects;
 mod explain;
 mod explain_campaign;
 mod export;
-mod fit;
 mod generate;
-mod human;
 mod influence;
 mod lines;
 mod part;
@@ -22,11 +18,14 @@ mod signals;
 mod solve;
 mod stability;
 mod verify;
-mod wedge;
 
 use clap::{Parser, Subcommand};
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
+use tracing_subscriber::Layer as _;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 /// A finite-element fingertip: solve scenes, run campaigns, check the physics.
 #[derive(Parser)]
@@ -54,14 +53,9 @@ enum Command {
     Dataset(dataset::Args),
     Atlas(atlas::Args),
     Convergence(convergence::Args),
-    Human(human::Args),
-    Fit(fit::Args),
     Verify(verify::Args),
     Stability(stability::Args),
     Export(export::Args),
-    CrossCheck(cross_check::Args),
-    Effects(effects::Args),
-    Wedge(wedge::Args),
 }
 
 /// Runs the command line; the exit code is documented in `--help`.
@@ -74,32 +68,51 @@ pub fn run() -> ExitCode {
         Command::Dataset(args) => dataset::run(&args),
         Command::Atlas(args) => atlas::run(&args),
         Command::Convergence(args) => convergence::run(&args),
-        Command::Human(args) => human::run(&args),
-        Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Stability(args) => stability::run(&args),
         Command::Export(args) => export::run(&args),
-        Command::CrossCheck(args) => cross_check::run(&args),
-        Command::Effects(args) => effects::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Operator(args) => influence::run(&args),
         Command::Contact(args) => contact::run(&args),
-        Command::Wedge(args) => wedge::run(&args),
     };
-    match result {
-        Ok(code) => code,
-        Err(error) => {
-            eprintln!("error: {}", papilla_output::told(error.as_ref()));
-            ExitCode::FAILURE
-        }
-    }
+    finished(result)
+}
+
+/// What a program over these libraries begins with: the log that `RUST_LOG` asks for, on standard
+/// error.
+///
+/// # Errors
+/// The exit code if that is no filter, which has been said.
+pub fn start_log() -> Result<(), ExitCode> {
+    let filter = match std::env::var("RUST_LOG") {
+        Ok(text) => text.parse().map_err(|error| {
+            eprintln!("error: RUST_LOG is '{text}', which is not a filter: {error}");
+            ExitCode::from(2)
+        })?,
+        Err(_) => Targets::new().with_default(LevelFilter::ERROR),
+    };
+    let log = tracing_subscriber::fmt::layer()
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_filter(filter);
+    tracing_subscriber::registry().with(log).init();
+    Ok(())
+}
+
+/// And ends with: says what went wrong.
+#[must_use]
+pub fn finished(result: anyhow::Result<ExitCode>) -> ExitCode {
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {}", papilla_output::told(error.as_ref()));
+        ExitCode::FAILURE
+    })
 }
 
 /// How a scene asks for the mesh that `papilla_fingertip::forecast::better` gives.
 const BETTER: &str = "with density = \"medium\", order = \"graded\" (the defaults)";
 
 /// Exit code of a run that finished but did not pass its own checks.
-const CHECKS_FAILED: u8 = 3;
+pub const CHECKS_FAILED: u8 = 3;
 
 /// Says what is wrong with the command line and gives its exit code.
 fn wrong_usage(error: &dyn std::error::Error) -> ExitCode {
@@ -108,7 +121,10 @@ fn wrong_usage(error: &dyn std::error::Error) -> ExitCode {
 }
 
 /// Prints a report as JSON or as people read it.
-fn print<T: serde::Serialize>(
+///
+/// # Errors
+/// It cannot be written.
+pub fn print<T: serde::Serialize>(
     report: &T,
     json: bool,
     human: impl FnOnce() -> String,
@@ -122,7 +138,10 @@ fn print<T: serde::Serialize>(
 }
 
 /// Refuses `--only` with a name that no case has.
-fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
+///
+/// # Errors
+/// Names the unknown one and all that there are.
+pub fn refuse_unknown(only: &[String], known: &[&str]) -> anyhow::Result<()> {
     match only.iter().find(|n| !known.contains(&n.as_str())) {
         Some(unknown) => {
             anyhow::bail!("there is no '{unknown}'; there are: {}", known.join(", "))
@@ -149,6 +168,6 @@ mod tests {
 
     #[test]
     fn out_is_a_folder_everywhere() {
-        assert!(out_is_a_folder(&Cli::command()) >= 12);
+        assert!(out_is_a_folder(&Cli::command()) >= 7);
     }
 }

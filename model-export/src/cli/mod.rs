@@ -1,6 +1,5 @@
 //! The command line.
 
-mod actuators;
 mod check;
 mod contact;
 mod contact_maps;
@@ -8,7 +7,6 @@ mod evaluate;
 mod here;
 mod index;
 mod ladder;
-mod operators;
 mod patterns;
 
 use clap::{Parser, Subcommand};
@@ -106,12 +104,6 @@ enum Command {
     /// `--features ort`, if ORT_DYLIB_PATH names its library.
     #[command(after_long_help = EXIT_CODES)]
     Here(here::Options),
-    /// Hold the operators of models against what one core of this machine can do.
-    ///
-    /// For each operator, as tract runs it: bytes of weights and maps, operations, its time, and the
-    /// least time in which this core reads the bytes and does the operations.
-    #[command(after_long_help = EXIT_CODES)]
-    Operators(operators::Options),
     /// Measure the contact ladder: from where an indenter is to pressure, force and SED.
     ///
     /// Springs, a half-space, the finger's compliance, and its second order told gaps or the object,
@@ -124,12 +116,6 @@ enum Command {
     /// with the same SED where contact's pressure is a little off.
     #[command(name = "contact-maps", after_long_help = EXIT_CODES)]
     ContactMaps(contact_maps::Options),
-    /// Measure drives of arrays of pins: the formula of sessions, and its inversion.
-    ///
-    /// For each held-out indentation both find the drive whose SED comes closest to it; a second
-    /// network tells what the drive gives.
-    #[command(after_long_help = EXIT_CODES)]
-    Actuators(actuators::Options),
     /// Load one model and say what that took, as JSON; the ladder runs it in a fresh process.
     #[command(hide = true)]
     Footprint {
@@ -149,10 +135,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Command::Patterns(options) => patterns::run(options, json),
         Command::Ladder(options) => ladder::run(options, json),
         Command::Here(options) => here::run(options, json),
-        Command::Operators(options) => operators::run(options),
         Command::Contact(options) => contact::run(options, json),
         Command::ContactMaps(options) => contact_maps::run(options, json),
-        Command::Actuators(options) => actuators::run(options, json),
         Command::Footprint { model } => ladder::weigh(model),
     }
 }

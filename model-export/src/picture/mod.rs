@@ -75,16 +75,22 @@ pub fn draw(heading: &str, sample: &Sample, maps: &Maps, dataset: &Dataset) -> R
 }
 
 /// A map of values from 0 up.
-pub(crate) struct Picture<'a> {
-    pub(crate) title: String,
-    pub(crate) values: Vec<f32>,
-    pub(crate) mask: &'a [bool],
-    pub(crate) max: f32,
-    pub(crate) unit: &'static str,
+pub struct Picture<'a> {
+    /// Above it.
+    pub title: String,
+    /// Value of each pixel.
+    pub values: Vec<f32>,
+    /// Which pixels have one.
+    pub mask: &'a [bool],
+    /// Where the colours end.
+    pub max: f32,
+    /// Of the values.
+    pub unit: &'static str,
 }
 
 /// Draws maps side by side.
-pub(crate) fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> RgbImage {
+#[must_use]
+pub fn sheet<const N: usize>(heading: &str, pictures: [Picture<'_>; N]) -> RgbImage {
     let panels = pictures.map(|Picture { title, values, mask, max, unit }| Panel {
         title,
         values,

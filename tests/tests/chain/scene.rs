@@ -13,7 +13,7 @@ use papilla_proto::{
     atlas::{Atlas, Patch, Raster},
 };
 
-use papilla_validation::acceptance::fault;
+use papilla_fingertip::simulation::sample::fault;
 
 use crate::{
     client,

@@ -3,6 +3,7 @@
 pub mod block;
 pub mod complete;
 pub mod gmsh;
+pub mod graded_block;
 pub mod hanging;
 pub mod lattice;
 pub mod nearest;

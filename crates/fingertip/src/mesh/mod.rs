@@ -7,6 +7,7 @@ mod half_cube;
 mod leaves;
 mod mirror;
 mod nail;
+pub mod named;
 mod patch;
 mod quality;
 mod refined;

@@ -96,7 +96,7 @@ impl MaterialSet {
     }
 }
 
-/// Epidermis, dermis and fat of [`MaterialSet::People`]: what `fe-datagen fit` writes, and the values
+/// Epidermis, dermis and fat of [`MaterialSet::People`]: what `papilla-studies fit` writes, and the values
 /// that it holds (studies/reports/fit.md).
 fn people() -> [MaterialSpec; 3] {
     let prony = PronySpec {

@@ -1,6 +1,6 @@
 //! A body pressed by a rigid plate: set-up, pose, and vertex values.
 
-use super::record::{Checks, IncrementRecord};
+use super::record::IncrementRecord;
 use crate::geometry::fingertip::FingertipShapeError;
 use crate::indenter::IndenterError;
 use crate::mesh::Transfer;
@@ -12,6 +12,7 @@ use crate::scene::{Located, Pose, Scene, SceneError, TissueError};
 use crate::tissue::{NoTissue, Tissue};
 use papilla_atlas::Atlas;
 use papilla_atlas::flatten::{AtlasReport, BuildAtlasError, build_atlas};
+use papilla_dataset::Checks;
 use papilla_fem::element::Inverted;
 use papilla_fem::mesh::Mesh;
 use papilla_fem::mesh::recovery::SedRecovery;

@@ -33,7 +33,7 @@ impl Body {
 mod tests {
     use crate::scene::Scene;
     use crate::simulation::Simulation;
-    use crate::simulation::record::Checks;
+    use papilla_dataset::Checks;
     use std::path::Path;
 
     /// Share of its volume that a body has lost, force (N) and checks at the end of a press.

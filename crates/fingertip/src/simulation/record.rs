@@ -1,35 +1,7 @@
 //! What one indentation hands to those who store it: checks, pose and vertex values.
 
+use papilla_dataset::Checks;
 use papilla_fem::contact::ContactRule;
-use serde::{Deserialize, Serialize};
-
-/// Self-checks of one equilibrium; dimensionless unless the name says otherwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Checks {
-    /// Norm of the out-of-balance force over the norm of the internal force.
-    pub residual_relative: f64,
-    /// |integral of the recorded p dA - plate reaction| over the plate reaction: the contact beyond
-    /// the recorded skin. Where all of it is recorded the two are equal by construction.
-    pub contact_force_vs_pressure_integral: f64,
-    /// |plate reaction - support reaction| over the plate reaction.
-    pub plate_vs_support_reaction: f64,
-    /// |stored energy - external work| over the largest external work so far.
-    pub energy_vs_work: f64,
-    /// Smallest volume ratio J at any quadrature point.
-    pub j_min: f64,
-    /// Deepest penetration of the skin into the indenter, mm.
-    pub penetration_mm_max: f64,
-    /// Newton iterations spent on this increment.
-    pub newton_iterations: u32,
-    /// How often the load step was halved on the way.
-    pub step_cuts: u32,
-    /// Augmentations of the contact multipliers.
-    pub augmentations: u32,
-    /// Numeric factorizations of the tangent.
-    pub factorizations: u32,
-    /// Iterations of conjugate gradients, summed over all solves.
-    pub cg_iterations: u32,
-}
 
 /// One stored equilibrium of an indentation: values at the atlas' vertices.
 ///

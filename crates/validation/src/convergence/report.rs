@@ -1,7 +1,8 @@
 //! Errors against the reference, and what each mesh costs.
 
 use super::solution::Solution;
-use super::{Case, ConvergenceError, MeshChoice};
+use super::{Case, ConvergenceError};
+use papilla_fingertip::mesh::named::MeshChoice;
 use papilla_output::plot::{Axis, Chart, Mark, Series, write_svg};
 use serde::Serialize;
 use std::fmt::Write as _;

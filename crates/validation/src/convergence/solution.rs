@@ -1,20 +1,22 @@
 //! One case on one mesh, on disk between runs.
 
 use super::target::Target;
-use super::{Case, ConvergenceError, MeshChoice};
-use crate::acceptance::fault;
-use crate::{part, processor};
+use super::{Case, ConvergenceError};
+use crate::part;
 use ndarray::Ix2;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::mesh::reader::SurfaceReader;
 use papilla_fem::solve::{Options, Solver, StepReport};
+use papilla_fingertip::mesh::named::MeshChoice;
 use papilla_fingertip::scene::{Geometry, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
 use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_fingertip::simulation::sample::fault;
 use papilla_output::OutputError;
 use papilla_output::npz::{NpzArrays, NpzBuilder};
+use papilla_progress::processor;
 use papilla_solid::tensor::norm;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,12 +1,12 @@
 //! A flat plate on the fingertip: every equilibrium balances.
 
 use super::{CaseError, Check, Context};
+use papilla_dataset::Checks;
 use papilla_fem::solve::Options;
 use papilla_fingertip::mesh::fingertip::Density;
 use papilla_fingertip::scene::Pose;
 use papilla_fingertip::simulation::body::Body;
 use papilla_fingertip::simulation::drive::{Approach, Drive};
-use papilla_fingertip::simulation::record::Checks;
 
 /// Refinement of the path between stored depths: the work integral needs it.
 const REFINEMENT: u32 = 2;

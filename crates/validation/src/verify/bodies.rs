@@ -82,7 +82,7 @@ pub(crate) fn solve<'a>(
 }
 
 /// Internal forces, N, one a degree of freedom.
-pub(crate) fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
+pub fn internal_force(problem: &Problem, u: &[[f64; 3]]) -> Result<Vec<f64>, StepError> {
     let trial = Trial {
         u,
         independent: &[],

@@ -33,7 +33,8 @@ impl Check {
     }
 
     /// `|value - reference| / |reference|` within `tolerance`.
-    pub(crate) fn relative(
+    #[must_use]
+    pub fn relative(
         quantity: impl Into<String>,
         value: f64,
         reference: f64,
@@ -45,7 +46,8 @@ impl Check {
     }
 
     /// `|value - reference|` within `tolerance`.
-    pub(crate) fn absolute(
+    #[must_use]
+    pub fn absolute(
         quantity: impl Into<String>,
         value: f64,
         reference: f64,
@@ -57,7 +59,8 @@ impl Check {
     }
 
     /// An error measure that should be zero, up to `tolerance`.
-    pub(crate) fn vanishes(
+    #[must_use]
+    pub fn vanishes(
         quantity: impl Into<String>,
         value: f64,
         tolerance: f64,
@@ -67,7 +70,8 @@ impl Check {
     }
 
     /// A value accepted up to `most`.
-    pub(crate) fn at_most(
+    #[must_use]
+    pub fn at_most(
         quantity: impl Into<String>,
         value: f64,
         most: f64,
@@ -78,7 +82,8 @@ impl Check {
     }
 
     /// A value accepted anywhere from `low` to `high`.
-    pub(crate) fn within(
+    #[must_use]
+    pub fn within(
         quantity: impl Into<String>,
         value: f64,
         [low, high]: [f64; 2],
@@ -101,7 +106,8 @@ impl Check {
     }
 
     /// A case that ended with an error.
-    pub(crate) fn failed(error: &(dyn std::error::Error + Send + Sync)) -> Self {
+    #[must_use]
+    pub fn failed(error: &(dyn std::error::Error + Send + Sync)) -> Self {
         Self::new(format!("failed: {error}"), [f64::NAN, f64::NAN, f64::NAN, 0.0], "")
     }
 }

@@ -27,11 +27,12 @@ mod solid_parts;
 mod tangent;
 mod uniaxial;
 
+pub use bodies::internal_force;
 pub use check::Check;
 pub use report::{Report, Row};
 
 /// Any error that a case may end with; it fails the case.
-pub(crate) type CaseError = Box<dyn std::error::Error + Send + Sync>;
+pub type CaseError = Box<dyn std::error::Error + Send + Sync>;
 
 /// How much to run.
 pub(crate) struct Context {

@@ -2,7 +2,7 @@
 
 use super::{CASES, CaseError, Check};
 use crate::csv::quoted;
-use crate::processor::today_here;
+use papilla_progress::processor::today_here;
 use serde::Serialize;
 use std::fmt::Write;
 use std::time::Instant;
@@ -75,7 +75,7 @@ pub struct Report {
 
 impl Report {
     /// Runs a case and adds its rows; an error is one row that fails.
-    pub(crate) fn take(
+    pub fn take(
         &mut self,
         case: &'static str,
         run: impl FnOnce() -> Result<Vec<Check>, CaseError>,

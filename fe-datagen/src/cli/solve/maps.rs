@@ -3,11 +3,11 @@
 use papilla_atlas::{MAP_LEN, MAP_SIDE_PX};
 use papilla_dataset::{Field, ShardMaps};
 use papilla_fingertip::scene::{Output, Scene};
+use papilla_fingertip::simulation::maps::FingerMaps;
 use papilla_fingertip::simulation::record::IncrementRecord;
 use papilla_output::atomic;
 use papilla_output::map_image::{MapView, Quantity, white_of};
 use papilla_output::npz::NpzBuilder;
-use papilla_validation::finger_maps::FingerMaps;
 use std::path::Path;
 
 /// Writes what the scene asks for: pictures of the deepest state, `maps.npz` of all states and the

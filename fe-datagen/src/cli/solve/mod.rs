@@ -5,6 +5,7 @@ mod press;
 
 use super::signals::{self, INTERRUPTED};
 use super::{BETTER, CHECKS_FAILED, print};
+use papilla_dataset::Checks;
 use papilla_fem::contact::ContactRule;
 use papilla_fem::solve::{Effort, Options};
 use papilla_fingertip::forecast::{SedError, better};
@@ -12,10 +13,9 @@ use papilla_fingertip::scene::{Output, Plan, Scene};
 use papilla_fingertip::simulation::Simulation;
 use papilla_fingertip::simulation::body::SimulationError;
 use papilla_fingertip::simulation::fields::PA_PER_MPA;
-use papilla_fingertip::simulation::record::Checks;
+use papilla_fingertip::simulation::maps::FingerMaps;
+use papilla_fingertip::simulation::sample;
 use papilla_output::atomic;
-use papilla_validation::acceptance;
-use papilla_validation::finger_maps::FingerMaps;
 use press::{LAST_STATE, Pressed, press};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -160,7 +160,7 @@ fn stopped(summary: &Summary, states: usize, args: &Args) -> anyhow::Result<Exit
 
 fn increment(pressed: &Pressed, maps: Option<&FingerMaps>) -> Increment {
     let Pressed { record, report, pressure_mpa_max } = pressed;
-    let own = || acceptance::fault(record, record.pressure_mpa.len());
+    let own = || sample::fault(record, record.pressure_mpa.len());
     let max = |v: &[f64]| {
         let largest = PA_PER_MPA * v.iter().copied().fold(0.0, f64::max);
         (!v.is_empty()).then_some(largest)

@@ -2,8 +2,6 @@
 
 use super::record::Record;
 use super::{Ending, How, SceneRecord, ScenesError};
-use crate::acceptance::fault;
-use crate::processor;
 use crate::stability::panic_text;
 use papilla_dataset::BALANCE_RELATIVE_MAX;
 use papilla_fem::solve::{Options, Solver, StepReport};
@@ -14,6 +12,8 @@ use papilla_fingertip::simulation::balanced::Balanced;
 use papilla_fingertip::simulation::body::{Body, SimulationError};
 use papilla_fingertip::simulation::drive::{Approach, Drive};
 use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_fingertip::simulation::sample::fault;
+use papilla_progress::processor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

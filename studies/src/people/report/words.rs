@@ -1,0 +1,59 @@
+//! What rows call their quantities, and what would mend them.
+
+use crate::people::measured::Quantity;
+
+/// What would bring rates nearer.
+pub(super) const RATES_MEND: &str = "another stimulus, deeper and over a disc (table below), or a monkey's finger, which is smaller";
+
+/// A quantity with its unit.
+pub(crate) fn quantity(quantity: &Quantity) -> String {
+    let plate = |pitch_deg: f64| match pitch_deg {
+        0.0 => "flat plate".to_owned(),
+        p => format!("plate at {p} degrees"),
+    };
+    match *quantity {
+        Quantity::Stiffness { force_n, pitch_deg } => {
+            format!("stiffness at {force_n} N, {}, N/mm", plate(pitch_deg))
+        }
+        Quantity::Stiffening { from_n, to_n, pitch_deg } => {
+            format!("stiffness at {to_n} N over that at {from_n} N, {}", plate(pitch_deg))
+        }
+        Quantity::Exponential { to_n, pitch_deg } => {
+            format!("R2 of an exponential force to {to_n} N, {}", plate(pitch_deg))
+        }
+        Quantity::RelaxationTime { rank } => format!("relaxation time {rank}, s"),
+        Quantity::PeakOverMean { force_n, pitch_deg } => {
+            format!("peak over mean pressure at {force_n} N, {}", plate(pitch_deg))
+        }
+        Quantity::AreaRatio { from_n, to_n, pitch_deg } => {
+            format!("contact area at {from_n} N over that at {to_n} N, {}", plate(pitch_deg))
+        }
+        Quantity::HertzModulus { force_n, pitch_deg } => {
+            format!("Hertz' modulus at {force_n} N, {}, MPa", plate(pitch_deg))
+        }
+        Quantity::VolumeLost { to_n, pitch_deg } => {
+            format!("largest loss of volume to {to_n} N, {}, %", plate(pitch_deg))
+        }
+        Quantity::EnergyLost { depth_mm, time_s } => {
+            format!("energy lost in a tap of {depth_mm} mm, {:.0} ms down and up, %", 1e3 * time_s)
+        }
+    }
+}
+
+/// What would bring the finger's figure nearer.
+pub(super) const fn mends(quantity: &Quantity) -> &'static str {
+    match quantity {
+        Quantity::Stiffness { .. }
+        | Quantity::Stiffening { .. }
+        | Quantity::Exponential { .. }
+        | Quantity::AreaRatio { .. }
+        | Quantity::HertzModulus { .. } => {
+            "fat that stiffens as it is squeezed (an exponential law), or a skin under tension"
+        }
+        Quantity::RelaxationTime { .. } | Quantity::EnergyLost { .. } => {
+            "Prony terms of 4 and 70 ms, of whose amplitudes the abstract says nothing"
+        }
+        Quantity::PeakOverMean { .. } => "tissue that stiffens as it is squeezed, or a finer mesh",
+        Quantity::VolumeLost { .. } => "a Poisson's ratio nearer to 1/2",
+    }
+}

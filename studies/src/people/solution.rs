@@ -1,0 +1,261 @@
+//! The states of a press, solved or read from an earlier run.
+
+use crate::people::PeopleError;
+use crate::people::contact::{self, ContactRead};
+use crate::people::force_path::{ForcePath, steps_mm};
+use crate::people::press::{Cells, Press};
+use crate::people::receptors::{Felt, Receptors};
+use papilla_dataset::BALANCE_RELATIVE_MAX;
+use papilla_fem::solve::{Options, Solver, StepReport};
+use papilla_fingertip::geometry::fingertip::FingertipShape;
+use papilla_fingertip::mesh::fingertip::{Density, Order};
+use papilla_fingertip::mesh::grading::Contact;
+use papilla_fingertip::scene::Scene;
+use papilla_fingertip::simulation::balanced::{AtState, Stoppable};
+use papilla_fingertip::simulation::body::{Body, SimulationError};
+use papilla_fingertip::simulation::drive::Drive;
+use papilla_fingertip::simulation::laws::solids;
+use papilla_fingertip::simulation::record::IncrementRecord;
+use papilla_progress::processor;
+use papilla_validation::part;
+use serde::{Deserialize, Serialize};
+use std::cell::Cell;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Changes what is read of a state: files of other readings are solved again.
+const READING: u32 = 1;
+
+/// One stored state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct State {
+    /// Contact, of presses that are asked about it.
+    pub contact: Option<ContactRead>,
+    /// Change of the soft tissue's volume, %.
+    pub volume_change_percent: f64,
+    /// What receptors feel, of presses that are asked about it.
+    pub felt: Felt,
+    /// |stored energy - work| over work.
+    pub energy_vs_work: f64,
+}
+
+/// A press that was solved.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Solution {
+    /// What it was solved from.
+    fingerprint: String,
+    /// Unknowns.
+    pub unknowns: usize,
+    /// Processor time, s.
+    pub solve_s: f64,
+    /// Depths and forces of its states.
+    pub path: ForcePath,
+    /// The states.
+    pub states: Vec<State>,
+    /// Why there are no deeper ones, if it was not told to stop.
+    pub ended: Option<String>,
+}
+
+/// What is read beside force and volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub(crate) enum Reads {
+    Force,
+    Contact,
+    Receptors,
+}
+
+/// How far a press goes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Course {
+    pub cells: Cells,
+    /// Stored states.
+    pub depths_mm: Vec<f64>,
+    /// It stops at the first state with this force, N.
+    pub until_n: f64,
+    pub reads: Reads,
+}
+
+impl Course {
+    /// Even steps to `limit_mm`, or until a force is met.
+    pub(crate) fn until(until_n: f64, cells: Cells, reads: Reads, limit_mm: f64) -> Self {
+        let count = (limit_mm / STEP_MAX_MM).ceil().max(STATES_MIN);
+        Self { cells, depths_mm: steps_mm(limit_mm / count, limit_mm), until_n, reads }
+    }
+}
+
+/// Largest distance of stored states, mm.
+const STEP_MAX_MM: f64 = 0.25;
+/// Fewest stored states on a way.
+const STATES_MIN: f64 = 6.0;
+
+impl Solution {
+    /// From `folder`, or solved and written there.
+    pub(crate) fn found_or_solved(
+        press: &Press,
+        course: &Course,
+        folder: &Path,
+    ) -> Result<Self, PeopleError> {
+        let scene = press.scene(course.cells, course.depths_mm.last().copied().unwrap_or(1.0));
+        let fingerprint = part::fingerprint(&(&scene, course, READING, env!("CARGO_PKG_VERSION")))?;
+        let path = folder.join(format!("{}-{}.json", press.name, &fingerprint[..8]));
+        let found: Option<Self> = part::read_json(&path)?;
+        if let Some(found) = found.filter(|f| f.fingerprint == fingerprint) {
+            return Ok(found);
+        }
+        let mut solution = Self { fingerprint, ..Self::default() };
+        solution.solve(press, course, &scene)?;
+        papilla_output::atomic::write_json(&path, &solution)?;
+        Ok(solution)
+    }
+
+    fn solve(&mut self, press: &Press, course: &Course, scene: &Scene) -> Result<(), PeopleError> {
+        let failed =
+            |e: SimulationError| PeopleError::Press { press: press.name.clone(), source: e.into() };
+        let begun_s = processor::thread_s();
+        let finger = FingertipShape::default();
+        let touch = press.first_touch(&course.depths_mm)?;
+        let mut body = body(scene, &finger, course.cells, &touch).map_err(failed)?;
+        body.read_at_nodes();
+        self.unknowns = body.problem.system.dofs.count;
+        let receptors = match course.reads {
+            Reads::Receptors => Some(Receptors::new(&press.name, &finger, &body, touch.first)?),
+            Reads::Force | Reads::Contact => None,
+        };
+        let rest_mm3 = body.problem.volume_mm3(&vec![[0.0; 3]; body.problem.mesh.nodes.len()]);
+        let rotation = touch.start.rotation;
+        let force = Cell::new(0.0);
+        let mut broken = None;
+        let path = &mut self.path;
+        let mut keep = |k: usize, solver: &Solver<'_>, record: &IncrementRecord, _: &StepReport| {
+            if k == 0 {
+                *path = ForcePath::default();
+            }
+            force.set(solver.force_along_path_n());
+            path.push(record.depth_mm, force.get());
+            let felt = receptors.as_ref().map(|r| r.felt(solver, record)).transpose();
+            let felt = felt.unwrap_or_else(|e| {
+                broken = Some(e.to_string());
+                None
+            });
+            let touches = course.reads == Reads::Contact;
+            let volume_mm3 = body.problem.volume_mm3(solver.displacement_mm());
+            State {
+                contact: if touches { contact::read(&body, solver, rotation) } else { None },
+                volume_change_percent: 100.0 * (volume_mm3 / rest_mm3 - 1.0),
+                felt: felt.unwrap_or_default(),
+                energy_vs_work: record.checks.energy_vs_work,
+            }
+        };
+        let mut at_state = |_: &AtState<'_, State>| match force.get() >= course.until_n {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let stoppable = Stoppable { from: None, at_state: &mut at_state };
+        let mut solver = body.solver(Options::default()).map_err(failed)?;
+        let (approach, drive) = (press.approach()?, Drive::Depths(course.depths_mm.clone()));
+        let limit = BALANCE_RELATIVE_MAX;
+        let pressed =
+            body.press_stoppable(&mut solver, &approach, &drive, limit, &mut keep, stoppable);
+        self.states = pressed.kept;
+        if self.states.is_empty() {
+            self.path = ForcePath::default();
+        }
+        self.ended = match pressed.pressed {
+            Ok(()) | Err(SimulationError::Halted) => broken,
+            Err(e) => Some(e.to_string()),
+        };
+        self.solve_s = processor::thread_s() - begun_s;
+        Ok(())
+    }
+
+    /// Largest |stored energy - work| over work.
+    pub(crate) fn energy_vs_work_max(&self) -> f64 {
+        self.states.iter().map(|s| s.energy_vs_work).fold(0.0, f64::max)
+    }
+}
+
+/// The finger, its cells, if any are split, for the very depths that are stored.
+fn body(
+    scene: &Scene,
+    finger: &FingertipShape,
+    cells: Cells,
+    touch: &Contact,
+) -> Result<Body, SimulationError> {
+    let plan = scene.plan()?;
+    let tissues = solids(&scene.materials, &plan)?;
+    let touch = (cells.order == Order::Graded).then_some(touch);
+    Body::fingertip(finger, tissues, cells.density, cells.order, plan.parts, touch)
+}
+
+/// Deepest that a force is looked for on a split mesh, of which all that may be touched is split, mm.
+const LIMIT_SPLIT_MM: f64 = 4.25;
+/// Deepest on an even one: a finger of Hertz' modulus .2 MPa has 10 N at 4.3 mm, one of .15 MPa at
+/// 5.2 mm.
+const LIMIT_EVEN_MM: f64 = 5.25;
+/// How much deeper than Hertz' guess a press may go at first.
+const BEYOND_GUESS: f64 = 1.25;
+
+/// A press until a force is met. Cells are split for all that may be touched, so the first try
+/// goes no deeper than Hertz' law for a soft finger, and each further one twice as deep.
+pub(crate) fn until(
+    press: &Press,
+    until_n: f64,
+    cells: Cells,
+    reads: Reads,
+    folder: &Path,
+) -> Result<Solution, PeopleError> {
+    let deepest_mm = if cells.order == Order::Graded { LIMIT_SPLIT_MM } else { LIMIT_EVEN_MM };
+    let mut limit_mm = (BEYOND_GUESS * press.hertz_depth_mm(until_n)?).min(deepest_mm);
+    loop {
+        let course = Course::until(until_n, cells, reads, limit_mm);
+        let found = Solution::found_or_solved(press, &course, folder)?;
+        if found.path.reaches(until_n) || found.ended.is_some() || limit_mm >= deepest_mm {
+            return Ok(found);
+        }
+        limit_mm = (2.0 * limit_mm).min(deepest_mm);
+    }
+}
+
+/// How far past the last force the way goes: the denser mesh may be as much stiffer or softer.
+const WAY_BEYOND: f64 = 1.02;
+
+/// A press held at `forces_n`: a way on the coarse mesh tells the depths, states there on `density`
+/// are solved. Their forces miss by what the meshes differ.
+pub(crate) fn held_at(
+    press: &Press,
+    forces_n: &[f64],
+    density: Density,
+    folder: &Path,
+) -> Result<Solution, PeopleError> {
+    let most_n = forces_n.last().copied().unwrap_or(0.0);
+    let coarse = Cells::graded(Density::Coarse);
+    let way = until(press, WAY_BEYOND * most_n, coarse, Reads::Force, folder)?;
+    let depth = |&force_n: &f64| {
+        way.path.depth_at(force_n).ok_or_else(|| {
+            let (reached_n, depth_mm) = way.path.deepest();
+            PeopleError::Force {
+                press: press.name.clone(),
+                wanted_n: force_n,
+                reached_n,
+                depth_mm,
+                why: way.ended.clone(),
+            }
+        })
+    };
+    let depths_mm = forces_n.iter().map(depth).collect::<Result<_, _>>()?;
+    let cells = Cells::graded(density);
+    let course = Course { cells, depths_mm, until_n: f64::INFINITY, reads: Reads::Receptors };
+    let held = Solution::found_or_solved(press, &course, folder)?;
+    if held.states.len() == forces_n.len() && held.ended.is_none() {
+        return Ok(held);
+    }
+    let (reached_n, depth_mm) = held.path.deepest();
+    let why = held.ended;
+    Err(PeopleError::Force {
+        press: press.name.clone(),
+        wanted_n: most_n,
+        reached_n,
+        depth_mm,
+        why,
+    })
+}
