@@ -33,10 +33,9 @@ the epoch by; the test indentations are touched once, after training, for the me
 
 s1-baseN is the published U-Net on maps (two encoding and two decoding stages, MSE on
 max-normalised maps).
-face-rR[-nK][-zW][-hH[s]] works on the faces of the interface and starts from --operator: a linear
-map of rank R with a stencil of K vertices, a gated layer of width W on the R coordinates, a
-correction for finite strain of width H, the same at every face (s: it sees each neighbour by
-itself); SED is a mean of sums of squares.
+map-cC-kK-rR[-hH][-p2] works on pixels: C components of strain from a linear map of rank R over the
+whole finger and from convolutions over K by K blocks at three resolutions; SED is the sum of their
+squares. A correction of width H follows; p2: on means of 2 by 2 pixels.
 
 Writes to --out: checkpoint.pt (after each epoch, atomically), history.csv, loss.png, metrics.json
 and metrics.csv (one row for each held-out sample). Stop it at any time: the same command with
@@ -181,7 +180,7 @@ def _untrained_arguments(parser: argparse.ArgumentParser) -> None:
 def _train_arguments(parser: argparse.ArgumentParser) -> None:
     _dataset_argument(parser)
     add = parser.add_argument
-    add("--network", default="s1-base8", help="s1-baseN, map-... or face-... (s1-base8)")
+    add("--network", default="s1-base8", help="s1-baseN or map-... (s1-base8)")
     add("--out", type=Path, required=True, metavar="RUN_DIR", help="directory of the run")
     add("--resume", action="store_true", help="go on with the run in RUN_DIR if there is one")
     add("--epochs", type=int, default=40, help="passes over the training indentations (40)")
@@ -214,20 +213,6 @@ def _train_arguments(parser: argparse.ArgumentParser) -> None:
         "each sample, the far field once more (auto: mse for s1-*, else relative)",
     )
     add("--far-weight", type=float, default=0.2, help="of the far field in `relative` (0.2)")
-    add("--operator", metavar="FILE.npz", help="linear operator that a face network starts from")
-    add(
-        "--base-rate",
-        type=float,
-        default=0.05,
-        help="part of the learning rate by which a face network's linear map learns (0.05; 0: it "
-        "stays the operator)",
-    )
-    add(
-        "--dropout",
-        type=float,
-        default=0.0,
-        help="part of a face network's correction that each step leaves out (0)",
-    )
     add(
         "--shift-px",
         type=int,

@@ -32,11 +32,9 @@ class Served:
     dataset_sha256: str
     # The hashes of several datasets that were trained on together.
     datasets: list[str] = field(default_factory=list)
-    # The constants of a face network's rasters; a network on maps has none.
-    frame: Weights = field(default_factory=dict)
 
     @staticmethod
-    def of(dataset: Dataset, frame: Weights | None = None) -> Served:
+    def of(dataset: Dataset) -> Served:
         """Mask (uint8 ``[224, 224]``), scales and identities of a dataset."""
         return Served(
             mask=torch.from_numpy(dataset.interface.mask()).to(torch.uint8),
@@ -46,7 +44,6 @@ class Served:
             effects=list(dataset.effects),
             dataset_sha256=dataset.dataset_sha256,
             datasets=dataset.hashes,
-            frame=frame or {},
         )
 
 

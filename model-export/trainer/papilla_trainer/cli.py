@@ -162,8 +162,8 @@ def _finer_text(found: dict[str, Any] | None) -> str:
 
 
 def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    from papilla_trainer.comparison.untrained import write_operator
     from papilla_trainer.joined import open_datasets
-    from papilla_trainer.untrained import write_operator
 
     _require_rank(options)
     result = write_operator(
@@ -178,9 +178,9 @@ def _operator(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
 
 
 def _half_space(options: argparse.Namespace) -> tuple[dict[str, Any], str]:
-    from papilla_trainer.halfspace import HalfSpace
+    from papilla_trainer.comparison.half_space import HalfSpace
+    from papilla_trainer.comparison.untrained import write_half_space
     from papilla_trainer.joined import open_datasets
-    from papilla_trainer.untrained import write_half_space
 
     _require_rank(options)
     body = HalfSpace(options.youngs_modulus_pa, options.poissons_ratio, options.depth_mm)

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from papilla_trainer.comparison.unet import NetworkSpec, parse_network
 from papilla_trainer.errors import RunError, UsageError
-from papilla_trainer.face_network import FaceSpec, parse_face_network
 from papilla_trainer.losses import LOSSES
 from papilla_trainer.map_network import MapSpec, parse_map_network
-from papilla_trainer.network import NetworkSpec, parse_network
 
 PRECISIONS = ("f32", "bf16")
 SCHEDULES = ("constant", "cosine")
@@ -39,21 +38,12 @@ class TrainConfig:
     device: str = "auto"
     loss: str = "auto"
     far_weight: float = 0.2
-    operator: str | None = None
     train_presses: int | None = None
     dataset_samples: int | None = None
-    base_rate: float = 0.05
-    dropout: float = 0.0
     shift_px: int = 0
     contact: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        if (self.operator is not None) != isinstance(self.spec, FaceSpec):
-            raise UsageError(
-                "--operator FILE.npz is what face networks, and they alone, start from"
-            )
-        if not 0.0 <= self.base_rate <= 1.0:
-            raise UsageError(f"--base-rate must lie between 0 and 1, not {self.base_rate}")
         if self.shift_px and not isinstance(self.spec, MapSpec):
             raise UsageError("--shift-px is for networks on maps (map-...) alone")
         if self.contact and not isinstance(self.spec, MapSpec):
@@ -63,8 +53,6 @@ class TrainConfig:
                 f"--shift-px must lie between 0 and {LARGEST_SHIFT_PX}, not {self.shift_px}: "
                 "further away the finger is another"
             )
-        if not 0.0 <= self.dropout < 1.0:
-            raise UsageError(f"--dropout must lie in 0 .. 1, not {self.dropout}")
         if self.loss not in LOSS_CHOICES or self.far_weight < 0.0:
             raise UsageError(f"--loss {self.loss} --far-weight {self.far_weight}: not a loss")
         if self.train_presses is not None and self.train_presses < 2:
@@ -80,10 +68,8 @@ class TrainConfig:
             raise UsageError(f"--threads must be at least 1, not {self.threads}")
 
     @property
-    def spec(self) -> NetworkSpec | FaceSpec | MapSpec:
+    def spec(self) -> NetworkSpec | MapSpec:
         """The network asked for."""
-        if self.network.startswith("face-"):
-            return parse_face_network(self.network)
         if self.network.startswith("map-"):
             return parse_map_network(self.network)
         return parse_network(self.network)

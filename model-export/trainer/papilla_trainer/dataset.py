@@ -92,7 +92,7 @@ class Dataset:
         self._check_splits(labels)
         self.skin = self._read_raster("skin")
         self.interface = self._read_raster("interface")
-        self._samplers: dict[str, tuple[NDArray[np.int64], NDArray[np.float64]]] = {}
+        self._sampler: tuple[NDArray[np.int64], NDArray[np.float64]] | None = None
 
     def load(self, ids: list[int]) -> Maps:
         """Rasterise the given indentations, in this order, all depths of each."""
@@ -112,30 +112,20 @@ class Dataset:
             start = end
         return Maps(pressure, sed, press_id, depth)
 
-    def load_vertices(self, ids: list[int]) -> tuple[F32, F32]:
-        """Pressure (Pa) and SED (J/m3) at the vertices, ``[N, V]`` each, of all depths."""
+    def vertex_pressures(self, ids: list[int]) -> F32:
+        """Pressure (Pa) at the skin's vertices, ``[N, V]``, of all depths."""
         shards = [self._read_shard(self.presses[i]) for i in ids]
-        return (
-            np.concatenate([self._at_vertices("skin", hats, s, "pressure_pa") for s in shards]),
-            np.concatenate(
-                [
-                    self._at_vertices("interface", quadratics, s, "sed_dermis_j_per_m3")
-                    for s in shards
-                ]
-            ),
-        )
+        return np.concatenate([self._at_vertices(shard) for shard in shards])
 
-    def _at_vertices(
-        self, patch: str, functions: Functions, shard: dict[str, NDArray[Any]], name: str
-    ) -> F32:
-        """What a map says about the vertices, where a shard has values elsewhere."""
+    def _at_vertices(self, shard: dict[str, NDArray[Any]]) -> F32:
+        """What the pressure map says about the vertices, where a shard has values elsewhere."""
         if CELL_PLACE not in shard:
-            return shard[name]
-        raster: Raster = getattr(self, patch)
-        if patch not in self._samplers:
-            self._samplers[patch] = vertex_sampler(raster, self.vertex_count)
-        pixels, weights = self._samplers[patch]
-        maps = _maps(raster, functions, shard, name).reshape(-1, MAP_LEN)
+            pressure: F32 = shard["pressure_pa"]
+            return pressure
+        if self._sampler is None:
+            self._sampler = vertex_sampler(self.skin, self.vertex_count)
+        pixels, weights = self._sampler
+        maps = _maps(self.skin, hats, shard, "pressure_pa").reshape(-1, MAP_LEN)
         return (maps[:, pixels] * weights).sum(axis=2).clip(min=0.0).astype(np.float32)
 
     def _check_identity(self) -> None:

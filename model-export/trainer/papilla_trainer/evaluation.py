@@ -11,17 +11,15 @@ import torch
 from torch import nn
 
 from papilla_trainer.checkpoint import Checkpoint
+from papilla_trainer.comparison.unet import ServedModel
 from papilla_trainer.config import TrainConfig, make_deterministic
 from papilla_trainer.dataset import Dataset
 from papilla_trainer.errors import RunError
-from papilla_trainer.face_network import FaceSpec
 from papilla_trainer.files import write_json
 from papilla_trainer.map_network import MapSpec, ServedMapModel
 from papilla_trainer.metrics import F32, METRICS, evaluate, summarise
-from papilla_trainer.network import ServedModel
 from papilla_trainer.report import write_csv
 from papilla_trainer.tasks import trained_network
-from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
 METRICS_FILE = "metrics.json"
 SAMPLES_FILE = "metrics.csv"
@@ -32,8 +30,6 @@ def served_model(checkpoint: Checkpoint, weights: str = "best") -> nn.Module:
     spec = TrainConfig(**checkpoint.config).spec
     chosen = checkpoint.best_model if weights == "best" else checkpoint.model
     network, served = trained_network(spec, chosen), checkpoint.served
-    if isinstance(spec, FaceSpec):
-        return ServedVertexModel(network, MapFrame(served.frame)).eval()
     if isinstance(spec, MapSpec):
         return ServedMapModel(network, served.mask.float()).eval()
     model = ServedModel(

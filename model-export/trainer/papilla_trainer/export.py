@@ -19,7 +19,6 @@ from papilla_trainer.checkpoint import Checkpoint, Served
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.evaluation import chosen_epoch, read_metrics, served_model
 from papilla_trainer.files import write_atomic
-from papilla_trainer.network import parameter_count
 from papilla_trainer.raster import SIDE_PX
 
 OPSET = 17
@@ -130,7 +129,7 @@ def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
         "loss": "mse, max-normalised",
         "precision": config.precision,
         "presses": {split: len(ids) for split, ids in checkpoint.splits.items()},
-        "parameters": parameter_count(served_model(checkpoint)),
+        "parameters": sum(p.numel() for p in served_model(checkpoint).parameters()),
         "seconds": round(checkpoint.seconds, 1),
         "trainer": __version__,
         **checkpoint.environment,
@@ -141,9 +140,6 @@ def training_record(checkpoint: Checkpoint, weights: str) -> dict[str, Any]:
         training["shift_px"] = config.shift_px
     if config.contact:
         training["contact"] = [Path(file).name for file in config.contact]
-    if config.operator is not None:
-        training["start"] = "linear operator of the finger"
-        training |= {"base_rate": config.base_rate, "dropout": config.dropout}
     return training
 
 

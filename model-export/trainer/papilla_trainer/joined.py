@@ -36,7 +36,7 @@ class JoinedDataset(Dataset):
         if len(set(self.hashes)) < len(parts):
             raise DatasetError(f"{first.directory}: a dataset is given twice")
         self.dataset_sha256 = hashlib.sha256("".join(self.hashes).encode()).hexdigest()
-        self._samplers = {}
+        self._sampler = None
         self.presses, self.train_ids, self.test_ids = {}, [], []
         for k, part in enumerate(parts):
             for i, press in part.presses.items():

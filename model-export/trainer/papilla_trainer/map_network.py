@@ -32,9 +32,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from papilla_trainer.errors import UsageError
-from papilla_trainer.face_network import PRESSURE_UNIT_PA, SED_UNIT_J_PER_M3
 from papilla_trainer.raster import SIDE_PX
 
+PRESSURE_UNIT_PA = 1e4
+SED_UNIT_J_PER_M3 = 100.0
 _NAME = re.compile(
     r"map-c(?P<components>\d+)-k(?P<kernel>\d+)-r(?P<rank>\d+)(?:-h(?P<hidden>\d+))?"
     r"(?:-p(?P<pixel>\d+))?"

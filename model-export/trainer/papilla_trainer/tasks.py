@@ -1,34 +1,27 @@
-"""What a run trains: the network, its samples and its loss, for maps or for vertices."""
+"""What a run trains: the network, its samples and its loss."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from papilla_trainer.atlas import Atlas
+from papilla_trainer.comparison.unet import NetworkSpec, S1UNet, build_network
 from papilla_trainer.config import TrainConfig
 from papilla_trainer.contact_maps import with_contact
-from papilla_trainer.dataset import F32, Dataset, Maps
-from papilla_trainer.face_init import start_from_operator
-from papilla_trainer.face_layout import FaceLayout
-from papilla_trainer.face_network import FaceNet, FaceSpec
+from papilla_trainer.dataset import Dataset, Maps
 from papilla_trainer.joined import STRIDE
-from papilla_trainer.linear_operator import Operator
 from papilla_trainer.losses import Loss, make_loss
 from papilla_trainer.map_network import MapNet, MapSpec
-from papilla_trainer.network import NetworkSpec, S1UNet, build_network
-from papilla_trainer.vertex_served import MapFrame
 
 
 @dataclass(frozen=True)
 class Samples:
-    """On the device: maps ``[N, 1, 224, 224]`` or values ``[N, V]``, in Pa and J/m3.
+    """On the device: maps ``[N, 1, 224, 224]``, in Pa and J/m3.
 
     The U-Net's are divided by the dataset's maxima, as in its paper. ``source`` ``[N]``, on the
     CPU, says which dataset each is of; with contact's pressure it counts as another.
@@ -76,31 +69,10 @@ def make_task(
     else:
         fit = load(dataset, fit_ids, device)
     validation = load(dataset, validation_ids, device) if validation_ids else None
-    if isinstance(spec, FaceSpec):
-        network = fresh_face_network(dataset, config, fit.inputs.cpu())
-        weights = torch.from_numpy(pixels_of_vertices(dataset))
-    else:
-        network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)
-        weights = torch.from_numpy(dataset.interface.mask())
+    network = fresh_network(spec, config.seed).to(memory_format=torch.channels_last)
+    weights = torch.from_numpy(dataset.interface.mask())
     loss = make_loss(config.loss_name, weights.to(device), config.far_weight)
     return Task(network.to(device), fit, validation, loss)
-
-
-def fresh_face_network(dataset: Dataset, config: TrainConfig, pressure_pa: Tensor) -> FaceNet:
-    """A start from the linear operator; the same seed gives the same weights."""
-    spec = config.spec
-    if not isinstance(spec, FaceSpec) or config.operator is None:
-        raise TypeError("not a face network")
-    atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
-    operator = Operator.read(Path(config.operator), atlas)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(config.seed)
-        network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near, spec.star))
-    if network.correction is not None:
-        network.correction.dropout.p = config.dropout
-    weights = torch.from_numpy(pixels_of_vertices(dataset))
-    start_from_operator(network, atlas, operator, pressure_pa, weights)
-    return network
 
 
 def fresh_network(spec: NetworkSpec | MapSpec, seed: int) -> nn.Module:
@@ -113,39 +85,17 @@ def fresh_network(spec: NetworkSpec | MapSpec, seed: int) -> nn.Module:
 
 
 def trained_network(
-    spec: NetworkSpec | FaceSpec | MapSpec, weights: dict[str, Tensor]
+    spec: NetworkSpec | MapSpec, weights: dict[str, Tensor]
 ) -> nn.Module:
     """A network that holds these weights."""
-    network: nn.Module
-    if isinstance(spec, FaceSpec):
-        network = FaceNet(spec, FaceLayout.of_weights(weights))
-    elif isinstance(spec, MapSpec):
-        network = MapNet(spec)
-    else:
-        network = S1UNet(spec.base)
+    network: nn.Module = MapNet(spec) if isinstance(spec, MapSpec) else S1UNet(spec.base)
     network.load_state_dict(weights)
     return network
 
 
-def frame_of(dataset: Dataset) -> dict[str, Tensor]:
-    """The constants of `MapFrame`, for the checkpoint."""
-    return dict(MapFrame.of(dataset.skin, dataset.interface, dataset.vertex_count).state_dict())
-
-
-def pixels_of_vertices(dataset: Dataset) -> F32:
-    """``[V]``: the pixels that each interface vertex stands for, which is what its error counts."""
-    raster = dataset.interface
-    counts = np.bincount(
-        raster.vertex.ravel(), weights=raster.weight.ravel(), minlength=dataset.vertex_count
-    )
-    return counts.astype(np.float32)
-
-
 def _loader(
-    spec: NetworkSpec | FaceSpec | MapSpec,
+    spec: NetworkSpec | MapSpec,
 ) -> Callable[[Dataset, list[int], torch.device], Samples]:
-    if isinstance(spec, FaceSpec):
-        return _load_vertices
     return _load_normalised if isinstance(spec, NetworkSpec) else _load_maps
 
 
@@ -156,16 +106,6 @@ def _load_normalised(dataset: Dataset, ids: list[int], device: torch.device) -> 
 
 def _load_maps(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
     return Samples.of(dataset.load(ids), device)
-
-
-def _load_vertices(dataset: Dataset, ids: list[int], device: torch.device) -> Samples:
-    pressure, sed = dataset.load_vertices(ids)
-    press_id = np.repeat(ids, [dataset.presses[i].samples for i in ids])
-    return Samples(
-        torch.from_numpy(pressure).to(device),
-        torch.from_numpy(sed).to(device),
-        source_of(press_id),
-    )
 
 
 def source_of(press_id: NDArray[np.int64]) -> Tensor:

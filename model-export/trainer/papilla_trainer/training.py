@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 
 from papilla_trainer.augment import varied
 from papilla_trainer.checkpoint import FILE_NAME, Checkpoint, Served, copy_weights
@@ -19,10 +19,9 @@ from papilla_trainer.config import TrainConfig, make_deterministic, pick_device
 from papilla_trainer.dataset import Dataset, fewer, validation_split
 from papilla_trainer.draw import draw, drawn
 from papilla_trainer.errors import RunError, TrainerError
-from papilla_trainer.face_network import FaceNet
 from papilla_trainer.map_network import MapNet
 from papilla_trainer.report import write_history
-from papilla_trainer.tasks import frame_of, make_task
+from papilla_trainer.tasks import make_task
 
 BEST_LOSS_AT_START = math.inf
 _LARGEST_GRADIENT = 1.0
@@ -62,15 +61,13 @@ class Trainer:
         self.network, self.loss = task.network, task.loss
         self.fit_samples, self.validation = task.fit, task.validation
         self.epoch_samples = drawn(task.fit.source, config.dataset_samples)
-        self.on_vertices = isinstance(self.network, FaceNet)
         self.on_pixels = isinstance(self.network, MapNet)
-        self.rates = _rates(self.network, config.base_rate)
         self.optimizer = torch.optim.Adam(
-            [{"params": params} for _, params in self.rates], lr=config.learning_rate, fused=True
+            self.network.parameters(), lr=config.learning_rate, fused=True
         )
         self.state = Checkpoint(
             config=config.as_json(),
-            served=Served.of(dataset, frame_of(dataset) if self.on_vertices else None),
+            served=Served.of(dataset),
             splits={"fit": fit_ids, "validation": validation_ids, "test": dataset.test_ids},
             epoch=0,
             model=copy_weights(self.network.state_dict()),
@@ -89,8 +86,8 @@ class Trainer:
             began = time.perf_counter()
             epoch = self.state.epoch + 1
             rate = self._learning_rate(epoch)
-            for group, (part, _) in zip(self.optimizer.param_groups, self.rates, strict=True):
-                group["lr"] = rate * part
+            for group in self.optimizer.param_groups:
+                group["lr"] = rate
             train_loss = self._train_epoch(epoch, listener)
             validation_loss = self._validate()
             seconds = time.perf_counter() - began
@@ -119,7 +116,7 @@ class Trainer:
             self.optimizer.zero_grad()
             loss = self.loss(self._forward(inputs), targets)
             loss.backward()
-            if self.on_vertices or self.on_pixels:
+            if self.on_pixels:
                 # Squares of squares: a first step too far would throw everything away.
                 torch.nn.utils.clip_grad_norm_(self.network.parameters(), _LARGEST_GRADIENT)
             self.optimizer.step()
@@ -140,9 +137,7 @@ class Trainer:
     def _forward(self, inputs: Tensor) -> Tensor:
         bf16 = self.config.precision == "bf16"
         with torch.autocast(self.device.type, dtype=torch.bfloat16, enabled=bf16):
-            if not self.on_vertices:
-                inputs = inputs.contiguous(memory_format=torch.channels_last)
-            output: Tensor = self.network(inputs)
+            output: Tensor = self.network(inputs.contiguous(memory_format=torch.channels_last))
         return output.float()
 
     @torch.no_grad()
@@ -195,16 +190,6 @@ class Trainer:
         torch.set_rng_state(earlier.rng_torch)
         earlier.environment = self.state.environment
         self.state = earlier
-
-
-def _rates(network: nn.Module, base_rate: float) -> list[tuple[float, list[nn.Parameter]]]:
-    """Parameters and their part of the learning rate: a given linear map is only touched up."""
-    if not isinstance(network, FaceNet):
-        return [(1.0, list(network.parameters()))]
-    linear = {id(parameter) for parameter in network.linear_map()}
-    others = [parameter for parameter in network.parameters() if id(parameter) not in linear]
-    groups = [(1.0, others), (base_rate, network.linear_map())]
-    return [(rate, parameters) for rate, parameters in groups if rate > 0.0 and parameters]
 
 
 def _environment(device: torch.device, threads: int) -> dict[str, Any]:

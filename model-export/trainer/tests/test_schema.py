@@ -59,7 +59,7 @@ def test_the_reader_asks_for_nothing_that_the_format_lacks(
     monkeypatch.setattr(reader, "read_npz", noted_npz)
     again = Dataset(tiny.directory)
     again.load(again.train_ids)
-    again.load_vertices(again.test_ids)
+    again.vertex_pressures(again.test_ids)
     entry = SCHEMA["manifest"]["$defs"]["IndentationEntry"]
     assert len(manifest) > 5
     assert manifest <= set(SCHEMA["manifest"]["required"])

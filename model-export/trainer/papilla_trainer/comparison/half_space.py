@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from papilla_trainer.atlas import Atlas
+from papilla_trainer.comparison.atlas import Atlas
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from papilla_trainer.atlas import Atlas
 from papilla_trainer.cli import main
+from papilla_trainer.comparison.atlas import Atlas
+from papilla_trainer.comparison.half_space import HalfSpace
 from papilla_trainer.dataset import Dataset
-from papilla_trainer.halfspace import HalfSpace
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.48])

@@ -1,3 +1,5 @@
+"""Operators as networks at the vertices."""
+
 from __future__ import annotations
 
 import json
@@ -7,18 +9,17 @@ import numpy as np
 import pytest
 import torch
 
-from papilla_trainer.atlas import Atlas
+from papilla_trainer.comparison.atlas import Atlas
+from papilla_trainer.comparison.compression import start_from_operator
+from papilla_trainer.comparison.layout import Layout, frames
+from papilla_trainer.comparison.linear_network import LinearNet, LinearSpec
+from papilla_trainer.comparison.linear_operator import Operator
+from papilla_trainer.comparison.vertex_served import MapFrame, ServedVertexModel
 from papilla_trainer.dataset import Dataset
-from papilla_trainer.errors import DatasetError, UsageError
-from papilla_trainer.face_init import start_from_operator
-from papilla_trainer.face_layout import FaceLayout, frames
-from papilla_trainer.face_network import FaceNet, FaceSpec, parse_face_network
-from papilla_trainer.linear_operator import Operator
-from papilla_trainer.losses import relative_loss
+from papilla_trainer.errors import DatasetError
 from papilla_trainer.sampling import vertex_sampler
-from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
-NAMES = ("face-r8", "face-r8-z6", "face-r8-n12", "face-r8-n12-z4-h6", "face-r8-n12-h6s")
+SPECS = (LinearSpec(8, 0, "test"), LinearSpec(8, 12, "test"))
 
 
 @pytest.fixture(scope="module")
@@ -31,19 +32,18 @@ def operator(operator_file: Path, atlas: Atlas) -> Operator:
     return Operator.read(operator_file, atlas)
 
 
-def build(name: str, atlas: Atlas, operator: Operator) -> FaceNet:
-    spec = parse_face_network(name)
+def build(spec: LinearSpec, atlas: Atlas, operator: Operator) -> LinearNet:
     torch.manual_seed(3)
-    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near, spec.star))
+    network = LinearNet(spec, Layout.of(atlas, operator, spec.near))
     with torch.no_grad():
         for parameter in network.parameters():
             parameter += 0.2 * torch.randn_like(parameter)
     return network
 
 
-def started(spec: FaceSpec, tiny: Dataset, atlas: Atlas, operator: Operator) -> FaceNet:
-    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
-    pressure = torch.from_numpy(tiny.load_vertices(tiny.train_ids)[0])
+def started(spec: LinearSpec, tiny: Dataset, atlas: Atlas, operator: Operator) -> LinearNet:
+    network = LinearNet(spec, Layout.of(atlas, operator, spec.near))
+    pressure = torch.from_numpy(tiny.vertex_pressures(tiny.train_ids))
     start_from_operator(network, atlas, operator, pressure, torch.ones(atlas.vertex_count))
     return network
 
@@ -54,28 +54,11 @@ def dense(operator: Operator, pressure: torch.Tensor) -> np.ndarray:
     return ((e**2).sum(axis=2)[:, operator.vertex_face] * operator.vertex_weight).sum(axis=2)
 
 
-def test_names_are_read() -> None:
-    for name in (*NAMES, "face-r128-n32-h48"):
-        assert parse_face_network(name).name == name
-    assert parse_face_network("face-r64-n8-h32") == FaceSpec(rank=64, near=8, hidden=32)
-    for wrong in (
-        "face",
-        "face-r7",
-        "face-r0",
-        "face-r8-n0",
-        "face-r8-x",
-        "face-r8-h4-n2",
-        "face-r8-s",
-    ):
-        with pytest.raises(UsageError, match=r"--network|unknown network"):
-            parse_face_network(wrong)
-
-
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("spec", SPECS)
 def test_zero_stays_zero_and_nothing_is_negative(
-    name: str, atlas: Atlas, operator: Operator
+    spec: LinearSpec, atlas: Atlas, operator: Operator
 ) -> None:
-    network = build(name, atlas, operator)
+    network = build(spec, atlas, operator)
     pressure = 1e5 * torch.rand(3, atlas.vertex_count)
     pressure[0] = 0.0
     with torch.no_grad():
@@ -86,19 +69,19 @@ def test_zero_stays_zero_and_nothing_is_negative(
     assert torch.isfinite(sed).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("spec", SPECS)
 def test_the_mirror_image_is_answered_by_the_mirror_image(
-    name: str, atlas: Atlas, operator: Operator
+    spec: LinearSpec, atlas: Atlas, operator: Operator
 ) -> None:
-    network, mirror = build(name, atlas, operator), torch.from_numpy(atlas.mirror)
+    network, mirror = build(spec, atlas, operator), torch.from_numpy(atlas.mirror)
     pressure = 1e4 * torch.rand(2, atlas.vertex_count)
     with torch.no_grad():
         ours, theirs = network(pressure)[:, mirror], network(pressure[:, mirror])
     assert (ours - theirs).abs().max() <= 1e-5 * ours.max()
 
 
-def test_without_correction_sed_is_quadratic(atlas: Atlas, operator: Operator) -> None:
-    network = build("face-r8-n12", atlas, operator)
+def test_sed_is_quadratic(atlas: Atlas, operator: Operator) -> None:
+    network = build(SPECS[1], atlas, operator)
     pressure = 1e4 * torch.rand(1, atlas.vertex_count)
     with torch.no_grad():
         torch.testing.assert_close(network(3.0 * pressure), 9.0 * network(pressure))
@@ -108,7 +91,7 @@ def test_the_sampler_inverts_the_rasteriser(tiny: Dataset) -> None:
     pixels, weights = vertex_sampler(tiny.skin, tiny.vertex_count)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-9)
     assert np.abs(weights).sum(axis=1).max() < 3.0  # noise is not blown up
-    values, _ = tiny.load_vertices(tiny.test_ids)
+    values = tiny.vertex_pressures(tiny.test_ids)
     maps = tiny.skin.rasterise(values).reshape(len(values), -1)
     back = (maps[:, pixels] * weights).sum(axis=2)
     error = np.linalg.norm(back - values, axis=1) / np.linalg.norm(values, axis=1)
@@ -122,18 +105,18 @@ def test_the_sampler_inverts_the_rasteriser(tiny: Dataset) -> None:
 
 def test_the_frame_draws_what_the_rasteriser_draws(tiny: Dataset) -> None:
     frame = MapFrame.of(tiny.skin, tiny.interface, tiny.vertex_count)
-    _, sed = tiny.load_vertices(tiny.test_ids[:1])
-    drawn = frame.draw(torch.from_numpy(sed[:1])).numpy()[0]
-    np.testing.assert_allclose(drawn, tiny.interface.rasterise(sed[:1]), atol=1e-5 * sed.max())
+    values = tiny.vertex_pressures(tiny.test_ids[:1])[:1]
+    drawn = frame.draw(torch.from_numpy(values)).numpy()[0]
+    np.testing.assert_allclose(drawn, tiny.interface.rasterise(values), atol=1e-5 * values.max())
     assert not drawn[0][tiny.interface.mask() == 0].any()
 
 
 def test_served_maps_are_the_networks_vertex_values(
     tiny: Dataset, atlas: Atlas, operator: Operator
 ) -> None:
-    network = build("face-r8-n12-z4-h6", atlas, operator)
+    network = build(SPECS[1], atlas, operator)
     frame = MapFrame.of(tiny.skin, tiny.interface, tiny.vertex_count)
-    pressure, _ = tiny.load_vertices(tiny.test_ids)
+    pressure = tiny.vertex_pressures(tiny.test_ids)
     maps = torch.from_numpy(tiny.skin.rasterise(pressure))[:, None]
     with torch.no_grad():
         served = ServedVertexModel(network, frame)(maps)[:, 0].numpy()
@@ -146,7 +129,7 @@ def test_served_maps_are_the_networks_vertex_values(
 def test_a_full_rank_start_is_the_operator(
     near: int, tiny: Dataset, atlas: Atlas, operator: Operator
 ) -> None:
-    network = started(FaceSpec(2 * atlas.vertex_count, near=near), tiny, atlas, operator)
+    network = started(LinearSpec(2 * atlas.vertex_count, near, "test"), tiny, atlas, operator)
     trial = 1e4 * torch.rand(3, atlas.vertex_count)
     with torch.no_grad():
         sed = network(trial).numpy()
@@ -159,7 +142,7 @@ def test_an_operator_of_the_vertices_works_alike(tiny: Dataset, atlas: Atlas) ->
     scales = 0.5 + 0.5 * np.arange(6)
     g = 1e-3 * np.exp(-((apart[:, None] / scales[None, :, None]) ** 2))
     operator = Operator.at_vertices(g.astype(np.float32))
-    network = started(FaceSpec(2 * atlas.vertex_count), tiny, atlas, operator)
+    network = started(LinearSpec(2 * atlas.vertex_count, 0, "test"), tiny, atlas, operator)
     trial = 1e4 * torch.rand(3, atlas.vertex_count)
     with torch.no_grad():
         sed = network(trial).numpy()
@@ -170,20 +153,10 @@ def test_a_stencil_makes_a_low_rank_better(tiny: Dataset, atlas: Atlas, operator
     trial = 1e4 * torch.rand(20, atlas.vertex_count)
     errors = []
     for near in (0, 16):
-        network = started(FaceSpec(16, near=near), tiny, atlas, operator)
+        network = started(LinearSpec(16, near, "test"), tiny, atlas, operator)
         with torch.no_grad():
             errors.append(np.linalg.norm(network(trial).numpy() - dense(operator, trial)))
     assert errors[1] < 0.5 * errors[0]
-
-
-def test_a_fresh_correction_corrects_nothing(
-    tiny: Dataset, atlas: Atlas, operator: Operator
-) -> None:
-    trial = 1e4 * torch.rand(3, atlas.vertex_count)
-    with torch.no_grad():
-        bare = started(FaceSpec(8, near=5), tiny, atlas, operator)(trial)
-        full = started(FaceSpec(8, near=5, whole=4, hidden=6), tiny, atlas, operator)(trial)
-    torch.testing.assert_close(bare, full)
 
 
 def test_frames_are_rotations(atlas: Atlas, operator: Operator) -> None:
@@ -231,13 +204,3 @@ def test_an_atlas_without_mirror_is_refused(tiny: Dataset, tmp_path: Path) -> No
     (tmp_path / "atlas.json").write_text(json.dumps(data))
     with pytest.raises(DatasetError, match="mirror"):
         Atlas.read(tmp_path / "atlas.json")
-
-
-def test_relative_loss_is_what_it_says() -> None:
-    target = torch.tensor([[10.0, 0.5, 0.5], [0.0, 0.0, 0.0]])
-    weights = torch.tensor([[1.0, 2.0, 0.0]])
-    output = target + torch.tensor([[1.0, 0.1, 99.0], [0.0, 0.0, 0.0]])
-    whole = (1.0 + 2 * 0.01) / (100.0 + 2 * 0.25)
-    far = 2 * 0.01 / (2 * 0.25 + 1e-4 * 100.5)
-    expected = 0.5 * (whole + 0.3 * far)  # the empty sample counts nothing
-    assert float(relative_loss(output, target, weights, 0.3)) == pytest.approx(expected, rel=1e-5)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from papilla_trainer.atlas import Atlas
+from papilla_trainer.comparison.atlas import Atlas
 from papilla_trainer.errors import DatasetError
 from papilla_trainer.files import read_json
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from papilla_trainer.comparison.unet import NetworkSpec, S1UNet, build_network, parse_network
 from papilla_trainer.errors import UsageError
-from papilla_trainer.network import NetworkSpec, S1UNet, build_network, parse_network
 
 
 def test_names_are_read() -> None:

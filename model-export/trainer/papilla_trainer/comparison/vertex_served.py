@@ -1,4 +1,4 @@
-"""The graph in which a face network is served: map in Pa, vertices, network, map in J/m3."""
+"""The graph in which a linear network is served: map in Pa, vertices, network, map in J/m3."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from papilla_trainer.face_network import FaceNet
+from papilla_trainer.comparison.linear_network import LinearNet
 from papilla_trainer.raster import MAP_LEN, SIDE_PX, Raster
 from papilla_trainer.sampling import vertex_sampler
 
@@ -70,7 +70,7 @@ class ServedVertexModel(nn.Module):
     The linear map is rounded to 16 bits (5e-4 of each value): it is nearly all of the file.
     """
 
-    def __init__(self, network: FaceNet, frame: MapFrame) -> None:
+    def __init__(self, network: LinearNet, frame: MapFrame) -> None:
         super().__init__()
         # So it is exported; errors are measured of what is served.
         for parameter in network.linear_map():

@@ -36,8 +36,8 @@ def parse_network(name: str) -> NetworkSpec:
     if match is None or int(match.group(1)) < 1:
         raise UsageError(
             f"unknown network '{name}': give s1-baseN, where N is the channels of the first "
-            "stage, e.g. s1-base4, s1-base8, s1-base16; or map-c6-k5-r32-h16, "
-            "face-r128-n32-h32 and the like"
+            "stage, e.g. s1-base4, s1-base8, s1-base16; or map-c6-k5-r32-h16 and "
+            "the like"
         )
     return NetworkSpec(kind="s1_unet", base=int(match.group(1)))
 
@@ -141,8 +141,3 @@ def _initialise(layer: nn.Conv2d | nn.ConvTranspose2d) -> None:
         nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
     if layer.bias is not None:
         nn.init.zeros_(layer.bias)
-
-
-def parameter_count(network: nn.Module) -> int:
-    """The number of trainable numbers."""
-    return sum(p.numel() for p in network.parameters())

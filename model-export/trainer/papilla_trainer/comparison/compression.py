@@ -1,4 +1,4 @@
-"""Puts a linear operator into a face network: low rank, and a stencil for what that leaves."""
+"""Puts an operator into a linear network: low rank, and a stencil for what that leaves."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from papilla_trainer.atlas import Atlas
-from papilla_trainer.face_layout import BLOCK, frames
-from papilla_trainer.face_network import PRESSURE_UNIT_PA, SED_UNIT_J_PER_M3, FaceNet
-from papilla_trainer.linear_operator import COMPONENTS, Operator
+from papilla_trainer.comparison.atlas import Atlas
+from papilla_trainer.comparison.layout import BLOCK, frames
+from papilla_trainer.comparison.linear_network import LinearNet
+from papilla_trainer.comparison.linear_operator import COMPONENTS, Operator
+from papilla_trainer.map_network import PRESSURE_UNIT_PA, SED_UNIT_J_PER_M3
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -22,7 +23,7 @@ _ROUNDS = 4
 
 
 def start_from_operator(
-    network: FaceNet,
+    network: LinearNet,
     atlas: Atlas,
     operator: Operator,
     pressure_pa: Tensor,
@@ -68,14 +69,14 @@ def start_from_operator(
         network.stencil.data.copy_(torch.from_numpy(shaped.copy()))
 
 
-def _halves(network: FaceNet, pressure_pa: Tensor) -> tuple[Tensor, Tensor]:
+def _halves(network: LinearNet, pressure_pa: Tensor) -> tuple[Tensor, Tensor]:
     """Even and odd part of pressures ``[N, V]``, as the network forms them."""
     pressure = pressure_pa / PRESSURE_UNIT_PA
     here, there = pressure[:, network.vertex], pressure[:, network.image]
     return here + there, (here - there)[:, : network.halves]
 
 
-def _parts(network: FaceNet, full: F32) -> tuple[F32, F32]:
+def _parts(network: LinearNet, full: F32) -> tuple[F32, F32]:
     """A map of all pressures as maps of their even and odd parts."""
     here, there = full[:, network.vertex.numpy()], full[:, network.image.numpy()]
     even = 0.5 * (here + there)
@@ -83,7 +84,7 @@ def _parts(network: FaceNet, full: F32) -> tuple[F32, F32]:
     return even, 0.5 * (here - there)[:, : network.halves]
 
 
-def _whole(network: FaceNet, parts: list[F64]) -> F32:
+def _whole(network: LinearNet, parts: list[F64]) -> F32:
     """The inverse of `_parts`."""
     even, odd = parts
     vertex, image = network.vertex.numpy(), network.image.numpy()
@@ -109,7 +110,7 @@ def _compress(part: F32, pressures: F32, rows: F64, rank: int) -> tuple[F64, F64
     return (weighted @ right) / rows[:, None], right.T @ inverse
 
 
-def _write(network: FaceNet, low_rank: list[tuple[F64, F64]]) -> None:
+def _write(network: LinearNet, low_rank: list[tuple[F64, F64]]) -> None:
     """Coordinates are scaled to size one."""
     inputs = (network.in_even, network.in_odd)
     outputs = (network.out_even, network.out_odd)

@@ -8,44 +8,34 @@ product of some size for each block costs the server far less than a small one f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from papilla_trainer.atlas import Atlas
+from papilla_trainer.comparison.atlas import Atlas
+from papilla_trainer.comparison.linear_operator import COMPONENTS, Operator
 from papilla_trainer.errors import DatasetError
-from papilla_trainer.linear_operator import COMPONENTS, Operator
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
 
-# Faces whose mean makes up a ring: the face itself among its nearest ones, then faces further out.
-RING = 8
-_SPREAD = (1, 3)
 _MIRROR_TOLERANCE_MM = 1e-3
 # Units of a block; the last one repeats a unit where they do not come out even.
 BLOCK = 8
-# Components that change sign in the mirror, in a frame (lengthwise, crosswise, outward): those with
-# one crosswise index.
-_ODD = (2, 4)
 # Where the finger's axis stands this steep on the skin, lengthwise is upward instead.
 _STEEP = 0.2
 
 
 @dataclass(frozen=True)
-class FaceLayout:
+class Layout:
     """Indices of V vertices, U units and 2 U slots: block by block, first side 0, then side 1.
 
     ``vertex``, ``image``: vertices of one half, then of the middle line, and their mirror images;
     ``unit``: ``[U]`` faces; ``near``: ``[U / 8, 2, K]`` the vertices nearest to each block, and the
-    same in the mirror; ``ring``: ``[2, RING, 2 U]`` slots near a slot and further out; ``star``:
-    ``[4, 2 U]`` (or ``[0, 2 U]``) its neighbours toward tip and base and to either side;
-    ``corner``: ``[4, 2 U]`` vertices of a slot's face; ``hand``: ``[2 U, 7]`` what turns a slot's
-    components (and pressure) to those of a frame that is not mirrored; ``place``: ``[2 U, 5]``
-    where on the finger; ``vertex_slot``, ``vertex_share``: ``[M, V]`` how slots' SED averages to
+    same in the mirror; ``vertex_slot``, ``vertex_share``: ``[M, V]`` how slots' SED averages to
     vertices.
     """
 
@@ -53,16 +43,11 @@ class FaceLayout:
     image: Tensor
     unit: Tensor
     near: Tensor
-    ring: Tensor
-    star: Tensor
-    corner: Tensor
-    hand: Tensor
-    place: Tensor
     vertex_slot: Tensor
     vertex_share: Tensor
 
     @staticmethod
-    def of(atlas: Atlas, operator: Operator, near: int, star: bool = False) -> FaceLayout:
+    def of(atlas: Atlas, operator: Operator, near: int) -> Layout:
         """The layout of an operator's faces with ``near`` vertices in each block's stencil."""
         vertex, image = _vertices(atlas)
         skin = operator.face_means(atlas.skin_mm)
@@ -76,32 +61,18 @@ class FaceLayout:
         used = used.reshape(2, -1, BLOCK).transpose(1, 0, 2).ravel()
         apart = np.linalg.norm(skin[blocks][:, :, None] - atlas.skin_mm, axis=3).min(axis=1)
         own = np.argsort(apart, axis=1, kind="stable")[:, :near]
-        corner = _corners(operator)[blocks]
-        corner = np.stack([corner, atlas.mirror[corner]], axis=1).reshape(-1, 4)
-        hand = np.ones((len(slots), COMPONENTS + 1))
-        hand.reshape(-1, 2, BLOCK, COMPONENTS + 1)[:, 1, :, _ODD] = -1.0
         slot, share = _averages(operator, np.where(used, slots, -1))
         arrays = {
             "vertex": vertex,
             "image": image,
             "unit": unit,
             "near": np.stack([own, atlas.mirror[own]], axis=1),
-            "ring": _rings(skin[slots], used),
-            "star": _star(skin[slots], _axes(atlas, operator)[slots], used, star),
-            "corner": corner.T,
-            "hand": hand.astype(np.float32),
-            "place": _place(skin[slots]).astype(np.float32),
             "vertex_slot": slot.T,
             "vertex_share": share.T.astype(np.float32),
         }
-        return FaceLayout(
+        return Layout(
             **{name: torch.from_numpy(np.ascontiguousarray(a)) for name, a in arrays.items()}
         )
-
-    @staticmethod
-    def of_weights(weights: dict[str, Tensor]) -> FaceLayout:
-        """The layout of a trained network, so that it can be built without atlas and operator."""
-        return FaceLayout(**{field.name: weights[field.name] for field in fields(FaceLayout)})
 
     @property
     def halves(self) -> int:
@@ -189,17 +160,6 @@ def _averages(operator: Operator, slots: I64) -> tuple[I64, F64]:
     return np.concatenate([a, b], axis=1), 0.5 * np.concatenate([weight, weight], axis=1)
 
 
-def _corners(operator: Operator) -> I64:
-    """``[F, 4]`` the vertices of each face, the first ones again where there are fewer."""
-    vertex, column = np.nonzero(operator.vertex_weight > 0.0)
-    face = operator.vertex_face[vertex, column]
-    order = np.argsort(face, kind="stable")
-    start = np.searchsorted(face[order], np.arange(len(operator.g) + 1))
-    counts = np.diff(start)
-    place = start[:-1, None] + np.arange(4)[None] % counts[:, None]
-    return vertex[order][place]
-
-
 def _blocks(centre: F64) -> I64:
     """``[U]``: an order in which each eight lie together: halved again and again, lengthwise."""
     order = np.arange(len(centre))
@@ -209,51 +169,3 @@ def _blocks(centre: F64) -> I64:
     half = max(1, round(len(order) / (2 * BLOCK))) * BLOCK
     parts = (order[:half], order[half:])
     return np.concatenate([part[_blocks(centre[part])] for part in parts])
-
-
-def _rings(centre: F64, used: NDArray[np.bool_]) -> I64:
-    """``[2, RING, 2 U]``: slots nearest to each, and every third of those around them.
-
-    A slot of side 1 has the images of its unit's, also where two are equally near.
-    """
-    here, image = _sides(len(centre))
-    apart = np.linalg.norm(centre[here][:, None] - centre[None], axis=2)
-    order = np.argsort(np.where(used, apart, np.inf), axis=1, kind="stable")
-    rings = np.empty((len(_SPREAD), RING, len(centre)), dtype=np.int64)
-    for k, step in enumerate(_SPREAD):
-        own = order[:, : RING * step : step].T
-        rings[k][:, here] = own
-        rings[k][:, image[here]] = image[own]
-    return rings
-
-
-def _star(centre: F64, axes: F64, used: NDArray[np.bool_], wanted: bool) -> I64:
-    """``[4, 2 U]``: the slots nearest to the places a face's size away, lengthwise and across."""
-    if not wanted:
-        return np.empty((0, len(centre)), dtype=np.int64)
-    here, image = _sides(len(centre))
-    apart = np.linalg.norm(centre[here][:, None] - centre[None], axis=2)
-    others = np.sort(np.where(used & (apart > _MIRROR_TOLERANCE_MM), apart, np.inf), axis=1)
-    size = others[:, :4].mean(axis=1, keepdims=True)
-    star = np.empty((4, len(centre)), dtype=np.int64)
-    for k, (axis, sign) in enumerate(((0, 1.0), (0, -1.0), (1, 1.0), (1, -1.0))):
-        place = centre[here] + sign * size * axes[here, axis]
-        off = np.linalg.norm(place[:, None] - centre[None], axis=2)
-        own = np.where(used, off, np.inf).argmin(axis=1)
-        star[k][here] = own
-        star[k][image[here]] = image[own]
-    return star
-
-
-def _sides(slots: int) -> tuple[I64, I64]:
-    """Slots of side 0, and the image of every slot."""
-    sides = np.arange(slots).reshape(-1, 2, BLOCK)
-    return sides[:, 0].ravel(), sides[:, ::-1].ravel()
-
-
-def _place(centre: F64) -> F64:
-    """Smooth numbers of size one, even in the mirror."""
-    low, high = centre.min(axis=0), centre.max(axis=0)
-    size = np.maximum(high - low, 1e-9)  # a flat patch has no height
-    x, y, z = (2.0 * (centre - low) / size - 1.0).T
-    return np.stack([x, y * y - 0.5, z, x * x - 0.5, x * z], axis=1)

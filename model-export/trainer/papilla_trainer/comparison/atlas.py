@@ -1,4 +1,4 @@
-"""The atlas as face networks see it: places, areas and the mirror of the finger."""
+"""The atlas as linear networks see it: places, areas and the mirror of the finger."""
 
 from __future__ import annotations
 
@@ -82,6 +82,6 @@ def _mirror(positions_mm: F64, path: Path) -> I64:
     mirror = apart.argmin(axis=1)
     if apart.min(axis=1).max() > _MIRROR_TOLERANCE_MM or np.unique(mirror).size != mirror.size:
         raise DatasetError(
-            f"{path}: the finger is not mirror-symmetric about y = 0, which face networks rely on"
+            f"{path}: the finger is not mirror-symmetric about y = 0, which linear networks rely on"
         )
     return mirror

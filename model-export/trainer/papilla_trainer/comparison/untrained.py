@@ -5,21 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from papilla_trainer import __version__
-from papilla_trainer.atlas import Atlas
 from papilla_trainer.checkpoint import Served
-from papilla_trainer.dataset import Dataset
+from papilla_trainer.comparison.atlas import Atlas
+from papilla_trainer.comparison.compression import start_from_operator
+from papilla_trainer.comparison.half_space import HalfSpace
+from papilla_trainer.comparison.layout import Layout
+from papilla_trainer.comparison.linear_network import LinearNet, LinearSpec
+from papilla_trainer.comparison.linear_operator import Operator
+from papilla_trainer.comparison.vertex_served import MapFrame, ServedVertexModel
+from papilla_trainer.dataset import F32, Dataset
 from papilla_trainer.evaluation import measure
 from papilla_trainer.export import properties, to_onnx, write_model
-from papilla_trainer.face_init import start_from_operator
-from papilla_trainer.face_layout import FaceLayout
-from papilla_trainer.face_network import FaceNet, FaceSpec
-from papilla_trainer.halfspace import HalfSpace
-from papilla_trainer.linear_operator import Operator
-from papilla_trainer.tasks import pixels_of_vertices
-from papilla_trainer.vertex_served import MapFrame, ServedVertexModel
 
 
 def write_operator(
@@ -28,7 +28,7 @@ def write_operator(
     """The finger's operator at small strain, compressed; returns its test errors."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
     operator = Operator.read(operator_file, atlas)
-    spec = FaceSpec(rank=rank, near=near, kind="fe_operator")
+    spec = LinearSpec(rank=rank, near=near, kind="fe_operator")
     return _write(operator, atlas, dataset, spec, out, name, {"operator_sha256": operator.sha256})
 
 
@@ -38,7 +38,7 @@ def write_half_space(
     """The closed form, compressed alike; returns its test errors."""
     atlas = Atlas.read(dataset.directory / "atlas.json", dataset.atlas_hash)
     operator = Operator.at_vertices(body.operator(atlas))
-    spec = FaceSpec(rank=rank, near=near, kind="half_space")
+    spec = LinearSpec(rank=rank, near=near, kind="half_space")
     return _write(operator, atlas, dataset, spec, out, name, {"half_space": vars(body)})
 
 
@@ -46,13 +46,13 @@ def _write(
     operator: Operator,
     atlas: Atlas,
     dataset: Dataset,
-    spec: FaceSpec,
+    spec: LinearSpec,
     out: Path,
     name: str | None,
     origin: dict[str, Any],
 ) -> dict[str, Any]:
-    network = FaceNet(spec, FaceLayout.of(atlas, operator, spec.near))
-    pressure, _ = dataset.load_vertices(dataset.train_ids)
+    network = LinearNet(spec, Layout.of(atlas, operator, spec.near))
+    pressure = dataset.vertex_pressures(dataset.train_ids)
     weights = torch.from_numpy(pixels_of_vertices(dataset))
     start_from_operator(network, atlas, operator, torch.from_numpy(pressure), weights)
     frame = MapFrame.of(dataset.skin, dataset.interface, dataset.vertex_count)
@@ -65,3 +65,12 @@ def _write(
     )
     write_model(to_onnx(model), props, out)
     return {"model": str(out), "bytes": out.stat().st_size, "metrics": metrics}
+
+
+def pixels_of_vertices(dataset: Dataset) -> F32:
+    """``[V]``: the pixels that each interface vertex stands for, which is what its error counts."""
+    raster = dataset.interface
+    counts = np.bincount(
+        raster.vertex.ravel(), weights=raster.weight.ravel(), minlength=dataset.vertex_count
+    )
+    return counts.astype(np.float32)

@@ -1,3 +1,5 @@
+"""Training of networks on maps: the relative loss, joined datasets, learning curves."""
+
 from __future__ import annotations
 
 import hashlib
@@ -21,27 +23,27 @@ from papilla_trainer.errors import DatasetError, RunError, UsageError
 from papilla_trainer.evaluation import evaluate_run
 from papilla_trainer.export import export_run
 from papilla_trainer.joined import STRIDE, open_datasets
+from papilla_trainer.losses import relative_loss
 from papilla_trainer.training import Trainer
 
 
 @pytest.fixture(scope="module")
-def face(operator_file: Path) -> TrainConfig:
+def on_maps() -> TrainConfig:
     return TrainConfig(
-        network="face-r8-n12-z4-h6",
+        network="map-c2-k3-r4-h2",
         epochs=6,
         seed=5,
         batch=2,
         threads=1,
         device="cpu",
         learning_rate=1e-2,
-        operator=str(operator_file),
     )
 
 
 @pytest.fixture(scope="module")
-def run_dir(tiny: Dataset, face: TrainConfig, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("face") / "run"
-    Trainer(tiny, face, directory).fit()
+def run_dir(tiny: Dataset, on_maps: TrainConfig, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("maps") / "run"
+    Trainer(tiny, on_maps, directory).fit()
     evaluate_run(directory, tiny)
     return directory
 
@@ -52,44 +54,44 @@ def test_the_loss_goes_down(run_dir: Path) -> None:
 
 
 def test_resumed_equals_straight_through(
-    tiny: Dataset, face: TrainConfig, run_dir: Path, tmp_path: Path
+    tiny: Dataset, on_maps: TrainConfig, run_dir: Path, tmp_path: Path
 ) -> None:
-    Trainer(tiny, replace(face, epochs=2), tmp_path / "run").fit()
-    resumed = Trainer(tiny, face, tmp_path / "run", resume=True).fit()
+    Trainer(tiny, replace(on_maps, epochs=2), tmp_path / "run").fit()
+    resumed = Trainer(tiny, on_maps, tmp_path / "run", resume=True).fit()
     straight = Checkpoint.load(run_dir)
     assert all(torch.equal(straight.model[k], resumed.model[k]) for k in straight.model)
     with pytest.raises(RunError, match="far_weight"):
-        Trainer(tiny, replace(face, far_weight=0.5), tmp_path / "run", resume=True)
+        Trainer(tiny, replace(on_maps, far_weight=0.5), tmp_path / "run", resume=True)
 
 
 def test_only_training_presses_are_loaded(
-    tiny: Dataset, face: TrainConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tiny: Dataset, on_maps: TrainConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded: list[int] = []
-    load = tiny.load_vertices
+    load = tiny.load
 
     def spy(ids: list[int]) -> object:
         loaded.extend(ids)
         return load(ids)
 
-    monkeypatch.setattr(tiny, "load_vertices", spy)
-    Trainer(tiny, replace(face, epochs=1), tmp_path / "all").fit()
+    monkeypatch.setattr(tiny, "load", spy)
+    Trainer(tiny, replace(on_maps, epochs=1), tmp_path / "all").fit()
     assert sorted(loaded) == sorted(tiny.train_ids)
     loaded.clear()
-    trainer = Trainer(tiny, replace(face, epochs=1, train_presses=2), tmp_path / "two")
+    trainer = Trainer(tiny, replace(on_maps, epochs=1, train_presses=2), tmp_path / "two")
     fit, validation = trainer.state.splits["fit"], trainer.state.splits["validation"]
     assert len(fit) == 2
     assert sorted(loaded) == sorted([*fit, *validation])
 
 
 def test_the_exported_graph_is_the_network(tiny: Dataset, run_dir: Path, tmp_path: Path) -> None:
-    model = export_run(run_dir, tmp_path / "face.onnx")
+    model = export_run(run_dir, tmp_path / "maps.onnx")
     report = check_model(model, tiny, [run_dir], None)
     assert report.failures == []
     assert report.zero_gives_zero is True
-    assert export_run(run_dir, tmp_path / "again" / "face.onnx").read_bytes() == model.read_bytes()
+    assert export_run(run_dir, tmp_path / "again" / "maps.onnx").read_bytes() == model.read_bytes()
     found = {entry.key: entry.value for entry in onnx.load(str(model)).metadata_props}
-    assert json.loads(found["papilla.network"])["kind"] == "face_net"
+    assert json.loads(found["papilla.network"])["kind"] == "map_net"
     assert json.loads(found["papilla.training"])["loss"].startswith("relative L2 squared")
 
 
@@ -100,32 +102,13 @@ def test_s1_can_have_the_better_loss(tiny: Dataset, config: TrainConfig, tmp_pat
     assert replace(config, network="s1-base2").loss_name == "mse"
 
 
-def test_senseless_settings_are_refused(tiny: Dataset, face: TrainConfig, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="operator"):
-        replace(face, network="s1-base4")
-    with pytest.raises(UsageError, match="operator"):
-        replace(face, operator=None)
-    with pytest.raises(UsageError, match="base-rate"):
-        replace(face, base_rate=-0.1)
+def test_senseless_settings_are_refused(on_maps: TrainConfig) -> None:
     with pytest.raises(UsageError, match="loss"):
-        replace(face, loss="l1")
-    out = ["--out", str(tmp_path / "run"), "--network", "face-r8", "--operator", "none.npz"]
-    assert main(["train", "--dataset", str(tiny.directory), *out]) == 3
-
-
-def test_without_base_rate_the_operator_stays(
-    tiny: Dataset, face: TrainConfig, tmp_path: Path
-) -> None:
-    trainer = Trainer(tiny, replace(face, base_rate=0.0, epochs=2), tmp_path / "run")
-    before = [parameter.detach().clone() for parameter in trainer.network.linear_map()]
-    state = trainer.fit()
-    for was, now in zip(before, trainer.network.linear_map(), strict=True):
-        assert torch.equal(was, now)
-    assert state.model["correction.load"].any()
+        replace(on_maps, loss="l1")
 
 
 def test_two_datasets_are_one(
-    tiny: Dataset, face: TrainConfig, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tiny: Dataset, on_maps: TrainConfig, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     second = write_tiny_dataset(tmp_path / "second", presses=5, seed=2)
     datasets = ["--dataset", str(tiny.directory), "--dataset", str(second)]
@@ -136,13 +119,13 @@ def test_two_datasets_are_one(
     other = Dataset(second)
     joined = hashlib.sha256((tiny.dataset_sha256 + other.dataset_sha256).encode())
     assert both.dataset_sha256 == joined.hexdigest()
-    pressure, _ = both.load_vertices([STRIDE + 3, 1])
-    np.testing.assert_array_equal(pressure[:6], other.load_vertices([3])[0])
-    np.testing.assert_array_equal(pressure[6:], tiny.load_vertices([1])[0])
+    pressure = both.vertex_pressures([STRIDE + 3, 1])
+    np.testing.assert_array_equal(pressure[:6], other.vertex_pressures([3]))
+    np.testing.assert_array_equal(pressure[6:], tiny.vertex_pressures([1]))
     with pytest.raises(DatasetError, match="twice"):
         open_datasets([second, second])
     run, model = str(tmp_path / "run"), str(tmp_path / "model.onnx")
-    settings = ["--network", face.network, "--operator", str(face.operator), "--epochs", "2"]
+    settings = ["--network", on_maps.network, "--epochs", "2"]
     assert main(["train", *datasets, "--out", run, *settings, "--threads", "1"]) == 0
     assert main(["export", run, "--onnx", model]) == 0
     assert main(["check", model, *datasets, "--run", run]) == 0
@@ -153,17 +136,19 @@ def test_two_datasets_are_one(
 
 
 def test_large_constants_are_stored_small_and_lose_nothing(
-    run_dir: Path, tiny: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tiny: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain = export_run(run_dir, tmp_path / "plain.onnx", "tiny")
+    body = ["--dataset", str(tiny.directory), "--rank", "8", "--near", "5", "--name", "tiny"]
+    plain, small = tmp_path / "plain.onnx", tmp_path / "small.onnx"
+    assert main(["half-space", *body, "--onnx", str(plain)]) == 0
     monkeypatch.setattr("papilla_trainer.export._LARGE", 16)
-    small = export_run(run_dir, tmp_path / "small.onnx", "tiny")
+    assert main(["half-space", *body, "--onnx", str(small)]) == 0
     stored = [i for i in onnx.load(str(small)).graph.initializer if i.name.endswith(".stored")]
     kinds = {i.data_type for i in stored}
     assert kinds == {onnx.TensorProto.FLOAT16, onnx.TensorProto.INT16}
     assert any("stencil" in i.name for i in stored)
     assert small.stat().st_size < plain.stat().st_size
-    assert check_model(small, tiny, [run_dir], None).failures == []
+    assert check_model(small, tiny, [], None).failures == []
     pressure = tiny.load(tiny.test_ids).pressure_pa[0][None, None]
     answers = [
         onnxruntime.InferenceSession(str(path)).run(None, {"pressure_pa": pressure})[0]
@@ -173,13 +158,13 @@ def test_large_constants_are_stored_small_and_lose_nothing(
 
 
 def test_a_learning_curve_grows_and_goes_on(
-    tiny: Dataset, operator_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tiny: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_tiny_dataset(tmp_path / "other", seed=9)
     out = tmp_path / "curve"
     arguments = ["curve", "--json", "--dataset", str(tiny.directory), "--judge"]
-    arguments += [str(tmp_path / "other"), "--network", "face-r8-n12-h4", "--threads", "1"]
-    arguments += ["--operator", str(operator_file), "--epochs", "2", "--out", str(out)]
+    arguments += [str(tmp_path / "other"), "--network", "map-c2-k3-r4", "--threads", "1"]
+    arguments += ["--epochs", "2", "--out", str(out)]
     arguments += ["--validation-presses", "1", "--presses", "4", "2"]
     assert main(arguments) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
@@ -196,3 +181,13 @@ def test_a_learning_curve_grows_and_goes_on(
     # What is trained on does not judge.
     arguments[5] = str(tiny.directory)
     assert main(arguments) == 2
+
+
+def test_relative_loss_is_what_it_says() -> None:
+    target = torch.tensor([[10.0, 0.5, 0.5], [0.0, 0.0, 0.0]])
+    weights = torch.tensor([[1.0, 2.0, 0.0]])
+    output = target + torch.tensor([[1.0, 0.1, 99.0], [0.0, 0.0, 0.0]])
+    whole = (1.0 + 2 * 0.01) / (100.0 + 2 * 0.25)
+    far = 2 * 0.01 / (2 * 0.25 + 1e-4 * 100.5)
+    expected = 0.5 * (whole + 0.3 * far)  # the empty sample counts nothing
+    assert float(relative_loss(output, target, weights, 0.3)) == pytest.approx(expected, rel=1e-5)
